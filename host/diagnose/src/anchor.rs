@@ -1,9 +1,9 @@
-//! Which nominal parameters a refit may move.
+//! Nominal parameters that a refit may change.
 //!
-//! Gravity's direction, a zero angle and a constant torque can all be taken up by base parameters. Where the description
-//! states such a value, it is held: what the data add to it is then an effect with a name (a tilted base, an offset)
-//! instead of a silently wrong parameter. Where it states nothing, the parameter is free and the effect not testable. Of
-//! several joints a motion leaves much open: what it tells less of than the description is held, too.
+//! Base parameters can absorb a wrong gravity direction, zero angle or constant torque. If the description states such
+//! a value, it is held. The data then show the difference as a named effect (a tilted base, an offset) instead of a
+//! wrong parameter. If it states nothing, the parameter is free and the effect not testable. On several joints,
+//! parameters that the motion determines less well than the description are held, too.
 
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
@@ -12,29 +12,29 @@ use super::rows::{Column, Nominal, Rows, combined};
 use super::stated::Stated;
 use rig_model::robot::{Quantity, Robot, Worth, worth};
 
-/// A free direction in the space of base parameters: parameters and factors.
+/// A free direction in the space of base parameters: indices and factors.
 pub(super) type Direction = Vec<(usize, f64)>;
 
 /// Free and held nominal parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Anchor {
-    /// What a refit moves.
+    /// Directions that a refit changes.
     pub(super) free: Vec<Direction>,
-    /// Base parameters as the description has them.
+    /// Described base parameters.
     pub(super) prior: Vec<f64>,
-    /// Base parameters that are held at the prior, wholly or but for one direction.
+    /// Base parameters held at the prior, fully or except for one direction.
     pub(super) held: Vec<usize>,
-    /// Whether the description states the links' inertia, so that a change against it means something.
+    /// True if the description states the links' inertia, so that a change of it has a meaning.
     pub(super) stated: bool,
-    /// Whether the direction of gravity is held.
+    /// True if the direction of gravity is held.
     pub(super) gravity_held: bool,
-    /// Free base parameters that the description does not state, so that no value of theirs contradicts it: constant torques where
-    /// its format has no place for them, friction where its values are worth nothing ([`worth`]).
+    /// Free base parameters without a described value: constant torques if the format has none, friction and drive
+    /// inertia with worthless values ([`worth`]). No estimate contradicts them.
     unstated: Vec<usize>,
 }
 
 impl Anchor {
-    /// Place among the free directions of a single link's first moment, where the direction of gravity is held.
+    /// Returns the free direction of a single link's first moment, if the direction of gravity is held.
     pub(super) fn first_moment(&self, nominal: &Nominal) -> Option<usize> {
         let along = |d: &Direction| {
             let mut columns = d.iter().map(|(b, _)| nominal.base.columns[*b]);
@@ -45,7 +45,7 @@ impl Anchor {
             .flatten()
     }
 
-    /// For a robot whose description states what `stated` has.
+    /// Creates the anchor of a robot whose description states `stated`.
     pub(super) fn of(robot: &Robot, nominal: &Nominal, stated: &Stated) -> Self {
         let n = robot.joints.len();
         let prior = nominal.stated(robot);
@@ -72,7 +72,7 @@ impl Anchor {
                 unstated.push(k);
                 free.push(vec![(k, 1.0)]);
             } else if offset.is_some_and(|f| f.offset != 0.0 && stated.pulls_told) {
-                // Part of it, or all, may come from outside.
+                // Some of it, or all, may be external.
                 free.push(vec![(k, 1.0)]);
             } else if offset.is_some() {
                 held.push(k);
@@ -91,7 +91,7 @@ impl Anchor {
         if gravity_held {
             free.push(gravity.into_iter().map(|(k, g)| (k, g / size)).collect());
         } else {
-            // A link said to be balanced: nothing to hold its gravity to.
+            // A described balanced link gives no gravity to hold.
             held.retain(|k| !gravity.iter().any(|g| g.0 == *k));
             free.extend(gravity.into_iter().map(|(k, _)| vec![(k, 1.0)]));
         }
@@ -105,25 +105,25 @@ impl Anchor {
         }
     }
 
-    /// Holds base parameters that were free by themselves at what the description states.
+    /// Holds free single base parameters at their described values.
     pub(super) fn hold(&mut self, parameters: &[usize]) {
         let alone = |d: &Direction| matches!(d.as_slice(), [(k, _)] if parameters.contains(k));
         self.free.retain(|direction| !alone(direction));
         self.held.extend(parameters);
     }
 
-    /// Whether a free direction is a constant torque that the description could not state.
+    /// Returns true if a free direction is a base parameter without a described value.
     pub(super) fn is_unstated(&self, direction: usize) -> bool {
         matches!(self.free[direction].as_slice(), [(k, _)] if self.unstated.contains(k))
     }
 
-    /// Whether the constant torque of a joint is held.
+    /// Returns true if the constant torque of a joint is held.
     pub(super) fn holds_constant(&self, joint: usize, nominal: &Nominal) -> bool {
         let own = joint * COLUMNS + column::OFFSET;
         self.held.iter().any(|&k| nominal.base.columns[k] == own)
     }
 
-    /// Columns of the free directions.
+    /// Returns the columns of the free directions.
     pub(super) fn columns(&self, rows: &Rows) -> Vec<Column> {
         self.free
             .iter()
@@ -131,12 +131,12 @@ impl Anchor {
             .collect()
     }
 
-    /// What the held parameters contribute to the torque.
+    /// Returns the torque of the held parameters.
     pub(super) fn held_torque(&self, rows: &Rows) -> Column {
         along(rows, &self.fixed())
     }
 
-    /// What the held parameters contribute at their prior, in the space that the free directions leave.
+    /// Returns the held parameters at their prior, orthogonal to the free directions.
     fn fixed(&self) -> Direction {
         let mut rest: Vec<f64> = vec![0.0; self.prior.len()];
         for &k in &self.held {
@@ -153,7 +153,7 @@ impl Anchor {
             .collect()
     }
 
-    /// Base parameters less what of the held ones has been taken off the torque.
+    /// Returns base parameters without the held part, which was subtracted from the torque.
     pub(super) fn beyond_held(&self, values: &[f64]) -> Vec<f64> {
         let mut rest = values.to_vec();
         for (k, x) in self.fixed() {
@@ -162,7 +162,7 @@ impl Anchor {
         rest
     }
 
-    /// Base parameters from the free directions' coefficients.
+    /// Returns base parameters from the free directions' coefficients.
     pub(super) fn values(&self, coefficients: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.prior.len()];
         for (k, x) in self.fixed() {
@@ -176,7 +176,7 @@ impl Anchor {
         values
     }
 
-    /// Coefficients of the free directions at the prior.
+    /// Returns the coefficients of the free directions at the prior.
     pub(super) fn prior_coefficients(&self) -> Vec<f64> {
         self.free
             .iter()
@@ -185,7 +185,7 @@ impl Anchor {
     }
 }
 
-/// Whether a standard column of `n` joints is friction of a joint or a motor.
+/// Returns true if a standard column of `n` joints is friction of a joint or a motor.
 pub(super) fn is_friction(c: usize, n: usize) -> bool {
     match c.checked_sub(n * COLUMNS) {
         None => [column::VISCOUS, column::COULOMB].contains(&(c % COLUMNS)),
@@ -193,7 +193,7 @@ pub(super) fn is_friction(c: usize, n: usize) -> bool {
     }
 }
 
-/// Whether the `value` of a standard column is stated: what is neither friction nor inertia of a drive is.
+/// Returns true if the `value` of a standard column is described. Always true except for friction and drive inertia.
 fn states(robot: &Robot, c: usize, value: f64) -> bool {
     let n = robot.joints.len();
     let quantity = match is_friction(c, n) {
@@ -211,7 +211,7 @@ fn states(robot: &Robot, c: usize, value: f64) -> bool {
     written && matches!(worth(quantity, robot.origin, value), Worth::Share(_))
 }
 
-/// The nominal columns along a direction.
+/// Returns the nominal columns along a direction.
 fn along(rows: &Rows, direction: &[(usize, f64)]) -> Column {
     let terms = direction.iter().map(|&(k, f)| (&rows.nominal[k], f));
     combined(rows.joints(), terms)

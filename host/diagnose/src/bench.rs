@@ -1,4 +1,4 @@
-//! What stays the same during a diagnosis: the robot, its nominal model, how recordings are treated.
+//! Constants of a diagnosis: the robot, its nominal model, the treatment of recordings.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -25,53 +25,53 @@ use rig_data::runs::{Run, runs_of};
 use rig_model::effects::Effects;
 use rig_model::robot::{JointKind, Robot};
 
-/// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
+/// Least pass band before decimation for the waves of effects, Hz.
 const LEAST_BAND: f64 = 30.0;
 
-/// Times the squares that a rest explains from which on rows about it hold more than that.
+/// Ratio of the mean squares near standstill to the expected ones above which these rows are used.
 const LOUD: f64 = 1.2;
 
-/// Recordings under one treatment.
+/// Prepared recordings under one treatment.
 pub(super) struct Loaded {
-    /// At the full rate.
+    /// Recordings at the full rate.
     pub(super) runs: Vec<Run>,
-    /// Less what the held parameters contribute.
+    /// Regression rows, without the torque of the held parameters.
     pub(super) rows: Rows,
-    /// Of these recordings, at their own rate.
+    /// Treatment of these recordings, at their own sample rate.
     pub(super) treatment: Treatment,
 }
 
 impl Loaded {
-    /// What positions pass before they are differentiated.
+    /// Returns the filter of positions before differentiation.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where there is no such filter.
+    /// [`DiagnoseError::Model`] if the filter cannot be built.
     pub(super) fn position_filter(&self) -> Result<LowPass, DiagnoseError> {
         position_filter(&self.treatment)
     }
 }
 
-/// Everything that stays the same during a diagnosis.
+/// Everything that is constant during a diagnosis.
 pub(super) struct Bench<'a> {
-    /// As it was given, without its effects.
+    /// The given robot, without its effects.
     pub(super) robot: &'a Robot,
-    /// The effects that it was given with.
+    /// The described effects.
     pub(super) stated: &'a Stated,
-    /// What recordings are freed of, and those of the rig with nothing that pulls on it.
+    /// Held effects whose torque is subtracted, and those of the rig without external loads.
     held: [Option<(Effects, Chain<f64>)>; 2],
-    /// Its base parameters.
+    /// Base parameters of the robot.
     pub(super) nominal: Nominal,
     /// Which of them are free.
     pub(super) anchor: Anchor,
     treatment: Treatment,
-    /// Joints of which rows about rests are used.
+    /// Joints whose rows near standstill are used.
     rests: Vec<usize>,
-    /// Joints that move in one direction only, whose constant torques are held.
+    /// Joints that move in one direction only. Their constant torques are held.
     pub(super) one_way: Vec<OneWay>,
 }
 
 impl<'a> Bench<'a> {
-    /// For a robot and the recordings that decide on the treatment of all.
+    /// Creates the context for a robot. The training recordings decide on the treatment of all.
     ///
     /// # Errors
     /// [`DiagnoseError`].
@@ -94,7 +94,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// What a base parameter is called: of a joint that moves in one direction only, its dry friction with the constant in it.
+    /// Returns a base parameter's name. If a joint moves in one direction, its friction includes the constant.
     pub(super) fn expression(&self, parameter: usize) -> String {
         let own = (self.one_way.iter()).find(|own| own.friction() == parameter);
         own.map_or_else(
@@ -103,7 +103,7 @@ impl<'a> Bench<'a> {
         )
     }
 
-    /// Reads recordings to learn from and takes off what the held effects and parameters contribute.
+    /// Reads training recordings and subtracts the torque of held effects and parameters.
     ///
     /// # Errors
     /// [`DiagnoseError`].
@@ -111,10 +111,10 @@ impl<'a> Bench<'a> {
         self.loaded(recordings, &self.treatment)
     }
 
-    /// The same of recordings held back, at their own rate.
+    /// The same for the hold-out, at its own sample rate.
     ///
     /// # Errors
-    /// [`DiagnoseError`]: two rates among them, or one that cannot hold the band.
+    /// [`DiagnoseError`] for two sample rates, or for one that is too low for the band.
     pub(super) fn load_held(&self, recordings: &[&dyn Recording]) -> Result<Loaded, DiagnoseError> {
         let joints = self.robot.joints.len();
         let mut own: Option<Treatment> = None;
@@ -148,7 +148,7 @@ impl<'a> Bench<'a> {
         self.rows(runs, treatment)
     }
 
-    /// The rows of runs, less what the held parameters contribute.
+    /// Returns the rows of runs, without the torque of the held parameters.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -173,8 +173,8 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Decides by the training data of which joints rows about rests are used: where they hold more than a rest makes of dry
-    /// friction that nobody knows, something shows there. Whether there is such a joint.
+    /// Selects by the training data the joints whose rows near standstill are used. Their residual there must exceed
+    /// what unknown dry friction at standstill explains. Returns true if there is such a joint.
     ///
     /// # Errors
     /// [`DiagnoseError`] of the fit.
@@ -196,13 +196,13 @@ impl<'a> Bench<'a> {
         Ok(!self.rests.is_empty())
     }
 
-    /// Samples a second of what is learnt from.
+    /// Returns the sample rate of the training data, Hz.
     pub(super) fn rate(&self) -> f64 {
         self.treatment.sample_rate
     }
 
-    /// Whether a joint's constant torque is fitted as part of the nominal model, whatever pulls on the joint: the preload of a spring
-    /// is part of it then, but where the description states that spring.
+    /// Returns true if the nominal model fits a constant torque of a joint, whatever external load acts. A spring's
+    /// preload is then part of it, unless the description states the spring.
     fn lets_constant_free(&self, joint: usize) -> bool {
         let states_spring = (self.stated.free().iter())
             .map(candidate)
@@ -212,7 +212,7 @@ impl<'a> Bench<'a> {
             && !self.anchor.holds_constant(joint, &self.nominal)
     }
 
-    /// What columns are formed from, with a model of these base parameters.
+    /// Returns the data for columns, with a model of these base parameters.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -243,8 +243,8 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// What a model leaves of recordings' torque, joint by joint over the rows: of its base parameters and the gains of the
-    /// effects' columns.
+    /// Returns the torque residual of a model, joint by joint over the rows, from base parameters and gains of the
+    /// columns.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -273,7 +273,7 @@ impl<'a> Bench<'a> {
         Ok(residual)
     }
 
-    /// RMS per joint of what the description as it stands leaves, its effects among it.
+    /// Returns the RMS residual per joint of the unchanged description, including its effects.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -284,7 +284,7 @@ impl<'a> Bench<'a> {
             effects.push(Profile {
                 candidate: candidate(&placed),
                 shapes: placed.effect.shapes,
-                // As many as gains; they are formed along these recordings.
+                // One per gain; computed along these recordings later.
                 columns: Arc::new(vec![Column::new(); gains.len()]),
                 evidence: Evidence::default(),
                 vanished: None,
@@ -315,7 +315,7 @@ impl<'a> Bench<'a> {
         Ok(rms(&loaded.rows, &residual))
     }
 
-    /// RMS per joint of what a model leaves on the rows used.
+    /// Returns the RMS residual per joint of a model on the used rows.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -329,7 +329,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// RMS per joint on the rows used.
+/// Returns the RMS per joint on the used rows.
 fn rms(rows: &Rows, residual: &[Vec<f64>]) -> Vec<f64> {
     (residual.iter().zip(&rows.keep))
         .map(|(r, keep)| floor::rms(r, keep))
@@ -341,7 +341,7 @@ fn position_filter(treatment: &Treatment) -> Result<LowPass, DiagnoseError> {
         .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))
 }
 
-/// Takes a column off signals, joint by joint.
+/// Subtracts a column from signals, joint by joint.
 fn take_off(signals: &mut [Vec<f64>], column: &Column) {
     for (signal, column) in signals.iter_mut().zip(column) {
         for (s, c) in signal.iter_mut().zip(column.iter().flatten()) {
@@ -350,7 +350,7 @@ fn take_off(signals: &mut [Vec<f64>], column: &Column) {
     }
 }
 
-/// Decides how recordings are treated: as for an identification, but with a band that shows more than the motion's own.
+/// Decides on the treatment as for an identification, but with a band wider than that of the motion.
 ///
 /// # Errors
 /// [`DiagnoseError`].
@@ -363,8 +363,8 @@ pub(super) fn treatment_of(
         .map(|r| Survey::take(*r, robot.joints.len()))
         .collect::<Result<Vec<_>, _>>()?;
     let limits = robot.torque_limits();
-    // Not by what the model leaves of the torque, as an identification does: what it lacks is what is looked for, and a low cut-off
-    // smears it away.
+    // An identification uses the torque residual of the model here. The diagnosis looks for that residual, and a low
+    // cut-off would smooth it away.
     let first = Treatment::decide(&surveys, &options, &limits)?;
     let (surveys, options, first) = match end_of_motion(recordings, &surveys, &first)? {
         None => (surveys, options, first),
@@ -393,9 +393,9 @@ pub(super) fn treatment_of(
     Ok(first.decimated(step, &surveys, &options, &limits)?)
 }
 
-/// Where the motion ends by what torque it takes, Hz, where the spectrum of the position cannot tell: noise is in its acceleration
-/// below the highest frequency that it takes for motion. Noise beyond that frequency, however loud, leaves the motion known, and a
-/// cut-off below its headroom would bend it.
+/// Returns the upper end of the motion by its torque, Hz, if the position spectrum cannot show it. Then noise dominates
+/// the acceleration below the highest motion frequency. Noise above that frequency does not matter, however high it is.
+/// A cut-off without headroom would distort the motion.
 fn end_of_motion(
     recordings: &[&dyn Recording],
     surveys: &[Survey],
@@ -412,7 +412,7 @@ fn end_of_motion(
     Ok(end.filter(|end| (swing..first.cutoff).contains(end)))
 }
 
-/// Every effect on every joint that the torque can show.
+/// Returns every effect on every joint that the torque can show.
 pub(super) fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Candidate> {
     let n = robot.joints.len();
     let mut list = Vec::new();
@@ -424,7 +424,7 @@ pub(super) fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Cand
             continue;
         }
         for joint in 0..n {
-            // A tilt is one of the base; all else needs a motion of its own joint.
+            // A tilt belongs to the base. Every other effect needs motion of its joint.
             let stirs = runs.iter().any(|run| moves(run, joint));
             if !stirs && kind != Kind::GravityTilt {
                 continue;
@@ -436,7 +436,7 @@ pub(super) fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Cand
                     list.extend((0..n).filter(|k| *k != joint).map(|k| at(Some(k))))
                 }
                 Kind::ViscousWarmupTemperature if !warm => {}
-                // A slide has no turn.
+                // A prismatic joint has no turn.
                 Kind::EncoderEccentricityJoint
                     if robot.joints[joint].kind == JointKind::Prismatic => {}
                 // One tilt for the whole base.

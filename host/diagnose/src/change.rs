@@ -1,4 +1,4 @@
-//! What the refit of nominal parameters says against the description: a payload, a torque constant, a single value.
+//! Changes of the nominal parameters against the description: a payload, a torque constant, a single value.
 
 use std::collections::BTreeMap;
 
@@ -13,44 +13,44 @@ use super::refit::{Refit, described_sizes};
 use super::rows::{Column, Rows, combined};
 use super::solve::Solution;
 
-/// Share of the whole change's gain that a part of the parameters must reach to speak for it.
+/// Share of the whole change's gain that some parameters must reach to explain it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
 
-/// … and inertia and gravity for a payload, where the joint's friction has effects: what their laws are not quite, its parameters make up for.
+/// The same for inertia and gravity of a payload beside friction effects, whose mismatch moves friction values.
 const SPEAKS_BESIDE_FRICTION: f64 = 0.5;
-/// Shares by which inertia and gravity have grown that are apart by less are one factor.
+/// Difference of the growth of inertia and gravity below which both have one factor.
 const ONE_RATIO: f64 = 0.05;
 
-/// Least relative change of one nominal parameter at least: a refit beside effects that are not quite the library's moves all
-/// by a per cent.
+/// Least relative change of at least one nominal parameter. The mismatch of effects moves all of them by a per cent in
+/// a refit.
 const LEAST_CHANGE: f64 = 0.04;
-/// Least relative change of inertia and gravity both that is a payload's …
+/// Least relative change of both inertia and gravity for a payload …
 const LEAST_OF_BOTH: f64 = 0.02;
-/// … and where something is left besides, which moves parameters as it likes.
+/// … and with an unexplained residual, which moves parameters at random.
 const LEAST_OF_BOTH_BESIDE: f64 = 0.04;
-/// Least standard deviations of a change.
+/// Least ratio of a change to its standard deviation.
 pub(super) const LEAST_SIGMAS: f64 = 4.0;
 
-/// Parameters that are told with their values.
+/// Maximum number of parameters reported with values.
 const MOST_TOLD: usize = 8;
-/// Share by which parameters may depart from one common factor: laws that are not quite the library's move them as much.
+/// Largest departure of parameters from one common factor. The mismatch of effects moves them as much.
 const ONE_FACTOR: f64 = 0.15;
 
 /// A change of nominal parameters.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
-    /// What moved, in words.
+    /// Description of the change.
     pub(super) words: String,
-    /// Name of the effect, where it is one.
+    /// Name of the effect, if it is one.
     pub(super) effect: Option<Kind>,
     /// Its parameters.
     pub(super) parameters: BTreeMap<String, Value>,
-    /// Of freeing the parameters that speak for it, corrected for the sets of parameters that were tried.
+    /// p-value of freeing the parameters that explain it, corrected for the sets tried.
     pub(super) p_value: f64,
 }
 
-/// Compares the refit to `rows` with the description. `known` is the torque that the effects found explain, `beside_friction` whether friction is
-/// among them, `left` whether they leave something, `without` is not named.
+/// Compares the refit to `rows` with the description. `known` is the torque of the effects found. `beside_friction` is
+/// true if friction is among them, `left` if a residual remains. Kinds in `without` are not named.
 pub(super) fn change(
     bench: &Bench,
     refit: &Refit,
@@ -68,7 +68,7 @@ pub(super) fn change(
     let prior = anchor.prior_coefficients();
     let mut frozen = refit.frozen(bench);
     frozen.subtract(known);
-    // What the description does not state is no change of it.
+    // An undescribed parameter cannot change.
     let (unstated, all): (Vec<usize>, Vec<usize>) =
         (0..free.len()).partition(|k| anchor.is_unstated(*k));
     let beside_constants = frozen.clone().taking(unstated.iter().map(|k| &free[*k]));
@@ -81,14 +81,14 @@ pub(super) fn change(
         fit.evidence(&columns, &open)
     };
     let evidence = |picked: &[usize]| evidence_in(&frozen, picked);
-    // All, a payload's, all in one ratio, each alone: what may be tried counts, not what was until one spoke.
+    // All, a payload, all in one ratio, each alone. Every set counts, not only those tried before a success.
     let tried = 3 + all.len();
     let corrected = |e: &Evidence| e.corrected(tried);
     let whole = evidence(&all)?;
     if whole.gain < LEAST_GAIN || corrected(&whole) > SIGNIFICANT {
         return None;
     }
-    // A value described as 0, or as a rounding of it, is no size to compare a change with.
+    // A value described as 0, or as a rounding of it, is no reference for a relative change.
     let sizes = described_sizes(bench);
     let moved_most = (all.iter())
         .map(|&k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(sizes[k]))
@@ -97,7 +97,7 @@ pub(super) fn change(
         return None;
     }
     let speaks = |e: &Evidence| e.gain >= SPEAKS_FOR_ALL * whole.gain;
-    // Not by one factor: that is a torque constant.
+    // A common factor is a torque constant.
     let carries = |e: &Evidence, [inertia, moment]: &[usize; 2]| {
         let [inertia, moment] = [inertia, moment].map(|k| after.values[*k] / prior[*k]);
         e.gain >= SPEAKS_BESIDE_FRICTION * whole.gain && (inertia / moment - 1.0).abs() > ONE_RATIO
@@ -122,7 +122,7 @@ pub(super) fn change(
                 "Inertia and gravity have grown in the ratio of a mass at one place: a payload.";
             return Some(told(words.into(), parameters, &e));
         }
-        // Constants that nothing states are fitted with it: gravity's part of them is not known before.
+        // Undescribed constants are fitted with it: gravity's part of them is not known before.
         let share = match beside_friction {
             true => SPEAKS_BESIDE_FRICTION,
             false => SPEAKS_FOR_ALL,
@@ -137,7 +137,7 @@ pub(super) fn change(
     }
     let scale = combined(known.len(), free.iter().zip(prior.iter().copied()));
     let open = [[f64::NEG_INFINITY, f64::INFINITY]];
-    // Where gravity and inertia are most of the torque they speak for friction as well, whatever that does.
+    // If gravity and inertia dominate the torque, they also decide on friction, whatever that does.
     let of_one_factor = |factor: f64| {
         all.iter().all(|&k| {
             let apart = (after.values[k] - factor * prior[k]).abs();
@@ -208,7 +208,7 @@ pub(super) fn change(
     })
 }
 
-/// Whether inertia and gravity beside these effects have grown as a payload on a single link makes them.
+/// Returns true if inertia and gravity beside these effects have grown like a payload on a single link.
 pub(super) fn is_loaded(bench: &Bench, refit: &Refit, chosen: &[Profile]) -> bool {
     let prior = bench.anchor.prior_coefficients();
     let grown = |after| on_single_link(bench, &after, &prior, LEAST_OF_BOTH_BESIDE).is_some();

@@ -1,4 +1,4 @@
-//! Columns of an effect from the measured motion.
+//! Torque columns of an effect, computed from the measured motion.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,7 +25,7 @@ use rig_model::robot::{Robot, unit_of};
 
 mod gears;
 
-/// What columns are formed from.
+/// Data for the columns.
 pub(super) struct Source<'a> {
     /// The robot.
     pub(super) robot: &'a Robot,
@@ -33,44 +33,44 @@ pub(super) struct Source<'a> {
     pub(super) runs: &'a [Run],
     /// Base parameters and geometry.
     pub(super) nominal: &'a Nominal,
-    /// What columns pass.
+    /// Filter and decimation of the columns.
     pub(super) thinning: &'a Thinning,
-    /// The present model's word, run by run.
+    /// Predictions of the present model, run by run.
     pub(super) predicted: Vec<Predicted>,
     /// Identified base parameters.
     pub(super) values: Vec<f64>,
-    /// Joints of which the nominal model holds a constant torque that is fitted, whatever pulls on them.
+    /// True for joints whose constant torque is fitted in the nominal model, whatever external load acts.
     pub(super) free_constants: Vec<bool>,
-    /// Delay at which the column of each joint's delay is taken, s.
+    /// Delay of each joint at which its delay column is computed, s.
     pub(super) delays: Vec<f64>,
-    /// How far the contacts of joints with presliding are bent, from −1 to 1, by run and joint: what acts through them has that in the
-    /// place of the direction.
+    /// Contact deflection of joints with presliding, from −1 to 1, by run and joint. Friction through the contact uses
+    /// it instead of the direction of motion.
     pub(super) bent: HashMap<(usize, usize), Vec<f64>>,
-    /// Friction that acts through those contacts over that of the model, by run and joint.
+    /// Ratio of the other friction through those contacts to the model's Coulomb friction, by run and joint.
     pub(super) beside: HashMap<(usize, usize), Vec<f64>>,
-    /// What twists obey, by run and joint, once it has been asked for.
+    /// Equations of the gear twist, by run and joint, computed on first use.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
-    /// What the recorded torque tells of gears whose links are followed, by run and joint.
+    /// Observer inputs from the recorded torque for observer-based gears, by run and joint.
     pub(super) seen: HashMap<(usize, usize), Seen>,
-    /// Slopes of the torque, by run and joint, once they have been asked for.
+    /// Derivatives of the torque, by run and joint, computed on first use.
     pub(super) slopes: Mutex<HashMap<(usize, usize), Arc<Slopes>>>,
 }
 
 /// An effect on a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Candidate {
-    /// Which.
+    /// Kind of the effect.
     pub(super) kind: Kind,
-    /// On which joint, from 0.
+    /// Its joint, from 0.
     pub(super) joint: usize,
-    /// The other joint that it names.
+    /// The other joint of a coupling.
     pub(super) other: Option<usize>,
-    /// The bits of a wave's order; none of what is no wave, and of a wave whose order is still to be found.
+    /// Bits of a wave's order. None for other effects, and for a wave whose order is not yet known.
     pub(super) order: Option<u64>,
 }
 
 impl Candidate {
-    /// A kind on a joint, whatever its order.
+    /// Creates a candidate without an order.
     pub(super) const fn on(kind: Kind, joint: usize) -> Self {
         Self {
             kind,
@@ -80,12 +80,12 @@ impl Candidate {
         }
     }
 
-    /// The same with another joint that it names.
+    /// Returns the candidate with another joint.
     pub(super) fn naming(self, other: Option<usize>) -> Self {
         Self { other, ..self }
     }
 
-    /// The same with these shapes: waves of different orders are different effects, which add up.
+    /// Returns the candidate with these shapes. Waves of different orders are different effects, and they add up.
     pub(super) fn shaped(self, shapes: &[f64; SHAPES]) -> Self {
         let wave = repeats_by_order(self.kind);
         Self {
@@ -94,7 +94,7 @@ impl Candidate {
         }
     }
 
-    /// What a library holds of it: waves of all orders in one.
+    /// Returns the library entry: one for the waves of all orders.
     pub(super) fn sort(self) -> Self {
         Self {
             order: None,
@@ -102,33 +102,33 @@ impl Candidate {
         }
     }
 
-    /// Whether they are two orders of one wave, which a joint may have both.
+    /// Returns true if both are orders of one wave. A joint may have both.
     pub(super) fn is_another_order(&self, other: &Self) -> bool {
         self.sort() == other.sort() && self.order != other.order
     }
 }
 
-/// Whether a kind is a torque that repeats with an angle: a joint may have it with several orders at once.
+/// Returns true if a kind is a torque that is periodic in an angle. A joint may have several orders of it.
 pub(super) fn repeats_by_order(kind: Kind) -> bool {
     kind.periodic().is_some() && kind.about().channel == Channel::Torque
 }
 
-/// Delay at which the column of a delay is taken until one is known, s: first order would be 2 % off at 3 Hz and 10 ms.
+/// Initial delay for a delay column, s. At 10 ms the first-order expansion would be 2 % off at 3 Hz.
 pub(super) const DELAY: f64 = 0.002;
 
-/// Effects beside which the torque of the drive is asked for with all that is in the model. To a ripple, which repeats with an
-/// angle, the nominal torque says enough; products of its wave with those of other effects bend to anything.
+/// Effects whose drive torque is predicted with all effects in the model. For a ripple the nominal torque is enough:
+/// products of its wave with those of other effects fit almost anything.
 const OF_THE_DRIVE: [Kind; 2] = [Kind::TorqueSaturation, Kind::MeasurementDelay];
 
-/// Rounds in which a saturation meets the torque that it makes: in each what is missing falls by half or more.
+/// Iterations of a saturation with its own torque. Each at least halves the error.
 const OWN_ROUNDS: usize = 6;
-/// Share of what a little more current would give that may be lost where the torque is predicted.
+/// Local loss of torque per current, as a share, up to which the predicted torque is used.
 const MOST_LOST: f64 = 0.5;
 
-/// Effects whose torque is linear in the filtered motion, or as good as: it has passed the position's filter with it.
+/// Effects with a torque linear in the filtered motion, or nearly so: it has already passed the position filter.
 const OF_THE_FILTERED_MOTION: [Kind; 2] = [Kind::InertiaCoupling, Kind::JointElasticity];
 
-/// How far an effect of presliding is bent along the velocities of a run, `beside` so much other friction.
+/// Returns the contact deflection of a presliding effect along a run. `beside` is other friction there.
 fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -> Vec<f64> {
     let mut memory = Memory::default();
     let along = |(&velocity, &beside): (&f64, &f64)| {
@@ -145,8 +145,8 @@ fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -
 }
 
 impl Source<'_> {
-    /// The same with the gears' load and the drives' torque as effects make them that are in the model; `gains` are those of
-    /// their columns, one effect after the other.
+    /// Adds the effects of the model to the predicted gear load and drive torque. `gains` are those of their columns,
+    /// one effect after the other.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -180,7 +180,7 @@ impl Source<'_> {
             if !asked {
                 continue;
             }
-            // A late reading is no torque.
+            // A delay changes the reading, not the torque.
             let others = self.sum(r, chosen, gains, &|kind| !OF_THE_DRIVE.contains(&kind))?;
             add(&mut self.predicted[r].torque, &others);
             self.saturate(r, chosen, gains)?;
@@ -188,9 +188,9 @@ impl Source<'_> {
         Ok(self)
     }
 
-    /// Saturation in the predicted torque that its own law asks for. Where more than half of what a little more current would give
-    /// is lost, a prediction is off by more than twice what the model is, and the recorded torque takes its place; elsewhere that
-    /// would hold noise that is in what it is to explain.
+    /// Iterates the saturation with its predicted torque. Above a local loss of one half, the error of the prediction
+    /// is more than twice that of the model, so the recorded torque replaces it. Elsewhere the recorded torque would
+    /// add noise that the model then explains.
     fn saturate(
         &mut self,
         r: usize,
@@ -215,7 +215,7 @@ impl Source<'_> {
             add(&mut self.predicted[r].torque, &own);
         }
         for (joint, coefficient) in saturated {
-            // d(τ − c·τ³)/dτ is a half there.
+            // d(τ − c·τ³)/dτ is one half here.
             let most = (MOST_LOST / (3.0 * coefficient)).sqrt();
             let recorded = (self.thinning).calm(&self.runs[r].joints[joint].recorded());
             for (to, recorded) in self.predicted[r].torque[joint].iter_mut().zip(recorded) {
@@ -227,7 +227,7 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// Torque over a run, joint by joint, of the effects of some kinds.
+    /// Returns the torque of the effects of some kinds over a run, joint by joint.
     fn sum(
         &self,
         r: usize,
@@ -256,7 +256,7 @@ impl Source<'_> {
         Ok(sum)
     }
 
-    /// One column a gain.
+    /// Returns one column per gain.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -268,7 +268,7 @@ impl Source<'_> {
         self.columns_by(1, candidate, shapes)
     }
 
-    /// One column a gain for each of several shapes, the runs shared among threads.
+    /// Returns one column per gain for each of several shapes; threads share the runs.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -284,7 +284,7 @@ impl Source<'_> {
         joined(parts)
     }
 
-    /// One column a gain, the runs shared among threads.
+    /// Returns one column per gain; threads share the runs.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -298,7 +298,7 @@ impl Source<'_> {
         Ok(all.into_iter().next().unwrap_or_default())
     }
 
-    /// For each of several shapes one column a gain, along one run.
+    /// Returns one column per gain for each of several shapes, along one run.
     fn of_run(
         &self,
         candidate: &Candidate,
@@ -332,29 +332,29 @@ impl Source<'_> {
         Ok(all)
     }
 
-    /// The longest time that the joints have been running at the end of a recording, s.
+    /// Returns the longest operating time at the end of a recording, s.
     pub(super) fn running(&self) -> f64 {
         let ran = |run: &Run| run.t.last().map_or(0.0, |t| t - run.began);
         self.runs.iter().map(ran).fold(0.0, f64::max)
     }
 
-    /// The highest speed that a joint reaches, rad/s or m/s.
+    /// Returns the highest speed of a joint, rad/s or m/s.
     pub(super) fn fastest(&self, joint: usize) -> f64 {
         let speeds = (self.runs.iter()).flat_map(|run| &run.joints[joint].qd);
         speeds.fold(0.0, |most, v| v.abs().max(most))
     }
 
-    /// Coulomb friction of a joint, as identified; 0 where it came out below that.
+    /// Returns the identified Coulomb friction of a joint, at least 0.
     pub(super) fn coulomb(&self, joint: usize) -> f64 {
         self.friction(joint)[1].max(0.0)
     }
 
-    /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles. A spring's preload is part
-    /// of a constant that is free.
+    /// Returns the gains of a candidate. The gains of a tilt are angles of gravity as a whole. The preload of a spring
+    /// has no gain where a constant is free.
     pub(super) fn gains(&self, candidate: &Candidate) -> Vec<Parameter> {
         let kind = candidate.kind;
         if is_gear(kind) {
-            // 1 where mass and load are right; the fit may move it a little until they are.
+            // 1 if mass and load are right; until they are, the fit may change it a little.
             return vec![Parameter {
                 name: "share",
                 unit: "1",
@@ -385,7 +385,7 @@ impl Source<'_> {
         }
     }
 
-    /// Unit of a candidate's parameter on its joint, ASCII. A tilt is an angle whatever the joint does.
+    /// Returns the unit of a candidate's parameter on its joint, ASCII. A tilt is an angle on every joint.
     pub(super) fn unit(&self, candidate: &Candidate, parameter: &Parameter) -> String {
         if candidate.kind == Kind::GravityTilt {
             parameter.unit.to_owned()
@@ -394,7 +394,7 @@ impl Source<'_> {
         }
     }
 
-    /// For each of the shapes one column a gain over one run, joint by joint, at the full rate.
+    /// Returns one column per gain for each of the shapes over one run, joint by joint, at the full rate.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -445,7 +445,7 @@ impl Source<'_> {
         shapes.iter().map(of_one).collect()
     }
 
-    /// Friction of a joint's effects that acts through its contact over that of the model, sample by sample.
+    /// Returns the effects' contact friction over the model's Coulomb friction, sample by sample.
     fn beside(&self, joint: usize, r: usize, chosen: &[Profile], gains: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.runs[r].len()];
         let [_, coulomb] = self.friction(joint);
@@ -470,12 +470,12 @@ impl Source<'_> {
         sum
     }
 
-    /// The effect's terms sample by sample.
+    /// Returns the effect's terms sample by sample.
     fn terms(&self, candidate: &Candidate, shapes: &[f64; SHAPES], r: usize) -> Vec<Vec<f64>> {
         self.along(candidate, shapes, r, false)
     }
 
-    /// The effect's terms sample by sample, `whole` as if each went in the positive direction.
+    /// Returns the effect's terms sample by sample; with `whole` as if the motion were always positive.
     fn along(
         &self,
         candidate: &Candidate,
@@ -525,7 +525,7 @@ impl Source<'_> {
                 other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
                 period: 1.0 / run.rate,
                 beside: beside.map_or(0.0, |beside| beside[k]),
-                // Delays and payloads have columns of their own.
+                // Delays and payloads have separate columns.
                 drive_rate: 0.0,
                 gravity: 0.0,
             };
@@ -547,13 +547,13 @@ impl Source<'_> {
         if let Some(slopes) = known().get(&(r, joint)) {
             return Ok(slopes.clone());
         }
-        // Others go on meanwhile.
+        // No lock here, so that other threads continue.
         let slopes = Arc::new(Slopes::of(self, joint, &self.runs[r])?);
         known().insert((r, joint), slopes.clone());
         Ok(slopes)
     }
 
-    /// Torque of a joint without friction and offset for a motion.
+    /// Returns the torque of a joint for a motion, without friction and offset.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -573,7 +573,7 @@ impl Source<'_> {
         Ok(torque)
     }
 
-    /// Viscous and Coulomb friction of a joint, as identified.
+    /// Returns the identified viscous and Coulomb friction of a joint.
     fn friction(&self, joint: usize) -> [f64; 2] {
         [column::VISCOUS, column::COULOMB].map(|place| {
             let c = joint * COLUMNS + place;
@@ -582,8 +582,8 @@ impl Source<'_> {
         })
     }
 
-    /// Inertia of a joint's drive that stands in a combination with the link's, as the description has it; 0 where it is
-    /// a base parameter by itself.
+    /// Returns the described drive inertia of a joint that is grouped with the link's. It is 0 where the drive inertia
+    /// is a base parameter of its own.
     pub(super) fn drive_inertia(&self, joint: usize) -> f64 {
         if self.nominal.has_own_drive_inertia(joint) {
             return 0.0;
@@ -591,10 +591,10 @@ impl Source<'_> {
         self.robot.standard_parameters()[joint][column::DRIVE_INERTIA]
     }
 
-    /// What a tilt of the base by a unit angle does to the torque: one column a horizontal axis that matters.
+    /// Returns the torque of a base tilt by a unit angle, one column for each horizontal axis that matters.
     ///
-    /// Gravity from another side also acts on what it did not act on before, first moments along an upright axis for one:
-    /// they are no base parameters, and taken from the description.
+    /// Tilted gravity also acts on parameters without effect before, such as first moments along a vertical axis. They
+    /// are not base parameters, so the description gives them.
     fn tilted(&self, run: &Run) -> Result<Vec<Column>, DiagnoseError> {
         let failed = |e: &dyn std::fmt::Display| DiagnoseError::Model(e.to_string());
         let n = self.nominal.joints();
@@ -614,7 +614,7 @@ impl Source<'_> {
         let (mut q, mut torque) = (vec![0.0; n], vec![0.0; n]);
         let mut columns = Vec::new();
         for axis in self.nominal.tilt_axes() {
-            // The base turns one way, gravity as seen from it the other; its torque is linear in it.
+            // Gravity turns opposite to the base, and the torque is linear in gravity.
             let change = gravity.cross(&Vector3::from(axis));
             let chain =
                 Chain::new(&self.robot.geometry(), change.into()).map_err(|e| failed(&e))?;
@@ -634,7 +634,7 @@ impl Source<'_> {
     }
 }
 
-/// Columns of runs, one run behind the other.
+/// Joins the columns of several runs.
 fn joined(
     parts: impl IntoIterator<Item = Result<Vec<Vec<Column>>, DiagnoseError>>,
 ) -> Result<Vec<Vec<Column>>, DiagnoseError> {
@@ -663,7 +663,7 @@ fn add(to: &mut [Vec<f64>], from: &[Vec<f64>]) {
     }
 }
 
-/// A signal that comes `samples` (not whole) later; the first value holds before it begins.
+/// Delays a signal by `samples` (fractional). The first value fills the start.
 fn late(signal: &[f64], samples: f64) -> Vec<f64> {
     let whole = samples.floor();
     let part = samples - whole;

@@ -1,7 +1,7 @@
-//! Which of names that the data support alike agrees with the description's values.
+//! Choice among equal names by the described values.
 //!
-//! A name that stands in for another one fits as well because the nominal parameters move beside it: a constant takes the
-//! place of a spring where gravity takes up its stiffness. With the true name the description's values stand.
+//! A wrong name can fit as well if nominal parameters compensate: a constant replaces a spring if gravity absorbs its
+//! stiffness. With the right name, the described values hold.
 
 use rig_shared::effects::Kind;
 
@@ -13,14 +13,14 @@ use super::profile::{Profile, stiff};
 use super::refit::Refit;
 use super::search::with;
 
-/// Share of what a name leaves beyond the floor, the description's values as they are, that another one leaves at most.
+/// Largest ratio of residuals beyond the floor, of a rival to the name, that replaces it (described values).
 const MUCH_LESS: f64 = 0.5;
 
-/// Times the floor that a name may leave, the description's values as they are: beside one that leaves more these have changed, and
-/// are no witness.
+/// Largest ratio of a rival's residual to the floor with the described values. If it leaves more, these values have
+/// changed and do not decide.
 const STANDS: f64 = 2.0;
 
-/// Puts names in the place of equal ones where the description's values, as they are, then leave much less.
+/// Replaces names by equal ones that leave much less with the described values.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -30,13 +30,13 @@ pub(super) fn by_description(
     bench: &Bench,
     judged: Judged,
 ) -> Result<Judged, DiagnoseError> {
-    // A load on the link is in its inertia as well, where no other name has a say: the description is no witness then.
+    // A load on the link also changes its inertia, which no other name explains. Then the description does not decide.
     if !bench.anchor.stated || is_loaded(bench, refit, &judged.chosen) {
         return Ok(judged);
     }
     let frozen = refit.frozen(bench);
     let left = |list: &[Profile], joint: usize| with(&frozen, list, None).rms(joint);
-    // Where gravity is as described, a spring that it could hide behind shows.
+    // With the described gravity, a spring hidden behind it becomes visible.
     let stands = |rival: &Profile, list: &[Profile], k: usize| {
         let shows = || stiff(&with(&frozen, list, Some(k)), &rival.columns);
         rival.vanished.is_none() || rival.candidate.kind == Kind::Spring && shows()
@@ -44,7 +44,7 @@ pub(super) fn by_description(
     let mut chosen = judged.chosen.clone();
     let mut moved = false;
     for k in 0..chosen.len() {
-        // Its name is the description's own.
+        // The description itself gives this name.
         if judge.search.rank_of(&chosen[k].candidate) < 2 {
             continue;
         }

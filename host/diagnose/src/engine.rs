@@ -49,8 +49,8 @@ use super::{DiagnoseError, Options};
 use rig_data::prepare::{Recording, as_recordings};
 use rig_model::robot::Robot;
 
-/// Finds what the model lacks. The second result is the description with the effects and the parameters identified
-/// anew.
+/// Finds effects that the model lacks. The second result is the description with the effects and the refitted
+/// parameters.
 ///
 /// # Errors
 /// [`DiagnoseError`].
@@ -65,8 +65,8 @@ pub fn diagnose(
         return Err(DiagnoseError::NoRecording);
     }
     let mut stated = Stated::of(robot);
-    // What the sensors read with the drive off gives a constant its name, and so does what is gone with all that pulled on the
-    // rig: then it is searched for.
+    // A constant gets a name if sensor readings with the drive off were given, or if some recordings have all external
+    // loads removed. Then it is searched for.
     let unburdened = training.iter().filter(|r| r.unburdened()).count();
     stated.pulls_told = (1..training.len()).contains(&unburdened);
     let told = !options.sensor_zeros.is_empty() || stated.pulls_told;
@@ -75,7 +75,7 @@ pub fn diagnose(
     let mut uneven = Uneven::default();
     let mut spoilt = Vec::new();
     loop {
-        // Each time around more of the description's effects are held or its limits left out, or another recording is brought to an even step.
+        // Each pass holds more described effects, ignores more limits, or resamples another recording to an even step.
         let [training, holdout] = [training, holdout].map(|recordings| uneven.even(recordings));
         let [training, holdout] = [&training, &holdout].map(|recordings| as_recordings(recordings));
         match attempt(robot, &stated, &training, &holdout, options, progress) {
@@ -86,7 +86,7 @@ pub fn diagnose(
             }
             Ok(Attempt::Hold(more)) => stated = *more,
             Err(DiagnoseError::Prepare(error)) if uneven.takes(&error) => {
-                // Between interpolated rows nothing tells of columns that have no derivative.
+                // Interpolated rows no longer show columns without derivative: check before.
                 let found = spoilt_columns(robot, &of_error(&error, &given))?;
                 if !options.fits(&found) {
                     return Ok((faulty(robot, found), robot.clone()));
@@ -104,10 +104,10 @@ pub fn diagnose(
     }
 }
 
-/// What came of one way to treat the description's effects.
+/// Outcome of one treatment of the description's effects.
 enum Attempt {
     Done(Box<(Diagnosis, Robot)>),
-    /// The same with more of them held, or limits left out.
+    /// Start again with more effects held, or with limits ignored.
     Hold(Box<Stated>),
 }
 
@@ -148,7 +148,7 @@ fn attempt(
     };
     let loaded = moved(&bench, loaded, &lead)?;
     let first = Pass::over(&bench, &loaded, options, progress)?;
-    // What was missing may have looked like a lead, or hidden one; a delay found beside a wrong lead is its other half.
+    // A missing effect may look like a torque lead, or hide one. A delay may compensate a wrong lead.
     let found: Vec<Profile> = (first.found.iter())
         .filter(|p| p.candidate.kind != Kind::MeasurementDelay)
         .cloned()
@@ -241,7 +241,7 @@ fn attempt(
         &refit.base,
         &mut judged.chosen,
     )?;
-    // What the voltage has given another name is the description's no longer.
+    // An effect that the voltage renamed no longer counts as described: sort again.
     let mut named: Vec<_> = judged.chosen.drain(..).zip(said).collect();
     named.sort_by_key(|(profile, _)| search.rank_of(&profile.candidate));
     let (chosen, said): (Vec<_>, Vec<_>) = named.into_iter().unzip();
@@ -299,7 +299,7 @@ fn attempt(
         )
         .or_else(|| not_carried_over(robot, &named, &descent.floors(&judged.floors)));
     }
-    // Where a motion was repeated, what is left has been held against the noise.
+    // With repeated runs, the residual was already compared with the noise.
     if judged.left.is_none() && judge.pairs.is_empty() {
         fallen.extend(search.still_taking(&refit.base, &found)?);
         judged.left = taken_by_none(robot, &fallen, &judged.chosen, &judged.floors);
@@ -321,7 +321,7 @@ fn attempt(
         judged.left = unexplained(&sizes, &named);
     }
     if let Some(why) = nameless {
-        // No effect was tried, so that nothing says of what is left that none explains it.
+        // No effect was tried, so do not claim that none explains the residual.
         judged.left = too_short_for_names(robot, &refit.base, &judged.known, why);
     }
     let left = judged.left.is_some();
@@ -516,7 +516,7 @@ fn attempt(
     Ok(Attempt::Done(Box::new((diagnosis, model))))
 }
 
-/// Orders over the motor's turn of the waves among effects of a joint.
+/// Returns the orders per motor turn of the waves among the effects of a joint.
 fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
     let wave = |p: &Profile| {
         let motor = is_of_the_motor(p.candidate.kind);
@@ -525,7 +525,7 @@ fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
     found.iter().filter_map(wave).collect()
 }
 
-/// `named`: whether there is an effect that the description does not state.
+/// `named` is true if an effect is not in the description.
 fn verdict(judged: &Judged, named: bool, changed: bool) -> Verdict {
     if judged.left.is_some() {
         Verdict::Remainder

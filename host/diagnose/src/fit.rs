@@ -1,4 +1,4 @@
-//! Weighted least squares on the rows with columns taken in one by one, and what one more column would explain.
+//! Weighted least squares on the rows: columns are added one by one, and candidates are tested beside them.
 
 use std::sync::{Arc, OnceLock};
 
@@ -14,43 +14,43 @@ mod jackknife;
 pub(super) use evidence::{Evidence, sigmas};
 use folds::Folded;
 
-/// Blocks that evidence is counted in: so many times the residual's memory long …
+/// Length of an evidence block, in correlation times of the residual …
 const MEMORIES: f64 = 5.0;
-/// … and at least so many.
+/// … and fewest blocks.
 const FEWEST_BLOCKS: usize = 12;
-/// Least length of a cluster, s: what a law is off by goes with the motion, whose own times are seconds, however short the
-/// noise that it is hidden in.
+/// Least length of a cluster, s. Model mismatch follows the motion, on time scales of seconds, even if the noise is
+/// correlated over a shorter time.
 const LEAST_CLUSTER: f64 = 1.0;
-/// Strata of a coordinate: few, so that what a law is off by has one sign in each.
+/// Strata of a coordinate: few, so that a law's mismatch has one sign in each.
 const STRATA: usize = 12;
-/// A column of which less than this share of its length is left beside the others is one of them in disguise.
+/// Share of a column's length orthogonal to the others below which it is collinear.
 const DISTINCT: f64 = 0.02;
 
-/// Rows under weights, an orthonormal basis of the columns taken in, and what is left of the torque.
+/// Weighted rows, an orthonormal basis of the columns, and the torque residual.
 #[derive(Clone)]
 pub(super) struct Fit<'a> {
     rows: &'a Rows,
-    /// Per joint, one over the standard deviation of its residual.
+    /// Weight of each joint: one over the standard deviation of its residual.
     scale: Vec<f64>,
-    /// What each row of a joint counts beside its others, up to 1; none where all count alike.
+    /// Weight of each row of a joint, up to 1; None if all rows have the same weight.
     counts: Vec<Option<Arc<Vec<f64>>>>,
     /// Block of each row of a joint (shared by all joints).
     block: Vec<usize>,
     blocks: usize,
     basis: Vec<Vec<f64>>,
     residual: Vec<f64>,
-    /// What every cross-validation shares, once one was asked for.
+    /// Data shared by all cross-validations, computed on first use.
     folded: OnceLock<Option<Folded>>,
 }
 
-/// Inner products of candidates' columns with themselves and with the residual, what was taken in taken off.
+/// Inner products of candidate columns with each other and with the residual, orthogonal to the basis.
 pub(super) struct Beside {
     gram: DMatrix<f64>,
     right: DVector<f64>,
 }
 
 impl<'a> Fit<'a> {
-    /// Takes the rows in; `memory` is the time in seconds that residuals are correlated over, `scale` one weight a joint.
+    /// Creates a fit without columns. `memory` is the residuals' correlation time, s; `scale` the weight per joint.
     pub(super) fn new(rows: &'a Rows, scale: Vec<f64>, memory: f64) -> Self {
         let (block, blocks) = blocked(rows, memory);
         let mut fit = Self {
@@ -74,7 +74,7 @@ impl<'a> Fit<'a> {
         self.folded = OnceLock::new();
     }
 
-    /// The rows again, nothing taken in, with those of each joint counting so much, none of them 0.
+    /// Returns a fit without columns, with these row weights (none is 0).
     pub(super) fn counting(&self, counts: Vec<Option<Arc<Vec<f64>>>>) -> Self {
         let mut fit = Self {
             counts,
@@ -84,7 +84,7 @@ impl<'a> Fit<'a> {
         fit
     }
 
-    /// The same with columns taken in.
+    /// Adds columns.
     pub(super) fn taking<'c>(mut self, columns: impl IntoIterator<Item = &'c Column>) -> Self {
         for column in columns {
             self.push(column);
@@ -92,7 +92,7 @@ impl<'a> Fit<'a> {
         self
     }
 
-    /// The same with blocks for a residual that is correlated over another time, s.
+    /// Returns the fit with blocks for another correlation time of the residual, s.
     pub(super) fn blocked_anew(&self, memory: f64) -> Self {
         let (block, blocks) = blocked(self.rows, memory);
         Self {
@@ -103,8 +103,8 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The same with blocks for what a last model leaves, correlated over `memory` s; of `pairs` of runs that repeat each
-    /// other equal times are in one block, as what the model lacks is the same in both.
+    /// Returns the fit with blocks for a final residual, correlated over `memory` s. Equal times of repeated runs
+    /// (`pairs`) share a block, because their model mismatch is the same.
     pub(super) fn clustered(&self, memory: f64, pairs: &[(usize, usize)]) -> Self {
         let starts = &self.rows.starts;
         let length = |run: usize| starts[run + 1] - starts[run];
@@ -121,7 +121,7 @@ impl<'a> Fit<'a> {
                 block[starts[second] + k] = block[starts[first] + like];
             }
         }
-        // Those of the repeats are free again.
+        // Renumber the blocks, as those of the repeats are unused.
         let mut number = vec![None; blocks];
         let mut next = 0;
         for b in &mut block {
@@ -138,8 +138,8 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The same with blocks of rows that are alike in a coordinate instead of near in time: `values` one a row, in strata of
-    /// equal numbers.
+    /// Returns the fit with strata as blocks: rows that are near in a coordinate instead of in time. `values` has one
+    /// value per row; each stratum has as many rows.
     pub(super) fn stratified(&self, values: &[f64]) -> Self {
         let (place, _) = bins(values, &vec![true; values.len()], STRATA);
         Self {
@@ -150,7 +150,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// A column as the weighted rows of all joints one after the other; masked rows are zero.
+    /// Returns a column as the weighted rows of all joints, one joint after the other. Masked rows are zero.
     pub(super) fn weighted(&self, column: &Column) -> Vec<f64> {
         let n = self.rows.count;
         let mut out = vec![0.0; n * self.rows.joints()];
@@ -173,7 +173,7 @@ impl<'a> Fit<'a> {
         out
     }
 
-    /// What is left of a weighted column beside those taken in.
+    /// Returns the part of a weighted column that is orthogonal to the basis.
     pub(super) fn projected(&self, mut column: Vec<f64>) -> Vec<f64> {
         for _ in 0..2 {
             for b in &self.basis {
@@ -184,7 +184,7 @@ impl<'a> Fit<'a> {
         column
     }
 
-    /// Takes a column in; false (and nothing done) where it is a combination of the others.
+    /// Adds a column. Returns false, without a change, if it is a combination of the others.
     pub(super) fn push(&mut self, column: &Column) -> bool {
         let weighted = self.weighted(column);
         let length = dot(&weighted, &weighted).sqrt();
@@ -203,14 +203,14 @@ impl<'a> Fit<'a> {
         true
     }
 
-    /// Takes a known torque off what is to be explained.
+    /// Subtracts a known torque.
     pub(super) fn subtract(&mut self, column: &Column) {
         let known = self.projected(self.weighted(column));
         axpy(-1.0, &known, &mut self.residual);
         self.folded = OnceLock::new();
     }
 
-    /// RMS of a joint's residual in its own unit, over the rows used, each as it counts.
+    /// Returns the weighted RMS of a joint's residual over the used rows, in its own unit.
     pub(super) fn rms(&self, joint: usize) -> f64 {
         let n = self.rows.count;
         let squares = dot_self(&self.residual[joint * n..(joint + 1) * n]);
@@ -224,13 +224,13 @@ impl<'a> Fit<'a> {
         (squares / used.max(f64::MIN_POSITIVE)).sqrt() / self.scale[joint]
     }
 
-    /// RMS of a joint's residual in its own unit, over the rows used, all alike.
+    /// Returns the RMS of a joint's residual over the used rows without row weights, in its own unit.
     pub(super) fn even_rms(&self, joint: usize) -> f64 {
         let squares = dot_self(&self.residual(joint));
         (squares / self.rows.used(joint).max(1) as f64).sqrt()
     }
 
-    /// Residual of a joint in its own unit; 0 on masked rows.
+    /// Returns the residual of a joint in its own unit; 0 on masked rows.
     pub(super) fn residual(&self, joint: usize) -> Vec<f64> {
         let n = self.rows.count;
         let mut own: Vec<f64> = self.residual[joint * n..(joint + 1) * n]
@@ -245,7 +245,7 @@ impl<'a> Fit<'a> {
         own
     }
 
-    /// The same, each row by what it counts, with the RMS of [`Fit::rms`] over all that are used.
+    /// Returns the residual with row weights, scaled to the RMS of [`Fit::rms`] over all used rows.
     pub(super) fn counted(&self, joint: usize) -> Vec<f64> {
         if self.counts[joint].is_none() {
             return self.residual(joint);
@@ -257,33 +257,33 @@ impl<'a> Fit<'a> {
         own.iter().map(|r| by * r).collect()
     }
 
-    /// What each row of a joint counts beside its others; none where all count alike.
+    /// Returns the row weights of a joint; None if all are equal.
     pub(super) fn counts(&self, joint: usize) -> Option<&[f64]> {
         self.counts[joint].as_deref().map(Vec::as_slice)
     }
 
-    /// The weighted residual of all joints.
+    /// Returns the weighted residual of all joints.
     pub(super) fn left(&self) -> &[f64] {
         &self.residual
     }
 
-    /// The rows.
+    /// Returns the rows.
     pub(super) fn rows(&self) -> &'a Rows {
         self.rows
     }
 
-    /// Number of blocks.
+    /// Returns the number of blocks.
     pub(super) fn blocks(&self) -> usize {
         self.blocks
     }
 
-    /// Block of each row of a joint.
+    /// Returns the block of each row of a joint.
     pub(super) fn block_of_rows(&self) -> &[usize] {
         &self.block
     }
 
-    /// Columns of a candidate beside those taken in; none where one of them is no column of its own. Joints on which a column
-    /// is zero take no part.
+    /// Projects a candidate's columns; None if one of them is collinear with the basis. Joints on which a column is
+    /// zero are skipped.
     pub(super) fn beside(&self, columns: &[Column]) -> Option<Beside> {
         let n = self.rows.count;
         let k = columns.len();
@@ -324,8 +324,8 @@ impl<'a> Fit<'a> {
         Some(Beside { gram, right })
     }
 
-    /// Share of the residual's squares that such columns explain, with their coefficients. `bounds` are those of the
-    /// coefficients: outside them nothing is explained.
+    /// Returns the share of the residual's squares that such columns explain, with their coefficients. None if a
+    /// coefficient is outside its `bounds`.
     pub(super) fn explained(
         &self,
         columns: &Beside,
@@ -346,12 +346,12 @@ impl<'a> Fit<'a> {
             .then(|| (share, beta.iter().copied().collect()))
     }
 
-    /// Inner product of two columns, weighted.
+    /// Returns the weighted inner product of two columns.
     pub(super) fn product(&self, a: &Column, b: &Column) -> f64 {
         dot(&self.weighted(a), &self.weighted(b))
     }
 
-    /// Weighted columns of a candidate projected; none where one of them is no column of its own.
+    /// Returns a candidate's weighted, projected columns; None if one of them is collinear with the basis.
     pub(super) fn distinct(&self, columns: &[Column]) -> Option<Vec<Vec<f64>>> {
         let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
         for column in columns {
@@ -366,7 +366,7 @@ impl<'a> Fit<'a> {
         Some(own)
     }
 
-    /// What of several columns is their own beside those taken in and each other: orthonormal, weighted.
+    /// Returns an orthonormal basis of the columns' parts beside the fit's basis, weighted.
     pub(super) fn span(&self, columns: &[Column]) -> Vec<Vec<f64>> {
         let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
         for column in columns {
@@ -388,8 +388,8 @@ impl<'a> Fit<'a> {
         own
     }
 
-    /// Covariance of the coefficients of weighted columns from the scores of the blocks (Liang and Zeger 1986, Biometrika
-    /// 73): `inverse` of the columns' inner products, and the `rest` that they leave.
+    /// Returns the covariance of the coefficients of weighted columns from block scores (Liang and Zeger 1986,
+    /// Biometrika 73). `inverse` belongs to the columns' inner products; `rest` is their residual.
     pub(super) fn sandwich(
         &self,
         columns: &[impl AsRef<[f64]>],
@@ -409,12 +409,12 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// Block of each row of a joint, and their number, for residuals correlated over `memory` seconds.
+/// Returns the block of each row of a joint and their number, for residuals correlated over `memory` seconds.
 fn blocked(rows: &Rows, memory: f64) -> (Vec<usize>, usize) {
     in_blocks(rows, memory, rows.count)
 }
 
-/// The same with the fewest blocks in `distinct` rows.
+/// The same, with the fewest blocks in `distinct` rows.
 fn in_blocks(rows: &Rows, memory: f64, distinct: usize) -> (Vec<usize>, usize) {
     let length = ((MEMORIES * memory / rows.period).ceil() as usize)
         .max(1)
@@ -430,14 +430,14 @@ fn in_blocks(rows: &Rows, memory: f64, distinct: usize) -> (Vec<usize>, usize) {
     (block, next)
 }
 
-/// Whether a column is one of its own: its square, and what of it is left beside the others.
+/// Returns true if a column is not collinear, from its squares beside the others and in all.
 fn is_own(left: f64, whole: f64) -> bool {
     whole > 0.0 && left > DISTINCT * DISTINCT * whole
 }
 
-/// Inner product.
+/// Returns the inner product.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Eight sums at a time: the compiler does not reorder one.
+    // Eight partial sums, because the compiler does not reorder a single one.
     let mut sums = [0.0; 8];
     let (a8, a_rest) = a.as_chunks::<8>();
     let (b8, b_rest) = b.as_chunks::<8>();
@@ -449,7 +449,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum::<f64>()
 }
 
-/// Sum of squares.
+/// Returns the sum of squares.
 pub(super) fn dot_self(a: &[f64]) -> f64 {
     dot(a, a)
 }

@@ -1,37 +1,36 @@
-//! The noise floor: what no model of the motion can explain.
+//! The noise floor: the part of the residual that no model of the motion can explain.
 
 use super::rows::Rows;
 use rig_data::prepare::Welch;
 use rig_data::runs::{Differences, Run};
 
-/// Share of the band of thinned rows that the low-pass before the thinning passes.
+/// Share of the rows' band that the low-pass before decimation passes.
 const PASSED: f64 = 0.8;
-/// Samples of a segment of a torque's spectrum.
+/// Samples per segment of a torque spectrum.
 const SEGMENT: usize = 1024;
-/// Parts, equal in log frequency, of the band in which a torque's noise is looked for.
+/// Parts of the noise band, equal in log frequency.
 const BANDS: usize = 6;
-/// Upper end of that band as a share of the rate: beyond it the filter before a sampler takes part.
+/// Upper end of that band as a share of the sample rate: beyond it an anti-aliasing filter acts.
 const TOP: f64 = 0.45;
-/// Times by which the density of a part may be off the line of noise of first order. The median of some hundred averages of a
-/// periodogram varies by less than a tenth; a line of a drive, or a tail of the motion, is off by more than half.
+/// Largest ratio of a part's density to the line of first-order noise. A median of some hundred averaged periodograms
+/// varies by less than a tenth. A spectral line of a drive, or a tail of the motion, is off by more than half.
 const OFF_LINE: f64 = 1.5;
-/// Two recordings repeat each other when their references (else their positions) differ by less than this share of their
-/// spread.
+/// Largest difference of the references (else positions) of two repeated runs, as a share of their spread.
 const ALIKE: f64 = 0.02;
-/// Share of the torque by which runs may differ that are driven alike.
+/// Largest difference of the torques of two runs driven alike, as a share of the torque.
 const DRIVEN_ALIKE: f64 = 0.2;
-/// Stretches over which two runs of a motion are compared, s.
+/// Segment length for the comparison of two runs, s.
 const STRETCH: f64 = 1.0;
-/// Lags looked at for the memory of a residual, s.
+/// Longest lag of a residual's autocorrelation, s.
 const LONGEST_MEMORY: f64 = 2.0;
 
-/// Pairs of runs that repeat one motion.
+/// Returns pairs of runs that repeat one motion.
 pub(super) fn repeats(runs: &[Run]) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for a in 0..runs.len() {
         for b in a + 1..runs.len() {
             let (a_run, b_run) = (&runs[a], &runs[b]);
-            // What pulls on one and not on the other is no noise.
+            // An external load on one of them is no noise.
             let comparable =
                 a_run.recording != b_run.recording && a_run.unburdened == b_run.unburdened;
             if comparable && alike(a_run, b_run) {
@@ -42,7 +41,7 @@ pub(super) fn repeats(runs: &[Run]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// A hold-out's run that repeats the motion of a training run, and that one.
+/// Returns a hold-out run that repeats the motion of a training run, and the latter.
 pub(super) fn repeated<'r>(training: &'r [Run], held: &'r [Run]) -> Option<(&'r Run, &'r Run)> {
     held.iter().find_map(|own| {
         let same = (training.iter()).find(|run| {
@@ -52,7 +51,7 @@ pub(super) fn repeated<'r>(training: &'r [Run], held: &'r [Run]) -> Option<(&'r 
     })
 }
 
-/// Whether the torques of runs of one motion differ by little: pushed from outside they do not.
+/// Returns true if the torques of two runs of one motion differ little; an external push makes them differ.
 fn driven_alike(a: &Run, b: &Run) -> bool {
     a.joints.iter().zip(&b.joints).all(|(a, b)| {
         let pairs = || a.tau.iter().zip(&b.tau);
@@ -83,19 +82,18 @@ fn alike(a: &Run, b: &Run) -> bool {
     })
 }
 
-/// What residuals of repeated runs of one motion say of a joint.
+/// Noise and residual of a joint in repeated runs of one motion.
 #[derive(Clone, Copy)]
 pub(super) struct Repeated {
-    /// What differs between them, over √2: noise, RMS.
+    /// RMS of their difference over √2: noise.
     pub(super) noise: f64,
-    /// All that is left in these very rows, RMS.
+    /// RMS of the residual in the same rows.
     pub(super) left: f64,
-    /// Pairs of rows.
+    /// Number of row pairs.
     pub(super) rows: f64,
 }
 
-/// Noise and what is left of a joint in repeated runs, where rows count so much (all alike where nothing is given). None without a
-/// repeat.
+/// Returns noise and residual of a joint in repeated runs, with row weights if given. None without a repeat.
 pub(super) fn from_repeats(
     rows: &Rows,
     pairs: &[(usize, usize)],
@@ -124,8 +122,8 @@ pub(super) fn from_repeats(
     })
 }
 
-/// How much more is left of a joint on average in the second of two runs of one motion than in the first, and its standard deviation
-/// by what that differs by between stretches of a second; none where there are not three of them.
+/// Returns the mean residual of a joint in run b minus that in run a, of one motion, and its standard deviation between
+/// segments of 1 s. None with fewer than three segments.
 pub(super) fn between(
     rows: &Rows,
     (a, b): (usize, usize),
@@ -150,7 +148,7 @@ pub(super) fn between(
     Some([mean, variance.sqrt()])
 }
 
-/// Mean of independent values and its variance; none of fewer than three.
+/// Returns the mean of independent values and its variance; None for fewer than three.
 pub(super) fn mean(values: &[f64]) -> Option<[f64; 2]> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -158,18 +156,18 @@ pub(super) fn mean(values: &[f64]) -> Option<[f64; 2]> {
     (n > 2.0).then(|| [mean, squares / (n * (n - 1.0))])
 }
 
-/// RMS of a signal over the rows that are used.
+/// Returns the RMS of a signal over the used rows.
 pub(super) fn rms(signal: &[f64], keep: &[bool]) -> f64 {
     let used = || signal.iter().zip(keep).filter(|(_, keep)| **keep);
     let squares: f64 = used().map(|(x, _)| x * x).sum();
     (squares / used().count().max(1) as f64).sqrt()
 }
 
-/// RMS on rows `period` s apart of what a joint's torque reading varies by from sample to sample: less noise than that there
-/// cannot be. None where the reading is no longer white, because something has filtered it before.
+/// Returns the RMS of a joint's sample-to-sample torque noise on rows `period` s apart: a lower limit of the noise.
+/// None if the noise is not white, because a filter acted before.
 ///
-/// By third differences, in which a smooth torque leaves nothing: of white noise they have 20 times its variance, and second
-/// ones 6 times.
+/// From third differences, where a smooth torque vanishes. They have 20 times the variance of white noise, second
+/// differences 6 times.
 pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
     let mut all = Differences::default();
     for run in runs {
@@ -183,12 +181,12 @@ pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64>
     all.white().map(|variance| (variance * passed).sqrt())
 }
 
-/// RMS on rows `period` s apart of a torque's noise, by its spectrum beyond the band of the rows. None where that band is less than an
-/// octave wide, or is not that of noise that a filter of first order has passed at most.
+/// Returns the RMS of a torque's noise on rows `period` s apart, from its spectrum beyond the rows' band. None if that
+/// band is narrower than an octave, or if its noise is neither white nor first-order low-passed.
 ///
-/// Noise of a sensor behind such a filter is an autoregression of first order, with the density S₀/(1 + (f/f₁)²). Its reciprocal is a
-/// line over f², which is fitted to the medians of [`BANDS`] parts of the band. The corner f₁ has to lie beyond the band of the rows:
-/// below it, such noise is not told from the torque of dry friction, which falls with f² as well.
+/// Sensor noise behind such a filter is a first-order autoregression, with the density S₀/(1 + (f/f₁)²). The reciprocal
+/// is a line over f², fitted to the medians of [`BANDS`] parts of the band. The corner f₁ must be beyond the rows'
+/// band: below it the noise is not distinguishable from dry friction, which also falls with f².
 pub(super) fn beyond_band(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
     let rate = runs.first()?.rate;
     let [low, high] = [0.5 / period, TOP * rate];
@@ -227,10 +225,10 @@ pub(super) fn beyond_band(runs: &[Run], joint: usize, period: f64) -> Option<f64
     (corner > low && variance > 0.0).then(|| variance.sqrt())
 }
 
-/// Density at low frequency and corner of noise of first order through points of frequency and density; an infinite corner of white
-/// noise. None where a point is off by more than [`OFF_LINE`] times.
+/// Fits first-order noise to points of frequency and density. Returns low-frequency density and corner, infinite for
+/// white noise. None if a point is off by more than a factor [`OFF_LINE`].
 fn first_order(points: &[[f64; 2]]) -> Option<[f64; 2]> {
-    // The reciprocal density times the density is 1: each point counts alike, whatever its level.
+    // Reciprocal density times density is 1: each point has the same weight at any level.
     let mut normal = [[0.0; 2]; 2];
     let mut right = [0.0; 2];
     for [f, density] in points {
@@ -257,13 +255,13 @@ fn first_order(points: &[[f64; 2]]) -> Option<[f64; 2]> {
         .then(|| [1.0 / constant, (constant / slope).sqrt()])
 }
 
-/// Standard deviation of a sample of white noise whose RMS on rows so many `samples` apart is `noise`.
+/// Returns the standard deviation of a white-noise sample, if its RMS on rows `samples` samples apart is `noise`.
 pub(super) fn of_a_sample(noise: f64, samples: f64) -> f64 {
     noise * (samples / PASSED).max(1.0).sqrt()
 }
 
-/// Time over which a joint's residual is correlated, s: the integral of its autocorrelation up to the first zero, the
-/// longest over the joints.
+/// Returns the correlation time of a joint's residual, s: the integral of its autocorrelation up to the first zero. The
+/// longest of all joints.
 pub(super) fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {
     let lags = ((LONGEST_MEMORY / rows.period).ceil() as usize).min(rows.count / 4);
     let of = |residual: &Vec<f64>| {
@@ -311,7 +309,7 @@ mod tests {
     fn a_reading_says_its_own_noise_unless_it_was_filtered() {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
         let smooth = |k: usize| 3.0 * (0.02 * k as f64).sin();
-        // Uniform from −1 to 1: variance a third.
+        // Uniform from −1 to 1: the variance is 1/3.
         let white: Vec<f64> = (0..20_000)
             .map(|k| smooth(k) + 2.0 * rng.random::<f64>() - 1.0)
             .collect();
@@ -323,8 +321,8 @@ mod tests {
         assert_eq!(reading((0..20_000).map(smooth).collect()), None);
     }
 
-    /// Noise that a filter of first order has passed, beside a motion of 0.5 to 6 Hz and its dry friction; what its band below the
-    /// rows' edge holds is known by its own spectrum. Where the corner lies within the rows' band it is not told from friction.
+    /// First-order noise beside a motion of 0.5 to 6 Hz with dry friction. Its spectrum beyond the rows' band gives its
+    /// part below. With the corner inside the band it is not distinguishable from friction.
     #[test]
     fn noise_behind_a_filter_is_found_beyond_the_band() {
         let [rate, period, std] = [1000.0, 0.01, 0.2];

@@ -1,4 +1,4 @@
-//! What stands at the end of a search: the noise floor, what is left beyond it, which other names a step may have.
+//! Judgement of a search's effects: the noise floor, the unexplained residual, alternative names.
 
 mod doubts;
 mod rank;
@@ -25,84 +25,84 @@ use super::search::{Search, is_gear, shadow, with};
 
 use rig_model::robot::{Joint, Robot};
 
-/// Share of its gap that a step must close to stand beside a remainder.
+/// Share of its gap that an effect must close to be accepted beside a remainder.
 const HALF: f64 = 0.5;
-/// … and at least, where nothing else would close half as much in its place.
+/// The same if every rival closes less than half as much.
 const QUARTER: f64 = 0.25;
-/// What is left counts as more than noise beyond this ratio to a floor known from repeated recordings, in rows of other motions,
-/// whose noise is not quite the same, or beside a play, of whose touches each law leaves something. The difference between a right
-/// name's law and the rig's may leave its shadow besides.
+/// Residual-to-noise RMS ratio above which a joint has an unexplained residual. For motions that were not repeated,
+/// with slightly different noise, and for joints with backlash, where each law has errors at contact. Model mismatch is
+/// extra.
 pub(super) const BEYOND_FLOOR: f64 = 1.12;
-/// … and beyond this in the repeated runs themselves: right names left 1.00 to 1.03 times the floor in 25 rigs of seed 3500, and up to
-/// 1.05 in 13 with a fifth of their noise …
+/// The same within the repeated runs. True models left 1.00 to 1.03 in 25 rigs of seed 3500, and up to 1.05 in 13 rigs
+/// with a fifth of their noise.
 const BEYOND_OWN_FLOOR: f64 = 1.06;
-/// … unless that is within so many standard deviations of chance: of ratio² − 1, the mean product of two runs' noise, 1/√rows.
+/// Standard deviations of chance (1/√rows each) in ratio² − 1 that the residual must also exceed.
 const CHANCE: f64 = 4.0;
-/// … and so much of the torque itself: filters and differences of a step each are not the derivatives that they stand for.
+/// Share of the torque RMS that the treatment may leave: its filters and differences are not exact derivatives.
 const TREATED: f64 = 3e-3;
-/// … and beyond this it is so much that names are guesses at it.
+/// Residual-to-noise RMS ratio above which weak effects count as guesses.
 const FAR_BEYOND_FLOOR: f64 = 1.25;
-/// … and where a coordinate explains this share of its squares; with a repeat, of those beyond the floor, or where it is left away
-/// from reversals too.
+/// Share of the squares that a coordinate must explain for a remainder. With repeated runs: of the excess over the
+/// floor. Less is enough there if the residual also exceeds the floor away from reversals.
 const SHARE_LEFT: f64 = 0.1;
 
-/// The training data that effects are judged on.
+/// The judge of effects, with the training data.
 pub(super) struct Judge<'a, 'r> {
     /// As it was given.
     pub(super) robot: &'a Robot,
-    /// The library on the training data.
+    /// The candidate library on the training data.
     pub(super) search: &'a Search<'r>,
-    /// Of links behind gears.
+    /// Follower of links behind gears.
     pub(super) follower: &'a Follower<'a, 'r>,
     /// The training data.
     pub(super) rows: &'a Rows,
-    /// Their coordinates, joint by joint.
+    /// Coordinates of the training data, joint by joint.
     pub(super) coordinates: &'a [Vec<Coordinate>],
     /// Runs that repeat each other.
     pub(super) pairs: Vec<(usize, usize)>,
-    /// What the reading of the positions leaves in each joint's torque.
+    /// Torque error from the position readings, joint by joint.
     pub(super) position_reading: PositionReading,
-    /// The refitted nominal model on them.
+    /// Fit of the nominal model.
     pub(super) base: &'a Fit<'r>,
-    /// Of the bootstrap.
+    /// Seed of the bootstrap.
     pub(super) seed: u64,
 }
 
-/// What stands.
+/// Accepted effects and the residual.
 pub(super) struct Judged {
     /// The effects.
     pub(super) chosen: Vec<Profile>,
     /// Noise floor, joint by joint.
     pub(super) floors: Vec<f64>,
-    /// … of rows as they count.
+    /// Noise floor with row weights.
     pub(super) quiet: Vec<f64>,
-    /// Noise floor that no model made, joint by joint; NaN where none is known.
+    /// Noise floor that does not depend on a model, joint by joint; NaN if unknown.
     pub(super) known: Vec<f64>,
-    /// What each of them rests on.
+    /// Sources of the known noise floors.
     pub(super) from: Vec<FloorFrom>,
-    /// What is left beyond it.
+    /// The unexplained residual.
     pub(super) left: Option<Remainder>,
-    /// Names that were no more than guesses at it.
+    /// Effects that only approximated it.
     pub(super) guesses: Vec<Profile>,
-    /// Whether that is so much that names may be guesses at it.
+    /// True if it is so large that effects may be guesses.
     much_left: bool,
 }
 
 impl Judge<'_, '_> {
-    /// Which of the effects found stand, and what they leave.
+    /// Returns the accepted effects among those found, and the residual.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn judged(&self, found: Vec<Profile>) -> Result<Judged, DiagnoseError> {
         let mut judged = self.as_found(found);
         let mut guesses = Vec::new();
-        // Beside something unknown, a name that closes less of the gap than it leaves is a guess at it, unless nothing else
-        // comes near.
+        // Beside an unknown effect, an effect that closes less of the gap than it leaves open is a guess, unless no
+        // rival comes near.
         while judged.much_left {
             let chosen = &judged.chosen;
             let followed = self.follower.followed(chosen, &judged.quiet)?;
             let followed = followed.map(|list| self.as_found(list));
-            // What the driven law of a gear leaves is no reason to doubt the names of its joint; other joints are as they were.
+            // A misfit of an open-loop gear is no reason to doubt effects of its joint. Other joints stay as they are.
             let on = |joint: usize| {
                 let gear = |p: &Profile| p.candidate.joint == joint && p.followed.is_some();
                 followed
@@ -112,20 +112,20 @@ impl Judge<'_, '_> {
             let closes = |k: usize| {
                 let j = chosen[k].candidate.joint;
                 let last = on(j).unwrap_or(&judged);
-                // The name is in doubt, not one of its orders, each of which closes a part of the gap.
+                // Test the effect as a whole: each order of a wave closes only a part of the gap.
                 let sort = chosen[k].candidate.sort();
                 let others = last.chosen.iter().filter(|p| p.candidate.sort() != sort);
                 let others: Vec<Profile> = others.cloned().collect();
                 let [before, after] =
                     [&others, &last.chosen].map(|list| with(self.base, list, None));
-                // A gear is worth what it does at its touches, which hardly count beside all else.
+                // A gear shows at its contacts, whose rows have small weights: compare without weights.
                 if is_gear(chosen[k].candidate.kind) {
                     closed([before.even_rms(j), after.even_rms(j)], last.floors[j])
                 } else {
                     closed([before.rms(j), after.rms(j)], last.quiet[j])
                 }
             };
-            // What the description states is no guess of the search.
+            // Described effects are no guesses.
             let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
                 .filter(|k| on(chosen[*k].candidate.joint).is_none_or(|last| last.much_left))
                 .map(|k| (k, closes(k)))
@@ -148,8 +148,8 @@ impl Judge<'_, '_> {
         Ok(judged)
     }
 
-    /// Whether nothing else in its place takes away half as much. What explains another joint is not in its place; what is the
-    /// same function of the motion is no other.
+    /// Returns true if no rival on the joint has half the gain. Kinds that are the same function of the motion are no
+    /// rivals.
     fn stands_out(&self, chosen: &[Profile], k: usize) -> Result<bool, DiagnoseError> {
         let own = &chosen[k];
         let own_kind = own.candidate.kind;
@@ -162,10 +162,10 @@ impl Judge<'_, '_> {
             .all(|r| r.evidence.gain < HALF * own.evidence.gain))
     }
 
-    /// What stands with these effects.
+    /// Judges these effects without dropping any.
     pub(super) fn as_found(&self, chosen: Vec<Profile>) -> Judged {
         let fit = with(self.base, &chosen, None);
-        // Of a play touches are loud, and so is what its law leaves of them.
+        // At backlash contacts the residual is large anyway: no bursts there.
         let plays = |j: usize| {
             let gear = |p: &Profile| p.candidate.kind == Kind::Backlash && p.candidate.joint == j;
             chosen.iter().any(gear)
@@ -173,7 +173,7 @@ impl Judge<'_, '_> {
         let bursts: Vec<Option<Burst>> = (0..self.rows.joints())
             .map(|j| (!plays(j)).then(|| self.burst(&fit, j)).flatten())
             .collect();
-        // Of a joint without its bursts.
+        // Factor from a joint's RMS to its RMS without bursts.
         let calm = |j: usize| {
             let loud = bursts[j].as_ref().map_or(0.0, |burst| burst.share);
             (1.0 - loud).max(0.0).sqrt()
@@ -226,7 +226,7 @@ impl Judge<'_, '_> {
         }
     }
 
-    /// Noise floor of a joint that no model made, and what it rests on; `repeated` is what repeated runs say.
+    /// Returns the model-independent noise floor of a joint and its source. `repeated` is the noise of repeated runs.
     fn known_floor(&self, repeated: Option<f64>, joint: usize) -> (f64, FloorFrom) {
         let runs = self.search.source.runs;
         match repeated {
@@ -241,7 +241,7 @@ impl Judge<'_, '_> {
         }
     }
 
-    /// What the floors have of the reading of the positions, joint by joint: nothing where they rest on something else.
+    /// Returns the part of the floors due to position readings, joint by joint; 0 if the floor has another source.
     pub(super) fn added(&self, from: &[FloorFrom]) -> Vec<f64> {
         let own = |(joint, from): (usize, &FloorFrom)| match from {
             FloorFrom::TorqueReading => self.position_reading.whole(joint),
@@ -250,7 +250,7 @@ impl Judge<'_, '_> {
         from.iter().enumerate().map(own).collect()
     }
 
-    /// Where the residual of the refitted description sits, `base`; `described` are its effects.
+    /// Locates the residual of the refitted description `base`, with its effects `described`.
     pub(super) fn places(&self, base: &Fit, floors: &[f64], described: &[Profile]) -> Vec<Place> {
         let fit = with(base, described, None);
         (0..self.rows.joints())
@@ -258,8 +258,8 @@ impl Judge<'_, '_> {
             .collect()
     }
 
-    /// Where a joint's residual sits, chance refitted as it was. What decides on a remainder takes chance as it comes, which asks
-    /// for more.
+    /// Locates a joint's residual with a refitted bootstrap. The decision on a remainder uses the plain bootstrap,
+    /// which is stricter.
     fn refitted_places(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
         let known = Known {
             refitted: Refitted::of(self.rows, fit.counts(joint), joint),
@@ -286,7 +286,7 @@ impl Judge<'_, '_> {
         )
     }
 
-    /// What a few stretches of a joint's residual hold; where a motion was repeated, that is in the floor.
+    /// Returns large residuals in a few segments. With repeated runs they are part of the noise floor.
     fn burst(&self, fit: &Fit, joint: usize) -> Option<Burst> {
         let rows = self.rows;
         (self.pairs.is_empty())
@@ -304,7 +304,7 @@ impl Judge<'_, '_> {
             .flatten()
     }
 
-    /// What is left of a joint beyond the floor and goes with the motion, or came and went; `own` is what repeated runs say of it.
+    /// Returns a joint's residual beyond the floor if it depends on the motion, or bursts. `own`: repeated runs.
     fn remainder_of(
         &self,
         fit: &Fit,
@@ -328,7 +328,7 @@ impl Judge<'_, '_> {
             let much = shown.is_some_and(|p| p.share > SHARE_LEFT);
             (much || self.away_from_reversals(fit, chosen, besides, joint)).then_some(more)?
         } else {
-            // The floor is what no coordinate of the motion explains.
+            // The floor is the part that no coordinate explains.
             [rms, rms * (1.0 - shown?.share).max(0.01).sqrt()]
         };
         let places = match places.is_empty() {
@@ -361,8 +361,8 @@ impl Judge<'_, '_> {
         })
     }
 
-    /// Whether more than the floor is left of a joint away from its reversals, which filters blur the same way in every run. A
-    /// gear shows at reversals. `besides` as in [`Self::beyond_noise`].
+    /// Returns true if the residual exceeds the floor away from reversals, where filters have the same error in every
+    /// run. Always true with a gear, which shows at reversals. `besides` as in [`Self::beyond_noise`].
     fn away_from_reversals(
         &self,
         fit: &Fit,
@@ -385,13 +385,13 @@ impl Judge<'_, '_> {
             })
     }
 
-    /// What repeated runs say of a joint's residual.
+    /// Returns noise and residual of a joint from repeated runs.
     fn repeated(&self, residual: &[f64], counts: Option<&[f64]>, joint: usize) -> Option<Repeated> {
         floor::from_repeats(self.rows, &self.pairs, residual, counts, joint)
     }
 
-    /// What is left of a joint and its noise, RMS, where that is more: of all rows, whose RMS and floor are `all`, or of the repeated
-    /// runs themselves. `besides` are squares that neither noise nor a missing effect leaves.
+    /// Returns residual and noise RMS of a joint if the residual exceeds the noise. It tests all rows (`all` is
+    /// residual and floor), then the repeated runs. `besides` are squares from other sources.
     fn beyond_noise(
         &self,
         all: [f64; 2],
@@ -412,8 +412,8 @@ impl Judge<'_, '_> {
     }
 }
 
-/// Squares that neither noise nor a missing effect leaves of a joint's torque in some rows: treatment, and the shadow of the names
-/// that take its residual from the one RMS to the other.
+/// Returns squares that neither noise nor missing effects cause. They come from the treatment, and from the mismatch of
+/// the effects that reduce the RMS from `before` to `after`.
 pub(super) fn besides(
     chosen: &[Profile],
     rows: &Rows,
@@ -427,12 +427,12 @@ pub(super) fn besides(
     (TREATED * torque).powi(2) + shadow
 }
 
-/// Share of the gap to the floor that a fall of the RMS closes, 1 at most; 0 where there was none, NaN where the floor is not known.
+/// Returns the share of the gap that an RMS drop closes, at most 1; 0 without a gap, NaN if the floor is unknown.
 pub(super) fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
     if floor.is_nan() {
         f64::NAN
     } else if before > floor {
-        // Below the floor there is nothing to explain.
+        // Below the floor there is no gap.
         ((before - after) / (before - floor)).min(1.0)
     } else {
         0.0

@@ -1,11 +1,11 @@
-//! How much earlier than it acts a torque was recorded, where that is less than a sample.
+//! The torque lead: time by which a torque was recorded earlier than it acts, if it is less than a sample.
 //!
-//! A controller holds its torque until its next sample: what is recorded with a position acts, on average, half a period
-//! after it (Franklin, Powell and Workman 1998, section 4.3). Fast motion shows it as a residual that goes with the torque's
-//! rate of change, larger than many effects. It is a property of the recording, not of the rig, and taken out before anything
-//! is searched for. Torque that comes later than the mean over one sample does is an effect: `measurement_delay`.
+//! A controller holds its torque until its next sample. So the torque recorded with a position acts, on average, half a
+//! period later (Franklin, Powell and Workman 1998, section 4.3). Fast motion shows this as a residual along the torque
+//! rate, larger than many effects. It belongs to the recording, not to the rig, and is removed before the search. A
+//! torque later than the mean over one sample is an effect: `measurement_delay`.
 //!
-//! Leaves out: holds longer than the recording's period (a slower controller recorded faster).
+//! Limit: holds longer than the recording's period (a slower controller, recorded faster).
 
 use rig_shared::effects::Kind;
 
@@ -15,26 +15,26 @@ use super::columns::{Candidate, Source};
 use super::fit::Fit;
 use rig_data::runs::{JointRun, Run};
 
-/// Standard deviations from which a lead counts.
+/// Standard deviations above which a lead is significant.
 const SEEN: f64 = 4.0;
-/// Share of a sample below which it changes nothing.
+/// Share of a sample below which a lead is neglected.
 const LEAST: f64 = 0.05;
-/// Share of a sample by which a lead must have changed for another search.
+/// Change of a lead, as a share of a sample, that requires another search.
 const WORTH_A_SEARCH: f64 = 0.2;
-/// Share of a sample that a torque may come late without being late: a reading that is the mean over the last sample, as of
-/// a current that is summed over it, is half a sample old; a tenth is for what the estimate is off by.
+/// Share of a sample by which a torque may be late without a delay. A mean over the last sample, such as a summed
+/// current, is half a sample old; a tenth allows for the error of the estimate.
 const LATE: f64 = 0.6;
-/// … and no more than this, s: a board reads its sensors within it, however slowly they are recorded.
+/// Upper limit of that time, s: a board reads its sensors within it, even if they are recorded slowly.
 const LATEST: f64 = 0.001;
 
-/// What the instants of sampling alone may make a torque late by, s.
+/// Returns the lateness that sampling alone may cause, s.
 pub(super) fn slack(runs: &[Run]) -> f64 {
     runs.first()
         .map_or(0.0, |run| (LATE / run.rate).min(LATEST))
 }
 
-/// How long before it acts (negative: after) each joint's torque was recorded, s: the `present` lead with what `fit` still
-/// shows. Where that is more than the instants of sampling explain it is something else, and 0 here.
+/// Returns the torque lead of each joint (negative: late), s: the `present` lead plus the one that `fit` still shows. 0
+/// if it exceeds what sampling explains: then it is another effect.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -64,7 +64,7 @@ pub(super) fn leads(
         .collect()
 }
 
-/// Whether two sets of leads are worth another search.
+/// Returns true if two sets of leads differ enough for another search.
 pub(super) fn differ(a: &[f64], b: &[f64], runs: &[Run]) -> bool {
     let rate = runs.first().map_or(0.0, |run| run.rate);
     a.iter()
@@ -72,7 +72,7 @@ pub(super) fn differ(a: &[f64], b: &[f64], runs: &[Run]) -> bool {
         .any(|(a, b)| (a - b).abs() * rate >= WORTH_A_SEARCH)
 }
 
-/// The recordings with each joint's torque where it acts.
+/// Returns the recordings with each joint's torque shifted to the time when it acts.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -81,7 +81,7 @@ pub(super) fn moved(bench: &Bench, loaded: Loaded, by: &[f64]) -> Result<Loaded,
         return Ok(loaded);
     }
     let mut runs = loaded.runs;
-    // A reading is late by a share of its sample: of a recording at another rate by as much of its own.
+    // The lateness is a share of a sample, so it scales with the sample rate of other recordings.
     let rate = bench.rate();
     for run in &mut runs {
         for (joint, lead) in run.joints.iter_mut().zip(by) {
@@ -91,14 +91,14 @@ pub(super) fn moved(bench: &Bench, loaded: Loaded, by: &[f64]) -> Result<Loaded,
     bench.rows(runs, &loaded.treatment)
 }
 
-/// A joint's torque `samples` later; what its reading varied by is kept, which this smooths.
+/// Delays a joint's torque by `samples`. The noise of the original reading is stored first, because this smooths it.
 fn put_later(joint: &mut JointRun, samples: f64) {
     joint.differences = Some(joint.differences());
     joint.tau = later(&joint.tau, samples);
     joint.taken_off = joint.taken_off.take().map(|held| later(&held, samples));
 }
 
-/// A signal `samples` (at most one, either way) later, by the cubic through the four nearest samples.
+/// Delays a signal by `samples` (at most one, either sign), by the cubic through the four nearest samples.
 fn later(signal: &[f64], samples: f64) -> Vec<f64> {
     if samples == 0.0 {
         return signal.to_vec();
@@ -106,7 +106,7 @@ fn later(signal: &[f64], samples: f64) -> Vec<f64> {
     let last = signal.len().saturating_sub(1) as isize;
     let at = |k: isize| signal[k.clamp(0, last) as usize];
     let whole = samples.floor();
-    // Between the sample before and the one after the place wanted, counted from the former.
+    // Position between the samples before and after the wanted time, from the former.
     let x = 1.0 - (samples - whole);
     let before = |k: usize| k as isize - whole as isize - 1;
     let weights = [
@@ -145,7 +145,7 @@ mod tests {
         };
         let before = of_reading(std::slice::from_ref(&run), 0, 0.01);
         put_later(&mut run.joints[0], 0.4);
-        // Once more: a lead is found in two passes.
+        // Shifted again: a lead is found in two passes.
         put_later(&mut run.joints[0], 0.1);
         assert!(before.is_some());
         assert_eq!(of_reading(&[run], 0, 0.01), before);
@@ -159,7 +159,7 @@ mod tests {
                 ..Run::default()
             }])
         };
-        // Half a sample at 1 kHz is sampling; the three quarters that a filter of the current adds are not.
+        // Half a sample at 1 kHz is sampling; three quarters with a current filter are not.
         assert!(late(1000.0) > 0.0005 && late(1000.0) < 0.00075);
         assert_eq!(late(100.0), LATEST);
         assert_eq!(slack(&[]), 0.0);

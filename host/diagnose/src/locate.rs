@@ -1,8 +1,8 @@
-//! Where the residual sits: its dependence on each coordinate of the motion, tested and put into words.
+//! Dependence of the residual on each coordinate of the motion: tests and sentences.
 //!
-//! Per coordinate the cumulated residual (a marked empirical process: Stute 1997, Ann. Statist. 25) against its wild block
-//! bootstrap (signs flipped block by block: Cameron, Gelbach & Miller 2008), the probabilities corrected for the number of
-//! coordinates under any dependence (Benjamini & Yekutieli 2001).
+//! Per coordinate, the cumulated residual (a marked empirical process: Stute 1997, Ann. Statist. 25) is compared with
+//! its wild block bootstrap (random signs per block: Cameron, Gelbach & Miller 2008). The p-values are corrected for
+//! the number of coordinates under any dependence (Benjamini & Yekutieli 2001).
 
 mod frequency;
 mod refitted;
@@ -20,46 +20,46 @@ use rig_data::runs::Run;
 use rig_model::robot::{JointKind, Robot};
 use rig_output::{format_significant, format_unit};
 
-/// Bins of equal numbers of rows.
+/// Number of bins with equal row counts.
 pub(super) const BINS: usize = 24;
-/// Draws of the bootstrap …
+/// Bootstrap draws …
 const DRAWS: usize = 999;
-/// … and for a coordinate that none of them reaches, where the correction for the number of coordinates asks for more: one
-/// alone among fifteen has to be at 0.0002.
+/// … and those of a coordinate that no draw reaches, if the correction for the number of coordinates needs more. One
+/// alone among fifteen must reach 0.0002.
 const MOST_DRAWS: usize = 19_999;
-/// Coordinates that most laws are functions of.
+/// Coordinates of most laws.
 const OF_LAWS: [&str; 4] = [VELOCITY, POSITION, ACCELERATION, DRIVE];
 const VELOCITY: &str = "velocity";
 const POSITION: &str = "position";
 const ACCELERATION: &str = "acceleration";
 const DRIVE: &str = "torque of the drive";
-/// The coordinate along which friction drifts.
+/// The coordinate of friction drift.
 pub(super) const SINCE_START: &str = "time since the start, by direction";
-/// What goes with a coordinate at this probability or more goes with it by chance.
+/// p-value from which on a dependence counts as chance.
 const BY_CHANCE: f64 = 0.05;
-/// Share of the explained squares that the interval has to hold.
+/// Share of the explained squares within the reported interval.
 const MOST_OF_IT: f64 = 0.75;
 
 /// A coordinate of one joint on the kept rows.
 #[derive(Clone)]
 pub(super) struct Coordinate {
-    /// In words.
+    /// Its name in words.
     pub(super) name: String,
-    /// ASCII
+    /// Unit, ASCII.
     pub(super) unit: &'static str,
-    /// One a row.
+    /// One value per row.
     pub(super) values: Vec<f64>,
 }
 
 impl Coordinate {
-    /// Whether laws of the library are functions of it, so that one that is not quite right errs along it.
+    /// Returns true if laws of the library depend on it, so that a mismatch of a law follows it.
     pub(super) fn is_of_a_law(&self) -> bool {
         OF_LAWS.contains(&self.name.as_str())
     }
 }
 
-/// All coordinates of a joint. `waves` are orders over the motor's turn that effects of it have: bins of a turn average a
-/// high one out.
+/// Returns all coordinates of a joint. `waves` are the orders per motor turn of its effects: bins of a turn would
+/// average a high order out.
 pub(super) fn coordinates(
     rows: &Rows,
     runs: &[Run],
@@ -113,7 +113,7 @@ pub(super) fn coordinates(
             .collect()
     });
     add(DRIVE, f, &|r, _| predicted[r].torque[joint].clone());
-    // Friction that drifts has no mean of its own over both directions.
+    // Friction drift has zero mean over both directions.
     add(SINCE_START, "s", &|_, run| {
         (run.t.iter().zip(&run.joints[joint].qd))
             .map(|(t, v)| v.signum() * (t - run.began))
@@ -153,12 +153,12 @@ pub(super) fn coordinates(
     list
 }
 
-/// Name of the coordinate that is another joint's velocity.
+/// Returns the name of another joint's velocity as a coordinate.
 pub(super) fn velocity_of(joint: &str) -> String {
     format!("velocity of joint {joint}")
 }
 
-/// Way and time since the last reversal, with the sign of the direction.
+/// Returns travel and time since reversal, with the sign of the direction.
 fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
     let j = &run.joints[joint];
     let (mut from, mut at, mut sign) = (0.0, 0.0, 0.0);
@@ -173,7 +173,7 @@ fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
     lists
 }
 
-/// Equal-count bins of a coordinate over used rows: bin of each row (none where not used) and the bins' edges.
+/// Sorts used rows into bins with equal counts. Returns the bin of each row (None if unused) and the edges.
 pub(super) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<usize>>, Vec<f64>) {
     let mut sorted: Vec<f64> = (values.iter().zip(keep))
         .filter(|(_, k)| **k)
@@ -195,17 +195,17 @@ pub(super) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<us
     (place, edges)
 }
 
-/// What is known of a residual beside its values.
+/// Additional knowledge about a residual.
 pub(super) struct Known<'a> {
-    /// What a refit that went before has taken out of it.
+    /// Components that a previous refit removed.
     pub(super) refitted: Refitted,
     /// Runs that repeat each other.
     pub(super) pairs: &'a [(usize, usize)],
 }
 
-/// Where the residual of a joint sits, most of the excess over `floor` first; nowhere where it goes with each coordinate no more
-/// than chance would have it. `block` is the block of each row; chance is refitted where it is known
-/// that the residual was.
+/// Returns the coordinates on which a joint's residual depends, the largest share of the excess over `floor` first.
+/// Empty if no dependence is beyond chance. `block` is the block of each row. With `known`, each draw of the bootstrap
+/// is refitted like the residual.
 pub(super) fn locate(
     rows: &Rows,
     coordinates: &[Coordinate],
@@ -238,7 +238,7 @@ pub(super) fn locate(
             }
         }
         let total: [f64; BINS] = std::array::from_fn(|b| sums.iter().map(|s| s[b]).sum());
-        // Squares that the bins' means explain, less what noise would by the blocks' spread.
+        // Squares explained by the bin means, minus the noise part from the spread of the blocks.
         let explained: [f64; BINS] = std::array::from_fn(|b| {
             let noise: f64 = sums.iter().map(|s| s[b] * s[b]).sum();
             if count[b] > 0.0 {
@@ -293,16 +293,16 @@ pub(super) fn locate(
     places
 }
 
-/// One coordinate's sums by bins.
+/// Sums of one coordinate, bin by bin.
 struct Process {
     /// Of the residual, block by block.
     sums: Vec<[f64; BINS]>,
-    /// Of what a refit takes, direction by direction.
+    /// Of the components that a refit removes, direction by direction.
     taken: Vec<[f64; BINS]>,
 }
 
-/// Probability of each process, corrected for their number. Those that no draw reaches get more of them where the
-/// correction asks for it: so few draws could not say more, whatever the process.
+/// Returns the p-value of each process, corrected for their number. If the correction makes significance impossible
+/// with `DRAWS`, processes that no draw reaches get more draws.
 fn probabilities(processes: &[Process], along: &[Vec<f64>], seed: u64) -> Vec<f64> {
     let mut list: Vec<f64> = (processes.iter())
         .map(|process| process_p(process, along, DRAWS, seed))
@@ -317,7 +317,7 @@ fn probabilities(processes: &[Process], along: &[Vec<f64>], seed: u64) -> Vec<f6
     corrected(&list)
 }
 
-/// Probabilities corrected for their number under any dependence (Benjamini & Yekutieli 2001).
+/// Corrects p-values for their number under any dependence (Benjamini & Yekutieli 2001).
 fn corrected(list: &[f64]) -> Vec<f64> {
     let m = list.len();
     let harmonic: f64 = (1..=m).map(|k| 1.0 / k as f64).sum();
@@ -332,8 +332,8 @@ fn corrected(list: &[f64]) -> Vec<f64> {
     result
 }
 
-/// Probability of the largest excursion of the cumulated residual, by the wild block bootstrap. `along` is the residual along each
-/// direction of the refit, block by block.
+/// Returns the p-value of the largest excursion of the cumulated residual, by the wild block bootstrap. `along` is the
+/// residual along each direction of the refit, block by block.
 fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> f64 {
     let excursion = |sign: &mut dyn FnMut() -> f64| {
         let mut total = [0.0; BINS];
@@ -343,7 +343,7 @@ fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> 
             for (t, x) in total.iter_mut().zip(s) {
                 *t += w * x;
             }
-            // Of a process that no refit takes anything of, nothing.
+            // Without a refit, nothing is removed.
             let own = along.get(k).map_or(&[][..], Vec::as_slice);
             for (f, x) in fitted.iter_mut().zip(own) {
                 *f += w * x;
@@ -369,7 +369,7 @@ fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> 
     (beyond + 1) as f64 / (draws + 1) as f64
 }
 
-/// The shortest run of bins that holds most of what is explained.
+/// Returns the shortest range of bins with most of the explained squares.
 fn narrowest(explained: &[f64; BINS], all: f64) -> (usize, usize) {
     let mut best = (0, BINS - 1);
     for low in 0..BINS {
@@ -411,7 +411,7 @@ fn sentence(
     let signed =
         coordinate.values.iter().any(|v| *v < 0.0) && coordinate.values.iter().any(|v| *v > 0.0);
     let parity = if signed {
-        // Bins of equal count mirror each other where the motion does.
+        // Bins of equal count are symmetric if the motion is.
         let (mut odd, mut even) = (0.0, 0.0);
         for b in 0..BINS / 2 {
             let (x, y) = (mean[b], mean[BINS - 1 - b]);
@@ -440,7 +440,7 @@ fn sentence(
 mod tests {
     use super::*;
 
-    /// Fourteen coordinates that nothing goes with, and one that something does in every block.
+    /// Fourteen coordinates without dependence, and one with a dependence in every block.
     fn processes(found: f64) -> Vec<Process> {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
         let mut noise = || rng.random::<f64>() - 0.5;
@@ -462,8 +462,8 @@ mod tests {
         vec![Vec::new(); 60]
     }
 
-    /// A residual that was refitted with x and a constant holds a cubic in x of a tenth of its noise: seen where chance is
-    /// refitted as well, and no more often than asked for where there is none.
+    /// A residual refitted with x and a constant contains a cubic in x of a tenth of its noise. A refitted bootstrap
+    /// detects it, and has no more false alarms than its level without it.
     #[test]
     fn chance_is_refitted_where_the_residual_was() {
         const ROWS: usize = 4000;
@@ -524,7 +524,7 @@ mod tests {
 
     #[test]
     fn the_correction_is_that_of_benjamini_and_yekutieli() {
-        // 1 + 1/2 + 1/3 + 1/4 = 25/12; each times 4 over its rank, no more than the next.
+        // 1 + 1/2 + 1/3 + 1/4 = 25/12; each times 4 over its rank, at most the next one.
         let got = corrected(&[0.04, 0.001, 0.03, 0.5]);
         let wanted = [1.0 / 9.0, 1.0 / 120.0, 1.0 / 9.0, 1.0];
         assert!(

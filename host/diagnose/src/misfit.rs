@@ -1,12 +1,12 @@
-//! Whether the names found leave what right ones would not: a free function of a coordinate, beside everything in the
-//! model, tested for lack of fit on stretches that it was not fitted to.
+//! Lack-of-fit test of the accepted effects: a free function of a coordinate, added to the model, is tested on blocks
+//! outside its fit.
 //!
-//! A name that stands in for an effect outside the library follows it over most of the motion and not over all of it: a
-//! tilted base explains a constant but for the difference of cos q and 1. What is left then is small against the noise of
-//! a sample, and repeats with the coordinate.
+//! A substitute for an effect outside the library follows it over most of the motion, but not over all of it. A tilted
+//! base explains a constant except for the difference of cos q and 1. The rest is small against the sample noise, but
+//! repeats with the coordinate.
 //!
-//! Leaves out: functions of two coordinates other than an inertia that changes with the position; what the motion does not tell
-//! from the name.
+//! Limit: of functions of two coordinates, only an inertia that depends on the position is tested. Functions collinear
+//! with the effect are not found.
 
 use super::columns::Source;
 use super::fit::Fit;
@@ -17,33 +17,33 @@ use rig_data::runs::JointRun;
 
 /// Degree of the polynomials.
 const DEGREE: usize = 5;
-/// Harmonics over a turn of the motor.
+/// Harmonics per motor turn.
 const HARMONICS: usize = 4;
-/// Least share of the RMS that a function takes away which does not change with the direction of motion …
+/// Least RMS share that a function without sign or acceleration factor must remove, except a function of the speed …
 const LEAST: f64 = 0.0075;
-/// … and any other: the friction of no rig is quite a constant and a line of the speed, nor its acceleration known as its position.
+/// … and any other: real friction is not exactly constant plus linear, and acceleration is less well known.
 const LEAST_OF_OTHERS: f64 = 0.02;
-/// … and that many standard deviations of it.
+/// … and the least ratio of that share to its standard deviation.
 const LEAST_SIGMAS: f64 = 1.5;
 
 /// The coordinate of friction.
 const SPEED: &str = "speed";
 
-/// A free function that takes away what the names leave.
+/// A free function that explains residual of the accepted effects.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Misfit {
-    /// Of what.
+    /// Its coordinate.
     pub(super) coordinate: &'static str,
-    /// What it is multiplied by.
+    /// Its factor.
     pub(super) times: Times,
-    /// Share of the joint's RMS that it takes away on stretches that it was not fitted to.
+    /// Share of the joint's RMS that it removes on blocks outside its fit.
     pub(super) gain: f64,
 }
 
-/// The free function that takes most off what `fit` leaves of `joint`; none where the names leave no more than right ones
-/// would.
+/// Returns the free function with the largest gain on the residual of `joint`; None if the right effects could leave as
+/// much.
 pub(super) fn misfit(source: &Source, rows: &Rows, fit: &Fit, joint: usize) -> Option<Misfit> {
-    // Names have taken away what was correlated longest.
+    // The effects removed the part with the longest correlation.
     let residuals: Vec<Vec<f64>> = (0..rows.joints()).map(|j| fit.residual(j)).collect();
     let fit = fit.blocked_anew(floor::memory(rows, &residuals));
     let families = families(source, joint);
@@ -56,7 +56,7 @@ pub(super) fn misfit(source: &Source, rows: &Rows, fit: &Fit, joint: usize) -> O
             }
             let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; own.len()];
             let evidence = fit.evidence(&own, &open)?;
-            // What goes with the speed is friction, whichever way it turns.
+            // A function of the speed is friction, with or without a sign factor.
             let least = match family.times {
                 Times::One if family.coordinate != SPEED => LEAST,
                 _ => LEAST_OF_OTHERS,
@@ -73,19 +73,19 @@ pub(super) fn misfit(source: &Source, rows: &Rows, fit: &Fit, joint: usize) -> O
         .max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 
-/// What a free function is multiplied by.
+/// Factor of a free function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Times {
-    /// Nothing: a torque.
+    /// None: a torque.
     One,
-    /// The sign of the velocity: dry friction.
+    /// Sign of the velocity: dry friction.
     Direction,
-    /// The acceleration: an inertia.
+    /// Acceleration: an inertia.
     Acceleration,
 }
 
 impl Times {
-    /// As in "a free function of the speed …".
+    /// Returns the phrase behind "a free function of the speed …".
     pub(super) fn said(self) -> &'static str {
         match self {
             Self::One => "",
@@ -101,12 +101,12 @@ struct Family {
     /// At the full rate, run by run.
     values: Vec<Vec<f64>>,
     times: Times,
-    /// Whether they repeat with every turn.
+    /// True if they repeat with every turn.
     periodic: bool,
 }
 
 impl Family {
-    /// Behind the low-pass, as every column is.
+    /// Returns the low-passed and decimated columns.
     fn columns(&self, source: &Source, joint: usize) -> Vec<Column> {
         let all = || self.values.iter().flatten();
         let low = all().copied().fold(f64::INFINITY, f64::min);
@@ -195,7 +195,7 @@ fn waves(angle: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Legendre polynomials from degree 0, between −1 and 1.
+/// Returns the Legendre polynomials from degree 0, between −1 and 1.
 fn polynomials(x: f64) -> Vec<f64> {
     let mut list = vec![1.0, x];
     for n in 1..DEGREE {

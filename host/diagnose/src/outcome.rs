@@ -1,4 +1,4 @@
-//! What a diagnosis says; serialises to `diagnosis.json`.
+//! Result of a diagnosis; serialises to `diagnosis.json`.
 
 use std::collections::BTreeMap;
 
@@ -6,109 +6,109 @@ use serde::Serialize;
 
 use rig_output::{format_significant, format_unit, format_value};
 
-/// Shares of a gap that differ by less are written alike.
+/// Difference below which two shares of a gap are printed as equal.
 const SAME_SHARE: f64 = 5e-4;
 
-/// Least posterior probability of a name that is called certain: the usual level of an interval.
+/// Least posterior probability of a certain name: the usual level of an interval.
 const CERTAIN: f64 = 0.95;
 
-/// What became of the gap.
+/// Verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The model explains the data to the noise floor as it is.
+    /// The model already explains the data to the noise floor.
     NothingMissing,
-    /// Named effects close the gap to a noise floor that no model made, or nearly all of it.
+    /// Named effects close all or nearly all of the gap to a noise floor that does not depend on a model.
     Explained,
     /// The structure holds; a nominal parameter has changed.
     ParameterChange,
-    /// Something is left that no known effect explains.
+    /// No known effect explains the residual.
     Remainder,
-    /// The recording cannot be what it says; nothing was fitted.
+    /// The recording is physically impossible; nothing was fitted.
     DataFault,
 }
 
-/// What is compared, and all residuals, floors and gaps are of.
+/// The compared quantity. All residuals, floors and gaps refer to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Residual {
     /// The torque that the model predicts for the recorded motion, N·m or N.
     #[default]
     Torque,
-    /// The position of the model that runs freely on the recorded voltage, rad or m.
+    /// The position of a model with only the recorded voltage as input, rad or m.
     Position,
 }
 
-/// What a noise floor rests on. None of these is a model of the torque.
+/// Source of a noise floor. None of these is a model of the torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FloorFrom {
     /// Two runs of one motion: the difference of their residuals.
     RepeatedRuns,
-    /// The torque's own noise beyond the band of the motion, with what the steps of the encoders and white noise of the positions leave
-    /// in the torque. A lower limit: noise that is not told from the motion is not in it.
+    /// Torque noise beyond the band of the motion, plus the torque error from encoder steps and white position noise. A
+    /// lower limit: it does not contain noise that looks like motion.
     TorqueReading,
-    /// No motion was repeated, and the noise of the torque is not told from its signal.
+    /// No motion was repeated, and the torque noise is not distinguishable from the signal.
     Unknown,
 }
 
-/// What the model that is written leaves of a joint's torque, on data that it was not fitted to.
+/// Torque residual of the written model on one joint, on data outside its fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Left {
     /// Name of the joint.
     pub joint: String,
     /// ASCII, N*m or N.
     pub unit: String,
-    /// Whether the data are the hold-out; else blocks of the training data, left out of the fit in turn.
+    /// True if the data are the hold-out; else they are blocks of the training data, left out of the fit in turn.
     pub on_holdout: bool,
-    /// RMS of the residual with the description's parameters fitted again.
+    /// RMS of the residual with the refitted description.
     pub before: f64,
     /// RMS of the residual of the written model.
     pub after: f64,
-    /// Noise floor of these data; NaN (null) where none is known.
+    /// Noise floor of these data; NaN (null) if unknown.
     pub floor: f64,
-    /// What it rests on.
+    /// Source of the noise floor.
     pub floor_from: FloorFrom,
     /// RMS of the recorded torque.
     pub torque: f64,
     /// `after` in per cent of `torque`.
     pub percent_of_torque: f64,
-    /// Whether `after` is the noise floor or nearly all of the gap is closed.
+    /// True if `after` is at the noise floor or nearly all of the gap is closed.
     pub explained: bool,
 }
 
-/// Where part of the gap sits.
+/// Dependence of the residual on a coordinate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Place {
     /// Name of the joint.
     pub joint: String,
-    /// What it depends on: `velocity`, `position`, `motor angle`, …
+    /// The coordinate: `velocity`, `position`, `motor angle`, …
     pub coordinate: String,
-    /// Interval of the coordinate that holds most of it.
+    /// Interval of the coordinate with most of the excess.
     pub interval: [f64; 2],
     /// Unit of the interval.
     pub unit: String,
     /// Share of the excess over the noise floor that the coordinate alone explains.
     pub share: f64,
-    /// Corrected for the number of coordinates.
+    /// p-value corrected for the number of coordinates.
     pub p_value: f64,
-    /// One sentence.
+    /// Description, a sentence.
     pub text: String,
 }
 
 /// A fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Value {
-    /// SI
+    /// Value, SI.
     pub value: f64,
-    /// Standard deviation; 0 of a whole number, infinite where the motion does not tell.
+    /// Standard deviation; 0 for an integer, infinite if not identifiable.
     pub std: f64,
-    /// ASCII
+    /// Unit, ASCII.
     pub unit: String,
 }
 
 impl Value {
-    /// With its standard deviation and `unit` behind it, or said not to be determined.
+    /// Returns the value with its standard deviation and `unit`, or "(not determined)".
     pub fn said(&self, unit: &str) -> String {
         if self.std.is_infinite() {
             format!(
@@ -121,137 +121,137 @@ impl Value {
     }
 }
 
-/// One effect that was found.
+/// An effect that was found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Step {
-    /// Best name.
+    /// Most probable name.
     pub effect: String,
-    /// Which of several laws under that name.
+    /// Law, if the name has several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub law: Option<String>,
     /// Name of the joint.
     pub joint: String,
-    /// Every name that these data support equally, `effect` among them.
+    /// All names that these data support equally, including `effect`.
     pub set: Vec<String>,
     /// Its parameters.
     pub parameters: BTreeMap<String, Value>,
-    /// Corrected for all that was tried.
+    /// p-value corrected for all trials.
     pub p_value: f64,
-    /// Posterior probability of the name among all that were tried in its place, by what each leaves of blocks that it was not
-    /// fitted to; NaN (null) where no search compared them.
+    /// Posterior probability of the name among all names tried in its place, from the residual on blocks outside the
+    /// fit; NaN (null) if no search compared them.
     pub name_probability: f64,
     /// Best name outside the set.
     pub runner_up: Option<String>,
     /// Share of this step's gap that the runner-up would have closed.
     pub runner_up_gap_closed: Option<f64>,
-    /// Unit of the residual that this step takes away, ASCII: that of [`Diagnosis::residual`], or V of what shows in the motor's
-    /// voltage alone.
+    /// Unit of the residual that this step reduces, ASCII: that of [`Diagnosis::residual`], or V for an effect in the
+    /// motor voltage alone.
     pub rms_unit: String,
     /// RMS of the joint's residual, before and after this step.
     pub train_rms: [f64; 2],
     /// The same on the hold-out; null without one.
     pub holdout_rms: Option<[f64; 2]>,
-    /// RMS of the simulated motion's error before and after this step, rad or m; null where it cannot be simulated.
+    /// RMS error of the simulated motion before and after this step, rad or m; null if it cannot be simulated.
     pub motion_rms: Option<[f64; 2]>,
-    /// Share of the hold-out's (else the training) gap that this step closes, 1 at most; NaN (null) where no noise floor is known or
-    /// the RMS has grown.
+    /// Share of the hold-out's (else the training) gap that this step closes, at most 1; NaN (null) if no noise floor
+    /// is known or the RMS rose.
     pub gap_closed: f64,
-    /// Why to believe it, one sentence.
+    /// Reason to believe it, a sentence.
     pub why: String,
 }
 
-/// What became of an effect that the description states.
+/// Fate of a described effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fate {
-    /// It stays, its parameters fitted together with everything else.
+    /// It stays, refitted together with everything else.
     FittedAgain,
-    /// It stays with the parameters that it was described with.
+    /// It stays with its described parameters.
     Held,
     /// The recordings contradict it: the new description does not have it.
     Dropped,
-    /// It counts as part of its link.
+    /// It is part of its link.
     InTheLink,
 }
 
-/// An effect that the description states.
+/// A described effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Described {
     /// Its name.
     pub effect: String,
-    /// Which of several laws under that name.
+    /// Law, if the name has several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub law: Option<String>,
     /// Name of the joint.
     pub joint: String,
-    /// What became of it.
+    /// Its fate.
     pub fate: Fate,
-    /// Its parameters where they were fitted again.
+    /// Its parameters, if refitted.
     pub parameters: BTreeMap<String, Value>,
-    /// The same in words, one sentence.
+    /// Its fate, a sentence.
     pub text: String,
 }
 
-/// What [`Absorbed::before`] is.
+/// Source of [`Absorbed::before`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Before {
     /// Identified without the effects that were found.
     WithoutEffects,
-    /// Stated by the description; there was no effect that could have bent it.
+    /// Described; no effect could have changed it.
     Described,
 }
 
-/// A nominal parameter that moved: when the effects came in, or against the description.
+/// A nominal parameter that changed, by adding the effects or against the description.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Absorbed {
-    /// Name with the joint's number, or the base parameter's expression.
+    /// Name with the joint's number, or the expression of the base parameter.
     pub parameter: String,
-    /// ASCII
+    /// Unit, ASCII.
     pub unit: String,
-    /// As [`Diagnosis::absorbed_before`] says.
+    /// Value before, see [`Diagnosis::absorbed_before`].
     pub before: f64,
-    /// Identified, with the effects where there are any.
+    /// Identified value, with the effects if there are any.
     pub after: f64,
-    /// Difference in standard deviations of the latter.
+    /// Difference over the standard deviation of `after`.
     pub sigmas: f64,
 }
 
-/// All parameters fitted once more, to the simulated motion of the training data.
+/// Refit of all parameters to the simulated motion of the training data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ByMotion {
-    /// Of the motion, ASCII.
+    /// Unit of the motion, ASCII.
     pub unit: String,
-    /// What the simulated motion departs by with the torque's values, and with its own.
+    /// RMS error of the simulated motion, with the parameters fitted to torque and to motion.
     pub motion_rms: [f64; 2],
-    /// Of the torque, ASCII.
+    /// Unit of the torque, ASCII.
     pub torque_unit: String,
-    /// What the two leave of the torque.
+    /// RMS torque residual of both.
     pub torque_rms: [f64; 2],
-    /// Whether the motion's values stand.
+    /// True if the parameters fitted to motion are used.
     pub adopted: bool,
-    /// Each parameter by both.
+    /// Both estimates of each parameter.
     pub parameters: Vec<Twice>,
-    /// In words.
+    /// Summary in words.
     pub text: String,
 }
 
-/// A parameter by torque and by motion.
+/// A parameter fitted to torque and to motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Twice {
-    /// Base parameter's expression, or the effect's name and the parameter's with a dot between.
+    /// Expression of the base parameter, or names of effect and parameter with a dot between.
     pub parameter: String,
-    /// ASCII
+    /// Unit, ASCII.
     pub unit: String,
-    /// By the torque.
+    /// Estimate from the torque.
     pub torque: f64,
-    /// Of that.
+    /// Its standard deviation.
     pub torque_std: f64,
-    /// By the simulated motion.
+    /// Estimate from the simulated motion.
     pub motion: f64,
-    /// Of that.
+    /// Its standard deviation.
     pub motion_std: f64,
-    /// Their difference in standard deviations of both.
+    /// Difference over the standard deviation of both.
     pub sigmas: f64,
 }
 
@@ -262,111 +262,111 @@ pub struct NotTestable {
     pub effect: String,
     /// Name of the joint.
     pub joint: String,
-    /// What the data lack.
+    /// Information that the data lack.
     pub why: String,
-    /// What would show it.
+    /// Experiment that would show it.
     pub experiment: String,
 }
 
-/// The smallest size of an effect that these data would have shown.
+/// Smallest detectable size of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Detectable {
     /// Its name.
     pub effect: String,
     /// Name of the joint.
     pub joint: String,
-    /// Which parameter the size is of.
+    /// Parameter of the size.
     pub parameter: String,
-    /// SI; the median over the shapes of the effect's law that were looked at.
+    /// Size, SI: the median over the tested shapes of the effect's law.
     pub size: f64,
-    /// The same at the shape that this motion shows least, such as a breakaway that is gone at a speed it hardly goes through; none
-    /// where the law has one shape.
+    /// The same at the least detectable shape, such as a breakaway at a speed that the motion hardly reaches; none if
+    /// the law has one shape.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_at_worst: Option<f64>,
-    /// ASCII
+    /// Unit, ASCII.
     pub unit: String,
 }
 
-/// What would separate a set, or make an effect testable.
+/// Experiment that would separate the names of a set, or make an effect testable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextExperiment {
-    /// Which primitive.
+    /// Its primitive.
     pub kind: String,
-    /// Names that it separates, or the one it makes testable.
+    /// Names that it separates, or the effect that it makes testable.
     pub separates: Vec<String>,
-    /// What to do, sentences.
+    /// Instructions, sentences.
     pub text: String,
-    /// File for `rig` to run, beside `diagnosis.json`; none where there is no motion for it.
+    /// File for `rig` to run, beside `diagnosis.json`; none if there is no motion for it.
     pub file: Option<String>,
-    /// Distance of the rivals' predictions in standard deviations of the noise, expected.
+    /// Expected distance of the rivals' predictions in standard deviations of the noise.
     pub separation: Option<f64>,
-    /// s
+    /// Duration, s.
     pub duration: Option<f64>,
-    /// Whether more than running [`Self::file`] is asked for: a load, the base turned, another sensor.
+    /// True if it needs more than running [`Self::file`]: a load, a turned base, another sensor.
     #[serde(skip)]
     pub hands: bool,
-    /// What [`Self::file`] has to hold, as TOML.
+    /// Contents of [`Self::file`], TOML.
     #[serde(skip)]
     pub trajectory: Option<String>,
 }
 
-/// What no known effect explains.
+/// Residual that no known effect explains.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Remainder {
     /// Name of the joint.
     pub joint: String,
-    /// RMS beyond the noise floor.
+    /// RMS beyond the noise floor: √(RMS² − floor²).
     pub rms: f64,
-    /// Its unit: of the residual, or V of what a voltage alone shows.
+    /// Its unit: of the residual, or V for a voltage residual.
     pub unit: String,
-    /// RMS over the noise floor.
+    /// Residual RMS over the noise floor.
     pub ratio: f64,
-    /// Where it sits.
+    /// Coordinates that it depends on.
     pub places: Vec<Place>,
-    /// In words.
+    /// Description in words.
     pub text: String,
-    /// Whether it is no number beyond a known floor but a reason not to believe that all is explained: the text says which.
+    /// True if it is not a residual beyond a known floor, but a reason to doubt a full explanation, given in the text.
     #[serde(skip)]
     pub doubt: bool,
 }
 
 impl Remainder {
-    /// Whether it is of a motor's voltage, and the torque may be explained.
+    /// Returns true if it is a residual of the motor voltage. The torque may be explained.
     pub fn of_a_voltage(&self) -> bool {
         self.unit == "V"
     }
 }
 
-/// Something about a recording that no physics explains.
+/// A physically impossible feature of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataFault {
     /// `sign`, `magnitude`, `unit`, `ratio`, `clock`, `swap`, `gravity`, `saturation`, `jump`, `too-short`, `not-moving`.
     pub kind: String,
-    /// Which columns.
+    /// The affected columns.
     #[serde(skip)]
     pub about: About,
-    /// Which recording.
+    /// The affected recording.
     pub recording: String,
     /// Name of the joint.
     pub joint: String,
-    /// Whether nothing else explains the data; what is not certain stops nothing.
+    /// True if nothing else explains the data. An uncertain fault does not stop the diagnosis.
     pub certain: bool,
-    /// What is wrong and what would be right, a sentence.
+    /// The fault and its correction, a sentence.
     pub text: String,
 }
 
 impl DataFault {
-    /// Whether rows are left to fit: not of a recording that cannot be prepared, is too short or does not move.
+    /// Returns true if rows remain to fit. False if the recording cannot be prepared, is too short or does not move.
     pub fn leaves_rows(&self) -> bool {
         self.about != About::Preparation
             && !["too-short", "not-moving"].contains(&self.kind.as_str())
     }
 }
 
-/// What of a recording a fault is about.
+/// Part of a recording that a fault concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum About {
-    /// The recording, which cannot be prepared: it is broken or irregular.
+    /// The whole recording, which cannot be prepared: it is broken or irregular.
     Preparation,
     /// Time, or the recording as a whole.
     Recording,
@@ -376,12 +376,12 @@ pub enum About {
     Torque,
 }
 
-/// RMS of the residual from model to model down to the floor, one joint.
+/// RMS residual of one joint from model to model down to the floor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Waterfall {
     /// Name of the joint.
     pub joint: String,
-    /// ASCII, N*m or N; rad or m where [`Diagnosis::residual`] is the position.
+    /// Unit, ASCII: N*m or N; rad or m if [`Diagnosis::residual`] is the position.
     pub unit: String,
     /// Names of the models: `frozen description`, `refitted`, then each effect.
     pub models: Vec<String>,
@@ -389,9 +389,9 @@ pub struct Waterfall {
     pub train: Vec<f64>,
     /// RMS over the hold-out; empty without one.
     pub holdout: Vec<f64>,
-    /// Noise floor; NaN (null) where none is known.
+    /// Noise floor; NaN (null) if unknown.
     pub floor: f64,
-    /// … of the hold-out's rows, of which fewer samples are the mean where it was recorded more slowly.
+    /// Noise floor of the hold-out's rows. With a lower sample rate, each row is the mean of fewer samples.
     pub holdout_floor: f64,
 }
 
@@ -400,66 +400,66 @@ pub struct Waterfall {
 pub struct Map {
     /// Name of the joint.
     pub joint: String,
-    /// What is on the abscissa.
+    /// Coordinate on the abscissa.
     pub coordinate: String,
-    /// ASCII
+    /// Its unit, ASCII.
     pub unit: String,
-    /// ASCII, unit of the residual.
+    /// Unit of the residual, ASCII.
     pub residual_unit: String,
-    /// Middles of the bins.
+    /// Bin centres.
     pub at: Vec<f64>,
     /// Mean residual before, and half the width of its 95 % band.
     pub before: Vec<[f64; 2]>,
     /// Mean residual after, and half the width of its 95 % band.
     pub after: Vec<[f64; 2]>,
-    /// The fitted law, without what the nominal model absorbs; empty where there is none.
+    /// The fitted law, without the part absorbed by the nominal model; empty without one.
     pub law: Vec<f64>,
-    /// Which step it belongs to, from 0; none for what is left at the end.
+    /// Its step, from 0; none for the final residual.
     pub step: Option<usize>,
 }
 
-/// Curves over time for a plot: a stretch of the hold-out (else training) recording.
+/// Curves over time for a plot: a segment of the hold-out (else training) recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Curves {
     /// Name of the joint.
     pub joint: String,
-    /// Which recording.
+    /// The recording.
     pub recording: String,
-    /// s
+    /// Time, s.
     pub t: Vec<f64>,
-    /// Measured and what the models without and with the effects predict, N·m or N; empty where none was recorded.
+    /// Measured torque, and predictions without and with the effects, N·m or N; empty if not recorded.
     pub torque: [Vec<f64>; 3],
-    /// Measured and simulated positions without and with the effects, rad or m; empty where not simulated.
+    /// Measured position, and simulations without and with the effects, rad or m; empty if not simulated.
     pub motion: [Vec<f64>; 3],
 }
 
-/// One candidate in the first round: what else was tried.
+/// A trial: one candidate in one sweep of the search.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tried {
     /// Its name (and law).
     pub effect: String,
     /// Name of the joint.
     pub joint: String,
-    /// Which step, from 0.
+    /// Its step, from 0.
     pub step: usize,
-    /// Share of the residual's RMS that it takes away on blocks it was not fitted to.
+    /// Share of the residual's RMS that it removes on blocks outside its fit.
     pub gain: f64,
-    /// That gain over its standard deviation.
+    /// The gain over its standard deviation.
     pub gain_sigmas: f64,
-    /// Corrected for all that was tried.
+    /// p-value corrected for all trials.
     pub p_value: f64,
-    /// Why it was not taken; empty for the one that was.
+    /// Reason for refusal; empty for the accepted candidate.
     pub refused: String,
 }
 
 impl Step {
-    /// RMS before and after, of the hold-out, else of the training data.
+    /// Returns the RMS before and after, on the hold-out, else on the training data.
     pub fn judged(&self) -> [f64; 2] {
         self.holdout_rms.unwrap_or(self.train_rms)
     }
 
-    /// How far the step closes its gap: a share from 0 to 1 in per cent, else the RMS before and after, as a share of a gap whose floor
-    /// is not known, or that has grown, is no number.
+    /// Returns the closed share of the gap in per cent if it is between 0 and 1. Otherwise (floor unknown or RMS risen)
+    /// returns the RMS before and after.
     pub fn fall(&self) -> String {
         match (0.0..=1.0).contains(&self.gap_closed) {
             true => format!("{} %", format_significant(100.0 * self.gap_closed, 3)),
@@ -472,7 +472,7 @@ impl Step {
 }
 
 impl Waterfall {
-    /// Noise floor of what the models are judged on.
+    /// Returns the noise floor of the data that judge the models.
     pub fn judged_floor(&self) -> f64 {
         if self.holdout.is_empty() {
             self.floor
@@ -481,7 +481,7 @@ impl Waterfall {
         }
     }
 
-    /// The models' RMS on the recordings held back, else on those of the fit.
+    /// Returns the models' RMS on the hold-out, else on the training data.
     pub fn judged(&self) -> &[f64] {
         if self.holdout.is_empty() {
             &self.train
@@ -491,99 +491,99 @@ impl Waterfall {
     }
 }
 
-/// How recordings were treated before anything was compared.
+/// Treatment of the recordings before the comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Treated {
-    /// Of the training recordings, Hz.
+    /// Sample rate of the training recordings, Hz.
     pub sample_rate: f64,
     /// Cut-off of the low-pass on the position, Hz.
     pub position_cutoff: f64,
-    /// Why, a sentence.
+    /// Reason for this cut-off, a sentence.
     pub position_cutoff_why: String,
-    /// Cut-off of the position that inertia and gravity are formed of before they pass the low-pass above, Hz; null where that takes
-    /// nothing away in the band, so that they are formed of the filtered position.
+    /// Cut-off of the position for inertia and gravity, Hz; they then pass the low-pass above. Null if that low-pass
+    /// has no loss in the band: then the filtered position is used.
     pub links_cutoff: Option<f64>,
-    /// Upper end of the band that is compared, Hz.
+    /// Upper end of the compared band, Hz.
     pub band: f64,
     /// Highest frequency of the motion, Hz.
     pub motion_frequency: f64,
-    /// Rows a second.
+    /// Rows per second.
     pub row_rate: f64,
-    /// Joint by joint.
+    /// Rows, joint by joint.
     pub rows: Vec<Rows>,
 }
 
 /// Rows of a joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rows {
-    /// Its name.
+    /// Name of the joint.
     pub joint: String,
-    /// Speed below which rows are left out.
+    /// Speed below which rows are not used.
     pub least_speed: f64,
-    /// Of that, ASCII.
+    /// Unit of the speed, ASCII.
     pub unit: String,
-    /// Used and all of the training recordings.
+    /// Used and total rows of the training recordings.
     pub train: [usize; 2],
     /// The same of the hold-out; null without one.
     pub holdout: Option<[usize; 2]>,
 }
 
-/// The result.
+/// The result of a diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// `rig-diagnosis/1`
     pub schema: String,
     /// Name of the robot.
     pub robot: String,
-    /// What became of the gap.
+    /// Verdict.
     pub verdict: Verdict,
-    /// What is compared.
+    /// The compared quantity.
     pub residual: Residual,
     /// The verdict in words, sentences.
     pub words: Vec<String>,
-    /// Per joint, in the residual's unit; NaN (null) where none is known.
+    /// Noise floor per joint, in the residual's unit; NaN (null) if unknown.
     pub noise_floor_rms: Vec<f64>,
-    /// What each of them rests on; empty where the residual is no torque.
+    /// Source of each noise floor; empty if the residual is not a torque.
     pub noise_floor_from: Vec<FloorFrom>,
-    /// What the written model leaves, joint by joint; empty where the residual is no torque.
+    /// Torque residual of the written model, joint by joint; empty if the residual is not a torque.
     pub left: Vec<Left>,
-    /// How it was estimated, a sentence.
+    /// Method of the noise floor, a sentence.
     pub noise_floor_how: String,
-    /// How the motion was simulated, or why not, a sentence.
+    /// Method of the motion simulation, or why there is none, a sentence.
     pub motion_how: String,
-    /// How the recordings were treated; null where nothing was fitted, and of a model that a voltage drives.
+    /// Treatment of the recordings; null if nothing was fitted, and for a model with a voltage input.
     pub treatment: Option<Treated>,
-    /// Per joint, how long before it acts (negative: after) a torque was recorded, s; taken out.
+    /// Torque lead per joint: time by which a torque was recorded before it acts (negative: after), s. It was removed.
     pub torque_lead: Vec<f64>,
-    /// Where the gap sits, most of it first; empty where it goes with no coordinate more than chance would have it.
+    /// Dependence of the gap on coordinates, the largest share first; empty if no dependence is beyond chance.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
-    /// The description's own effects, in its order.
+    /// The described effects, in their order.
     pub described: Vec<Described>,
-    /// What was found beside them, in that order.
+    /// The effects found, in their order.
     pub steps: Vec<Step>,
-    /// Of the hold-out (else training) residual's excess over the noise floor; null where nothing was found. Of what fitting the
-    /// description again leaves; of what it leaves as it stands where its own values are said to have changed.
+    /// Closed share of the hold-out (else training) residual's excess over the noise floor; null if nothing was found.
+    /// It starts from the refitted description, or from the unchanged one if its values have changed.
     pub gap_closed: Option<f64>,
-    /// Nominal parameters that had been lying; without effects, those of the description. Empty where it states none.
+    /// Nominal parameters changed by the effects, or without effects against the description. Empty if it states none.
     pub absorbed: Vec<Absorbed>,
-    /// What they are compared with.
+    /// Source of the values before.
     pub absorbed_before: Before,
-    /// All of them by torque and by motion; none where that was not done.
+    /// Estimates from torque and from motion; none if there was no fit to motion.
     pub by_motion: Option<ByMotion>,
     /// Effects that these data cannot show.
     pub not_testable: Vec<NotTestable>,
-    /// The smallest size of each other effect that they would have shown.
+    /// Smallest detectable size of each other effect.
     pub detectable: Vec<Detectable>,
-    /// What to do next.
+    /// Next experiment.
     pub next_experiment: Option<NextExperiment>,
-    /// What is left.
+    /// The unexplained residual.
     pub remainder: Option<Remainder>,
-    /// What is wrong with the data.
+    /// Faults of the data.
     pub data_faults: Vec<DataFault>,
     /// RMS from model to model.
     pub waterfall: Vec<Waterfall>,
-    /// Everything that was tried.
+    /// All trials.
     pub tried: Vec<Tried>,
     /// Residual maps for plots.
     #[serde(skip)]
@@ -594,8 +594,8 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Whether a step's name is certain: no other name is in its set, the posterior probability of the name is at least 95 %, and
-    /// what is left of its joint leaves nothing for another name to explain.
+    /// Returns true if a step's name is certain. Its set has no other name, its posterior probability is at least 95 %,
+    /// and its joint has no residual for another name.
     pub fn is_certain(&self, step: &Step) -> bool {
         let own = self.left.iter().find(|left| left.joint == step.joint);
         let left =
@@ -606,12 +606,12 @@ impl Diagnosis {
             && !left
     }
 
-    /// Share that the effects close of the gap which fitting the description's parameters again leaves, where [`Self::gap_closed`]
-    /// counts that fitting in; none where it is of the effects alone.
+    /// Returns the share of the refitted description's gap that the effects close, if [`Self::gap_closed`] includes the
+    /// refit. None if it already refers to the effects alone.
     pub fn closed_by_effects(&self) -> Option<f64> {
         let (mut gap, mut closed) = (0.0, 0.0);
         for w in &self.waterfall {
-            // A changed value that has an effect's name is a step, and no model of its own.
+            // A changed value with an effect's name is a step without a model of its own.
             if let [_, refitted, .., last] = w.judged()
                 && self.residual == Residual::Torque
                 && w.models.len() >= self.steps.len() + 2

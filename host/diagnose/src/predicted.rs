@@ -1,4 +1,4 @@
-//! What the nominal model says of a run.
+//! Predictions of the nominal model for a run.
 
 use rig_shared::multibody::column;
 
@@ -7,16 +7,16 @@ use super::rows::{Nominal, motion_of};
 use rig_data::runs::Run;
 use rig_model::robot::Robot;
 
-/// What the present model says of a run at the full rate.
+/// Predictions of the present model for a run at the full rate.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Predicted {
     /// Torque, joint by joint.
     pub(super) torque: Vec<Vec<f64>>,
-    /// Torque that the gear transmits: without friction and the drive's own inertia.
+    /// Torque through the gear: without friction and the drive's own inertia.
     pub(super) load: Vec<Vec<f64>>,
 }
 
-/// What the nominal model with these base parameters says of a run, and of the load on the gears.
+/// Predicts the torque and the gear load of a run with these base parameters.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -44,7 +44,7 @@ pub(super) fn predict(
     })?;
     let drives = robot.standard_parameters();
     for j in 0..n {
-        // The drive's inertia is part of a combination with the link's: the description says how much is its own.
+        // The drive inertia is grouped with the link's; the description gives its own part.
         let own = drives[j][column::DRIVE_INERTIA];
         let grouped = !nominal.has_own_drive_inertia(j);
         if own != 0.0 && grouped {

@@ -1,4 +1,4 @@
-//! A candidate at the shapes that explain most, and whether that is enough to take it.
+//! Fit of a candidate's shapes, and the tests for its acceptance.
 
 mod shapes;
 #[cfg(test)]
@@ -19,48 +19,48 @@ use super::search::{Search, is_gear};
 use super::simplex::{MOST_ANSWERS, Simplex};
 use super::transmission::ABREAST;
 
-/// Share of the torque that a twist changes by mass and load of the link, below which it is no twist: true gears of the emulated rig come
-/// out from 0.7 to 1.1, and a wide play of a third stands in for a base that is not level …
+/// Least share of the twist torque of mass and load that a gear must have. True gears of the emulated rig give 0.7 to
+/// 1.1. A wide backlash with a third can replace a tilted base.
 const LEAST_OF_A_TWIST: f64 = 0.5;
-/// … a soft spring, whose swing the motor's motion alone does not tell for long, has come out at 0.49.
+/// The same for an elastic gear: a soft one, whose swing the motor motion predicts only briefly, gave 0.49.
 const LEAST_OF_A_SPRINGS_TWIST: f64 = 0.4;
-/// Family-wise probability of a name although nothing is there.
+/// Family-wise significance level of an effect.
 pub(super) const SIGNIFICANT: f64 = 0.01;
-/// Least share of the RMS that an effect must take away on folds it was not fitted to.
+/// Least RMS share that an effect must remove on folds outside its fit (its gain).
 pub(super) const LEAST_GAIN: f64 = 0.02;
-/// … and that many standard deviations of it.
+/// Least ratio of the gain to its standard deviation.
 const LEAST_SIGMAS: f64 = 2.0;
-/// … beside its double, which takes nearly all of it away: what no model without it would leave, for neither has another form …
+/// Least gain beside a near-collinear effect. Both have one form only, so a model without it leaves less.
 const LEAST_GAIN_BESIDE_ITS_DOUBLE: f64 = 0.0075;
-/// … and in standard deviations of so little.
+/// Least ratio of such a small gain to its standard deviation.
 const LEAST_SIGMAS_BESIDE_ITS_DOUBLE: f64 = 3.0;
-/// What takes away this share of the RMS is no chance, whatever it is called: a link that is driven by the noise of a motion with
-/// rests took a fifth where nothing was missing.
+/// Gain that is real even if it varies strongly between blocks. Noise alone gave a fifth: on an elastic link, for a
+/// motion with dwells.
 const MUCH: f64 = 0.3;
-/// … of an elastic gear, whose link may ring in a few blocks alone, this. Play bends to a single touch.
+/// The same for an elastic gear, which may ring in few blocks. Not for backlash: it fits a single contact.
 const MUCH_OF_A_SPRING: f64 = 0.5;
-/// … then it need only be so many standard deviations of its gain: what shows where the torque is highest alone shows in few blocks.
+/// Least ratio of such a gain to its standard deviation: an effect at the highest torque shows in few blocks.
 const LEAST_SIGMAS_OF_MUCH: f64 = 1.0;
-/// Deviations of a fair coin by which it takes something off more blocks than not, where a few loud blocks hide what it varies by.
+/// Standard deviations of the sign test over blocks that suffice instead, as a few loud blocks hide the variation.
 const SIGNS: f64 = 3.0;
-/// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
+/// Least gain of a gear: its three or four shapes fit much that is no gear.
 const LEAST_GAIN_OF_GEARS: f64 = 0.1;
-/// … of a play whose link follows the recorded torque by far better, this …
+/// Least gain of a backlash that the observer supports.
 const LEAST_GAIN_OF_HEARD: f64 = 0.05;
-/// … which is tried where its gain is so many standard deviations.
+/// Least ratio of the gain to its standard deviation for trying the observer on it.
 const CLEAR_SIGMAS: f64 = 4.0;
-/// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
+/// A candidate whose explained share of the squares is lower at every grid point cannot reach the least gain.
 const HOPELESS: f64 = 0.5 * LEAST_GAIN;
-/// … and a gear, from whose starting points the ridge is further away.
+/// The same for a gear, whose starting points are farther from the optimum.
 const HOPELESS_GEAR: f64 = 0.02;
-/// Share of critical damping beyond which a gear is no spring: shafts and gears of steel have some hundredths, and what hardly
-/// swings is a lag of friction, with which a spring and all friction on the link are easily confused.
+/// Damping ratio above which a gear is no spring: steel shafts and gears have some hundredths. An overdamped one is a
+/// friction lag, easily confused with a spring and all friction on the link.
 const MOST_DAMPED: f64 = 0.5;
-/// Starting points that are followed up, side by side.
+/// Starting points that are refined in parallel.
 const FOLLOWED: usize = ABREAST;
-/// First step of a simplex, in a shape's coordinate, and its answers: from a grid …
+/// First step of a simplex in a shape's coordinate, and its evaluations: from a grid …
 const FAR: (f64, usize) = (0.4, MOST_ANSWERS);
-/// … and from shapes that were the best beside a model that was nearly this one.
+/// … and from the best shapes beside a similar model.
 const NEAR: (f64, usize) = (0.2, 50);
 /// Golden-section steps of the refinement.
 const REFINEMENTS: usize = 14;
@@ -68,7 +68,7 @@ const REFINEMENTS: usize = 14;
 /// Share explained, shapes, columns.
 type Best = (f64, [f64; SHAPES], Arc<Vec<Column>>);
 
-/// A candidate at its best shapes.
+/// A candidate with fitted shapes.
 #[derive(Clone, Debug)]
 pub(super) struct Profile {
     /// Which.
@@ -77,31 +77,30 @@ pub(super) struct Profile {
     pub(super) shapes: [f64; SHAPES],
     /// Its columns.
     pub(super) columns: Arc<Vec<Column>>,
-    /// What they do.
+    /// Test results of the columns.
     pub(super) evidence: Evidence,
-    /// A shape that has run to the least of what is searched, where a law is its limit of none; the swing of a link on a gear
-    /// that hardly lets it; the stiffness of a spring that is a constant; a gain that has left what physics allows.
+    /// Name of the degenerate part: a shape at its lower search bound, a gain outside its bounds, or the stiffness of a
+    /// spring that is a constant. For gears also an overdamped swing, or too small a share of the torque.
     pub(super) vanished: Option<&'static str>,
-    /// Whether it is a play whose link follows the recorded torque by far better.
+    /// True for a backlash that the observer supports.
     pub(super) heard: bool,
-    /// Whether its double is in the model: what is nearly the same function of the motion, and of one form alone.
+    /// True if a near-collinear effect is in the model.
     pub(super) doubled: bool,
-    /// Of a gear whose link is followed from the recorded torque. Its columns are then a known torque, whose gains are 1.
+    /// Set for an observer-based gear. Its columns are then a known torque, with gains of 1.
     pub(super) followed: Option<Followed>,
-    /// Of a gear, the shapes by the other of two ways, where it was seen both by the motor's motion alone and with its link
-    /// followed.
+    /// Shapes of a gear by the other of two methods, if both were used: open-loop and observer-based.
     pub(super) otherwise: Option<[f64; SHAPES]>,
 }
 
-/// How a link is followed.
+/// Settings of the observer of a link.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Followed {
-    /// RMS on the rows of what counts as noise of the torque, N·m.
+    /// RMS of the torque noise on the rows, N·m.
     pub(super) noise: f64,
 }
 
 impl Profile {
-    /// Why it is not taken at a p-value corrected for `tried` trials; none where it passes.
+    /// Returns the reason for refusal at a p-value corrected for `tried` trials; None if the candidate passes.
     pub(super) fn refused(&self, tried: usize) -> Option<String> {
         let e = &self.evidence;
         let p = self.corrected(tried);
@@ -127,7 +126,7 @@ impl Profile {
         }
     }
 
-    /// Whether it takes away so much that something is there, be it this or another.
+    /// Returns true if the gain proves that something is missing, whatever its name.
     pub(super) fn takes_much(&self, tried: usize) -> bool {
         let e = &self.evidence;
         self.corrected(tried) <= SIGNIFICANT
@@ -135,8 +134,8 @@ impl Profile {
             && e.gain_sigmas >= LEAST_SIGMAS
     }
 
-    /// Whether its gain is too little beside what it varies by from block to block. A gear's shapes bend to much; what is no gear
-    /// may also show by how many blocks it takes something off.
+    /// Returns true if the gain is not clear of its variation between blocks. A gear fits many things. Any other effect
+    /// may also pass by the number of blocks that it improves.
     pub(super) fn in_too_few_blocks(&self) -> bool {
         let e = &self.evidence;
         let gear = is_gear(self.candidate.kind);
@@ -154,7 +153,7 @@ impl Profile {
         e.gain_sigmas < least && (gear || e.sign_sigmas() < SIGNS)
     }
 
-    /// Whether it is a play that only takes away too little, as the motor's motion alone drives its link.
+    /// Returns true for a backlash that passes all tests except the least gain, because the link is open-loop.
     pub(super) fn is_nearly_a_play(&self, tried: usize) -> bool {
         let e = &self.evidence;
         self.candidate.kind == Kind::Backlash
@@ -176,19 +175,19 @@ impl Profile {
         }
     }
 
-    /// p-value corrected for `tried` trials.
+    /// Returns the p-value corrected for `tried` trials.
     pub(super) fn corrected(&self, tried: usize) -> f64 {
         self.evidence.corrected(tried)
     }
 }
 
-/// Share of critical damping at which a link of that inertia swings on an elastic gear while the motor stands.
+/// Returns the damping ratio of a link with this inertia on an elastic gear with the motor locked.
 fn damping_ratio(shapes: &[f64; SHAPES], mass: f64) -> f64 {
     let [stiffness, damping, ..] = *shapes;
     0.5 * damping / (stiffness * mass).sqrt()
 }
 
-/// Whether a spring pulls back, beside what it pulls everywhere alike: preload alone is a constant, which has names of its own.
+/// Returns true if a spring's stiffness is significant. Preload alone is a constant, with its own names.
 pub(super) fn stiff(fit: &Fit, columns: &[Column]) -> bool {
     let (Some(stiffness), Some(preload)) = (about_its_middle(fit, columns), columns.get(1..))
     else {
@@ -203,7 +202,7 @@ pub(super) fn stiff(fit: &Fit, columns: &[Column]) -> bool {
     evidence.is_some_and(|e| e.corrected(1) < SIGNIFICANT && e.gain_sigmas >= LEAST_SIGMAS)
 }
 
-/// What a spring pulls back from the middle of the motion: by that it is told from others, wherever its coordinate is zero.
+/// Returns the stiffness column orthogonal to the preload, independent of the zero of the coordinate.
 pub(super) fn about_its_middle(fit: &Fit, columns: &[Column]) -> Option<Column> {
     let (stiffness, preload) = columns.split_first()?;
     let mut rest = stiffness.clone();
@@ -216,15 +215,15 @@ pub(super) fn about_its_middle(fit: &Fit, columns: &[Column]) -> Option<Column> 
 }
 
 impl Search<'_> {
-    /// Share of the residual that a candidate's columns explain.
+    /// Returns the share of the residual's squares that a candidate's columns explain.
     fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<f64> {
         let bounds = self.bounds(&self.library[c]);
         let (share, _) = fit.explained(&fit.beside(columns)?, &bounds)?;
         Some(share)
     }
 
-    /// A candidate at its best shapes; none where it is no column of its own, its signs are impossible, or the motion spans none
-    /// of its waves. What it starts from it keeps.
+    /// Fits the shapes of a candidate. The result is at least as good as `start`. None if its columns are collinear,
+    /// its signs are impossible, or the motion does not span its waves.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -237,7 +236,7 @@ impl Search<'_> {
         self.profile_but(fit, c, start, &[])
     }
 
-    /// The same of a wave of none of the orders that are taken `but` for it.
+    /// The same for a wave whose order is not in `but`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -284,7 +283,7 @@ impl Search<'_> {
             return Ok(None);
         };
         let about = kind.about();
-        // One joint's share of the squares of all.
+        // Convert the share of one joint to the squares of all joints.
         let hopeless = if gear { HOPELESS_GEAR } else { HOPELESS };
         if best.0 * (self.source.nominal.joints() as f64) < hopeless {
             return Ok(None);
@@ -299,7 +298,7 @@ impl Search<'_> {
         if kind == Kind::PreslidingLugre && fixed.is_none() {
             self.without_fall(fit, c, &mut best)?;
         }
-        // The simplex has moved all shapes at once; one shape does not wait for another to move.
+        // The simplex has already moved all shapes together. A single shape needs no second round.
         let rounds = match about.shapes {
             _ if gear => 0,
             [] | [_] => 1,
@@ -350,8 +349,8 @@ impl Search<'_> {
         }))
     }
 
-    /// Bristles as stiff whose friction does not fall with the speed, where they take more away: from those whose friction does they
-    /// are reached by no shape alone.
+    /// Tries equally stiff bristles without friction fall, and keeps them if they explain more. No change of a single
+    /// shape reaches them.
     fn without_fall(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
         let [stroke, breakaway, velocity, ..] = best.1;
         let mut shapes = best.1;
@@ -367,8 +366,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Simplices from each of the starts, side by side, over the coordinates of all shapes at once: stiffness, damping and
-    /// play pull on each other. They begin so far from it, and end after so many answers.
+    /// Runs simplex searches from all starts in parallel, over all shapes at once: stiffness, damping and gap interact.
+    /// `far` is the first step, `answers` the number of evaluations.
     fn descend(
         &self,
         fit: &Fit,
@@ -381,7 +380,7 @@ impl Search<'_> {
         let [least, most] = self.ends(&self.library[c])?;
         let mut simplices: Vec<Simplex> = (starts.iter())
             .map(|(_, shapes, _)| {
-                // Where a bound lets it move.
+                // Inside the bounds, so that it can move.
                 let inside = |place: usize| shapes[place].max(2.0 * least[place]).min(most[place]);
                 let at: Vec<f64> = (scales.iter().zip(0..))
                     .map(|(shape, place)| coordinate(shape, inside(place)))
@@ -426,8 +425,7 @@ impl Search<'_> {
         }
     }
 
-    /// Shapes from a start on, and their columns, that leave least of the residual where their torque is known: beside the other
-    /// columns, without gains.
+    /// Fits shapes of a known torque (gains fixed) beside the other columns, from a start. Returns shapes and columns.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -472,7 +470,7 @@ impl Search<'_> {
             .ok_or_else(|| DiagnoseError::Model("its gear has no shape to begin with.".into()))
     }
 
-    /// Golden section over one shape about the best point.
+    /// Refines one shape by golden section around the best point.
     fn refine(
         &self,
         fit: &Fit,
@@ -490,7 +488,7 @@ impl Search<'_> {
             self.source.fastest(self.library[c].joint),
         ];
         let [least, most] = searched(shape, told, reached).map(|bound| coordinate(shape, bound));
-        // What is stated may lie beyond what these recordings tell.
+        // A described value may lie outside the range that these recordings resolve.
         let mut high = (middle + step).min(most);
         let mut low = (middle - step).max(least).min(high);
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
@@ -525,7 +523,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// What physics allows the gains to be; a delay within the instants of sampling is none.
+    /// Returns the physical bounds of the gains. A delay within the sampling jitter is no effect.
     fn bounds(&self, candidate: &Candidate) -> Vec<[f64; 2]> {
         if candidate.kind == Kind::MeasurementDelay {
             return vec![[slack(self.source.runs), f64::INFINITY]];

@@ -1,21 +1,21 @@
-//! Rows that touches make loud count less.
+//! Row weights near gear contacts.
 //!
-//! Where teeth touch, a law is off by the instant of the touch, whatever its shapes: within 50 ms of one the torque departs by
-//! ten times the noise of all other rows, and two recordings of one motion depart from each other by as much. By least squares
-//! over all rows alike touches are all that counts, and an effect as large as the noise shows in nothing. So once a gear is in
-//! the model a row counts by what is left about it, where that is more than about half of all rows (Carroll 1982, Annals of
-//! Statistics 10: weights from smoothed squares of residuals).
+//! At tooth contact every law has a timing error, whatever its shapes. Within 50 ms of a contact, the torque residual
+//! is ten times the noise of other rows. Two recordings of one motion differ by as much. In plain least squares such
+//! rows dominate, and an effect at noise level is invisible. So with a gear in the model, rows count less where the
+//! residual around them is above the median. The method is that of Carroll (1982, Annals of Statistics 10): weights
+//! from smoothed squares of residuals.
 
 use super::transmission::STRETCH;
 
-/// What each row of a joint counts beside the others, up to 1, where this is left of it: rows `period` s apart, of which those of
-/// `keep` are used, and runs that begin at `starts`.
+/// Returns the weight of each row of a joint, up to 1, from its residual. Rows are `period` s apart, `keep` marks used
+/// ones, and runs begin at `starts`.
 pub(super) fn counts(residual: &[f64], keep: &[bool], starts: &[usize], period: f64) -> Vec<f64> {
     let reach = (STRETCH / period).ceil() as usize;
     let mut loud = vec![0.0; residual.len()];
     for pair in starts.windows(2) {
         let (start, end) = (pair[0], pair[1]);
-        // Sums of squares and numbers of rows up to each row.
+        // Cumulated squares and counts of used rows.
         let mut sums = vec![(0.0, 0.0)];
         let (mut squares, mut used) = (0.0, 0.0);
         for k in start..end {
@@ -51,7 +51,7 @@ mod tests {
     #[test]
     fn a_row_counts_by_what_is_left_about_it_in_its_own_run() {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
-        // Two runs of 1000 rows 10 ms apart; the second begins with a touch, and one row that is not used is wrong altogether.
+        // Two runs of 1000 rows, 10 ms apart. The second begins with a contact. One unused row is completely wrong.
         let touch = 1000..1020;
         let mut residual: Vec<f64> = (0..2000)
             .map(|k| (rng.random::<f64>() - 0.5) * if touch.contains(&k) { 20.0 } else { 1.0 })
@@ -62,7 +62,7 @@ mod tests {
         for k in touch.start + 6..touch.end - 6 {
             assert!((0.02..0.1).contains(&counts[k]), "{k}: {}", counts[k]);
         }
-        // Nothing of it reaches into the run before.
+        // The contact does not affect the run before.
         let elsewhere = (0..1000).chain(1030..2000);
         for count in elsewhere.map(|k| counts[k]) {
             assert!((0.6..=1.0).contains(&count), "{count}");

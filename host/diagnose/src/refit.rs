@@ -1,4 +1,4 @@
-//! Nominal parameters and effects fitted together.
+//! Joint fit of nominal parameters and effects.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,28 +27,28 @@ use super::type_b::widened;
 use rig_identify::contradicted;
 use rig_model::robot::DESCRIBED;
 
-/// Standard deviations, over the value of a shape of which ratios count, from which on the motion does not tell it: as the Stribeck
-/// velocity of bristles whose friction does not fall.
+/// Relative standard deviation above which a log-scaled shape is not identifiable, such as the Stribeck velocity of
+/// bristles whose friction does not fall.
 const UNTOLD: f64 = 10.0;
 
-/// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
+/// Relative step of the difference quotient over a shape: far above rounding, far below the width of any law.
 const DIFFERENCE: f64 = 0.01;
-/// Standard deviation that stands for no knowledge, SI.
+/// Standard deviation that means "unknown", SI.
 const WIDE: f64 = 1e6;
-/// What gravity's direction of a single link stands for, as a result names it.
+/// Displayed name of the gravity direction of a single link.
 const GRAVITY: &str = "m*g*l (gravity's largest torque)";
-/// Share of the description's variance from which on data have added hardly anything.
+/// Ratio of the posterior to the described variance above which the data add almost nothing.
 const HARDLY_BETTER: f64 = 0.5;
 
-/// The nominal model on the training data, its free parameters fitted anew.
+/// The nominal model, refitted to the training data.
 pub(super) struct Refit<'r> {
     /// Columns of the free nominal directions.
     pub(super) free: Vec<Column>,
-    /// Nothing taken in.
+    /// Fit without any column.
     pub(super) plain: Fit<'r>,
-    /// The free nominal columns taken in.
+    /// Fit with the free nominal columns.
     pub(super) base: Fit<'r>,
-    /// Both with all rows alike, where those of the others count by what a gear leaves about them.
+    /// Both fits without row weights, if the fits above have row weights because of a gear.
     even: Option<[Fit<'r>; 2]>,
     /// Coefficients of the free nominal directions.
     pub(super) before: Solution,
@@ -56,10 +56,10 @@ pub(super) struct Refit<'r> {
 }
 
 impl<'r> Refit<'r> {
-    /// Weighs the joints by what a first fit without weights leaves of them.
+    /// Refits the nominal model. The weight of a joint is the inverse residual RMS of a first fit without weights.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the motion does not tell the nominal parameters apart.
+    /// [`DiagnoseError::Model`] if the nominal parameters are collinear along this motion.
     pub(super) fn of(bench: &Bench, rows: &'r Rows) -> Result<Self, DiagnoseError> {
         let n = rows.joints();
         let free = bench.anchor.columns(rows);
@@ -81,7 +81,7 @@ impl<'r> Refit<'r> {
         })
     }
 
-    /// The same with rows that count by what these effects leave about them, on the joints `loud`.
+    /// Adds row weights, from the residual with these effects, on the geared joints `loud`.
     pub(super) fn quieted(self, chosen: &[Profile], loud: &[usize]) -> Self {
         let left = with(&self.base, chosen, None);
         let counts = (0..self.joints)
@@ -100,12 +100,12 @@ impl<'r> Refit<'r> {
         }
     }
 
-    /// Whether rows count by what a gear leaves about them.
+    /// Returns true if rows have weights because of a gear.
     pub(super) fn is_quieted(&self) -> bool {
         self.even.is_some()
     }
 
-    /// The same with all rows alike.
+    /// Returns the fits without row weights.
     pub(super) fn evened(mut self) -> Self {
         if let Some([plain, base]) = self.even.take() {
             (self.plain, self.base) = (plain, base);
@@ -113,13 +113,13 @@ impl<'r> Refit<'r> {
         self
     }
 
-    /// The free nominal columns taken in, all rows alike.
+    /// Returns the fit with the free nominal columns and without row weights.
     pub(super) fn even(&self) -> &Fit<'r> {
         self.even.as_ref().map_or(&self.base, |[_, base]| base)
     }
 
-    /// Rows as they count for a model of these effects: without a gear all alike. First nothing taken in, then the free nominal
-    /// columns.
+    /// Returns the two fits for a model with these effects: without any column, and with the free nominal columns.
+    /// Without a gear they have no row weights.
     pub(super) fn footing(&self, chosen: &[Profile]) -> [&Fit<'r>; 2] {
         match &self.even {
             Some([plain, base]) if !chosen.iter().any(|p| is_gear(p.candidate.kind)) => {
@@ -129,7 +129,7 @@ impl<'r> Refit<'r> {
         }
     }
 
-    /// Columns of the free nominal directions, then of the effects.
+    /// Returns the columns of the free nominal directions, then of the effects.
     fn columns<'c>(&'c self, chosen: &'c [Profile]) -> Columns<'c> {
         let mut columns = Columns {
             fitted: self.free.iter().collect(),
@@ -151,10 +151,10 @@ impl<'r> Refit<'r> {
         columns
     }
 
-    /// Coefficients of the free nominal directions and of the effects' columns.
+    /// Returns the coefficients of the free nominal directions and of the effects' columns.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the motion does not tell them apart.
+    /// [`DiagnoseError::Model`] if the columns are collinear along this motion.
     pub(super) fn solution(&self, chosen: &[Profile]) -> Result<Solution, DiagnoseError> {
         let columns = self.columns(chosen);
         let [plain, _] = self.footing(chosen);
@@ -165,10 +165,10 @@ impl<'r> Refit<'r> {
             })
     }
 
-    /// Nominal parameters, gains and shapes together; `pairs` are runs that repeat each other.
+    /// Fits nominal parameters, gains and shapes together. `pairs` are runs that repeat each other.
     ///
-    /// Uncertain by what the last model leaves: its memory, not that of what the effects have taken away, and what repeats
-    /// with the motion counts once.
+    /// The uncertainty uses the correlation time of the final residual, without the effects' torque. A residual that
+    /// repeats with the motion counts once.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -209,7 +209,7 @@ impl<'r> Refit<'r> {
                     continue;
                 }
                 let slope = slope(source, profile, place, shape, gains)?;
-                // A shape that changes nothing, or what others change as well, is not known.
+                // Infinite unless the shape has an influence that is not collinear with the others.
                 stds[k][place] = f64::INFINITY;
                 let straight = is_straight(shape, profile.shapes[place], source.running());
                 if !straight && beside.push(&slope) {
@@ -238,14 +238,14 @@ impl<'r> Refit<'r> {
         })
     }
 
-    /// Torque of the effects with their gains.
+    /// Returns the torque of the effects with their gains.
     pub(super) fn explained(&self, chosen: &[Profile], after: &Solution) -> Column {
         let columns = chosen.iter().flat_map(|p| p.columns.iter());
         let gains = after.values[self.free.len()..].iter().copied();
         combined(self.joints, columns.zip(gains))
     }
 
-    /// What the description as it stands leaves; friction that it does not state is fitted beside it.
+    /// Returns the fit with all parameters as described. Friction that the description does not state is fitted.
     pub(super) fn frozen(&self, bench: &Bench) -> Fit<'r> {
         let anchor = &bench.anchor;
         let prior = anchor.prior_coefficients();
@@ -261,8 +261,8 @@ impl<'r> Refit<'r> {
         frozen.taking(unknown.map(|k| &self.free[k]))
     }
 
-    /// What moved among the nominal parameters, the surest first. `before` are their coefficients without the effects, or as
-    /// described; those that are no number are left out.
+    /// Returns the changed nominal parameters, the most significant first. `before` holds their coefficients without
+    /// the effects, or as described. NaN entries are skipped.
     pub(super) fn absorbed(
         &self,
         bench: &Bench,
@@ -287,17 +287,17 @@ impl<'r> Refit<'r> {
     }
 }
 
-/// Name and unit of each free nominal direction, and what its coefficient is to be multiplied by for that.
+/// Returns name, unit and display factor of each free nominal direction.
 fn of_directions(bench: &Bench) -> impl Iterator<Item = (String, String, f64)> {
     let base = &bench.nominal.base;
     (bench.anchor.free.iter()).map(|direction| match direction.as_slice() {
         [(b, _)] => (bench.expression(*b), base.unit(*b).to_owned(), 1.0),
-        // The one direction of several parameters is that of gravity, along the first moment as described.
+        // Only gravity combines several parameters: it points along the described first moment.
         _ => (GRAVITY.to_owned(), "N*m".to_owned(), bench.nominal.pull()),
     })
 }
 
-/// The same of everything that is fitted together: nominal directions, the effects' gains, these of their shapes (effect and place).
+/// Returns the same for all fitted parameters: nominal directions, gains, and the given shapes (effect, index).
 pub(super) fn named(
     bench: &Bench,
     source: &Source,
@@ -319,16 +319,16 @@ pub(super) fn named(
     of_directions(bench).chain(gains).chain(shapes).collect()
 }
 
-/// Columns that are fitted, and those of a known torque.
+/// Fitted columns and columns of known torque.
 struct Columns<'c> {
     fitted: Vec<&'c Column>,
     known: Vec<&'c Column>,
-    /// Where the known ones are among all.
+    /// Indices of the known columns among all columns.
     places: Vec<usize>,
 }
 
 impl Columns<'_> {
-    /// A fit of what the known ones leave.
+    /// Returns a fit without the known torque.
     fn beside<'r>(&self, plain: &Fit<'r>) -> Fit<'r> {
         let mut plain = plain.clone();
         for column in &self.known {
@@ -338,7 +338,7 @@ impl Columns<'_> {
     }
 }
 
-/// The rows in units of what columns leave of each joint, and the time that this remembers, s.
+/// Weights the joints by their inverse residual RMS. Also returns the residual's correlation time, s.
 pub(super) fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) {
     let n = rows.joints();
     let first = Fit::new(rows, vec![1.0; n], 0.1).taking(columns);
@@ -350,17 +350,17 @@ pub(super) fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) 
     (Fit::new(rows, scale, memory), memory)
 }
 
-/// What becomes of what the description states of several joints.
+/// Described parameters that the data do not improve, or contradict, on robots with several joints.
 #[derive(Default)]
 pub(super) struct Open {
-    /// Base parameters of which the motion tells less than the description: what data and description together know hardly better
-    /// than the description alone.
+    /// Base parameters that the data hardly improve: data and description together know them almost no better than the
+    /// description alone.
     pub(super) held: Vec<usize>,
-    /// Friction as described that the data contradict, by how many standard deviations.
+    /// Described friction that the data contradict, with the difference in standard deviations.
     pub(super) contradicted: Vec<(usize, f64)>,
 }
 
-/// What the description is worth beside the data: right to [`DESCRIBED`], and unknown where it states nothing.
+/// Compares the description with the data. It counts as right to [`DESCRIBED`], and as unknown where it states nothing.
 pub(super) fn open(bench: &Bench, rows: &Rows) -> Open {
     let anchor = &bench.anchor;
     if rows.joints() < 2 || !anchor.stated {
@@ -375,7 +375,7 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Open {
         .collect();
     for (k, column) in columns.iter().enumerate() {
         let whole = (dot(&torque, &torque) / dot(column, column)).sqrt();
-        // It makes all of the torque at most.
+        // Upper limit: this column alone makes the whole torque.
         if anchor.is_unstated(k) && whole.is_finite() {
             spread[k] = whole;
         }
@@ -412,7 +412,7 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Open {
         _ => None,
     };
     let held = (anchor.free.iter().enumerate())
-        // What nobody stated is fitted, but for the friction and the constant of a joint that stands throughout.
+        // Unstated parameters are fitted, except friction and constant of a joint that never moves.
         .filter(|(k, _)| !anchor.is_unstated(*k) || dot(&columns[*k], &columns[*k]) <= 0.0)
         .filter(|(k, _)| spread[*k].is_finite() && left[(*k, *k)] > HARDLY_BETTER)
         .filter_map(|(_, direction)| alone(direction))
@@ -423,7 +423,8 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Open {
     Open { held, contradicted }
 }
 
-/// Natural size of each free direction by the description: of its parameters, each at least a share of the largest of its kind.
+/// Returns the natural size of each free direction, from its described parameters. Each of them counts with at least a
+/// share of the largest one of its kind.
 pub(super) fn described_sizes(bench: &Bench) -> Vec<f64> {
     let combination = &bench.nominal.base.combination;
     let sizes = weights(bench.robot, combination.ncols());
@@ -441,7 +442,7 @@ pub(super) fn described_sizes(bench: &Bench) -> Vec<f64> {
         .collect()
 }
 
-/// Directions of stated friction that data contradict; `gram` and `along` are of columns with the noise as unit.
+/// Returns the directions of described friction that the data contradict. `gram` and `along` are in units of the noise.
 fn refuted(
     bench: &Bench,
     gram: DMatrix<f64>,
@@ -473,15 +474,15 @@ fn refuted(
     contradicted(&data, &right, spread, &stated)
 }
 
-/// Whether a shape is of teeth while they touch: the motor's motion shows their play, and of the contact itself no more than
-/// that it is there. The fit needs values, which are no measurements.
+/// Returns true if a shape describes tooth contact. The motor motion shows the backlash gap and that there is contact,
+/// but no contact values. The fit needs such values, yet they are not measurements.
 fn is_of_contact(kind: Kind, place: usize) -> bool {
     let name = kind.about().shapes[place].name;
     kind == Kind::Backlash && matches!(name, "stiffness" | "damping")
 }
 
-/// What play comes out differently by, seen by the motor's motion alone and by following the link. Either law errs where teeth
-/// touch, by more than stretches and strata show, and mostly to opposite sides.
+/// Returns the difference of a backlash gap between the open-loop and the observer-based fit. Each law has an error at
+/// tooth contact, larger than blocks and strata show, and mostly in opposite directions.
 fn between_ways(profile: &Profile, place: usize) -> f64 {
     let is_play = profile.candidate.kind == Kind::Backlash
         && profile.candidate.kind.about().shapes[place].name == "gap";
@@ -489,8 +490,7 @@ fn between_ways(profile: &Profile, place: usize) -> f64 {
     otherwise.map_or(0.0, |shapes| shapes[place] - profile.shapes[place])
 }
 
-/// Derivative of an effect's torque with respect to one of its shapes, by a difference that stays within what physics
-/// allows.
+/// Returns the derivative of an effect's torque with respect to one shape, by a difference within the physical bounds.
 fn slope(
     source: &Source,
     profile: &Profile,
@@ -514,7 +514,7 @@ fn slope(
     Ok(combined(source.nominal.joints(), terms))
 }
 
-/// 1 % of the value; of the range where a linear one is nearer to zero than that is wide.
+/// Returns 1 % of the value. For a linear shape, 1 % of its range if that is larger.
 fn difference_step(shape: &Parameter, value: f64) -> f64 {
     let size = match shape.scale {
         Scale::Linear => value.abs().max(shape.range[1] - shape.range[0]),
@@ -523,17 +523,17 @@ fn difference_step(shape: &Parameter, value: f64) -> f64 {
     DIFFERENCE * size
 }
 
-/// Everything fitted together.
+/// Estimates of the joint fit.
 pub(super) struct Joint {
-    /// Coefficients of the free nominal directions, then of the effects' columns; the covariance goes on with the shapes.
+    /// Coefficients of the free nominal directions, then of the columns. The covariance also contains the shapes.
     pub(super) solution: Solution,
-    /// Standard deviations of each effect's shapes: 0 of a whole number, infinite where the motion does not tell.
+    /// Standard deviations of each effect's shapes: 0 for an integer, infinite if not identifiable.
     stds: Vec<[f64; SHAPES]>,
 }
 
 impl Joint {
-    /// Probability that the first `count` gains of the `k`-th effect are nothing but error (Wald 1943), by the covariance that
-    /// its intervals are of.
+    /// Returns the p-value that the first `count` gains of the `k`-th effect are zero (Wald 1943), from the covariance
+    /// that also gives their intervals.
     pub(super) fn of_nothing(
         &self,
         chosen: &[Profile],
@@ -549,19 +549,19 @@ impl Joint {
         (wald.zip(ChiSquared::new(count as f64).ok())).map_or(1.0, |(wald, law)| law.sf(wald))
     }
 
-    /// Gains of the `k`-th effect beside all others.
+    /// Returns the gains of the `k`-th effect.
     pub(super) fn gains(&self, chosen: &[Profile], free: usize, k: usize) -> &[f64] {
         let at = place(chosen, free, k);
         &self.solution.values[at..at + chosen[k].columns.len()]
     }
 
-    /// A gain of the `k`-th effect with its standard deviation.
+    /// Returns a gain of the `k`-th effect with its standard deviation.
     pub(super) fn gain(&self, chosen: &[Profile], free: usize, k: usize, gain: usize) -> [f64; 2] {
         let at = place(chosen, free, k) + gain;
         [self.solution.values[at], self.solution.std(at)]
     }
 
-    /// Effect and place of each shape that the motion tells, with value and standard deviation.
+    /// Returns effect and index of each identifiable shape, with value and standard deviation.
     pub(super) fn shapes(&self, chosen: &[Profile]) -> Vec<((usize, usize), [f64; 2])> {
         let of_effect = |(k, profile): (usize, &Profile)| {
             let stds = self.stds[k];
@@ -573,7 +573,7 @@ impl Joint {
         chosen.iter().enumerate().flat_map(of_effect).collect()
     }
 
-    /// Gains and shapes of the `k`-th effect with their standard deviations.
+    /// Returns the gains and shapes of the `k`-th effect with their standard deviations.
     pub(super) fn parameters(
         &self,
         source: &Source,
@@ -611,7 +611,7 @@ impl Joint {
     }
 }
 
-/// Angle over slope of a tilted base: what is fitted is gravity across, of which the angle's tangent is a share.
+/// Returns angle / tangent of a base tilt. The fit estimates the tangent: gravity across over gravity along the base.
 pub(super) fn turn(slopes: &[f64]) -> f64 {
     let slope = slopes.iter().fold(0.0, |norm: f64, s| norm.hypot(*s));
     if slope == 0.0 {
@@ -621,7 +621,7 @@ pub(super) fn turn(slopes: &[f64]) -> f64 {
     }
 }
 
-/// Where the coefficients of the `k`-th effect begin, behind the `free` nominal directions.
+/// Returns the index of the first coefficient of the `k`-th effect, after the `free` nominal directions.
 fn place(chosen: &[Profile], free: usize, k: usize) -> usize {
     free + chosen[..k].iter().map(|p| p.columns.len()).sum::<usize>()
 }

@@ -1,4 +1,4 @@
-//! Runs as rows of a regression: torque and nominal regressor, low-passed, thinned, masked.
+//! Regression rows of runs: torque and nominal regressor, low-passed, decimated, masked.
 
 use std::ops::Range;
 
@@ -15,33 +15,33 @@ use rig_identify::{Base, ModelKind, chain_of, transmission_of};
 use rig_model::batch::{BLOCK, ChainBatch, RegressorBlock};
 use rig_model::robot::{JointKind, Robot};
 
-/// Share of a row's neighbourhood that may be slow or saturated before the row is left out: what the low-pass makes of an
-/// indicator that is 1 on such samples. Where a joint sticks before it turns back its friction may be anything between both
-/// directions', so that twice this share of the dry friction is what a kept row may be off by.
+/// Share of slow or saturated samples around a row above which the row is not used. It is the low-passed indicator of
+/// such samples. Before a reversal, stiction may lie anywhere between the Coulomb friction of both directions. So a
+/// kept row may have an error of twice this share of the dry friction.
 const SPOILT: f64 = 0.03;
-/// … and where such rows hold more than that.
+/// The same share above which a row near standstill is not usable either.
 pub(super) const ILLEGIBLE: f64 = 0.1;
 
-/// Rows about rests by which what is left there is judged.
+/// Fewest rows near standstill that allow a comparison of their residual.
 const FEWEST_ABOUT_RESTS: usize = 20;
 
-/// Periods of the position filter's cut-off by which it may move a reversal: it rounds the corner where friction changes its
-/// sign, or stops the joint for a moment.
+/// Periods of the position filter's cut-off frequency by which the filter may shift a reversal. It rounds the corner
+/// where friction changes sign, or stops the joint for a moment.
 const SMEAR: f64 = 0.2;
 
-/// Share of a row's neighbourhood that may rest or reverse where none is to be in it: twice that of dry friction is below most noise.
+/// Largest share of standstill or reversal around a clear row. Twice this share of dry friction is below most noise.
 const CLEAR: f64 = 0.005;
 
-/// Share of the power of a signal that the position's filter may take away at the upper end of the low-pass without being heard.
+/// Power loss by the position filter at the upper edge of the low-pass above which the filter matters.
 const HEARD: f64 = 1e-4;
 
-/// Highest cut-off as a share of half the sample rate: as that of the position's filter.
+/// Highest cut-off as a share of half the sample rate, as for the position filter.
 const WIDEST: f64 = 0.8;
 
-/// Directions whose angle has a sine below this are one.
+/// Sine of the angle below which two directions are parallel.
 const PARALLEL: f64 = 1e-6;
 
-/// A signal on the kept rows, joint by joint; absent where it is zero throughout.
+/// A signal on the kept rows, joint by joint; None if it is zero throughout.
 pub(super) type Column = Vec<Option<Vec<f64>>>;
 
 /// Σ factor·column over the `joints` of the columns.
@@ -62,34 +62,34 @@ pub(super) fn combined<'a>(
     sum
 }
 
-/// Low-pass and thinning that torque and every regressor column pass alike.
+/// Low-pass and decimation of the torque and of every regressor column.
 ///
-/// The motion has passed the position's filter before. Torque has not, nor has what is formed from the motion by a law that is
-/// not linear in it, such as the sign of a velocity: they pass that filter here, or both sides of the equation would differ by
-/// what it takes away wherever its cut-off is near the band of the rows.
+/// The motion has already passed the position filter. The torque has not, and neither has a nonlinear function of the
+/// motion, such as the sign of the velocity. These signals pass that filter here. Otherwise both sides of the equation
+/// would differ by its loss where its cut-off is near the band of the rows.
 ///
-/// Inertia, gravity and what turns with the square of the speed are not linear in the motion either: M(q)·q̈ of the filtered motion is
-/// not the filtered M(q)·q̈. Where the filter is heard in the band these columns are formed of a motion that has passed a
-/// [`wide`] filter instead, which takes nothing away in the band, and pass the position's filter here, as the torque does.
+/// Inertia, gravity and velocity products are not linear in the motion either: M(q)·q̈ of the filtered motion is not
+/// the filtered M(q)·q̈. If the filter matters in the band, their columns use a motion behind a [`wide`] filter without
+/// loss in the band. Like the torque, they then pass the position filter here.
 #[derive(Clone, Debug)]
 pub(super) struct Thinning {
     low_pass: LowPass,
-    /// The position's filter, and whether it takes away anything that the low-pass passes.
+    /// The position filter, and whether it removes anything that the low-pass passes.
     position: LowPass,
     heard: bool,
-    /// The filter of the motion that columns of the links are formed of, where the position's is heard.
+    /// The filter of the motion for link columns, if the position filter matters.
     wide: Option<(f64, LowPass)>,
     step: usize,
-    /// Samples at either end that the position's filter spoils. They are cut before the low-pass, which would carry them far in.
+    /// Samples with transients of the position filter at either end. They are cut before the low-pass.
     spoilt: usize,
     smear: f64,
 }
 
 impl Thinning {
-    /// The treatment's own.
+    /// Creates the filters of a treatment.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where there is no such filter.
+    /// [`DiagnoseError::Model`] if a filter cannot be built.
     pub(super) fn of(treatment: &Treatment) -> Result<Self, DiagnoseError> {
         let low_pass = treatment
             .parallel_low_pass()
@@ -97,7 +97,7 @@ impl Thinning {
         let position = treatment.position_filter().ok_or_else(|| {
             DiagnoseError::Model("the filter of its position cannot be built.".into())
         })?;
-        // Of the power, as it goes forward and backward.
+        // Power loss: the filter runs forward and backward.
         let taken = 1.0
             - position
                 .gain(treatment.parallel_edge, treatment.sample_rate)
@@ -114,17 +114,17 @@ impl Thinning {
         })
     }
 
-    /// Time from row to row of a run of that sample rate, s.
+    /// Returns the time between rows of a run with this sample rate, s.
     pub(super) fn period(&self, rate: f64) -> f64 {
         self.step as f64 / rate
     }
 
-    /// Cut-off of the position that columns of the links are formed of, Hz, where that is not the filtered one.
+    /// Returns the cut-off of the position for link columns, Hz, if it differs from that of the position filter.
     pub(super) fn links_cutoff(&self) -> Option<f64> {
         self.wide.as_ref().map(|(cutoff, _)| *cutoff)
     }
 
-    /// The motion that columns of the links are formed of, where that is not the filtered one.
+    /// Returns the motion for link columns, if it differs from the filtered motion.
     fn wide_motion(&self, run: &Run) -> Option<[Vec<Vec<f64>>; 3]> {
         let (_, filter) = self.wide.as_ref()?;
         let step = 1.0 / run.rate;
@@ -138,34 +138,34 @@ impl Thinning {
         Some(motion)
     }
 
-    /// Time by which the position's filter may move a reversal, s.
+    /// Returns the time by which the position filter may shift a reversal, s.
     pub(super) fn smear(&self) -> f64 {
         self.smear
     }
 
-    /// Samples of a run of `samples` that the position's filter has not spoilt.
+    /// Returns the samples without transients of the position filter, for a run of `samples`.
     fn sound(&self, samples: usize) -> Range<usize> {
         self.spoilt..samples.saturating_sub(self.spoilt).max(self.spoilt)
     }
 
-    /// How long after a run's beginning its first row is, s.
+    /// Returns the time from the start of a run to its first row, s.
     pub(super) fn trimmed(&self, run: &Run) -> f64 {
         self.spoilt as f64 / run.rate
     }
 
-    /// Kept samples of a run of `samples`.
+    /// Returns the kept samples of a run of `samples`.
     fn kept(&self, samples: usize) -> impl Iterator<Item = usize> {
         self.sound(samples).step_by(self.step)
     }
 
-    /// What is kept of a signal at the full rate that is linear in the filtered motion, appended to `out`.
+    /// Appends the rows of a full-rate signal to `out`. The signal must be linear in the filtered motion.
     pub(super) fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
         let sound = signal.get(self.sound(signal.len())).unwrap_or_default();
         let smooth = self.low_pass.zero_phase_even(sound);
         out.extend(smooth.into_iter().step_by(self.step));
     }
 
-    /// The same of one that has not passed the position's filter.
+    /// Appends the rows of a signal that has not passed the position filter.
     pub(super) fn push_raw(&self, signal: &[f64], out: &mut Vec<f64>) {
         match self.heard {
             true => self.push(&self.position.zero_phase_even(signal), out),
@@ -173,22 +173,22 @@ impl Thinning {
         }
     }
 
-    /// A signal behind the position's filter, at its own rate.
+    /// Applies the position filter, without decimation.
     pub(super) fn calm(&self, signal: &[f64]) -> Vec<f64> {
         self.position.zero_phase(signal)
     }
 
-    /// A signal behind the low-pass, at its own rate.
+    /// Applies the low-pass, without decimation.
     pub(super) fn smooth(&self, signal: &[f64]) -> Vec<f64> {
         self.low_pass.zero_phase(signal)
     }
 
-    /// What is kept of signals of one length that are linear in the filtered motion.
+    /// Returns the rows of signals of equal length that are linear in the filtered motion.
     pub(super) fn thinned(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
         self.thinned_behind(None, signals)
     }
 
-    /// The same of such that have not passed the position's filter.
+    /// Returns the rows of signals that have not passed the position filter.
     pub(super) fn thinned_raw(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
         self.thinned_behind(self.heard.then_some(&self.position), signals)
     }
@@ -222,14 +222,14 @@ impl Thinning {
         thin
     }
 
-    /// Kept samples as they are, without the low-pass.
+    /// Appends the kept samples without the low-pass.
     pub(super) fn pick(&self, signal: &[f64], out: &mut Vec<f64>) {
         out.extend(self.kept(signal.len()).map(|k| signal[k]));
     }
 }
 
-/// A filter of the position that takes no more than [`HEARD`] of the power away at the upper end of the rows' band, as far as the
-/// sampling allows: behind a Butterworth filter of order n forward and backward the power falls by 2·(f/cut-off)²ⁿ.
+/// Returns a position filter with a power loss of at most [`HEARD`] at the upper band edge, as far as the sampling
+/// allows. A Butterworth filter of order n, forward and backward, loses the power share 2·(f/cut-off)²ⁿ.
 fn wide(treatment: &Treatment) -> Option<(f64, LowPass)> {
     let rate = treatment.sample_rate;
     let order = treatment.order;
@@ -241,30 +241,30 @@ fn wide(treatment: &Treatment) -> Option<(f64, LowPass)> {
         .map(|filter| (cutoff, filter))
 }
 
-/// The regression: rows over all runs, one set a joint.
+/// The regression: rows over all runs, one set per joint.
 pub(super) struct Rows {
-    /// What the columns pass.
+    /// Filter and decimation of the columns.
     pub(super) thinning: Thinning,
-    /// Rows a joint.
+    /// Rows per joint.
     pub(super) count: usize,
-    /// First row of each run, and one past the last.
+    /// First row of each run, and the total count at the end.
     pub(super) starts: Vec<usize>,
-    /// Distance of the rows, s.
+    /// Time between rows, s.
     pub(super) period: f64,
     /// Torque, joint by joint.
     pub(super) torque: Vec<Vec<f64>>,
-    /// Whether the row is used, joint by joint.
+    /// True if the row is used, joint by joint.
     pub(super) keep: Vec<Vec<bool>>,
-    /// Whether it is used or could be: its torque tells something, but what a rest nearby may be off by. Joint by joint; empty
-    /// where no row is near a rest.
+    /// True if the row is used or usable: its torque has information, except for the error near standstill. Joint by
+    /// joint; empty if no row is near standstill.
     pub(super) legible: Vec<Vec<bool>>,
-    /// Whether the filters let nothing of a rest or a reversal into the row, joint by joint; empty where no row is near one.
+    /// True if no standstill or reversal leaks into the row through the filters, joint by joint; empty if none is near.
     pub(super) clear: Vec<Vec<bool>>,
-    /// Nominal columns, one a base parameter.
+    /// Nominal columns, one per base parameter.
     pub(super) nominal: Vec<Column>,
 }
 
-/// The base parameters with the geometry that they belong to.
+/// Base parameters with their geometry.
 pub(super) struct Nominal {
     /// Base parameters.
     pub(super) base: Base,
@@ -274,7 +274,7 @@ pub(super) struct Nominal {
 }
 
 impl Nominal {
-    /// Those of a robot.
+    /// Creates the base parameters of a robot.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -288,7 +288,7 @@ impl Nominal {
         })
     }
 
-    /// Base parameters as a description has them.
+    /// Returns the described values of the base parameters.
     pub(super) fn stated(&self, robot: &Robot) -> Vec<f64> {
         let mut standard = robot.standard_parameters().concat();
         standard.extend(robot.motor_parameters().as_flattened());
@@ -298,8 +298,8 @@ impl Nominal {
             .collect()
     }
 
-    /// Axes of the base frame about which a tilt changes gravity as the joints feel it: where all of them turn about one
-    /// direction that is not upright, that direction alone (about another the change is of second order).
+    /// Returns the axes of the base frame about which a tilt matters. If all joints turn about one direction that is
+    /// not vertical, only that direction matters: about another one the change is of second order.
     pub(super) fn tilt_axes(&self) -> Vec<[f64; 3]> {
         let g = Vector3::from(self.robot.gravity);
         if g.norm() == 0.0 {
@@ -327,32 +327,32 @@ impl Nominal {
         vec![first.into(), second.into()]
     }
 
-    /// Gravity across the first joint's axis, m/s²: its torque per kg·m of first moment where that pulls most.
+    /// Returns gravity across the first joint's axis, m/s²: the largest torque per kg·m of first moment.
     pub(super) fn pull(&self) -> f64 {
         let alpha = self.robot.joints.first().map_or(0.0, |joint| joint.alpha);
         let axis = Vector3::new(0.0, -alpha.sin(), alpha.cos());
         axis.cross(&Vector3::from(self.robot.gravity)).norm()
     }
 
-    /// Whether a base parameter is Coulomb friction.
+    /// Returns true if a base parameter is Coulomb friction.
     pub(super) fn is_coulomb(&self, k: usize) -> bool {
         self.place(k).is_ok_and(|c| c == column::COULOMB)
             || self.place(k).is_err_and(|c| c == motor_column::COULOMB)
     }
 
-    /// Whether a base parameter belongs to the drive: friction, offset or its own inertia.
+    /// Returns true if a base parameter belongs to the drive: friction, offset or its own inertia.
     pub(super) fn is_drive(&self, k: usize) -> bool {
         self.place(k).map_or(true, |c| c >= column::DRIVE_INERTIA)
     }
 
-    /// Whether the inertia of a joint's drive is a base parameter by itself.
+    /// Returns true if the drive inertia of a joint is a base parameter of its own.
     pub(super) fn has_own_drive_inertia(&self, joint: usize) -> bool {
         self.base
             .columns
             .contains(&(joint * COLUMNS + column::DRIVE_INERTIA))
     }
 
-    /// Place of a base parameter's column among its joint's, or (as the error) among its motor's.
+    /// Returns the index of a base parameter's column in its joint, or (as the error) in its motor.
     fn place(&self, k: usize) -> Result<usize, usize> {
         let c = self.base.columns[k];
         match c.checked_sub(self.joints() * COLUMNS) {
@@ -361,16 +361,16 @@ impl Nominal {
         }
     }
 
-    /// Joints.
+    /// Returns the number of joints.
     pub(super) fn joints(&self) -> usize {
         self.batch.joint_count()
     }
 
-    /// The regressor of a motion at the full rate: `visit(base parameter, joint, values)` for each column that is not
-    /// zero by structure.
+    /// Visits the regressor of a motion at the full rate: `visit(base parameter, joint, values)` for each column that
+    /// is not structurally zero.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] on lengths.
+    /// [`DiagnoseError::Model`] if lengths differ.
     pub(super) fn columns(
         &self,
         motion: [&[Vec<f64>]; 3],
@@ -401,9 +401,9 @@ impl Nominal {
         self.motor_columns(motion, visit)
     }
 
-    /// Joint by joint, samples at which a motor is slow whose friction is in the joint's torque, though the joint may move fast; nothing
-    /// where every drive moves its own joint only. A motor counts as slow below what its joints' thresholds come to at it, as in an
-    /// identification.
+    /// Returns, joint by joint, the samples where a motor with friction on this joint is slow, even if the joint is
+    /// fast. Empty if each drive moves only its own joint. As in an identification, the threshold of a motor is the
+    /// root sum of squares of its joints' thresholds.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -479,7 +479,7 @@ impl Nominal {
     }
 }
 
-/// Position, velocity and acceleration of all joints over a run.
+/// Returns position, velocity and acceleration of all joints over a run.
 pub(super) fn motion_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
     let of = |pick: fn(&rig_data::runs::JointRun) -> &Vec<f64>| -> Vec<Vec<f64>> {
         run.joints.iter().map(|j| pick(j).clone()).collect()
@@ -487,7 +487,7 @@ pub(super) fn motion_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
     [of(|j| &j.q), of(|j| &j.qd), of(|j| &j.qdd)]
 }
 
-/// The same of the links, where encoders on them were recorded.
+/// Returns the motion of the links, where link encoders were recorded, else of the joints.
 pub(super) fn links_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
     let mut motion = motion_of(run);
     for (j, joint) in run.joints.iter().enumerate() {
@@ -501,7 +501,7 @@ pub(super) fn links_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
 }
 
 impl Rows {
-    /// Forms torque, masks and nominal columns of all runs.
+    /// Computes torque, masks and nominal columns of all runs.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -541,7 +541,7 @@ impl Rows {
                 }
                 let mut share = Vec::new();
                 thinning.push_raw(&spoilt, &mut share);
-                // The low-pass rings: a share below 0 is as spoilt as one above.
+                // The low-pass rings, so a share below 0 counts like one above.
                 keep[j].extend(share.iter().map(|s| s.abs() < SPOILT));
                 legible[j].extend(share.iter().map(|s| *s < ILLEGIBLE));
                 for (spoilt, (v, a)) in spoilt.iter_mut().zip(joint.qd.iter().zip(&joint.qdd)) {
@@ -589,13 +589,13 @@ impl Rows {
         })
     }
 
-    /// Joints.
+    /// Returns the number of joints.
     pub(super) fn joints(&self) -> usize {
         self.torque.len()
     }
 
-    /// Of each of a run's `samples`, whether the row nearest to it is legible, as it is for a link behind a gear; before the first row and behind
-    /// the last none does.
+    /// Returns, for each sample, true if the nearest row is usable by the observer of a link behind a gear. False
+    /// outside the rows.
     pub(super) fn sure(&self, run: usize, joint: usize, samples: usize) -> Vec<bool> {
         let all = self.legible.get(joint).map_or(&[][..], Vec::as_slice);
         let legible = all
@@ -610,8 +610,8 @@ impl Rows {
             .collect()
     }
 
-    /// What is left of a joint on the rows about rests that are not used, mean of the squares, and on those that are; `residual` is of
-    /// all rows. None where too few are near a rest.
+    /// Returns the mean squared residual of a joint: on usable rows near standstill, and on the used rows. `residual`
+    /// covers all rows. None if too few rows are near standstill.
     pub(super) fn about_rests(&self, joint: usize, residual: &[f64]) -> Option<[f64; 2]> {
         let keep = &self.keep[joint];
         let legible = self.legible.get(joint)?;
@@ -625,14 +625,14 @@ impl Rows {
         Some([mean(true)?, mean(false)?])
     }
 
-    /// Uses the rows about a joint's rests as well.
+    /// Also uses the rows near a joint's standstill.
     pub(super) fn use_rests(&mut self, joint: usize) {
         if let Some(legible) = self.legible.get(joint) {
             self.keep[joint].clone_from(legible);
         }
     }
 
-    /// Which rows of a joint are used and clear of rests and reversals.
+    /// Returns true for the rows of a joint that are used and clear of standstill and reversals.
     pub(super) fn away(&self, joint: usize) -> Vec<bool> {
         let clear = self.clear.get(joint);
         let clear = |row: usize| clear.is_none_or(|clear| clear[row]);
@@ -641,7 +641,7 @@ impl Rows {
             .collect()
     }
 
-    /// Rows used of a joint.
+    /// Returns the number of used rows of a joint.
     pub(super) fn used(&self, joint: usize) -> usize {
         self.keep[joint].iter().filter(|k| **k).count()
     }
@@ -650,7 +650,7 @@ impl Rows {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 impl Rows {
-    /// Of one joint with these nominal columns, in one run.
+    /// Creates the rows of one joint in one run with these nominal columns.
     pub(super) fn of_columns(nominal: Vec<Column>, count: usize) -> Self {
         Self {
             thinning: Thinning {

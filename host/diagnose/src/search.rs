@@ -1,4 +1,4 @@
-//! Which effect, one after the other: each candidate at its best, gates; then joint refinement, removal and exchange.
+//! Stepwise search: fit of each candidate, acceptance tests, joint refinement, removal and exchange.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,50 +30,50 @@ pub(super) use kinds::{is_constant, is_first_law, is_friction, is_gear, rivals};
 use shadow::in_the_shadow;
 pub(super) use shadow::shadow;
 
-/// Steps of the recorded position below which a distance is not told from none: the direction of motion is not known to less.
+/// Encoder steps below which a distance equals zero: the direction of motion is not known more precisely.
 const STEPS_OF_A_DISTANCE: f64 = 2.0;
-/// An effect in the model stays while its own probability is below this.
+/// p-value below which an effect stays in the model.
 const STAYS: f64 = 1e-3;
-/// How often laws are weighed against others of their names, each time beside those that have changed.
+/// Rounds in which each law is compared with other laws of its name, beside the updated others.
 const LAWS_ANEW: usize = 2;
-/// Most effects beside those of the description, the orders of one wave counting once.
+/// Maximum number of effects beside the described ones. The orders of one wave count once.
 const MOST_EFFECTS: usize = 6;
 
-/// The search over a library.
+/// The search over a candidate library.
 pub(super) struct Search<'a> {
-    /// What columns are formed from.
+    /// Data for the columns.
     pub(super) source: Source<'a>,
     /// Candidates.
     pub(super) library: Vec<Candidate>,
-    /// What the description states of them: the search begins with it.
+    /// Described effects, with which the search begins.
     pub(super) described: Vec<Placed>,
-    /// Gears that encoders on the links have shown, with their shapes: the torque has no say in them.
+    /// Gears from link encoders, with their shapes. The torque does not change them.
     pub(super) measured: Vec<(Candidate, [f64; SHAPES])>,
-    /// Gears that the torque has shown, once all else is searched beside them.
+    /// Gears from the torque, with fixed shapes while all other effects are searched.
     settled: Vec<(Candidate, [f64; SHAPES])>,
     /// Threads.
     pub(super) threads: usize,
-    /// Joint by joint.
+    /// Encoder resolution, joint by joint.
     pub(super) resolution: Vec<f64>,
-    /// How far each joint goes from a reversal within the time that its filter blurs, rad or m.
+    /// Travel since reversal within the blur time of the filter, joint by joint, rad or m.
     blurred: Vec<f64>,
-    /// Lowest to highest position, joint by joint, rad or m.
+    /// Range of positions, joint by joint, rad or m.
     spans: Vec<f64>,
-    /// Orders of waves of the motors' torque beyond the grids', joint by joint.
+    /// Orders of motor torque waves beyond the grid, joint by joint.
     orders: Vec<Orders>,
-    /// Constants of which a gear has told on which side of it they act.
+    /// Constants whose side of the gear is certain.
     sided: Vec<Candidate>,
-    /// What the last search had to drop.
+    /// Candidates that the last search dropped.
     dropped: Vec<Candidate>,
-    /// A play that it all but took.
+    /// A backlash that almost passed.
     pub(super) nearly: Option<Profile>,
-    /// Plays whose links followed the recorded torque by far better: less is asked of them as the motor's motion drives them.
+    /// Backlash that the observer supports: its open-loop gain may be smaller.
     pub(super) heard: Vec<Candidate>,
     cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
 
 impl<'a> Search<'a> {
-    /// A search.
+    /// Creates a search.
     pub(super) fn new(
         source: Source<'a>,
         library: Vec<Candidate>,
@@ -107,8 +107,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The least distance that joint `joint`'s motion tells from none to a law of that kind, rad or m: some steps of its encoder;
-    /// to friction also how far the joint goes from a reversal before the filter lets it be seen that it has reversed.
+    /// Returns the smallest distance that a law of this kind can resolve on a joint, rad or m: some encoder steps. For
+    /// friction at least the travel since reversal before the filter shows the reversal.
     pub(super) fn least_told(&self, kind: Kind, joint: usize) -> f64 {
         let steps = STEPS_OF_A_DISTANCE * self.resolution[joint];
         if is_gear(kind) {
@@ -118,9 +118,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Takes a source with another model's predictions; columns that depend on them are forgotten.
+    /// Sets a source with new predictions, and clears cached columns that depend on them.
     fn renewed(&mut self, source: Source<'a>) {
-        // Where presliding has come in, or has gone, what acts through its contact goes with it.
+        // Presliding changes the friction through its contact.
         let slid = !(self.source.bent.is_empty() && source.bent.is_empty());
         self.source = source;
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
@@ -131,21 +131,21 @@ impl<'a> Search<'a> {
         });
     }
 
-    /// Whether the motion spans a candidate with these shapes where it is a wave.
+    /// Returns true if the motion spans a candidate with these shapes; other effects than waves always pass.
     pub(super) fn shows(&self, candidate: &Candidate, shapes: &[f64; SHAPES]) -> bool {
         let joint = &self.source.robot.joints[candidate.joint];
         waves::shown(candidate.kind, joint, shapes, self.spans[candidate.joint])
     }
 
-    /// Place of a candidate in the library.
+    /// Returns the index of a candidate in the library.
     pub(super) fn place(&self, candidate: &Candidate) -> Option<usize> {
         self.library.iter().position(|l| *l == candidate.sort())
     }
 
-    /// Shapes that the search of a candidate begins with.
+    /// Returns the grid of a candidate's shapes.
     pub(super) fn grid(&self, candidate: &Candidate) -> Vec<[f64; SHAPES]> {
         let joints = &self.source.robot.joints;
-        // Of one joint such waves stand in for what the laws of others leave: of load friction, on the emulated rig.
+        // On a single joint such waves replace the misfit of other laws: of load friction, on the emulated rig.
         let mut points = if joints.len() == 1 {
             grid(candidate.kind)
         } else {
@@ -163,7 +163,7 @@ impl<'a> Search<'a> {
         points
     }
 
-    /// Columns of the points of a candidate's grid.
+    /// Returns the columns at a candidate's grid points.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -185,9 +185,9 @@ impl<'a> Search<'a> {
         Ok(columns)
     }
 
-    /// Finds effects one by one, after those of the description, which stand first, or after those `found` with rows that counted
-    /// otherwise. `base` holds the nominal columns; `told` hears of every sweep and of the number of effects found by then; `renew` gives what columns are formed from once they
-    /// are in.
+    /// Finds effects one by one, after the described ones or after those `found` with other row weights. `base` holds
+    /// the nominal columns. `told` receives every sweep and the number of effects found. `renew` returns the source for
+    /// given effects.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -238,7 +238,7 @@ impl<'a> Search<'a> {
             chosen.push(best);
             let vanished = self.settle(base, &mut chosen, trials, &impossible)?;
             if vanished.contains(&newcomer) && !same(&before, &chosen) {
-                // It has pushed others out that it cannot do without.
+                // It removed others that it needs.
                 impossible.push(newcomer);
                 chosen = before;
                 continue;
@@ -255,8 +255,7 @@ impl<'a> Search<'a> {
             }
             stood.push(before);
             if stood.iter().any(|before| same(before, &chosen)) {
-                // It does not stand at its best shapes, or pushes out what pushes it out in turn; another that takes away less
-                // may.
+                // It is not stable at its best shapes, or two effects remove each other in turn. A weaker one may stay.
                 if impossible.contains(&newcomer) {
                     break;
                 }
@@ -276,8 +275,8 @@ impl<'a> Search<'a> {
         Ok(chosen)
     }
 
-    /// The effects once more by what the model predicts with them in: load and inertia, how far contacts are bent, and the columns
-    /// that rest on them. What vanishes by that goes, and its part in them with it.
+    /// Recomputes predicted load, inertia and contact deflection with the current effects, then refits the effects.
+    /// Effects at a bound are removed.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -300,8 +299,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// What would stand in the place of the `i`-th effect beside all others, best first; gears only where a gear or what is
-    /// taken for one stands there.
+    /// Returns replacements of the `i`-th effect beside all others, best first. Gears only if it is a gear or
+    /// confusable with one.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -326,7 +325,7 @@ impl<'a> Search<'a> {
         self.sweep_at(chosen[i].candidate.joint, &fit, &others, &[])
     }
 
-    /// What the last search had to drop although it takes away much beside `chosen`, all that it found.
+    /// Returns candidates that the last search dropped but that have a large gain beside all effects, `chosen`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -346,14 +345,14 @@ impl<'a> Search<'a> {
         Ok(taking)
     }
 
-    /// Places in the library of what excludes a candidate, but for itself: other laws under its name, other transmissions.
+    /// Returns the other laws that exclude a candidate, with library index: the same name or another transmission.
     fn laws_beside(&self, present: Candidate) -> impl Iterator<Item = (usize, &Candidate)> {
         let another = move |c: &Candidate| rivals(c, &present) && c.kind != present.kind;
         (self.library.iter().enumerate()).filter(move |(_, c)| another(c))
     }
 
-    /// Another law under the same name where it does better: clearly, where it has more parameters to bend or the description states
-    /// the law. Says whether there was one.
+    /// Replaces effects by better laws of the same name. A law with more parameters, or in place of a described one,
+    /// must be clearly better. Returns true if it replaced one.
     fn other_laws(&self, base: &Fit, chosen: &mut [Profile]) -> Result<bool, DiagnoseError> {
         let mut changed = false;
         for i in 0..chosen.len() {
@@ -377,8 +376,8 @@ impl<'a> Search<'a> {
         Ok(changed)
     }
 
-    /// Refines all shapes together, drops what no longer stands by itself, exchanges what something else does better. Gives
-    /// what has vanished.
+    /// Refines all shapes, removes effects that are not significant, and swaps effects for better ones. Returns those
+    /// at a bound.
     fn settle(
         &self,
         base: &Fit,
@@ -389,9 +388,9 @@ impl<'a> Search<'a> {
         for _ in 0..2 {
             self.refine_all(base, chosen)?;
         }
-        // Stand-ins go once the true effect is in.
+        // Substitutes go once the true effect is in the model.
         let vanished = self.standing(base, chosen)?;
-        // Something else in the place of an effect that was taken before the last.
+        // Look for a better effect in the place of each earlier one.
         if chosen.len() > 1 {
             for i in 0..chosen.len() - 1 {
                 if self.fixed(&chosen[i].candidate).is_some() {
@@ -409,7 +408,7 @@ impl<'a> Search<'a> {
                 if let Some(rival) = rival
                     && rival.candidate != chosen[i].candidate
                     && rival.evidence.gain > chosen[i].evidence.gain
-                    // A name that a description gave goes for a better one, not for another that does as well.
+                    // A described effect gives way to a better one, not to an equal one.
                     && !(self.is_described(&chosen[i].candidate) && equal(&chosen[i], &rival))
                 {
                     chosen[i] = rival;
@@ -420,7 +419,7 @@ impl<'a> Search<'a> {
         Ok(vanished)
     }
 
-    /// What of effects is still possible where others have gone, refined.
+    /// Refines effects after others were removed, and drops those at a bound.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -434,7 +433,7 @@ impl<'a> Search<'a> {
         Ok(chosen)
     }
 
-    /// Each effect's shapes beside all others; its evidence beside all others.
+    /// Refines the shapes of each effect, and updates its evidence, beside all others.
     fn refine_all(&self, base: &Fit, chosen: &mut [Profile]) -> Result<(), DiagnoseError> {
         for i in 0..chosen.len() {
             let fit = with(base, chosen, Some(i));
@@ -442,14 +441,14 @@ impl<'a> Search<'a> {
             let Some(c) = c else { continue };
             let mut better = self.profile(&fit, c, Some(chosen[i].shapes))?;
             if better.is_none() && chosen[i].candidate.kind.is_presliding() {
-                // Beside other friction than its shapes were found with, one of its elements may be below zero there.
+                // Beside other friction, a bristle of these shapes may be negative.
                 better = self.profile(&fit, c, None)?;
             }
             if let Some(mut better) = better {
                 better.doubled = (chosen.iter()).any(|p| doubles(&p.candidate, &better.candidate));
                 chosen[i] = better;
             } else {
-                // No column of its own any more, or only with signs that cannot be.
+                // Its columns are collinear, or have impossible signs.
                 chosen[i].evidence.gain = 0.0;
                 chosen[i].evidence.joint_gain = 0.0;
                 chosen[i].evidence.p_value = 1.0;
@@ -460,7 +459,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Orders of a joint beyond those of the grids that the library's waves of its motor begin with.
+/// Returns the orders of a joint beyond the grids of its motor waves.
 fn orders_of(source: &Source, library: &[Candidate], joint: usize) -> Orders {
     let own = |c: &&Candidate| c.joint == joint && has_many_orders(c.kind);
     let highest = (library.iter().filter(own))
@@ -474,21 +473,21 @@ fn orders_of(source: &Source, library: &[Candidate], joint: usize) -> Orders {
     Orders::of(source.runs, joint, of.gear_ratio(), highest as usize)
 }
 
-/// How many effects there are, the orders of one wave counting once.
+/// Returns the number of effects. The orders of one wave count once.
 fn sorts(chosen: &[Profile]) -> usize {
     let sort = |p: &Profile| p.candidate.sort();
     let first = |k: &usize| !chosen[..*k].iter().any(|p| sort(p) == sort(&chosen[*k]));
     (0..chosen.len()).filter(first).count()
 }
 
-/// Whether they are the same effects.
+/// Returns true if both lists have the same effects.
 pub(super) fn same(a: &[Profile], b: &[Profile]) -> bool {
     a.len() == b.len()
         && a.iter()
             .all(|p| b.iter().any(|q| q.candidate == p.candidate))
 }
 
-/// The nominal columns with those of the effects, but for one.
+/// Returns the fit with the columns of all effects except `but`.
 pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -> Fit<'f> {
     let mut fit = base.clone();
     for (k, profile) in chosen.iter().enumerate() {

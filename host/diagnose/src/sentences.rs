@@ -1,4 +1,4 @@
-//! A diagnosis in sentences.
+//! Sentences of a diagnosis.
 
 use rig_shared::effects::Kind;
 use rig_shared::multibody::{COLUMNS, column};
@@ -15,15 +15,15 @@ use super::waves::{is_of_the_motor, ratio_is_described};
 use rig_model::robot::Joint;
 use rig_output::{format_significant, format_unit, format_value, listed};
 
-/// From so many standard deviations on a parameter has moved.
+/// Standard deviations above which a parameter has changed.
 const MOVED: f64 = 3.0;
-/// Times the RMS that the description leaves, from which on fitting again has made it worse.
+/// RMS ratio of the refitted to the unchanged description above which the refit made it worse.
 const WORSE: f64 = 1.1;
 
-/// What the residuals of the description and of the refitted description say; none where fitting again has made the hold-out worse, or
-/// nothing falls.
+/// Explains the residuals of the description and of its refit. None if the refit made the hold-out worse, or reduced
+/// nothing.
 pub fn what_falls(d: &Diagnosis) -> Option<&'static str> {
-    // A missing effect may bend parameters so that nothing falls before it is in the model.
+    // A missing effect may bias parameters so that the refit alone reduces nothing.
     let falls =
         |w: &Waterfall| matches!(w.judged(), [described, refitted, ..] if refitted < described);
     let fallen = d.waterfall.iter().any(falls) && worse_refitted(d).is_none();
@@ -49,7 +49,7 @@ fn percent(share: f64) -> String {
     format!("{} %", format_significant(100.0 * share, 3))
 }
 
-/// The verdict with its figures.
+/// Returns the verdict with its figures.
 pub(super) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
     let mut words = Vec::new();
     match d.verdict {
@@ -134,14 +134,14 @@ pub(super) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
     words
 }
 
-/// Two numbers with as many digits as tell them apart.
+/// Formats two numbers with enough digits to distinguish them.
 fn apart(a: f64, b: f64) -> [String; 2] {
     let with = |digits| [a, b].map(|x| format_significant(x, digits));
     let differ = |pair: &[String; 2]| pair[0] != pair[1];
     (3..8).map(with).find(differ).unwrap_or_else(|| with(8))
 }
 
-/// What was found and what it is worth.
+/// Lists the effects found and their gains.
 fn effects(d: &Diagnosis) -> String {
     let names: Vec<String> = (d.steps.iter())
         .map(|s| {
@@ -157,7 +157,7 @@ fn effects(d: &Diagnosis) -> String {
             } else {
                 format!(" (or {})", rivals.join(" or "))
             };
-            // A joint may have one name several times, with one order each.
+            // A joint may have one name several times, with different orders.
             let order = match s.parameters.get("order") {
                 Some(order) => format!(" of order {}", format_significant(order.value, 4)),
                 None => String::new(),
@@ -191,24 +191,24 @@ fn effects(d: &Diagnosis) -> String {
     )
 }
 
-/// Values of the description that a step's effect may stand for as well, as they would be called; none where there are none.
+/// Returns described values that a step's effect is collinear with, in words; None if there are none.
 pub fn values_alike(d: &Diagnosis, step: &Step) -> Option<&'static str> {
     let tilt = step.effect == Kind::GravityTilt.about().name;
-    // Of a slide a tilt is a constant, whatever its link is like.
+    // On a prismatic joint a tilt is always a constant.
     let turns = |w: &Waterfall| w.unit != "N";
     let single = matches!(&d.waterfall[..], [only] if turns(only));
     (tilt && single)
         .then_some("a first_moment that points elsewhere in the link, or another zero of q1")
 }
 
-/// Why a tilt of a single joint is no certain name.
+/// Explains why a tilt of a single joint is no certain name.
 fn tilt_alike(d: &Diagnosis) -> Option<&'static str> {
     (d.steps.iter()).any(|s| values_alike(d, s).is_some()).then_some(
         "Of a single joint a tilted base, a first_moment that points elsewhere in the link and another zero of q1 are one function of the position, and no motion tells them apart: the name takes first_moment and zero to be as described. A spirit level on the base settles it; if it stands level, correct first_moment (`rig identify` finds it) or the zero.",
     )
 }
 
-/// What an identification makes of effects that may be a constant torque.
+/// Says how an identification treats effects that may be a constant torque.
 fn constant(d: &Diagnosis) -> Option<String> {
     let constant = Kind::TorqueOffset.about().name;
     let joints: Vec<String> = (d.steps.iter())
@@ -223,7 +223,7 @@ fn constant(d: &Diagnosis) -> Option<String> {
     })
 }
 
-/// Constant torques that were fitted beside the friction of a description without a place for them, as far as they are any.
+/// Lists significant constant torques that were fitted because the format of the description has none.
 pub(super) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
     let base = &bench.nominal.base.columns;
     let found: Vec<String> = (bench.anchor.free.iter().enumerate())
@@ -251,8 +251,8 @@ pub(super) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
     })
 }
 
-/// RMS of a joint as the description stands, with its parameters fitted again, and with the effects: what fitting again takes
-/// away is no merit of theirs.
+/// Gives the RMS of a joint with the unchanged description, with the refitted one, and with the effects. The effects do
+/// not count the gain of the refit.
 fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
     let [described, refitted, effects @ ..] = w.judged() else {
         return None;
@@ -283,10 +283,10 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
     ))
 }
 
-/// Joints whose hold-out the description predicts better than its parameters fitted again: the motion did not determine them.
+/// Lists joints whose hold-out the unchanged description predicts better: the motion did not determine the parameters.
 fn worse_refitted(d: &Diagnosis) -> Option<String> {
     let joints: Vec<String> = (d.waterfall.iter())
-        // What only the missing effect had bent is right with it.
+        // Parameters biased only by the missing effect are right with it.
         .filter(|w| matches!(w.holdout[..], [given, _, ..] if w.holdout[1..].iter().all(|rms| *rms > WORSE * given)))
         .map(|w| w.joint.clone())
         .collect();
@@ -298,7 +298,7 @@ fn worse_refitted(d: &Diagnosis) -> Option<String> {
     })
 }
 
-/// The simulated motion's error from the refitted description to the last model, at joints where something was found.
+/// Gives the error of the simulated motion from the refitted description to the last model, on joints with effects.
 fn motion(d: &Diagnosis) -> Option<String> {
     let of_joint = |w: &Waterfall| {
         let mut steps = d.steps.iter().filter(|s| s.joint == w.joint);
@@ -316,7 +316,7 @@ fn motion(d: &Diagnosis) -> Option<String> {
     (!told.is_empty()).then(|| format!("The simulated motion is off by {}.", told.join("; ")))
 }
 
-/// The candidate that came closest to being taken.
+/// Names the refused candidate with the largest gain.
 fn closest(d: &Diagnosis) -> Option<String> {
     let closest = (d.tried.iter())
         .filter(|t| !t.refused.is_empty())
@@ -333,7 +333,7 @@ fn closest(d: &Diagnosis) -> Option<String> {
     ))
 }
 
-/// Why to believe a step.
+/// Gives the reason to believe a step.
 pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     let e = &profile.evidence;
     let j = profile.candidate.joint;
@@ -402,12 +402,12 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     )
 }
 
-/// Unit of a joint's effort, as printed.
+/// Returns the unit of a joint's effort, as printed.
 fn effort(joint: &Joint) -> String {
     format_unit(joint.kind.units().1)
 }
 
-/// How the noise floor was found.
+/// Says how the noise floor was found.
 pub(super) fn floor_how(found: &Found, pairs: &[(usize, usize)]) -> String {
     let runs = found.search.source.runs;
     let figure = |joint: &Joint, floor: f64| match floor.is_nan() {

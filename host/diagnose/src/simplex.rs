@@ -1,28 +1,28 @@
-//! The simplex of Nelder and Mead (1965), one question at a time, so that several can be answered side by side.
+//! The simplex of Nelder and Mead (1965), one evaluation at a time, so that several simplices can run in parallel.
 
-/// Answers that a simplex may ask for beyond its corners, unless told otherwise.
+/// Default number of evaluations beyond the corners.
 pub(super) const MOST_ANSWERS: usize = 120;
-/// Spread of the corners' values, by the best, at which it ends.
+/// Relative spread of the corner values at which it ends.
 const FLAT: f64 = 1e-4;
 
-/// Where a simplex stands, and what it asks next.
+/// State of a simplex: the next evaluation.
 enum Stage {
     /// The value at corner `k`.
     Corner(usize),
-    /// The worst corner thrown through the middle of the others.
+    /// The worst corner reflected through the middle of the others.
     Reflect,
-    /// Twice as far; the value at the reflection is known.
+    /// Twice as far; holds the value at the reflection.
     Expand(f64),
-    /// Half as far, on the side of the reflection where that was better than the worst; its value is known.
+    /// Half as far, on the better side of the worst corner and the reflection; holds the value at the reflection.
     Contract(f64),
-    /// Corner `k`, half as far from the best.
+    /// Corner `k`, moved half-way to the best.
     Shrink(usize),
     Done,
 }
 
-/// A simplex that seeks the least value.
+/// A simplex that minimises a function.
 pub(super) struct Simplex {
-    /// Value and place; best first, once all are known.
+    /// Value and place; best first once all are known.
     corners: Vec<(f64, Vec<f64>)>,
     stage: Stage,
     answers: usize,
@@ -30,7 +30,7 @@ pub(super) struct Simplex {
 }
 
 impl Simplex {
-    /// About `start`, each corner moved along one coordinate by its `step`.
+    /// Creates a simplex at `start`, with each other corner moved along one coordinate by its `step`.
     pub(super) fn new(start: &[f64], steps: &[f64]) -> Self {
         let moved = (steps.iter().enumerate()).map(|(k, step)| {
             let mut x = start.to_vec();
@@ -46,7 +46,7 @@ impl Simplex {
         }
     }
 
-    /// With the move that brings so many answers as its last.
+    /// Sets the number of evaluations, after which the present move is the last.
     pub(super) fn of_most(self, answers: usize) -> Self {
         Self {
             most_answers: answers,
@@ -54,7 +54,7 @@ impl Simplex {
         }
     }
 
-    /// Where it wants the value next; none at its end.
+    /// Returns the place of the next evaluation; None at the end.
     pub(super) fn asks(&self) -> Option<Vec<f64>> {
         match self.stage {
             Stage::Corner(k) | Stage::Shrink(k) => Some(self.corners[k].1.clone()),
@@ -65,7 +65,7 @@ impl Simplex {
         }
     }
 
-    /// The value where it asked.
+    /// Receives the value at that place.
     pub(super) fn told(&mut self, value: f64) {
         self.answers += 1;
         let last = self.corners.len() - 1;
@@ -113,7 +113,7 @@ impl Simplex {
         };
     }
 
-    /// The best place of those known when it last sorted them.
+    /// Returns the best place after the last move.
     pub(super) fn best(&self) -> &[f64] {
         &self.corners[0].1
     }
@@ -133,7 +133,7 @@ impl Simplex {
         self.along(if reflected < worst { -0.5 } else { 0.5 })
     }
 
-    /// On the line from the middle of the others (0) to the worst corner (1).
+    /// Returns a place on the line from the middle of the others (0) to the worst corner (1).
     fn along(&self, share: f64) -> Vec<f64> {
         let n = self.corners.len() - 1;
         let (others, worst) = self.corners.split_at(n);
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_narrow_valley_is_followed_to_its_end() {
-        // Rosenbrock's function, its least value at (1, 1).
+        // Rosenbrock's function, with its minimum at (1, 1).
         let f = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2) + 1.0;
         let mut simplex = Simplex::new(&[-0.2, 0.5], &[0.4, 0.4]);
         let mut best = (f64::INFINITY, Vec::new());

@@ -1,7 +1,7 @@
-//! What errors of one joint's reading do to the torque of all joints.
+//! Effect of one joint's position error on the torque of all joints.
 //!
-//! An error of the reading by e(t) is one of the velocity by ė and of the acceleration by ë. To first order the torque
-//! changes by its slopes along the three: they belong to the motion, and serve every wave that an error may have.
+//! A position error e(t) is also a velocity error ė and an acceleration error ë. To first order the torque changes by
+//! its slopes along the three. They depend on the motion only, and serve every wave of an error.
 
 use super::DiagnoseError;
 use super::columns::Source;
@@ -9,8 +9,8 @@ use super::rows::{Column, motion_of};
 use rig_data::prepare::{central_difference, second_difference};
 use rig_data::runs::Run;
 
-/// Change at which slopes are taken, rad (rad/s, rad/s²), m on a slide: small against every wave of the motion, and so
-/// large that rounding stays below 10⁻¹⁰ of the torque's range.
+/// Step of the difference quotients, rad (rad/s, rad/s²), m on a prismatic joint. Small against every wave of the
+/// motion; rounding stays below 10⁻¹⁰ of the torque's range.
 const NUDGE: f64 = 1e-5;
 
 /// Slopes of the torque of all joints along one joint's position, velocity and acceleration over a run.
@@ -21,7 +21,7 @@ pub(super) struct Slopes {
 }
 
 impl Slopes {
-    /// Along joint `joint` over `run`.
+    /// Computes the slopes along joint `joint` over `run`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -46,7 +46,7 @@ impl Slopes {
         Ok(Self { along })
     }
 
-    /// What a reading that is off by `error`, samples `period` s apart, does to the torque: the true position is less.
+    /// Returns the torque change for a reading with `error`, sampled every `period` s: the true position is smaller.
     pub(super) fn misread(&self, error: &[f64], period: f64) -> Column {
         let changes = [
             error.to_vec(),
@@ -67,8 +67,8 @@ impl Slopes {
     }
 }
 
-/// Torque of the nominal model for a motion, without its jumps: the direction does not change with a small error of the
-/// reading.
+/// Returns the torque of the nominal model for a motion without Coulomb friction: a small position error does not
+/// change its direction.
 fn smooth_torque(
     source: &Source,
     motion: &[Vec<Vec<f64>>; 3],

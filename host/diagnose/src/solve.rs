@@ -1,4 +1,4 @@
-//! All coefficients together, with a covariance that survives correlated residuals.
+//! Joint solution for all coefficients, with a covariance that is robust to correlated residuals.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,19 +8,19 @@ use super::rows::Column;
 /// Coefficients of columns fitted together.
 #[derive(Clone, Debug)]
 pub(super) struct Solution {
-    /// One a column.
+    /// One per column.
     pub(super) values: Vec<f64>,
-    /// Robust to correlation within blocks; columns that were only linearised take part.
+    /// Covariance, robust to correlation within blocks; it includes linearised columns.
     pub(super) covariance: DMatrix<f64>,
 }
 
 impl Solution {
-    /// Standard deviation of a coefficient.
+    /// Returns the standard deviation of a coefficient.
     pub(super) fn std(&self, k: usize) -> f64 {
         self.covariance[(k, k)].max(0.0).sqrt()
     }
 
-    /// The same with coefficients of 1 that are known at these places, in rising order, of the longer list.
+    /// Inserts known coefficients of 1 at these indices of the longer list, in rising order.
     pub(super) fn with_known(mut self, places: &[usize]) -> Self {
         for &place in places {
             self.values.insert(place, 1.0);
@@ -33,16 +33,16 @@ impl Solution {
     }
 }
 
-/// Fits `columns` to the torque; `slopes` are derivatives with respect to parameters that do not enter linearly: they take
-/// part in the covariance alone, behind the columns. None where the columns are not independent.
+/// Fits `columns` to the torque. `slopes` are derivatives by nonlinear parameters; they follow the columns in the
+/// covariance only. None if the columns are collinear.
 pub(super) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
     solved(columns, slopes, plain, &|all, inverse, rest| {
         Some(plain.sandwich(all, inverse, rest))
     })
 }
 
-/// [`solve`] with the covariance of the jackknife over the blocks of `plain`, widened where the blocks of one of `strata` say
-/// more: what a law is off by goes with speed, position or load, and pulls at the parameters the same way in all their rows.
+/// [`solve`] with a jackknife covariance over the blocks of `plain`, widened if blocks of one of the `strata` give
+/// more. A law's mismatch follows speed, position or load, with the same bias in all such rows.
 pub(super) fn jackknifed(
     plain: &Fit,
     strata: &[Fit],
@@ -68,7 +68,7 @@ pub(super) fn jackknifed(
     })
 }
 
-/// Covariance from weighted columns, the inverse of their inner products, and what they leave.
+/// Covariance from weighted columns, the inverse of their inner products, and their residual.
 type Covariance<'f> = dyn Fn(&[Vec<f64>], &DMatrix<f64>, &[f64]) -> Option<DMatrix<f64>> + 'f;
 
 fn solved(
@@ -97,7 +97,7 @@ fn solved(
     Some(Solution { values, covariance })
 }
 
-/// Solution and inverse of the normal matrix, by columns scaled to length one.
+/// Returns the solution and the inverse of the normal matrix, with columns scaled to unit length.
 fn normal(columns: &[Vec<f64>], torque: &[f64]) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let k = columns.len();
     let lengths: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt()).collect();

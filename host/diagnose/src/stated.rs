@@ -1,11 +1,11 @@
-//! What the description states beyond the standard model, and what becomes of it.
+//! Described effects beyond the standard model, and their treatment.
 //!
-//! An effect that a description states is where the search begins, its parameters as first values; it is fitted again
-//! together with everything else. One that these recordings neither show nor contradict is held at its description and
-//! taken off them, as is one that the search has no columns for. A tilt is held until the recordings show another beside it: then it
-//! is taken out, and what they show of a tilt is looked for in its place. A payload is a mass of its link.
+//! A described effect starts the search with its parameters, and is refitted with everything else. If the recordings
+//! neither show nor contradict it, it is held as described, and its torque subtracted. So is one without columns in the
+//! search. A tilt is held until the recordings show another one, which then replaces it. A payload is a mass of its
+//! link.
 //!
-//! Leaves out: effects between motor and link that are held, which no torque for a given motion can be freed of.
+//! Limit: held effects between motor and link cannot be subtracted from the torque of a given motion.
 
 use std::collections::BTreeMap;
 
@@ -22,28 +22,28 @@ use rig_model::effects::{Effects, is_torque};
 use rig_model::robot::{JointKind, Placed, Robot, RobotEffect, title_of, unit_of};
 use rig_output::{format_significant, format_unit};
 
-/// Standard deviations within which the recordings do not contradict a described gain.
+/// Standard deviations within which a fitted gain agrees with the described one.
 const AGREES: f64 = 3.0;
-/// A described value is another where it differs by this share …
+/// Relative difference above which a value has changed …
 const CHANGED: f64 = 0.1;
-/// … and so many standard deviations.
+/// … and the standard deviations that it must also exceed.
 const SURE: f64 = 5.0;
 
-/// What happens to a described effect.
+/// Treatment of a described effect.
 #[derive(Clone, Debug, PartialEq)]
 enum Way {
     /// Part of the link.
     Link,
-    /// The search begins with it.
+    /// Fitted: the search begins with it.
     Free,
-    /// At its description, for the reason given; whether recordings are freed of it.
+    /// Held as described, with the reason, and whether its torque is subtracted.
     Held { why: String, taken_off: bool },
-    /// Taken out: beside it the recordings show another of its kind, which takes its place.
+    /// Removed: the recordings show another effect of its kind.
     GivenUp,
 }
 
 impl Way {
-    /// Of a search by torque.
+    /// Returns the treatment of an effect held in a search by torque.
     fn held(kind: Kind, why: &str) -> Self {
         let seen = !matches!(
             kind.about().channel,
@@ -59,19 +59,19 @@ impl Way {
 /// The effects of a description.
 #[derive(Clone, Debug)]
 pub(super) struct Stated {
-    /// The description without them; payloads are masses of their links.
+    /// The description without its effects; payloads are part of their links.
     pub(super) robot: Robot,
-    /// Whether its format has no place for a constant torque.
+    /// True if the format of the description has no constant torque.
     pub(super) no_offsets: bool,
-    /// Whether the recordings tell which part of a stated constant torque comes from outside.
+    /// True if the recordings tell which part of a described constant torque is external.
     pub(super) pulls_told: bool,
-    /// What was said of limits that were left out, sentences.
+    /// Sentences about ignored torque limits.
     pub(super) lifted: Vec<String>,
     effects: Vec<(RobotEffect, Placed, Way)>,
 }
 
 impl Stated {
-    /// Those of a description.
+    /// Reads the effects of a description.
     pub(super) fn of(robot: &Robot) -> Self {
         let mut plain = robot.clone();
         plain.effects.clear();
@@ -101,26 +101,26 @@ impl Stated {
         }
     }
 
-    /// The effects that are fitted again, in the order of the description.
+    /// Returns the effects that are refitted, in the order of the description.
     pub(super) fn free(&self) -> Vec<Placed> {
         let of = |(_, placed, way): &(_, Placed, Way)| (*way == Way::Free).then_some(*placed);
         self.effects.iter().filter_map(of).collect()
     }
 
-    /// Tables of the effects that are not fitted.
+    /// Returns the tables of the held effects.
     pub(super) fn held(&self) -> impl Iterator<Item = &RobotEffect> {
         let held = |(_, _, way): &&(RobotEffect, Placed, Way)| matches!(way, Way::Held { .. });
         self.effects.iter().filter(held).map(|(effect, ..)| effect)
     }
 
-    /// The effects that were taken out.
+    /// Returns the removed effects.
     pub(super) fn given_up(&self) -> impl Iterator<Item = &Placed> {
         let out = |(_, _, way): &&(_, Placed, Way)| *way == Way::GivenUp;
         self.effects.iter().filter(out).map(|(_, placed, _)| placed)
     }
 
-    /// Takes held tilts out where a tilt was found beside them: one that is stated and is not there, or is another, would come out
-    /// as the difference. Whether there was one.
+    /// Removes held tilts if a tilt was found beside them. A wrong described tilt would otherwise appear as a
+    /// difference. Returns true if any was removed.
     pub(super) fn give_up_tilts(&mut self, found: &[Profile]) -> bool {
         let tilted = |kind: Kind| kind == Kind::GravityTilt;
         let another = found.iter().any(|p| tilted(p.candidate.kind));
@@ -134,7 +134,7 @@ impl Stated {
         changed
     }
 
-    /// Whether an effect of the kind is held on a joint.
+    /// Returns true if an effect of the kind is held on a joint.
     pub(super) fn holds(&self, kind: Kind, joint: usize) -> bool {
         let of = |(_, placed, way): &(_, Placed, Way)| {
             placed.effect.kind == kind && placed.joint == joint && matches!(way, Way::Held { .. })
@@ -142,18 +142,18 @@ impl Stated {
         self.effects.iter().any(of)
     }
 
-    /// Whether the description has the effect, whatever became of it.
+    /// Returns true if the description has the effect, with any treatment.
     pub(super) fn states(&self, effect: &Candidate) -> bool {
         self.effects
             .iter()
             .any(|(_, placed, _)| is_one(placed, effect))
     }
 
-    /// What recordings are freed of, those of the rig with nothing that pulls on it where `unburdened`; none where nothing is
+    /// Returns the held effects to subtract from recordings, without external loads if `unburdened`; None if nothing is
     /// held.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] on a description that makes no chain.
+    /// [`DiagnoseError::Model`] if the description makes no chain.
     pub(super) fn taken_off(
         &self,
         unburdened: bool,
@@ -170,7 +170,7 @@ impl Stated {
         Ok(Some((effects, chain)))
     }
 
-    /// The description whose motion is compared with recordings that were freed of what is held.
+    /// Returns the description to simulate and compare with recordings without the torque of held effects.
     pub(super) fn moving(&self) -> Robot {
         let free = self.effects.iter().filter(|(.., way)| *way == Way::Free);
         Robot {
@@ -179,7 +179,7 @@ impl Stated {
         }
     }
 
-    /// Holds free effects that a library has no columns for; whether there was one.
+    /// Holds fitted effects that are not in the library. Returns true if there was one.
     pub(super) fn hold_what_is_not_in(&mut self, library: &[Candidate]) -> bool {
         let mut changed = false;
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
@@ -195,8 +195,8 @@ impl Stated {
         changed
     }
 
-    /// Holds delays of up to `slack`, s, which are taken for the instants of sampling where nothing states them; whether
-    /// there was one.
+    /// Holds delays of up to `slack`, s: without a description they would count as sampling. Returns true if there was
+    /// one.
     pub(super) fn hold_delays(&mut self, slack: f64) -> bool {
         let mut changed = false;
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
@@ -210,8 +210,8 @@ impl Stated {
         changed
     }
 
-    /// Whether what was fitted is not what the description states: an effect that is gone, or a value that is another by
-    /// more than noise and rounding.
+    /// Returns true if the fit changed the described effects: one is gone, or a value differs by more than noise and
+    /// rounding.
     pub(super) fn changed(&self, told: &[Described]) -> bool {
         (self.effects.iter().zip(told)).any(|((effect, ..), now)| match now.fate {
             Fate::Dropped => true,
@@ -222,8 +222,8 @@ impl Stated {
         })
     }
 
-    /// Holds free effects that are not among those found and that the recordings do not contradict; whether there was one.
-    /// Those that encoders on the links have `refuted` are contradicted.
+    /// Holds fitted effects that were not found, unless the recordings contradict them. Link encoders contradict those
+    /// that are `refuted`. Returns true if any was held.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -238,7 +238,7 @@ impl Stated {
         let fit = with(base, found, None);
         let mut changed = false;
         for ((_, placed, way), stays) in self.effects.iter_mut().zip(stays) {
-            // Of two gears on a joint the one that was found stands for both.
+            // If another gear was found on the joint, it replaces this one.
             let replaced = is_gear(placed.effect.kind)
                 && (found.iter())
                     .any(|p| p.candidate.joint == placed.joint && is_gear(p.candidate.kind));
@@ -266,7 +266,7 @@ impl Stated {
         Ok(changed)
     }
 
-    /// For each effect the place of what it has become among those found; of several under one name the nearest in shape.
+    /// Returns the index of each described effect among those found; with several orders, the nearest one.
     pub(super) fn matched(&self, found: &[Profile]) -> Vec<Option<usize>> {
         let mut taken = vec![false; found.len()];
         (self.effects.iter())
@@ -282,8 +282,7 @@ impl Stated {
             .collect()
     }
 
-    /// What became of each, in the order of the description; `now` are law and parameters of those that are still in the
-    /// model.
+    /// Returns the fate of each described effect, in order. `now` are law and parameters of those in the model.
     pub(super) fn told(&self, now: Vec<Option<Now>>) -> Vec<Described> {
         (self.effects.iter().zip(now))
             .map(|((effect, placed, way), now)| {
@@ -340,8 +339,8 @@ impl Stated {
             .collect()
     }
 
-    /// Decides what a model that a voltage drives makes of the effects: those of its `library` are fitted again, other
-    /// torques take part as they are, the rest does not. Gives those that take part, and which of them are fitted.
+    /// Sets the treatment for a model with a voltage input. Effects of its `library` are refitted, other torques take
+    /// part unchanged, the rest is ignored. Returns those that take part, and whether each is fitted.
     pub(super) fn driven(&mut self, library: &[Kind]) -> Vec<(Effect<f64>, bool)> {
         let mut parts = Vec::new();
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w != Way::Link) {
@@ -368,7 +367,7 @@ impl Stated {
         parts
     }
 
-    /// Tables of the effects that take no part in a model that a voltage drives; after [`Self::driven`].
+    /// Returns the tables of effects that take no part in a model with a voltage input; after [`Self::driven`].
     pub(super) fn undriven(&self) -> Vec<RobotEffect> {
         (self.held())
             .filter(|e| {
@@ -378,7 +377,7 @@ impl Stated {
             .collect()
     }
 
-    /// Kinds of the effects that are fitted again; none for the others, in the order of the description.
+    /// Returns the kinds of the refitted effects; None for the others, in the order of the description.
     pub(super) fn fitted(&self) -> impl Iterator<Item = Option<Kind>> {
         let of =
             |(_, placed, way): &(_, Placed, Way)| (*way == Way::Free).then_some(placed.effect.kind);
@@ -386,21 +385,21 @@ impl Stated {
     }
 }
 
-/// What a described effect is in the last model.
+/// A described effect in the last model.
 pub(super) struct Now {
-    /// By which law.
+    /// Its law.
     pub(super) kind: Kind,
-    /// As fitted.
+    /// Its fitted values.
     pub(super) parameters: BTreeMap<String, Value>,
 }
 
-/// Whether a fitted value is another than the one stated, by more than noise and rounding.
+/// Returns true if a fitted value differs from the described one by more than noise and rounding.
 fn is_another(value: &Value, stated: f64) -> bool {
     let off = (value.value - stated).abs();
     off > CHANGED * stated.abs() && off > SURE * value.std
 }
 
-/// What of a stated effect's values has changed, a sentence; empty where nothing has.
+/// Returns a sentence on the changed values of a described effect; empty if none changed.
 fn what_changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
     let changed: Vec<String> = (effect.values())
         .filter_map(|(p, stated)| {
@@ -419,14 +418,14 @@ fn what_changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
     }
 }
 
-/// The place of a described effect in a library.
+/// Returns the candidate of a described effect.
 pub(super) fn candidate(placed: &Placed) -> Candidate {
     Candidate::on(placed.effect.kind, placed.joint)
         .naming(placed.other)
         .shaped(&placed.effect.shapes)
 }
 
-/// What the columns of a described effect are multiplied by: a gear's twist counts once.
+/// Returns the described gains of the columns. The twist of a gear has gain 1.
 pub(super) fn gains(placed: &Placed) -> Vec<f64> {
     if is_gear(placed.effect.kind) {
         return vec![1.0];
@@ -434,7 +433,7 @@ pub(super) fn gains(placed: &Placed) -> Vec<f64> {
     placed.effect.gains[..placed.effect.kind.about().gains.len()].to_vec()
 }
 
-/// Whether an effect is the described one, by whatever law; a wave of another order is another effect.
+/// Returns true if an effect is the described one, with any law. A wave of another order is another effect.
 pub(super) fn is_one(placed: &Placed, effect: &Candidate) -> bool {
     placed.effect.kind.about().name == effect.kind.about().name
         && placed.joint == effect.joint
@@ -442,7 +441,7 @@ pub(super) fn is_one(placed: &Placed, effect: &Candidate) -> bool {
         && !candidate(placed).is_another_order(effect)
 }
 
-/// Counts a payload to its link, where the description says what the link weighs.
+/// Adds a payload to its link, if the description gives the link's mass.
 fn carried(robot: &mut Robot, placed: &Placed) {
     let (mass, arm) = (placed.effect.gains[0], placed.effect.shapes[0]);
     if let Some(link) = robot.joints[placed.joint].inertial.as_mut() {

@@ -1,4 +1,4 @@
-//! Columns of gears: what twist and play add to the torque of a joint.
+//! Columns of gears: torque that twist and backlash add to a joint.
 
 use std::sync::{Arc, PoisonError};
 
@@ -14,8 +14,8 @@ use crate::search::is_gear;
 use crate::transmission::{Driven, Load, Seen};
 
 impl Source<'_> {
-    /// The same with the links behind gears followed by what the recorded torque tells of them, where a profile asks for it;
-    /// `gains` are those of the columns, one effect after the other.
+    /// Adds observer inputs from the recorded torque, for the profiles with an observer. `gains` are those of the
+    /// columns, one effect after the other.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -54,13 +54,13 @@ impl Source<'_> {
         Ok(self)
     }
 
-    /// The same with each stretch of a link that is followed begun where its own readings, too, say that the link was.
+    /// Makes the observer start each segment at its most likely state, also by the readings of that segment.
     pub(crate) fn smoothed(mut self) -> Self {
         self.seen.values_mut().for_each(|seen| seen.smoothed = true);
         self
     }
 
-    /// What a gear adds to the torque of its joint over a run, one signal for each of the shapes: nothing where it is none.
+    /// Returns the torque that a gear adds to its joint, one signal per set of shapes. Zero if it fails.
     pub(super) fn twisted(
         &self,
         candidate: &Candidate,
@@ -68,7 +68,7 @@ impl Source<'_> {
         r: usize,
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
         let run = &self.runs[r];
-        // An encoder on the link has seen what the gear does.
+        // The link encoder measures the gear's motion.
         if let Some(excess) = self.measured(candidate.joint, r)? {
             return Ok(vec![excess; shapes.len()]);
         }
@@ -90,8 +90,8 @@ impl Source<'_> {
             .collect())
     }
 
-    /// What the links' measured motion adds to the torque of a joint over a run beside that of rigid gears; none where its
-    /// link has no encoder.
+    /// Returns the torque that the measured link motion adds to a joint over a run, compared with rigid gears. None
+    /// without a link encoder on that joint.
     fn measured(&self, joint: usize, r: usize) -> Result<Option<Vec<f64>>, DiagnoseError> {
         let run = &self.runs[r];
         let own = &run.joints[joint];
@@ -112,7 +112,7 @@ impl Source<'_> {
         ))
     }
 
-    /// Torque on the gear of a joint over a run for the links' measured motion.
+    /// Returns the gear torque of a joint over a run for the measured link motion.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -127,7 +127,7 @@ impl Source<'_> {
         Ok(load)
     }
 
-    /// Inertia that the gear of a joint carries, over a run on average.
+    /// Returns the mean inertia behind a joint's gear over a run.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].

@@ -1,15 +1,15 @@
-//! Recordings whose rows come at uneven steps, which is known only once they are prepared.
+//! Recordings with uneven sample times. Only their preparation detects them.
 
 use std::collections::BTreeMap;
 
 use rig_data::prepare::{Evened, PrepareError, Recording, Resampled, interpolation};
 
-/// Step of recordings that are interpolated, s, and what is said of it, by their names.
+/// Interpolation step (s) and message of each resampled recording, by label.
 #[derive(Default)]
 pub(super) struct Uneven(BTreeMap<String, (f64, String)>);
 
 impl Uneven {
-    /// Whether a recording that could not be prepared can be when interpolated, which is remembered.
+    /// Returns true if a recording that failed can be prepared by interpolation, and stores its step.
     pub(super) fn takes(&mut self, error: &PrepareError) -> bool {
         let (PrepareError::Irregular { label, .. }, Some(how)) = (error, interpolation(error))
         else {
@@ -18,7 +18,7 @@ impl Uneven {
         self.0.insert(label.clone(), how).is_none()
     }
 
-    /// Recordings as they are to be used.
+    /// Returns the recordings, resampled where necessary.
     pub(super) fn even<'a>(&self, recordings: &[&'a dyn Recording]) -> Vec<Evened<'a>> {
         (recordings.iter())
             .map(|recording| match self.0.get(&recording.label()) {
@@ -28,13 +28,13 @@ impl Uneven {
             .collect()
     }
 
-    /// What is to be said of those that were interpolated.
+    /// Returns the messages about interpolated recordings.
     pub(super) fn told(&self) -> impl Iterator<Item = String> {
         self.0.values().map(|(_, note)| note.clone())
     }
 }
 
-/// The recordings that an error of preparing names.
+/// Returns the recordings that a preparation error names.
 pub(super) fn of_error<'a>(
     error: &PrepareError,
     given: &[&'a dyn Recording],

@@ -1,4 +1,4 @@
-//! Recordings taken in: read, looked through for faults, freed of touches, under one treatment.
+//! Intake of recordings: reading, data faults, disturbances, one treatment.
 
 use rig_shared::effects::Kind;
 
@@ -16,31 +16,31 @@ use rig_data::past::in_sessions;
 use rig_data::prepare::Recording;
 use rig_data::runs::{Run, copies};
 
-/// What came of looking at the recordings.
+/// Outcome of the intake.
 pub(super) enum Intake<'a> {
-    /// They can be learnt from.
+    /// The recordings can be fitted.
     Fit(Box<Material<'a>>),
-    /// They cannot.
+    /// The recordings have faults.
     Faulty(Vec<DataFault>),
-    /// The same with more of the description's effects held, or its limits left out.
+    /// Start again with more described effects held, or with limits ignored.
     Hold(Box<Stated>),
 }
 
-/// Recordings that can be learnt from.
+/// Recordings that can be fitted.
 pub(super) struct Material<'a> {
     /// Robot and treatment.
     pub(super) bench: Bench<'a>,
     /// The training data.
     pub(super) loaded: Loaded,
-    /// Those held back.
+    /// The hold-out.
     pub(super) sealed: Option<Loaded>,
-    /// What of the description the training data tell less of, and what they contradict.
+    /// Described parameters that the training data do not improve, and those that they contradict.
     pub(super) open: Open,
-    /// Why no name is learnt from them, a sentence: they are too short. None where they are not.
+    /// Reason why no effect is searched for (the recordings are too short), a sentence; None otherwise.
     pub(super) nameless: Option<String>,
-    /// What was left out of them, and what of the model they do not tell apart, sentences.
+    /// Sentences on segments left out as disturbances and on collinear parameters.
     pub(super) touches: Vec<String>,
-    /// What may be wrong with them, or is wrong where they were fitted all the same.
+    /// Possible data faults; real ones only if the fit was requested in spite of them.
     pub(super) faults: Vec<DataFault>,
 }
 
@@ -69,7 +69,7 @@ pub(super) fn intake<'a>(
     if !options.fits(&faults) {
         return Ok(Intake::Faulty(faults));
     }
-    // From a short motion the parameters follow, and no name: both need stretches that nothing was fitted to.
+    // A short motion allows parameters but no effects: both need blocks outside the fit.
     let nameless = too_short_to_learn(&loaded.runs).map(|fault| fault.text);
     let without = without(options, nameless.is_some());
     let mut more = stated.clone();
@@ -130,7 +130,7 @@ pub(super) fn intake<'a>(
     })))
 }
 
-/// Kinds that are left out of the search: all where recordings are `nameless`.
+/// Returns the kinds left out of the search: all of them if the recordings are too short (`nameless`).
 pub(super) fn without(options: &Options, nameless: bool) -> Vec<Kind> {
     match nameless {
         true => Kind::ALL.to_vec(),
@@ -138,7 +138,7 @@ pub(super) fn without(options: &Options, nameless: bool) -> Vec<Kind> {
     }
 }
 
-/// What about the recordings cannot be.
+/// Returns the data faults of all recordings.
 fn wrong(
     stated: &Stated,
     loaded: &Loaded,

@@ -1,4 +1,4 @@
-//! A search for effects on the training data: from the refitted model on, and once more beside gears that it has found.
+//! One search for effects on the training data, repeated with new row weights if it finds gears.
 
 use super::follow::Follower;
 use crate::across::{Across, across, gears, refutes};
@@ -12,24 +12,24 @@ use crate::stated::candidate;
 use crate::{DiagnoseError, Options};
 use rig_model::robot::title_of;
 
-/// How often all else is searched beside gears, whose own shapes it may move.
+/// Maximum number of searches with row weights. Each may change the gear shapes.
 const BESIDE_GEARS: usize = 2;
 
-/// What a search has found.
+/// Result of a search.
 pub(super) struct Pass<'a> {
-    /// The nominal model, rows counting by what gears leave about them.
+    /// The nominal model, with row weights if a gear was found.
     pub(super) refit: Refit<'a>,
-    /// The library, by the last model.
+    /// The library, with the predictions of the last model.
     pub(super) search: Search<'a>,
     /// The effects.
     pub(super) found: Vec<Profile>,
-    /// All that was tried.
+    /// All trials.
     pub(super) tried: Vec<Tried>,
-    /// What encoders on the links show.
+    /// Results of the link encoders.
     pub(super) across: Vec<Across>,
 }
 
-/// What was tried, and how many sweeps that took.
+/// Trials so far, and number of sweeps.
 #[derive(Default)]
 struct Heard {
     tried: Vec<Tried>,
@@ -37,7 +37,7 @@ struct Heard {
 }
 
 impl<'a> Pass<'a> {
-    /// Over recordings whose torque has been moved to when it acts.
+    /// Searches recordings whose torque lead is already compensated.
     pub(super) fn over(
         bench: &'a Bench,
         loaded: &'a Loaded,
@@ -46,11 +46,11 @@ impl<'a> Pass<'a> {
     ) -> Result<Self, DiagnoseError> {
         let refit = Refit::of(bench, &loaded.rows)?;
         let source = bench.source(loaded, &bench.anchor.values(&refit.before.values))?;
-        // Encoders on the links come before the torque: what acts across a transmission they show or exclude.
+        // Link encoders come before the torque: they confirm or exclude effects across a transmission.
         let across = across(&source, &bench.anchor, &refit.before, loaded, None, options)?;
         let mut library = library(bench.robot, &loaded.runs, &options.without);
         library.retain(|c| !refutes(&across, c));
-        // Of a joint that moves one way every constant is its dry friction.
+        // If a joint moves in one direction only, every constant is collinear with its Coulomb friction.
         let one_way = |c: &Candidate| bench.one_way.iter().any(|own| own.joint == c.joint);
         library.retain(|c| !(is_constant(c.kind) && one_way(c)));
         let mut described = bench.stated.free();
@@ -89,7 +89,7 @@ impl<'a> Pass<'a> {
             }
         }
         if refit.is_quieted() && search.loud(&found).is_empty() {
-            // The gear was none after all.
+            // The gear was dropped: search without row weights.
             refit = refit.evened();
             search.settle_gears(refit.even(), &mut found)?;
             found = further(&refit, &mut search, Some(found))?;
@@ -104,7 +104,7 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// The effects, beginning with those `found` by then.
+/// Searches for effects, starting with those already `found`.
 fn searched<'a>(
     bench: &'a Bench,
     loaded: &'a Loaded,
@@ -115,7 +115,7 @@ fn searched<'a>(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<Profile>, DiagnoseError> {
     let trials = search.trials();
-    // Where the effects' columns stand in for nominal ones, these stay as they were.
+    // If effect columns are collinear with nominal ones, the nominal values stay.
     let renew = |chosen: &[Profile]| {
         let solution = refit.solution(chosen);
         let coefficients = solution.as_ref().unwrap_or(&refit.before);

@@ -1,7 +1,7 @@
-//! What a machine can have: physical plausibility of a name, in one table with its sources.
+//! Physical plausibility of effects: one table with sources.
 //!
-//! A name that fails here stands in for something that the library does not hold, such as slow friction, a lag or flexible links. It
-//! is not taken, and what it explained is left as a remainder.
+//! An effect that fails here replaces something that the library lacks, such as slow friction, a lag or flexible links.
+//! It is refused, and the torque that it explained becomes a remainder.
 
 use rig_shared::effects::Kind;
 
@@ -9,17 +9,17 @@ use crate::profile::Profile;
 use crate::refit::Joint;
 use crate::search::Search;
 
-/// One thing that a machine cannot have.
+/// One physical limit.
 struct Belief {
-    /// Of which effects.
+    /// Effects that it applies to.
     kinds: &'static [Kind],
-    /// What is asked; true where the machine cannot have it.
+    /// Returns true if a machine cannot have the effect.
     fails: fn(&Asked, usize) -> bool,
-    /// Why it is refused, a clause.
+    /// Reason for the refusal, a clause.
     why: &'static str,
 }
 
-/// The effects and what they are judged by.
+/// The effects and the results to judge them by.
 pub(super) struct Asked<'a, 'r> {
     /// The library on the training data.
     pub(super) search: &'a Search<'r>,
@@ -31,13 +31,13 @@ pub(super) struct Asked<'a, 'r> {
     pub(super) chosen: &'a [Profile],
 }
 
-/// Twist of a joint of an arm under the RMS torque that the arm puts on it, rad. Lightweight arms, the softest that are no series
-/// elastic actuators, have 6 to 15 kN·m/rad at up to 200 N·m (Albu-Schäffer et al. 2007, "The DLR lightweight robot", Industrial Robot
-/// 34(5)): 20 mrad at the full torque. A softer joint sags so far that a user knows it and describes it.
+/// Largest plausible twist of an arm's joint under its RMS load, rad. Lightweight arms are the softest without series
+/// elastic actuators: 6 to 15 kN·m/rad at up to 200 N·m, 20 mrad at full torque (Albu-Schäffer et al. 2007, "The DLR
+/// lightweight robot", Industrial Robot 34(5)). On a softer joint the sag is visible, so the user describes it.
 const MOST_SAG: f64 = 0.02;
-/// Standard deviations by which a gap has to be larger than none. Two: its 95 % interval then leaves out zero.
+/// Least backlash gap over its standard deviation. Two: the 95 % interval then excludes zero.
 const SURE_OF_A_GAP: f64 = 2.0;
-/// Standard deviations by which delays of two joints of one recorder may differ. Three: one pair in 400 by chance.
+/// Standard deviations by which two joints' delays on one recorder may differ. Three: by chance 1 pair in 400.
 const ONE_CLOCK: f64 = 3.0;
 
 const TABLE: [Belief; 4] = [
@@ -64,7 +64,7 @@ const TABLE: [Belief; 4] = [
 ];
 
 impl Asked<'_, '_> {
-    /// The first of the effects `found` that the machine cannot have, and why.
+    /// Returns the first implausible effect among `found`, with the reason.
     pub(super) fn implausible(
         &self,
         mut found: std::ops::Range<usize>,
@@ -82,7 +82,7 @@ impl Asked<'_, '_> {
         self.search.source.robot.joints.len()
     }
 
-    /// Value of a shape of an effect, with its standard deviation where the motion tells one.
+    /// Returns the value of a named shape, and its standard deviation if it is identifiable.
     fn shape(&self, k: usize, name: &str) -> Option<(f64, Option<f64>)> {
         let profile = &self.chosen[k];
         let shapes = profile.candidate.kind.about().shapes;
@@ -92,20 +92,20 @@ impl Asked<'_, '_> {
         Some((profile.shapes[place], std.map(|(_, [_, std])| *std)))
     }
 
-    /// The delay of an effect and its variance.
+    /// Returns the delay of an effect and its variance.
     fn delay(&self, k: usize) -> [f64; 2] {
         let [value, std] = self.joint.gain(self.chosen, self.free, k, 0);
         [value, std * std]
     }
 }
 
-/// Whether an arm would sag on an elastic joint. A single link may be on any spring.
+/// Returns true if an arm would sag too much on an elastic joint. A single link may have any spring.
 fn sags(asked: &Asked, k: usize) -> bool {
     let Some((stiffness, _)) = asked.shape(k, "stiffness").filter(|_| asked.joints() > 1) else {
         return false;
     };
     let own = asked.chosen[k].candidate.joint;
-    // A joint about the vertical carries the same weight across its axis as the next one turns.
+    // A joint with a vertical axis carries the same weight across its axis as the next joint turns.
     let loads = (own..asked.joints()).map(|joint| {
         let predicted = &asked.search.source.predicted;
         let all = || predicted.iter().flat_map(|run| &run.load[joint]);
@@ -115,14 +115,14 @@ fn sags(asked: &Asked, k: usize) -> bool {
     loads.fold(0.0, f64::max) > MOST_SAG * stiffness
 }
 
-/// Whether a gap could as well be none.
+/// Returns true if a gap is not significantly larger than zero.
 fn gap_may_be_none(asked: &Asked, k: usize) -> bool {
-    // Of a gap that the motion does not tell there is no deviation.
+    // A gap without standard deviation is not identifiable.
     (asked.shape(k, "gap"))
         .is_some_and(|(gap, std)| std.is_none_or(|std| gap < SURE_OF_A_GAP * std))
 }
 
-/// Whether a delay of an arm's joint is not that of all joints that move.
+/// Returns true if not all moving joints of an arm have this delay.
 fn another_clock(asked: &Asked, k: usize) -> bool {
     let delays = |kind: Kind| kind == Kind::MeasurementDelay;
     let library = asked.search.library.iter();
@@ -138,7 +138,7 @@ fn another_clock(asked: &Asked, k: usize) -> bool {
     asked.joints() > 1 && (found.len() < moving || found.iter().any(differs))
 }
 
-/// Whether a coupling is one of joints that are not next to each other.
+/// Returns true if a coupling connects joints that are not neighbours.
 fn not_neighbours(asked: &Asked, k: usize) -> bool {
     let candidate = asked.chosen[k].candidate;
     (candidate.other).is_some_and(|other| candidate.joint.abs_diff(other) > 1)

@@ -1,4 +1,4 @@
-//! What is said besides the verdict: how recordings were treated, what stayed as described, what they are too much alike for.
+//! Remarks beside the verdict: treatment of recordings, parameters held as described, recordings that are too similar.
 
 use rig_shared::effects::Kind;
 
@@ -12,12 +12,12 @@ use crate::solve::Solution;
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit, format_value};
 
-/// Share of the described first moment below which a link is light beside a spring …
+/// Ratio of the fitted to the described first moment below which a link is too light beside a spring.
 const LIGHT: f64 = 0.5;
-/// … and standard deviations that it is so by.
+/// Standard deviations by which the fitted first moment must differ from the described one for that remark.
 const CLEAR: f64 = 5.0;
 
-/// That a spring has taken a link's weight: a spring that stiffens is nearly a straight one less a part of the weight.
+/// Warns that a spring took part of a link's weight: a stiffening spring is like a linear one with less weight.
 pub(super) fn weight_of_a_spring(
     bench: &Bench,
     chosen: &[Profile],
@@ -41,8 +41,8 @@ pub(super) fn weight_of_a_spring(
     })
 }
 
-/// Sentences on recordings learnt from and held back, the what of the description is `open` to doubt, what the sensors read with the drive off,
-/// and the constants of the last model.
+/// Returns sentences on the recordings, the described parameters that are held or contradicted (`open`), the sensor
+/// readings with the drive off, and the constants of the last model.
 pub(super) fn remarks(
     bench: &Bench,
     loaded: &Loaded,
@@ -62,7 +62,7 @@ pub(super) fn remarks(
     words
 }
 
-/// That a hold-out is judged at another rate than that of the recordings learnt from.
+/// Says that the hold-out has another sample rate than the training data.
 fn own_rate(bench: &Bench, sealed: &Loaded) -> Option<String> {
     let [learnt, held] = [bench.rate(), sealed.treatment.sample_rate];
     let label = &sealed.runs.first()?.label;
@@ -77,7 +77,7 @@ fn own_rate(bench: &Bench, sealed: &Loaded) -> Option<String> {
     })
 }
 
-/// What the sensors read with the drive off.
+/// Returns the sensor readings with the drive off.
 fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
     (robot.joints.iter().zip(zeros))
         .map(|(joint, [value, std])| {
@@ -91,7 +91,7 @@ fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
         .collect()
 }
 
-/// A hold-out that is the training motion once more.
+/// Says that the hold-out repeats the training motion.
 fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
     let (own, same) = floor::repeated(&loaded.runs, &sealed.runs)?;
     Some(format!(
@@ -100,7 +100,7 @@ fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
     ))
 }
 
-/// Described friction that is no knowledge beside these recordings.
+/// Lists described friction that the recordings contradict.
 fn contradicted(bench: &Bench, list: &[(usize, f64)]) -> Vec<String> {
     (list.iter())
         .map(|&(k, times)| {
@@ -115,7 +115,7 @@ fn contradicted(bench: &Bench, list: &[(usize, f64)]) -> Vec<String> {
         .collect()
 }
 
-/// What was left as the description has it.
+/// Lists parameters that stay as described.
 fn held(bench: &Bench, open: &[usize]) -> Option<String> {
     let names: Vec<String> = (open.iter().map(|&k| bench.nominal.base.expression(k))).collect();
     (!names.is_empty()).then(|| {

@@ -1,4 +1,4 @@
-//! The steps of a result: what each effect is worth, which other names it may have.
+//! Steps of a result: the gain of each effect, and alternative names.
 
 use rig_shared::effects::Kind;
 
@@ -14,7 +14,7 @@ use crate::search::Search;
 use crate::waves::{is_of_the_motor, ratio_is_described};
 use rig_model::robot::{Robot, title_of};
 
-/// One step an effect that the description does not state, with the names that may stand in its place.
+/// Returns one step for each effect that is not described, with its alternative names.
 pub(super) fn steps(
     search: &Search,
     refit: &Refit,
@@ -59,7 +59,7 @@ pub(super) fn steps(
             let rivals = search.alternatives(&refit.base, chosen, k)?;
             let is_not = |kind| search.is_not(&profile.candidate, kind);
             rank(&mut step, profile, &rivals, source.runs, &is_not);
-            // Whether a wave comes from the motor or from the link is open where no ratio tells the motor's angle.
+            // Without a gear ratio, motor and link waves are not distinguishable.
             if is_of_the_motor(profile.candidate.kind)
                 && !ratio_is_described(&source.robot.joints[j])
             {
@@ -71,13 +71,13 @@ pub(super) fn steps(
     Ok(steps)
 }
 
-/// Share of a gap that a fall closes; NaN where it has grown.
+/// Returns the share of the gap closed by a step; NaN if the RMS rises.
 fn share(rms: [f64; 2], floor: f64) -> f64 {
     let share = closed(rms, floor);
     if share < 0.0 { f64::NAN } else { share }
 }
 
-/// Says of an effect that was taken why it does not stand.
+/// Notes in `tried` why an accepted effect was dropped.
 pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: &str) {
     let title = title_of(fallen.candidate.kind);
     let joint = &robot.joints[fallen.candidate.joint].name;
@@ -87,7 +87,7 @@ pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: 
     }
 }
 
-/// A law that came in for another of its name, in whose round it was taken.
+/// Replaces the entry of a law by that of another law with the same name that took over.
 fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile, trials: usize) {
     let (kind, joint) = (
         profile.candidate.kind,
@@ -115,8 +115,8 @@ fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile, trials: u
     tried.insert(at, taken);
 }
 
-/// Brings what was said of each try in line with what stands in the end: what came in without a round of its own was taken, what
-/// is not there has fallen.
+/// Makes the list of trials consistent with the final effects. Effects without a sweep of their own are marked as
+/// accepted, absent ones as dropped.
 pub(super) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile], trials: usize) {
     let is = |t: &Tried, p: &Profile| {
         t.effect == title_of(p.candidate.kind) && t.joint == robot.joints[p.candidate.joint].name
@@ -136,7 +136,7 @@ pub(super) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile]
         let own: Vec<usize> = (0..found.len())
             .filter(|k| is(fallen, &found[*k]))
             .collect();
-        // Each order of a wave was taken in a round of its own.
+        // Each order of a wave was accepted in a sweep of its own.
         let stands = own.first().is_some_and(|first| {
             rounds[*first] += 1;
             found[*first].candidate.order.is_none() || rounds[*first] <= own.len()
@@ -149,7 +149,7 @@ pub(super) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile]
     }
 }
 
-/// The same of names that were no more than guesses at what is left.
+/// Marks effects as refused that only approximated an unknown residual.
 pub(super) fn refuse_guesses(robot: &Robot, tried: &mut [Tried], judged: &Judged) {
     for guess in &judged.guesses {
         let why = "closes less of the gap than stays open beside it, and may be a guess at what has no name";
@@ -157,7 +157,7 @@ pub(super) fn refuse_guesses(robot: &Robot, tried: &mut [Tried], judged: &Judged
     }
 }
 
-/// The step of a change that has an effect's name.
+/// Returns the step of a parameter change that has the name of an effect.
 pub(super) fn change_step(
     robot: &Robot,
     change: &Change,

@@ -1,4 +1,4 @@
-//! Which of the effects that a search has found stand before the simulated motion, all the others and the recordings held back.
+//! Acceptance of the effects found: tests by simulated motion, joint fit and hold-out.
 
 use super::steps::{refuse, refuse_guesses};
 use super::unbelieved::{CarriedOver, carried_over, ordered, unbelieved};
@@ -12,33 +12,34 @@ use crate::outcome::Tried;
 use crate::profile::Profile;
 use crate::refit::Refit;
 
-/// Share by which a name may not make the simulated motion held back worse: that is often too short to say how sure it is.
+/// Relative rise of the hold-out's simulated error that drops an effect without a significance test. The hold-out is
+/// often too short for one.
 const MUCH_WORSE: f64 = 0.1;
 
-/// What effects are held against.
+/// Data for the acceptance tests.
 pub(super) struct Trial<'a, 'r> {
     /// The training data.
     pub(super) judge: &'a Judge<'a, 'r>,
     /// The nominal model on them.
     pub(super) refit: &'a Refit<'r>,
-    /// Its models with effects.
+    /// Models with effects.
     pub(super) fitting: &'a Fitting<'a, 'r>,
-    /// The training motion simulated.
+    /// Simulation of the training motion.
     pub(super) replay: &'a Replay<'a>,
-    /// Recordings held back.
+    /// The hold-out.
     pub(super) sealed: Option<&'a Loaded>,
 }
 
-/// What is left of the effects.
+/// Result of the acceptance tests.
 pub(super) struct Survivors {
-    /// Those that stand.
+    /// Accepted effects.
     pub(super) judged: Judged,
-    /// Those that took much away and could not stand.
+    /// Dropped effects with a large gain.
     pub(super) fallen: Vec<Profile>,
 }
 
 impl Trial<'_, '_> {
-    /// Takes the effects `found` that do not stand out, one by one. Why goes to `tried`.
+    /// Drops effects that fail a test, one at a time, and writes the reason to `tried`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -57,13 +58,13 @@ impl Trial<'_, '_> {
             judged,
             fallen: Vec::new(),
         };
-        // A name that makes the simulated motion worse stands in for something else.
+        // An effect that increases the simulated error replaces another one.
         let why = "explains torque, but the simulated motion gets worse with it";
         left = self.unspoilt(left, (self.replay, f64::INFINITY), why, tried)?;
         while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
             left = self.without(left, k, why, tried)?;
         }
-        // The hold-out finds no name; one that it contradicts does not stand.
+        // The hold-out selects no effect, but removes those that it contradicts.
         if let Some(sealed) = self.sealed {
             let why = "explains the training data, and leaves more of the recordings held back than there is without it";
             loop {
@@ -84,7 +85,7 @@ impl Trial<'_, '_> {
         Ok(left)
     }
 
-    /// Without what makes a simulated motion worse, by a share that is too much however sure it is.
+    /// Drops effects that degrade a simulation. `most` is the relative rise that suffices without significance.
     fn unspoilt(
         &self,
         mut left: Survivors,

@@ -1,4 +1,4 @@
-//! Effects that all effects fitted together take back, or that other recordings do.
+//! Effects that fail the joint fit of all effects, or the hold-out.
 
 use std::f64::consts::TAU;
 
@@ -13,20 +13,20 @@ use crate::profile::{Profile, SIGNIFICANT};
 use crate::refit::Refit;
 use crate::search::{Search, is_gear};
 
-/// Probability above which an effect may be nothing: its 95 % interval holds zero.
+/// p-value above which an effect is dropped: its 95 % interval contains zero.
 const NOTHING: f64 = 0.05;
-/// Gains of a coupling that are of an inertia, which come first; the last is friction.
+/// Number of inertia gains of a coupling. They come first; the last gain is friction.
 const OF_INERTIA: usize = 2;
-/// Share of the torque that a twist changes, beyond which it is no twist: the mass and load of the link hold no more than 1, and
-/// true gears of the emulated rig come out from 0.7 to 1.1.
+/// Largest share of the twist torque that an accepted gear may have. Mass and load of the link give 1 at most; real
+/// gears of the emulated rig give 0.7 to 1.1.
 const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
-/// Amplitude of what an encoder on the joint may read wrongly, rad: half more than the catalogue has of any, 0.6 mm off centre on a ring
-/// of 20 mm radius. A larger one is a wave of something else, friction under load for one.
+/// Largest amplitude of a joint encoder error, rad. 1.5 times the largest catalogue value (0.6 mm off centre on a ring
+/// of 20 mm radius). A larger one belongs to another wave, such as friction under load.
 const MOST_OF_AN_ENCODER: f64 = 0.03;
-/// What a name may leave more on recordings held back than the model without it: half of what the least of names takes away.
+/// Largest RMS ratio on the hold-out, with an effect over without it. The rise is half the least gain of an effect.
 const WORSE: f64 = 1.01;
 
-/// The effect found that is least to be believed beside the others, and why; none where all are.
+/// Returns the least credible effect beside the others, with the reason; None if all are credible.
 ///
 /// # Errors
 /// [`DiagnoseError`] of the fit.
@@ -94,19 +94,19 @@ pub(super) fn unbelieved(
     Ok(None)
 }
 
-/// What recordings held back say of the effects found.
+/// Verdict of the hold-out on the effects found.
 pub(super) enum CarriedOver {
-    /// One by one they explain them better.
+    /// Each effect reduces the hold-out RMS in the given order.
     Yes,
-    /// All together they do, though not one by one in the order that they were found in.
+    /// All together do, but not one by one in the order of the search.
     InAnotherOrder,
-    /// This one does not.
+    /// This effect does not.
     Not(usize),
 }
 
-/// Whether the effects found explain the recordings held back. One does not with which they are explained worse than without it by
-/// what came before it, and no better beside all the others. Beside a gear that is not to be told: its link is followed only once
-/// its name stands.
+/// Compares the effects found with the hold-out. An effect fails if it increases the RMS after its predecessors and
+/// does not reduce it beside all others. Joints with a gear are skipped: the observer estimates their link only after
+/// acceptance.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -132,8 +132,8 @@ pub(super) fn carried_over(
     Ok(CarriedOver::InAnotherOrder)
 }
 
-/// The effects with those found in another order, last always what is missed least of the recordings held back: friction that depends
-/// on the position may show there only once its warming is known.
+/// Sorts the effects found by their use on the hold-out, the least useful last. For example, position-dependent
+/// friction may reduce the RMS only after warm-up is in the model.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -162,7 +162,7 @@ pub(super) fn ordered(
     Ok(front)
 }
 
-/// The effects found after which more is left of the recordings held back than by what came before them, and by how many times.
+/// Returns the effects that increase the hold-out RMS after their predecessors, with the ratio.
 fn rising(
     fitting: &Fitting,
     search: &Search,
@@ -194,13 +194,13 @@ fn rising(
     Ok(rising)
 }
 
-/// All but the `k`-th.
+/// Returns all effects except the `k`-th.
 fn but(chosen: &[Profile], k: usize) -> Vec<Profile> {
     let others = (chosen.iter().enumerate()).filter(|(i, _)| *i != k);
     others.map(|(_, profile)| profile.clone()).collect()
 }
 
-/// Frequency at which the link swings on its gear while the motor stands, Hz.
+/// Returns the resonance of the link on its gear with the motor locked, Hz.
 fn resonance(search: &Search, gear: &Profile) -> Result<f64, DiagnoseError> {
     let shapes = gear.candidate.kind.about().shapes;
     let stiffness = (shapes.iter().zip(&gear.shapes)).find(|(shape, _)| shape.name == "stiffness");

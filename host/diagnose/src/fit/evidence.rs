@@ -1,43 +1,43 @@
-//! What candidates' columns would do, and how sure that is.
+//! Evidence for candidate columns, with its significance.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{Beside, Fit, axpy, dot};
 
-/// What candidates' columns would do.
+/// Evidence for candidate columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Evidence {
     /// Coefficients of the columns.
     pub(crate) gains: Vec<f64>,
     /// Their standard deviations, robust to correlation within blocks.
     pub(crate) stds: Vec<f64>,
-    /// Share of the residual's squares that they take away.
+    /// Share of the residual's squares that they explain.
     pub(crate) explained: f64,
-    /// Share of the RMS that they take away on folds they were not fitted to.
+    /// Share of the RMS that they remove on folds outside their fit.
     pub(crate) gain: f64,
-    /// The same for the joint that gains most: what one joint lacks is a small share of all joints together.
+    /// The same for the joint with the largest share: a single joint is a small part of all joints together.
     pub(crate) joint_gain: f64,
     /// The gain over its standard deviation between blocks.
     pub(crate) gain_sigmas: f64,
-    /// Of all coefficients together being zero; not corrected for anything.
+    /// p-value of all coefficients being zero, uncorrected.
     pub(crate) p_value: f64,
-    /// Squared error of each block without and with them, on folds not fitted to.
+    /// Squared error of each block without and with them, on folds outside the fit.
     pub(crate) block_errors: Vec<[f64; 2]>,
 }
 
 impl Evidence {
-    /// p-value corrected for `tried` trials (Bonferroni).
+    /// Returns the p-value corrected for `tried` trials (Bonferroni).
     pub(crate) fn corrected(&self, tried: usize) -> f64 {
         (self.p_value * tried as f64).min(1.0)
     }
 
-    /// Share of the RMS that `simpler` leaves, which this takes away besides, in the joint that gains most.
+    /// Returns the share of the RMS left by `simpler` that this one also removes, in the joint with the largest gain.
     pub(crate) fn beyond(&self, simpler: &Self) -> f64 {
         1.0 - (1.0 - self.joint_gain) / (1.0 - simpler.joint_gain).max(f64::MIN_POSITIVE)
     }
 
-    /// By how many standard deviations of a fair coin more blocks are left with less than with more (the sign test, Arbuthnott 1710).
+    /// Returns the standard deviations by which improved blocks outnumber others (the sign test, Arbuthnott 1710).
     pub(crate) fn sign_sigmas(&self) -> f64 {
         let signs: Vec<f64> = (self.taken())
             .filter(|taken| *taken != 0.0)
@@ -46,12 +46,12 @@ impl Evidence {
         signs.iter().sum::<f64>() / (signs.len().max(1) as f64).sqrt()
     }
 
-    /// Squares that they take away, block by block.
+    /// Returns the squares that they remove, block by block.
     pub(crate) fn taken(&self) -> impl Iterator<Item = f64> {
         (self.block_errors.iter()).map(|[without, with]| without - with)
     }
 
-    /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
+    /// Returns the standard deviations of the paired block differences by which this one leaves less than the other.
     pub(crate) fn ahead_of(&self, other: &Self) -> f64 {
         let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))
             .map(|(a, b)| b[1] - a[1])
@@ -60,7 +60,7 @@ impl Evidence {
     }
 }
 
-/// The mean over its standard deviation between blocks.
+/// Returns the mean over its standard deviation between blocks.
 pub(crate) fn sigmas(blocks: &[f64]) -> f64 {
     let n = blocks.len().max(2) as f64;
     let mean = blocks.iter().sum::<f64>() / n;
@@ -69,7 +69,7 @@ pub(crate) fn sigmas(blocks: &[f64]) -> f64 {
 }
 
 impl Fit<'_> {
-    /// Everything about projected columns.
+    /// Returns the evidence for projected columns.
     pub(crate) fn evidence(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<Evidence> {
         let beside = Beside {
             gram: DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
@@ -82,7 +82,7 @@ impl Fit<'_> {
         };
         let (explained, gains) = self.explained(&beside, bounds)?;
         let (k, g) = (columns.len(), self.blocks as f64);
-        // What is left under the alternative: after the columns.
+        // The residual under the alternative: with the columns.
         let mut rest = self.residual.clone();
         for (column, gain) in columns.iter().zip(&gains) {
             axpy(-gain, column, &mut rest);
@@ -140,7 +140,7 @@ mod tests {
             joint_gain,
             ..Evidence::default()
         };
-        // Of ten per cent that are left, one more is a tenth; of ninety it is hardly anything.
+        // Of a residual of 10 %, one point more is a tenth; of 90 % it is almost nothing.
         assert!((of(0.91).beyond(&of(0.90)) - 0.1).abs() < 1e-12);
         assert!((of(0.11).beyond(&of(0.10)) - 1.0 / 90.0).abs() < 1e-12);
     }
@@ -151,11 +151,11 @@ mod tests {
             block_errors,
             ..Evidence::default()
         };
-        // A little off every block, and one in which everything happens.
+        // A small gain in every block, and one loud block.
         let mut agree: Vec<[f64; 2]> = (0..60).map(|_| [1.0, 0.8]).collect();
         agree.push([500.0, 450.0]);
         assert!(of(agree).sign_sigmas() > 7.0);
-        // As much in all, off one block; what stays as it was says nothing.
+        // The same total gain in one block. Unchanged blocks have no vote.
         let mut one = vec![[1.0, 1.0]; 60];
         one.push([500.0, 450.0]);
         assert!(of(one).sign_sigmas() <= 1.0);

@@ -1,4 +1,4 @@
-//! Squared errors on folds that nothing was fitted to.
+//! Cross-validation: squared errors on folds outside the fit.
 
 use std::ops::Range;
 
@@ -6,23 +6,23 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{Fit, axpy, dot};
 
-/// Parts for cross-validation.
+/// Number of folds.
 const FOLDS: usize = 10;
 
-/// The columns taken in, fold by fold.
+/// The basis, fold by fold.
 #[derive(Clone)]
 pub(super) struct Folded {
-    /// Ranges of the weighted rows that lie in one fold, with it.
+    /// Ranges of the weighted rows within one fold, with the fold.
     stretches: Vec<(Range<usize>, usize)>,
     /// Inner products of the basis within each fold.
     own: Vec<DMatrix<f64>>,
-    /// … with the residual.
+    /// … and of the basis with the residual.
     right: Vec<DVector<f64>>,
-    /// Squared error of each block, and of each joint, with the basis refitted without the block's fold.
+    /// Squared error of each block and of each joint, with a basis refitted without the block's fold.
     errors: Errors,
 }
 
-/// Squared errors on folds not fitted to.
+/// Squared errors on folds outside the fit.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Errors {
     pub(super) of_block: Vec<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Errors {
 }
 
 impl Fit<'_> {
-    /// Squared errors without and with the columns, everything refitted without each fold.
+    /// Returns squared errors without and with the columns. Each fold is predicted by a fit to the others.
     pub(super) fn cross_validated(&self, columns: &[Vec<f64>]) -> Option<(&Errors, Errors)> {
         let folded = self.folded.get_or_init(|| self.folded()).as_ref()?;
         let (p, size) = (self.basis.len(), self.basis.len() + columns.len());
@@ -57,7 +57,7 @@ impl Fit<'_> {
         Some((&folded.errors, more))
     }
 
-    /// Times its RMS that the fit leaves of folds left out of it in turn, joint by joint; 1 where the folds do not determine it.
+    /// Returns, per joint, the cross-validated RMS over the RMS of the fit; 1 if the folds do not determine it.
     pub(crate) fn left_out_in_turn(&self) -> Vec<f64> {
         let n = self.rows.count;
         let of_joint = |j: usize| {
@@ -74,12 +74,12 @@ impl Fit<'_> {
             .collect()
     }
 
-    /// What does not depend on the candidate.
+    /// Computes the part that does not depend on the candidate.
     fn folded(&self) -> Option<Folded> {
         let p = self.basis.len();
         let folds = FOLDS.min(self.blocks.max(2));
         let fold_of = |b: usize| b * folds / self.blocks.max(1);
-        // Runs of rows of one fold, so that the sums go over slices.
+        // Ranges of rows in one fold, so that sums use slices.
         let stretches = self.stretches(&fold_of);
         let mut own = vec![DMatrix::<f64>::zeros(p, p); folds];
         let mut right = vec![DVector::<f64>::zeros(p); folds];
@@ -105,7 +105,7 @@ impl Fit<'_> {
         })
     }
 
-    /// Squared errors of `columns`, whose inner products by folds are given, on each fold by a fit to the others.
+    /// Returns the squared errors of `columns` on each fold by a fit to the others, from inner products by folds.
     fn errors(
         &self,
         columns: &[&Vec<f64>],
@@ -147,7 +147,7 @@ impl Fit<'_> {
         Some(errors)
     }
 
-    /// Ranges of the weighted rows that lie in one fold, with it.
+    /// Returns the ranges of the weighted rows within one fold, with the fold.
     pub(super) fn stretches(&self, fold_of: &dyn Fn(usize) -> usize) -> Vec<(Range<usize>, usize)> {
         let n = self.rows.count;
         let mut list: Vec<(Range<usize>, usize)> = Vec::new();
@@ -155,7 +155,7 @@ impl Fit<'_> {
             for (row, &b) in self.block.iter().enumerate() {
                 let (at, fold) = (j * n + row, fold_of(b));
                 match list.last_mut() {
-                    // A stretch stays within a joint.
+                    // A range stays within a joint.
                     Some((range, f)) if *f == fold && range.end == at && row > 0 => {
                         range.end = at + 1;
                     }

@@ -1,20 +1,21 @@
-//! How far coefficients may be off: what each cluster of rows would have made of them had it not been there.
+//! Jackknife covariance: the change of the coefficients when one cluster of rows is left out.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{Fit, dot};
 
 impl Fit<'_> {
-    /// Covariance of the coefficients of weighted columns by leaving out one cluster at a time (MacKinnon, Nielsen and Webb
-    /// 2023, Journal of Applied Econometrics 38: CV3): `rest` is what they leave. The sandwich of scores is too small where
-    /// clusters are few or one of them tells much more than others. None where the columns are not independent.
+    /// Returns the jackknife covariance of the coefficients of weighted columns, one cluster left out at a time
+    /// (MacKinnon, Nielsen and Webb 2023, Journal of Applied Econometrics 38: CV3). `rest` is their residual. The
+    /// sandwich of scores is too small if clusters are few or one of them has most information. None if the columns are
+    /// collinear.
     pub(crate) fn jackknife(
         &self,
         columns: &[impl AsRef<[f64]>],
         rest: &[f64],
     ) -> Option<DMatrix<f64>> {
         let k = columns.len();
-        // Columns of very different units.
+        // Scale columns of very different units.
         let scale: Vec<f64> = (columns.iter())
             .map(|c| 1.0 / dot(c.as_ref(), c.as_ref()).sqrt())
             .collect();
@@ -38,7 +39,7 @@ impl Fit<'_> {
         let whole = all.clone().cholesky()?;
         let mut sum = DMatrix::zeros(k, k);
         for (matrix, score) in own.iter().zip(&scores) {
-            // Without the only cluster that tells something nothing would be known: its score then counts as it is.
+            // If the only informative cluster is left out, the others know nothing: use its plain score.
             let moved = match (&all - matrix).cholesky() {
                 Some(others) => others.solve(score),
                 None => whole.solve(score),

@@ -1,5 +1,4 @@
-//! What is left and is no plain remainder: changes between recordings, touches, what nobody knows to be noise, names that leave what
-//! right ones would not.
+//! Doubtful residuals: changes between recordings, disturbances, unknown noise, lack of fit of the named effects.
 
 use super::{Judge, QUARTER};
 use crate::burst::Burst;
@@ -13,21 +12,21 @@ use crate::search::is_gear;
 use rig_model::robot::Joint;
 use rig_output::{format_significant, format_unit, format_value};
 
-/// A name is doubted where what it leaves is this share of what it takes away: no law holds of a rig to the last per cent, and
-/// what stands in for another leaves more of it.
+/// Ratio of an effect's lack of fit to its torque above which it is doubted. No law fits a rig to the last per cent,
+/// but a substitute leaves more.
 const NOT_QUITE: f64 = 0.02;
-/// Share of the RMS that a free function takes away where no effect was found, from which on something is missing.
+/// RMS share that a free function must remove to show a missing effect, where no effect was found.
 const UNNAMED: f64 = 0.15;
-/// Times the noise of a torque's reading from which on what names leave is not passed off as noise without a repeat: a drive's
-/// own unrest is as much again, or twice.
+/// Residual-to-reading-noise ratio above which a residual without repeated runs is not accepted as noise. A drive adds
+/// one or two times the reading noise.
 const TIMES_READING: f64 = 3.0;
-/// … beside a gear, whose law makes more of the position's noise where motor and link resonate, and where nothing has a name.
+/// The same with a gear, whose law amplifies position noise at resonance, and on joints without an effect.
 const TIMES_READING_WITHOUT_A_LAW: f64 = 7.0;
-/// Standard deviations from which on a change between recordings is certain.
+/// Standard deviations above which a change between recordings is certain.
 const CERTAIN: f64 = 5.0;
 
 impl Judge<'_, '_> {
-    /// What differs between the recordings with all that pulls on a joint and those without, where no effect explains it.
+    /// Detects an unexplained difference between the recordings with and without external loads on a joint.
     pub(super) fn changed_besides(&self, fit: &Fit, joint: usize) -> Option<Remainder> {
         let rows = self.rows;
         let runs = self.search.source.runs;
@@ -51,7 +50,7 @@ impl Judge<'_, '_> {
         })
     }
 
-    /// What differs on average between two runs of one motion, and passes for noise: a constant that has changed in between.
+    /// Detects a different mean in two runs of one motion. It looks like noise, but a constant has changed in between.
     pub(super) fn changed_between(&self, fit: &Fit, joint: usize) -> Option<Remainder> {
         let residual = fit.residual(joint);
         let rms = fit.even_rms(joint);
@@ -109,7 +108,7 @@ impl Judge<'_, '_> {
         }
     }
 
-    /// What is left of a joint that is far more than its reading's own noise, where no repeat says how much of it is noise.
+    /// Detects a residual far above the reading noise, if no repeated run tells how much of it is noise.
     pub(super) fn unproven(
         &self,
         fit: &Fit,
@@ -148,7 +147,7 @@ impl Judge<'_, '_> {
         })
     }
 
-    /// Friction that falls with the speed over nearly all speeds of a joint: no Stribeck friction, which has fallen long before.
+    /// Detects friction that falls over nearly all speeds. Stribeck friction falls at lower speeds.
     pub(super) fn falls_throughout(
         &self,
         chosen: &[Profile],
@@ -178,7 +177,7 @@ impl Judge<'_, '_> {
         })
     }
 
-    /// What the names of a joint leave that right ones would not.
+    /// Detects a lack of fit of a joint's effects that the right effects would not have.
     pub(super) fn doubt(
         &self,
         fit: &Fit,
@@ -202,7 +201,7 @@ impl Judge<'_, '_> {
         let percent = format_significant(100.0 * found.gain, 2);
         let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
         if names.is_empty() {
-            // The description's own friction and filters leave a little of that.
+            // Friction and filters of the rig itself leave some lack of fit.
             return (found.gain > UNNAMED).then(|| Remainder {
                 joint: name.clone(),
                 unit: kind.units().1.to_owned(),

@@ -1,4 +1,4 @@
-//! Which other names a step may have.
+//! Alternative names of a step.
 
 use std::collections::BTreeMap;
 
@@ -10,19 +10,19 @@ use crate::profile::Profile;
 use crate::testable;
 use rig_data::runs::Run;
 
-/// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
+/// Share of a step's gain from which on an alternative is equal, if the blocks show no difference.
 const AS_GOOD: f64 = 0.9;
-/// … nor leave more than so many times what it leaves: beside a name that goes down to the noise that is something missing.
+/// Largest RMS ratio of an equal alternative to the step. A larger one means a missing effect.
 const LEAVES: f64 = 1.2;
-/// Standard deviations by which a stiffness may be larger than found.
+/// Standard deviations by which a stiffness may exceed its estimate.
 const SURELY: f64 = 2.0;
-/// How far from the middle of the motion a spring may be at rest, in spans of the motion.
+/// Largest distance of a spring's rest position from the middle of the motion, in spans of the motion.
 const SPANS_TO_REST: f64 = 2.0;
-/// Standard deviations of a paired difference between blocks.
+/// Standard deviations of a paired block difference below which alternatives are equal.
 const NO_DIFFERENCE: f64 = 2.5;
 
-/// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first; one on another joint
-/// takes away something else, and of some kinds it `is_not`.
+/// Fills the set and the runner-up of a step. `rivals` would replace it, best first. A rival on another joint is no
+/// runner-up. Kinds that it `is_not` are excluded.
 pub(crate) fn rank(
     step: &mut Step,
     own: &Profile,
@@ -64,9 +64,9 @@ pub(crate) fn rank(
     step.name_probability = posterior(own, others);
 }
 
-/// Posterior probability of a name beside its rivals, all of them as likely before: the odds of each rival are those by which it
-/// predicts blocks better that neither was fitted to, by the mean and spread of their paired differences (pseudo-BMA with the
-/// uncertainty of a sum over blocks, Yao et al. 2018, Bayesian Analysis 13(3)).
+/// Returns the posterior probability of a name among its rivals, with equal priors. The odds of each rival come from
+/// mean and spread of the paired differences on blocks outside both fits (pseudo-BMA with the uncertainty of a sum over
+/// blocks, Yao et al. 2018, Bayesian Analysis 13(3)).
 fn posterior<'p>(own: &Profile, rivals: impl Iterator<Item = &'p Profile>) -> f64 {
     let normal = Normal::standard();
     let mut best: BTreeMap<&str, f64> = BTreeMap::new();
@@ -79,8 +79,8 @@ fn posterior<'p>(own: &Profile, rivals: impl Iterator<Item = &'p Profile>) -> f6
     1.0 / (1.0 + best.values().sum::<f64>())
 }
 
-/// Whether a rival may be what is there: none whose law has run to its limit, but a spring that is at rest not far from where the
-/// joint goes, were it a little stiffer than found.
+/// Returns true if a rival is not at a bound. A spring may also be too soft to tell, if a slightly stiffer one would
+/// rest not far from the motion.
 pub(super) fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
     let (gains, stds) = (&rival.evidence.gains, &rival.evidence.stds);
     let (&[stiffness, preload], &[std, _]) = (&gains[..], &stds[..]) else {
@@ -97,7 +97,7 @@ pub(super) fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
     pull.abs() <= (stiffness + SURELY * std) * SPANS_TO_REST * (high - low)
 }
 
-/// Whether the data support a rival as well as what stands.
+/// Returns true if the data support a rival equally well.
 pub(crate) fn equal(own: &Profile, rival: &Profile) -> bool {
     rival.candidate.joint == own.candidate.joint
         && rival.evidence.gain >= AS_GOOD * own.evidence.gain

@@ -1,4 +1,4 @@
-//! Which other names a step may have.
+//! Alternative names of a step.
 
 #![allow(clippy::unwrap_used)]
 
@@ -80,7 +80,7 @@ fn what_a_law_takes_that_cannot_stand_is_not_nothing() {
     println!("{}", left.text);
     assert!(left.text.contains("40 %") && left.text.contains("no name"));
     assert!((left.ratio - 1.0 / 0.6).abs() < 1e-12 && (left.rms - 0.3 * 0.8).abs() < 1e-12);
-    // Where a name stands, what it leaves is judged by itself.
+    // The residual of an accepted effect is judged separately.
     let named = profile(Kind::JointElasticity, 0, 0.5);
     assert!(taken_by_none(&robot, &[fallen], &[named], &[0.3]).is_none());
 }
@@ -101,9 +101,9 @@ fn a_spring_may_stand_where_it_is_at_rest_not_far_away() {
         spring.vanished = vanished;
         may_stand(&spring, std::slice::from_ref(&run))
     };
-    // About the middle of the motion, 2.5 rad, it pulls with 0.3 N·m: with 0.2 N·m/rad more it is at rest 1.5 rad away …
+    // At mid-motion, 2.5 rad, it pulls with 0.3 N·m; with 0.2 N·m/rad more it rests 1.5 rad away …
     assert!(spring(0.0, 0.3, Some("stiffness")));
-    // … and with 0.6 N·m 3 rad, thrice as far as it moves.
+    // … and with 0.6 N·m 3 rad, three times its motion.
     assert!(!spring(0.0, 0.6, Some("stiffness")));
     assert!(spring(0.0, 0.6, None));
     let mut other = profile(Kind::Stribeck, 0, 0.5);
@@ -111,8 +111,8 @@ fn a_spring_may_stand_where_it_is_at_rest_not_far_away() {
     assert!(!may_stand(&other, &[run]));
 }
 
-/// A motion held back twice has a floor of its own, which names have to reach, but for what filters and right laws leave; one held back
-/// once is judged by the floor of other rows, and touches of a gear are loud.
+/// A repeated hold-out has its own floor. Effects must reach it, except for filter errors and model mismatch. Other
+/// hold-outs use the training floor, and gear contacts are loud.
 #[test]
 fn what_is_held_back_twice_is_held_to_its_own_floor() {
     let robot = Robot::from_toml(
@@ -135,7 +135,7 @@ fn what_is_held_back_twice_is_held_to_its_own_floor() {
     assert!(left(1.6, &play, Some(0.0)).is_some());
 }
 
-/// Takes nearly as much away, and leaves half as much again as noise.
+/// Nearly the same gain, but 1.5 times the noise remains.
 #[test]
 fn a_rival_that_leaves_clearly_more_is_no_equal() {
     let own = profile(Kind::PreslidingDahl, 0, 0.84);

@@ -1,4 +1,4 @@
-//! What is left that only recordings held back show, or that a law took which could not stand.
+//! Residuals that only the hold-out shows, and those of effects that were dropped.
 
 use crate::fit::Fit;
 use crate::floor;
@@ -8,17 +8,17 @@ use crate::search::is_gear;
 use rig_model::robot::{Joint, Robot, title_of};
 use rig_output::{format_significant, format_unit};
 
-/// What is left of data held back, whose motion is another, counts as more than noise beyond this ratio to the training data's floor,
-/// or beside a gear, of whose touches each law leaves something.
+/// Residual-to-noise RMS ratio on the hold-out above which a residual is unexplained. For the floor of the training
+/// data, whose motion is another, and for gears, where each law has errors at contact.
 const BEYOND_FLOOR_HELD: f64 = 1.5;
-/// … and beyond this to a floor of their own, known from repeated runs: right names left up to 1.06 of it in 33 rigs of seed 4150.
+/// The same for a floor from repeated hold-out runs: true models left up to 1.06 in 33 rigs of seed 4150.
 const BEYOND_OWN_FLOOR_HELD: f64 = 1.12;
-/// What is left of the training data counts as noise up to this many floors.
+/// Ratio up to which the residual of the training data counts as noise.
 const LIKE_THE_FLOOR: f64 = 1.15;
 
-/// What the last model leaves of data held back, where nothing that it leaves of the training data goes with the motion: in the
-/// joint where it is most beyond the floor. `floors` are those of the training data and of the data held back, `chosen` the effects in
-/// the model; of joints whose floor of data held back is their own `twice` gives what else leaves squares there.
+/// Returns the hold-out residual of the worst joint, if the training residual has no dependence on the motion. `floors`
+/// are those of training data and hold-out, `chosen` are the effects. For a joint with a hold-out floor of its own,
+/// `twice` returns squares from other sources.
 pub(crate) fn left_of_held(
     robot: &Robot,
     held: &[f64],
@@ -69,8 +69,8 @@ pub(crate) fn left_of_held(
     })
 }
 
-/// Names that take something off the training data and nothing off those held back: in the joint where these gain least.
-/// `steps` are each named joint's RMS held back before and after all of them.
+/// Returns the joint whose effects improve the training data but not the hold-out. `steps` is the hold-out RMS of each
+/// joint before and after all its effects.
 pub(crate) fn not_carried_over(
     robot: &Robot,
     steps: &[(usize, [f64; 2])],
@@ -93,7 +93,7 @@ pub(crate) fn not_carried_over(
     })
 }
 
-/// What was taken off by a law that could not stand, on a joint where nothing was found that could.
+/// Returns the residual that a dropped effect explained, on a joint without accepted effects.
 pub(crate) fn taken_by_none(
     robot: &Robot,
     fallen: &[Profile],
@@ -120,7 +120,7 @@ pub(crate) fn taken_by_none(
     })
 }
 
-/// What recordings leave that are too short to learn a name from, of the joint that they leave most of its torque; `why` says how short.
+/// Returns the residual of the joint with the largest share, if recordings are too short for effects. `why`: how short.
 pub(crate) fn too_short_for_names(
     robot: &Robot,
     base: &Fit,

@@ -1,7 +1,7 @@
-//! The frequencies of what comes back in every run of a motion: the cross-spectrum of what two of them leave (Welch 1967; the
-//! coordinate of resonances and of slow drifts that come back).
+//! Frequencies of the residual that repeats in every run of a motion, from the cross-spectrum of two runs (Welch 1967).
+//! They show resonances and repeated slow drifts.
 //!
-//! Leaves out: what differs between the runs, which is the noise floor; motions that were recorded once.
+//! Limit: the difference between runs is the noise floor; motions without a repeat have no such spectrum.
 
 use std::f64::consts::PI;
 
@@ -14,14 +14,14 @@ use rig_output::format_significant;
 
 /// Name of the coordinate.
 const FREQUENCY: &str = "frequency";
-/// Length of a window, s: as fine as a quarter of a hertz.
+/// Window length, s: a resolution of 0.25 Hz.
 const WINDOW: f64 = 4.0;
 /// Fewest windows.
 const FEWEST: usize = 8;
-/// Share of the rows' rate up to which they are looked at: the low-pass before the thinning passes so much.
+/// Largest frequency as a share of the row rate: the passband of the low-pass before decimation.
 const PASSED: f64 = 0.4;
 
-/// What two runs have in common band by band, window by window; none of runs that are too short, or without a pair.
+/// Returns the common spectrum of two runs, per band and window. None without a pair, or if runs are too short.
 pub(super) fn frequency(
     rows: &Rows,
     residual: &[f64],
@@ -42,10 +42,10 @@ pub(super) fn frequency(
             .map(|(r, w)| r * w)
             .collect();
         let mut output = fft.make_output_vec();
-        // The lengths are those of the plan; the only error of this call is another length.
+        // The lengths are those of the plan; another length is the only error of this call.
         fft.process(&mut input, &mut output).ok().map(|()| output)
     };
-    // Bins of equal ratio from one line on.
+    // Bins of equal frequency ratio, from the first line.
     let edge = |b: usize| (highest as f64).powf(b as f64 / BINS as f64);
     let bin = |line: usize| {
         let share = (line as f64).ln() / (highest as f64).ln();
@@ -91,7 +91,7 @@ pub(super) fn frequency(
     Some((place, Process { sums, taken }))
 }
 
-/// Whether a place is one of these, which say of everything that comes back and stand behind what it goes with.
+/// Returns true for a frequency dependence. It describes the whole repeated residual, so it comes last.
 pub(super) fn is_frequency(place: &Place) -> bool {
     place.coordinate == FREQUENCY
 }
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::locate::probabilities;
 
-    /// Two runs of a minute at 100 rows a second, with a resonance at 7 Hz in both and noise of each.
+    /// Two runs of a minute at 100 rows/s, with a resonance at 7 Hz in both and independent noise.
     fn found(size: f64) -> (Place, f64) {
         const ROWS: usize = 12_000;
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);

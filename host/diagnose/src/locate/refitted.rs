@@ -1,20 +1,20 @@
-//! What a refit takes out of whatever is left: noise that is refitted to is no longer free to go with the model's own columns,
-//! and a test that let it would find nothing (estimated parameters in a marked empirical process: Stute, González Manteiga &
-//! Presedo Quindimil 1998, J. Am. Stat. Assoc. 93).
+//! Components that a refit removes from a residual. After a refit, the noise has no part along the model's own columns.
+//! A test that ignores this finds nothing (estimated parameters in a marked empirical process: Stute, González Manteiga
+//! & Presedo Quindimil 1998, J. Am. Stat. Assoc. 93).
 //!
-//! Leaves out: base parameters that several joints share; each joint is taken as refitted by itself.
+//! Limit: each joint counts as refitted separately, also if joints share base parameters.
 
 use super::BINS;
 use crate::rows::Rows;
 
-/// Least share of a column that is its own beside those before it.
+/// Smallest part of a column orthogonal to those before it, as a share of its length.
 const OWN: f64 = 1e-6;
 
-/// The nominal columns of one joint as directions: of length 1, across each other.
+/// Orthonormal basis of one joint's nominal columns.
 pub(crate) struct Refitted(Vec<Vec<f64>>);
 
 impl Refitted {
-    /// Of a joint, where rows count so much (all alike where nothing is given).
+    /// Creates the basis of a joint, with row weights if given.
     pub(crate) fn of(rows: &Rows, counts: Option<&[f64]>, joint: usize) -> Self {
         let keep = &rows.keep[joint];
         let mut basis: Vec<Vec<f64>> = Vec::new();
@@ -27,7 +27,7 @@ impl Refitted {
                 })
                 .collect();
             let whole = dot(&own, &own);
-            // Twice is enough (Kahan).
+            // Two passes are enough (Kahan).
             for _ in 0..2 {
                 for b in &basis {
                     take(&mut own, b);
@@ -43,12 +43,12 @@ impl Refitted {
         Self(basis)
     }
 
-    /// No refit.
+    /// Creates an empty basis: no refit.
     pub(super) fn none() -> Self {
         Self(Vec::new())
     }
 
-    /// What a refit leaves of a residual.
+    /// Returns a residual after the refit.
     pub(super) fn rest(&self, residual: &[f64]) -> Vec<f64> {
         let mut left = residual.to_vec();
         for b in &self.0 {
@@ -57,7 +57,7 @@ impl Refitted {
         left
     }
 
-    /// A residual along each direction, block by block.
+    /// Returns a residual along each direction, block by block.
     pub(super) fn along(&self, residual: &[f64], block: &[usize], blocks: usize) -> Vec<Vec<f64>> {
         let mut along = vec![vec![0.0; self.0.len()]; blocks];
         for (d, b) in self.0.iter().enumerate() {
@@ -68,7 +68,7 @@ impl Refitted {
         along
     }
 
-    /// Each direction summed over bins.
+    /// Returns each direction summed over bins.
     pub(super) fn in_bins(&self, place: &[Option<usize>]) -> Vec<[f64; BINS]> {
         let of = |b: &Vec<f64>| {
             let mut sums = [0.0; BINS];

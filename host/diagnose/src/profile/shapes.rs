@@ -1,4 +1,4 @@
-//! Where a law's shapes are looked for.
+//! Search ranges of shapes.
 
 use std::f64::consts::TAU;
 
@@ -10,25 +10,25 @@ use crate::columns::Candidate;
 use crate::search::{Search, is_gear};
 use rig_model::robot::{Joint, JointKind};
 
-/// Points of a grid per decade of a logarithmic range.
+/// Grid points per decade of a logarithmic range.
 const PER_DECADE: f64 = 4.0;
-/// Steps of a grid over a linear range.
+/// Grid steps over a linear range.
 const LINEAR_STEPS: u32 = 8;
-/// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
+/// Initial tooth stiffness (N·m/rad) and damping (N·m·s/rad) of the search for backlash.
 const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
-/// A link does not swing slower on closed teeth, Hz. Softer ones bend to what a wide play does between two touches, as a spring with
-/// a little play, and then nothing stands.
+/// Lowest link resonance on closed teeth, Hz. Softer teeth fit the motion between two contacts of a wide backlash, as a
+/// spring with a small gap, and then no effect is accepted.
 const SLOWEST_TEETH: f64 = 0.5 * CLOSED_TEETH;
-/// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
+/// Ratio to the lower search bound, less one, within which a shape is at the bound: twice the refinement tolerance.
 const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
-/// Share of a joint's highest speed beyond which friction has fallen: the Stribeck velocities of lubricated contacts are tenths of it or
-/// less (Armstrong-Hélouvry 1991).
+/// Share of a joint's highest speed beyond which Stribeck friction has fallen. For lubricated contacts the Stribeck
+/// velocity is tenths of that speed or less (Armstrong-Hélouvry 1991).
 const THROUGHOUT: f64 = 0.4;
-/// A shape is known well enough within this ratio, less one, or this share of a linear range.
+/// Refinement tolerance of a shape: a ratio, less one, or a share of a linear range.
 const FINE_ENOUGH: f64 = 0.01;
 
-/// Where the search for a gear's shapes begins. With play the fit has a narrow ridge along gap and friction and many false
-/// tops where contact chatters: teeth that are taken as soft and damped show the ridge alone.
+/// Returns initial shapes of a gear. With backlash, the fit has a narrow ridge along gap and friction, and many false
+/// maxima from contact chatter. Soft, damped teeth show only the ridge.
 fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
     let mut list = Vec::new();
     let shapes = kind.about().shapes;
@@ -40,7 +40,7 @@ fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
             list.push(if kind == Kind::Backlash {
                 [first, SOFT_TEETH[0], SOFT_TEETH[1], share]
             } else {
-                // A few per cent of critical damping for a tenth of a kg·m².
+                // A few per cent of critical damping for 0.1 kg·m².
                 [first, 0.1 * (0.1 * first).sqrt(), share, 0.0]
             });
         }
@@ -48,10 +48,10 @@ fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
     list
 }
 
-/// Periods that the later stages of a gear, and the spokes of a torque sensor behind it, make in a turn of the joint. One would be gravity.
+/// Periods per joint turn of the later gear stages, and of a torque sensor's spokes. One period would be gravity.
 const OF_THE_JOINT: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 6.0];
 
-/// Grid of shapes of an effect on a joint.
+/// Returns the grid of an effect's shapes on a joint.
 pub(crate) fn grid_on(kind: Kind, joint: &Joint) -> Vec<[f64; SHAPES]> {
     let mut points = grid(kind);
     if kind == Kind::GearEccentricity && joint.kind == JointKind::Revolute {
@@ -70,7 +70,7 @@ pub(crate) fn grid_on(kind: Kind, joint: &Joint) -> Vec<[f64; SHAPES]> {
     points
 }
 
-/// Grid of shapes of an effect.
+/// Returns the grid of an effect's shapes.
 pub(crate) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
     if is_gear(kind) {
         return starts(kind);
@@ -109,7 +109,7 @@ pub(crate) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
     points
 }
 
-/// A shape's value as the search moves it: its logarithm where ratios count.
+/// Returns a shape's search coordinate: its logarithm if it is log-scaled.
 pub(super) fn coordinate(shape: &Parameter, value: f64) -> f64 {
     match shape.scale {
         Scale::Logarithmic => value.ln(),
@@ -117,9 +117,9 @@ pub(super) fn coordinate(shape: &Parameter, value: f64) -> f64 {
     }
 }
 
-/// Where a refinement may go: beyond ten times its range a law is no longer told from its limit, nor is a distance below the
-/// least that is `told`, nor a time constant beyond the time that the joints have been `running`, nor a velocity beyond a share of the
-/// `fastest` that the joint reaches: what falls over all speeds bends to anything.
+/// Returns the search range of a shape. Beyond ten times its range, a law equals its limit. A distance must be at least
+/// `told`, a time constant at most the operating time `running`. A velocity is at most a share of `fastest`: friction
+/// that falls over all speeds fits anything.
 pub(super) fn searched(shape: &Parameter, told: f64, [running, fastest]: [f64; 2]) -> [f64; 2] {
     let ([low, high], [least, most]) = (shape.bounds, shape.range);
     match shape.scale {
@@ -142,14 +142,14 @@ pub(super) fn searched(shape: &Parameter, told: f64, [running, fastest]: [f64; 2
     }
 }
 
-/// Whether friction falls as far up as it is looked for, of a joint that goes so fast at most.
+/// Returns true if Stribeck friction falls up to its search bound, for a joint with this highest speed.
 pub(crate) fn falls_throughout(kind: Kind, shapes: &[f64; SHAPES], fastest: f64) -> bool {
     matches!(kind, Kind::Stribeck | Kind::StribeckExponential)
         && shapes[0] * (1.0 + AT_THE_END) > THROUGHOUT * fastest
 }
 
-/// The shape without which there is no effect, the first of each law, where it stands at the least of what is searched; of a
-/// gear only play is one.
+/// Returns the first shape of a law if it is at its lower search bound: then there is no effect. For gears this applies
+/// only to a backlash gap.
 pub(super) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
     let shape = kind.about().shapes.first()?;
     let least = (1.0 + AT_THE_END) * searched(shape, told, [f64::INFINITY; 2])[0];
@@ -157,34 +157,34 @@ pub(super) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<
     (counts && shapes[0] < least).then_some(shape.name)
 }
 
-/// Whether a shape is a way that the position shows.
+/// Returns true if a shape is a distance in the position.
 pub(super) fn is_distance(shape: &Parameter) -> bool {
     shape.unit == "rad"
 }
 
-/// Whether a shape is a velocity.
+/// Returns true if a shape is a velocity.
 fn is_velocity(shape: &Parameter) -> bool {
     shape.unit == "rad/s"
 }
 
-/// Whether a shape is a time that goes by.
+/// Returns true if a shape is a duration.
 fn is_duration(shape: &Parameter) -> bool {
     shape.unit == "s"
 }
 
-/// Whether a shape is a time constant that has run to the time that the joints have been `running`: what happens by a longer one
-/// is a straight line, of which gain and time constant are one number.
+/// Returns true if a shape is a time constant that reached the operating time `running`. Beyond it the law is a
+/// straight line, with gain and time constant collinear.
 pub(crate) fn is_straight(shape: &Parameter, value: f64, running: f64) -> bool {
     is_duration(shape) && value * (1.0 + AT_THE_END) > running
 }
 
-/// Whether one of a law's shapes is such a one.
+/// Returns true if one of a law's shapes is such a time constant.
 pub(crate) fn goes_straight(kind: Kind, shapes: &[f64; SHAPES], running: f64) -> bool {
     let scales = kind.about().shapes.iter();
     (scales.zip(shapes)).any(|(shape, value)| is_straight(shape, *value, running))
 }
 
-/// The value there, within what physics allows.
+/// Returns the value at a search coordinate, within the physical bounds.
 pub(super) fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
     let [low, high] = shape.bounds;
     match shape.scale {
@@ -194,7 +194,7 @@ pub(super) fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
     .clamp(low, high)
 }
 
-/// Distance of the grid's points along a coordinate of one of `count` shapes, and the one at which a refinement ends.
+/// Returns the grid spacing along the coordinate of one of `count` shapes, and the tolerance of its refinement.
 pub(super) fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
     let [low, high] = shape.range;
     match shape.scale {
@@ -210,10 +210,10 @@ pub(super) fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
 }
 
 impl Search<'_> {
-    /// The least and the most that a candidate's shapes may be where that depends on the rig.
+    /// Returns lower and upper bounds of a candidate's shapes that depend on the rig.
     ///
-    /// A gear whose link would swing on it at more than half the rate of the rows is not believed (`engine::unbelieved`): up to that
-    /// rate and its critical damping it is searched, and no further, where each sample would take many steps.
+    /// A gear with a link resonance above half the row rate is refused (`engine::unbelieved`). The search ends at the
+    /// row rate and at critical damping there, because a stiffer gear needs many steps per sample.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -238,7 +238,7 @@ impl Search<'_> {
         Ok([least, most])
     }
 
-    /// A candidate's grid within its [`Self::ends`].
+    /// Returns a candidate's grid within its [`Self::ends`].
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].

@@ -1,4 +1,4 @@
-//! What is taken.
+//! Acceptance of candidates.
 
 use super::*;
 
@@ -22,14 +22,14 @@ fn profile(kind: Kind, joint_gain: f64, gain_sigmas: f64) -> Profile {
     }
 }
 
-/// A saturation shows where the torque is highest: in few blocks, and there it takes most away.
+/// A saturation shows in few blocks, those with the highest torque, and has its largest gain there.
 #[test]
 fn what_takes_much_away_may_do_so_in_few_blocks() {
     let saturated = |gain, sigmas| profile(Kind::TorqueSaturation, gain, sigmas).refused(300);
     assert_eq!(saturated(0.6, 1.9), None);
     assert!(saturated(0.6, 0.9).is_some());
     assert!(saturated(0.1, 1.9).is_some());
-    // Play bends to so much that one touch is enough for a false one; a spring rings at its resonance alone.
+    // Backlash fits so much that one contact suffices for a false one. A spring rings at its resonance alone.
     assert!(profile(Kind::Backlash, 0.6, 1.9).refused(300).is_some());
     assert_eq!(profile(Kind::JointElasticity, 0.8, 1.9).refused(300), None);
     assert!(
@@ -39,7 +39,7 @@ fn what_takes_much_away_may_do_so_in_few_blocks() {
     );
 }
 
-/// A constant that shows beside loud blocks: nearly all of them are left with less, what they vary by hides it.
+/// A constant beside loud blocks: it improves nearly all blocks, but their variation hides that.
 #[test]
 fn many_blocks_that_agree_stand_in_for_a_gain_beyond_what_they_vary_by() {
     let of = |kind, less: usize| {
@@ -54,7 +54,7 @@ fn many_blocks_that_agree_stand_in_for_a_gain_beyond_what_they_vary_by() {
     assert!(of(Kind::Backlash, 75).is_some());
 }
 
-/// The link of a wide play is seldom where the motor's motion has it.
+/// The link of a wide backlash is seldom where the motor motion puts it.
 #[test]
 fn a_play_that_takes_little_is_heard_where_that_is_clear() {
     let play = |gain, sigmas| profile(Kind::Backlash, gain, sigmas);

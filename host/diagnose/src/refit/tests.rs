@@ -1,4 +1,4 @@
-//! That intervals hold what is true.
+//! Coverage of the intervals.
 
 #![allow(clippy::unwrap_used)]
 
@@ -20,12 +20,12 @@ use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 /// Hz, and s.
 const RATE: f64 = 250.0;
 const SECONDS: f64 = 24.0;
-/// Drag that is hidden, N·m·s²/rad².
+/// Hidden drag, N·m·s²/rad².
 const DRAG: f64 = 0.12;
 const SEEDS: u64 = 80;
 
-/// Two runs of one motion with noise that is correlated over a tenth of a second. `unknown` is a torque with the cube of the
-/// position that no parameter of the fit has, N·m/rad³: the law of a rig is never quite the library's.
+/// Two runs of one motion, with noise correlated over 0.1 s. `unknown` is a torque with the cube of the position that
+/// the fit cannot model, N·m/rad³: the law of a rig never equals the library's.
 fn recorded(seed: u64, unknown: f64) -> [InMemory; 2] {
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
     let turn = std::f64::consts::TAU;
@@ -47,7 +47,7 @@ fn recorded(seed: u64, unknown: f64) -> [InMemory; 2] {
                 v += amplitude * rate * cos;
                 a -= amplitude * rate * rate * sin;
             }
-            // Six uniform numbers are nearly normal.
+            // The sum of six uniform numbers is nearly normal.
             let white = (0..6).map(|_| rng.random::<f64>() - 0.5).sum::<f64>();
             slow = decay * slow + 0.005 * white;
             let model = 0.17 * a + 0.3 * v + 0.4 * f64::signum(v) + 0.3 * 9.81 * f64::cos(x);
@@ -71,12 +71,12 @@ fn recorded(seed: u64, unknown: f64) -> [InMemory; 2] {
     })
 }
 
-/// What one recording gives.
+/// Result of one recording.
 struct Outcome {
-    /// Error of the drag and of the viscous friction in standard deviations, by the intervals of a result and by those of a
-    /// sandwich over the blocks of the nominal residual.
+    /// Errors of drag and viscous friction in standard deviations: from the result's intervals, and from a sandwich
+    /// over the blocks of the nominal residual.
     errors: [[f64; 2]; 2],
-    /// Probability that the drag is nothing, and a wave with the position that is not there, each beside the other.
+    /// p-values for zero drag and for a position wave that is not there, each beside the other.
     nothing: [f64; 2],
 }
 
@@ -132,7 +132,7 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
     }
 }
 
-/// Share of the intervals that hold the truth, the same two ways.
+/// Share of the intervals that contain the truth, by the same two methods.
 fn held(unknown: f64) -> [f64; 2] {
     let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one.toml")).unwrap();
     let all: Vec<[[f64; 2]; 2]> = (0..SEEDS)
@@ -155,7 +155,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
 fn what_repeats_with_the_motion_counts_once() {
     let [own, blocks] = held(0.03);
     println!("held {own}, {blocks} by the blocks of the nominal residual");
-    // Twelve clusters of a torque that no parameter has: nine of ten, where each run by itself had given eight.
+    // Twelve clusters of an unmodelled torque: nine of ten; with each run as its own cluster, eight.
     assert!(own >= 0.86 && own > blocks + 0.03, "{own} {blocks}");
 }
 
@@ -168,6 +168,6 @@ fn what_is_there_is_not_nothing_and_what_is_not_seldom_something() {
     assert!(all.iter().all(|[drag, _]| *drag < 1e-6), "{all:?}");
     let something = all.iter().filter(|[_, wave]| *wave < 0.05).count() as f64;
     println!("something {something} of {SEEDS}");
-    // One in twenty, and no more than three of its deviations above.
+    // One in twenty, plus at most three standard deviations.
     assert!(something / (SEEDS as f64) < 0.05 + 3.0 * (0.05 * 0.95 / SEEDS as f64).sqrt());
 }

@@ -1,4 +1,4 @@
-//! A search that begins with the effects of a description.
+//! Start of a search from the described effects.
 
 use std::sync::Arc;
 
@@ -12,35 +12,35 @@ use crate::profile::LEAST_GAIN;
 use crate::stated::{candidate, is_one};
 
 impl<'a> Search<'a> {
-    /// Whether an effect is one that the description states.
+    /// Returns true if the description states an effect.
     pub(crate) fn is_described(&self, effect: &Candidate) -> bool {
         self.described.iter().any(|placed| is_one(placed, effect))
     }
 
-    /// The shapes of a gear that an encoder on the link has shown; none of anything else.
+    /// Returns the shapes of a gear that a link encoder showed; None for other effects.
     pub(crate) fn shapes_of(&self, effect: &Candidate) -> Option<[f64; SHAPES]> {
         let own = |(candidate, _): &&(Candidate, _)| candidate == effect;
         self.measured.iter().find(own).map(|(_, shapes)| *shapes)
     }
 
-    /// Whether an encoder on the link has shown it.
+    /// Returns true if a link encoder showed the effect.
     pub(crate) fn is_measured(&self, effect: &Candidate) -> bool {
         self.shapes_of(effect).is_some()
     }
 
-    /// The shapes of a gear that is not searched for any more.
+    /// Returns the shapes of a gear whose shapes are fixed.
     pub(crate) fn fixed(&self, effect: &Candidate) -> Option<[f64; SHAPES]> {
         let own = |(candidate, _): &&(Candidate, _)| candidate == effect;
         let settled = self.settled.iter().find(own).map(|(_, shapes)| *shapes);
         self.shapes_of(effect).or(settled)
     }
 
-    /// Whether it is a gear of which the torque alone speaks: no encoder on the link says more.
+    /// Returns true for a gear known by torque alone, without a link encoder.
     pub(crate) fn is_gear_by_torque(&self, effect: &Candidate) -> bool {
         is_gear(effect.kind) && !self.is_measured(effect)
     }
 
-    /// Joints on which the torque has shown a gear.
+    /// Returns the joints with such a gear.
     pub(crate) fn loud(&self, chosen: &[Profile]) -> Vec<usize> {
         (chosen.iter().map(|p| &p.candidate))
             .filter(|c| self.is_gear_by_torque(c))
@@ -48,8 +48,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Gears that the torque has shown get their shapes anew beside all else, rows counting as in `base`, and keep them from
-    /// there on.
+    /// Refits the shapes of gears known by torque, with the row weights of `base`, and fixes them.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -80,7 +79,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The description's effects come first, then what encoders on the links have shown.
+    /// Returns the rank of an effect: described ones first, then those from link encoders.
     pub(crate) fn rank_of(&self, effect: &Candidate) -> u8 {
         match (self.is_described(effect), self.is_measured(effect)) {
             (true, _) => 0,
@@ -89,19 +88,19 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// How many of the effects, in the order of their rank, no search by torque has found.
+    /// Returns the number of effects that no search by torque found. They come first.
     pub(crate) fn count_given(&self, chosen: &[Profile]) -> usize {
         let given = |p: &&Profile| self.rank_of(&p.candidate) < 2;
         chosen.iter().take_while(given).count()
     }
 
-    /// How many of the effects, those of the description first, it states.
+    /// Returns the number of described effects. They come first.
     pub(crate) fn count_described(&self, chosen: &[Profile]) -> usize {
         let described = |p: &&Profile| self.is_described(&p.candidate);
         chosen.iter().take_while(described).count()
     }
 
-    /// The effects of the description, refined from its shapes, as far as they stand.
+    /// Returns the described effects, refined, without those that are not significant.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -132,8 +131,8 @@ impl<'a> Search<'a> {
         if chosen.is_empty() {
             return Ok(chosen);
         }
-        // Load, inertia and bent contacts as they are with the effects in, and as described: shapes that are refined beside columns
-        // without them run away.
+        // First update load, inertia and contact deflection with the described effects. Shapes would diverge beside
+        // columns without them.
         for _ in 0..2 {
             self.renewed(renew(&chosen)?);
             for profile in &mut chosen {
@@ -149,8 +148,8 @@ impl<'a> Search<'a> {
         Ok(chosen)
     }
 
-    /// Drops what no longer stands by itself; gives what has vanished. What the description states needs no least size, and
-    /// is no stand-in for being small beside another.
+    /// Removes effects that are no longer significant; returns those at a bound. Given effects are exempt from the
+    /// minimum-gain and mismatch tests.
     pub(super) fn standing(
         &self,
         base: &Fit,

@@ -1,4 +1,4 @@
-//! Two plain effects against one that bends to much: a gear, or a law of friction with many shapes.
+//! Comparison of two plain effects with one flexible effect: a gear, or a friction law with many shapes.
 
 use super::kinds::is_searched;
 use super::{Search, is_gear, with};
@@ -7,12 +7,12 @@ use crate::columns::Candidate;
 use crate::fit::Fit;
 use crate::profile::Profile;
 
-/// Share of what the best first law leaves that another law must take away besides to come before it.
+/// Share of the best default law's residual that another law must remove to precede it.
 const FAR_MORE: f64 = 0.5;
 
 impl Search<'_> {
-    /// A gear whose link sticks bends to friction that has memory and falls with speed at once: where two plain effects, by
-    /// whichever law, leave no more than the gear does, the better of them is taken instead.
+    /// Prevents a false gear: one with stiction fits friction with both memory and Stribeck fall. If two plain effects
+    /// of any laws leave at most the same residual, the first of them is taken.
     pub(super) fn plain_before_gear(
         &self,
         base: &Fit,
@@ -37,9 +37,8 @@ impl Search<'_> {
         })
     }
 
-    /// Names are searched by their first law. Where that misses most of what another law of the name explains, another name
-    /// would come first and the right one never: the law that takes far more away is taken, unless two plain effects leave no
-    /// more.
+    /// Prevents a wrong name: where the default law misses most of the torque, another name would win. A law that
+    /// removes far more is taken instead, unless two plain effects leave at most the same residual.
     pub(super) fn richer_law_first(
         &self,
         base: &Fit,
@@ -76,7 +75,7 @@ impl Search<'_> {
         Ok(if plain { best } else { rich })
     }
 
-    /// `first` and the plain effect that does most beside it, after those in the model, refined.
+    /// Adds `first`, then the plain effect with the largest gain beside it, and refines all.
     fn pair(
         &self,
         base: &Fit,

@@ -1,4 +1,4 @@
-//! What a right name leaves because its law is not quite the rig's.
+//! Model mismatch: residual of a right effect whose law is not exactly the rig's.
 
 use rig_shared::effects::Kind;
 
@@ -8,25 +8,24 @@ use crate::fit::sigmas;
 use crate::profile::Profile;
 use rig_model::robot::Robot;
 
-/// Share of the squares that an effect takes away which the difference between its law and the rig's may leave: a law that
-/// closes 93 % of the gap leaves so much …
+/// Mismatch as a share of the squares that an effect removes. A law that closes 93 % of the gap leaves this share …
 const SHADOW: f64 = 0.005;
-/// … the curve along which friction falls with speed has other forms than the library's: a law that closes 86 % …
+/// … a Stribeck curve has other forms than the library's, and a law closes 86 % …
 const SHADOW_OF_A_CURVE: f64 = 0.02;
-/// … a constant and the direction of gravity have no other form: what they leave is what the joint does at rest …
+/// … a constant and the direction of gravity have one form only: their mismatch is at standstill …
 const SHADOW_OF_A_CONSTANT: f64 = 0.001;
-/// … and 86 % for gears, whose motion is driven by the measured one; so much of an eccentric gear's wave its harmonics may be, which are
-/// no second effect.
+/// … and 86 % for gears, driven by the measured motion. Harmonics of an eccentric gear's wave may reach this share;
+/// they are no second effect.
 const SHADOW_OF_A_GEAR: f64 = 0.02;
 
-/// Standard deviations between blocks by which an effect stands clear of another's shadow where that other does little.
+/// Standard deviations between blocks by which an effect exceeds another one's mismatch where that one acts little.
 const CLEAR: f64 = 3.0;
 
-/// Share of what friction under load takes away that friction by position may take besides where nobody says how much of the inertia
-/// is the motor's: with a motor of half of it a true one leaves a quarter.
+/// Share of load friction's squares that position friction may mimic, if the motor's share of the inertia is unknown.
+/// With half the inertia in the motor, a true one leaves a quarter.
 const SHADOW_OF_AN_UNKNOWN_DRIVE: f64 = 0.4;
 
-/// Whether an effect takes away no more than another of its joint leaves because its law is not quite the rig's.
+/// Returns true if an effect removes no more than the mismatch of another one on its joint.
 pub(super) fn in_the_shadow(robot: &Robot, chosen: &[Profile], i: usize) -> bool {
     let taken = |p: &Profile| -> Vec<f64> { p.evidence.taken().collect() };
     let own = taken(&chosen[i]);
@@ -43,15 +42,15 @@ pub(super) fn in_the_shadow(robot: &Robot, chosen: &[Profile], i: usize) -> bool
         k != i
             && other.candidate.joint == chosen[i].candidate.joint
             && own.iter().sum::<f64>() < share * casting.iter().sum::<f64>()
-            // The form of a wave errs all over its turn, most where the wave itself passes zero.
+            // The mismatch of a wave spreads over its turn. It is largest at its zero crossings.
             && (harmonic
                 || !errs_where_it_acts(other.candidate.kind)
                 || !clear(&own, &casting, share))
     })
 }
 
-/// Whether a wave of a gear is a harmonic of another: the error of teeth over a turn of their shaft is no pure sine, and its next periods
-/// are of the same teeth. As far up as the orders of a shaft are searched.
+/// Returns true if a gear wave is a harmonic of another one: tooth errors are no pure sine over a turn of their shaft.
+/// Only orders within the search range of a shaft count.
 fn is_harmonic(own: &Candidate, of: &Candidate) -> bool {
     if own.kind != Kind::GearEccentricity || !own.is_another_order(of) {
         return false;
@@ -64,14 +63,14 @@ fn is_harmonic(own: &Candidate, of: &Candidate) -> bool {
     (2.0..=highest / lowest).contains(&times) && (order - times * first).abs() < 1e-6 * order
 }
 
-/// Whether the description says what of the inertia is the motor's, which no gear carries.
+/// Returns true if the description states the motor's share of the inertia, which no gear carries.
 fn knows_drive(robot: &Robot, of: &Profile) -> bool {
     let drive = robot.joints[of.candidate.joint].drive.as_ref();
     drive.is_some_and(|d| d.joint_inertia + d.rotor_inertia > 0.0)
 }
 
-/// Whether what is wrong with a law is in proportion to what it does: of touches and waves. Friction's curves err between
-/// where they act and where they do not.
+/// Returns true if a law's mismatch is proportional to its torque, as for contacts and waves. A friction curve errs
+/// between its active and inactive ranges.
 fn errs_where_it_acts(kind: Kind) -> bool {
     let waves = [
         Kind::Cogging,
@@ -83,8 +82,8 @@ fn errs_where_it_acts(kind: Kind) -> bool {
     is_gear(kind) || waves.contains(&kind)
 }
 
-/// Whether in the half of the blocks in which the other one does least, what an effect takes away is surely more than that
-/// one's shadow there.
+/// Returns true if an effect clearly exceeds the other one's mismatch in the half of the blocks where that one acts
+/// least.
 fn clear(own: &[f64], casting: &[f64], share: f64) -> bool {
     let mut blocks: Vec<[f64; 2]> = (own.iter().zip(casting)).map(|(o, c)| [*o, *c]).collect();
     blocks.sort_by(|a, b| a[1].total_cmp(&b[1]));
@@ -96,7 +95,7 @@ fn clear(own: &[f64], casting: &[f64], share: f64) -> bool {
     sigmas(&beyond) > CLEAR
 }
 
-/// Share of the squares that an effect takes away which the difference between its law and the rig's may leave.
+/// Returns the mismatch as a share of the squares that an effect removes.
 pub(crate) fn shadow(of: &Profile) -> f64 {
     match of.candidate.kind {
         kind if is_gear(kind) => SHADOW_OF_A_GEAR,
@@ -112,7 +111,7 @@ mod tests {
 
     #[test]
     fn what_stands_where_the_other_does_nothing_is_no_shadow_of_it() {
-        // A touch every fourth block; block by block something else of its own.
+        // A contact in every fourth block, and a constant effect in all.
         let loud = |k: usize| if k.is_multiple_of(4) { 100.0 } else { 0.5 };
         let casting: Vec<f64> = (0..80).map(loud).collect();
         let share = SHADOW_OF_A_GEAR;
@@ -120,10 +119,10 @@ mod tests {
         let everywhere: Vec<f64> = (0..80).map(|k| 0.3 + 0.02 * f64::from(k % 5)).collect();
         assert!(everywhere.iter().sum::<f64>() < share * whole);
         assert!(clear(&everywhere, &casting, share));
-        // As much, but in proportion to what casts it.
+        // The same size, but proportional to the casting effect.
         let shadow: Vec<f64> = casting.iter().map(|c| 0.9 * share * c).collect();
         assert!(!clear(&shadow, &casting, share));
-        // As much where it is quiet, of one block alone.
+        // The same size where the other is quiet, but in one block.
         let mut once = vec![0.0; 80];
         once[1] = 24.0;
         assert!(!clear(&once, &casting, share));
@@ -137,7 +136,7 @@ mod tests {
             assert!(is_harmonic(&gear(own), &gear(of)), "{own} of {of}");
             assert!(!is_harmonic(&gear(of), &gear(own)), "{of} of {own}");
         }
-        // Another shaft; and what a motor has of them is as large as its slots and poles make it.
+        // Another shaft; and a motor's slots and poles set each of its harmonics separately.
         assert!(!is_harmonic(&gear(1.0), &gear(2.0 / 45.0)));
         assert!(!is_harmonic(&gear(3.0), &gear(2.0)));
         let cogging = |order| wave(Kind::Cogging, order);

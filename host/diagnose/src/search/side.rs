@@ -1,7 +1,7 @@
-//! On which side of a gear a constant acts: a gear transmits a torque on the link and knows nothing of a sensor's error, so that
-//! friction under load, or a play's touches, tell the one from the other.
+//! The side of a gear on which a constant acts. A gear transmits a torque on the link, but no sensor error. So load
+//! friction or backlash contacts distinguish them.
 //!
-//! Leaves out: friction that differs with the direction, which is a constant on the motor's side here.
+//! Limit: direction-dependent friction counts as a constant on the motor side.
 
 use rig_shared::effects::Kind;
 
@@ -11,15 +11,15 @@ use crate::columns::{Candidate, Source};
 use crate::fit::Fit;
 use crate::profile::Profile;
 
-/// Of effects that are one constant in the torque, one of each side.
+/// One constant for each side.
 const ON_THE_LINK: Kind = Kind::TorqueOffset;
 const ELSEWHERE: Kind = Kind::CurrentOffset;
-/// Standard deviations between blocks from which on a side is certain.
+/// Standard deviations between blocks above which a side is certain.
 const CERTAIN: f64 = 5.0;
 
 impl<'a> Search<'a> {
-    /// Gives constants beside friction under load or a gear the name of the side on which they explain more. What a description
-    /// states keeps its name.
+    /// Names constants beside load friction or a gear by the side that explains more. Described constants keep their
+    /// names.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -52,7 +52,7 @@ impl<'a> Search<'a> {
             turned[i].candidate = other;
             self.renewed(renew(&turned)?);
             for _ in 0..2 {
-                // First its own columns, then what it does beside those of the others.
+                // First refines its own columns, then its evidence beside the others.
                 self.refine_all(base, &mut turned)?;
             }
             let left = |chosen: &[Profile]| with(base, chosen, None).rms(own.joint);
@@ -69,7 +69,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Whether a gear tells that what it is called is no constant of another kind.
+    /// Returns true if a gear excludes that this constant is of another kind.
     pub(crate) fn is_not(&self, own: &Candidate, kind: Kind) -> bool {
         is_constant(kind)
             && own.kind.on_the_link() != kind.on_the_link()

@@ -1,8 +1,8 @@
-//! Of candidates that explain alike, the one that needs least.
+//! Choice of the smallest among candidates that explain equally well.
 //!
-//! What holds another law wins by a hair wherever the other one is true: a spring's stiffness and preload hold every
-//! constant. Of two laws of which one holds the other, the larger is taken where what it adds stands by itself (Wald 1943; the
-//! covariance of the blocks as elsewhere) and is as large as an effect has to be; others are told apart by whether the data do.
+//! A law that contains another one wins by a small margin if the other is true: a spring contains every constant. The
+//! larger of two nested laws is taken if its additional part is significant (Wald 1943; block covariance as elsewhere)
+//! and large enough for an effect. Other laws are compared by whether the data distinguish them.
 
 use rig_shared::effects::Kind;
 
@@ -14,13 +14,13 @@ use crate::judge::equal;
 use crate::profile::{LEAST_GAIN, Profile, SIGNIFICANT, about_its_middle};
 
 impl Search<'_> {
-    /// Gains and shapes of a candidate.
+    /// Returns the number of gains and shapes of a candidate.
     pub(super) fn size(&self, candidate: &Candidate) -> usize {
         self.source.gains(candidate).len() + candidate.kind.about().shapes.len()
     }
 
-    /// Which of `profiles`, best first, is taken: of those that pass, the best, or the smallest that the data support as
-    /// well on the same joint. `fit` holds everything else in the model.
+    /// Returns the first effect to add from `profiles`, best first: the best that passes, or the smallest equal one on
+    /// its joint. `fit` holds the rest of the model.
     pub(super) fn first_to_take(
         &self,
         fit: &Fit,
@@ -29,7 +29,7 @@ impl Search<'_> {
     ) -> Option<Profile> {
         let passing = || profiles.iter().filter(|p| p.refused(trials).is_none());
         let best = passing().next()?;
-        // Of two transmissions the one without play unless play takes away clearly more.
+        // Prefer the transmission without backlash, unless backlash has a clearly larger gain.
         if best.candidate.kind == Kind::Backlash {
             let simpler = passing().find(|p| {
                 p.candidate.kind == Kind::JointElasticity
@@ -47,7 +47,7 @@ impl Search<'_> {
         Some(smallest.unwrap_or(best).clone())
     }
 
-    /// What the `i`-th effect gives way to beside all others as they are now, of `rivals`; none where it stays.
+    /// Returns the smaller candidate of `rivals` that replaces the `i`-th effect beside all others; None if it stays.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -93,8 +93,8 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Springs that were taken for what an effect found later explains give way to the constant that they hold. Says whether there
-    /// was one.
+    /// Replaces springs by the constants that they contain, if a later effect explains the rest. Returns true if it
+    /// replaced one.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -119,8 +119,8 @@ impl Search<'_> {
         Ok(changed)
     }
 
-    /// Whether the data support a smaller candidate as well as `best`. What acts between motor and link only bends to what
-    /// has no gear; the search weighs them elsewhere.
+    /// Returns true if the data support a smaller candidate as well as `best`. Gears are excluded: they fit too much,
+    /// and the search compares them elsewhere.
     fn as_good_and_smaller(
         &self,
         fit: &Fit,
@@ -143,7 +143,7 @@ impl Search<'_> {
     }
 }
 
-/// Whether the smaller one's columns are combinations of the larger one's and of what is in the model.
+/// Returns true if the smaller one's columns are combinations of the larger one's and of the model's.
 fn holds(fit: &Fit, larger: &Profile, smaller: &Profile) -> bool {
     let mut beside = fit.clone();
     for column in larger.columns.iter() {
@@ -152,7 +152,7 @@ fn holds(fit: &Fit, larger: &Profile, smaller: &Profile) -> bool {
     (smaller.columns.iter()).all(|c| beside.beside(std::slice::from_ref(c)).is_none())
 }
 
-/// Whether what the larger one has beside the smaller one stands by itself.
+/// Returns true if the additional part of the larger one is significant and large enough.
 fn adds(fit: &Fit, larger: &Profile, smaller: &Profile, trials: usize) -> bool {
     let mut beside = fit.clone();
     for column in smaller.columns.iter() {

@@ -1,4 +1,4 @@
-//! All candidates at once, each at its best beside a model.
+//! One fit of all candidates beside a model.
 
 use rig_shared::effects::Kind;
 
@@ -11,7 +11,7 @@ use crate::profile::Profile;
 use rig_model::batch::each_by;
 
 impl Search<'_> {
-    /// All candidates at their best, best gain first, but those that exclude one that is `present`, and the `impossible` ones.
+    /// Fits all candidates, best gain first, except `impossible` ones and those excluded by one that is `present`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -24,7 +24,7 @@ impl Search<'_> {
         self.sweep_of(fit, present, impossible, &|_| true)
     }
 
-    /// Those of one joint: what may stand in the place of an effect there.
+    /// Fits the candidates of one joint: possible replacements of an effect there.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -35,7 +35,7 @@ impl Search<'_> {
         present: &[Candidate],
         impossible: &[Candidate],
     ) -> Result<Vec<Profile>, DiagnoseError> {
-        // A tilt is one of all joints.
+        // A tilt acts on all joints.
         let there = |c: &Candidate| c.joint == joint || c.kind == Kind::GravityTilt;
         self.sweep_of(fit, present, impossible, &there)
     }
@@ -76,13 +76,13 @@ impl Search<'_> {
         Ok(profiles)
     }
 
-    /// Number of trials of a sweep.
+    /// Returns the number of trials of a sweep.
     pub(crate) fn trials(&self) -> usize {
         (self.library.iter())
             .filter(|c| is_searched(c.kind))
             .map(|c| {
                 let shown = self.grid(c).into_iter().filter(|s| self.shows(c, s));
-                // Of the orders beyond a grid the loudest were chosen from all.
+                // The loudest orders beyond the grid were selected from all scanned ones.
                 let chosen_from = if has_many_orders(c.kind) {
                     self.orders[c.joint].scanned
                 } else {
@@ -94,7 +94,7 @@ impl Search<'_> {
     }
 }
 
-/// Leaves of the laws of one name that bend to as much the one that takes most away: a second law is no second effect.
+/// Keeps the best law of each name, if the laws are equally flexible: a second law is no second effect.
 fn better_laws(profiles: &mut Vec<Profile>) {
     let rank = |p: &Profile| (p.vanished.is_none(), p.evidence.gain);
     let beaten: Vec<bool> = (profiles.iter())

@@ -1,4 +1,4 @@
-//! Effects that another, missing or wrong, keeps from being sure: put in first, and judged together.
+//! Trial of effects that are not significant because another effect is missing or wrong.
 
 use super::{Search, is_gear, same};
 use crate::DiagnoseError;
@@ -6,15 +6,15 @@ use crate::columns::Candidate;
 use crate::fit::Fit;
 use crate::profile::{Profile, SIGNIFICANT};
 
-/// Share of the RMS that a candidate must take away to be put in although chance might do so: what is left is mostly of others then,
-/// and goes on for long, so that few stretches of it are independent.
+/// RMS share that a candidate must remove for a trial although it is not significant. Other missing effects then
+/// dominate the residual, whose long correlation leaves few independent blocks.
 const WORTH_TRYING: f64 = 0.1;
-/// Candidates that are put in, one after the other.
+/// Maximum number of candidates on trial.
 const TRIES: usize = 2;
 
 impl Search<'_> {
-    /// `chosen` with one of `profiles` that is not sure beside it, everything settled, where each effect passes by itself then; none
-    /// where that makes none sure.
+    /// Adds one of `profiles` that is not significant and settles all effects. Returns the larger model if each effect
+    /// passes in it; None if no such model exists.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -26,7 +26,7 @@ impl Search<'_> {
         trials: usize,
         impossible: &[Candidate],
     ) -> Result<Option<Vec<Profile>>, DiagnoseError> {
-        // Alone it stays as unsure as it is.
+        // A lone candidate would stay not significant.
         if chosen.is_empty() {
             return Ok(None);
         }

@@ -1,4 +1,4 @@
-//! Which of names that explain alike is taken.
+//! Choice among names that explain equally well.
 
 #![allow(clippy::unwrap_used)]
 
@@ -18,7 +18,7 @@ use rig_data::{Block, JointColumns};
 use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 use rig_scenario::{Effect, Scenario};
 
-/// What is found beside gears, which are not what is asked; `again`: the training motion recorded twice.
+/// Returns the effects found beside gears. `again` records the training motion twice.
 fn diagnosed(effect: Effect, seed: u64, again: bool) -> (Diagnosis, f64) {
     let mut made = Scenario::short([effect], seed).make().unwrap();
     let options = Options {
@@ -58,20 +58,20 @@ fn a_constant_is_no_spring_and_a_spring_no_constant() {
     }
 }
 
-/// The law is one of what the current says, not of what is left of it: by the latter the coefficient is a quarter too large.
+/// The law uses the measured current. With the torque after saturation the coefficient is a quarter too large.
 #[test]
 fn a_saturation_is_as_large_as_it_is() {
     let loss = 0.12;
     let (diagnosis, constant) = diagnosed(Effect::TorqueSaturation { loss }, 5, true);
     assert_eq!(names(&diagnosis), ["torque_saturation"]);
     let step = &diagnosis.steps[0];
-    // The rig's 1/(1 + (i/knee)²) begins as 1 − (i/knee)² and ends above it, by an eighth at the peak current and more beyond.
+    // The rig's 1/(1 + (i/knee)²) starts as 1 − (i/knee)² and exceeds it later: by an eighth at the peak current.
     let truth = loss / (1.0 - loss) / (Effect::PEAK_CURRENT * constant).powi(2);
     let found = step.parameters["coefficient"].value / truth;
     assert!((0.75..1.03).contains(&found), "{found}");
 }
 
-/// Before it is found, presliding looks like a torque recorded early; what is then taken out as that comes back as a delay.
+/// Without presliding in the model, it looks like a torque lead. Removing that lead then creates a delay.
 #[test]
 fn presliding_is_no_delay_besides() {
     let effect = Effect::Presliding { stroke: 0.007 };
@@ -92,7 +92,7 @@ fn a_constant_that_a_description_cannot_state_is_fitted_beside_its_friction() {
     assert_eq!(stated.steps.len(), 1);
     let (open, model) = made.diagnosed(&made.robot, &options(true));
     assert!(open.steps.is_empty(), "{:?}", names(&open));
-    // No change either: there was nothing to change.
+    // No change of parameters either: nothing was changed.
     assert_eq!(open.verdict, stated_without_a_constant());
     let offset = model.joints[0].friction.as_ref().unwrap().offset;
     assert!((offset.abs() - 0.15).abs() < 0.01, "{offset}");
@@ -103,7 +103,7 @@ fn a_constant_that_a_description_cannot_state_is_fitted_beside_its_friction() {
     }
 }
 
-/// The verdict on the same rig without the constant.
+/// Returns the verdict on the same rig without the constant.
 fn stated_without_a_constant() -> Verdict {
     let made = Scenario::short([], 101).make().unwrap();
     let options = Options {
@@ -113,7 +113,7 @@ fn stated_without_a_constant() -> Verdict {
     made.diagnosed(&made.robot, &options).0.verdict
 }
 
-/// What a spring pulls everywhere alike is part of a constant that is fitted anyway; its stiffness is not.
+/// The preload of a spring is part of a fitted constant; its stiffness is not.
 #[test]
 fn a_spring_is_found_where_the_description_cannot_state_a_constant() {
     let (stiffness, rest) = (1.2, 0.3);
@@ -128,13 +128,13 @@ fn a_spring_is_found_where_the_description_cannot_state_a_constant() {
     let found = &diagnosis.steps[0].parameters["stiffness"];
     assert!((found.value / stiffness - 1.0).abs() < 0.1, "{found:?}");
     assert!(diagnosis.steps[0].gap_closed > 0.9);
-    // The rest of the law, −stiffness·rest, stands as the joint's offset.
+    // The rest of the law, −stiffness·rest, is in the joint's offset.
     let offset = model.joints[0].friction.as_ref().unwrap().offset;
     assert!((offset + stiffness * rest).abs() < 0.1, "{offset}");
 }
 
-/// A minute of the one-link rig moved along seven sines, its torque by its equation with `more` (of position and speed) and
-/// white noise.
+/// Records a minute of the one-link rig along seven sines. The torque is its equation with `more` (of position and
+/// speed) and white noise.
 fn moved(seed: u64, more: impl Fn(f64, f64) -> f64) -> InMemory {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let slowest = TAU * rng.random_range(0.08..0.12);
@@ -179,7 +179,7 @@ fn asked(seed: u64, more: impl Fn(f64, f64) -> f64) -> Diagnosis {
         .0
 }
 
-/// Where friction falls with a longer tail than by the square of the speed, nothing stands in for the tail.
+/// Friction with a longer Stribeck tail than a quadratic one: no other effect replaces the tail.
 #[test]
 fn friction_that_falls_exponentially_has_one_name() {
     for seed in [1, 2, 3] {
@@ -195,8 +195,7 @@ fn friction_that_falls_exponentially_has_one_name() {
     }
 }
 
-/// What comes in first has no say in the law: a tilt hides most of the friction until it is in the model, and both laws explain the
-/// rest alike.
+/// The order of selection does not decide on the law: before a tilt is in the model, both laws explain equally much.
 #[test]
 fn friction_that_falls_exponentially_has_its_law_beside_a_tilt() {
     for seed in [1, 2, 3] {
@@ -218,8 +217,7 @@ fn friction_that_falls_exponentially_has_its_law_beside_a_tilt() {
     }
 }
 
-/// Twelve waves a turn of the joint have no name on one joint. What fits them by chance falls where other recordings speak
-/// against it.
+/// Twelve waves per turn have no name on a single joint. A chance fit of them fails on the hold-out.
 #[test]
 fn no_name_stands_that_the_hold_out_contradicts() {
     for seed in [1, 2, 3, 4] {
@@ -233,7 +231,7 @@ fn no_name_stands_that_the_hold_out_contradicts() {
     }
 }
 
-/// Effects that push each other out in turn come to an end; friction as a whole that varies with the position is no one law.
+/// Effects that remove each other in turn come to an end. All friction varying with position is no single law.
 #[test]
 fn a_search_ends_where_names_take_turns() {
     for seed in [1, 2, 3] {

@@ -1,4 +1,4 @@
-//! A link that is followed gives its gear's own stiffness, and nothing for a gear that is none.
+//! An observer-based gear: its stiffness is correct, and it explains nothing without a real gear.
 
 #![allow(clippy::unwrap_used)]
 
@@ -13,8 +13,8 @@ use crate::test_made::Diagnosed as _;
 use rig_data::prepare::Recording;
 use rig_scenario::{Effect, Scenario};
 
-/// The rig's spring hardens, its friction has memory and its link is pushed at random. Driven by the motor's motion alone the
-/// stiffness comes out 7 to 12 % too soft, with 70 to 86 % of the gap closed.
+/// The rig's spring hardens, its friction has memory, and its link is pushed at random. Open-loop, the stiffness is 7
+/// to 12 % too soft, and 70 to 86 % of the gap is closed.
 #[test]
 fn a_stiff_gear_is_as_stiff_as_it_is() {
     let effect = Effect::JointElasticity {
@@ -33,7 +33,7 @@ fn a_stiff_gear_is_as_stiff_as_it_is() {
         "{:?}",
         diagnosis.words
     );
-    // Everything is in units of the description's torque constant, which is the rig's.
+    // All values use the description's torque constant, which equals the rig's.
     let stiffness = &step.parameters["stiffness"];
     assert!(
         (stiffness.value / 1400.0 - 1.0).abs() < 0.02,
@@ -52,7 +52,7 @@ fn a_stiff_gear_is_as_stiff_as_it_is() {
     assert_eq!(model.effects[0].effect.shapes[0], stiffness.value);
 }
 
-/// Touches come at instants that no law predicts, and leave ten times the noise of everything between them.
+/// Contacts come at times that no law predicts, and leave ten times the noise of the rest.
 #[test]
 fn an_effect_as_large_as_the_noise_is_found_beside_play() {
     let hidden = [
@@ -78,7 +78,7 @@ fn an_effect_as_large_as_the_noise_is_found_beside_play() {
     assert!((amplitude / 0.15 - 1.0).abs() < 0.3, "{amplitude}");
 }
 
-/// RMS of the training residual of a rig without a gear that gives: rigid, and with a made-up gear whose link is followed.
+/// Returns the training residual RMS of a rig with a rigid gear: rigid model, and with a false observer-based gear.
 fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f64; 2] {
     let made = Scenario::short(effect, seed).make().unwrap();
     let stated = Stated::of(&made.robot);
@@ -117,7 +117,7 @@ fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f
     let rigid = refit.base.rms(0);
     let follower = Follower::new(&bench, &loaded, &refit, &search);
     let chosen = follower.followed(&[made_up], &[rigid]).unwrap().unwrap();
-    // Where it stays driven, following leaves more.
+    // Where the gear stays open-loop, the observer leaves more.
     let stands = chosen[0].followed.is_some();
     let followed = if stands {
         with(&refit.base, &chosen, None).rms(0)
@@ -127,8 +127,7 @@ fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f
     [rigid, followed]
 }
 
-/// What is heard of the torque up to the beginning of a stretch, or of where the link begins it, must not pass for a law of the
-/// gear within it.
+/// The torque before a segment, or its initial state, must not pass for a law of the gear within it.
 #[test]
 fn a_gear_that_is_none_gains_nothing_by_being_followed() {
     let drag = Effect::draw("quadratic_drag", 1.0, 7);

@@ -1,4 +1,4 @@
-//! Gears that are none.
+//! False gears.
 
 #![allow(clippy::unwrap_used)]
 
@@ -24,7 +24,7 @@ const SPRING: Effect = Effect::JointElasticity {
 };
 const GEAR: Candidate = Candidate::on(Kind::JointElasticity, 0);
 
-/// What `ask` makes of the library on a rig with that hidden.
+/// Returns the result of `ask` for the library on a rig with this hidden effect.
 fn on<T>(
     effect: Option<Effect>,
     seed: u64,
@@ -46,14 +46,14 @@ fn on<T>(
     ask(&bench, &loaded, &refit, &search)
 }
 
-/// Stiffness, damping and share of the friction as shapes.
+/// Stiffness, damping and friction share as shapes.
 fn shapes(of: [f64; 3]) -> [f64; SHAPES] {
     let mut shapes = [0.0; SHAPES];
     shapes[..3].copy_from_slice(&of);
     shapes
 }
 
-/// What is said of an elastic gear of such a stiffness on a rig that has one of 700 N·m/rad; its torque made `times` as large.
+/// Returns the reason against an elastic gear (rig: 700 N·m/rad) of this stiffness; its torque is scaled by `times`.
 fn said(stiffness: f64, times: f64) -> Option<&'static str> {
     on(Some(SPRING), 5, |bench, loaded, refit, search| {
         let shapes = shapes([stiffness, 0.3, 0.25]);
@@ -92,14 +92,14 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
 #[test]
 fn a_gear_stands_that_is_as_stiff_as_the_rig_and_not_one_that_is_too_stiff_or_moves_too_much() {
     assert_eq!(said(700.0, 1.0), None);
-    // A quarter of its torque is asked for four times.
+    // A quarter of its torque needs a factor of four.
     assert!(said(700.0, 0.25).unwrap().contains("mass and load"));
-    // Of 0.15 kg·m² at 1e5 N·m/rad that is 130 Hz, beyond rows of less than 100 Hz.
+    // 0.15 kg·m² at 1e5 N·m/rad resonate at 130 Hz, above rows of less than 100 Hz.
     assert!(said(1e5, 1.0).unwrap().contains("band"));
 }
 
-/// Where the rig creeps, its friction lags a little: a link with all friction on it behind a spring of five times critical damping
-/// would take a tenth off what that leaves, and 6 % with rows about rests left out.
+/// With creep, the friction of the rig lags a little. A link with all friction behind a spring of five times critical
+/// damping would remove a tenth of that residual (6 % without rows near standstill).
 #[test]
 fn a_gear_that_does_not_swing_is_none() {
     let made = Scenario::short([], 900).make().unwrap();
@@ -120,7 +120,7 @@ fn a_gear_that_does_not_swing_is_none() {
     }
 }
 
-/// What comes of an elastic gear where the search begins with one like that.
+/// Returns the elastic gear from a search that starts at these shapes.
 fn profiled(effect: Option<Effect>, seed: u64, begun: [f64; 3]) -> Profile {
     on(effect, seed, |_, _, refit, search| {
         let place = search.library.iter().position(|c| *c == GEAR).unwrap();
@@ -129,7 +129,7 @@ fn profiled(effect: Option<Effect>, seed: u64, begun: [f64; 3]) -> Profile {
     })
 }
 
-/// On the creeping rig the best gear beyond critical damping stays there; a true one swings.
+/// On the creeping rig the best gear above critical damping stays there; a true one swings.
 #[test]
 fn a_gear_beyond_critical_damping_is_refused_for_that_alone() {
     let lag = profiled(None, 900, [3000.0, 190.0, 0.25]);
@@ -138,7 +138,7 @@ fn a_gear_beyond_critical_damping_is_refused_for_that_alone() {
     assert_eq!(gear.refused(300), None);
 }
 
-/// What is said of an effect on the second joint of an upright arm of two with nothing hidden; `count` columns of it.
+/// Returns the reason against an effect with `count` columns on joint 2 of an upright two-link arm without effects.
 fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'static str> {
     let made = ArmScenario {
         seconds: [20.0, 15.0],
@@ -184,12 +184,12 @@ fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'st
         heard: false,
         doubled: false,
     };
-    // A gear so soft that its motion cannot be followed has no column.
+    // A gear too soft to simulate has no column.
     let fallen = unbelieved(&refit, &search, &judge, &[profile]).ok()?;
     fallen.map(|(_, why)| why)
 }
 
-/// The second link of the arm puts some newton metres on its joint.
+/// The second link of the arm loads its joint with some N·m.
 #[test]
 fn an_arm_does_not_stand_on_a_soft_joint() {
     let of = |stiffness: f64| said_on_arm(Kind::JointElasticity, shapes([stiffness, 1.0, 0.25]), 1);
@@ -208,7 +208,7 @@ fn one_joint_of_a_recorder_has_no_clock_of_its_own() {
     assert!(said.unwrap().contains("one clock"), "{said:?}");
 }
 
-/// Play of a thousandth of a degree on a rig without any.
+/// Backlash of a thousandth of a degree on a rig without any.
 #[test]
 fn a_gap_that_may_be_none_is_none() {
     on(None, 6, |bench, loaded, refit, search| {
