@@ -2,7 +2,7 @@
 //!
 //! The convex problem
 //!
-//! min ½‖R·K·π − z‖² + Σ pullᵢ·D(Jᵢ(π)‖Jᵢ⁰) + Σ pullⱼ·(πⱼ/πⱼ⁰ − ln(πⱼ/πⱼ⁰) − 1),
+//!   min ½‖R·K·π − z‖² + Σ pullᵢ·D(Jᵢ(π)‖Jᵢ⁰) + Σ pullⱼ·(πⱼ/πⱼ⁰ − ln(πⱼ/πⱼ⁰) − 1),
 //!
 //! with R and z the triangular factor of the data in units of its own noise, K the grouping, D the divergence of
 //! [`super::pseudo_inertia`]. D is the barrier of the linear matrix inequalities Jᵢ ≻ 0. It is centred on a prior,

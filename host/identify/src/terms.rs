@@ -222,8 +222,7 @@ impl Evidence {
         Seen::of(&all)
     }
 
-    /// Returns a term's values that would make all of the joint's torque, or the assumed tilt; none if the joint stands
-    /// still.
+    /// Returns a term's values that would make all of the joint's torque, or the prior tilt; none for a still joint.
     pub(super) fn sizes(&self, term: Term) -> Option<Vec<f64>> {
         let Term::Position { joint, .. } = term else {
             return Some(vec![LEVEL; term.columns().len()]);
