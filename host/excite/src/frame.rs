@@ -142,8 +142,7 @@ impl Room {
         Ok(Self { margin, speed })
     }
 
-    /// Returns the reference's position range; includes the limit itself on a side where `start` is already in the
-    /// margin.
+    /// Returns the reference's position range; the limit itself on a side where `start` is already in the margin.
     fn positions(&self, [low, high]: [f64; 2], start: Option<f64>) -> [f64; 2] {
         let free = 0.5 * self.margin * (high - low);
         let (inner_low, inner_high) = (low + free, high - free);
