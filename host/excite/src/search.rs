@@ -23,7 +23,7 @@ use rig_model::simulate::SimulateError;
 
 /// Number of random motions per start, of which the best is used: judging one costs a fiftieth of improving it.
 const CANDIDATES: usize = 12;
-/// Every so many starts one is fully refined, but at least [`LEAST_FINALISTS`].
+/// Number of starts per fully refined one; at least [`LEAST_FINALISTS`] are refined.
 const FINALIST_SHARE: usize = 6;
 const LEAST_FINALISTS: usize = 3;
 /// Samples per period of the fastest harmonic in the first improvement: enough to rank the starts.

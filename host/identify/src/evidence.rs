@@ -168,8 +168,8 @@ impl Belief {
     }
 
     /// Returns the log evidence without its constant, the mean and the variances. Forms A·Aᵀ + 1: with its diagonal
-    /// scaled to one, this squares the condition of the combinations, not of their sizes. For data almost without
-    /// noise, where this is too much, the factor is found without forming the matrix.
+    /// scaled to one, this squares the condition number due to collinearity, not due to different sizes. For data
+    /// almost without noise, where this is too much, the factor is found without forming the matrix.
     pub(super) fn judged(
         &self,
         data: &Seen,
@@ -279,7 +279,7 @@ impl Posterior {
     }
 }
 
-/// Returns the lower factor of A·Aᵀ + 1 by orthogonal transformations of [Aᵀ; 1] (Golub and Van Loan 2013, section
+/// Returns the lower factor of A·Aᵀ + 1 by orthogonal transformations of Aᵀ over 1 (Golub and Van Loan 2013, section
 /// 5.2).
 fn unsquared(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (m, n) = a.shape();

@@ -20,9 +20,10 @@
 //!
 //! No rules are published for motors of coupled drives. Rule used here: with constant ratios, the inertia of a motor is
 //! a fixed quadratic form in the joint velocities. It joins parameters whose forms add up to it: `Ia`; `Izz` of links
-//! whose rotation about their own axis is a fixed sum of joint velocities; and, for a prismatic joint of fixed
-//! direction, the moved mass minus the same mass at rest on the preceding link. All other motor parameters are taken as
-//! independent.
+//! whose rotation about their own axis is a fixed sum of joint velocities (those that turn about one direction or about
+//! a second one); and, for a prismatic joint of fixed direction, the moved mass minus the same mass at rest on the
+//! preceding link. The last form contains the joint's velocity squared and times those of the preceding prismatic
+//! joints. All other motor parameters are taken as independent.
 
 use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind, column};

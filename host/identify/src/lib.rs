@@ -1,15 +1,14 @@
-//! Identification: from prepared motion to base parameters with honest uncertainty.
+//! Identification: from prepared motion to base parameters with their uncertainty.
 //!
-//! Rows of a model stream into triangular factors ([`TriangularFactor`]); the base parameters of the robot
-//! ([`Base`]) are estimated from them, what the data do not excite is named, and further passes over the
-//! recordings give residuals and a covariance that allows for their correlation in time. Memory does not grow
-//! with the recordings.
+//! Rows of a model are streamed into triangular factors ([`TriangularFactor`]), from which the base parameters of the
+//! robot ([`Base`]) are estimated. Parameters without excitation are named. Further passes over the recordings give
+//! residuals and a covariance that allows for their correlation in time. Memory does not grow with the recordings.
 //!
-//! Least squares (ordinary, weighted by joint, robust) take the regressor as exact; its noise is kept small by the
-//! choice of the cut-off ([`rig_data::prepare::NOISE_SHARE`]). Where that does not do, there are instrumental variables,
-//! output error and total least squares; maximum likelihood for residuals that are correlated; ridge regression and
-//! physical consistency for what the motion leaves open. Every estimate can be compared with the others on stretches
-//! of time left out of the fit ([`Comparison`]).
+//! Least squares (ordinary, weighted by joint, robust) assume an exact regressor; the choice of the cut-off keeps its
+//! noise small ([`rig_data::prepare::NOISE_SHARE`]). If this is not enough, there are instrumental variables, output
+//! error and total least squares. Maximum likelihood is for correlated residuals. Ridge regression and physical
+//! consistency are for parameters that the motion does not identify. All estimates can be compared on time segments
+//! left out of the fit ([`Comparison`]).
 //!
 //! The parameters of a simulated pendulum, from its motion and torque:
 //!
@@ -42,7 +41,8 @@
 //! # }
 //! ```
 //!
-//! Leaves out: estimation of the friction law's form (see [`friction_map()`]); noise models that change with the motion.
+//! Limits: the form of the friction law is not estimated (see [`friction_map()`]); the noise model is independent of
+//! the motion.
 
 mod added_torque;
 mod band;
@@ -285,7 +285,7 @@ pub struct Options {
     pub prepare: PrepareOptions,
     /// Window length of the integral model, s; chosen from the motion if absent. Unused by the differential model.
     pub window: Option<f64>,
-    /// Seed of the random states that determine the base parameters.
+    /// Seed of the random states used to find the base parameters.
     pub seed: u64,
     /// How many times each training recording counts; recordings beyond the end of the list count once.
     pub recording_weights: Vec<f64>,

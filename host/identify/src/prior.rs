@@ -176,7 +176,7 @@ impl Prior {
         self
     }
 
-    /// Appends values of unknown sign and known size.
+    /// Appends values of which only the size is known.
     pub(super) fn with_free(&self, sizes: &[f64]) -> Self {
         let mut prior = self.clone();
         let all = prior.centre.len() + sizes.len();

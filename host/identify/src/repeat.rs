@@ -10,7 +10,7 @@ use rig_data::prepare::{PrepareError, Recording};
 const WINDOWS: usize = 10;
 /// Samples per period of the fastest motion: half a sample is a twentieth of a radian of it.
 const SAMPLES_A_PERIOD: usize = 60;
-/// Every so many samples one is compared.
+/// Distance between compared samples, in samples.
 const STRIDE: usize = 6;
 /// Smallest number of periods of the fastest motion in a window.
 const LEAST_PERIODS: usize = 2;

@@ -1,4 +1,4 @@
-//! Identification with effects that scale with the friction of their joint: their torque depends on the identified
+//! Identification with effects that depend on the friction of their joint: their torque depends on the identified
 //! parameters.
 
 use rig_shared::multibody::{COLUMNS, column};
@@ -13,7 +13,7 @@ const SETTLED: f64 = 1e-3;
 /// Largest number of passes.
 const MOST_PASSES: usize = 12;
 
-/// Identifies `robot` from `training` and checks the result on `holdout`. With effects that scale with the friction of
+/// Identifies `robot` from `training` and checks the result on `holdout`. With effects that depend on the friction of
 /// their joint, it repeats the identification with the new friction until it converges.
 ///
 /// # Errors

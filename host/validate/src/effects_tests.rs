@@ -320,7 +320,7 @@ fn what_is_identified_is_the_robot_without_its_effects() {
     }
 }
 
-/// Effects scale with the joint's identified friction, not with the described one.
+/// Effects use the joint's identified friction, not the described one.
 #[test]
 fn effects_go_by_the_friction_that_is_identified() {
     for (kind, gains, shapes) in [

@@ -17,7 +17,7 @@ pub use samples::{SampledReference, load_reference};
 /// Size limit of a trajectory file; a thousand joints would fit.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Recorded time after the drive is switched off, s: a geared joint stops within 1 s, a free link swings for longer.
+/// Recorded time after the drive is switched off, s: a geared joint stops within one, a free link swings several times.
 pub const COASTING: f64 = 5.0;
 
 /// The motion of all joints of a robot.
