@@ -26,7 +26,7 @@ const STAGE: f64 = 0.1;
 const MOST_STEPS: usize = 500;
 /// Squared Newton decrement that ends a stage: for stages before the last, and for the last.
 const SETTLED: [f64; 2] = [1e-2, 1e-13];
-/// Decrease of the squares below which the last stage also ends; smaller ones are rounding errors.
+/// Decrease of the squares below which a stage also ends; smaller ones are rounding errors.
 const NOTHING_TO_GAIN: f64 = 1e-11;
 /// Number of consecutive steps without a larger decrease after which a stage ends: rounding moves the point.
 const MOST_STANDING: usize = 4;
