@@ -1,10 +1,9 @@
 //! Proof that a Fourier motion stays within its limits at every instant, not only at samples.
 //!
-//! Time is cut into cells. Within a cell of length h a function lies no further than h²/8 times the bound of its
-//! second derivative from the straight line between its ends; the bounds follow from the coefficients and the
-//! envelope. Positions, velocities and accelerations so become intervals, and inverse dynamics over intervals
-//! gives the torque's, whatever the number of joints. A cell in which a velocity can change its sign counts Coulomb
-//! friction in both directions.
+//! Time is cut into cells. Within a cell of length h a function deviates from the straight line between its ends by at
+//! most h²/8 times the bound of its second derivative. The bounds follow from the coefficients and the envelope. So
+//! positions, velocities and accelerations become intervals. Inverse dynamics over intervals gives that of the torque,
+//! for any number of joints. A cell in which a velocity can change its sign counts Coulomb friction in both directions.
 
 use rig_shared::multibody::{COLUMNS, Chain, inverse_dynamics, point_position};
 use rig_shared::scalar::Real;
@@ -16,7 +15,7 @@ use super::interval::Interval;
 use super::schedule::JointMotion;
 use rig_model::simulate::SimulateError;
 
-/// Cells per period of the fastest harmonic: what the proof takes away from a limit is then below 1 %.
+/// Number of cells per period of the fastest harmonic: the proof then costs less than 1 % of a limit.
 const CELLS: usize = 512;
 
 /// Largest absolute values of the quintic envelope's derivatives of order 0 to 4, times the ramp's length to that
@@ -30,7 +29,7 @@ const BINOMIAL: [[f64; 5]; 5] = [
     [1.0, 4.0, 6.0, 4.0, 1.0],
 ];
 
-/// How far a joint goes at most.
+/// Bounds of a joint's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
     /// Lowest and highest position, rad or m.
@@ -39,21 +38,21 @@ pub struct Reach {
     pub velocity: f64,
     /// Highest acceleration, rad/s² or m/s².
     pub acceleration: f64,
-    /// Highest torque or force by the prior parameters, N·m or N; none where these are not known.
+    /// Highest torque or force by the prior parameters, N·m or N; none if they are unknown.
     pub torque: Option<f64>,
 }
 
-/// How far a motion goes at most.
+/// Bounds of a motion.
 pub(super) struct Reached {
-    /// Joint by joint.
+    /// Per joint.
     pub joints: Vec<Reach>,
-    /// Per crank of the frame the lowest and highest sum of its joints' angles, rad.
+    /// Per crank of the frame: lowest and highest sum of its joints' angles, rad.
     pub combined: Vec<[f64; 2]>,
-    /// Per plane of the frame the least distance along its normal, m.
+    /// Per plane of the frame: smallest distance along its normal, m.
     pub heights: Vec<f64>,
 }
 
-/// Bound of the derivative of that order of envelope times series.
+/// Returns a bound of the derivative of this order of envelope times series.
 fn derivative_bound(order: usize, omega: f64, coefficients: &[f64], ramp: Option<f64>) -> f64 {
     let harmonics = coefficients.len() / 2;
     let series = |m: usize| -> f64 {
@@ -72,7 +71,7 @@ fn derivative_bound(order: usize, omega: f64, coefficients: &[f64], ramp: Option
     }
 }
 
-/// The reach of each joint, bounded from above, and how close points come to their planes.
+/// Returns upper bounds of each joint's motion, and lower bounds of the points' distances to their planes.
 pub(super) fn reach(
     frame: &Frame,
     motions: &[JointMotion],
@@ -108,7 +107,7 @@ pub(super) fn reach(
     let mut state = vec![[Interval::default(); 3]; n];
     let mut tau = vec![Interval::default(); n];
     let mut jacobian = vec![[0.0; 3]; n];
-    // One whole period stands for all of them.
+    // One period represents all of them.
     for (from, length, on_ramp) in [(0.0, ramp, true), (ramp, whole, false), (down, ramp, true)] {
         let cells = (length * per_second).ceil() as usize;
         let h = length / cells.max(1) as f64;
@@ -122,7 +121,7 @@ pub(super) fn reach(
             })
             .collect();
         let at = |joint: usize, k: usize| {
-            // At the very end of a segment the next one begins, continuously.
+            // At the end of a segment the next one begins, continuously.
             let here = trajectories[joint].at(from + h * k as f64);
             [
                 motions[joint].base + here.position,
@@ -186,7 +185,7 @@ pub(super) fn reach(
                 for (p, plane) in frame.planes.iter().enumerate() {
                     let bend = plane.acceleration_bound(&state) * h * h / 8.0;
                     let lowest = heights_before[p].min(heights_now[p]) - bend;
-                    // Rounding of sums of a few lengths.
+                    // Allow for rounding errors of sums of a few lengths.
                     heights[p] = heights[p].min(lowest - 1e-12 * plane.reach);
                 }
                 heights_before = heights_now;

@@ -1,14 +1,14 @@
-//! What makes a motion good.
+//! Optimality criteria of a motion.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// What makes a motion good.
+/// Optimality criterion of a motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Criterion {
-    /// Small ratio of largest to smallest singular value: errors spread evenly (Gautier & Khalil 1992).
+    /// Small ratio of largest to smallest singular value: errors are spread evenly (Gautier & Khalil 1992).
     #[default]
     ConditionNumber,
-    /// Large smallest singular value: the worst combination of parameters is known as well as possible.
+    /// Large smallest singular value: the least identifiable combination of parameters is known as well as possible.
     SmallestSingularValue,
     /// Large determinant of the information matrix (D-optimal): the confidence ellipsoid is small.
     Determinant,
@@ -24,7 +24,7 @@ impl Criterion {
         }
     }
 
-    /// The criterion of that name.
+    /// Returns the criterion of that name.
     pub fn from_name(name: &str) -> Option<Self> {
         [
             Self::ConditionNumber,
@@ -35,7 +35,7 @@ impl Criterion {
         .find(|c| c.name() == name)
     }
 
-    /// Its value in those of a motion: smaller is better for the condition number, larger for the others.
+    /// Returns its value for a motion: smaller is better for the condition number, larger for the others.
     pub fn of(self, values: &Values) -> f64 {
         match self {
             Self::ConditionNumber => values.condition_number,
@@ -52,28 +52,28 @@ impl Criterion {
     }
 }
 
-/// How well a motion tells the parameters apart, over one whole period.
+/// Identifiability of the parameters from a motion, over one whole period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Values {
-    /// Condition number of the regressor with rows weighted and columns scaled as [`super`] says.
+    /// Condition number of the regressor with weighted rows and scaled columns, see [`super`].
     pub condition_number: f64,
     /// Smallest singular value of that regressor over the square root of its number of samples.
     pub smallest_singular_value: f64,
-    /// Geometric mean of its singular values likewise: the determinant of the information to the power 1/(2p).
+    /// Geometric mean of its singular values, likewise: the determinant of the information to the power 1/(2p).
     pub mean_singular_value: f64,
-    /// Condition number of the regressor in SI units as it is, as identification prints it.
+    /// Condition number of the unscaled regressor in SI units, as in an identification.
     pub si_condition_number: f64,
 }
 
-/// How the extreme singular values enter while a motion is optimised: the largest eigenvalue λ of the information by
-/// the norm (Σ λᵏ)^(1/k) of all of them, with this k, and the inverse of the smallest likewise. Eigenvalues coincide at
-/// an optimum, where the extreme ones have kinks and the norm has none; it is no less than the value itself and no more
-/// than p^(1/k) times it.
+/// Smoothing of the extreme singular values during optimisation. The largest eigenvalue λ of the information is
+/// replaced by the norm (Σ λᵏ)^(1/k) of all of them, with this k, and the inverse of the smallest likewise. Eigenvalues
+/// coincide at an optimum, where the extreme ones have kinks and the norm has none. The norm is between the value and
+/// p^(1/k) times it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Smoothing(pub i32);
 
-/// The criterion's value at an information matrix, as a logarithm to be minimised, and its derivative by the
-/// matrix's entries. Not finite where the matrix is not.
+/// Returns the criterion of an information matrix, as a logarithm to be minimised, and its derivative by the matrix's
+/// entries. Not finite if the matrix is not.
 pub(super) fn criterion_of(
     information: &DMatrix<f64>,
     criterion: Criterion,
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn the_derivative_is_that_of_central_differences() {
-        // Angles that grow with the square: no sum of two, as sines of sums would be.
+        // Angles that grow with the square; sines of sums would give a singular matrix.
         let root = DMatrix::from_fn(9, 5, |i, j| ((1 + i * 7 + j * 3).pow(2) as f64 * 1.7).sin());
         let information = root.tr_mul(&root);
         for criterion in [

@@ -1,4 +1,4 @@
-//! Coupled drives and cranks in a design: the motors' columns, their torque, and limits on combinations of joints.
+//! Coupled drives and cranks in a design: motor columns, motor torque, and limits on combinations of joints.
 
 use rig_shared::dual::Dual;
 use rig_shared::scalar::Real;
@@ -10,19 +10,19 @@ use super::{ExciteError, frame::Bounds};
 use rig_model::robot::Robot;
 use rig_model::simulate::{Motors, SimulateError};
 
-/// Derivatives that one pass over dual numbers gives.
+/// Number of derivatives per pass over dual numbers.
 const AT_ONCE: usize = 4;
 type D = Dual<L, AT_ONCE>;
 
-/// Drives that move more than their own joint or do it at a changing ratio, over every scalar that a design needs.
+/// Drives that move several joints or have a varying ratio, for every scalar type of a design.
 pub(super) struct Drives {
     pub plain: Transmission<f64>,
     lanes: Transmission<L>,
     dual: Transmission<D>,
     pub enclosing: Transmission<Interval>,
-    /// Prior parameters, 3 a motor.
+    /// Prior parameters, 3 per motor.
     pub parameters: Vec<f64>,
-    /// Per motor the speed within which the optimiser rounds the sign of its velocity off.
+    /// Per motor, the speed within which the optimiser smooths the sign of its velocity.
     widths: Vec<f64>,
 }
 
@@ -31,7 +31,7 @@ fn wrong(e: TransmissionError) -> ExciteError {
 }
 
 impl Drives {
-    /// Those of a robot; none where every drive moves its own joint at a constant ratio.
+    /// Returns the drives of a robot; none if every drive moves its own joint at a constant ratio.
     pub(super) fn of(
         robot: &Robot,
         motors: Option<Motors>,
@@ -55,7 +55,7 @@ impl Drives {
         Ok(Some(Self {
             widths: directions
                 .chunks_exact(n)
-                // A simple drive has no direction, nor columns.
+                // A simple drive has no direction and no columns.
                 .map(|row| (SIGN_WIDTH * fastest(row)).max(f64::MIN_POSITIVE.sqrt()))
                 .collect(),
             plain: motors.transmission,
@@ -66,7 +66,7 @@ impl Drives {
         }))
     }
 
-    /// Columns of the motors, n × 3n, with the signs of their velocities rounded off.
+    /// Computes the columns of the motors, n × 3n, with smoothed signs of their velocities.
     pub(super) fn columns(&self, state: [&[L]; 3], out: &mut [L]) -> Result<(), ExciteError> {
         smooth_columns(&self.lanes, state, &self.widths, out)
     }
@@ -104,7 +104,7 @@ impl Drives {
     }
 }
 
-/// The columns with Coulomb friction on s/√(s² + width²) instead of the sign of s.
+/// Computes the columns with Coulomb friction on s/√(s² + width²) instead of the sign of s.
 fn smooth_columns<T: Real>(
     transmission: &Transmission<T>,
     [q, qd, qdd]: [&[T]; 3],
@@ -132,11 +132,11 @@ fn smooth_columns<T: Real>(
 
 /// A crank's range: a limit on Σ c_j·q_j.
 pub(super) struct Combined {
-    /// c, one a joint.
+    /// c, one per joint.
     pub weights: Vec<f64>,
     pub low: f64,
     pub high: f64,
-    /// The joint that is named where nothing fits: that of the drive.
+    /// The joint named in errors: that of the drive.
     pub joint: usize,
 }
 
@@ -170,8 +170,8 @@ impl Combined {
     }
 }
 
-/// `q` moved by the smallest steps, one crank after the other, until each is within `share` of its range about the
-/// middle; a few rounds, as cranks share joints.
+/// Moves `q` by the smallest steps, one crank after the other, until each is within `share` of its range about the
+/// middle. Several rounds, because cranks share joints.
 pub(super) fn into_cranks(combined: &[Combined], q: &mut [f64], share: f64) {
     for _ in 0..20 {
         for limit in combined {

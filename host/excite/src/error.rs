@@ -1,4 +1,4 @@
-//! What can be wrong with a design or a trajectory file.
+//! Errors of a design or a trajectory file.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use rig_model::robot::Place;
 use rig_model::simulate::SimulateError;
 use rig_output::WriteError;
 
-/// Why there is no trajectory.
+/// Reasons why there is no trajectory.
 #[derive(Debug, thiserror::Error)]
 pub enum ExciteError {
     /// Joints without limits.
@@ -22,24 +22,24 @@ pub enum ExciteError {
         /// Their names.
         joints: Vec<String>,
     },
-    /// Limits that bound nothing.
+    /// Limits that are too wide.
     #[error(
         "the limits of joint \"{joint}\" let it move at {velocity:e} (SI units), and a motion is sized by them; give the velocity, or the acceleration, that its drive can do"
     )]
     Boundless {
         /// Its name.
         joint: String,
-        /// What the limits allow, rad/s or m/s.
+        /// Velocity within the limits, rad/s or m/s.
         velocity: f64,
     },
     /// An option outside its range.
     #[error("the {name} is {value}, but {right}")]
     Option {
-        /// Which.
+        /// Name of the option.
         name: &'static str,
-        /// What was given.
+        /// Given value.
         value: String,
-        /// What would be right.
+        /// Valid values.
         right: String,
     },
     /// No motion fits.
@@ -52,14 +52,14 @@ pub enum ExciteError {
         /// position, velocity, acceleration, torque, crank or workspace
         limit: &'static str,
     },
-    /// A staged motion that the limits leave no room for.
+    /// The limits leave no room for a staged motion.
     #[error("no {kind} fits joint \"{joint}\": {why}")]
     NoRoom {
         /// The kind of motion.
         kind: &'static str,
         /// The joint's name.
         joint: String,
-        /// Why, and what would help.
+        /// Reason and remedy.
         why: String,
     },
     /// The base parameters cannot be found.
@@ -68,7 +68,7 @@ pub enum ExciteError {
     /// The model cannot be built or simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// Lengths that do not fit the chain.
+    /// Lengths do not match the chain.
     #[error(transparent)]
     Multibody(#[from] MultibodyError),
     /// A sampled trajectory cannot be read or written.
@@ -79,13 +79,13 @@ pub enum ExciteError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// An ending that says nothing.
+    /// An unknown file extension.
     #[error("{} ends neither in .toml (the trajectory's parameters) nor in .csv (its samples); name one of them", path.display())]
     UnknownFormat {
         /// The file.
@@ -97,14 +97,14 @@ pub enum ExciteError {
         /// The file.
         path: PathBuf,
     },
-    /// TOML that does not parse or does not describe trajectories.
+    /// Invalid TOML, or TOML that describes no trajectories.
     #[error("{}:{place}: {message}", path.display())]
     Toml {
         /// The file.
         path: PathBuf,
-        /// Where.
+        /// Position in the file.
         place: Place,
-        /// One sentence: what is there and what would be right.
+        /// One sentence: the error and a remedy.
         message: String,
     },
     /// The file belongs to another robot.
@@ -119,7 +119,7 @@ pub enum ExciteError {
         /// The robot's joints.
         expected: String,
     },
-    /// A sampled trajectory that is not evenly sampled.
+    /// A sampled trajectory with uneven sampling.
     #[error("{}, row {row}: the samples of a trajectory must be evenly spaced in time, without gaps; sample it at one rate", path.display())]
     Uneven {
         /// The file.
@@ -129,7 +129,7 @@ pub enum ExciteError {
     },
 }
 
-/// The joints, and that they have.
+/// Returns the joints with the right form of "have".
 fn limitless(joints: &[String]) -> String {
     let list = joints.join("\", \"");
     match joints.len() {

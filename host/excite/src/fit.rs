@@ -1,4 +1,4 @@
-//! From what the optimiser found to a motion that is proved to keep the limits.
+//! Fits the optimiser's result into the limits, with a proof.
 
 use rig_shared::multibody::{Chain, point_position};
 
@@ -8,15 +8,15 @@ use super::frame::Frame;
 use super::interval::Interval;
 use super::schedule::JointMotion;
 
-/// Kept free of every limit, so that a trajectory rounded to single precision still fits.
+/// Relative margin to every limit, so that a trajectory rounded to single precision still fits.
 const ROUNDING: f64 = 1e-6;
-/// Attempts to shrink a motion until the proof succeeds; each takes away at least 0.1 %.
+/// Largest number of attempts to shrink a motion until the proof succeeds; each removes at least 0.1 %.
 const SHRINKS: usize = 100;
 
 /// The joint and the limit at fault.
 pub(super) type Blame = (usize, &'static str);
 
-/// A motion and its proved reach, or what is at fault.
+/// A motion and its proved bounds, or the joint and limit at fault.
 pub(super) type Fitted = Result<(Vec<JointMotion>, Reached), Blame>;
 
 fn share(value: f64, limit: f64) -> f64 {
@@ -27,8 +27,8 @@ fn share(value: f64, limit: f64) -> f64 {
     }
 }
 
-/// What keeps a motion from its limits: the joint and the limit, with the factor that would repair the worst of them
-/// if it were proportional to the amplitude; none where all is well.
+/// Returns the joint and limit with the largest violation, and the factor that would repair it if it were proportional
+/// to the amplitude; none without a violation.
 fn worst(
     frame: &Frame,
     reached: &Reached,
@@ -91,7 +91,7 @@ fn worst(
         .min_by(|(a, _), (b, _)| a.total_cmp(b)))
 }
 
-/// A motion scaled down about its start until the proof succeeds; the joint and limit at fault where it never does.
+/// Scales a motion down about its start until the proof succeeds; returns joint and limit at fault if it fails.
 pub(super) fn fit_within(
     frame: &Frame,
     enclosing: &Chain<Interval>,
@@ -107,7 +107,7 @@ pub(super) fn fit_within(
         if !factor.is_finite() {
             break;
         }
-        // Torque is not proportional to the amplitude: never more than 5 % at once.
+        // Torque is not proportional to the amplitude, so at most 5 % at once.
         let factor = factor.clamp(0.95, 0.999);
         for motion in &mut motions {
             for c in &mut motion.coefficients {

@@ -1,4 +1,4 @@
-//! Everything that is the same for all starts of a design.
+//! Data common to all starts of a design.
 
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -17,13 +17,13 @@ use rig_identify::{Base, ModelKind};
 use rig_model::robot::{Robot, sound};
 use rig_model::simulate::{Model, SimulateError};
 
-/// States from which the size of a column is estimated; it serves as a unit and need not be precise.
+/// Number of states for the size of a column; the size is a unit and need not be precise.
 const SIZE_STATES: usize = 4000;
-/// Seed of these states and of those that find the base parameters: not the user's, so that values of different
-/// seeds compare.
+/// Seed of these states and of those for the base parameters. Not the user's seed, so that results of different seeds
+/// are comparable.
 const SIZE_SEED: u64 = 1;
 
-/// What a joint may do.
+/// Bounds of a joint's motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     /// Lowest position.
@@ -33,8 +33,8 @@ pub(super) struct Bounds {
     pub velocity: f64,
     pub acceleration: Option<f64>,
     pub torque: Option<f64>,
-    /// Velocity and acceleration that the torque limit allows the joint as it is described, where it has no acceleration limit; infinite
-    /// where that is not known.
+    /// Velocity and acceleration that the torque limit allows the described joint, if it has no acceleration limit;
+    /// infinite if unknown.
     pub driven: [f64; 2],
 }
 
@@ -48,42 +48,42 @@ impl Bounds {
     }
 }
 
-/// Everything that is the same for all starts.
+/// Data common to all starts.
 pub(super) struct Frame {
     pub lanes: Chain<Lanes<LANES>>,
     pub plain: Chain<f64>,
-    /// Regressor columns that stand for the base parameters, in ascending order.
+    /// Regressor columns that represent the base parameters, in ascending order.
     pub columns: Vec<usize>,
-    /// Size of each of these columns by which it is divided.
+    /// Size by which each of these columns is divided.
     pub sizes: Vec<f64>,
     /// Factor of each joint's rows.
     pub weights: Vec<f64>,
-    /// Prior parameters, where the description has them all.
+    /// Prior parameters, if the description has all of them.
     pub parameters: Option<Vec<[f64; COLUMNS]>>,
-    /// Drives that are coupled or of changing ratio.
+    /// Drives that are coupled or have a varying ratio.
     pub drives: Option<Drives>,
     pub bounds: Vec<Bounds>,
     /// Ranges of cranks.
     pub combined: Vec<Combined>,
-    /// Where points of the links must stay.
+    /// Planes that bound points of the links.
     pub planes: Vec<Plane>,
     pub schedule: Schedule,
-    /// Where the joints start, if that is not free.
+    /// Start positions of the joints, unless free.
     pub fixed: Option<Vec<f64>>,
     pub criterion: Criterion,
 }
 
-/// Highest velocity that a motion is sized by, rad/s or m/s: beyond what the joint of any robot does.
+/// Highest velocity for which a motion is sized, rad/s or m/s: above that of any robot joint.
 const FASTEST: f64 = 1e4;
 
-/// Shortest period that is chosen, s. Limits that stand for "none" would have a motion of a fraction of a second, in which nothing
-/// settles and of which no recording is long enough.
+/// Shortest chosen period, s. Limits that mean "none" would give a motion of a fraction of a second, too short to
+/// settle and to record.
 const SHORTEST: f64 = 1.0;
 
-/// A period whose harmonics can use the limits: the fundamental slow enough to sweep the position range at the
-/// highest velocity, and the fastest harmonic no faster than where highest velocity and acceleration meet; the longest
-/// over the joints, rounded up to 0.1 s, and 1 s at least. The highest are the limits; without an acceleration limit, what the
-/// torque limit allows the joint with the inertia and viscous friction that are described.
+/// Returns a period whose harmonics can use the limits. The fundamental is slow enough to sweep the position range at
+/// the highest velocity. The fastest harmonic is at most where highest velocity and acceleration meet. The longest over
+/// the joints, rounded up to 0.1 s, at least 1 s. The highest values are the limits. Without an acceleration limit they
+/// are the torque limit's values, with the described inertia and viscous friction.
 pub fn default_period(robot: &Robot, harmonics: usize) -> Result<f64, ExciteError> {
     period_within(&bounds_of(robot, Room::ALL, None)?.0, harmonics)
 }
@@ -102,16 +102,16 @@ fn period_within(bounds: &[Bounds], harmonics: usize) -> Result<f64, ExciteError
             .max(TAU * bounds.half() / velocity)
             .max(TAU * harmonics as f64 * velocity / acceleration);
     }
-    // Rounding must not lift an exact tenth to the next.
+    // Rounding errors must not raise an exact tenth to the next.
     Ok((period * 10.0 - 1e-9).ceil() / 10.0)
 }
 
-/// What of the limits a motion leaves to the controller.
+/// Margin of a motion within the limits, for the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Room {
-    /// Share of the position range that is kept free, half of it at each end.
+    /// Free share of the position range, half of it at each end.
     pub margin: f64,
-    /// Share of the velocity limit that is used; its square of the acceleration limit, as if time ran slower.
+    /// Used share of the velocity limit; its square of the acceleration limit, as if time ran slower.
     pub speed: f64,
 }
 
@@ -123,7 +123,7 @@ impl Room {
     };
 
     /// # Errors
-    /// [`ExciteError::Option`] where a share is none.
+    /// [`ExciteError::Option`] if a share is invalid.
     pub(super) fn new(margin: f64, speed: f64) -> Result<Self, ExciteError> {
         if !(0.0..=0.95).contains(&margin) {
             return Err(wrong(
@@ -142,7 +142,7 @@ impl Room {
         Ok(Self { margin, speed })
     }
 
-    /// Positions that the reference may take; the limit itself on a side where `start` already stands in the margin.
+    /// Returns the reference's position range; the limit itself on a side where `start` is already in the margin.
     fn positions(&self, [low, high]: [f64; 2], start: Option<f64>) -> [f64; 2] {
         let free = 0.5 * self.margin * (high - low);
         let (inner_low, inner_high) = (low + free, high - free);
@@ -154,7 +154,7 @@ impl Room {
     }
 }
 
-/// Limits of all joints less the room that is left to the controller, and notes on what they lack.
+/// Returns the limits of all joints minus the controller's margin, and notes on missing limits.
 pub(super) fn bounds_of(
     robot: &Robot,
     room: Room,
@@ -187,7 +187,7 @@ pub(super) fn bounds_of(
                 ));
             }
         }
-        // A number that no drive reaches stands for "no limit" in many descriptions; a row weighed by it would be lost.
+        // A value beyond any drive often means "no limit"; a row weighted by it would be lost.
         let reachable = |limit: &f64| sound(*limit);
         let acceleration = limits
             .acceleration
@@ -196,7 +196,7 @@ pub(super) fn bounds_of(
         if acceleration.is_none() {
             boundless.push(joint.name.as_str());
         }
-        // From rest over the whole range and back to rest, at the highest acceleration, is as fast as a joint gets.
+        // The fastest motion: from rest over the whole range to rest, at the highest acceleration.
         let within = acceleration.map_or(f64::INFINITY, |a| (a * (high - low)).sqrt());
         let stated = room.speed * limits.velocity;
         let velocity = stated.min(within);
@@ -235,7 +235,7 @@ pub(super) fn bounds_of(
     Ok((list, notes))
 }
 
-/// Fills in what the torque limits allow in the middle of the ranges, where bodies are described and acceleration limits are not.
+/// Sets the values that torque limits allow mid-range, if links are described and acceleration limits are not.
 fn drive(robot: &Robot, list: &mut [Bounds]) -> Result<(), ExciteError> {
     let model = Model::from_robot(robot)?;
     if prior(robot, &model).is_err() {
@@ -265,7 +265,7 @@ fn named(joints: &[&str]) -> String {
     format!("joint{plural} {}", quoted.join(", "))
 }
 
-/// Prior parameters, if every link has its own; else none, with the name of the first joint without.
+/// Returns the prior parameters if every link has its own; otherwise the name of the first joint without.
 pub(super) fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>, String> {
     match robot.joints.iter().find(|j| j.inertial.is_none()) {
         Some(joint) => Err(joint.name.clone()),
@@ -273,7 +273,7 @@ pub(super) fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>,
     }
 }
 
-/// Columns of the motors, n × 3n; empty where there are none.
+/// Returns the columns of the motors, n × 3n; empty if there are none.
 fn motors_at(
     drives: Option<&Drives>,
     q: &[f64],
@@ -291,7 +291,7 @@ fn motors_at(
     Ok(out)
 }
 
-/// Entry of base column `c` in the row of joint `j`: behind the joints' own columns come the motors'.
+/// Returns the entry of base column `c` in the row of joint `j`; the motors' columns follow the joints'.
 fn entry(own: &[f64], motors: &[f64], n: usize, j: usize, c: usize) -> f64 {
     match c.checked_sub(n * COLUMNS) {
         Some(m) => motors[j * n * MOTOR_COLUMNS + m],
@@ -299,7 +299,7 @@ fn entry(own: &[f64], motors: &[f64], n: usize, j: usize, c: usize) -> f64 {
     }
 }
 
-/// Root mean square of each base column over states within the limits.
+/// Returns the root mean square of each base column over states within the limits.
 fn column_sizes(
     chain: &Chain<f64>,
     drives: Option<&Drives>,
@@ -319,7 +319,7 @@ fn column_sizes(
         for (j, b) in bounds.iter().enumerate() {
             q[j] = b.middle() + symmetric(b.half());
             qd[j] = symmetric(b.velocity);
-            // What the velocity limit lets the fastest harmonic do, where that is less.
+            // Acceleration of the fastest harmonic at the velocity limit, if that is smaller.
             let reachable = b.velocity * fastest;
             qdd[j] = symmetric(b.acceleration.map_or(reachable, |a| a.min(reachable)));
         }
@@ -337,7 +337,7 @@ fn column_sizes(
         .collect())
 }
 
-/// Singular values of a motion's regressor over one period at `samples` instants.
+/// Returns the singular values of a motion's regressor over one period at `samples` instants.
 pub(super) fn values_of(
     frame: &Frame,
     motions: &[JointMotion],
@@ -456,7 +456,7 @@ fn check_start(
     }
     for ((value, b), joint) in start.iter().zip(bounds).zip(&robot.joints) {
         if !(b.low < *value && *value < b.high) {
-            // What the user stated, without the margin.
+            // The user's limits, without the margin.
             let stated = joint.limits.as_ref().map(|limits| limits.for_motions());
             let [low, high] = stated
                 .filter(|range| range.iter().all(|v| v.is_finite()))
@@ -487,7 +487,7 @@ fn check_start(
     Ok(())
 }
 
-/// Factors of the joints' rows: what is known of their noise, else of their strength.
+/// Returns the factors of the joints' rows: from their noise if known, else from their torque limits.
 fn weights_of(
     robot: &Robot,
     options: &Options,
@@ -511,7 +511,7 @@ fn weights_of(
         }
         return Ok(noise.iter().map(|sigma| 1.0 / sigma).collect());
     }
-    // Unlike units only compare where every joint says what it can give.
+    // Different units are comparable only if every joint has a torque limit.
     let comparable = options.scaling == Scaling::Sizes
         && bounds.len() > 1
         && bounds.iter().all(|b| b.torque.is_some());
@@ -563,8 +563,8 @@ pub(super) fn frame_of(
     let own = robot.joints.len() * COLUMNS;
     let mut base = Base::structural(robot, ModelKind::Differential, SIZE_SEED)?;
     if options.parameters == Parameters::Links {
-        // Of a link's own columns and its drive's, the link's are preferred as representatives, so that what is
-        // left without the drives' is a base of the links alone.
+        // A link's own columns are preferred over its drive's as representatives. So the remainder without the drives'
+        // columns is a base of the links alone.
         base = base.restricted(|c| c < own && c % COLUMNS < column::DRIVE_INERTIA);
     }
     let weights = weights_of(robot, options, &bounds)?;

@@ -1,7 +1,7 @@
-//! Intervals: arithmetic that encloses every value a formula can take.
+//! Interval arithmetic that encloses all values of a formula.
 //!
-//! Moore 1966. Each operation rounds outwards, so what comes out contains the true range; it may be wider, as
-//! every occurrence of a variable counts as a variable of its own.
+//! Moore 1966. Each operation rounds outwards, so the result contains the true range. It may be wider, because every
+//! occurrence of a variable counts as a separate variable.
 
 use core::ops::{
     Add, AddAssign, BitAnd, BitOr, Div, DivAssign, Mul, MulAssign, Neg, Not, Sub, SubAssign,
@@ -16,7 +16,7 @@ pub(super) struct Interval {
     pub high: f64,
 }
 
-/// What a comparison of two intervals can give.
+/// Result of a comparison of two intervals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Answer {
     yes: bool,
@@ -63,7 +63,7 @@ impl Not for Answer {
 }
 
 impl Interval {
-    /// From two bounds in either order.
+    /// Builds the interval from two bounds in either order.
     pub(super) fn hull(a: f64, b: f64) -> Self {
         Self {
             low: a.min(b),
@@ -71,7 +71,7 @@ impl Interval {
         }
     }
 
-    /// Wider by `by` on both sides.
+    /// Widens it by `by` on both sides.
     pub(super) fn widened(self, by: f64) -> Self {
         Self {
             low: self.low - by,
@@ -80,7 +80,7 @@ impl Interval {
         .outwards()
     }
 
-    /// The largest absolute value.
+    /// Returns the largest absolute value.
     pub(super) fn magnitude(self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
@@ -99,10 +99,10 @@ impl Interval {
         }
     }
 
-    /// The range of sin(x + shift) with `shift` a multiple of π/2 and its values at both ends given.
+    /// Returns the range of sin(x + shift), `shift` a multiple of π/2, from its values at both ends.
     fn wave(self, at_ends: [f64; 2], peak: f64) -> Self {
         use core::f64::consts::{PI, TAU};
-        // Whether a point of the grid `from + k·2π` may lie inside; rounding of large angles is allowed for.
+        // Returns true if a point of the grid `from + k·2π` may lie inside; allows for rounding of large angles.
         let slack = 1e-15 * (1.0 + self.magnitude());
         let holds = |from: f64| {
             ((self.low - slack - from) / TAU).ceil() <= ((self.high + slack - from) / TAU).floor()
@@ -197,7 +197,7 @@ assigning!(SubAssign sub_assign -);
 assigning!(MulAssign mul_assign *);
 assigning!(DivAssign div_assign /);
 
-/// A function that grows throughout, applied to both ends.
+/// Applies an increasing function to both ends.
 fn growing(x: Interval, f: impl Fn(f64) -> f64) -> Interval {
     Interval {
         low: f(x.low),
@@ -241,8 +241,8 @@ impl Real for Interval {
     fn tanh(self) -> Self {
         growing(self, f64::tanh)
     }
-    /// Encloses for bases of one and above or of one and below, as x^e is then monotone in each argument; the hull
-    /// over all four corners covers either.
+    /// Encloses for bases ≥ 1 or ≤ 1, for which x^e is monotone in each argument; the hull over all four corners covers
+    /// both.
     fn powf(self, exponent: Self) -> Self {
         let corners = [
             self.low.powf(exponent.low),

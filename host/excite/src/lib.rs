@@ -1,19 +1,19 @@
-//! Motions that tell the parameters of a robot apart.
+//! Excitation motions: motions that make the parameters of a robot identifiable.
 //!
-//! [`design`] finds Fourier series (Swevers et al. 1997) that are optimal for the base parameters within the limits
-//! on position, velocity, acceleration and torque, and within the regions of the base frame that points of the links
-//! must not leave; [`staged`] makes chirps, staircases, slow reversals and friction sweeps from the same limits of the
-//! joints; [`TrajectoryFile`] keeps either; [`replay`] runs one through the simulated closed loop.
+//! [`design`] finds Fourier series (Swevers et al. 1997) that are optimal for the base parameters within the limits on
+//! position, velocity, acceleration and torque, and within the regions of the base frame that points of the links must
+//! not leave. [`staged`] makes chirps, staircases, slow reversals and friction sweeps from the same limits of the
+//! joints. [`TrajectoryFile`] stores both; [`replay`] runs one through the simulated closed loop.
 //!
 //! # Scaling
-//! The columns of the regressor have different units, so that its condition number means nothing by itself. With
-//! [`Scaling::Sizes`] each column is divided by its own size: its root mean square over states drawn evenly from
-//! within the limits. A singular value is then how well a combination of parameters is excited, relative to what the
-//! limits would let any motion do for a column alone. No prior value of a parameter enters, so that an offset expected
-//! to be zero counts as much as any other.
+//! The columns of the regressor have different units, so its condition number alone has no meaning. With
+//! [`Scaling::Sizes`] each column is divided by its own size: its root mean square over uniformly drawn states within
+//! the limits. A singular value then tells how well a combination of parameters is excited, relative to the largest
+//! possible excitation of one column. No prior value of a parameter enters, so an offset expected to be zero counts as
+//! much as any other.
 //!
-//! Each joint's rows are divided by the standard deviation of its torque ([`Options::torque_noise`]); where that is
-//! not given, by its torque limit, if several joints all have one.
+//! Each joint's rows are divided by the standard deviation of its torque ([`Options::torque_noise`]). If that is not
+//! given, they are divided by its torque limit, if several joints all have one.
 //!
 //! ```
 //! use rig_excite::{Options, design};
@@ -27,8 +27,8 @@
 //! # }
 //! ```
 //!
-//! Leaves out: collisions; [`rig_model::robot::Robot::effects`]; errors of the controller (the limits hold for the
-//! reference). [`staged`] does not look at the regions of the workspace and says so.
+//! Limits: no collisions; no [`rig_model::robot::Robot::effects`]; no controller errors (the limits hold for the
+//! reference). [`staged`] does not check the regions of the workspace and says so.
 
 mod certificate;
 mod criterion;
@@ -65,57 +65,57 @@ pub use trajectory_file::{
 use frame::frame_of;
 use search::search;
 
-/// Which parameters a motion is to tell apart.
+/// The parameters that a motion should make identifiable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Parameters {
-    /// All that identification finds: links, drive inertias, friction and offsets.
+    /// All parameters of an identification: links, drive inertias, friction and offsets.
     #[default]
     All,
-    /// Inertial parameters of the links alone, as papers that leave friction out count them.
+    /// Inertial parameters of the links alone, as in papers without friction.
     Links,
 }
 
-/// By what the columns of the regressor are divided.
+/// The scaling of the regressor's columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scaling {
-    /// By their sizes, see [`self`].
+    /// Divided by their sizes, see [`self`].
     #[default]
     Sizes,
-    /// By nothing: the regressor in SI units, as much of the literature judges it.
+    /// Not scaled: the regressor in SI units, as often in the literature.
     None,
 }
 
-/// Settings of a design. The default uses the limits to their end; `rig excite` leaves room.
+/// Settings of a design. The default uses the full limits; `rig excite` keeps a margin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// What is optimised.
+    /// Optimised criterion.
     pub criterion: Criterion,
-    /// Which parameters count.
+    /// Parameters that count.
     pub parameters: Parameters,
-    /// By what columns are divided.
+    /// Scaling of the columns.
     pub scaling: Scaling,
     /// Standard deviation of each joint's torque, N·m or N: the rows are divided by it.
     pub torque_noise: Option<Vec<f64>>,
     /// Harmonics per joint, 1 to [`HARMONICS`](rig_shared::trajectory::HARMONICS).
     pub harmonics: usize,
-    /// Period of the fundamental, s; chosen from the limits where absent, see [`default_period`].
+    /// Period of the fundamental, s; if absent, chosen from the limits, see [`default_period`].
     pub period: Option<f64>,
     /// Whole periods at full amplitude.
     pub periods: u16,
-    /// Length of the ramp before and after them, s; one period where absent.
+    /// Length of the ramp before and after them, s; one period if absent.
     pub ramp: Option<f64>,
-    /// Where the joints start, rad or m; free where absent.
+    /// Start positions of the joints, rad or m; free if absent.
     pub start: Option<Vec<f64>>,
-    /// Share of the position range that is kept free, half of it at each end: what the controller is off by at a turning
-    /// point must fit in there. The limits of cranks and regions of the workspace have none.
+    /// Free share of the position range, half of it at each end. It must contain the controller's error at a turning
+    /// point. Limits of cranks and regions of the workspace have no margin.
     pub margin: f64,
-    /// Share of the velocity limits that is used, and its square of the acceleration limits, as if time ran slower.
+    /// Used share of the velocity limits, and its square of the acceleration limits, as if time ran slower.
     pub speed_share: f64,
-    /// Random starts of the optimiser.
+    /// Number of random starts of the optimiser.
     pub starts: u32,
-    /// Seed of them.
+    /// Seed of the starts.
     pub seed: u64,
-    /// Threads; as many as the machine offers where absent. The result does not depend on it.
+    /// Number of threads; all of the machine's if absent. The result does not depend on it.
     pub threads: Option<usize>,
 }
 
@@ -140,7 +140,7 @@ impl Default for Options {
     }
 }
 
-/// How close a point comes to the edge of its region.
+/// Distance of a point to the edge of its region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clearance {
     /// Name of the joint whose link carries the point.
@@ -156,30 +156,30 @@ pub struct Clearance {
 pub struct Design {
     /// The motion, ready to be saved and run.
     pub file: TrajectoryFile,
-    /// How well it does.
+    /// Its quality.
     pub values: Values,
-    /// The base parameters that it is optimal for, as a paper prints them.
+    /// The base parameters for which it is optimal, in the notation of the literature.
     pub base_parameters: Vec<String>,
-    /// Upper bounds of how far each joint goes.
+    /// Upper bounds of each joint's motion.
     pub reach: Vec<Reach>,
-    /// Lower bounds of how close points come to the edges of their regions.
+    /// Lower bounds of the points' distances to the edges of their regions.
     pub clearances: Vec<Clearance>,
-    /// Criterion reached from each start that was refined to the end and is within the limits, in order of the starts.
+    /// Criterion of each start that was fully refined and is within the limits, in order of the starts.
     pub reached: Vec<f64>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Finds the motion that is best by the criterion within the robot's limits.
+/// Finds the motion with the best criterion within the robot's limits.
 ///
-/// Random starts are improved with exact gradients in parallel threads; the most promising are refined on a finer grid,
-/// proved to stay within the limits at every instant, and compared by what they are then worth; the best is
-/// returned. The result depends on robot and options alone, not on the number of threads. `progress` is told how many
-/// units of work are done, and of how many.
+/// Exact gradients improve random starts in parallel threads. The most promising are refined on a finer grid, proved to
+/// stay within the limits at every instant, and compared by their criterion; the best is returned. The result depends
+/// on robot and options only, not on the number of threads. `progress` receives the completed and the total number of
+/// units of work.
 ///
 /// # Errors
-/// [`ExciteError`]: limits that are missing, options out of range, a robot without a model, or no motion within the
-/// limits (the joint and the limit at fault are named).
+/// [`ExciteError`]: missing limits, options out of range, a robot without a model, or no motion within the limits (the
+/// joint and the limit at fault are named).
 pub fn design(
     robot: &Robot,
     options: &Options,

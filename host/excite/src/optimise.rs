@@ -1,37 +1,37 @@
 //! Minimisation with exact gradients: BFGS inside an augmented Lagrangian.
 //!
 //! The constraints c ≤ 0 enter as μ/2·max(0, c + λ/μ)² with multipliers λ that are updated between the rounds
-//! (Rockafellar 1973; Nocedal & Wright 2006, ch. 17). The line search asks for the weak Wolfe conditions by
-//! bisection, with which BFGS also descends where the criterion has kinks, as the smallest singular value has
-//! where it is double (Lewis & Overton 2013).
+//! (Rockafellar 1973; Nocedal & Wright 2006, ch. 17). The line search finds the weak Wolfe conditions by bisection.
+//! With them BFGS also descends at kinks of the criterion, such as a double smallest singular value (Lewis & Overton
+//! 2013).
 
 use nalgebra::{DMatrix, DVector};
 
 use super::criterion::Smoothing;
 
-/// Sufficient decrease and sufficient rise of the slope (Nocedal & Wright 2006, sec. 3.1).
+/// Constants of sufficient decrease and of sufficient slope increase (Nocedal & Wright 2006, sec. 3.1).
 const ARMIJO: f64 = 1e-4;
 const WOLFE: f64 = 0.9;
-/// Halvings and doublings of a step before the direction is given up.
+/// Largest number of halvings and doublings of a step before the direction is abandoned.
 const BISECTIONS: usize = 30;
 
-/// Between two updates of the multipliers.
+/// Settings between two updates of the multipliers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Round {
-    /// Weight of the penalty: constraints are relative to their limits and the criterion is a logarithm, so that
-    /// multipliers are of the order of one.
+    /// Weight of the penalty: constraints are relative to their limits and the criterion is a logarithm, so multipliers
+    /// are of the order of one.
     pub weight: f64,
-    /// How extreme singular values are smoothed.
+    /// Smoothing of the extreme singular values.
     pub smoothing: Smoothing,
-    /// Most steps of BFGS.
+    /// Largest number of BFGS steps.
     pub steps: usize,
 }
 
-/// What is minimised.
+/// The function to minimise.
 pub(super) trait Objective {
-    /// The value at `x` of the criterion plus the penalties; fills the gradient. Not finite where undefined.
+    /// Returns the criterion plus the penalties at `x` and fills the gradient. Not finite if undefined.
     fn value(&mut self, x: &DVector<f64>, gradient: &mut DVector<f64>) -> f64;
-    /// Renews the multipliers at `x` for the round that follows.
+    /// Updates the multipliers at `x` for the next round.
     fn update(&mut self, x: &DVector<f64>, next: &Round);
 }
 
@@ -69,7 +69,7 @@ fn bfgs(objective: &mut impl Objective, mut x: DVector<f64>, iterations: usize) 
             direction = -&gradient;
             slope = direction.dot(&gradient);
         }
-        // Without knowledge of the curvature, a step of a tenth of a variable's range is a guess that fits.
+        // Without curvature information, a step of a tenth of a variable's range is suitable.
         let mut step = if fresh {
             (0.1 / direction.amax()).min(1.0)
         } else {
@@ -100,7 +100,7 @@ fn bfgs(objective: &mut impl Objective, mut x: DVector<f64>, iterations: usize) 
             if fresh {
                 break;
             }
-            // A kink spoils the curvature: once more along the steepest descent.
+            // A kink invalidates the curvature: restart with the steepest descent.
             inverse.fill_with_identity();
             fresh = true;
             continue;

@@ -1,4 +1,4 @@
-//! A trajectory run through the simulated closed loop, as a recording would show it.
+//! A trajectory run through the simulated closed loop, with the result as a recording.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,27 +12,27 @@ use rig_data::{Column, RecordingWriter};
 use rig_model::robot::Robot;
 use rig_model::simulate::{Inputs, Model, Motion, STAND_IN_BANDWIDTH, closed_loop, controllers};
 
-/// The model stands in its controller for so long before the recording begins that gravity has found its balance, s.
+/// Time that the controlled model stands before the recording begins, so that gravity is balanced, s.
 pub const SETTLING: f64 = 1.0;
-/// Time constant of the stand-in's feedback, s.
+/// Time constant of the substitute controller's feedback, s.
 const TIME_CONSTANT: f64 = 1.0 / (core::f64::consts::TAU * STAND_IN_BANDWIDTH);
-/// Share of a joint's motion by which it may be off its reference, RMS, before that is said.
+/// RMS deviation from the reference, as a share of the joint's motion, above which a note is given.
 const OFF: f64 = 0.1;
-/// Longest step of the simulation, s: a hundredth of the fastest time constant that the controllers here have.
+/// Longest step of the simulation, s: a hundredth of the controllers' fastest time constant.
 pub const STEP: f64 = 0.25e-3;
 
 /// White normal noise of the measured columns, standard deviations; 0 for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Noise {
-    /// rad or m
+    /// Position, rad or m.
     pub position: f64,
-    /// rad/s or m/s
+    /// Velocity, rad/s or m/s.
     pub velocity: f64,
-    /// N·m or N
+    /// Torque, N·m or N.
     pub torque: f64,
 }
 
-/// What the simulated rig did.
+/// Result of the simulated rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Replay {
     /// Sample period, s.
@@ -41,17 +41,17 @@ pub struct Replay {
     pub reference: Vec<Vec<f64>>,
     /// Position, velocity and torque as measured, noise included.
     pub motion: Motion,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Simulates the robot of a description following `reference`, which is at rest where it begins.
+/// Simulates the described robot along `reference`, which starts at rest.
 ///
-/// The recording begins when the model has stood at the first reference for one second. The controllers run at every step of the
-/// simulation, 0.25 ms at most, whatever the rate of the recording: a loop that runs once a recorded sample, at 250 Hz, was not
-/// stable in all poses of an arm and made bursts of torque from limit to limit. A controller that is described has the reference
-/// alone; a stand-in gets the described torque of the reference, too, without which dry friction holds a light link. `progress` is
-/// told how many steps are done, and of how many.
+/// The recording begins after the model has stood at the first reference for one second. The controllers run at every
+/// step of the simulation, at most 0.25 ms, for every rate of the recording. A loop that ran once per recorded sample,
+/// at 250 Hz, was not stable in all poses of an arm and gave torque bursts from limit to limit. A described controller
+/// has only the reference. A substitute also gets the described torque of the reference, without which dry friction
+/// holds a light link. `progress` receives the completed and the total number of steps.
 ///
 /// # Errors
 /// [`ExciteError`]: noise that is not 0 or more, a robot without inertial parameters, gains that do not fit it.
@@ -169,13 +169,13 @@ pub fn replay(
     })
 }
 
-/// Noise of a deviation. Drawn also where that is 0: one noise must not change the other's numbers.
+/// Draws noise of a deviation, also for 0, so that one noise does not change the numbers of another.
 pub fn drawn(random: &mut Pcg64, deviation: f64) -> f64 {
     let unit: f64 = StandardNormal.sample(random);
     deviation * unit
 }
 
-/// RMS of what a joint was off by, and of what it was asked to move about its mean.
+/// Returns the RMS deviation of a joint, and the RMS of its reference about the mean.
 fn followed(q: &[f64], asked: &[f64]) -> (f64, f64) {
     let count = asked.len() as f64;
     let mean = asked.iter().sum::<f64>() / count;
@@ -187,15 +187,15 @@ fn followed(q: &[f64], asked: &[f64]) -> (f64, f64) {
     ((off / count).sqrt(), (moved / count).sqrt())
 }
 
-/// A sample period in cells no longer than a sixteenth of the stand-in's time constant: length of a cell in s, and how many there are.
-/// References and feed-forward of a slow recorder would else come in steps that a fast one's do not have.
+/// Splits a sample period into cells of at most a sixteenth of the substitute's time constant; returns their length in
+/// s and number. Otherwise references and feed-forward of a slow recorder would have steps that a fast one's lack.
 fn cells(period: f64) -> (f64, usize) {
     let cells = (16.0 * period / TIME_CONSTANT).ceil().max(1.0);
     (period / cells, cells as usize)
 }
 
-/// The series with `cells` values a sample, on the cubics through the samples whose slopes are those of their neighbours (Catmull and
-/// Rom 1974); it is at rest before it begins, and where it ends its second difference stays.
+/// Interpolates the series with `cells` values per sample, by cubics with slopes from the neighbouring samples (Catmull
+/// and Rom 1974). It is at rest before it begins; its second difference is constant at the end.
 fn refined(list: &[f64], cells: usize) -> Vec<f64> {
     let count = list.len().saturating_sub(1) * cells + list.len().min(1);
     let value = |cell: usize| {
@@ -206,7 +206,7 @@ fn refined(list: &[f64], cells: usize) -> Vec<f64> {
     (0..count).map(value).collect()
 }
 
-/// Sample `k` and its neighbours, one before and two behind it.
+/// Returns sample `k` with its neighbours, one before and two after it.
 fn around(list: &[f64], k: usize) -> [f64; 4] {
     let (before, now) = (list[k.saturating_sub(1)], list[k]);
     let next = list.get(k + 1).copied().unwrap_or(now);
@@ -214,10 +214,10 @@ fn around(list: &[f64], k: usize) -> [f64; 4] {
     [before, now, next, list.get(k + 2).copied().unwrap_or(last)]
 }
 
-/// Torques that `model` needs for its reference, and what the speed of the reference makes of each `gain` that the controller has on
-/// its own; one list a joint, empty where there is no gain. The torques are inverse dynamics with friction, all as the mean over a
-/// time constant of the stand-in on either side, so that corners of the reference and the steps of dry friction are as smooth as what
-/// the feedback can follow. Effects beyond the standard model are left to the feedback.
+/// Returns the model's torques for its reference, and the torques from the reference's speed for the controllers' own
+/// `gains`; one list per joint, empty without a gain. The torques are inverse dynamics with friction, averaged over a
+/// time constant of the substitute on either side. So corners of the reference and steps of dry friction are smooth
+/// enough for the feedback. Effects beyond the standard model are left to the feedback.
 fn feed_forward(
     model: &Model,
     gains: &[Option<f64>],
@@ -252,7 +252,7 @@ fn feed_forward(
 }
 
 impl Replay {
-    /// Writes the recording: t, and per joint q, qd, tau and ref. The file appears whole or not at all.
+    /// Writes the recording: t, and per joint q, qd, tau and ref. The file is written completely or not at all.
     ///
     /// # Errors
     /// [`ExciteError::Data`].

@@ -1,9 +1,9 @@
-//! Times that all joints share, and the functions of time whose sum a motion is.
+//! Times common to all joints, and the basis functions of a motion.
 
 use nalgebra::DMatrix;
 use rig_shared::trajectory::{Fourier, Trajectory};
 
-/// Times that all joints share.
+/// Times common to all joints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Schedule {
     pub period_us: u32,
@@ -13,12 +13,12 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    /// Angular frequency of the fundamental, rad/s.
+    /// Returns the angular frequency of the fundamental, rad/s.
     pub(super) fn omega(&self) -> f64 {
         core::f64::consts::TAU / (f64::from(self.period_us) * 1e-6)
     }
 
-    /// The trajectory with these coefficients, sines first.
+    /// Returns the trajectory with these coefficients, sines first.
     pub(super) fn trajectory(&self, coefficients: &[f64]) -> Trajectory<f64> {
         let (sine, cosine) = coefficients.split_at(self.harmonics.min(coefficients.len()));
         Trajectory::Fourier(Fourier {
@@ -31,17 +31,17 @@ impl Schedule {
     }
 }
 
-/// Motion of one joint: where it starts, and sines then cosines.
+/// Motion of one joint: start position, and coefficients of sines then cosines.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct JointMotion {
     pub base: f64,
     pub coefficients: Vec<f64>,
 }
 
-/// Position, velocity and acceleration of each coefficient's function at the samples. They are taken from the
-/// trajectory itself, envelope included, so that what is optimised is what runs.
+/// Position, velocity and acceleration of each coefficient's function at the samples. They come from the trajectory
+/// with its envelope, so that the optimised motion is the one that runs.
 pub(super) struct Basis {
-    /// Samples of one whole period, which come first; those of the two ramps follow. Both counts are multiples of
+    /// Number of samples of one whole period, which come first; those of the two ramps follow. Both are multiples of
     /// [`LANES`](super::problem::LANES).
     pub whole: usize,
     /// samples × 2·harmonics
@@ -51,7 +51,7 @@ pub(super) struct Basis {
 }
 
 impl Basis {
-    /// With `density` samples per period of the fastest harmonic, a multiple of four.
+    /// Computes it with `density` samples per period of the fastest harmonic, a multiple of four.
     pub(super) fn new(schedule: &Schedule, density: usize) -> Self {
         let (ramp, period) = (f64::from(schedule.ramp_us), f64::from(schedule.period_us));
         let whole = density * schedule.harmonics;

@@ -1,4 +1,4 @@
-//! Many starts, the promising ones to the end.
+//! Multi-start search: many starts, of which the promising ones are fully refined.
 
 use std::sync::mpsc;
 
@@ -21,16 +21,16 @@ use rig_model::batch::each_by;
 use rig_model::robot::Robot;
 use rig_model::simulate::SimulateError;
 
-/// Random motions of which the best becomes a start: judging one costs a fiftieth of improving it.
+/// Number of random motions per start, of which the best is used: judging one costs a fiftieth of improving it.
 const CANDIDATES: usize = 12;
-/// One start in so many is refined to the end, but never fewer than [`LEAST_FINALISTS`].
+/// Number of starts per fully refined one; at least [`LEAST_FINALISTS`] are refined.
 const FINALIST_SHARE: usize = 6;
 const LEAST_FINALISTS: usize = 3;
-/// Samples per period of the fastest harmonic for the first improvement: enough to rank the starts.
+/// Samples per period of the fastest harmonic in the first improvement: enough to rank the starts.
 const COARSE: usize = 16;
-/// And to the end; see `MARGIN` in `problem/constraints.rs`.
+/// The same in the refinement; see `MARGIN` in `problem/constraints.rs`.
 const FINE: usize = 48;
-/// Samples per period of the fastest harmonic from which the reported values are computed.
+/// Samples per period of the fastest harmonic for the reported values.
 const REPORT_SAMPLES: usize = 200;
 
 const fn round(weight: f64, power: i32, steps: usize) -> Round {
@@ -41,9 +41,9 @@ const fn round(weight: f64, power: i32, steps: usize) -> Round {
     }
 }
 
-/// The first improvement: far from the optimum a smooth mean of the singular values leads there faster.
+/// Rounds of the first improvement: far from the optimum a smooth mean of the singular values converges faster.
 const FIRST: [Round; 3] = [round(1e1, 2, 60), round(1e2, 4, 60), round(1e2, 8, 60)];
-/// The refinement.
+/// Rounds of the refinement.
 const LAST: [Round; 5] = [
     round(1e2, 8, 160),
     round(1e3, 16, 160),
@@ -52,19 +52,19 @@ const LAST: [Round; 5] = [
     round(3e3, 128, 160),
 ];
 
-/// A motion scaled to less than this share of its size is refined again from there …
+/// Scale factor of a motion below which it is refined again from there.
 const KEPT_SIZE: f64 = 0.9;
-/// … so many times at most.
+/// Largest number of such repetitions.
 const AGAIN: usize = 2;
 
-/// One motion that passed the proof.
+/// A motion that passed the proof.
 pub(super) struct Candidate {
     pub motions: Vec<JointMotion>,
     pub reached: Reached,
     pub values: Values,
 }
 
-/// Runs `work` for 0 to `count`, in parallel, results in order. `work` is given what to call after each unit of work.
+/// Runs `work` for 0 to `count` in parallel, with results in order. `work` gets a callback for each unit of work.
 fn in_parallel<T: Send>(
     threads: usize,
     count: usize,
@@ -76,7 +76,7 @@ fn in_parallel<T: Send>(
         let work = &work;
         let all = scope.spawn(move || {
             each_by(count, threads, |index| {
-                // The receiver lives until the sender is gone: sending cannot fail.
+                // The receiver outlives the sender, so sending cannot fail.
                 work(index, &|| {
                     let _ = send.send(());
                 })
@@ -90,7 +90,7 @@ fn in_parallel<T: Send>(
     })
 }
 
-/// A random motion within the limits of position, velocity and acceleration.
+/// Returns a random motion within the limits of position, velocity and acceleration.
 pub(super) fn random_motion(
     problem: &mut Problem<'_>,
     frame: &Frame,
@@ -115,14 +115,14 @@ pub(super) fn random_motion(
     problem.shrunk(&x, 0.9)
 }
 
-/// The best of a few random motions.
+/// Returns the best of a few random motions.
 pub(super) fn random_start(
     problem: &mut Problem<'_>,
     frame: &Frame,
     seed: u64,
     index: usize,
 ) -> DVector<f64> {
-    // One stream a start: the same numbers whichever thread takes it.
+    // One random stream per start: the same numbers on every thread.
     let mut random = rand_pcg::Pcg64::new(u128::from(seed), index as u128);
     let mut best: Option<(f64, DVector<f64>)> = None;
     for _ in 0..CANDIDATES {
@@ -135,7 +135,7 @@ pub(super) fn random_start(
     best.map_or_else(|| DVector::zeros(problem.size()), |(_, x)| x)
 }
 
-/// A start, improved, with what it promises: the criterion after scaling it into the limits of the joints.
+/// Improves a start; returns it with its criterion after scaling into the limits of the joints.
 fn improve(frame: &Frame, seed: u64, index: usize, done: &dyn Fn()) -> (f64, DVector<f64>) {
     let mut problem = Problem::new(frame, COARSE, FIRST[0].smoothing);
     let start = random_start(&mut problem, frame, seed, index);
@@ -154,7 +154,7 @@ fn improve(frame: &Frame, seed: u64, index: usize, done: &dyn Fn()) -> (f64, DVe
 
 type Outcome = Result<Result<Candidate, Blame>, ExciteError>;
 
-/// The motion that `x` stands for, scaled until the proof succeeds.
+/// Scales the motion of `x` until the proof succeeds.
 fn proven(
     frame: &Frame,
     enclosing: &Chain<Interval>,
@@ -187,7 +187,7 @@ fn refine(
     let mut problem = Problem::new(frame, FINE, LAST[0].smoothing);
     let x = minimise(&mut problem, from, &LAST, done);
     let mut best = proven(frame, enclosing, &mut problem, &x)?;
-    // What ended outside a limit and was scaled into it is no optimum: there is a better one beside it.
+    // A motion that had to be scaled into a limit is no optimum: there is a better one nearby.
     for _ in 0..AGAIN {
         let Ok(candidate) = &best else { break };
         let scaled = problem.encode(&candidate.motions);
@@ -206,7 +206,7 @@ fn refine(
     Ok(best)
 }
 
-/// The best motion found, and the criterion reached from each start that was refined.
+/// Returns the best motion and the criterion of each refined start.
 pub(super) fn search(
     robot: &Robot,
     frame: &Frame,
@@ -222,7 +222,7 @@ pub(super) fn search(
         .or_else(|| std::thread::available_parallelism().ok().map(Into::into))
         .unwrap_or(1)
         .max(1);
-    // A fine sample costs what a coarse one does.
+    // A fine sample costs as much as a coarse one.
     let fine = (FINE / COARSE) as u64;
     let total = (starts * FIRST.len()) as u64 + fine * (finalists * (LAST.len() + 1)) as u64;
     let mut done = 0;

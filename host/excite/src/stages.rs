@@ -1,4 +1,4 @@
-//! Motions of one joint with a purpose other than identification at large, sized by the robot's limits.
+//! Motions of one joint for special purposes, sized by the robot's limits.
 
 use core::f64::consts::TAU;
 
@@ -15,25 +15,25 @@ use super::{ExciteError, JointTrajectory, TrajectoryFile};
 use rig_model::robot::{JointKind, Robot};
 use rig_model::simulate::{Model, SimulateError};
 
-/// Fastest speed of a sweep over the slowest. Friction of gears weakens below 0.01 to 0.3 rad/s (Armstrong-Hélouvry, Dupont
-/// & Canudas de Wit 1994), and joints reach some rad/s: the slowest passes have to lie below the one, the fastest at the
-/// other. Over the 40 of before, the sweep of the one-link rig began at 0.12 rad/s and could not show weakening at
-/// 0.025 rad/s.
+/// Ratio of a sweep's fastest speed to its slowest. Friction of gears weakens below 0.01 to 0.3 rad/s
+/// (Armstrong-Hélouvry, Dupont & Canudas de Wit 1994), and joints reach some rad/s: the slowest passes must lie below
+/// the former, the fastest at the latter. With a ratio of 40 the sweep of the one-link rig began at 0.12 rad/s and
+/// could not show weakening at 0.025 rad/s.
 const SPEED_SPAN: f64 = 200.0;
-/// Time at constant speed of the fastest pass, s: 0.05 s in which the controller settles and twice that to take a mean of. All passes
-/// have the same ends, so that more of it makes the slow ones longer.
+/// Time at constant speed of the fastest pass, s: 0.05 s for the controller to settle and twice that for the mean. All
+/// passes have the same ends, so a longer time makes the slow ones longer.
 const FASTEST_PASS: f64 = 0.15;
-/// Share of each limit that these motions use where nothing else is asked for, of positions from the start to the limit.
+/// Default share of each limit that these motions use; for positions, of the distance from the start to the limit.
 const SHARE: f64 = 0.8;
-/// Factor by which velocity and acceleration are lowered until the torque fits, and how often.
+/// Factor by which velocity and acceleration are lowered until the torque fits, and number of attempts.
 const SLOWER: f64 = 0.85;
 const ATTEMPTS: usize = 30;
-/// Instants at which the torque is looked at; [`SHARE`] leaves room for what lies between them.
+/// Number of instants at which the torque is checked; [`SHARE`] leaves a margin between them.
 const TORQUE_SAMPLES: usize = 50_000;
-/// Peaks of the quintic's velocity and acceleration, in distance over time and over time squared.
+/// Peaks of the quintic's velocity and acceleration, in units of distance over time and over time squared.
 const QUINTIC: [f64; 2] = [1.875, 5.773_502_691_896_26];
 
-/// What the motion is for.
+/// Purpose of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StagedKind {
     /// Swept sine: frequency response, resonances.
@@ -58,19 +58,19 @@ impl StagedKind {
     }
 }
 
-/// What is asked of a motion; what is absent follows from the limits.
+/// User options of a motion; absent ones follow from the limits.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StagedOptions {
-    /// The joint that moves; the first where absent.
+    /// The joint that moves; the first if absent.
     pub joint: Option<String>,
-    /// Where the joints stand, rad or m; in the middle of their ranges where absent.
+    /// Positions of the joints, rad or m; the middle of their ranges if absent.
     pub start: Option<Vec<f64>>,
-    /// Share of the position range that is kept free, half of it at each end; where absent the motion uses 80 % of the way
-    /// from its start to the nearer limit.
+    /// Free share of the position range, half of it at each end. If absent, the motion uses 80 % of the distance from
+    /// its start to the nearer limit.
     pub margin: Option<f64>,
-    /// Share of the velocity limit that is used, and its square of the acceleration limit; 80 % of both where absent.
+    /// Used share of the velocity limit, and its square of the acceleration limit; 80 % of both if absent.
     pub speed_share: Option<f64>,
-    /// Distance to either side of the start, rad or m.
+    /// Distance on either side of the start, rad or m.
     pub amplitude: Option<f64>,
     /// Reversals: the speed. Sweep: the slowest and the fastest. rad/s or m/s.
     pub speeds: Option<Vec<f64>>,
@@ -78,12 +78,12 @@ pub struct StagedOptions {
     pub count: Option<usize>,
     /// Chirp: first and last frequency, Hz.
     pub band: Option<[f64; 2]>,
-    /// Reversals: triangles, of two reversals each, at every amplitude.
+    /// Reversals: number of triangles, with two reversals each, at every amplitude.
     pub cycles: Option<u16>,
 }
 
 impl StagedOptions {
-    /// The speeds of a sweep, none where not given.
+    /// Returns the slowest and fastest speed of a sweep, none if not given.
     fn span(&self) -> Option<[f64; 2]> {
         match self.speeds.as_deref() {
             Some(&[slowest, fastest]) => Some([slowest, fastest]),
@@ -91,7 +91,7 @@ impl StagedOptions {
         }
     }
 
-    /// Refuses numbers that no motion has, and such as the kind does not use.
+    /// Rejects invalid numbers and options that the kind does not use.
     fn check(&self, kind: StagedKind, unit: &str) -> Result<(), ExciteError> {
         let option = |name, value: String, right: &str| {
             Err(ExciteError::Option {
@@ -157,24 +157,24 @@ impl StagedOptions {
     }
 }
 
-/// What a motion may use.
+/// Limits available to a motion.
 struct Allowance<'a> {
-    /// To either side of the start.
+    /// On either side of the start.
     distance: f64,
     velocity: f64,
     acceleration: f64,
-    /// What was asked for.
+    /// User options.
     asked: &'a StagedOptions,
 }
 
-/// Whole microseconds that are at least so long; none beyond 32 bits.
+/// Rounds a time up to whole microseconds; none if it exceeds 32 bits.
 fn micros(seconds: f64) -> Option<u32> {
     let whole = (seconds * 1e6).ceil();
     (whole >= 1.0 && whole <= f64::from(u32::MAX)).then_some(whole as u32)
 }
 
 impl Allowance<'_> {
-    /// Time of a quintic move.
+    /// Returns the duration of a quintic move.
     fn move_time(&self, distance: f64) -> f64 {
         let by_velocity = QUINTIC[0] * distance / self.velocity;
         by_velocity.max((QUINTIC[1] * distance / self.acceleration).sqrt())
@@ -190,13 +190,13 @@ impl Allowance<'_> {
     }
 
     fn chirp(&self) -> Option<Trajectory<f64>> {
-        // From where the amplitude is bounded by the range to well beyond where acceleration bounds it.
+        // From a frequency at which the range bounds the amplitude to one at which acceleration clearly does.
         let [start_hz, end_hz] = self.asked.band.unwrap_or_else(|| {
             let start_hz = 0.25 * self.velocity / (TAU * self.distance);
             let end_hz = 4.0 * self.acceleration / (TAU * self.velocity);
             [start_hz, end_hz.max(8.0 * start_hz)]
         });
-        // About five turns in the slowest octave, so that the sweep is slow against its own frequency.
+        // About five periods in the slowest octave, so that the sweep is slow compared with its own frequency.
         let octaves = (end_hz / start_hz).log2();
         let duration = 5.0 * octaves / start_hz;
         Some(Trajectory::Chirp(Chirp {
@@ -213,7 +213,7 @@ impl Allowance<'_> {
     }
 
     fn staircase(&self) -> Option<Trajectory<f64>> {
-        // Up to one end, down to the other, back up: every level but the ends from both sides.
+        // Up to one end, down to the other, back up: every level except the ends from both sides.
         let quarters = [1, 2, 3, 4, 3, 2, 1, 0, -1, -2, -3, -4, -3, -2, -1];
         Some(Trajectory::Staircase(Staircase {
             levels: quarters
@@ -229,10 +229,10 @@ impl Allowance<'_> {
         // A hundredth of the velocity limit is below the Stribeck velocity of usual gears.
         let asked = self.asked.speeds.as_ref().and_then(|s| s.first().copied());
         let speed = asked.unwrap_or(0.01 * self.velocity);
-        // The turn's acceleration peaks at 3/2 of twice the speed over its length.
+        // The acceleration of a reversal peaks at 3/2 of twice the speed over its duration.
         let turn = (3.0 * speed / self.acceleration).max(0.1);
         let least = 2.0 * speed * turn;
-        // The largest is 30 % of the room, or what was asked for.
+        // The largest amplitude: 30 % of the available distance, or the user's.
         let largest = self.asked.amplitude.unwrap_or(0.3 * self.distance);
         let amplitudes: Vec<f64> = [1.0 / 15.0, 1.0 / 3.0, 1.0]
             .into_iter()
@@ -248,10 +248,10 @@ impl Allowance<'_> {
         let count = self.asked.count.unwrap_or(12).max(2);
         let ratio = (fastest / slowest).powf(1.0 / (count - 1) as f64);
         let speeds: Vec<f64> = (0..count).map(|k| slowest * ratio.powi(k as i32)).collect();
-        // The acceleration of a ramp peaks at 3/2 of speed over length.
+        // The acceleration of a ramp peaks at 3/2 of the speed over its duration.
         let ramp = 1.5 * fastest / self.acceleration;
         let whole = 2.0 * self.distance - fastest * ramp;
-        // The map needs levels, not distance.
+        // The map needs different speeds, not distance.
         let travel = if self.asked.amplitude.is_some() {
             whole
         } else {
@@ -263,7 +263,7 @@ impl Allowance<'_> {
     }
 }
 
-/// Largest share of a torque limit that is used, Coulomb friction counted in full; none where it is not known.
+/// Returns the largest used share of a torque limit, with full Coulomb friction; none if the torque is unknown.
 fn torque_share(
     model: &Model,
     bounds: &[Bounds],
@@ -279,7 +279,7 @@ fn torque_share(
     }
     let mut tau = vec![0.0; n];
     let mut share = 0.0_f64;
-    // Coulomb friction of the motors counts in full as well.
+    // Coulomb friction of the motors also counts in full.
     let width = n * MOTOR_COLUMNS;
     let mut motors = vec![0.0; n * width];
     let duration = trajectory.duration();
@@ -320,7 +320,7 @@ fn torque_share(
     Ok(share)
 }
 
-/// Motions longer than this get a word, s.
+/// Duration above which a motion gets a note, s.
 const LONG: f64 = 400.0;
 
 /// The joint that moves.
@@ -343,7 +343,7 @@ fn moving_joint(robot: &Robot, joint: Option<&str>) -> Result<usize, ExciteError
     })
 }
 
-/// Where the joints stand.
+/// Returns the positions of the joints.
 fn start_of(
     given: Option<&[f64]>,
     bounds: &[Bounds],
@@ -364,7 +364,7 @@ fn start_of(
     }
 }
 
-/// How far the joint may go to either side of its start, and why it may not where that is nowhere.
+/// Returns the available distance on either side of the start, or the reason why there is none.
 fn distance_of(
     options: &StagedOptions,
     bounds: &Bounds,
@@ -381,7 +381,7 @@ fn distance_of(
             room = room.min((limit.high - now).min(now - limit.low) / turn);
         }
     }
-    // A margin is already taken off the bounds.
+    // A margin is already subtracted from the bounds.
     let share = if options.margin.is_some() { 1.0 } else { SHARE };
     let most = share * room;
     if most.is_nan() || most <= 0.0 {
@@ -399,7 +399,7 @@ fn distance_of(
     }
 }
 
-/// Refuses speeds beyond what the limits allow.
+/// Rejects speeds above the limits.
 fn refuse_fast(options: &StagedOptions, bounds: &Bounds) -> Result<(), ExciteError> {
     let fastest = options.speeds.iter().flatten().copied().fold(0.0, f64::max);
     if fastest <= bounds.velocity {
@@ -415,10 +415,10 @@ fn refuse_fast(options: &StagedOptions, bounds: &Bounds) -> Result<(), ExciteErr
     })
 }
 
-/// A motion of one joint, the others holding their place, within 80 % of the limits or what `options` ask for.
+/// Designs a motion of one joint, with the others at rest, within 80 % of the limits or as `options` require.
 ///
-/// Returns the file and what the user should know. Torque is looked at at samples, with the prior parameters, where
-/// there are any; the optimal motions of [`super::design`] are proved instead.
+/// Returns the file and notes for the user. Torque is checked at samples, with the prior parameters if there are any;
+/// the optimal motions of [`super::design`] are proved instead.
 ///
 /// # Errors
 /// [`ExciteError`]: no limits, no such joint, options out of range, or no room.
@@ -476,7 +476,7 @@ pub fn staged(
     Ok((file, notes))
 }
 
-/// One joint of a robot that stands, and what its motion may use.
+/// One joint of a robot at rest, and the limits available to its motion.
 struct Within<'a> {
     robot: &'a Robot,
     moving: usize,
@@ -485,7 +485,7 @@ struct Within<'a> {
 }
 
 impl Within<'_> {
-    /// The fastest motion of a kind whose reference keeps all limits; `notes` hears of a torque that is not known.
+    /// Finds the fastest motion of a kind whose reference keeps all limits; adds a note if the torque is unknown.
     fn fastest(
         &self,
         kind: StagedKind,
@@ -502,11 +502,11 @@ impl Within<'_> {
                 "The torque limit was not checked: joint \"{joint}\" has no [joint.inertial], so that its torque is not known beforehand."
             ));
         }
-        // Without an acceleration limit: the velocity limit is reached within a tenth of the way.
+        // Without an acceleration limit the velocity limit is reached within a tenth of the distance.
         let acceleration = b
             .acceleration
             .unwrap_or(5.0 * b.velocity * b.velocity / distance);
-        // A margin that is left free need not be kept to the last bit of single precision; a limit has to.
+        // A margin need not be kept to the last bit of single precision, but a limit must be.
         let rounding = match options.margin {
             Some(margin) if margin > 0.0 => 1e-6 * (b.high - b.low),
             _ => 0.0,
@@ -533,7 +533,7 @@ impl Within<'_> {
                 why = "its distances, speeds and times do not fit each other".into();
                 continue;
             };
-            // In single precision, as the rig runs it.
+            // In single precision, as on the rig.
             let checked: Result<Extremes<f64>, _> = trajectory
                 .to_f32()
                 .to_f64()
@@ -563,7 +563,7 @@ impl Within<'_> {
     }
 }
 
-/// The motion of one joint beside others that stand.
+/// Builds the file for one moving joint and others at rest.
 fn file_of(
     robot: &Robot,
     moving: usize,

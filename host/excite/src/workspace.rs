@@ -1,11 +1,11 @@
-//! Limits on where points of the links go, as planes.
+//! Planes that bound the positions of points of the links.
 
 use rig_shared::multibody::JointKind;
 
 use super::interval::Interval;
 use rig_model::robot::Robot;
 
-/// One side of a plane that a point of a link must stay on.
+/// A half-space in which a point of a link must stay.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Plane {
     /// The link that carries the point, from 0.
@@ -14,26 +14,25 @@ pub(super) struct Plane {
     pub point: [f64; 3],
     /// Unit normal towards the allowed side, in the base frame.
     pub normal: [f64; 3],
-    /// How far along the normal the point must be at least, m.
+    /// Smallest allowed distance along the normal, m.
     pub least: f64,
     /// Upper bound of the distance between the point and the base frame's origin, m: the unit of violations.
     pub reach: f64,
-    /// Of each joint up to the link: its kind, and the length of the way from its predecessor's frame (for a prismatic
-    /// joint the part of it across the joint), m.
+    /// For each joint up to the link: its kind, and the absolute values of its link lengths a and d, m.
     segments: Vec<(JointKind, f64, f64)>,
 }
 
 impl Plane {
-    /// Distance along the normal.
+    /// Returns the distance along the normal.
     pub(super) fn height(&self, at: [f64; 3]) -> f64 {
         self.normal.iter().zip(at).map(|(n, x)| n * x).sum()
     }
 
-    /// Upper bound of the point's acceleration, m/s², for velocities and accelerations (`state[j][1]`, `state[j][2]`)
-    /// and positions of prismatic joints (`state[j][0]`) within intervals.
+    /// Returns an upper bound of the point's acceleration, m/s², for velocities and accelerations (`state[j][1]`,
+    /// `state[j][2]`) and positions of prismatic joints (`state[j][0]`) within intervals.
     ///
-    /// The point is the sum of the segments, each turning with its link: |r̈| ≤ |r|·(|ω̇| + |ω|²) + 2·|ω|·|ḋ| + |d̈|,
-    /// |ω| at most the sum of the joints' speeds below it, |ω̇| at most that of their accelerations and ½|ω|².
+    /// The point is the sum of the segments, each turning with its link: |r̈| ≤ |r|·(|ω̇| + |ω|²) + 2·|ω|·|ḋ| + |d̈|.
+    /// |ω| is at most the sum of the preceding joints' speeds, |ω̇| at most the sum of their accelerations plus ½|ω|².
     pub(super) fn acceleration_bound(&self, state: &[[Interval; 3]]) -> f64 {
         let (mut turning, mut swinging, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64);
         let around = |length: f64, w: f64, a: f64| length * (a + 1.5 * w * w);
@@ -56,12 +55,12 @@ impl Plane {
     }
 }
 
-/// The planes of all regions of a robot.
+/// Returns the planes of all regions of a robot.
 pub(super) fn planes_of(robot: &Robot) -> Vec<Plane> {
     let geometry = robot.geometry();
     let mut planes = Vec::new();
     for region in &robot.workspace {
-        // The loader has refused names that are none.
+        // The loader has rejected unknown names.
         let Some(link) = robot.joint_index(&region.joint) else {
             continue;
         };

@@ -1,9 +1,9 @@
-//! Torque that was added beside the controller: columns `added<k>` and `pulses` of a recording.
+//! Torque added to the controller's: columns `added<k>` and `pulses` of a recording.
 
 use rig_data::Block;
 use rig_model::robot::Controller;
 
-/// The torque added to joint `j` over the first `rows` rows of a block, and in words where it is the first such.
+/// Returns the torque added to joint `j` over the first `rows` rows of a block, with a text at its first occurrence.
 pub fn added_torque(
     block: &Block,
     j: usize,

@@ -1,4 +1,4 @@
-//! How far up in frequency the model explains the torque.
+//! The frequency up to which the model explains the torque.
 
 use super::factor::TriangularFactor;
 use super::linear::{product, weighted_minimum_norm};
@@ -6,12 +6,12 @@ use super::model::{Plan, each_rows};
 use super::{IdentifyError, ModelKind};
 use rig_data::prepare::{Recording, Welch};
 
-/// Share of the torque's power that may stay unexplained: one half, where signal and rest are equally strong.
+/// Share of the torque's power that may stay unexplained: one half, at equal power of signal and residual.
 const UNEXPLAINED: f64 = 0.5;
 
-/// The frequency up to which, on some joint, the model explains at least half of the power of the torque, Hz; none
-/// where the rows are too few for a spectrum or all of their band is explained. Beyond it the torque is noise, vibration and
-/// the controller's answer to its sensors, and rows that pass it only weaken the fit.
+/// Returns the frequency up to which the model explains at least half of the torque's power on some joint, Hz. None if
+/// the rows are too few for a spectrum or the whole band is explained. Above it the torque is noise, vibration and the
+/// controller's response to its sensors, and rows with it only weaken the fit.
 pub(super) fn explained_band(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -69,7 +69,7 @@ pub(super) fn explained_band(
     Ok(band.filter(|f| *f < plan.treatment.parallel_edge))
 }
 
-/// First frequency from which on, over half an octave, more than [`UNEXPLAINED`] of the power is left.
+/// Returns the first frequency above which, over half an octave, more than [`UNEXPLAINED`] of the power is residual.
 fn explained(frequency: &[f64], whole: &[f64], left: &[f64]) -> f64 {
     (0..frequency.len())
         .find(|&k| {

@@ -1,4 +1,4 @@
-//! Base (canonical) parameters: the combinations of parameters that the torque depends on.
+//! Base (canonical) parameters: the combinations of parameters on which the torque depends.
 
 use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMN_NAMES, COLUMNS, Chain, MAX_JOINTS, column};
@@ -12,48 +12,47 @@ use super::{IdentifyError, ModelKind};
 use rig_model::robot;
 use rig_model::robot::Robot;
 
-/// A column counts as dependent when, scaled to length one, less than this is left of it after the columns
-/// before it are taken away; rounding leaves about 1e-14 of a column at random states.
+/// Remainder of a column of unit length after projection onto the preceding columns, below which it is dependent.
+/// Rounding leaves about 1e-14 at random states.
 const DEPENDENT: f64 = 1e-10;
-/// … and as independent when more than this is left. Between the two lies nothing for a real geometry, whose right angles
-/// are exact once it is read; something there means link lengths or angles that are zero only by intention, and is an
-/// error.
+/// The same remainder above which a column is independent. A real geometry, whose right angles are exact after reading,
+/// has no remainder between the two. One there is an error: a length or angle is zero only by intention.
 const INDEPENDENT: f64 = 1e-7;
 
-/// The chain of a robot description.
+/// Builds the chain of a robot description.
 ///
 /// # Errors
-/// [`IdentifyError::Model`] where the geometry is not one.
+/// [`IdentifyError::Model`] if the geometry is invalid.
 pub fn chain_of(robot: &Robot) -> Result<Chain<f64>, IdentifyError> {
     Chain::new(&robot.geometry(), robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
-/// The drives of a robot description.
+/// Builds the drives of a robot description.
 ///
 /// # Errors
-/// [`IdentifyError::Model`] where they cannot be.
+/// [`IdentifyError::Model`] if the drives are impossible.
 pub fn transmission_of(robot: &Robot) -> Result<Transmission<f64>, IdentifyError> {
     robot
         .transmission()
         .map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
-/// Independent columns of a matrix and how the others follow from them.
+/// Independent columns of a matrix, and the dependent ones as combinations of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Independent {
     /// Kept columns, in ascending order.
     pub kept: Vec<usize>,
-    /// kept × all columns: column j = Σ kept columns · entries of column j. Identity on the kept ones.
+    /// Kept × all columns: column j = Σ kept columns · entries of column j. Identity on the kept ones.
     pub combination: DMatrix<f64>,
-    /// Smallest remainder of a kept column and largest of a dropped one, both relative to the column.
+    /// Smallest remainder of a kept column and largest of a dropped one, each relative to the column.
     pub remainders: (f64, f64),
     /// Remainder of every column relative to its length; 0 for a column of zeros.
     pub remainder: Vec<f64>,
 }
 
-/// Visits the columns of `matrix` in `order` and keeps those that are not, to within `tolerance` of their
-/// length, combinations of the ones kept before: a QR factorisation pivoted by preference (Gautier 1991).
-/// Columns shorter than 1e-12 of the longest count as zero.
+/// Visits the columns of `matrix` in `order` and keeps each that is not a combination of the ones kept before, to
+/// within `tolerance` of its length: a QR factorisation pivoted by preference (Gautier 1991). Columns shorter than
+/// 1e-12 of the longest count as zero.
 pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f64) -> Independent {
     let all = matrix.ncols();
     let longest = (0..all)
@@ -61,7 +60,7 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
         .fold(0.0, f64::max);
     let mut basis: Vec<nalgebra::DVector<f64>> = Vec::new();
     let mut visited: Vec<usize> = Vec::new();
-    // Coordinates of every column in the orthonormal basis, filled as the basis grows.
+    // Coordinates of every column in the orthonormal basis, extended as the basis grows.
     let mut coordinates: Vec<Vec<f64>> = vec![Vec::new(); all];
     let (mut least_kept, mut most_dropped) = (f64::INFINITY, 0.0f64);
     let mut remainder = vec![0.0; all];
@@ -71,7 +70,7 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
             continue;
         }
         let mut rest = matrix.column(c).into_owned() / length;
-        // Twice is enough (Kahan): the second pass removes what rounding left in the first.
+        // Twice is enough (Kahan): the second pass removes the rounding error of the first.
         for _ in 0..2 {
             for b in &basis {
                 let along = b.dot(&rest);
@@ -112,7 +111,7 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
         }
     }
     let kept: Vec<usize> = order_of.iter().map(|&k| visited[k]).collect();
-    // Exactly the identity on the kept columns, whatever rounding says.
+    // Set the identity on the kept columns exactly, without rounding errors.
     for (row, &c) in kept.iter().enumerate() {
         combination.column_mut(c).fill(0.0);
         combination[(row, c)] = 1.0;
@@ -125,24 +124,23 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
     }
 }
 
-/// The base parameters of a robot: β = K·π, with π the 14 parameters of every joint and, where a drive moves more than
-/// its own joint, the 3 of every motor behind them ([`rig_shared::transmission`]).
+/// The base parameters of a robot: β = K·π, with π the 14 parameters of every joint. If a drive moves several joints,
+/// the 3 parameters of every motor follow ([`rig_shared::transmission`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Base {
-    /// Columns of the standard regressor (14 a joint, 3 a motor) that stand for the base parameters.
+    /// Columns of the standard regressor (14 per joint, 3 per motor) that represent the base parameters.
     pub columns: Vec<usize>,
-    /// K, base parameters × 14n, or × 17n where there are motor columns.
+    /// K, base parameters × 14n, or × 17n with motor columns.
     pub combination: DMatrix<f64>,
     /// Kinds of the joints, for units and names.
     pub kinds: Vec<robot::JointKind>,
-    /// Kinds of the drives, one a joint.
+    /// Kinds of the drives, one per joint.
     pub drives: Vec<DriveKind>,
 }
 
-/// Order in which columns are preferred as representatives, so that the expressions group as the literature
-/// groups them (Khalil & Dombre 2002, ch. 9): of a revolute link `Iyy`, `mz` and `m` go to the link before,
-/// of a prismatic link its inertia; drive inertia joins the link's own where it cannot be told from it. What a motor
-/// adds comes last.
+/// Returns the order in which columns are preferred as representatives, so that expressions group as in the literature
+/// (Khalil & Dombre 2002, ch. 9). `Iyy`, `mz` and `m` of a revolute link and the inertia of a prismatic link go to the
+/// preceding link. Drive inertia joins the link's own if the two are collinear. Motor columns come last.
 pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
     let revolute: &[usize] = &[4, 5, 6, 8, 9, 1, 2];
     let prismatic: &[usize] = &[0, 1, 2, 3];
@@ -172,14 +170,13 @@ pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
 }
 
 impl Base {
-    /// Finds the base parameters of `robot` for a model from random states of it: of the equations that are fitted
-    /// ([`ModelKind`]). Momentum and torque have the same ones: a combination that no torque shows changes no momentum (the
-    /// momentum is what multiplies the accelerations in the torque, with the velocities in their place) and, the torque being
-    /// its change and the rest, none of the rest.
+    /// Finds the base parameters of `robot` from random states of the equations to fit ([`ModelKind`]). Momentum and
+    /// torque have the same base parameters. The momentum is the inertia term of the torque with velocities in place of
+    /// accelerations. So a combination without torque changes no momentum, and none of the remaining terms either.
     ///
     /// # Errors
-    /// [`IdentifyError::Model`] for an impossible geometry, [`IdentifyError::Undecided`] where a column is
-    /// neither clearly dependent nor clearly independent.
+    /// [`IdentifyError::Model`] for an impossible geometry, [`IdentifyError::Undecided`] if a column is neither clearly
+    /// dependent nor clearly independent.
     pub fn structural(robot: &Robot, model: ModelKind, seed: u64) -> Result<Self, IdentifyError> {
         let kinds: Vec<robot::JointKind> = robot.joints.iter().map(|j| j.kind).collect();
         let matrix = States::of(robot)?.rows(model, seed)?;
@@ -218,7 +215,7 @@ impl Base {
         })
     }
 
-    /// The same with the coefficients of rules that say the same, which have no rounding of random states in them.
+    /// Takes the coefficients of equivalent rules, which have no rounding errors from random states.
     fn with_coefficients_of(self, rules: &Self) -> Self {
         if self.columns == rules.columns {
             return Self {
@@ -237,7 +234,7 @@ impl Base {
         }
     }
 
-    /// The base parameters whose own column satisfies `keep`.
+    /// Keeps the base parameters whose own column satisfies `keep`.
     #[must_use]
     pub fn restricted(self, keep: impl Fn(usize) -> bool) -> Self {
         let rows: Vec<usize> = (0..self.columns.len())
@@ -251,38 +248,38 @@ impl Base {
         }
     }
 
-    /// Number of base parameters.
+    /// Returns the number of base parameters.
     pub fn len(&self) -> usize {
         self.columns.len()
     }
 
-    /// Whether the torque depends on nothing (never for a chain, whose joints have friction).
+    /// Returns true if the torque depends on no parameter (never for a chain, whose joints have friction).
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty()
     }
 
-    /// The combination a base parameter stands for, as a paper prints it: `Izz1 + Ia1`.
+    /// Returns the combination of a base parameter in the notation of the literature: `Izz1 + Ia1`.
     pub fn expression(&self, row: usize) -> String {
         expression(&self.combination, row, self.columns[row])
     }
 
-    /// Unit of a base parameter, ASCII.
+    /// Returns the unit of a base parameter, ASCII.
     pub fn unit(&self, row: usize) -> &'static str {
         self.column_unit(self.columns[row])
     }
 
-    /// Name of a column of the standard regressor, with the number of its joint or motor.
+    /// Returns the name of a column of the standard regressor, with the number of its joint or motor.
     pub fn column_name(&self, c: usize) -> String {
         column_name(c, self.kinds.len())
     }
 
-    /// Unit of a column, ASCII.
+    /// Returns the unit of a column, ASCII.
     pub fn column_unit(&self, c: usize) -> &'static str {
         unit(c, &self.kinds, &self.drives)
     }
 }
 
-/// Name of a column with the number of its joint or motor, for a robot of so many joints.
+/// Returns the name of a column, with the number of its joint or motor, for a robot with `joints` joints.
 pub fn column_name(c: usize, joints: usize) -> String {
     match c.checked_sub(joints * COLUMNS) {
         None => format!("{}{}", COLUMN_NAMES[c % COLUMNS], c / COLUMNS + 1),
@@ -294,8 +291,8 @@ pub fn column_name(c: usize, joints: usize) -> String {
     }
 }
 
-/// Number of joints from the number of columns: 14 a joint, or 17 with the motors' (no number of at most
-/// [`MAX_JOINTS`] joints gives both).
+/// Returns the number of joints for a number of columns: 14 per joint, or 17 with motor columns (unambiguous for up to
+/// [`MAX_JOINTS`] joints).
 fn joints_of(columns: usize) -> usize {
     let without = columns / COLUMNS;
     if columns.is_multiple_of(COLUMNS) && without <= MAX_JOINTS {
@@ -305,13 +302,13 @@ fn joints_of(columns: usize) -> usize {
     }
 }
 
-/// A row of a combination matrix in words, its own column first.
+/// Writes a row of a combination matrix in words, its own column first.
 pub fn expression(combination: &DMatrix<f64>, row: usize, own: usize) -> String {
     let joints = joints_of(combination.ncols());
     let mut text = column_name(own, joints);
     for c in 0..combination.ncols() {
         let k = combination[(row, c)];
-        // Rounding of the text only: the values are computed with the coefficients as they are.
+        // Rounds the text only: the values use the exact coefficients.
         if c == own || k.abs() < 1e-9 {
             continue;
         }
@@ -328,7 +325,7 @@ pub fn expression(combination: &DMatrix<f64>, row: usize, own: usize) -> String 
     text
 }
 
-/// Unit of a column.
+/// Returns the unit of a column.
 pub fn unit(c: usize, kinds: &[robot::JointKind], drives: &[DriveKind]) -> &'static str {
     let (joint, place) = match c.checked_sub(kinds.len() * COLUMNS) {
         None => (c / COLUMNS, c % COLUMNS),
@@ -341,7 +338,7 @@ pub fn unit(c: usize, kinds: &[robot::JointKind], drives: &[DriveKind]) -> &'sta
             (motor / MOTOR_COLUMNS, same)
         }
     };
-    // The values of a drive of changing ratio are the motor's own, which always turns.
+    // The values of a drive with a varying ratio belong to the motor, which always turns.
     let at_motor =
         c >= kinds.len() * COLUMNS && matches!(drives.get(joint), Some(DriveKind::Varying));
     let revolute = at_motor || matches!(kinds.get(joint), Some(robot::JointKind::Revolute));

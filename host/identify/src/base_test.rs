@@ -8,7 +8,7 @@ use super::Base;
 use crate::ModelKind;
 use rig_model::robot::{EDDA_TEMPLATE, IRP6_TEMPLATE, Robot, TX40};
 
-/// The terms of an expression, names as ours.
+/// Returns the terms of an expression, with this project's names.
 pub(super) fn terms(text: &str) -> BTreeMap<String, f64> {
     let mut found = BTreeMap::new();
     for part in text.replace(" - ", " + -").split(" + ") {
@@ -77,7 +77,7 @@ fn motor_columns_carry_their_names_and_units() {
         let row: Vec<f64> = (0..base.len()).map(|k| base.combination[(k, c)]).collect();
         assert!(row.iter().any(|v| v.abs() > 1e-6), "{name} does nothing");
     }
-    // A motor that moves its own joint only states nothing beside it.
+    // A motor that moves only its own joint adds no columns of its own.
     for name in ["Iam1", "fvm1", "fcm1", "Ia5"] {
         let (c, _) = named(name);
         assert!(
@@ -90,7 +90,7 @@ fn motor_columns_carry_their_names_and_units() {
 #[test]
 fn an_angle_that_no_motion_decides_is_named() {
     let mut robot = Robot::from_toml(EDDA_TEMPLATE, Path::new("edda.toml")).unwrap();
-    // Not read from a file, where it would be taken as a half turn.
+    // Set directly: a file with this angle would be read as a half turn.
     robot.joints[1].alpha = 1e-8;
     let said = Base::structural(&robot, ModelKind::Differential, 1)
         .unwrap_err()

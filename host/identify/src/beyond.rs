@@ -1,4 +1,4 @@
-//! What an identification adds to the description beyond values of its parameters.
+//! Effects that an identification adds to the description: springs, ripple and a tilted base.
 
 use nalgebra::DMatrix;
 use rig_shared::effects::Kind;
@@ -15,27 +15,27 @@ use super::terms::{Evidence, PERIODS, Term};
 use super::tilt::{Axes, BaseTilt};
 use rig_model::robot::{JointKind, Robot};
 
-/// Gain in the logarithm of the evidence from which on a term is taken: 2·ln B = 10, "very strong" (Kass & Raftery 1995).
+/// Gain in log evidence above which a term is added: 2·ln B = 10, "very strong" (Kass & Raftery 1995).
 const VERY_STRONG: f64 = 5.0;
-/// A term that moves by less than this share of its standard deviation stays where it is.
+/// Share of a term's standard deviation below which a change of it is ignored.
 const SETTLED: f64 = 0.25;
-/// Share of the squares of a joint's residual that a term has to take off them, at one joint at least: a twentieth of its
-/// RMS. Evidence alone grows with the recording, and what friction leaves at reversals, which no column has and every period
-/// of the motion repeats, does not become less: the longest recording would have a term for all of it. On simulated arms
-/// without any term the best took 1 to 8 % (IRp-6, TX40; 600 to 1400 s), on the LWR4+ those that were taken 15 to 76 %.
+/// Share of a joint's squared residual that a term must remove, at one joint at least: a twentieth of its RMS. Evidence
+/// alone is not enough: it grows with the recording, and friction errors at reversals repeat with every period of the
+/// motion. On simulated arms without any term the best candidate removed 1 to 8 % (IRp-6, TX40; 600 to 1400 s). On the
+/// LWR4+ the accepted terms removed 15 to 76 %.
 const MATERIAL: f64 = 0.1;
-/// Share of a joint's torque, as RMS, beyond which what is left is not for a spring or ripple of that joint to explain: with a
-/// wrong zero, axis or length in the description everything that goes with the position seems to help.
+/// Share of a joint's RMS torque above which its residual is not attributed to its spring or ripple. With a wrong zero,
+/// axis or length in the description, every position-dependent term seems to help.
 const MOST_LEFT: f64 = 0.3;
-/// Candidates of the description's relative uncertainty in the search.
+/// Number of candidates of the description's relative uncertainty in the search.
 const STEPS: usize = 9;
 
-/// Springs, ripple and a base that is not level.
+/// Identified springs, ripple and base tilt.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Beyond {
-    /// Torques that go with a joint's position.
+    /// Torques that depend on a joint's position.
     pub torques: Vec<PositionTorque>,
-    /// Gravity.
+    /// Tilt of the base.
     pub tilt: Option<BaseTilt>,
 }
 
@@ -44,7 +44,7 @@ impl Beyond {
         self.torques.is_empty() && self.tilt.is_none()
     }
 
-    /// As terms with their gains in evidence, and their values in the same order.
+    /// Returns the terms with their gains in evidence, and their values in the same order.
     fn terms(&self, robot: &Robot) -> (Vec<(Term, f64)>, Vec<f64>) {
         let mut values = Vec::new();
         let mut terms = Vec::new();
@@ -66,14 +66,14 @@ impl Beyond {
         (terms, values)
     }
 
-    /// Sentences.
+    /// Returns one sentence per term.
     pub(super) fn said(&self) -> impl Iterator<Item = String> + '_ {
         let tilt = self.tilt.iter().map(BaseTilt::said);
         tilt.chain(self.torques.iter().map(PositionTorque::said))
     }
 }
 
-/// `robot` with all that.
+/// Returns `robot` with these torques and this tilt.
 pub(super) fn with_beyond(
     robot: &Robot,
     torques: &[PositionTorque],
@@ -89,7 +89,7 @@ pub(super) fn with_beyond(
     robot
 }
 
-/// Terms that the description does not state already, and can state: ripple of joints that one motor alone turns.
+/// Returns the terms that the description can state and does not yet; ripple only if all drives are simple.
 fn candidates(problem: &Problem) -> Vec<Term> {
     let robot = problem.robot;
     let stated = robot.placed_effects();
@@ -121,13 +121,13 @@ fn candidates(problem: &Problem) -> Vec<Term> {
     all
 }
 
-/// What the data show beyond the description. `factors` are those of the fitted equations.
+/// Finds the effects that the data show beyond the description. `factors` are those of the fitted equations.
 pub(super) fn beyond(
     problem: &Problem,
     factors: &[TriangularFactor],
     prior: &Prior,
 ) -> Result<Beyond, IdentifyError> {
-    // Blocks that stand in for links say nothing of inertia.
+    // Substitute bodies carry no information about inertia.
     if !prior.stated {
         return Ok(Beyond::default());
     }
@@ -145,7 +145,7 @@ pub(super) fn beyond(
     loop {
         let without = belief.judged(&data.joined(&taken), &likely.deviation)?;
         let without = data.left(&taken, &belief.base_values(&without.standard));
-        // A first look with the deviations as they are, which tells less for a term than is in it; then the best anew.
+        // Screen with fixed deviations, which underestimates the gain of a term; then optimise for the best term.
         let mut best: Option<(f64, Term, Belief)> = None;
         for (term, sizes) in all.iter().filter(|(term, _)| !taken.contains(term)) {
             let tried = belief.with(sizes);
@@ -188,8 +188,8 @@ pub(super) fn beyond(
     with_values(problem, &list, values, &covariance, problem.robot.gravity)
 }
 
-/// Terms, each with its gain in evidence, as what a description states; `values` and their covariance stand in the terms'
-/// order, gravity as the description had it.
+/// Converts terms, each with its gain in evidence, to effects of a description. `values` and their covariance are in
+/// the order of the terms; gravity is the described one.
 fn with_values(
     problem: &Problem,
     terms: &[(Term, f64)],
@@ -226,7 +226,7 @@ fn with_values(
             (Term::Tilt, None) => continue,
         };
         let values = values[own.clone()].to_vec();
-        // A later term may have left a spring nothing.
+        // A later term may have removed the need for the spring.
         if periods.is_none() && values[0] <= 0.0 {
             continue;
         }
@@ -243,20 +243,19 @@ fn with_values(
     Ok(result)
 }
 
-/// Terms and parameters fitted together.
+/// Joint refit of terms and parameters.
 pub(super) struct Together {
-    /// The terms that were known: their values moved, or as they were where that is within their own uncertainty, with its
-    /// standard deviations.
+    /// The known terms with their standard deviations. Values change only if the change exceeds their own uncertainty.
     pub terms: Beyond,
-    /// Whether none moved by more than [`SETTLED`].
+    /// True if no term changed by more than [`SETTLED`].
     pub settled: bool,
-    /// What the terms' uncertainty adds to the covariance of all base columns.
+    /// Contribution of the terms' uncertainty to the covariance of all base columns.
     pub beside: DMatrix<f64>,
 }
 
-/// Fits `known`, whose torques were taken off the rows, together with all parameters. The base parameters of a robot that
-/// is not level are others than those of a level one, and what a tilt acts on is known better once it has been allowed for:
-/// hence the second look. `described` is gravity as the description states it.
+/// Refits the terms `known`, whose torques are subtracted from the rows, together with all parameters. A tilted robot
+/// has different base parameters, and the masses on which a tilt acts are known better once the tilt is subtracted:
+/// hence the second fit. `described` is the described gravity.
 pub(super) fn together(
     problem: &Problem,
     factors: &[TriangularFactor],

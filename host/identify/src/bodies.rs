@@ -1,8 +1,7 @@
-//! Base parameters that were found elsewhere, as those of bodies that can exist.
+//! Physically consistent links for base parameters from another fit.
 //!
-//! A fit that is free to gives an arm links that no body is, and an inertia matrix that is not positive: nothing can be
-//! simulated with it. The set taken is the physically consistent one ([`super::consistent`]) that is nearest in the measure
-//! of the data.
+//! An unconstrained fit may give impossible links and an inertia matrix that is not positive definite, which cannot be
+//! simulated. The result is the nearest physically consistent set ([`super::consistent`]) in the metric of the data.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -23,17 +22,17 @@ pub struct Sizes {
     pub acceleration: Vec<f64>,
 }
 
-/// `robot` with links that can exist.
+/// `robot` with physically consistent links.
 pub struct Bodies {
-    /// With them.
+    /// The robot with them.
     pub robot: Robot,
     /// Their base parameters.
     pub values: Vec<f64>,
-    /// What had to be said, sentences.
+    /// Remarks, sentences.
     pub remarks: Vec<String>,
 }
 
-/// The bodies nearest to base parameters of which the data tell `information`, the inverse of their covariance.
+/// Finds the bodies nearest to base parameters; `information` is the inverse of their covariance.
 ///
 /// # Errors
 /// [`IdentifyError::Inconsistent`].
@@ -50,7 +49,7 @@ pub fn as_bodies(
         &hints(columns, (base.columns, base.values), sizes),
         DESCRIBED,
     );
-    // R with RᵀR the information, which may lack rank.
+    // R with RᵀR the information matrix, which may be singular.
     let SymmetricEigen {
         eigenvalues,
         eigenvectors,

@@ -1,4 +1,4 @@
-//! Rows that several passes need, kept in a temporary file: made once, read as often as asked, memory constant.
+//! Rows for several passes, kept in a temporary file: computed once, read any number of times, memory constant.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -11,13 +11,13 @@ use rig_data::prepare::record;
 use rig_data::prepare::record::{Record, begin, put_count, put_numbers, unusable};
 use rig_data::prepare::{PrepareError, Recording};
 
-/// Which rows: of which recording (by address and name, both fixed while it is borrowed), of which model.
+/// Recording (by address and name, both fixed while it is borrowed) and model.
 type Key = (usize, String, bool);
 
-/// Rows of every recording that a plan has been applied to.
+/// Cached rows of every recording of a plan.
 #[derive(Debug, Default)]
 pub struct RowCache {
-    /// Rows that differ from the wanted ones only in which of them are used.
+    /// Rows that differ from the wanted ones only in the `keep` flags.
     earlier: Option<Box<RowCache>>,
     kept: Mutex<HashMap<Key, (File, Tally)>>,
 }
@@ -28,8 +28,8 @@ fn key(recording: &dyn Recording, model: ModelKind) -> Key {
 }
 
 impl RowCache {
-    /// A cache for a plan that differs from that of `earlier` only in which rows are used: the rows of the
-    /// differential model are then taken from there.
+    /// Creates a cache for a plan that differs from that of `earlier` only in the used rows: rows of the differential
+    /// model are then taken from there.
     pub(super) fn after(earlier: Self) -> Self {
         Self {
             earlier: Some(Box::new(earlier)),
@@ -37,7 +37,7 @@ impl RowCache {
         }
     }
 
-    /// Rows of the earlier plan, record by record, if there are any.
+    /// Returns the rows of the earlier plan, record by record, if there are any.
     pub(super) fn earlier(
         &self,
         recording: &dyn Recording,
@@ -70,7 +70,7 @@ impl RowCache {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Gives the rows again if they are kept; `None` if they have to be made.
+    /// Passes cached rows to `take`; returns `None` if they must be computed.
     pub(super) fn replay(
         &self,
         recording: &dyn Recording,
@@ -86,7 +86,7 @@ impl RowCache {
         Ok(Some(tally))
     }
 
-    /// Makes the rows with `make`, gives them to `take` and keeps them.
+    /// Computes the rows with `make`, passes them to `take` and caches them.
     pub(super) fn keep(
         &self,
         recording: &dyn Recording,
@@ -108,32 +108,32 @@ impl RowCache {
     }
 }
 
-/// Rows that are read again.
+/// Reader of cached rows.
 pub(super) struct Records {
     file: File,
     record: Vec<u8>,
 }
 
 impl Records {
-    /// The rows of the next piece.
+    /// Returns the rows of the next piece.
     pub(super) fn next(&mut self) -> Result<Option<Rows>, PrepareError> {
         read(&mut self.file, &mut self.record).map_err(unusable)
     }
 }
 
-/// Columns of the regressor before the first that is not zero throughout: those of the links below the joint.
+/// Returns the number of leading regressor columns that are zero in all rows: those of the links below the joint.
 fn leading_zeros(equation: &Equation) -> usize {
     let width = equation.x.len() / equation.y.len().max(1);
     let mut rows = equation.x.chunks_exact(width.max(1));
     rows.try_fold(width, |least, row| {
         let zeros = row[..least].iter().take_while(|x| **x == 0.0).count();
-        // Nothing more to be found.
+        // The number cannot fall further.
         if zeros == 0 { Err(()) } else { Ok(zeros) }
     })
     .unwrap_or(0)
 }
 
-/// One record: its length in bytes, then the rows.
+/// Writes one record: its length in bytes, then the rows.
 fn write(to: &mut File, record: &mut Vec<u8>, rows: &Rows) -> std::io::Result<()> {
     begin(record);
     put_count(record, rows.equations.len());
@@ -177,7 +177,7 @@ fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<Option<Rows>> 
             for row in 1..=y.len() {
                 x.resize(x.len() + zeros, 0.0);
                 record.numbers(&mut x)?;
-                // Every row is whole, whatever the file says.
+                // Complete every row, whatever the file contains.
                 x.resize(row * width, 0.0);
             }
             let keep = record.bytes(y.len())?.iter().map(|k| *k == 1).collect();

@@ -1,4 +1,4 @@
-//! The motion that an identified model makes in its closed loop, as a companion of the recording.
+//! The simulated closed-loop motion of an identified model, in step with the recording.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, Chain};
@@ -17,31 +17,31 @@ use rig_model::effects::Effects;
 use rig_model::robot::{Controller, Robot};
 use rig_model::simulate::{Model, Motors, Stepper};
 
-/// Rows through which a parabola is laid for the first state of a stretch.
+/// Number of rows in the parabola that gives the initial state of a stretch.
 const FIRST_ROWS: usize = 21;
-/// Steps of the simulation within one sample.
+/// Simulation steps per sample.
 const SUBSTEPS: u32 = 4;
-/// Cut-off of the stand-in for a missing reference, as a multiple of the highest frequency of the motion.
+/// Cut-off of the substitute for a missing reference, as a multiple of the highest frequency of the motion.
 const SMOOTHING: f64 = 1.5;
 
-/// Where a motion free of the measurement's noise can come from.
+/// Source of a motion without measurement noise.
 pub(super) enum Source {
-    /// Model and the description's controllers, driven by the recorded reference.
+    /// Model and described controllers, driven by the recorded reference.
     Loop(Vec<Controller>),
-    /// The recorded reference itself: what a computed-torque controller designed from the model follows.
+    /// The recorded reference itself, which an ideal computed-torque controller follows.
     Reference,
-    /// The measured position behind a low-pass close to the motion.
+    /// The measured position after a low-pass close to the motion.
     Smoothed(LowPass),
 }
 
-/// What the references of the recordings are good for.
+/// Usability of the recorded references.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum References {
     /// Some are missing.
     Missing,
-    /// All are there, and some are in another unit or sense than their positions.
+    /// All are present; some have another unit or sense than their positions.
     Strange,
-    /// All are there.
+    /// All are present.
     Usable,
 }
 
@@ -71,11 +71,11 @@ fn stated_controllers(problem: &Problem) -> Option<Vec<Controller>> {
 const LOOP: &str = "the closed loop of the identified model and the description's controllers, driven by the recorded reference";
 
 impl Source {
-    /// The closed loop that description and recordings state, and in words.
+    /// Returns the closed loop of description and recordings, and a text about it.
     ///
     /// # Errors
-    /// [`IdentifyError::NoLoop`] where they state none, [`IdentifyError::StrangeReference`] where the references cannot be
-    /// the motion's and the estimator that needs them was not asked for by name.
+    /// [`IdentifyError::NoLoop`] if they define none, [`IdentifyError::StrangeReference`] if the references do not
+    /// match the motion and the estimator that needs them was not requested by name.
     pub(super) fn closed_loop(problem: &Problem) -> Result<(Self, String), IdentifyError> {
         let references = References::of(problem)?;
         match (references, stated_controllers(problem)) {
@@ -87,7 +87,7 @@ impl Source {
         }
     }
 
-    /// The best that description and recordings allow, and in words.
+    /// Returns the best source that description and recordings allow, and a text about it.
     pub(super) fn of(problem: &Problem) -> Result<(Self, String), IdentifyError> {
         let references = References::of(problem)?;
         if references == References::Usable {
@@ -121,7 +121,7 @@ impl Source {
     }
 }
 
-/// The physically consistent model nearest to values of the base columns, in the data's own measure.
+/// Returns the physically consistent model nearest to values of the base columns, in the metric of the data.
 pub(super) fn nearest(
     problem: &Problem,
     factor: &TriangularFactor,
@@ -137,10 +137,10 @@ pub(super) fn nearest(
     Ok(consistent(&data, prior)?.parameters)
 }
 
-/// Standard parameters as a model to simulate, with the drives of `robot`.
+/// Builds a model for simulation from standard parameters, with the drives of `robot`.
 ///
 /// # Errors
-/// [`IdentifyError::Model`] where the drives make no transmission.
+/// [`IdentifyError::Model`] if the drives are no valid transmission.
 pub(super) fn model_of(
     robot: &Robot,
     chain: &Chain<f64>,
@@ -166,7 +166,7 @@ pub(super) fn model_of(
     .map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
-/// Simulates block after block; the state carries over where a block continues the one before.
+/// Block-by-block simulation; the state carries over if a block continues the previous one.
 pub(super) struct LoopMotion<'a> {
     robot: &'a Robot,
     controllers: &'a [Controller],
@@ -177,7 +177,7 @@ pub(super) struct LoopMotion<'a> {
 }
 
 impl<'a> LoopMotion<'a> {
-    /// For one recording sampled every `period` seconds.
+    /// Creates the simulation of a recording sampled every `period` seconds.
     pub(super) fn new(
         robot: &'a Robot,
         controllers: &'a [Controller],
@@ -267,7 +267,7 @@ impl Companion for LoopMotion<'_> {
     }
 }
 
-/// The reference as it was recorded.
+/// The recorded reference.
 pub(super) struct ReferenceMotion;
 
 impl Companion for ReferenceMotion {
@@ -276,7 +276,7 @@ impl Companion for ReferenceMotion {
     }
 }
 
-/// Position and velocity at the first row of a stretch, by a parabola through its first rows.
+/// Returns position and velocity at the first row of a stretch, from a parabola through its first rows.
 fn first_state(block: &Block, period: f64) -> (Vec<f64>, Vec<f64>) {
     let rows = FIRST_ROWS.min(block.len());
     let a = DMatrix::from_fn(rows, 3, |i, power| (i as f64).powi(power as i32));
@@ -286,7 +286,7 @@ fn first_state(block: &Block, period: f64) -> (Vec<f64>, Vec<f64>) {
         .iter()
         .map(|joint| {
             let y = DVector::from_fn(rows, |i, _| joint.q[i]);
-            // A parabola over distinct instants always has a solution; the first row stands in otherwise.
+            // A parabola over distinct instants always has a solution; the first row is the fallback.
             svd.solve(&y, 1e-12)
                 .map_or((joint.q[0], 0.0), |x| (x[0], x[1] / period))
         })

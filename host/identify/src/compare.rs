@@ -1,4 +1,4 @@
-//! Estimators side by side, judged alike, and which result to trust.
+//! Comparison of estimators by the same criteria, and the recommended result.
 
 use rig_model::robot::Robot;
 use serde::Serialize;
@@ -23,49 +23,49 @@ use super::total::total;
 use super::{Estimator, IdentifyError};
 use rig_data::prepare::Recording;
 
-/// A set counts as consistent when it lies nearer than this to one that is, in standard deviations of all parameters
-/// together: the barrier keeps the solution a little inside.
+/// Distance to the nearest consistent set below which a set counts as consistent, in standard deviations of all
+/// parameters together. Not zero, because the barrier keeps the solution slightly inside.
 const AT_THE_SET: f64 = 1.0;
-/// How much weaker than in a fit the prior's pull is when the distance to the consistent set is measured.
+/// Factor on the prior's pull when the distance to the consistent set is measured.
 const PULL_OF_DISTANCE: f64 = 1e-4;
 
-/// One estimator's result.
+/// The result of one estimator.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Compared {
-    /// Which.
+    /// Estimator.
     pub estimator: Estimator,
-    /// Per joint, RMS of the residual over RMS of the torque, every stretch predicted from the others, null of a joint whose
-    /// torque is not used; null where the estimator failed.
+    /// Per joint, RMS of the residual over RMS of the torque, with every time segment predicted from the others. Null
+    /// for a joint without usable torque, and altogether if the estimator failed.
     pub cross_validated_relative_error: Option<Vec<f64>>,
-    /// The same on the hold-out, where given.
+    /// The same on the hold-out, if given.
     pub holdout_relative_error: Option<Vec<f64>>,
-    /// Distance of the estimate from the nearest physically consistent one, in standard deviations of all
-    /// parameters together.
+    /// Distance of the estimate from the nearest physically consistent one, in standard deviations of all parameters
+    /// together.
     pub distance_to_consistent: Option<f64>,
-    /// Whether that is no distance.
+    /// True if that distance is negligible.
     pub physically_consistent: Option<bool>,
-    /// Largest difference from the weighted fit over all parameters, in standard deviations of the weighted fit.
+    /// Largest difference from the weighted fit over all parameters, in standard deviations of that fit.
     pub largest_shift: Option<f64>,
     /// Values in the order of `base_parameters`.
     pub values: Option<Vec<f64>>,
-    /// How it went, or why it failed.
+    /// Remarks on the fit, or the reason of its failure.
     pub said: Vec<String>,
 }
 
-/// The table and the verdict.
+/// Results of all estimators and the recommendation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Stretches of time that were predicted from the others.
+    /// Number of cross-validation segments.
     pub folds: usize,
-    /// Recordings held back that repeat a motion learnt from: no evidence of how another one is predicted.
+    /// Hold-out recordings that repeat a training motion, so they do not test the prediction of another motion.
     pub repeated_holdout: Vec<String>,
-    /// One an estimator.
+    /// One entry per estimator.
     pub estimators: Vec<Compared>,
-    /// Durbin, Wu and Hausman's question, absent where instrumental variables failed.
+    /// Durbin–Wu–Hausman test; absent if instrumental variables failed.
     pub endogeneity: Option<Endogeneity>,
-    /// The result to trust.
+    /// The recommended estimator.
     pub recommended: Estimator,
-    /// Which and why.
+    /// The recommendation and its reason.
     pub recommendation: String,
 }
 
@@ -89,8 +89,8 @@ pub(super) fn fit(
     }
 }
 
-/// Per joint, RMS of what `full` leaves of the rows behind `factors` over that of the torque: of `whole`, where the rows do
-/// not hold all of it.
+/// Returns, per joint, the RMS residual of `full` on the rows of `factors` over the RMS torque. Uses the torque `whole`
+/// if the rows do not contain all of the torque.
 pub(super) fn relative_errors(
     factors: &[TriangularFactor],
     full: &[f64],
@@ -110,7 +110,7 @@ pub(super) fn relative_errors(
     factors.iter().enumerate().map(one).collect()
 }
 
-/// Recordings as one factor a joint, torque against motion; none of none.
+/// Returns one factor per joint of the hold-out, torque against motion; none for an empty hold-out.
 pub(super) fn judge(
     problem: &Problem,
     holdout: &[Planned],
@@ -133,7 +133,7 @@ pub(super) fn judge(
     Ok(Some(factors))
 }
 
-/// Distance of an estimate from the physically consistent set, in standard deviations.
+/// Returns the distance of an estimate from the physically consistent set, in standard deviations.
 fn distance(
     problem: &Problem,
     tempered: &TriangularFactor,
@@ -146,26 +146,26 @@ fn distance(
     loop {
         match consistent(&about, &loose) {
             Ok(found) => return Ok(found.squares.sqrt()),
-            // Far from every body, and with combinations that the data hardly touch, rounding hides the last of the
-            // path. What is found before it lies as far or, by the pull's own size, farther.
+            // Far from every consistent set, and with weakly excited combinations, rounding hides the end of the path.
+            // An earlier point gives the same distance or one that is larger by the size of the pull.
             Err(_) if loose.strength < 1.0 => loose.strength *= 10.0,
             Err(e) => return Err(e),
         }
     }
 }
 
-/// The recordings held back.
+/// The hold-out recordings.
 pub(super) struct Held {
-    /// Rows of all of them, a factor a joint.
+    /// Rows of all of them, one factor per joint.
     pub all: Vec<TriangularFactor>,
-    /// Rows of those that do not repeat a motion learnt from; none where all do.
+    /// Rows of those with a motion that is not in the training data; none if every one repeats a training motion.
     fresh: Option<Vec<TriangularFactor>>,
-    /// Those that repeat one.
+    /// Recordings that repeat a training motion.
     repeated: Vec<String>,
 }
 
 impl Held {
-    /// Judges `holdout` against the motions learnt from; none of none.
+    /// Compares `holdout` with the training motions; none for an empty hold-out.
     pub(super) fn of(
         problem: &Problem,
         holdout: &[Planned],
@@ -199,8 +199,8 @@ impl Held {
     }
 }
 
-/// Fits with every estimator of `list` and judges, by the hold-out where there is one. `measured` are the RMS torques of
-/// training data and hold-out, joint by joint, where the rows do not hold all of the torque.
+/// Fits with every estimator of `list` and judges it, on the hold-out if given. `measured` holds the RMS torques of
+/// training data and hold-out per joint, for rows that do not contain all of the torque.
 pub(super) fn compare(
     problem: &Problem,
     parts: &Parts,
@@ -269,7 +269,7 @@ pub(super) fn compare(
                         .cloned()
                         .collect(),
                 };
-                // What is held back counts where it is another motion; a mean over joints needs no torque of its own.
+                // Only another motion in the hold-out counts. A mean over joints needs no `whole` torque.
                 let judged = match fresh {
                     Some(factors) => Some(relative_errors(factors, &fitted.full.whole, None)),
                     None => row.holdout_relative_error.clone(),
@@ -318,7 +318,7 @@ pub(super) fn compare(
     })
 }
 
-/// Joints whose torque held back the `recommended` result predicts worse than no model, in words; empty if there are none.
+/// Names the joints whose hold-out torque the `recommended` result predicts worse than no model; empty if none.
 fn beyond_use(robot: &Robot, rows: &[Compared], recommended: Estimator) -> String {
     let row = rows.iter().find(|row| row.estimator == recommended);
     let errors = row.and_then(|row| row.holdout_relative_error.as_ref());
@@ -338,7 +338,7 @@ fn beyond_use(robot: &Robot, rows: &[Compared], recommended: Estimator) -> Strin
     )
 }
 
-/// Geometric mean of the relative errors over the joints that have one, so that strong and weak ones count alike.
+/// Returns the geometric mean of the relative errors over the joints that have one, so that all joints count equally.
 fn mean(errors: &[f64]) -> f64 {
     let judged = errors.iter().filter(|e| !e.is_nan());
     let (sum, count) = judged.fold((0.0, 0usize), |(sum, count), e| {

@@ -1,17 +1,18 @@
-//! Physically consistent parameters: every link a body that can exist, friction and drive inertia not negative.
+//! Physically consistent parameters: every link is a possible body, friction and drive inertia are not negative.
 //!
 //! The convex problem
 //!
 //!   min ½‖R·K·π − z‖² + Σ pullᵢ·D(Jᵢ(π)‖Jᵢ⁰) + Σ pullⱼ·(πⱼ/πⱼ⁰ − ln(πⱼ/πⱼ⁰) − 1),
 //!
-//! R and z the triangular factor of the data in units of its own noise, K the grouping, D the divergence of
-//! [`super::pseudo_inertia`]: it is the barrier of the linear matrix inequalities Jᵢ ≻ 0 and, being centred on a
-//! prior, decides what the data leave open (Wensing, Kim & Slotine 2018; Lee, Wensing & Park 2020). It is solved by
-//! Newton's method along the path of a falling multiple of the pulls (Nesterov & Nemirovskii 1994; Boyd &
-//! Vandenberghe 2004, ch. 11), in coordinates in which the data's part is diagonal. The pull costs at most its own
-//! size in units of the data's noise, a few units against thousands of rows.
+//! with R and z the triangular factor of the data in units of its own noise, K the grouping, D the divergence of
+//! [`super::pseudo_inertia`]. D is the barrier of the linear matrix inequalities Jᵢ ≻ 0. It is centred on a prior,
+//! which decides what the data do not identify (Wensing, Kim & Slotine 2018; Lee, Wensing & Park 2020). Newton's method
+//! solves it along the path of a falling multiple of the pulls (Nesterov & Nemirovskii 1994; Boyd & Vandenberghe 2004,
+//! ch. 11), in coordinates in which the data's part is diagonal. The pull costs at most its own size, a few units of
+//! noise.
 //!
-//! Leaves out: that rotor inertia seen at several joints comes from one rotor; bounds on where a link's mass may lie.
+//! Limits: does not use that rotor inertia seen at several joints comes from one rotor; no bounds on the centre of
+//! mass.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -19,25 +20,25 @@ use super::IdentifyError;
 use super::prior::{Prior, Rule};
 use super::pseudo_inertia::INERTIAL;
 
-/// Each stage of the path lowers the pulls by this factor.
+/// Factor on the pulls from one stage of the path to the next.
 const STAGE: f64 = 0.1;
-/// Newton steps over all stages, at most.
+/// Largest number of Newton steps over all stages.
 const MOST_STEPS: usize = 500;
-/// Squared Newton decrement at which a stage before the last ends, and the last.
+/// Squared Newton decrement that ends a stage: for stages before the last, and for the last.
 const SETTLED: [f64; 2] = [1e-2, 1e-13];
-/// The last stage also ends when a step would gain less than this of the squares: below it lies rounding.
+/// Decrease of the squares below which a stage also ends; smaller ones are rounding errors.
 const NOTHING_TO_GAIN: f64 = 1e-11;
-/// … or after so many steps in turn that have gained no more than that: rounding moves the point about.
+/// Number of consecutive steps without a larger decrease after which a stage ends: rounding moves the point.
 const MOST_STANDING: usize = 4;
-/// Shares of its diagonal that may be added to a Hessian, one after another.
+/// Relative additions to the diagonal of a Hessian, tried in this order.
 const ROUNDING: [f64; 5] = [0.0, 1e-14, 1e-12, 1e-10, 1e-8];
-/// Pull of an offset towards its prior: only decides where the data say nothing.
+/// Pull of an offset towards its prior; matters only if the data do not identify the offset.
 const OFFSET_PULL: f64 = 1e-6;
 
-/// Data as ½‖matrix·π − right‖², the residual's noise as unit.
+/// Data as ½‖matrix·π − right‖², in units of the residual's noise.
 #[derive(Clone, Debug)]
 pub(super) struct Quadratic {
-    /// R·K, any number of rows up to that of the standard columns.
+    /// R·K, with at most as many rows as standard columns.
     pub matrix: DMatrix<f64>,
     /// z.
     pub right: DVector<f64>,
@@ -50,7 +51,7 @@ pub(super) struct Consistent {
     pub parameters: Vec<f64>,
     /// ‖R·K·π − z‖².
     pub squares: f64,
-    /// W with W·Wᵀ the covariance of the prior's values: the inverse of what the data bend and of [`believed`].
+    /// W with W·Wᵀ the covariance of the prior's values: the inverse of the Hessians of data and [`believed`].
     pub spread: DMatrix<f64>,
     /// Newton steps.
     pub steps: usize,
@@ -77,7 +78,7 @@ impl Coordinates {
         let svd = square.svd(true, true);
         let mut right = DVector::zeros(m);
         right.rows_mut(0, rows).copy_from(&data.right.rows(0, rows));
-        // Both were asked for; identity stands in for neither.
+        // Both factors were requested, so the identity is never used.
         let u = svd.u.unwrap_or_else(|| DMatrix::identity(m, m));
         let mut lift = svd
             .v_t
@@ -93,7 +94,7 @@ impl Coordinates {
         }
     }
 
-    /// c of π.
+    /// Returns c for π.
     fn lower(&self, pi: &[f64], scale: &[f64]) -> DVector<f64> {
         let scaled = DVector::from_fn(pi.len(), |k, _| pi[k] / (scale[k] * scale[k]));
         self.lift.transpose() * scaled
@@ -103,7 +104,7 @@ impl Coordinates {
         self.singular.component_mul(c) - &self.target
     }
 
-    /// Of the data and of pulls whose Hessian times `lift` is `strength` times `bent`.
+    /// Returns the Hessian of the data and of pulls whose own Hessian times `lift` is `strength` times `bent`.
     fn hessian(&self, bent: &DMatrix<f64>, strength: f64) -> DMatrix<f64> {
         let mut sum = self.lift.tr_mul(bent) * strength;
         for (k, singular) in self.singular.iter().enumerate() {
@@ -113,7 +114,7 @@ impl Coordinates {
     }
 }
 
-/// The pulls' value at π, `None` outside the cone.
+/// Returns the pulls' value at π; `None` outside the cone.
 fn barrier(prior: &Prior, pi: &[f64]) -> Option<f64> {
     let mut sum = 0.0;
     for (c, rule) in prior.rules.iter().enumerate() {
@@ -132,7 +133,7 @@ fn barrier(prior: &Prior, pi: &[f64]) -> Option<f64> {
     sum.is_finite().then_some(sum)
 }
 
-/// Gradient of the pulls and their Hessian times `lift`.
+/// Returns the gradient of the pulls and their Hessian times `lift`.
 fn slopes(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let m = pi.len();
     let mut gradient = DVector::zeros(m);
@@ -165,9 +166,9 @@ fn slopes(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<(DVector<f64
     Some((gradient, bent))
 }
 
-/// Hessian, times `lift`, of what is believed before the data, as far as that is a spread: at the edge of the cone the pulls
-/// bend without bound, which says where the minimum is and not how far the truth may lie from it. Bodies bend as at the sum of
-/// prior and solution, friction and drive inertia as at the prior, and not at all where nothing is known of them.
+/// Returns the prior's Hessian, times `lift`, as used for the covariance. At the edge of the cone the pulls' own
+/// Hessian is unbounded, which says nothing about the uncertainty. Bodies are taken at the mean of prior and solution,
+/// friction and drive inertia at the prior; unknown values get [`OFFSET_PULL`] only.
 fn believed(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut bent = DMatrix::zeros(pi.len(), pi.len());
     for (c, rule) in prior.rules.iter().enumerate() {
@@ -177,7 +178,7 @@ fn believed(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<DMatrix<f6
                 let body = prior.bodies.get(c / rig_shared::multibody::COLUMNS)?;
                 let both: Vec<f64> = (c..c + INERTIAL).map(|k| pi[k] + prior.centre[k]).collect();
                 let (_, h) = body.derivatives(&both)?;
-                // Twice as large bends a quarter.
+                // At twice the argument the Hessian is a quarter.
                 let h = DMatrix::from_fn(INERTIAL, INERTIAL, |r, s| 4.0 * pull * h[(r, s)]);
                 bent.rows_mut(c, INERTIAL)
                     .copy_from(&(h * lift.rows(c, INERTIAL)));
@@ -192,7 +193,7 @@ fn believed(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<DMatrix<f6
     Some(bent)
 }
 
-/// Cholesky factor after scaling the diagonal to one, and the scales.
+/// Returns the Cholesky factor after scaling the diagonal to one, and the scales.
 pub(super) fn scaled_cholesky(
     mut h: DMatrix<f64>,
 ) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
@@ -206,8 +207,8 @@ pub(super) fn scaled_cholesky(
     Some((h.cholesky()?, scale))
 }
 
-/// [`scaled_cholesky`] of what is positive definite but for rounding, which close to the edge of the cone may hide that: as
-/// little is added to the diagonal as makes it so.
+/// [`scaled_cholesky`] of a matrix that is positive definite apart from rounding errors near the edge of the cone. Adds
+/// the smallest of [`ROUNDING`] that makes it so.
 fn steadied(
     h: &DMatrix<f64>,
 ) -> Result<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>), IdentifyError> {
@@ -249,7 +250,7 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
     let value = |c: &DVector<f64>, pi: &DVector<f64>, strength: f64| {
         Some(0.5 * space.misfit(c).norm_squared() + strength * barrier(prior, pi.as_slice())?)
     };
-    // Strong enough that the first Newton step is short.
+    // Strong enough for a short first Newton step.
     let first = {
         let (_, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(broken)?;
         let (cholesky, scale) = steadied(&(space.lift.transpose() * bent))?;
@@ -276,7 +277,7 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
         while length > 1e-10 {
             let next_c = &c + length * &step;
             let next_pi = &space.lift * &next_c;
-            // Close to the minimum rounding hides the descent; a full step is right there.
+            // Close to the minimum rounding hides the descent; a full step is correct there.
             let least =
                 before - 1e-4 * length * decrement * strength + 1e-12 * (before.abs() + strength);
             if value(&next_c, &next_pi, strength).is_some_and(|v| v <= least) {

@@ -1,24 +1,26 @@
-//! Which values that are believed before the data these contradict.
+//! Test for prior values that the data contradict.
 //!
-//! Believed values are normal with independent deviations. The data then move the mean of value k by a shift whose variance, if the
-//! belief is right, is what its variance falls by (Box 1980, prior predictive check). A shift of too many of those standard
-//! deviations refutes the belief. The worst one is set free and the others are judged anew: one wrong value moves the rest as well.
+//! The prior is normal with independent deviations. The data shift the mean of value k. If the prior is right, the
+//! shift's variance is the decrease of the value's variance (Box 1980, prior predictive check). A shift of too many
+//! such standard deviations refutes the prior. The worst value is freed and the others are tested again, because one
+//! wrong value shifts the rest.
 //!
-//! Leaves out: beliefs that are correlated; errors of the model, which move values too.
+//! Limits: no correlated priors; errors of the model also shift values.
 
 use nalgebra::{DMatrix, DVector};
 
 use rig_model::robot::CONTRADICTED;
 
-/// How many times wider a value is believed once it is set free.
+/// Factor on the prior deviation of a freed value.
 const FREE: f64 = 1e3;
-/// Share of a value's variance that data have to take away to judge it: less is rounding.
+/// Smallest relative decrease of a value's variance for a test; smaller ones are rounding errors.
 const SEEN: f64 = 1e-9;
 
-/// Those among `judged` columns that are contradicted, with by how many standard deviations, in the order in which they were set free.
+/// Returns the contradicted columns among `judged`, each with its number of standard deviations, in the order of
+/// freeing.
 ///
-/// `data` has the noise as unit and one column a value, `surprise` is what the believed values leave of the right side, `spread` their
-/// standard deviations.
+/// `data` is in units of the noise and has one column per value, `surprise` is the residual of the prior values,
+/// `spread` their standard deviations.
 pub fn contradicted(
     data: &DMatrix<f64>,
     surprise: &DVector<f64>,
@@ -47,7 +49,7 @@ pub fn contradicted(
     }
 }
 
-/// Shift of each value over its standard deviation under the belief; 0 where the data say nothing. None where rounding hides it.
+/// Returns each value's shift over its standard deviation under the prior; 0 without information. None if rounded away.
 fn shifts(scaled: &DMatrix<f64>, surprise: &DVector<f64>) -> Option<Vec<f64>> {
     let svd = scaled.clone().svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
@@ -77,7 +79,7 @@ fn shifts(scaled: &DMatrix<f64>, surprise: &DVector<f64>) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
 
-    /// Rows that see three values, the last two hardly apart; what the believed values leave where the truth is `truth` away.
+    /// Rows of three values, the last two nearly collinear, and the prior's residual if the truth is `truth` away.
     fn seen(truth: [f64; 3]) -> (DMatrix<f64>, DVector<f64>) {
         let data = DMatrix::from_fn(60, 3, |r, c| {
             let t = 0.1 * r as f64;
@@ -99,9 +101,9 @@ mod tests {
             matches!(found.as_slice(), [(0, times)] if *times > 50.0),
             "{found:?}"
         );
-        // Not asked about: nothing to say of it.
+        // Not tested, so nothing is contradicted.
         assert!(contradicted(&data, &right, &spread, &[]).is_empty());
-        // Known too vaguely to be refuted.
+        // The prior is too wide to be refuted.
         assert!(contradicted(&data, &right, &[1.0, 0.01, 0.01], &[0, 1, 2]).is_empty());
     }
 }

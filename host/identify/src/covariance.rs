@@ -1,16 +1,16 @@
-//! Covariance of the estimate that holds when residuals are correlated in time.
+//! Covariance of the estimate for residuals that are correlated in time.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
-/// Groups that are collected; neighbouring ones are joined afterwards where residuals remember for longer.
+/// Number of collected groups; neighbouring groups are merged later if the residual's correlation time is longer.
 pub(super) const FINEST_GROUPS: usize = 64;
-/// Fewest groups from which an interval is still formed.
+/// Smallest number of groups for an interval.
 const FEWEST_GROUPS: usize = 8;
-/// A group must be this many times as long as the residual's memory, so that groups are nearly independent.
+/// Minimum length of a group, in correlation times of the residual, so that groups are nearly independent.
 const MEMORIES_PER_GROUP: f64 = 10.0;
-/// Lags, in rows, over which the memory of residuals is followed.
+/// Largest lag, in rows, of the residuals' autocorrelation.
 pub(super) const LAGS: usize = 200;
 
 /// Autocovariance of a stream of residuals.
@@ -35,9 +35,9 @@ impl Default for Memory {
 }
 
 impl Memory {
-    /// Takes the next residual.
+    /// Adds the next residual.
     pub(super) fn push(&mut self, e: f64) {
-        // Written backwards, so that what came before lies in order behind it; zeros before the first.
+        // Written backwards, so that earlier residuals follow in order; zeros before the first.
         if self.next == 0 {
             self.next = self.ring.len() - LAGS;
             let (start, end) = self.ring.split_at_mut(self.next);
@@ -52,25 +52,25 @@ impl Memory {
         self.seen += 1;
     }
 
-    /// Autocorrelation at lags 0 … [`LAGS`].
+    /// Returns the autocorrelation at lags 0 … [`LAGS`].
     pub(super) fn correlation(&self) -> Vec<f64> {
         let zero = self.sums[0].max(f64::MIN_POSITIVE);
         self.sums.iter().map(|s| s / zero).collect()
     }
 
-    /// Integrated memory 1 + 2·Σρ in rows, summed while ρ stays above twice its standard error (the truncation
-    /// of Geyer's initial sequence, 1992, with the noise of the estimate in mind); never below one.
+    /// Returns the correlation time 1 + 2·Σρ in rows, at least one. The sum ends where ρ falls below twice its standard
+    /// error (truncation of Geyer's initial sequence, 1992, adapted to the noise of the estimate).
     pub(super) fn length(&self) -> f64 {
         memory_of(&self.correlation(), self.seen)
     }
 
-    /// Residuals seen.
+    /// Returns the number of residuals so far.
     pub(super) fn seen(&self) -> u64 {
         self.seen
     }
 }
 
-/// [`Memory::length`] of a given autocorrelation (lag 0 first) of `seen` residuals.
+/// Returns [`Memory::length`] for a given autocorrelation (lag 0 first) of `seen` residuals.
 pub(super) fn memory_of(correlation: &[f64], seen: u64) -> f64 {
     let threshold = 2.0 / (seen.max(1) as f64).sqrt();
     let sum: f64 = correlation
@@ -81,7 +81,7 @@ pub(super) fn memory_of(correlation: &[f64], seen: u64) -> f64 {
     1.0 + 2.0 * sum
 }
 
-/// Sums over stretches of time, in coordinates z in which Σ z·zᵀ over all rows is the identity.
+/// Sums over time segments, in coordinates z in which Σ z·zᵀ over all rows is the identity.
 #[derive(Clone, Debug)]
 pub(super) struct Groups {
     information: Vec<DMatrix<f64>>,
@@ -90,7 +90,7 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    /// For `total` instants and `size` parameters.
+    /// Creates empty sums for `total` instants and `size` parameters.
     pub(super) fn new(size: usize, total: u64) -> Self {
         Self {
             information: vec![DMatrix::zeros(size, size); FINEST_GROUPS],
@@ -99,20 +99,20 @@ impl Groups {
         }
     }
 
-    /// Takes one row: whitened regressor `z` and residual `e` of instant `index`.
+    /// Adds one row: whitened regressor `z` and residual `e` of instant `index`.
     pub(super) fn push(&mut self, index: u64, z: &DVector<f64>, e: f64) {
         let g = group_of(index, self.total);
         self.information[g].ger(1.0, z, z, 1.0);
         self.score[g].axpy(e, z, 1.0);
     }
 
-    /// Covariance of the whitened parameters by leaving out one group at a time, and the number of groups.
+    /// Returns the covariance of the whitened parameters by leaving out one group at a time, and the number of groups.
     ///
-    /// The delete-group jackknife (Shao & Tu 1995, ch. 2; for clusters MacKinnon, Nielsen & Webb 2023, "CV₃"): it
-    /// needs no model of the correlation within a group and corrects for the pull of influential groups. With G
-    /// groups the estimate divided by its standard deviation follows Student's t with G − 1 degrees of freedom
-    /// (Bester, Conley & Hansen 2011). `None` where the recording is too short for independent groups, or where all
-    /// information on some parameter lies in a single group.
+    /// Delete-group jackknife (Shao & Tu 1995, ch. 2; for clusters MacKinnon, Nielsen & Webb 2023, "CV₃"). It needs no
+    /// model of the correlation within a group and corrects for influential groups. With G groups the estimate divided
+    /// by its standard deviation follows Student's t with G − 1 degrees of freedom (Bester, Conley & Hansen 2011).
+    /// `None` if the recording is too short for independent groups, or if all information on a parameter lies in one
+    /// group.
     pub(super) fn jackknife(&self, memory_rows: f64) -> Option<(DMatrix<f64>, usize)> {
         let most = (self.total as f64 / (MEMORIES_PER_GROUP * memory_rows)).floor() as usize;
         let groups = most.clamp(FEWEST_GROUPS, FINEST_GROUPS);
@@ -139,19 +139,19 @@ impl Groups {
     }
 }
 
-/// Group of instant `index` among `total`.
+/// Returns the group of instant `index` among `total`.
 pub(super) fn group_of(index: u64, total: u64) -> usize {
     ((index as u128 * FINEST_GROUPS as u128 / total.max(1) as u128) as usize).min(FINEST_GROUPS - 1)
 }
 
-/// An estimate with what is known of its error.
+/// An estimate with its uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     /// Values of the base parameters.
     pub values: Vec<f64>,
-    /// Standard deviations that allow for correlation of the residuals in time.
+    /// Standard deviations; allow for correlation of the residuals in time.
     pub std: Vec<f64>,
-    /// Standard deviations that the literature prints: σ²·(XᵀX)⁻¹, residuals taken as white.
+    /// Standard deviations for white residuals, as in the literature: σ²·(XᵀX)⁻¹.
     pub classical_std: Vec<f64>,
     /// Covariance, row by row.
     pub covariance: Vec<Vec<f64>>,
@@ -159,23 +159,23 @@ pub struct Estimate {
     pub correlation: Vec<Vec<f64>>,
     /// 95 % intervals (Student's t with `degrees_of_freedom`).
     pub interval: Vec<[f64; 2]>,
-    /// Groups less one.
+    /// Number of groups minus one.
     pub degrees_of_freedom: usize,
     /// Rows used.
     pub rows: u64,
-    /// Rows divided by the residual's memory.
+    /// Rows divided by the residual's correlation time.
     pub effective_rows: f64,
-    /// Memory of the residuals in rows: 1 + 2·Σρ.
+    /// Correlation time of the residuals in rows: 1 + 2·Σρ.
     pub memory_rows: f64,
-    /// Condition number of the regressor as it is, SI units.
+    /// Condition number of the unscaled regressor, SI units.
     pub condition: f64,
     /// Condition number with every column scaled to length one.
     pub scaled_condition: f64,
 }
 
 impl Estimate {
-    /// From values with their covariance, `regressor` being the upper triangle that was fitted and `memory_rows` what
-    /// the residuals remember.
+    /// Builds the estimate from values and their covariance. `regressor` is the fitted upper triangle, `memory_rows`
+    /// the correlation time of the residuals.
     pub(super) fn of(
         values: &[f64],
         covariance: &DMatrix<f64>,
@@ -238,21 +238,21 @@ pub struct Ellipse {
     pub second: [f64; 2],
 }
 
-/// Student's t quantile for a two-sided 95 % interval.
+/// Returns Student's t quantile for a two-sided 95 % interval.
 pub fn t_quantile(degrees_of_freedom: usize) -> f64 {
     StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64)
         .map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
 }
 
 impl Estimate {
-    /// Whether a value lies in the 95 % interval of parameter `k`.
+    /// Returns true if a value lies in the 95 % interval of parameter `k`.
     pub fn covers(&self, k: usize, value: f64) -> bool {
         self.interval
             .get(k)
             .is_some_and(|[low, high]| (*low..=*high).contains(&value))
     }
 
-    /// Joint 95 % region of two parameters: half axes scaled by √(2·F₀.₉₅(2, ν)). `None` for a wrong pair.
+    /// Returns the joint 95 % region of two parameters, half axes scaled by √(2·F₀.₉₅(2, ν)). `None` for a bad pair.
     pub fn ellipse(&self, a: usize, b: usize) -> Option<Ellipse> {
         let n = self.values.len();
         if a >= n || b >= n || a == b {

@@ -1,15 +1,15 @@
-//! The cut-off of the position filter, judged by how well the torque is explained with it.
+//! The cut-off of the position filter, chosen by how well the torque is explained with it.
 //!
-//! The spectrum of a position shows where it sinks into noise only if the noise is white. Time stamps with jitter, coarse
-//! encoders and positions that the drive has filtered make noise that stands above the floor of the top of the band and looks
-//! like motion. The torque tells the two apart: motion needs torque, noise needs none. So the model is fitted once for each
-//! of several cut-offs, to the same torque in the same band, and the residuals are compared: a cut-off that is too low bends the
-//! motion, one that is too high lets noise into the regressor, and both leave more of the torque unexplained. The cut-off of
-//! the spectrum stays where no other one explains the torque better by [`BETTER`]. A lower one is taken only where the spectrum
-//! flattens above it, which noise does and motion does not: friction that the model lacks is smeared away by a low cut-off, too.
+//! The spectrum of a position shows its noise floor only if the noise is white. Jittered time stamps, coarse encoders
+//! and positions filtered by the drive give noise that looks like motion. The torque separates the two: motion needs
+//! torque, noise needs none. The model is fitted once per cut-off, to the same torque in the same band, and the
+//! residuals are compared. A cut-off that is too low distorts the motion; one that is too high lets noise into the
+//! regressor. Both raise the residual. The spectrum's cut-off is replaced only if another one explains the torque
+//! better by [`BETTER`]. A lower one also needs a spectrum that is flat above it, as noise is and motion is not,
+//! because a low cut-off also hides unmodelled friction.
 //!
-//! Leaves out: one cut-off a joint (the regressor couples the joints); noise that the controller's answer carries into the torque,
-//! which is explained together with the noise in the position.
+//! Limits: one cut-off for all joints, because the regressor couples them. Noise that the controller feeds back into
+//! the torque is explained together with the position noise.
 
 use rig_shared::multibody::Chain;
 use rig_shared::transmission::Transmission;
@@ -27,41 +27,41 @@ use rig_data::prepare::{
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 
-/// Reduction of the mean logarithm of the joints' residuals from which another cut-off takes the place of the spectrum's.
-/// 0.15: on the rig of `rig demo`, whose position noise is white and whose friction before sliding the fitted model lacks, a
-/// cut-off five times lower than the right one left 11 % less; positions with noise that is not white left 20 % to 300 % more.
+/// Reduction of the mean log residual of the joints from which another cut-off replaces the spectrum's. 0.15: on the
+/// rig of `rig demo` (white position noise, presliding friction unmodelled) a cut-off five times too low left 11 %
+/// less. Positions with noise that is not white left 20 % to 300 % more.
 const BETTER: f64 = 0.15;
-/// Difference of the mean logarithm of the joints' residuals below which two cut-offs explain the torque equally.
+/// Difference of the mean log residual of the joints below which two cut-offs count as equal.
 const EQUAL: f64 = 0.01;
-/// The lowest cut-off that is tried times the length of the shortest stretch: each end loses three periods of the cut-off, so
-/// at most a fifth of the recording is lost.
+/// Lowest trial cut-off times the length of the shortest stretch. Each end loses three periods of the cut-off, so at
+/// most a fifth of the recording is lost.
 const LEAST_PERIODS: f64 = 30.0;
-/// Band in which the torque is compared, as a multiple of the frequency of the joints' swings: friction at a reversal has harmonics
-/// well above the motion, and a cut-off that smears them must show in the residual.
+/// Band of the torque comparison, as a multiple of the joints' main motion frequency. Friction at a reversal has
+/// harmonics well above the motion, and a cut-off that blurs them must show in the residual.
 const HEADROOM: f64 = 10.0;
-/// Length of the recordings that a trial uses, all together, s: five periods of a usual motion of 10 s. The choice then costs no
-/// more on a long recording.
+/// Total length of the recordings in a trial, s: five periods of a usual motion of 10 s. Limits the cost for long
+/// recordings.
 const TRIAL_SECONDS: f64 = 50.0;
-/// Rows slower than this share of the RMS speed are left out of the comparison: the sign of their speed is noise with every cut-off.
+/// Share of the RMS speed below which rows are excluded from the comparison: the sign of their speed is noise.
 const SLOW: f64 = 0.05;
 
-/// What the rows of a trial are made from.
+/// The model behind the rows of a trial.
 #[derive(Clone, Copy)]
 pub(crate) struct Equations<'a> {
     /// Geometry.
     pub chain: &'a Chain<f64>,
     /// Drives.
     pub transmission: &'a Transmission<f64>,
-    /// Columns of the base parameters.
+    /// Columns of the base parameters in the standard regressor.
     pub columns: &'a [usize],
-    /// Whether the equations are all that is described of the torque: effects beside them would count as residual.
+    /// True if the description has no effects beside the equations. Such effects would count as residual.
     pub complete: bool,
 }
 
-/// Decides how `recordings` of `robot` are treated where nothing is identified.
+/// Decides the treatment of the `recordings` of `robot` without an identification.
 ///
 /// # Errors
-/// [`IdentifyError`]: recordings that cannot be prepared; a geometry that is none.
+/// [`IdentifyError`]: recordings that cannot be prepared; an invalid geometry.
 pub fn treatment_for(
     robot: &Robot,
     recordings: &[&dyn Recording],
@@ -85,8 +85,8 @@ pub fn treatment_for(
     )
 }
 
-/// Decides how `recordings` are treated: as [`Treatment::decide`], with the cut-off that explains the torque best. Returns the
-/// surveys as they are then known: the signal of each joint ends at the cut-off where the torque shows no motion above it.
+/// Decides the treatment of `recordings` as [`Treatment::decide`] does, with the cut-off that explains the torque best.
+/// Returns updated surveys: the signal of each joint ends at the cut-off if the torque shows no motion above it.
 ///
 /// # Errors
 /// [`IdentifyError`]: as [`Treatment::decide`]; recordings that cannot be read.
@@ -121,7 +121,7 @@ pub(crate) fn decided(
     if by_spectrum <= least + BETTER {
         return Ok((surveys, Treatment { trials, ..first }));
     }
-    // The lowest of the equals has the least noise in the speed.
+    // Of equal cut-offs the lowest one has the least noise in the speed.
     let equal = trials.iter().find(|t| score(t) <= least + EQUAL);
     let cutoff = equal.map_or(first.cutoff, |t| t.cutoff);
     let noisy = |j: usize| {
@@ -154,8 +154,8 @@ pub(crate) fn decided(
     Ok((surveys, treatment))
 }
 
-/// What a reader should know first of the cut-off: that the torque gave another one than the spectrum, and which joints are
-/// explained clearly better with one of their own.
+/// Returns warnings about the cut-off: the torque gave another one than the spectrum, or some joints are explained
+/// clearly better with a cut-off of their own.
 pub(super) fn doubts(treatment: &Treatment, robot: &Robot) -> Vec<String> {
     let mut doubts = Vec::new();
     let (cutoff, trials) = (treatment.cutoff, &treatment.trials);
@@ -192,7 +192,7 @@ pub(super) fn doubts(treatment: &Treatment, robot: &Robot) -> Vec<String> {
     doubts
 }
 
-/// Mean over the joints that every trial can judge of the logarithm of their relative errors.
+/// Returns the mean logarithm of the relative errors, over the joints with a valid error in every trial.
 fn mean_logarithm(errors: &[f64], trials: &[CutoffTrial]) -> f64 {
     let judged = |j: usize| trials.iter().all(|t| t.relative_error[j] > 0.0);
     let logarithms: Vec<f64> = (errors.iter().enumerate())
@@ -202,7 +202,7 @@ fn mean_logarithm(errors: &[f64], trials: &[CutoffTrial]) -> f64 {
     logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64
 }
 
-/// The cut-off that explains the torque of joint `j` best.
+/// Returns the cut-off that explains the torque of joint `j` best.
 fn own_cutoff(trials: &[CutoffTrial], j: usize) -> f64 {
     let judged = trials.iter().filter(|t| t.relative_error[j] > 0.0);
     judged
@@ -220,8 +220,8 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// The spectrum's cut-off and others an octave apart, half an octave apart about the best; none where the recordings are
-    /// too short to compare.
+    /// Runs trials with the spectrum's cut-off, with others an octave apart, and with half-octave neighbours of the
+    /// best. Returns none if the recordings are too short.
     fn trials(&self) -> Result<Option<Vec<CutoffTrial>>, IdentifyError> {
         let rate = self.first.sample_rate;
         let shortest = self.surveys.iter().map(|s| s.longest).min().unwrap_or(0);
@@ -229,9 +229,9 @@ impl Comparison<'_> {
         let swing = (self.first.spectra.iter())
             .map(|s| s.swing())
             .fold(0.0, f64::max);
-        // Below the swing's own frequency a cut-off bends the swing itself, however long the recording is.
+        // Below the main motion frequency a cut-off distorts the motion itself, whatever the recording's length.
         let least = (LEAST_PERIODS * rate / shortest.max(1) as f64).max(swing);
-        // Of one row in one the torque would pass the position's filter, which differs from trial to trial.
+        // Without decimation the torque would pass the position filter, which differs between trials.
         let decimation = ((0.4 * rate / (HEADROOM * swing)).floor() as usize).max(2);
         let trimmed = trimmed_rows(least.min(self.first.cutoff), decimation, rate);
         let fastest = self.fastest(0.4 * rate / decimation as f64);
@@ -262,8 +262,8 @@ impl Comparison<'_> {
         Ok(Some(trials))
     }
 
-    /// The recordings in which some joint moves faster than in any other, by its speed below `band` Hz. Slow reversals are no
-    /// judge: what the model lacks of friction near standstill is most of their residual, and a low cut-off smears it away.
+    /// Returns, for each joint, the recording in which its speed below `band` Hz is highest. Slow reversals are
+    /// unsuitable: unmodelled friction near standstill dominates their residual, and a low cut-off hides it.
     fn fastest(&self, band: f64) -> Vec<&dyn Recording> {
         let speed = |s: &Survey, j: usize| s.joints[j].spectrum.velocity_rms_below(band);
         let of = |j: usize| {
@@ -317,7 +317,7 @@ impl Comparison<'_> {
     }
 }
 
-/// The beginnings of `recordings` that a trial uses.
+/// Returns the beginnings of `recordings` that a trial uses.
 pub(super) fn beginnings<'a>(
     recordings: &[&'a dyn Recording],
     treatment: &Treatment,
@@ -328,7 +328,7 @@ pub(super) fn beginnings<'a>(
         .collect()
 }
 
-/// The rows of each joint's equation for which `used` (of the rows, joint, row) is true.
+/// Factorises the rows of each joint's equation for which `used` (arguments: rows, joint, row) is true.
 ///
 /// # Errors
 /// [`IdentifyError`]: recordings that cannot be read.
@@ -359,13 +359,13 @@ pub(super) fn factors_of(
     Ok(factors)
 }
 
-/// Whether a row is usable.
+/// Returns true if a row is usable.
 pub(super) fn kept(rows: &Rows, joint: usize, row: usize) -> bool {
     rows.equations[joint].keep[row]
 }
 
-/// Per joint, what least squares over all joints leaves of the torque, weighed by what is left of each; not a number where a
-/// joint has no rows or no torque.
+/// Returns the RMS residual of each joint over its RMS torque. The least-squares fit covers all joints and weights them
+/// by their residuals. Not a number for a joint without rows or torque.
 fn relative_errors(factors: &[TriangularFactor]) -> Vec<f64> {
     let rms = |squares: f64, factor: &TriangularFactor| (squares / factor.rows() as f64).sqrt();
     let Some(beta) = by_noise(factors) else {

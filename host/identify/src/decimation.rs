@@ -1,12 +1,12 @@
-//! How many rows are kept, judged by how well stretches that were left out are predicted.
+//! Choice of the decimation, by how well left-out segments are predicted.
 //!
-//! Noise of the position passes into the acceleration with the square of the frequency, and least squares, which takes its columns
-//! for exact, then finds inertias too small (errors in variables; Söderström 2018, ch. 2). Torque and regressor pass one low-pass
-//! before rows are dropped: a narrower band drops that noise and, with it, part of what a lively motion says of inertia. Which of
-//! the two weighs more is for the data to say: each band is fitted without a stretch of time, and predicts that stretch in the
-//! narrowest band, in which noise of the position bends the comparison least.
+//! Position noise passes into the acceleration with the square of the frequency. Least squares assumes an exact
+//! regressor and then underestimates inertias (errors in variables; Söderström 2018, ch. 2). Torque and regressor pass
+//! one low-pass before rows are dropped. A narrower band removes this noise, but also part of the information of a fast
+//! motion about inertia. The data decide: each band is fitted without one time segment and predicts that segment in the
+//! narrowest band, where position noise biases the comparison least.
 //!
-//! Leaves out: a band for each joint; noise below the narrowest band.
+//! Limits: one band for all joints; noise below the narrowest band remains.
 
 use super::IdentifyError;
 use super::cutoff::{beginnings, kept};
@@ -16,13 +16,13 @@ use rig_data::prepare::{PrepareError, Recording, Treatment};
 
 /// Ratio of neighbouring bands.
 const STEP: f64 = std::f64::consts::SQRT_2;
-/// The narrowest band as a multiple of the frequency of the joints' swings: it holds the swing and its torque.
+/// The narrowest band as a multiple of the joints' main motion frequency: it contains the motion and its torque.
 const HEADROOM: f64 = 4.0;
 
-/// Treatments of narrower and narrower bands, from `first` on. `narrowed` gives that of a band in Hz, or the widest possible one.
+/// Returns treatments of ever narrower bands, starting with `first`. `narrowed` treats a band in Hz, or the widest one.
 ///
 /// # Errors
-/// What `narrowed` gives.
+/// Errors of `narrowed`.
 pub(super) fn candidates(
     first: Treatment,
     narrowed: &dyn Fn(f64) -> Result<Treatment, PrepareError>,
@@ -42,8 +42,8 @@ pub(super) fn candidates(
     Ok(list)
 }
 
-/// The treatment of the one of `plans`, from the widest band to the narrowest, that predicts best what it was not fitted to; the
-/// widest one of equals.
+/// Returns the treatment of the plan with the smallest prediction error; of equals, the widest band. `plans` are in
+/// order from the widest to the narrowest band.
 ///
 /// # Errors
 /// [`IdentifyError`]: recordings that cannot be read.
@@ -60,7 +60,7 @@ pub(super) fn best(
     let sorted = (plans.iter())
         .map(|plan| Stretches::of(&beginnings, plan, &kept))
         .collect::<Result<Vec<_>, _>>()?;
-    // The last is of the narrowest band.
+    // The last plan has the narrowest band.
     let errors: Vec<f64> = (sorted.iter())
         .map(|own| sorted.last().map_or(f64::NAN, |judge| own.error(judge)))
         .collect();

@@ -1,4 +1,4 @@
-//! The identified robot as a description that other commands load.
+//! The identified robot as a description for other commands.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
@@ -10,13 +10,12 @@ use super::prior::described;
 use rig_model::robot::{JointKind, Robot};
 use rig_output::format_significant;
 
-/// `robot` with the identified values, its dynamics those of the base parameters.
+/// Returns `robot` with the identified values and the dynamics of the base parameters, and a list of remarks.
 ///
-/// Only combinations are identified, so their split is a choice: the physically consistent full set where there is
-/// one ([`super::StandardSet`]). A robot of one link is otherwise made a body that can exist: positive mass, inertia no
-/// smaller than its centre of mass demands, the drive's share as given before. Failing both, the prior description is
-/// moved by the smallest step that gives the identified combinations (K⁺·(β − K·π₀)). The second result lists what
-/// had to be said.
+/// Only combinations are identified, so their split is a choice. The first choice is the physically consistent full set
+/// ([`super::StandardSet`]). Otherwise a robot of one link becomes a possible body: positive mass, inertia at least as
+/// large as its centre of mass requires, the drive's share unchanged. Otherwise the prior description changes by the
+/// smallest step that gives the identified combinations (K⁺·(β − K·π₀)).
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let details = &identification.details;
     let mut robot = with_beyond(
@@ -45,19 +44,19 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
     (result, remarks)
 }
 
-/// Base parameters with what they combine.
+/// Base parameters and their combinations.
 pub struct Combinations<'a> {
-    /// Base over standard parameters.
+    /// Base parameters as combinations of standard parameters.
     pub combination: &'a DMatrix<f64>,
-    /// Column of the standard regressor that each is named after.
+    /// Column of the standard regressor that names each parameter.
     pub columns: &'a [usize],
-    /// SI
+    /// Values, SI.
     pub values: &'a [f64],
 }
 
-/// `robot` with these base parameters: one link as a body that can exist, several links by the smallest change of the
-/// description, each parameter's change counted in its `weights` (one a standard parameter, above 0; none for all alike).
-/// The second result lists what had to be said.
+/// Returns `robot` with these base parameters, and a list of remarks. One link becomes a possible body. Several links
+/// take the smallest change of the description, weighted by `weights` (one per standard parameter, above 0; none for
+/// equal weights).
 pub fn redistributed(
     robot: &Robot,
     base: &Combinations,
@@ -86,7 +85,7 @@ pub fn redistributed(
     written(robot, &pi, remarks)
 }
 
-/// The description with these standard parameters.
+/// Returns the description with these standard parameters.
 pub(super) fn written(
     robot: &Robot,
     pi: &DVector<f64>,
@@ -104,9 +103,9 @@ pub(super) fn written(
     (result, remarks)
 }
 
-/// Raises masses below zero, which no description can hold, to zero along directions that leave every identified
-/// combination as it is (mass of a link that turns is no combination of its own: the links before take it up). Where
-/// there is no such direction the links keep what the description said of them, and the remark says so.
+/// Raises negative masses, which no description can hold, to zero along directions that change no identified
+/// combination. (The mass of a revolute link is no combination of its own; the preceding links absorb it.) If there is
+/// no such direction, the links keep their described values and a remark reports it.
 fn without_negative_masses(
     robot: &Robot,
     k: &DMatrix<f64>,
@@ -123,7 +122,7 @@ fn without_negative_masses(
     let Ok(inverse) = pseudo_inverse(k) else {
         return;
     };
-    // The projection onto what the data do not see, its columns those of the masses.
+    // Projection onto the directions that the data do not determine; its columns are the masses.
     let seen = inverse * k;
     let free = DMatrix::from_fn(pi.len(), masses.len(), |i, m| {
         f64::from(u8::from(i == masses[m])) - seen[(i, masses[m])]
@@ -138,7 +137,7 @@ fn without_negative_masses(
     if let Some(y) = step {
         *pi += free * y;
         for &c in &masses {
-            // What rounding has left below zero.
+            // Clear negative rounding errors.
             if pi[c] < 0.0 && pi[c] > -1e-9 * (1.0 + lacking.amax()) {
                 pi[c] = 0.0;
             }
@@ -170,7 +169,7 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
     };
     let prior_drive = pi[column::DRIVE_INERTIA];
     for c in [1, 2, column::VISCOUS, column::COULOMB, column::OFFSET] {
-        // What the data did not tell apart is inside the value of another column: zero here, not the prior.
+        // An unidentified parameter is contained in the value of another column, so it is zero here, not the prior.
         if let Some(value) = identified(c) {
             pi[c] = value;
         } else if robot.joints[0].kind == JointKind::Revolute || c > 2 {
@@ -206,7 +205,7 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
             let moment = pi[1].hypot(pi[2]);
             let mut drive = prior_drive;
             let prior_mass = pi[column::MASS];
-            // Izz about the joint is at least (m·c)²/m: with the mass given that bounds the drive's share.
+            // Izz about the joint is at least (m·c)²/m: for a given mass this bounds the drive's share.
             let least = |mass: f64| {
                 if mass > 0.0 {
                     moment * moment / mass
@@ -242,7 +241,7 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
                 ));
                 mass
             };
-            // A flat body in the plane of motion: second moments S = m·c·cᵀ + what is left, half each way.
+            // A flat body in the plane of motion: second moments S = m·c·cᵀ + remainder, half in each direction.
             let rest = (link - least(mass)).max(0.0);
             let (xx, yy, xy) = (
                 pi[1] * pi[1] / mass + 0.5 * rest,

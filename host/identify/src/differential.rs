@@ -1,9 +1,8 @@
-//! Rows of the differential model: torque and regressor at the full rate, all passed through the parallel low-pass,
-//! one row in so many kept.
+//! Rows of the differential model: torque and regressor are computed at the full rate, filtered by the parallel
+//! low-pass, and decimated.
 //!
-//! A stretch of a few hundred rows at a time goes from motion through regressor into the low-pass while it lies in the
-//! second-level cache; regressor columns at the full rate are never written out, columns that are zero by structure
-//! never formed.
+//! A stretch of a few hundred rows passes from motion through regressor to low-pass while it is in the second-level
+//! cache. Regressor columns at the full rate are never stored, and structurally zero columns are never computed.
 
 use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::MOTOR_COLUMNS;
@@ -13,32 +12,32 @@ use super::slow::{SlowMotor, slow_motors};
 use rig_data::prepare::{Decimator, JointMotion, Motion, PrepareError};
 use rig_model::batch::{BLOCK, BatchError, ChainBatch, RegressorBlock};
 
-/// Rows that go through regressor and low-pass together, about: with six joints 0.3 MB of regressor.
+/// Approximate number of rows computed together: with six joints 0.3 MB of regressor.
 const STRETCH: usize = 192;
 
-/// A signal that passes the low-pass.
+/// A signal for the low-pass.
 enum Signal {
-    /// Column of the regressor: joint whose torque it is part of, standard column, place in the row.
+    /// Regressor column: joint of the torque, standard column, place in the row.
     Regressor(usize, usize, usize),
-    /// Column of a motor: joint whose torque it is part of, column behind the standard ones, place in the row.
+    /// Motor column: joint of the torque, column after the standard ones, place in the row.
     Motor(usize, usize, usize),
     /// Torque of a joint.
     Torque(usize),
 }
 
-/// What forms the rows of one recording.
+/// Computes the rows of one recording.
 pub(super) struct Differential<'a> {
     plan: &'a Plan<'a>,
     batch: ChainBatch,
     decimator: Decimator,
-    /// Rows after which the low-pass has forgotten.
+    /// Length of the low-pass response, rows.
     settle: usize,
     signals: Vec<Signal>,
 }
 
-/// What a stretch of rows goes through, used again for the next one.
+/// Buffers for a stretch of rows, reused for the next one.
 struct Room {
-    /// Position, velocity and acceleration, joint by joint.
+    /// Position, velocity and acceleration, per joint.
     motion: [Vec<Vec<f64>>; 3],
     block: RegressorBlock,
 }
@@ -71,7 +70,7 @@ impl<'a> Differential<'a> {
         })
     }
 
-    /// Signals of the given rows of `motion`, one after the other from `out[s·stride]` on.
+    /// Computes the signals of the given rows of `motion`, one after the other from `out[s·stride]`.
     fn signals_at(
         &self,
         motion: &Motion,
@@ -111,7 +110,7 @@ impl<'a> Differential<'a> {
             .map_err(failed)
     }
 
-    /// The part of the motors.
+    /// Computes the motors' part.
     fn motors_at(
         &self,
         q: &[Vec<f64>],
@@ -146,7 +145,7 @@ impl<'a> Differential<'a> {
         Ok(())
     }
 
-    /// Rows of a piece that are kept.
+    /// Returns the rows of a piece that decimation keeps.
     fn picked(&self, motion: &Motion) -> Vec<usize> {
         let step = self.decimator.step() as u64;
         (motion.usable.0..motion.usable.1)
@@ -154,7 +153,7 @@ impl<'a> Differential<'a> {
             .collect()
     }
 
-    /// The rows of one piece.
+    /// Computes the rows of one piece.
     pub(super) fn rows(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
         let picked = self.picked(motion);
         let p = self.plan.columns.len();
@@ -172,10 +171,10 @@ impl<'a> Differential<'a> {
         Ok(result)
     }
 
-    /// Which rows of the piece are used, and nothing else.
+    /// Decides which rows of the piece are used, without computing them.
     ///
     /// # Errors
-    /// Lengths that do not fit the drives.
+    /// Lengths that do not match the drives.
     pub(super) fn used(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
         let motors = slow_motors(motion, self.plan)?;
         let (picked, step) = (self.picked(motion), self.decimator.step());
@@ -192,8 +191,8 @@ impl<'a> Differential<'a> {
     fn filter(&self, motion: &Motion, first: usize, result: &mut Rows) -> Result<(), PrepareError> {
         let p = self.plan.columns.len();
         let (step, settle) = (self.decimator.step() as i64, self.settle as i64);
-        // What the position's filter spoils at the ends of the segment would be carried far in by this one: torque and columns
-        // begin and end alike where they are sound, mirrored there.
+        // The position filter distorts the ends of the segment, and the low-pass would spread this far inwards. So
+        // torque and columns are cut where they are sound and mirrored there.
         let (low, high) = (motion.sound.0 as i64, motion.sound.1 as i64);
         let pads = (motion.at_ends).map(|end| if end { settle.min(high - low - 1) } else { 0 });
         let outer = low - pads[0]..high + pads[1];
@@ -250,7 +249,7 @@ impl<'a> Differential<'a> {
     }
 }
 
-/// Quotient rounded up; `by` > 0.
+/// Returns the quotient rounded up; `by` > 0.
 fn quotient_up(a: i64, by: i64) -> i64 {
     -(-a).div_euclid(by)
 }
@@ -263,7 +262,7 @@ fn picks(motion: &Motion, picked: &[usize], of: fn(&JointMotion) -> &[f64]) -> V
     motion.joints.iter().map(pick).collect()
 }
 
-/// Number of true entries before each place.
+/// Returns the number of true entries before each place.
 fn running_count(list: &[bool]) -> Vec<u32> {
     std::iter::once(0)
         .chain(list.iter().scan(0, |sum, flag| {
@@ -273,7 +272,7 @@ fn running_count(list: &[bool]) -> Vec<u32> {
         .collect()
 }
 
-/// Whether each picked row of joint `j` is used.
+/// Decides for each kept row of joint `j` if it is used.
 fn kept(
     joint: &JointMotion,
     motors: &[SlowMotor],
@@ -289,7 +288,7 @@ fn kept(
         .map(|list| (list, running_count(list)))
         .collect();
     let saturated_before = running_count(&joint.saturated);
-    // How many of the rows within `reach` of k are marked, and how many rows these are.
+    // Number of marked rows within `reach` of k, and number of rows there.
     let around = |before: &[u32], k: usize, reach: usize| {
         let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(rows));
         ((before[to] - before[from]) as usize, to - from)
@@ -297,8 +296,8 @@ fn kept(
     picked
         .iter()
         .map(|&k| {
-            // A passing reversal is the model's business; where the joint is slow for longer than the
-            // low-pass remembers, its neighbours carry the torque of standing still too.
+            // The model covers a short reversal. If the joint is slow for longer than the low-pass response, its
+            // neighbours also contain the torque at standstill.
             let slow = slow.iter().any(|(list, before)| {
                 let (near, all) = around(before, k, step);
                 let dwells = near == all || around(before, k, 2 * step).0 > 3 * step.max(2);

@@ -1,4 +1,4 @@
-//! Whether noise in the motion biases least squares.
+//! Test for bias of least squares by noise in the motion.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -9,40 +9,40 @@ use super::problem::{Fitted, Problem};
 use super::total::moved_by_noise;
 use rig_output::{format_p_value, format_significant, format_value};
 
-/// p-value below which a difference counts as shown.
+/// p-value below which a difference is significant.
 const SHOWN: f64 = 0.01;
-/// A difference of less than this many standard deviations of the weighted fit makes none.
+/// Number of standard deviations of the weighted fit below which a difference is immaterial.
 const MATERIAL: f64 = 0.5;
-/// Bias may be so many times what the noise of the position's spectrum makes: noise that is not white, and its way through the
-/// controller.
+/// Largest ratio of a bias to the one expected from the position's spectrum. Above one, because noise may not be white
+/// and may pass through the controller.
 const AT_MOST: f64 = 5.0;
 
-/// What the difference between least squares and instrumental variables shows.
+/// Interpretation of the difference between least squares and instrumental variables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Noise in the motion biases least squares.
     Biased,
-    /// They do not differ by more than chance.
+    /// The difference is not significant.
     NoSign,
-    /// They differ by more than chance, but by less than the estimate's own uncertainty.
+    /// The difference is significant but smaller than the estimate's own uncertainty.
     Immaterial,
-    /// They differ by more than the position's noise can cause.
+    /// The difference is larger than the position noise can cause.
     NotNoise,
-    /// Nothing: the instruments are not good enough to ask.
+    /// No result: the instruments are not good enough.
     Undecided,
 }
 
-/// Whether least squares and instrumental variables differ by more than chance, and what that shows.
+/// Significance of the difference between least squares and instrumental variables, and its interpretation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Endogeneity {
-    /// What it shows.
+    /// Interpretation.
     pub verdict: Verdict,
     /// p-value of the parameter below, times the number of parameters (Bonferroni).
     pub p_value: f64,
-    /// Index in `base_parameters` of the parameter that decided.
+    /// Index in `base_parameters` of the deciding parameter.
     pub parameter: usize,
-    /// Difference, instrumental variables less weighted least squares.
+    /// Difference, instrumental variables minus weighted least squares.
     pub difference: f64,
     /// Its standard deviation.
     pub std: f64,
@@ -52,10 +52,10 @@ pub struct Endogeneity {
     pub text: String,
 }
 
-/// Hausman's test (1978), parameter by parameter: the difference against its own jackknife standard deviation, which
-/// needs neither efficiency of the one nor independence of the rows. What differs by more than chance is bias by noise
-/// only where it matters and where the noise that the position's spectrum shows can make it. `doubtful` says why the
-/// instruments are not good enough to ask.
+/// Hausman's test (1978) per parameter: the difference is compared with its own jackknife standard deviation. It
+/// requires neither an efficient estimator nor independent rows. A significant difference is bias by noise only if it
+/// is material and if the noise in the position's spectrum can cause it. `doubtful` gives the reason why the
+/// instruments are too poor for the test.
 pub(super) fn endogeneity(
     problem: &Problem,
     parts: &Parts,
@@ -139,7 +139,7 @@ pub(super) fn endogeneity(
     }))
 }
 
-/// How two estimates differ, parameter by parameter.
+/// Difference of two estimates, per parameter.
 struct Asked<'a> {
     p_value: Vec<f64>,
     /// In standard deviations of the weighted fit.
@@ -148,7 +148,7 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// What differs by more than chance, and by so much that it matters.
+    /// Returns the parameters with a significant and material difference.
     fn material(&self) -> Vec<usize> {
         let all = 0..self.shift.len();
         all.filter(|&k| self.p_value[k] < SHOWN && self.shift[k].abs() >= MATERIAL)
@@ -161,7 +161,7 @@ impl Asked<'_> {
             .unwrap_or(0)
     }
 
-    /// Whether they differ by more than chance and materially (then not yet known to be noise), and the parameter that says so.
+    /// Judges if the difference is significant and material, with the deciding parameter; the cause is still open.
     fn by_chance(&self) -> (Verdict, usize) {
         let shown: Vec<usize> = (0..self.shift.len())
             .filter(|&k| self.p_value[k] < SHOWN)
@@ -178,7 +178,7 @@ impl Asked<'_> {
         }
     }
 
-    /// Whether noise that moves the parameters by `moved` can have made a material difference.
+    /// Judges if noise with the expected bias `moved` can cause a material difference.
     fn by_noise(&self, moved: &[f64]) -> (Verdict, usize) {
         let material = self.material();
         let possible: Vec<usize> = (material.iter().copied())
@@ -229,7 +229,7 @@ mod tests {
     fn a_difference_is_bias_only_where_noise_can_make_it() {
         let much = asked([1e-9, 1e-4, 1e-3], [0.0025, 3.0, -4.0]);
         for (moved, expected) in [
-            // Noise moves the first alone, then the second by a fifth of what is seen.
+            // Noise moves only the first; then it moves the second by a fifth of its difference.
             ([1e-6, 0.01, 0.01], (Verdict::NotNoise, 2)),
             ([0.0, -0.061, 0.01], (Verdict::Biased, 1)),
         ] {

@@ -1,12 +1,13 @@
-//! Essential parameters: the few that the torque needs, the rest taken as zero.
+//! Essential parameters: the few that suffice for the torque, with the others taken as zero.
 //!
-//! Backward elimination by relative standard deviation (Pham & Gautier 1991; Khalil & Dombre 2002, § 12.4.4): the
-//! least certain parameter goes, the others are fitted anew, until none is more than [`RATIO`] times as uncertain as
-//! the best known, or until an F-test, rows counted as what they are worth, says that one was needed: of the last
-//! parameter alone, and of all that went together (many that were not needed would hide one that was).
+//! Backward elimination by relative standard deviation (Pham & Gautier 1991; Khalil & Dombre 2002, § 12.4.4). The least
+//! certain parameter is removed and the others are refitted. This ends when no parameter is more than [`RATIO`] times
+//! as uncertain as the best one, or when an F-test finds a removed one significant. The F-test counts independent rows.
+//! It tests the last parameter alone and all removed ones together, because many insignificant ones would hide a
+//! significant one.
 //!
-//! It begins from the estimate that is returned, with the covariance that this has: what follows from a free fit where the
-//! estimate is one of bodies would be values that no body has.
+//! It starts from the returned estimate and its covariance. Starting from a free fit could give values that no body has
+//! if the estimate is physically consistent.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -14,35 +15,35 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::factor::TriangularFactor;
 
-/// Ratio of the largest to the smallest relative standard deviation at which elimination ends; the literature uses
-/// 10 to 30.
+/// Ratio of the largest to the smallest relative standard deviation at which elimination ends; the literature uses 10
+/// to 30.
 const RATIO: f64 = 30.0;
-/// p-value of the F-test below which what was taken away was needed.
+/// p-value of the F-test below which the removed parameters are significant.
 const NEEDED: f64 = 0.05;
 
 /// One essential parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Essential {
-    /// As `base_parameters` prints it.
+    /// Expression as in `base_parameters`.
     pub expression: String,
-    /// SI, fitted with the inessential ones at zero.
+    /// Value, SI, fitted with the inessential ones at zero.
     pub value: f64,
-    /// Residual's memory allowed for.
+    /// Relative standard deviation, %; allows for correlated residuals.
     pub relative_std_percent: f64,
-    /// ASCII
+    /// Unit, ASCII.
     pub unit: String,
 }
 
 /// The essential set.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EssentialSet {
-    /// In the order of `base_parameters`.
+    /// Parameters in the order of `base_parameters`.
     pub parameters: Vec<Essential>,
-    /// Expressions of those taken as zero, in the order of elimination.
+    /// Expressions of the removed parameters, in the order of elimination.
     pub left_out: Vec<String>,
-    /// By how much the residual's RMS grew, %.
+    /// Increase of the residual RMS, %.
     pub residual_increase_percent: f64,
-    /// Why elimination ended, a sentence.
+    /// Reason why elimination ended, a sentence.
     pub ended: String,
 }
 
@@ -52,23 +53,23 @@ struct Fit {
     squares: f64,
 }
 
-/// What is known of the identified combinations x, as ‖r·x − z‖² + rest.
+/// Information about the identified combinations x, as ‖r·x − z‖² + rest.
 pub(super) struct Known {
     r: DMatrix<f64>,
     z: DVector<f64>,
     /// Squares that no x explains.
     rest: f64,
-    /// Rows behind it.
+    /// Number of rows.
     rows: f64,
-    /// Rows that the residual remembers.
+    /// Correlation time of the residual in rows.
     memory: f64,
-    /// Whether the squares have the variance of the noise as unit; else it is what they leave.
+    /// True if the squares are in units of the noise variance; otherwise the residual gives the variance.
     unit: bool,
 }
 
 impl Known {
-    /// Of least squares on weighted rows; `columns` are the identified ones in the factor, `memory` the rows that the
-    /// residual remembers. `None` where the fit is singular.
+    /// Builds it from least squares on weighted rows. `columns` are the identified ones in the factor, `memory` is the
+    /// correlation time of the residual in rows. `None` if the fit is singular.
     pub(super) fn of_rows(
         factor: &TriangularFactor,
         columns: &[usize],
@@ -88,7 +89,7 @@ impl Known {
         })
     }
 
-    /// Of an estimate with its covariance. `None` where that has no inverse.
+    /// Builds it from an estimate with its covariance. `None` if the covariance has no inverse.
     pub(super) fn of_estimate(
         values: &[f64],
         covariance: &DMatrix<f64>,
@@ -113,7 +114,7 @@ impl Known {
         })
     }
 
-    /// Of an estimate beside which the rows of `factor` say how well each combination is known.
+    /// Builds it from an estimate; the rows of `factor` give the information about each combination.
     pub(super) fn about(
         values: &[f64],
         factor: &TriangularFactor,
@@ -153,8 +154,8 @@ impl Known {
     }
 }
 
-/// Eliminates; `left` gives what values of all identified combinations leave of the torque. `None` where the fit is
-/// singular.
+/// Runs the elimination; `left` returns the torque residual for values of all identified combinations. `None` if the
+/// fit is singular.
 pub(super) fn essential(
     known: &Known,
     names: &[(String, String)],
@@ -191,7 +192,7 @@ pub(super) fn essential(
         let mut fewer = active.clone();
         let gone = fewer.remove(worst);
         let next = fit(&fewer)?;
-        // Where the residual remembers m rows, chance moves the squares m times as far.
+        // With a correlation time of m rows, chance changes the squares by m times as much.
         let variance = known.variance(first.squares, size);
         let chance = |grown: f64, removed: f64| {
             let f = grown / removed / variance.max(f64::MIN_POSITIVE);

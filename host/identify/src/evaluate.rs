@@ -11,8 +11,8 @@ use super::residual::{Ranges, ResidualReport, ResidualStream};
 use super::{IdentifyError, ModelKind, Options};
 use rig_data::prepare::{PrepareError, Recording, Survey};
 
-/// The estimate with its covariance, from one pass over the rows that were fitted; `beside` is what the identified
-/// combinations' covariance has besides.
+/// Returns the estimate with its covariance, from one pass over the fitted rows. `beside` is added to the covariance of
+/// the identified combinations.
 pub(super) fn covariance(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -88,24 +88,24 @@ pub(super) fn covariance(
     ))
 }
 
-/// A recording whose torque is compared with the model's, and how its rows are formed.
+/// A recording whose torque is compared with the model's, and the definition of its rows.
 #[derive(Clone, Copy)]
 pub struct Planned<'a> {
     /// The recording.
     pub recording: &'a dyn Recording,
-    /// How its rows are formed.
+    /// Definition of its rows.
     pub plan: &'a Plan<'a>,
 }
 
 impl<'a> Planned<'a> {
-    /// Recordings of one plan.
+    /// Combines recordings with one plan.
     pub fn all(list: &[&'a dyn Recording], plan: &'a Plan<'a>) -> Vec<Self> {
         list.iter()
             .map(|&recording| Self { recording, plan })
             .collect()
     }
 
-    /// Its rows, torque against motion.
+    /// Streams its rows, torque against motion.
     pub(super) fn each_rows(
         &self,
         take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
@@ -114,10 +114,10 @@ impl<'a> Planned<'a> {
     }
 }
 
-/// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models
-/// can be compared. `by_position` is the torque (of a joint at a position) that was taken off
-/// before the fit without being stated: measured and predicted torque are shown with it. Where effects were taken off
-/// the recordings, `measured` are these as they were: errors are relative to the whole torque.
+/// Returns the torque residuals per joint, in the differential form for every model, so that models can be compared.
+/// `by_position` is the torque (of a joint at a position) that was subtracted before the fit and is not in the
+/// description; measured and predicted torque include it. `measured` are the original recordings if effects were
+/// subtracted: errors are relative to the whole torque.
 pub fn torque_residuals(
     recordings: &[Planned],
     surveys: &[Survey],
@@ -140,7 +140,7 @@ pub fn torque_residuals(
             })
     };
     let p = full.len();
-    // The survey's peak speed is that of raw differences, noise included; the filtered one needs a look.
+    // The survey's peak speed comes from raw differences with noise; the filtered peak needs a pass.
     let mut speed = vec![0.0f64; joints];
     for recording in recordings {
         recording.each_rows(&mut |rows| {
@@ -196,7 +196,7 @@ pub fn torque_residuals(
     Ok(reports)
 }
 
-/// Per joint, RMS of the torque over the rows that count, and over all.
+/// Returns, per joint, the RMS torque over the used rows and over all rows.
 fn torque_rms(recordings: &[Planned], joints: usize) -> Result<Vec<[f64; 2]>, IdentifyError> {
     let mut sums = vec![[(0u64, 0.0); 2]; joints];
     for recording in recordings {

@@ -1,12 +1,12 @@
-//! The description as a prior, and how far the data speak for it.
+//! The description as a prior, with its uncertainty chosen by the evidence of the data.
 //!
-//! π ~ N(π₀, diag(d)²), data of unit noise: π̂ = π₀ + D·Aᵀ·(A·Aᵀ + 1)⁻¹·(z − R·K·π₀) with A = R·K·D. The deviations d of what
-//! the description states are not given: it may be right in most values and far off in a few. Each is s times the value's
-//! natural size times a factor of its own, as heavy in the tail as Student's t with [`TAIL`] degrees of freedom has it (a
-//! scale mixture of normal distributions; Lange, Little & Taylor 1989). s and the factors are those under which the data
-//! are most likely, found by expectation and maximisation (MacKay 1992; Tipping 2001).
+//! π ~ N(π₀, diag(d)²), data of unit noise: π̂ = π₀ + D·Aᵀ·(A·Aᵀ + 1)⁻¹·(z − R·K·π₀) with A = R·K·D. The deviations d
+//! of the stated values are unknown: a description may be right in most values and far off in a few. Each deviation is
+//! s times the value's natural size times its own factor. The factors give the prior the tail of Student's t with
+//! [`TAIL`] degrees of freedom (a scale mixture of normal distributions; Lange, Little & Taylor 1989). Expectation and
+//! maximisation find the s and the factors that make the data most likely (MacKay 1992; Tipping 2001).
 //!
-//! Leaves out: uncertainty of s and of the factors.
+//! Limits: the uncertainty of s and of the factors is not included.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -18,16 +18,16 @@ use super::problem::singular;
 
 /// Candidates of s, from 0.1 % to 1000 %.
 pub(super) const CANDIDATES: [f64; 2] = [1e-3, 10.0];
-/// Relative uncertainty of what the description does not state: no opinion.
+/// Relative uncertainty of values that the description does not state: effectively no prior.
 const BROAD: f64 = 100.0;
-/// Degrees of freedom of the prior's tail: Cauchy's. Where the description is a stand-in (tests/other_engine, 1 kg and
-/// 0.01 kg·m² for every link) a normal prior leaves joint 1 of a Panda at 1.42 times the noise on another motion, four
-/// degrees at 1.38, one at 1.24, no prior at all at 1.18.
+/// Degrees of freedom of the prior's tail: Cauchy's. Evidence: a placeholder description (tests/other_engine, 1 kg and
+/// 0.01 kg·m² for every link) and joint 1 of a Panda on another motion. A normal prior leaves 1.42 times the noise,
+/// four degrees 1.38, one 1.24, no prior 1.18.
 const TAIL: f64 = 1.0;
-/// Rounds of expectation and maximisation.
+/// Iterations of expectation and maximisation.
 const ROUNDS: usize = 12;
 
-/// Data as ‖R·β − z‖² and what no β explains, noise as unit.
+/// Data as ‖R·β − z‖² plus the squares that no β explains, in units of the noise.
 pub(super) struct Seen {
     r: DMatrix<f64>,
     z: DVector<f64>,
@@ -41,7 +41,7 @@ impl Seen {
         Self { r, z, left }
     }
 
-    /// Over what `combination` combines.
+    /// Rewrites the data as a problem over the values that `combination` combines.
     pub(super) fn quadratic(&self, combination: &DMatrix<f64>) -> Quadratic {
         Quadratic {
             matrix: &self.r * combination,
@@ -50,10 +50,10 @@ impl Seen {
     }
 }
 
-/// What is believed before the data: values, natural sizes, and which of them the description states.
+/// Prior beliefs: values, natural sizes, and which values the description states.
 #[derive(Clone)]
 pub(super) struct Belief {
-    /// Base over the values here.
+    /// Base columns as combinations of the values here.
     pub combination: DMatrix<f64>,
     pub centre: DVector<f64>,
     scale: DVector<f64>,
@@ -75,7 +75,7 @@ impl Belief {
         }
     }
 
-    /// The same with more values that are base columns of their own, zero but for `sizes`.
+    /// Appends values that are base columns of their own, with mean zero and deviations `sizes`.
     pub(super) fn with(&self, sizes: &[f64]) -> Self {
         let (rows, columns) = self.combination.shape();
         let more = sizes.len();
@@ -100,25 +100,25 @@ impl Belief {
         }
     }
 
-    /// Values of the base columns, those of terms behind them.
+    /// Returns the values of the base columns, followed by those of terms.
     pub(super) fn base_values(&self, standard: &DVector<f64>) -> DVector<f64> {
         &self.combination * standard
     }
 
-    /// Deviations of the first values, and of what came behind them since.
+    /// Extends the deviations `first` by those of values appended since.
     pub(super) fn widened(&self, first: &DVector<f64>) -> DVector<f64> {
         let even = self.even(1.0);
         DVector::from_fn(even.len(), |c, _| *first.get(c).unwrap_or(&even[c]))
     }
 
-    /// Deviations where every stated value is right to the same share `s` of its size.
+    /// Returns the deviations if every stated value has the same relative uncertainty `s`.
     pub(super) fn even(&self, s: f64) -> DVector<f64> {
         DVector::from_fn(self.scale.len(), |c, _| {
             self.scale[c] * if self.stated[c] { s } else { BROAD }
         })
     }
 
-    /// The deviations under which the data are most likely, among `steps` candidates of s.
+    /// Returns the deviations with the largest evidence, among `steps` candidates of s.
     pub(super) fn most_likely(&self, data: &Seen, steps: usize) -> Result<Likely, IdentifyError> {
         let mut best: Option<Likely> = None;
         for k in 0..steps {
@@ -132,7 +132,7 @@ impl Belief {
         best.ok_or_else(|| singular("of the ridge problem"))
     }
 
-    /// Factors of their own for the stated values, for a given s.
+    /// Finds the factors of the stated values for a given s.
     fn tailed(&self, data: &Seen, s: f64) -> Result<Likely, IdentifyError> {
         let mut deviation = self.even(s);
         for _ in 0..ROUNDS {
@@ -158,7 +158,7 @@ impl Belief {
         })
     }
 
-    /// Base columns over values of unit deviation.
+    /// Returns the base columns over values of unit deviation.
     fn spread(&self, deviation: &DVector<f64>) -> DMatrix<f64> {
         let mut spread = self.combination.clone();
         for (c, mut column) in spread.column_iter_mut().enumerate() {
@@ -167,9 +167,9 @@ impl Belief {
         spread
     }
 
-    /// Logarithm of the evidence but for a constant, mean and variances. A·Aᵀ + 1 is formed: with its diagonal scaled to
-    /// one that costs the square of what base parameters are told apart by, not of their sizes. Where data without noise
-    /// make that too much, its factor is found without forming it.
+    /// Returns the log evidence without its constant, the mean and the variances. Forms A·Aᵀ + 1: with its diagonal
+    /// scaled to one, this squares the condition number due to collinearity, not due to different sizes. For data
+    /// almost without noise, where this is too much, the factor is found without forming the matrix.
     pub(super) fn judged(
         &self,
         data: &Seen,
@@ -210,7 +210,7 @@ impl Belief {
         })
     }
 
-    /// What is believed after the data, its covariance too.
+    /// Returns the posterior with its covariance.
     pub(super) fn posterior(
         &self,
         data: &Seen,
@@ -219,7 +219,7 @@ impl Belief {
         let Seen { r, z, .. } = data;
         let spread = self.spread(deviation);
         let seen = r * &spread;
-        // In the basis of its singular vectors the data's covariance is diagonal: nothing is squared.
+        // In the basis of its singular vectors the data's covariance is diagonal, so no condition number is squared.
         let svd = seen.svd(true, true);
         let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
             return Err(singular("of the ridge problem"));
@@ -239,14 +239,14 @@ impl Belief {
     }
 }
 
-/// Deviations and how likely they make the data.
+/// Deviations and their evidence.
 pub(super) struct Likely {
     pub evidence: f64,
     pub s: f64,
     pub deviation: DVector<f64>,
 }
 
-/// How likely deviations make the data, and what is believed then.
+/// Evidence of the deviations and the resulting posterior values.
 pub(super) struct Judged {
     pub evidence: f64,
     /// Mean.
@@ -255,7 +255,7 @@ pub(super) struct Judged {
     variance: DVector<f64>,
 }
 
-/// What is believed after the data.
+/// Posterior distribution.
 pub(super) struct Posterior {
     /// Mean.
     pub standard: DVector<f64>,
@@ -265,9 +265,9 @@ pub(super) struct Posterior {
 }
 
 impl Posterior {
-    /// Covariance of the base columns' values, those of terms behind them.
+    /// Returns the covariance of the base columns' values, followed by those of terms.
     pub(super) fn base(&self) -> DMatrix<f64> {
-        // What the data see of K·P·Kᵀ shrinks by 1/(1 + d²), the rest stays; no difference of large numbers is taken.
+        // The observed part of K·P·Kᵀ shrinks by 1/(1 + d²), the rest stays. No difference of large numbers is taken.
         let along = &self.spread * self.v_t.transpose();
         let rest = &self.spread - &along * &self.v_t;
         let mut base = &rest * rest.transpose();
@@ -279,7 +279,8 @@ impl Posterior {
     }
 }
 
-/// Lower factor of A·Aᵀ + 1 by orthogonal transformations of A's transpose over 1 (Golub and Van Loan 2013, section 5.2).
+/// Returns the lower factor of A·Aᵀ + 1 by orthogonal transformations of Aᵀ over 1 (Golub and Van Loan 2013, section
+/// 5.2).
 fn unsquared(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (m, n) = a.shape();
     let mut tall = DMatrix::zeros(n + m, m);
@@ -294,7 +295,7 @@ mod tests {
 
     #[test]
     fn the_factor_of_a_sum_that_cannot_be_formed_is_that_of_one_that_can() {
-        // Columns of very different sizes, as data without noise weigh them.
+        // Columns of very different sizes, as from data without noise.
         let a = DMatrix::from_fn(4, 6, |r, c| {
             10f64.powi(c as i32 - 2) * ((r * 7 + c * 3) as f64).sin()
         });

@@ -1,4 +1,4 @@
-//! What the data tell apart, and what they do not.
+//! Parameters that are identifiable from the data, and the others.
 
 use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMNS, column};
@@ -11,12 +11,11 @@ use super::least::triangle;
 use super::prior::Prior;
 use rig_model::robot::JointKind;
 
-/// A base parameter counts as not excited when its column, scaled to length one, differs from a combination of
-/// the others by less than this: its value would rest on a thousandth of the torque, which is the order of
-/// what filters and sensors distort.
+/// Relative distance of a column of unit length from the combinations of the others, below which its base parameter is
+/// not excited. Its value would rest on a thousandth of the torque, about as much as filters and sensors distort.
 const EXCITED: f64 = 1e-3;
 
-/// Columns of the accumulated regressor that the data tell apart, and what the others join.
+/// Returns the identifiable columns of the accumulated regressor, and the combinations that the others join.
 pub(super) fn excited(base: &Base, factor: &TriangularFactor) -> Independent {
     let (excitation, _) = factor.system();
     without_traces(
@@ -25,7 +24,7 @@ pub(super) fn excited(base: &Base, factor: &TriangularFactor) -> Independent {
     )
 }
 
-/// Base columns in the order in which they are kept when the data cannot tell all of them apart.
+/// Returns the base columns in the order in which they are kept if some are collinear.
 fn data_order(base: &Base) -> Vec<usize> {
     let preferred = preference(&base.kinds);
     let rank = |c: usize| preferred.iter().position(|&x| x == c).unwrap_or(usize::MAX);
@@ -35,8 +34,8 @@ fn data_order(base: &Base) -> Vec<usize> {
     order
 }
 
-/// Leaves out of the combinations what is too small for these data to show, so that a parameter is not printed
-/// with a hundred-thousandth of another beside it.
+/// Removes from the combinations the terms that are too small for these data, so that a parameter is not printed with a
+/// hundred-thousandth of another.
 fn without_traces(mut data: Independent, excitation: &DMatrix<f64>) -> Independent {
     for k in 0..excitation.ncols() {
         let length = excitation.column(k).norm();
@@ -50,7 +49,7 @@ fn without_traces(mut data: Independent, excitation: &DMatrix<f64>) -> Independe
     data
 }
 
-/// What is not identified on its own, with the reason and a motion that would help.
+/// Returns the parameters that are not identified on their own, with the reason and a motion that would help.
 pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
     (0..base.len())
         .filter(|k| !data.kept.contains(k))
@@ -80,7 +79,7 @@ pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
         .collect()
 }
 
-/// A motion that would show base parameter `k` better.
+/// Describes a motion that would excite base parameter `k` better.
 fn motion(base: &Base, k: usize) -> String {
     let links = base.kinds.len() * COLUMNS;
     let motor = base.columns[k].checked_sub(links);
@@ -104,8 +103,8 @@ fn motion(base: &Base, k: usize) -> String {
     }
 }
 
-/// What is identified on its own, but of which the data alone know less than is known without them: more than half of
-/// an estimate that allows for both would be prior. `factor` has the residual's noise as unit, its memory allowed for.
+/// Returns parameters that are identified on their own but less well than the prior knows them: more than half of a
+/// combined estimate would be prior. `factor` is in units of σ·√(correlation time) of the residual.
 pub(super) fn hardly_excited(
     base: &Base,
     data: &Independent,

@@ -1,13 +1,13 @@
 //! Accumulation of a triangular factor: least squares over any number of rows in constant memory.
 
-/// Rows that are reduced together: with a few dozen columns they stay in the second-level cache.
+/// Number of rows reduced together: with a few dozen columns they fit in the second-level cache.
 const BLOCK_ROWS: usize = 128;
 
 /// The upper triangular R of a QR factorisation of all rows so far, each row `[x | y]`.
 ///
-/// Rows are collected in blocks; a full block is stacked under R and the stack is made triangular again by
-/// Householder reflections (Golub & Van Loan, Matrix Computations, §5.2 and §6.5.2; the sequential TSQR of
-/// Demmel et al. 2012). No normal equations are formed: the condition number is not squared.
+/// Rows are collected in blocks. A full block is stacked under R, and Householder reflections make the stack triangular
+/// again (Golub & Van Loan, Matrix Computations, §5.2 and §6.5.2; the sequential TSQR of Demmel et al. 2012). No normal
+/// equations are formed, so the condition number is not squared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangularFactor {
     width: usize,
@@ -19,7 +19,7 @@ pub struct TriangularFactor {
     rows: u64,
 }
 
-/// Scalar product in four strands, which the compiler turns into vector registers.
+/// Computes the scalar product in independent strands, which the compiler vectorises.
 #[inline]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0f64; 8];
@@ -42,7 +42,7 @@ fn add_scaled(target: &mut [f64], factor: f64, source: &[f64]) {
 }
 
 impl TriangularFactor {
-    /// For rows of `columns` regressor entries and one right-hand side.
+    /// Creates a factor for rows of `columns` regressor entries and one right-hand side.
     pub fn new(columns: usize) -> Self {
         let width = columns + 1;
         Self {
@@ -54,17 +54,17 @@ impl TriangularFactor {
         }
     }
 
-    /// Regressor columns.
+    /// Returns the number of regressor columns.
     pub fn columns(&self) -> usize {
         self.width - 1
     }
 
-    /// Rows taken so far.
+    /// Returns the number of rows so far.
     pub fn rows(&self) -> u64 {
         self.rows
     }
 
-    /// Takes one row `weight·[x | y]`; `x` has [`Self::columns`] entries (more are ignored, fewer leave zeros).
+    /// Adds one row `weight·[x | y]`; `x` has [`Self::columns`] entries (more are ignored, fewer leave zeros).
     pub fn push(&mut self, x: &[f64], y: f64, weight: f64) {
         let row = self.filled;
         let columns = self.columns();
@@ -79,7 +79,7 @@ impl TriangularFactor {
         }
     }
 
-    /// Takes all rows of another factor, each scaled by `weight`.
+    /// Adds all rows of another factor, each scaled by `weight`.
     pub fn merge(&mut self, other: &Self, weight: f64) {
         let mut other = other.clone();
         other.reduce();
@@ -122,8 +122,8 @@ impl TriangularFactor {
         self.filled = 0;
     }
 
-    /// R, column-major, (columns + 1)²; the last column belongs to the right-hand side and its last entry is,
-    /// but for the sign, the norm of the residual.
+    /// Returns R, column-major, (columns + 1)². The last column belongs to the right-hand side; its last entry is,
+    /// apart from the sign, the norm of the residual.
     pub fn triangle(&self) -> Vec<f64> {
         let mut whole = self.clone();
         whole.reduce();
@@ -136,7 +136,7 @@ impl TriangularFactor {
         whole.r
     }
 
-    /// The regressor's part of R and the right-hand side Qᵀy, as matrices.
+    /// Returns the regressor's part of R and the right-hand side Qᵀy, as matrices.
     pub fn system(&self) -> (nalgebra::DMatrix<f64>, nalgebra::DVector<f64>) {
         let columns = self.columns();
         let all = nalgebra::DMatrix::from_vec(self.width, self.width, self.triangle());
@@ -146,7 +146,7 @@ impl TriangularFactor {
         )
     }
 
-    /// Sum of squares of the residuals that the parameters `x` leave over all rows.
+    /// Returns the sum of squared residuals of the parameters `x` over all rows.
     pub fn residual_squares(&self, x: &[f64]) -> f64 {
         let r = self.triangle();
         let (width, columns) = (self.width, self.columns());
@@ -160,7 +160,7 @@ impl TriangularFactor {
             .sum()
     }
 
-    /// Sum of squares of the right-hand side.
+    /// Returns the sum of squares of the right-hand side.
     pub fn right_side_squares(&self) -> f64 {
         self.residual_squares(&[])
     }

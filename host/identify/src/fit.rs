@@ -1,5 +1,5 @@
-//! The base parameters fitted to torques: every row into a triangular factor of its equation, and the equations weighed against one
-//! another.
+//! Fit of the base parameters to torques: all rows enter a triangular factor per equation, then the equations are
+//! weighted.
 
 use super::IdentifyError;
 use super::base::{Base, Independent};
@@ -11,34 +11,34 @@ use super::robust::{reweighted, spread_of};
 use super::{Estimator, Options};
 use rig_data::prepare::{Recording, each_of, threads};
 
-/// Reweighting stops when no parameter moves by more than this share of its standard deviation …
+/// Largest change of a parameter at the end of reweighting, as a share of its standard deviation.
 const SETTLED: f64 = 1e-3;
-/// … or after this many passes; then a warning says so.
+/// Largest number of passes; a warning reports it.
 pub(super) const MOST_PASSES: usize = 30;
 
-/// Base parameters by least squares, and what they come from.
+/// Base parameters by least squares, and their data.
 pub(super) struct Fit {
     /// Rows of each equation.
     pub factors: Vec<TriangularFactor>,
-    /// Instants of them all.
+    /// Number of instants of all recordings.
     pub instants: u64,
-    /// What became of the rows.
+    /// Counts of used and excluded rows.
     pub tally: Tally,
-    /// Columns that the recordings tell apart.
+    /// Columns that are identifiable from the recordings.
     pub data: Independent,
-    /// One over each equation's residual.
+    /// Weights: one over each equation's residual.
     pub by_noise: Vec<f64>,
-    /// Values with the equations weighed by these.
+    /// Values with these weights.
     pub weighted: Vec<f64>,
-    /// Weights by the estimator that was asked for …
+    /// Weights of the requested estimator.
     pub weights: Vec<f64>,
-    /// … the rows with these …
+    /// Rows with the estimator's weights.
     pub factor: TriangularFactor,
-    /// … and its values.
+    /// Values of the estimator.
     pub beta: Vec<f64>,
-    /// Scale of each equation's residual, where rows were weighed too.
+    /// Scale of each equation's residual, if rows were also weighted.
     pub scales: Option<Vec<f64>>,
-    /// Whether the values stopped moving.
+    /// True if the values converged.
     pub converged: bool,
 }
 
@@ -46,7 +46,7 @@ impl Fit {
     /// Fits `training`.
     ///
     /// # Errors
-    /// [`IdentifyError`]: recordings that cannot be read, too few rows left, a singular problem.
+    /// [`IdentifyError`]: recordings that cannot be read, too few usable rows, a singular problem.
     pub(super) fn of(
         training: &[&dyn Recording],
         plan: &Plan,
@@ -95,7 +95,7 @@ impl Fit {
             }
             all
         };
-        // Joints of different strength must not hide one another when excitation is judged.
+        // Scaled by torque, so that strong joints do not hide weak ones when excitation is judged.
         let by_torque: Vec<f64> = factors
             .iter()
             .map(|f| {
@@ -175,7 +175,7 @@ impl Fit {
         })
     }
 
-    /// Values of all base columns, zero where the recordings do not tell a column from others.
+    /// Returns the values of all base columns, zero for columns that are not identifiable on their own.
     pub(super) fn full(&self) -> Vec<f64> {
         spread(&self.beta, &self.data.kept, self.data.combination.ncols())
     }

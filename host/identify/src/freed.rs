@@ -1,4 +1,4 @@
-//! Recordings freed of the description's effects before anything is fitted to them.
+//! Recordings with the torque of the description's effects subtracted before the fit.
 
 use rig_shared::multibody::Chain;
 
@@ -7,7 +7,7 @@ use rig_data::Compensated;
 use rig_data::prepare::{Recording, Treatment};
 use rig_model::effects::Effects;
 
-/// Each of several recordings and its treatment, payloads taken off too: what is identified is the robot without them.
+/// Subtracts effects and payloads from each recording with its treatment: the bare robot is identified.
 pub(super) fn freed<'a>(
     list: &[&'a dyn Recording],
     effects: &'a Effects,
@@ -20,7 +20,7 @@ pub(super) fn freed<'a>(
         .collect()
 }
 
-/// As recordings.
+/// Converts to trait objects.
 pub(super) fn plain<R: Recording>(list: &[R]) -> Vec<&dyn Recording> {
     list.iter().map(|r| r as &dyn Recording).collect()
 }

@@ -1,5 +1,5 @@
-//! What an identification holds beyond least squares: the other estimators, the essential and the physically
-//! consistent parameters, the comparison.
+//! Results beyond least squares: the other estimators, the essential and the physically consistent parameters, the
+//! comparison.
 
 use nalgebra::DMatrix;
 
@@ -19,14 +19,14 @@ use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about,
 use super::{BaseParameter, Estimator, IdentifyError, ModelKind, NotExcited, Options};
 use rig_model::robot::Robot;
 
-/// Weights of recordings: beyond it the other recordings are lost in rounding.
+/// Allowed weights of recordings; beyond this range the other recordings are lost in rounding errors.
 const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
-/// Standard deviations to either side that hold 95 % of a normal distribution.
+/// Half width of the interval that holds 95 % of a normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
-/// A residual that is so many times that of the weighted fit calls for a warning.
+/// Ratio of a residual to that of the weighted fit above which a warning is given.
 const MUCH_MORE: f64 = 1.2;
 
-/// Refuses settings that mean nothing, or nothing beside the others.
+/// Rejects settings that are invalid or have no effect with the others.
 pub(super) fn check(robot: &Robot, options: &Options) -> Result<(), IdentifyError> {
     if let Some(&weight) = options
         .recording_weights
@@ -37,7 +37,7 @@ pub(super) fn check(robot: &Robot, options: &Options) -> Result<(), IdentifyErro
     }
     match options.prior_uncertainty {
         Some(u) if !(u.is_finite() && u > 0.0) => return Err(IdentifyError::PriorUncertainty(u)),
-        // The standard parameters of several joints have the description's values as their prior, whichever the estimator.
+        // The prior of several joints' standard parameters is the description, for every estimator.
         Some(uncertainty) if robot.joints.len() == 1 && !options.estimator.has_prior() => {
             return Err(IdentifyError::UnusedUncertainty {
                 uncertainty,
@@ -52,17 +52,17 @@ pub(super) fn check(robot: &Robot, options: &Options) -> Result<(), IdentifyErro
     }
 }
 
-/// The fit of an estimator beyond the three least squares.
+/// The fit of an estimator other than the three least squares.
 pub(super) struct Own {
-    /// Values of all base columns and more.
+    /// Values of all base columns and the other results.
     pub fitted: Fitted,
     /// The estimate.
     pub estimate: Estimate,
     parts: Parts,
 }
 
-/// Fits with the estimator asked for; `None` where that is one of the three least squares.
-/// `beside` is the covariance that terms beyond the description add.
+/// Fits with the requested estimator; `None` if it is one of the three least squares. `beside` is the covariance added
+/// by terms beyond the description.
 pub(super) fn own(
     problem: &Problem,
     beside: Option<&DMatrix<f64>>,
@@ -89,8 +89,8 @@ pub(super) fn own(
     }))
 }
 
-/// What the data show beyond the description. That is asked with the description as the prior, whichever the estimator:
-/// without one, torques with position cannot be told from inertia. `factors` are those of the fitted equations.
+/// Finds effects beyond the description. The prior is always the description, for every estimator: without it,
+/// position-dependent torques are collinear with inertia. `factors` are those of the fitted equations.
 pub(super) fn beyond_description(
     problem: &Problem,
     factors: &[TriangularFactor],
@@ -102,7 +102,7 @@ pub(super) fn beyond_description(
     }
 }
 
-/// The terms that were found with all parameters at once; `described` is gravity as the description states it.
+/// Refits the found terms together with all parameters; `described` is the described gravity.
 pub(super) fn together_with(
     problem: &Problem,
     factors: &[TriangularFactor],
@@ -122,9 +122,9 @@ fn prior(problem: &Problem) -> Prior {
     )
 }
 
-/// The same without what the data contradict; `factor` has the residual's noise as unit, its memory allowed for.
+/// Returns the prior without values that the data contradict; `factor` has the unit σ·√(correlation time).
 fn prior_beside(problem: &Problem, factor: &TriangularFactor) -> Prior {
-    // A worth that the user states is what the description is worth.
+    // A prior uncertainty set by the user is used for all values.
     if problem.options.prior_uncertainty.is_some() {
         return prior(problem);
     }
@@ -132,7 +132,7 @@ fn prior_beside(problem: &Problem, factor: &TriangularFactor) -> Prior {
     prior(problem).without_contradicted(&data.matrix, &data.right, problem.robot)
 }
 
-/// What stands beside the estimate.
+/// Results beside the estimate.
 #[derive(Default)]
 pub(super) struct Further {
     pub essential: Option<EssentialSet>,
@@ -145,20 +145,20 @@ pub(super) struct Further {
     pub warnings: Vec<String>,
 }
 
-/// Base columns whose values the estimate gives, its equations and itself.
+/// The estimate, its values of all base columns and its equations.
 pub(super) struct Outcome<'a> {
     pub estimate: &'a Estimate,
     pub full: &'a [f64],
-    /// By equation, rows unweighted.
+    /// By equation, unweighted rows.
     pub factors: &'a [TriangularFactor],
-    /// By equation, rows that the residual remembers.
+    /// By equation, correlation time of the residual in rows.
     pub memory: Vec<f64>,
     pub parameters: &'a [BaseParameter],
-    /// RMS torques of training data and hold-out by joint, where effects were taken off the rows.
+    /// RMS torques of training data and hold-out per joint, if effects were subtracted from the rows.
     pub measured: Option<[Vec<f64>; 2]>,
 }
 
-/// What it means that an estimator leaves much more than the weighted fit; `trusted` where the comparison recommends it.
+/// Explains a much larger residual than that of the weighted fit; `trusted` if the comparison recommends the estimator.
 fn what_it_means(estimator: Estimator, trusted: bool) -> &'static str {
     match estimator {
         Estimator::Consistent => {
@@ -174,7 +174,7 @@ fn what_it_means(estimator: Estimator, trusted: bool) -> &'static str {
     }
 }
 
-/// Computes it.
+/// Computes all further results.
 pub(super) fn further(
     problem: &Problem,
     own: Option<Own>,
@@ -199,7 +199,7 @@ pub(super) fn further(
     let weighted = combine(&|_| 1.0);
     let known = match &own {
         None => Known::of_rows(&weighted, &data.kept, memory),
-        // A jackknife of sixteen stretches has no inverse: there the rows say how well each value is known.
+        // The jackknife covariance of sixteen segments has no inverse, so the rows give the uncertainty of each value.
         Some(own) => match &own.fitted.covariance {
             Some(_) => {
                 let estimate = result.estimate;
@@ -239,7 +239,7 @@ pub(super) fn further(
             Some(standard) if estimator == Estimator::Consistent => Ok(standard.clone()),
             _ => {
                 let problem = match estimator {
-                    // Rows know a little of what counts as not excited, too.
+                    // The rows also carry a little information about unexcited parameters.
                     Estimator::Ols | Estimator::Weighted => quadratic(&tempered, base),
                     _ => quadratic_about(&tempered, base, result.full),
                 };

@@ -1,27 +1,29 @@
-//! Base parameters by rules, from the geometry alone: no random states, no rank.
+//! Base parameters by rules, from the geometry alone: without random states or a numeric rank.
 //!
-//! What a link shares with the one before it moves there (Gautier & Khalil 1990; Khalil & Dombre 2002, sec. 9.4; stated
-//! here as the transfer of masses that it is, after Ros et al. 2012): of a revolute joint a mass on its axis, a first moment
-//! along it, and an inertia that is the same about all axes across it; of a prismatic joint the whole inertia tensor. So
-//! `m`, `mz`, `Iyy` of a revolute link and all six inertias of a prismatic one join the link before it, and those of the
-//! first link are lost in the base.
+//! Parameters that a link shares with the preceding link are moved there (Gautier & Khalil 1990; Khalil & Dombre 2002,
+//! sec. 9.4; stated here as a transfer of masses, after Ros et al. 2012). For a revolute joint these are a mass on its
+//! axis, a first moment along it, and an inertia that is equal about all axes across it; for a prismatic joint, the
+//! whole tensor. So `m`, `mz`, `Iyy` of a revolute link and all six inertias of a prismatic one join the preceding
+//! link. Those of the first link vanish in the base.
 //!
-//! Links that turn about one fixed direction a at most (up to the second direction of the revolute joints) have more rules:
-//! * before the first revolute joint nothing turns: first moments have no effect, nor have inertias;
-//! * with all turning about a, only the inertia about a counts, and a first moment along a has no effect; that of a
-//!   prismatic link sliding along a moves to the link before it;
-//! * where the origin does not move across a and gravity is along a, first moments have no effect;
-//! * without gravity, where all axes so far meet in a point, a first moment is an inertia about that point.
+//! More rules hold for links that turn about at most one fixed direction a (up to the second direction of revolute
+//! joints):
+//! * Before the first revolute joint nothing turns, so first moments and inertias have no effect.
+//! * If all turn about a, only the inertia about a counts and a first moment along a has no effect. The first moment of
+//!   a prismatic link that slides along a moves to the preceding link.
+//! * If the origin does not move across a and gravity is along a, first moments have no effect.
+//! * Without gravity, if all axes so far meet in a point, a first moment is an inertia about that point.
 //!
-//! Drive inertia `Ia` joins `Izz` of the first revolute joint, and of the joint that first turns about another direction
-//! where that is perpendicular to the first; that of a prismatic joint of fixed direction, perpendicular to the prismatic
-//! ones before it, is the mass it moves less what moves along, but for gravity, which its constant torque `off` states.
+//! `Ia` joins `Izz` of the first revolute joint, and of the first that turns about a second, perpendicular direction.
+//! For a prismatic joint of fixed direction, perpendicular to the preceding prismatic ones, `Ia` is the moved mass
+//! minus the mass moving along; its constant torque `off` states gravity.
 //!
-//! No rules are published for motors of coupled drives. Here: the inertia of one of constant ratios is a fixed quadratic form
-//! in the joint velocities. It joins what has such a form too, where the forms add up to it: `Ia`; `Izz` of links whose turning
-//! about their own axis is a fixed sum of joint velocities (those that turn about one direction or about a second one); and of a
-//! prismatic joint of fixed direction the mass it moves less the same mass resting on the link before, in whose form the joint's velocity stands squared and times those of the prismatic ones before it.
-//! Everything else of the motors is taken as independent.
+//! No rules are published for motors of coupled drives. Rule used here: with constant ratios, the inertia of a motor is
+//! a fixed quadratic form in the joint velocities. It joins parameters whose forms add up to it: `Ia`; `Izz` of links
+//! whose rotation about their own axis is a fixed sum of joint velocities (those that turn about one direction or about
+//! a second one); and, for a prismatic joint of fixed direction, the moved mass minus the same mass at rest on the
+//! preceding link. The last form contains the joint's velocity squared and times those of the preceding prismatic
+//! joints. All other motor parameters are taken as independent.
 
 use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind, column};
@@ -31,8 +33,8 @@ use super::base::chain_of;
 use super::{Base, IdentifyError};
 use rig_model::robot::Robot;
 
-/// Directions whose sine or cosine is below this are parallel or perpendicular; between this and the tolerance of the
-/// numeric method lies nothing for a real geometry.
+/// Sine or cosine below which directions are parallel or perpendicular. Real geometries have no values between this and
+/// the tolerance of the numeric method.
 const EXACT: f64 = 1e-9;
 
 const XX: usize = 4;
@@ -42,14 +44,14 @@ const YY: usize = 7;
 const YZ: usize = 8;
 const ZZ: usize = 9;
 
-/// A column as a combination of kept columns, one entry a column.
+/// A column as a combination of kept columns, one entry per column.
 type Combination = Vec<f64>;
 
-/// The base parameters of `robot` by the rules: kept columns and combinations as [`Base::structural`] gives them. They hold
-/// for the differential and for the integral model.
+/// Returns the base parameters of `robot` by the rules: kept columns and combinations as in [`Base::structural`]. They
+/// hold for the differential and the integral model.
 ///
 /// # Errors
-/// [`IdentifyError::Model`] where the geometry is none.
+/// [`IdentifyError::Model`] if the geometry is invalid.
 pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     chain_of(robot)?;
     let transmission = robot
@@ -88,7 +90,7 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     })
 }
 
-/// Replaces the inertia of coupled motors by what has the same quadratic form, where there is such.
+/// Replaces the inertia of coupled motors by parameters with the same quadratic form, if there are any.
 fn join_motors(
     transmission: &Transmission<f64>,
     spins: &[Option<Vec<f64>>],
@@ -97,7 +99,7 @@ fn join_motors(
 ) -> Result<(), IdentifyError> {
     let n = spins.len();
     let square = |v: &[f64]| DMatrix::from_fn(n, n, |i, j| v[i] * v[j]);
-    // What has a constant form, with that form.
+    // Parameters with a constant form, together with that form.
     let mut forms = moved;
     for (j, spin) in spins.iter().enumerate() {
         if let Some(spin) = spin {
@@ -112,7 +114,7 @@ fn join_motors(
     }
     let mut directions = vec![0.0; n * n];
     let coupled = |k: usize| transmission.kind(k) == Some(DriveKind::Coupled);
-    // A screw's direction is not asked for; its position need not be one that it can have.
+    // A screw's direction is not needed, so its position may be one that it cannot have.
     transmission
         .motor_directions(&vec![0.0; n], &mut directions)
         .map_err(|e| IdentifyError::Model(e.to_string()))?;
@@ -125,7 +127,7 @@ fn join_motors(
         let own = n * COLUMNS + MOTOR_COLUMNS * k + motor_column::INERTIA;
         join(own, form, &mut forms, columns);
     }
-    // Viscous friction is such a form too, of the joints' its squares.
+    // Viscous friction is such a form too; that of the joints is the square of their own velocity.
     let mut forms: Vec<(Combination, DMatrix<f64>)> = Vec::new();
     for j in 0..n {
         let mut own = vec![0.0; n];
@@ -144,7 +146,7 @@ fn join_motors(
     Ok(())
 }
 
-/// Column `own` as a combination of others where their forms add up to its form; else it is one of them from now on.
+/// Expresses column `own` by others if their forms add up to its form; otherwise adds it to them.
 fn join(
     own: usize,
     form: DMatrix<f64>,
@@ -162,7 +164,7 @@ fn join(
         Some(factors) => {
             let mut combination = vec![0.0; columns[own].len()];
             for ((from, _), factor) in forms.iter().zip(factors.iter()) {
-                // Rounding of the solution.
+                // Skip rounding errors of the solution.
                 if factor.abs() > EXACT {
                     add(&mut combination, *factor, from);
                 }
@@ -173,13 +175,13 @@ fn join(
     }
 }
 
-/// Whether two sets of base parameters say the same: equally many, and each a combination of the others.
+/// Returns true if two sets of base parameters are equivalent: equal in number and each a combination of the others.
 pub fn agree(a: &Base, b: &Base) -> bool {
     if a.len() != b.len() || a.combination.ncols() != b.combination.ncols() {
         return false;
     }
-    // Rows of `a` are β = K·π; over the kept columns of `a` K is the identity, so that b's rows must be what they have
-    // there times K.
+    // Rows of `a` are β = K·π, and K is the identity over the kept columns of `a`. So b's rows must equal their entries
+    // in these columns times K.
     let there = b.combination.select_columns(&a.columns);
     let rebuilt = &there * &a.combination;
     let scale = b.combination.amax().max(1.0) * there.amax().max(1.0);
@@ -198,11 +200,11 @@ fn add(to: &mut Combination, factor: f64, from: &Combination) {
     }
 }
 
-/// Which directions the links turn about so far.
+/// The directions about which the links turn so far.
 #[derive(Clone, Copy)]
 enum Turning {
     Nothing,
-    /// About this direction of the base, by the first revolute joint.
+    /// About this direction of the base, from the first revolute joint.
     One(Vector3<f64>),
     Many,
 }
@@ -211,25 +213,25 @@ struct Walk<'a> {
     geometry: &'a [JointGeometry<f64>],
     gravity: Vector3<f64>,
     width: usize,
-    /// Every column so far, link by link.
+    /// All columns so far, link by link.
     columns: Vec<Combination>,
     turning: Turning,
-    /// Place of the link in the base at q = 0.
+    /// Pose of the link in the base at q = 0.
     pose: Isometry3<f64>,
-    /// Directions, in the base at q = 0, of the prismatic joints so far.
+    /// Directions of the prismatic joints so far, in the base at q = 0.
     slides: Vec<Vector3<f64>>,
-    /// These joints.
+    /// Indices of these joints.
     sliders: Vec<usize>,
-    /// Of prismatic joints of fixed direction, what the mass they move adds to the same mass resting on the link before,
-    /// gravity taken away: a quadratic form in the joint velocities.
+    /// For prismatic joints of fixed direction: the moved mass minus the same mass at rest on the preceding link,
+    /// without gravity. It has a quadratic form in the joint velocities.
     moved: Vec<(Combination, DMatrix<f64>)>,
     /// Axes of the revolute joints so far: point and direction in the base at q = 0.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
-    /// Joints of these axes.
+    /// Indices of the joints of these axes.
     turners: Vec<usize>,
-    /// Joint that first turned about another direction, while those after it turn about the same.
+    /// First joint that turns about a second direction, as long as all later ones turn about that direction.
     second: Option<usize>,
-    /// Per joint, factors of the joint velocities in its link's turning about its own axis, where they are constant.
+    /// Per joint: factors of the joint velocities in its link's rotation about its own axis, if they are constant.
     spins: Vec<Option<Vec<f64>>>,
 }
 
@@ -352,7 +354,7 @@ impl<'a> Walk<'a> {
                 fixed_direction = true;
             }
             Turning::One(a) => {
-                // Along a nothing is felt: one component follows from the other two.
+                // A first moment along a has no effect, so one component follows from the other two.
                 let along = self.pose.rotation.inverse() * a;
                 let most = along.iamax();
                 let mut combination = nothing.clone();
@@ -387,7 +389,7 @@ impl<'a> Walk<'a> {
         own
     }
 
-    /// What a set of parameters of link `j` is as one of the link before it, with the joint at zero.
+    /// Expresses a set of parameters of link `j` as parameters of the preceding link, with the joint at zero.
     fn carried(&self, j: usize, step: &Isometry3<f64>, set: &[(usize, f64)]) -> Combination {
         let mut result = vec![0.0; self.width];
         let Some(before) = j.checked_sub(1) else {
@@ -398,7 +400,7 @@ impl<'a> Walk<'a> {
             body[*c] = *value;
         }
         for (c, value) in seen_from(step, &body).into_iter().enumerate() {
-            // Rounding of a turn by a quarter.
+            // Skip rounding errors of a right angle.
             if value.abs() > 1e-15 {
                 add(&mut result, value, &self.columns[before * COLUMNS + c]);
             }
@@ -406,8 +408,8 @@ impl<'a> Walk<'a> {
         result
     }
 
-    /// Factors of the joint velocities in the turning of revolute link `j` about its own axis; none where they change
-    /// with the position.
+    /// Returns the factors of the joint velocities in the rotation of revolute link `j` about its own axis; none if
+    /// they depend on the position.
     fn spin(&mut self, j: usize, before: &Turning, z: Vector3<f64>) -> Option<Vec<f64>> {
         let first = match (&self.turning, before) {
             (Turning::Nothing | Turning::One(_), _) => 0,
@@ -417,7 +419,7 @@ impl<'a> Walk<'a> {
         };
         let mut factors = vec![0.0; self.geometry.len()];
         for (&i, (_, axis)) in self.turners.iter().zip(&self.axes) {
-            // The first direction is fixed in the base, and keeps its angle to the second.
+            // The first direction is fixed in the base and keeps its angle to the second.
             if i >= first && axis.cross(&z).norm() > EXACT {
                 self.second = None;
                 return None;
@@ -430,7 +432,7 @@ impl<'a> Walk<'a> {
         Some(factors)
     }
 
-    /// Whether the origin of the link does not move across a, the one direction that links turn about.
+    /// Returns true if the link's origin does not move across a, the only direction of rotation.
     fn on_axis(&self, a: &Vector3<f64>) -> bool {
         let Some((first, _)) = self.axes.first() else {
             return true;
@@ -442,7 +444,7 @@ impl<'a> Walk<'a> {
         one_line && self.slides.iter().all(|s| s.cross(a).norm() < EXACT)
     }
 
-    /// Where all axes meet in one point that is fixed: height of the link's origin above it along its axis.
+    /// Returns the height of the link's origin, along its axis, above the fixed common point of all axes, if any.
     fn above_centre(&self) -> Option<f64> {
         if !self.slides.is_empty() {
             return None;
@@ -462,14 +464,14 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Ten parameters of a body seen from the frame in which its own frame lies at `pose`.
+/// Returns the ten parameters of a body in the frame in which its own frame has the pose `pose`.
 fn seen_from(pose: &Isometry3<f64>, body: &[f64; 10]) -> [f64; 10] {
     let [m, mx, my, mz, xx, xy, xz, yy, yz, zz] = *body;
     let r = pose.rotation.to_rotation_matrix();
     let p = pose.translation.vector;
     let h = r * Vector3::new(mx, my, mz);
     let i = r * nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * r.transpose();
-    // Steiner without a centre of mass: Σ m·S(r + p)ᵀ·S(r + p).
+    // Parallel-axis theorem without a centre of mass: Σ m·S(r + p)ᵀ·S(r + p).
     let product = |a: &Vector3<f64>, b: &Vector3<f64>| {
         nalgebra::Matrix3::identity() * a.dot(b) - b * a.transpose()
     };

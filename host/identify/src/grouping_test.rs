@@ -1,4 +1,4 @@
-//! The rules against the numeric method, and both against published counts.
+//! The rules compared with the numeric method, and both with published counts.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ fn arm(gravity: [f64; 3], rows: &[[f64; 3]]) -> Robot {
     robot(gravity, joints)
 }
 
-/// Base parameters by both methods, which must agree; how many are inertial and how many are drive inertias.
+/// Returns the numbers of inertial parameters and of drive inertias; asserts that both methods agree.
 fn counts(robot: &Robot) -> (usize, usize) {
     let rules = grouped(robot).unwrap();
     for model in [ModelKind::Differential, ModelKind::Integral] {
@@ -125,7 +125,7 @@ fn known_robots_have_their_published_counts() {
         [-R, 0.0, 0.0823],
     ];
     assert_eq!(counts(&arm(DOWN, &ur5)).0, 36);
-    // A slide along the horizontal: its mass alone.
+    // A horizontal slide: only its mass.
     let slide = robot(
         DOWN,
         vec![joint(1, JointKind::Prismatic, [R, 0.0, 0.0, 0.0])],
@@ -145,7 +145,7 @@ fn shipped_robots_agree() {
     }
 }
 
-/// One length squared times several masses is one number, and one for both models.
+/// One length squared times several masses has one coefficient, equal in both models.
 #[test]
 fn equal_coefficients_are_printed_alike() {
     let robot = Robot::from_toml(IRP6_TEMPLATE, Path::new("irp6.toml")).unwrap();
@@ -182,7 +182,7 @@ fn rules_and_rank_agree_on_random_chains_with_special_angles() {
     let (mut coupled, mut refused) = (0, 0);
     for draw in 0..180 {
         let n = 1 + draw % 12;
-        // The first joints decide over the special rules: there, slides and special angles are likely.
+        // The first joints decide about the special rules, so slides and special angles are likely there.
         let special = |rng: &mut Pcg64, share: f64, values: &[f64], range: f64| {
             if rng.random_bool(share) {
                 values[rng.random_range(0..values.len())]
@@ -209,7 +209,7 @@ fn rules_and_rank_agree_on_random_chains_with_special_angles() {
                 )
             })
             .collect();
-        // Every other chain has coupled drives, at ratios of bevels and belts or at any.
+        // Every other chain has coupled drives, with ratios of bevel gears and belts or any other.
         if draw % 2 == 0 && n > 1 {
             for k in 0..n {
                 let couples: BTreeMap<String, f64> = (0..n)
@@ -236,7 +236,7 @@ fn rules_and_rank_agree_on_random_chains_with_special_angles() {
         let robot = robot(gravity, joints);
         let text = robot.to_toml().unwrap();
         if Robot::from_toml(&text, Path::new("chain.toml")).is_err() {
-            // Two motors that turn alike move no two joints.
+            // Refused: two motors with proportional ratios cannot move two joints.
             refused += 1;
             continue;
         }

@@ -1,15 +1,15 @@
-//! Instrumental variables, IDIM-IV (Janot, Vandanjon & Gautier 2014): instruments are the model's own regressor
-//! along the motion of its simulated closed loop, which knows nothing of the measurement's noise.
+//! Instrumental variables, IDIM-IV (Janot, Vandanjon & Gautier 2014). The instruments are the model's regressor along
+//! the motion of its simulated closed loop, which contains no measurement noise.
 //!
-//! β = (Zᵀ·X)⁻¹·Zᵀ·y, Z formed anew from the model just identified until it settles. Least squares is biased where
-//! the noise of the position, or feedback of it through the controller, makes regressor and residual correlated;
-//! this is not. Solved through the triangular factor of [Z | X | y], so that no condition number is squared.
+//! β = (Zᵀ·X)⁻¹·Zᵀ·y, with Z recomputed from the latest model until it converges. Least squares is biased if position
+//! noise, or its feedback through the controller, correlates regressor and residual; this estimator is not. It is
+//! solved through the triangular factor of [Z | X | y], so that no condition number is squared.
 //!
-//! How strong the instruments are is asked with Cragg and Donald's statistic (1993), rows counted as what they are worth when
-//! the residual remembers its past: the smallest eigenvalue of the first stage's F matrix. One regressor with one instrument
-//! needs some 10 (Staiger & Stock 1997); Stock & Yogo (2005) tabulate it for few regressors, from 7 to 16.
+//! Cragg and Donald's statistic (1993) measures the strength of the instruments: the smallest eigenvalue of the first
+//! stage's F matrix. Rows are counted as independent ones, by the residual's correlation time. One regressor with one
+//! instrument needs some 10 (Staiger & Stock 1997); Stock & Yogo (2005) tabulate it for few regressors, from 7 to 16.
 //!
-//! Leaves out: re-estimation of the joints' weights between passes; refined IV with a noise model (RIV).
+//! Limits: joint weights are not re-estimated between passes; no refined IV with a noise model (RIV).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,19 +25,19 @@ use super::problem::{Fitted, Problem, singular};
 use super::twin::{Companion, Twin, each_pair};
 use rig_output::format_significant;
 
-/// Settled when no parameter moves by more than this share of its standard deviation …
+/// Largest change of a parameter at convergence, as a share of its standard deviation.
 const SETTLED: f64 = 0.02;
-/// … or after this many passes; then a warning says so.
+/// Largest number of passes; a warning reports it.
 const MOST_PASSES: usize = 12;
-/// Cragg and Donald's statistic below which instruments are weak.
+/// Value of Cragg and Donald's statistic below which instruments are weak.
 const WEAK: f64 = 10.0;
-/// A reference farther off the motion than this share of the motion's spread is a guess at what the arm does.
+/// Distance of reference and motion, as a share of the motion's spread, above which the reference is unreliable.
 const OFF: f64 = 0.02;
-/// A residual of so many times the weighted fit's comes from the instruments, not from noise that biases least squares: noise
-/// that takes three quarters of an inertia away doubles it.
+/// Ratio of the residual to the weighted fit's above which the instruments are the cause, not noise that biases least
+/// squares. Noise that removes three quarters of an inertia only doubles the residual.
 const SEVERAL: f64 = 2.0;
 
-/// Rows along the simulated motion beside the measured ones, as told by `source` and the model `standard`.
+/// Passes rows along the simulated motion together with the measured ones, for `source` and the model `standard`.
 pub(super) fn each_simulated(
     problem: &Problem,
     source: &Source,
@@ -64,7 +64,7 @@ pub(super) fn each_simulated(
     }
 }
 
-/// β from the triangular factor of [Z | X | y]: Zᵀ·Z cancels.
+/// Returns β from the triangular factor of [Z | X | y]: Zᵀ·Z cancels.
 fn solve(factor: &TriangularFactor, size: usize) -> Result<Vec<f64>, IdentifyError> {
     let (r, z) = factor.system();
     let a = r.view((0, size), (size, size)).into_owned();
@@ -75,15 +75,15 @@ fn solve(factor: &TriangularFactor, size: usize) -> Result<Vec<f64>, IdentifyErr
         .ok_or_else(|| singular("of the instruments"))
 }
 
-/// Cragg and Donald's statistic of as many instruments as regressors, from their smallest canonical correlation; `rows` are
-/// independent ones.
+/// Returns Cragg and Donald's statistic for as many instruments as regressors, from their smallest canonical
+/// correlation; `rows` is the number of independent rows.
 fn cragg_donald(strength: f64, rows: f64, size: usize) -> f64 {
     let size = size as f64;
     let share = (strength * strength).min(1.0);
     (rows - size).max(0.0) / size * share / (1.0 - share).max(f64::EPSILON)
 }
 
-/// Smallest canonical correlation of Z and X.
+/// Returns the smallest canonical correlation of Z and X.
 fn strength(factor: &TriangularFactor, size: usize) -> f64 {
     let (r, _) = factor.system();
     let shared = r.view((0, size), (size, size)).into_owned();
@@ -114,7 +114,7 @@ pub(super) fn instrumental(
         let mut factors = vec![TriangularFactor::new(2 * size); PARTS];
         let mut index = 0;
         let mut row = vec![0.0; 2 * size];
-        // Per joint: squares of simulated less measured position, and of the measured about its mean.
+        // Per joint: squares of simulated minus measured position, and of the measured position about its mean.
         let mut drift = Drift::new(problem.robot.joints.len());
         each_simulated(problem, &source, &standard, &mut |r, x, z| {
             drift.push(x, z);
@@ -142,7 +142,7 @@ pub(super) fn instrumental(
             })
             .fold(0.0, f64::max);
         values.clone_from(&kept.whole);
-        // Instruments that do not come from a simulation do not change from pass to pass.
+        // Instruments without a simulation do not change between passes.
         let fixed = !matches!(source, Source::Loop(_));
         if fixed || moved <= SETTLED || passes == MOST_PASSES {
             let strength = strength(&all.whole, size);
@@ -197,8 +197,8 @@ pub(super) fn instrumental(
     }
 }
 
-/// The joint at which values of the base columns leave most of the weighted fit's residual, and how many times as much, where
-/// that is [`SEVERAL`].
+/// Returns the joint with the largest ratio of its residual to the weighted fit's, and that ratio, if it reaches
+/// [`SEVERAL`]. `full` holds the values of the base columns.
 fn much_more<'a>(problem: &'a Problem, parts: &Parts, full: &[f64]) -> Option<(&'a str, f64)> {
     let plain = problem.start_full();
     let squares = |k: usize, full: &[f64]| -> f64 {
@@ -215,7 +215,7 @@ fn much_more<'a>(problem: &'a Problem, parts: &Parts, full: &[f64]) -> Option<(&
         .filter(|(_, times)| *times > SEVERAL)
 }
 
-/// Distance of the simulated from the measured motion.
+/// Distance between simulated and measured motion.
 pub(super) struct Drift {
     sums: Vec<[f64; 4]>,
 }
@@ -242,7 +242,7 @@ impl Drift {
         }
     }
 
-    /// RMS distance joint by joint, as a share of the motion's spread.
+    /// Returns the RMS distance of each joint, as a share of the motion's spread.
     fn shares<'a>(&'a self, problem: &'a Problem) -> impl Iterator<Item = (&'a str, f64)> {
         let joints = self.sums.iter().zip(&problem.robot.joints);
         joints.map(|([n, sum, squares, off], joint)| {
@@ -252,7 +252,7 @@ impl Drift {
         })
     }
 
-    /// The joint that is farthest off.
+    /// Returns the joint with the largest distance.
     fn farthest<'a>(&'a self, problem: &'a Problem) -> Option<(&'a str, f64)> {
         self.shares(problem).max_by(|a, b| a.1.total_cmp(&b.1))
     }

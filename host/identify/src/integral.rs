@@ -8,7 +8,7 @@ use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
 use super::momentum::{as_trapezia_see, momentum_rows};
 use rig_data::prepare::{LowPass, Motion, PrepareError};
 
-/// What forms the rows of one recording.
+/// Computes the rows of one recording.
 pub(super) struct Integral<'a> {
     plan: &'a Plan<'a>,
     low_pass: LowPass,
@@ -23,7 +23,7 @@ impl<'a> Integral<'a> {
         Ok(Self { plan, low_pass })
     }
 
-    /// The rows of one piece.
+    /// Computes the rows of one piece.
     pub(super) fn rows(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
         if motion.joints.len() > 1 {
             return momentum_rows(motion, self.plan, &self.low_pass, tally);
@@ -32,13 +32,13 @@ impl<'a> Integral<'a> {
     }
 }
 
-/// Work done over windows against the change of energy and the work of friction:
+/// Computes rows in which work over a window equals change of energy plus the work of friction:
 /// ∫ τᵀq̇ dt = H(end) − H(start) + Σ (fv·∫q̇² + fc·∫|q̇| + off·∫q̇).
 ///
-/// The torque passes the position's filter, and so does the sign of the velocity: what the filter takes from
-/// one side it takes from the other. Each window is divided by √(W·∫Σ(loudness·q̇)²), which makes the residuals of
-/// all windows equally uncertain (noise of the torque enters the work multiplied by the velocity) and gives
-/// them the unit of a torque. Energy is taken as the trapezia see it that sum the work ([`as_trapezia_see`]).
+/// Torque and sign of the velocity both pass the position filter, which then affects both sides equally. Each window is
+/// divided by √(W·∫Σ(loudness·q̇)²). This makes the residuals of all windows equally uncertain (torque noise enters the
+/// work multiplied by the velocity) and gives them the unit of a torque. The energy gets the same trapezoidal error as
+/// the work ([`as_trapezia_see`]).
 fn integral_rows(
     motion: &Motion,
     plan: &Plan,
@@ -115,7 +115,7 @@ fn integral_rows(
     };
     let mut around = [(); 3].map(|()| vec![0.0; width]);
     let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
-    // The row before a window and the one after it are looked at as well.
+    // The row before a window and the row after it are also needed.
     for start in motion.usable.0.max(1)..motion.usable.1 {
         let end = start + plan.window;
         if !(motion.offset + start as u64).is_multiple_of(plan.stride as u64)
@@ -176,8 +176,8 @@ fn integral_rows(
     Ok(result)
 }
 
-/// Per motor the work of its friction from the first row on, for unit coefficients: viscous, Coulomb (its sign behind
-/// the position's filter, as the torque is). Empty where no drive is coupled.
+/// Returns per motor the work of its friction from the first row, for unit coefficients: viscous, Coulomb (with the
+/// filtered sign, as for the torque). Empty without coupled drives.
 fn motor_friction(
     motion: &Motion,
     plan: &Plan,

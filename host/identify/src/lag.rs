@@ -1,13 +1,13 @@
-//! How long before it acts the torque was recorded.
+//! The torque-rate lead: how long before it acts the torque was recorded.
 //!
-//! A controller holds its torque until its next sample: what is recorded with a position acts, on average, half a period
-//! after it (Franklin, Powell and Workman 1998, section 4.3). A torque l earlier than it acts differs from it by l·τ̇, which
-//! friction and inertia take up, each by more than its interval. So the torque's own rate stands beside all parameters here,
-//! and what it explains is said. Rows about a reversal have no part in it: torque and the error of a friction's law leap there
-//! together. By symmetric differences, noise of the torque has no part in it.
+//! A controller holds its torque until its next sample. So the torque recorded with a position acts, on average, half a
+//! period later (Franklin, Powell and Workman 1998, section 4.3). With a lead l the torque differs by l·τ̇. Friction
+//! and inertia absorb this, and their errors exceed their intervals. So the torque rate is fitted as a regressor beside
+//! all parameters. Rows near a reversal are excluded, because torque and friction error jump together there. The rate
+//! is a symmetric difference, so noise of the torque does not bias it.
 //!
-//! Leaves out: lags that differ from joint to joint; what is more than a few samples, of which only that it is there is told; noise of
-//! the position, which a controller feeds back into the torque and which makes a lead look up to some times longer.
+//! Limits: one lead for all joints; a lead of more than a few samples is detected but not measured. Position noise that
+//! a controller feeds back into the torque can make a lead look several times longer.
 
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
@@ -17,32 +17,32 @@ use super::factor::TriangularFactor;
 use super::model::Rows;
 use super::problem::Problem;
 
-/// Standard deviations from which a lag counts.
+/// Number of standard deviations above which a lead is significant.
 const SEEN: f64 = 5.0;
-/// … and for all joints but the one that says most.
+/// The same for all joints except the one with the smallest standard deviation.
 const SEEN_BY_THE_OTHERS: f64 = 3.0;
-/// Share of a sample of the recording below which it is not worth a word.
+/// Smallest lead that is reported, as a share of the recording's sample period.
 const LEAST: f64 = 0.1;
-/// Instants that are looked at, evenly spread over all recordings.
+/// Largest number of instants used, evenly spread over all recordings.
 const ENOUGH: u64 = 10_000;
-/// Neighbours on each side that the rate is taken from: the ideal differentiator behind a Hamming window of so many is good
-/// to within a tenth up to four fifths of half the rows' rate, beyond which their filter leaves nothing.
+/// Number of neighbours on each side for the torque rate. An ideal differentiator with a Hamming window of this length
+/// is accurate to a tenth up to four fifths of half the rows' rate; above that the rows' filter passes nothing.
 const NEIGHBOURS: usize = 8;
 
-/// A lag of all joints.
+/// A torque-rate lead common to all joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lag {
-    /// How long before it acts the torque was recorded, s; negative: after.
+    /// Time by which the torque was recorded before it acts, s; negative if after.
     pub lead: f64,
-    /// Standard deviation, s: what the joints' own differ by counts.
+    /// Standard deviation, s; includes the differences between joints.
     pub std: f64,
 }
 
 impl Lag {
-    /// What `problem`'s recordings show; `memory` has, for each joint, the rows that its residual remembers. None where they show
-    /// none that matters.
+    /// Estimates the lead from `problem`'s recordings; `memory` has the correlation time of each joint's residual in
+    /// rows. None if the lead is not significant.
     pub(super) fn of(problem: &Problem, memory: &[f64]) -> Result<Option<Self>, IdentifyError> {
-        // Who gave one knows of it.
+        // A user-set lead is already known.
         if problem.plan.treatment.torque_lead != 0.0 {
             return Ok(None);
         }
@@ -73,7 +73,7 @@ impl Lag {
         Ok(shown(&own.collect::<Vec<_>>()).filter(|lag| lag.lead.abs() >= LEAST * treatment.dt()))
     }
 
-    /// In words; `sample` is the recording's, s.
+    /// Describes the lead in words; `sample` is the recording's sample period, s.
     pub(super) fn said(&self, sample: f64) -> String {
         let samples = self.lead / sample;
         let size = format!(
@@ -100,7 +100,7 @@ impl Lag {
     }
 }
 
-/// The rows about row `i`, where they follow each other without a gap.
+/// Returns the rows around row `i` if they follow each other without a gap.
 fn neighbours(rows: &Rows, i: usize, period: f64) -> Option<RangeInclusive<usize>> {
     let first = i.checked_sub(NEIGHBOURS)?;
     let last = i + NEIGHBOURS;
@@ -108,7 +108,7 @@ fn neighbours(rows: &Rows, i: usize, period: f64) -> Option<RangeInclusive<usize
     (span < (2.0 * NEIGHBOURS as f64 + 0.5) * period).then_some(first..=last)
 }
 
-/// Rate of change at row `i`, a row.
+/// Returns the rate of change at row `i`, per row.
 fn rate(y: &[f64], i: usize) -> f64 {
     let weight = |k: usize| {
         let window = 0.54 + 0.46 * (PI * k as f64 / (NEIGHBOURS + 1) as f64).cos();
@@ -120,7 +120,7 @@ fn rate(y: &[f64], i: usize) -> f64 {
         .sum()
 }
 
-/// Lead of one joint and its variance: least squares for the last column beside all others, whatever their rank.
+/// Returns the lead of a joint and its variance: least squares for the last column beside all others, of any rank.
 fn own(factor: &TriangularFactor, memory: f64) -> Option<[f64; 2]> {
     let (width, rows) = (factor.columns() + 1, factor.rows());
     let freedom = rows.saturating_sub(width as u64) as f64;
@@ -131,8 +131,8 @@ fn own(factor: &TriangularFactor, memory: f64) -> Option<[f64; 2]> {
     (freedom > 0.0 && column != 0.0).then(|| [r[y * width + c] / column, deviation])
 }
 
-/// One lead that all show: every joint but the one that says most must still show it, where there are several. A law of one
-/// joint that is not quite right looks like a lead there alone.
+/// Returns a lead common to all joints. With several joints it must stay significant without the joint of smallest
+/// variance: a wrong friction law of one joint looks like a lead there alone.
 fn shown(own: &[[f64; 2]]) -> Option<Lag> {
     let all = together(own)?;
     let seen = |lag: &Lag, times: f64| lag.lead.abs() >= times * lag.std;
@@ -145,7 +145,7 @@ fn shown(own: &[[f64; 2]]) -> Option<Lag> {
     (seen(&all, SEEN) && agreed).then_some(all)
 }
 
-/// One lead for all: mean by inverse variance, its variance widened by what the joints differ (Birge 1932).
+/// Returns the mean of the leads by inverse variance; its variance includes the joints' differences (Birge 1932).
 fn together(own: &[[f64; 2]]) -> Option<Lag> {
     let sum: f64 = own.iter().map(|[_, variance]| 1.0 / variance).sum();
     let lead = own
@@ -183,7 +183,7 @@ mod tests {
     fn one_joint_alone_does_not_make_a_lead() {
         assert!(shown(&[[1e-3, 1e-10]]).is_some());
         assert!(shown(&[[1e-3, 1e-10], [0.9e-3, 1e-8], [1.1e-3, 1e-8]]).is_some());
-        // As an arm with screws shows whose torque and motion are of one instant.
+        // Values of an arm with screws whose torque and motion are simultaneous.
         let geared = [
             [0.826e-3, 1.3e-9],
             [-0.105e-3, 1.0e-7],

@@ -1,4 +1,4 @@
-//! Least squares as a member of the family: the same fit with one stretch left out at a time, for comparison.
+//! Least squares for the comparison of estimators: the same fit with one segment left out at a time.
 
 use nalgebra::DMatrix;
 
@@ -9,7 +9,7 @@ use super::linear::{classical, kept_columns, least_squares, spread};
 use super::parts::{LeaveOut, Parts};
 use super::problem::{Fitted, Problem};
 
-/// Least squares with the equations at `weights`.
+/// Fits by least squares with the equations weighted by `weights`.
 pub(super) fn least(
     problem: &Problem,
     parts: &Parts,
@@ -18,7 +18,7 @@ pub(super) fn least(
     from_factors(problem, &LeaveOut::of(&parts.weighted(weights)))
 }
 
-/// Least squares on factors whose rows are as they are to count.
+/// Fits by least squares on factors whose rows are already weighted.
 pub(super) fn from_factors(problem: &Problem, factors: &LeaveOut) -> Result<Fitted, IdentifyError> {
     let (data, base) = (problem.data, problem.base);
     let kept = factors.refit(&|factor| least_squares(factor, data, base))?;
@@ -36,7 +36,7 @@ pub(super) fn from_factors(problem: &Problem, factors: &LeaveOut) -> Result<Fitt
     })
 }
 
-/// Triangular factor of the kept columns alone.
+/// Returns the triangular factor of the kept columns alone.
 pub(super) fn triangle(factor: &TriangularFactor, data: &Independent) -> DMatrix<f64> {
     kept_columns(factor, data).0.qr().r()
 }

@@ -1,4 +1,4 @@
-//! Ways to treat the recordings compared by how well they predict stretches of time that they were not fitted to.
+//! Comparison of treatments by how well they predict time segments that were left out of the fit.
 
 use super::factor::TriangularFactor;
 use super::linear::by_noise;
@@ -7,16 +7,16 @@ use super::parts::LeaveOut;
 use super::{IdentifyError, ModelKind};
 use rig_data::prepare::Recording;
 
-/// Stretches of time that are left out in turn.
+/// Number of segments that are left out in turn.
 const STRETCHES: usize = 8;
-/// Reduction of the mean logarithm of the joints' errors from which a treatment that uses fewer rows is better.
+/// Reduction of the mean log error of the joints above which a treatment with fewer rows is better.
 pub(super) const BETTER: f64 = 0.02;
 
-/// By stretch, then by joint, the rows of the equation.
+/// Rows of the equations, by segment, then by joint.
 pub(super) struct Stretches(Vec<Vec<TriangularFactor>>);
 
 impl Stretches {
-    /// Sorts the rows of the recordings for which `used` (of the rows, joint, row) is true.
+    /// Sorts the rows of the recordings for which `used` (arguments: rows, joint, row) is true.
     ///
     /// # Errors
     /// [`IdentifyError`]: recordings that cannot be read.
@@ -52,7 +52,7 @@ impl Stretches {
         Ok(Self(sorted))
     }
 
-    /// Mean over the joints of the logarithm of the RMS that fits to all of these stretches but one leave of that one in `judge`.
+    /// Returns the mean log RMS error of the joints: each segment of `judge`, predicted from the other segments here.
     pub(super) fn error(&self, judge: &Self) -> f64 {
         let joints = self.0.first().map_or(0, Vec::len);
         let without = |j: usize| {

@@ -1,15 +1,14 @@
-//! Identification: from prepared motion to base parameters with honest uncertainty.
+//! Identification: from prepared motion to base parameters with their uncertainty.
 //!
-//! Rows of a model stream into triangular factors ([`TriangularFactor`]); the base parameters of the robot
-//! ([`Base`]) are estimated from them, what the data do not excite is named, and further passes over the
-//! recordings give residuals and a covariance that allows for their correlation in time. Memory does not grow
-//! with the recordings.
+//! Rows of a model are streamed into triangular factors ([`TriangularFactor`]), from which the base parameters of the
+//! robot ([`Base`]) are estimated. Parameters without excitation are named. Further passes over the recordings give
+//! residuals and a covariance that allows for their correlation in time. Memory does not grow with the recordings.
 //!
-//! Least squares (ordinary, weighted by joint, robust) take the regressor as exact; its noise is kept small by the
-//! choice of the cut-off ([`rig_data::prepare::NOISE_SHARE`]). Where that does not do, there are instrumental variables,
-//! output error and total least squares; maximum likelihood for residuals that are correlated; ridge regression and
-//! physical consistency for what the motion leaves open. Every estimate can be compared with the others on stretches
-//! of time left out of the fit ([`Comparison`]).
+//! Least squares (ordinary, weighted by joint, robust) assume an exact regressor; the choice of the cut-off keeps its
+//! noise small ([`rig_data::prepare::NOISE_SHARE`]). If this is not enough, there are instrumental variables, output
+//! error and total least squares. Maximum likelihood is for correlated residuals. Ridge regression and physical
+//! consistency are for parameters that the motion does not identify. All estimates can be compared on time segments
+//! left out of the fit ([`Comparison`]).
 //!
 //! The parameters of a simulated pendulum, from its motion and torque:
 //!
@@ -42,7 +41,8 @@
 //! # }
 //! ```
 //!
-//! Leaves out: estimation of the friction law's form (see [`friction_map()`]); noise models that change with the motion.
+//! Limits: the form of the friction law is not estimated (see [`friction_map()`]); the noise model is independent of
+//! the motion.
 
 mod added_torque;
 mod band;
@@ -150,41 +150,41 @@ use rig_model::robot::Robot;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ModelKind {
-    /// Torque against acceleration, velocity and position.
+    /// Torque as a function of acceleration, velocity and position.
     #[default]
     Differential,
-    /// One joint: work against change of energy over windows. Several: impulse against change of momentum, one equation a
-    /// joint. Needs no acceleration.
+    /// One joint: work equals change of energy over a window. Several joints: impulse equals change of momentum, one
+    /// equation per joint. Needs no acceleration.
     Integral,
 }
 
-/// How they are fitted.
+/// The estimation method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
     /// Ordinary least squares.
     Ols,
-    /// Each joint's rows divided by the standard deviation of its residual.
+    /// Each joint's rows are divided by the standard deviation of its residual.
     #[default]
     Weighted,
-    /// Weighted, and rows with large residuals count less (iteratively reweighted least squares).
+    /// Weighted, with smaller weights for rows with large residuals (iteratively reweighted least squares).
     Robust,
     /// Instrumental variables from the simulated closed loop (IDIM-IV).
     Iv,
-    /// Torque of the simulated closed loop against the measured one (DIDIM).
+    /// Fits the torque of the simulated closed loop to the measured torque (DIDIM).
     OutputError,
-    /// Total least squares: noise in the regressor too.
+    /// Total least squares: allows for noise in the regressor.
     Tls,
-    /// Maximum likelihood: autoregressive residuals, correlated between joints.
+    /// Maximum likelihood: residuals are autoregressive and correlated between joints.
     Ml,
     /// Ridge regression towards the description's values.
     Ridge,
-    /// Weighted, under the condition that every link is a body that can exist.
+    /// Weighted, with the constraint that every link has physically consistent inertial parameters.
     Consistent,
 }
 
 impl Estimator {
-    /// All, plain ones first.
+    /// All estimators, the simple ones first.
     pub const ALL: [Self; 9] = [
         Self::Ols,
         Self::Weighted,
@@ -197,10 +197,10 @@ impl Estimator {
         Self::Consistent,
     ];
 
-    /// The estimator that is used for `robot` where none is asked for. One joint: weighted least squares, which need no
-    /// prior. Several joints are seldom all excited, and what is fitted to one motion must hold for the next: `consistent`
-    /// takes from the description what the data do not say and gives links that can exist, so that the values reported
-    /// are those of the files that are written.
+    /// Returns the default estimator for `robot`. One joint: weighted least squares, which needs no prior. Several
+    /// joints: `consistent`, because one motion seldom excites all joints. It takes from the description what the data
+    /// do not identify, and its links are physically consistent. The reported values then equal those in the written
+    /// files.
     pub fn for_robot(robot: &Robot) -> Self {
         if robot.joints.len() > 1 {
             Self::Consistent
@@ -209,7 +209,7 @@ impl Estimator {
         }
     }
 
-    /// Whether the description's values enter its estimate.
+    /// Returns true if the description's values enter the estimate.
     pub fn has_prior(self) -> bool {
         matches!(
             self,
@@ -217,7 +217,7 @@ impl Estimator {
         )
     }
 
-    /// As the command line and `identification.json` name it.
+    /// The name on the command line and in `identification.json`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ols => "ols",
@@ -232,7 +232,7 @@ impl Estimator {
         }
     }
 
-    /// In words.
+    /// The name in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Ols => "ordinary least squares",
@@ -248,19 +248,19 @@ impl Estimator {
     }
 }
 
-/// Which large residuals count less, and how much.
+/// The function that reduces the weight of large residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Loss {
-    /// Huber 1964, k = 1.345 (95 % efficient for normal residuals): bounded influence.
+    /// Huber 1964, k = 1.345 (95 % efficient for normal residuals): influence is bounded.
     #[default]
     Huber,
-    /// Tukey's bisquare, c = 4.685 (95 % efficient): outliers count nothing.
+    /// Tukey's bisquare, c = 4.685 (95 % efficient): outliers have zero weight.
     Bisquare,
 }
 
 impl Loss {
-    /// Weight of a residual of `u` standard deviations.
+    /// Returns the weight of a residual of `u` standard deviations.
     pub fn weight(self, u: f64) -> f64 {
         let u = u.abs();
         match self {
@@ -275,32 +275,32 @@ impl Loss {
 /// Settings of an identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Equations.
+    /// The equations to fit.
     pub model: ModelKind,
-    /// Fit.
+    /// The estimator.
     pub estimator: Estimator,
     /// Loss of the robust estimator.
     pub loss: Loss,
     /// Filters, decimation, masks.
     pub prepare: PrepareOptions,
-    /// Length of the integral model's windows, s; chosen from the motion where absent. The differential model has none.
+    /// Window length of the integral model, s; chosen from the motion if absent. Unused by the differential model.
     pub window: Option<f64>,
-    /// Seed of the random states from which the base parameters are found.
+    /// Seed of the random states used to find the base parameters.
     pub seed: u64,
-    /// How many times each training recording counts; those beyond the list count once.
+    /// How many times each training recording counts; recordings beyond the end of the list count once.
     pub recording_weights: Vec<f64>,
-    /// Relative uncertainty of the description's inertial values, for [`Estimator::has_prior`] and, of several joints, for
-    /// the standard parameters; where absent, `ridge` takes what makes the data most likely and all else takes 2.
+    /// Relative uncertainty of the described inertial values, for [`Estimator::has_prior`] and the standard parameters
+    /// of several joints. If absent, `ridge` maximises the likelihood of the data and everything else uses 2.
     pub prior_uncertainty: Option<f64>,
-    /// Which estimators are compared besides; none for no comparison.
+    /// Further estimators to compare; empty for no comparison.
     pub compare: Vec<Estimator>,
-    /// Look for springs, ripple and a base that is not level where several joints are described with all their links; else
-    /// the description is taken as it is.
+    /// Searches for springs, ripple and a tilted base if several joints are described with all their links. If false,
+    /// the description is used unchanged.
     pub look_beyond: bool,
 }
 
 impl Options {
-    /// Factor that rows of training recording `r` are multiplied by: squares then count as often as was asked.
+    /// Returns the factor for the rows of training recording `r`: the root of its weight, because squares are summed.
     pub fn row_weight(&self, r: usize) -> f64 {
         self.recording_weights.get(r).map_or(1.0, |w| w.sqrt())
     }
@@ -323,7 +323,7 @@ impl Default for Options {
     }
 }
 
-/// What mends a recording of which too few rows are usable, by why the others are not.
+/// Returns the advice for a recording with too few usable rows, by the main reason for the unusable ones.
 fn what_helps(slow: u64, saturated: u64) -> &'static str {
     if saturated > slow {
         "the torque stands at its limit: record a motion that needs less, or without the limit"
@@ -332,16 +332,16 @@ fn what_helps(slow: u64, saturated: u64) -> &'static str {
     }
 }
 
-/// Why an identification is not possible.
+/// Reasons why an identification fails.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
-    /// Reading or preparing has failed.
+    /// Reading or preparing a recording failed.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
     /// The robot has no valid model.
     #[error("The robot's model cannot be built: {0}")]
     Model(String),
-    /// Base parameters cannot be decided.
+    /// The base parameters are ambiguous.
     #[error(
         "The base parameters of {robot} cannot be decided: column {column} of joint `{joint}` is independent of the others by only {least:.1e} of its length; write lengths and angles of that joint and the one before it that are meant to be zero, or multiples of a right angle, exactly."
     )]
@@ -350,7 +350,7 @@ pub enum IdentifyError {
         column: String,
         /// Its joint.
         joint: String,
-        /// Remainder of the doubtful column.
+        /// Relative length of the doubtful column after projection onto the others.
         least: f64,
         /// Name of the robot.
         robot: String,
@@ -358,12 +358,12 @@ pub enum IdentifyError {
     /// No recording.
     #[error("No training recording was given; name at least one.")]
     NoRecording,
-    /// Everything was masked.
+    /// Too few rows are usable after masking.
     #[error(
         "Of all rows only {used} are usable for {unknown} parameters (too slow: {slow}, saturated: {saturated}); {}.", what_helps(*slow, *saturated)
     )]
     NothingLeft {
-        /// Rows left.
+        /// Usable rows.
         used: u64,
         /// Parameters.
         unknown: usize,
@@ -372,14 +372,14 @@ pub enum IdentifyError {
         /// Rows at a torque limit.
         saturated: u64,
     },
-    /// The torque is zero throughout.
+    /// The torque is zero in all rows.
     #[error(
         "The torque of joint {joint} is zero throughout; record the torque or the motor current{}.", if *.still { ", or make the joint, which stands still, type=\"fixed\" in the URDF" } else { "" }
     )]
     NoTorque {
         /// Number of the joint, from 1.
         joint: usize,
-        /// Whether it stands still throughout.
+        /// True if the joint stands still in all rows.
         still: bool,
     },
     /// The fit is singular.
@@ -387,58 +387,58 @@ pub enum IdentifyError {
         "The least-squares problem is singular although its columns looked independent; the smallest of them is {column}."
     )]
     Singular {
-        /// Its name.
+        /// Name of the smallest column.
         column: String,
     },
-    /// No honest interval.
+    /// The recording is too short for a confidence interval.
     #[error(
         "{rows} rows whose residuals remember {memory:.0} rows are too few for a confidence interval; record at least {needed} s."
     )]
     TooShortForIntervals {
         /// Rows.
         rows: u64,
-        /// Memory of the residuals, rows.
+        /// Correlation time of the residuals, rows.
         memory: f64,
         /// Duration needed, s.
         needed: u64,
     },
-    /// A window that no integral model can have.
+    /// The window length is impossible for the integral model.
     #[error(
         "A window of {} s is not possible for the integral model; it must last between {least} s and {most} s here.",
         rig_model::robot::written(*window)
     )]
     Window {
-        /// Asked for, s.
+        /// Requested length, s.
         window: f64,
         /// Shortest possible, s.
         least: f64,
         /// Longest possible, s.
         most: f64,
     },
-    /// A physically consistent fit that comes to no end.
+    /// The physically consistent fit did not converge.
     #[error(
         "The physically consistent fit found no end: {why}. A prior uncertainty nearer to 1 (--prior-uncertainty) or a description nearer to the robot would help."
     )]
     Inconsistent {
-        /// What stopped it.
+        /// Reason.
         why: String,
     },
-    /// An iteration that does not end.
+    /// An iteration did not converge.
     #[error(
         "{what} did not settle after {passes} steps; a longer recording or a prior closer to the robot would help."
     )]
     Unsettled {
-        /// What was iterated.
+        /// Name of the iteration.
         what: &'static str,
         /// Steps.
         passes: usize,
     },
-    /// Output error without a closed loop.
+    /// Output error was requested without a closed loop.
     #[error(
         "Estimator output-error simulates the closed loop: every joint needs a [joint.controller] in the description and a column ref<k> in every recording; use iv, which makes do with less."
     )]
     NoLoop,
-    /// References that are not the motion's.
+    /// The recorded references do not match the motion.
     #[error(
         "Estimator output-error follows the recorded references (columns ref<k>), and these are in another unit or sense than the positions; correct them."
     )]
@@ -446,44 +446,44 @@ pub enum IdentifyError {
     /// The identified model cannot be simulated.
     #[error("The identified model cannot be simulated: {0}")]
     Simulation(String),
-    /// A weight that is none.
+    /// A recording's weight is out of range.
     #[error(
         "A recording's weight is {0}; it must lie between 1e-12 and 1e12 (1 counts the recording once, 2 twice)."
     )]
     Weight(f64),
-    /// A prior uncertainty that is none.
+    /// The prior uncertainty is not positive.
     #[error(
         "The description's relative uncertainty is given as {0}; it must be above zero (0.1 means 10 %)."
     )]
     PriorUncertainty(f64),
-    /// An uncertainty of the description for an estimate that it does not enter.
+    /// A prior uncertainty was given for an estimator that uses no prior.
     #[error(
         "The description's relative uncertainty is given as {uncertainty}, but {estimator} of one joint takes nothing from the description; give --estimator ridge or consistent, or leave --prior-uncertainty out."
     )]
     UnusedUncertainty {
-        /// What was given.
+        /// The given uncertainty.
         uncertainty: f64,
         /// The estimator's name.
         estimator: &'static str,
     },
-    /// A window for a model without windows.
+    /// A window was given for the differential model.
     #[error(
         "A window of {0} s is given, but the differential model has no windows; give --model integral, or leave --window out."
     )]
     UnusedWindow(f64),
-    /// A friction map cannot be drawn.
+    /// The friction map cannot be computed.
     #[error("{0}")]
     FrictionMap(String),
 }
 
-/// One identified combination.
+/// An identified base parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BaseParameter {
-    /// As a paper prints it: `m1 + Ia1`.
+    /// The combination in the notation of the literature: `m1 + Ia1`.
     pub expression: String,
-    /// SI
+    /// Value, SI.
     pub value: f64,
-    /// Standard deviation, correlation of the residuals allowed for.
+    /// Standard deviation; allows for the correlation of the residuals.
     pub std: f64,
     /// `100·std/|value|`
     pub relative_std_percent: f64,
@@ -491,26 +491,26 @@ pub struct BaseParameter {
     pub unit: String,
     /// 95 % interval.
     pub interval: [f64; 2],
-    /// What the literature prints: residuals taken as white.
+    /// Relative standard deviation for white residuals, as in the literature, %.
     pub classical_relative_std_percent: f64,
 }
 
-/// One joint's residuals in figures.
+/// Residual figures of a joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointFigures {
     /// Name of the joint.
     pub name: String,
-    /// N·m or N; not a number (null) where none of the joint's rows could be used, as of one that stands still.
+    /// N·m or N; not a number (null) if no row of the joint was usable, for example because it stood still.
     pub train_residual_rms: f64,
-    /// N·m or N; null without a hold-out or where none of the joint's rows in it could be used.
+    /// N·m or N; null without a hold-out or if no row of the joint in it was usable.
     pub holdout_residual_rms: Option<f64>,
     /// RMS of the residual over RMS of the torque.
     pub train_relative_error: f64,
     /// The same over the hold-out.
     pub holdout_relative_error: Option<f64>,
-    /// Share of the training rows that these errors are over: slow rows, and ones at the torque limit, are left out.
+    /// Share of the training rows in these errors: slow rows and rows at the torque limit are excluded.
     pub train_rows_share: f64,
-    /// The same of the hold-out.
+    /// The same for the hold-out.
     pub holdout_rows_share: Option<f64>,
     /// RMS of the residual over RMS of the torque, over all rows.
     pub train_relative_error_all_rows: f64,
@@ -519,7 +519,7 @@ pub struct JointFigures {
 }
 
 impl JointFigures {
-    /// Of residuals over the training data, and over the hold-out where there is one.
+    /// Collects the figures of the training residuals and, if given, of the hold-out residuals.
     fn of(name: &str, train: &ResidualReport, held: Option<&ResidualReport>) -> Self {
         let share = |r: &ResidualReport| r.rows as f64 / r.all.rows.max(1) as f64;
         Self {
@@ -536,14 +536,14 @@ impl JointFigures {
     }
 }
 
-/// A combination that these data say nothing about, or less than the description does.
+/// A combination that the data do not determine, or determine less well than the description.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NotExcited {
-    /// The base parameter that was not identified on its own, or that the data hardly touch.
+    /// The base parameter that was not identified on its own or is weakly excited.
     pub combination: String,
-    /// Why.
+    /// Reason.
     pub why: String,
-    /// A motion that would change that.
+    /// A motion that would excite it.
     pub motion: String,
 }
 
@@ -556,9 +556,9 @@ pub struct Identification {
     pub robot: String,
     /// Equations fitted.
     pub model: ModelKind,
-    /// Fit.
+    /// Estimator.
     pub estimator: Estimator,
-    /// Number of base parameters that the data determine.
+    /// Number of base parameters that are identifiable from the data.
     pub rank: usize,
     /// Condition number of the regressor of these parameters.
     pub condition_number: f64,
@@ -566,51 +566,51 @@ pub struct Identification {
     pub base_parameters: Vec<BaseParameter>,
     /// Residuals by joint.
     pub joints: Vec<JointFigures>,
-    /// Torques with position that the description does not state and the data show.
+    /// Position-dependent torques that the data show and the description lacks.
     pub position_torques: Vec<PositionTorque>,
-    /// Gravity off the direction that the description states, where the data show it.
+    /// Deviation of gravity from the described direction, if the data show one.
     pub base_tilt: Option<BaseTilt>,
-    /// What the data say nothing about.
+    /// Combinations that the data do not determine.
     pub not_excited: Vec<NotExcited>,
     /// Sentences.
     pub warnings: Vec<String>,
-    /// The few parameters that the torque needs.
+    /// The few parameters that suffice for the torque.
     pub essential: Option<EssentialSet>,
-    /// A full set of standard parameters that a robot can have; absent for a single joint unless asked for.
+    /// A full, physically consistent set of standard parameters; absent for a single joint unless requested.
     pub standard_parameters: Option<StandardSet>,
-    /// Estimators side by side and the one to trust, where asked for.
+    /// Comparison of the estimators with the recommended one, if requested.
     pub comparison: Option<Comparison>,
-    /// How the estimator went, sentences.
+    /// The course of the estimation, sentences.
     pub procedure: Vec<String>,
-    /// What a report shows beyond that.
+    /// Further content of the report.
     #[serde(skip)]
     pub details: Details,
 }
 
-/// What a report shows beyond `identification.json`.
+/// Report content beyond `identification.json`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Details {
     /// Preparation.
     pub treatment: Treatment,
-    /// What was left out of the fit.
+    /// Rows excluded from the fit.
     pub masked: Vec<Masked>,
-    /// The training recordings at a glance.
+    /// Summaries of the training recordings.
     pub training: Vec<Survey>,
-    /// The hold-out recordings at a glance.
+    /// Summaries of the hold-out recordings.
     pub holdout: Vec<Survey>,
     /// Values, covariance, condition numbers.
     pub estimate: Estimate,
-    /// What weighted least squares give for each base parameter, free of any prior, with its 95 % interval: what the data say
-    /// where the estimator bends it.
+    /// Weighted least-squares value of each base parameter, without a prior, with its 95 % interval. It shows what the
+    /// data alone give where the estimator's prior changes the value.
     pub free: Vec<[f64; 3]>,
-    /// K with identified values = K·π, π the 14 standard parameters of each joint; rows as `base_parameters`.
+    /// K in identified values = K·π, with π the 14 standard parameters of each joint; rows as `base_parameters`.
     pub combination: nalgebra::DMatrix<f64>,
-    /// Standard column that stands for each base parameter.
+    /// Standard column that represents each base parameter.
     pub columns: Vec<usize>,
     /// Residuals of the training recordings by joint (torque, differential form).
     pub train: Vec<ResidualReport>,
-    /// Residuals of the hold-out, where given.
+    /// Residuals of the hold-out, if given.
     pub holdout_residuals: Option<Vec<ResidualReport>>,
-    /// Length of the integral model's windows, s, and why; absent for the differential model.
+    /// Window length of the integral model, s, and its reason; absent for the differential model.
     pub window: Option<(f64, String)>,
 }

@@ -1,13 +1,13 @@
-//! Maximum likelihood with the residual's own covariance: autoregressive in time joint by joint, correlated between
-//! joints at one instant.
+//! Maximum likelihood with the residual's own covariance: autoregressive in time per joint, correlated between joints
+//! at one instant.
 //!
-//! Feasible generalised least squares, iterated to its fixed point, which maximises the Gaussian likelihood (Oberhofer &
-//! Kmenta 1974): per equation an autoregression of the residual (Yule–Walker, solved by Levinson's recursion, order by
-//! Bayes' information criterion) prewhitens regressor and torque; the innovations' correlation between joints is
-//! removed by its Cholesky factor; least squares on what is left is efficient. Where a stretch begins, after a gap or a
-//! masked row, the recursion's predictors of lower order take over, so that no row is lost.
+//! Feasible generalised least squares, iterated to its fixed point, which maximises the Gaussian likelihood (Oberhofer
+//! & Kmenta 1974). Per equation an autoregression of the residual prewhitens regressor and torque (Yule–Walker, solved
+//! by Levinson's recursion, order by Bayes' information criterion). A Cholesky factor removes the correlation of the
+//! innovations between joints. Least squares on the whitened rows is efficient. At the start of a stretch, after a gap
+//! or a masked row, the recursion's predictors of lower order are used, so that no row is lost.
 //!
-//! Leaves out: correlation of one joint's residual with another's at other instants; changes of the noise with the
+//! Limits: no correlation of one joint's residual with another's at other instants; the noise does not change with the
 //! motion.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -24,12 +24,12 @@ use super::problem::{Fitted, Problem};
 
 /// Highest order of the autoregression.
 const MOST_ORDER: usize = 20;
-/// White noise taken to be in every residual, as a share of its variance. Filters leave bands without power; an
-/// autoregression true to them would blow up what little is there, errors of the model above all.
+/// Share of white noise assumed in every residual's variance. Filters leave bands without power, in which a pure
+/// autoregression would amplify small errors, mainly model errors.
 const WHITE_SHARE: f64 = 0.01;
-/// Settled when no parameter moves by more than this share of its standard deviation …
+/// Largest change of a parameter at convergence, as a share of its standard deviation.
 const SETTLED: f64 = 0.01;
-/// … or after this many passes; then a warning says so.
+/// Largest number of passes; a warning reports it.
 const MOST_PASSES: usize = 30;
 
 /// Predictors of every order up to the chosen one.
@@ -41,7 +41,7 @@ struct Predictors {
     sigma: Vec<f64>,
 }
 
-/// Levinson's recursion on autocovariances (lag 0 first), order by Bayes' criterion over `rows` rows.
+/// Runs Levinson's recursion on autocovariances (lag 0 first); order by Bayes' criterion over `rows` rows.
 fn levinson(covariance: &[f64], rows: u64) -> Predictors {
     let mut coefficients = vec![Vec::new()];
     let mut variance = vec![covariance[0].max(f64::MIN_POSITIVE)];
@@ -75,14 +75,14 @@ fn levinson(covariance: &[f64], rows: u64) -> Predictors {
     }
 }
 
-/// The last rows of one equation without a break: [x | y] of the kept columns.
+/// The latest consecutive rows of one equation: [x | y] of the kept columns.
 #[derive(Clone, Default)]
 struct Past {
     rows: VecDeque<Vec<f64>>,
 }
 
 impl Past {
-    /// The innovation of `row`, in units of its standard deviation.
+    /// Returns the innovation of `row`, in units of its standard deviation.
     fn innovation(&mut self, row: Vec<f64>, predictors: &Predictors) -> Vec<f64> {
         let order = self.rows.len().min(predictors.sigma.len() - 1);
         let mut out = row.clone();
@@ -101,7 +101,7 @@ impl Past {
     }
 }
 
-/// Calls `take` at every instant with its number, its place in the rows and whether it follows the one before.
+/// Calls `take` at every instant with its number, its row index and whether it directly follows the previous one.
 fn each_instant(
     problem: &Problem,
     take: &mut dyn FnMut(usize, u64, &Rows, usize, bool),
@@ -118,7 +118,7 @@ fn each_instant(
                 for i in 0..rows.t.len() {
                     let t = rows.t[i];
                     let since = last.map(|before| t - before);
-                    // The first interval seen is a row's; a gap is longer than any.
+                    // The shortest interval so far is one row; a gap is longer than 1.5 rows.
                     let follows = since.is_some_and(|s| s > 0.0 && s < 1.5 * step);
                     if let Some(s) = since.filter(|s| *s > 0.0) {
                         step = step.min(s);
@@ -134,7 +134,7 @@ fn each_instant(
     Ok(())
 }
 
-/// Autoregressions of the residual under `full`, one an equation.
+/// Fits the autoregressions of the residual under `full`, one per equation.
 fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, IdentifyError> {
     let (p, equations) = (problem.base.len(), problem.weights.len());
     let mut past: Vec<VecDeque<f64>> = vec![VecDeque::new(); equations];
@@ -167,14 +167,14 @@ fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, I
         .collect())
 }
 
-/// Inverse of the lower Cholesky factor of the present joints' correlation, by which of them are present.
+/// Inverse lower Cholesky factor of the joints' correlation, for each set of joints present.
 struct Whiteners {
     correlation: DMatrix<f64>,
     by_mask: BTreeMap<u64, DMatrix<f64>>,
 }
 
 impl Whiteners {
-    /// From sums of products; drawn towards independence until it is a correlation of something.
+    /// Builds the correlation from sums of products; shrinks it towards independence until it is positive definite.
     fn new(sums: &DMatrix<f64>) -> Self {
         let n = sums.nrows();
         let mut correlation = DMatrix::from_fn(n, n, |i, j| {
@@ -208,7 +208,7 @@ impl Whiteners {
         self.by_mask.entry(mask).or_insert_with(|| {
             let n = present.len();
             let part = DMatrix::from_fn(n, n, |i, j| correlation[(present[i], present[j])]);
-            // A part of a positive definite matrix is one.
+            // A principal submatrix of a positive definite matrix is positive definite.
             part.cholesky()
                 .and_then(|c| c.l().try_inverse())
                 .unwrap_or_else(|| DMatrix::identity(n, n))
@@ -216,7 +216,7 @@ impl Whiteners {
     }
 }
 
-/// One pass: factors of the whitened rows by stretch, and the innovations' products between joints.
+/// Runs one pass: factors of the whitened rows by stretch, and the innovations' products between joints.
 fn whitened(
     problem: &Problem,
     full: &[f64],
@@ -289,7 +289,7 @@ pub(super) fn likelihood(problem: &Problem, parts: &Parts) -> Result<Fitted, Ide
             .map(|((a, b), s)| (a - b).abs() / s.max(f64::MIN_POSITIVE))
             .fold(0.0, f64::max);
         values.clone_from(&fitted.kept.whole);
-        // The first pass knows nothing yet of the correlation between joints.
+        // In the first pass the correlation between joints is still unknown.
         if (pass > 1 && moved <= SETTLED) || pass == MOST_PASSES {
             if moved > SETTLED {
                 fitted.warnings.push(format!(

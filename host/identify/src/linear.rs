@@ -1,4 +1,4 @@
-//! Least squares on a triangular factor, some of its columns left out.
+//! Least squares on a triangular factor, with some columns left out.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,12 +6,12 @@ use super::IdentifyError;
 use super::base::{Base, Independent};
 use super::factor::TriangularFactor;
 
-/// Row times parameters.
+/// Multiplies a row by the parameters.
 pub(super) fn product(x: &[f64], beta: &[f64]) -> f64 {
     x.iter().zip(beta).map(|(x, b)| x * b).sum()
 }
 
-/// Values of the kept columns spread over all columns, zero elsewhere.
+/// Spreads the values of the kept columns over all columns, zero elsewhere.
 pub(super) fn spread(beta: &[f64], kept: &[usize], p: usize) -> Vec<f64> {
     let mut full = vec![0.0; p];
     for (value, &k) in beta.iter().zip(kept) {
@@ -20,8 +20,8 @@ pub(super) fn spread(beta: &[f64], kept: &[usize], p: usize) -> Vec<f64> {
     full
 }
 
-/// Solution of least norm over equations that count by `weights`: columns that the rows do not tell apart share their value.
-/// None where it cannot be found.
+/// Returns the minimum-norm solution of equations weighted by `weights`: collinear columns share their value. None if
+/// there is no solution.
 pub(super) fn weighted_minimum_norm(
     factors: &[TriangularFactor],
     weights: &[f64],
@@ -38,7 +38,7 @@ pub(super) fn weighted_minimum_norm(
     svd.solve(&z, smallest).ok()
 }
 
-/// Solution of least norm over all joints, weighed by what is left of each. None where it cannot be found.
+/// Returns the minimum-norm solution over all joints, weighted by their residuals. None if there is no solution.
 pub(super) fn by_noise(factors: &[TriangularFactor]) -> Option<Vec<f64>> {
     let mut squares: Vec<f64> = factors
         .iter()
@@ -71,7 +71,7 @@ pub(super) fn kept_columns(
     (r.select_columns(&data.kept), z)
 }
 
-/// Triangular R of the kept columns alone and their solution.
+/// Solves for the kept columns alone.
 pub(super) fn least_squares(
     factor: &TriangularFactor,
     data: &Independent,
@@ -94,7 +94,7 @@ pub(super) fn least_squares(
         })
 }
 
-/// Standard deviations of the textbook, σ²·(XᵀX)⁻¹, and the inverse of the triangular factor.
+/// Returns the classical standard deviations, σ²·(XᵀX)⁻¹, and the inverse of the triangular factor.
 pub(super) fn classical(
     factor: &TriangularFactor,
     data: &Independent,

@@ -1,4 +1,4 @@
-//! Rows of the two models, streamed from a recording.
+//! Rows of the differential and the integral model, streamed from a recording.
 
 use rig_shared::multibody::{COLUMNS, Chain, column};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, Transmission};
@@ -10,41 +10,41 @@ use super::one_way::OneWay;
 use super::{IdentifyError, ModelKind};
 use rig_data::prepare::{Masked, Motion, PrepareError, Recording, Treatment, worked_motion};
 
-/// How rows are formed.
+/// The definition of the rows.
 pub struct Plan<'a> {
     /// Geometry.
     pub chain: &'a Chain<f64>,
     /// Drives.
     pub transmission: &'a Transmission<f64>,
-    /// Columns that are wanted (the base parameters'): 14 a joint, behind them 3 a motor.
+    /// Wanted columns (of the base parameters): 14 per joint, followed by 3 per motor.
     pub columns: &'a [usize],
-    /// What is done to the recordings.
+    /// Treatment of the recordings.
     pub treatment: &'a Treatment,
     /// Length of a window of the integral model, rows at the full rate.
     pub window: usize,
     /// Distance between the starts of neighbouring windows, rows at the full rate.
     pub stride: usize,
-    /// Per joint, how loud its torque is taken to be in the energy balance (its RMS), N·m or N.
+    /// Per joint, scale of its torque in the energy balance (its RMS), N·m or N.
     pub loudness: Vec<f64>,
     /// Joints that move in one direction only.
     pub one_way: Vec<OneWay>,
-    /// Rows made so far.
+    /// Rows computed so far.
     pub cache: RowCache,
 }
 
-/// What a column of the regressor belongs to.
+/// The origin of a regressor column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Belongs {
-    /// Column of [`Chain`]'s regressors: all of them, 14 a joint.
+    /// Column of [`Chain`]'s regressors, 14 per joint.
     Joint(usize),
-    /// Column of [`Transmission`]'s: motor, and which of its three.
+    /// Column of [`Transmission`]'s: motor, and index among its three.
     Motor(usize, usize),
     /// Zero for these drives.
     Nothing,
 }
 
 impl Plan<'_> {
-    /// What column `c` belongs to.
+    /// Returns the origin of column `c`.
     pub(super) fn belongs(&self, c: usize) -> Belongs {
         let standard = self.chain.parameter_count();
         if let Some(motor) = c.checked_sub(standard) {
@@ -54,7 +54,7 @@ impl Plan<'_> {
                 _ => Belongs::Nothing,
             };
         }
-        // Where the motor's own column states the inertia of the drive, the joint's does not.
+        // The joint has no drive inertia if a motor column holds it.
         let drive = c % COLUMNS == column::DRIVE_INERTIA;
         if drive && !self.transmission.has_joint_inertia(c / COLUMNS) {
             Belongs::Nothing
@@ -71,16 +71,16 @@ pub struct Equation {
     pub x: Vec<f64>,
     /// Torque, or the energy of a window scaled to a torque.
     pub y: Vec<f64>,
-    /// Whether the row is used.
+    /// True if the row is used.
     pub keep: Vec<bool>,
 }
 
 /// Rows of one piece.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
-    /// s (start of the window for the integral model)
+    /// Time, s (start of the window for the integral model).
     pub t: Vec<f64>,
-    /// One a joint for the differential model, one for the integral model.
+    /// One per joint for the differential model, one for the integral model.
     pub equations: Vec<Equation>,
     /// Per joint, position at each row.
     pub q: Vec<Vec<f64>>,
@@ -88,16 +88,16 @@ pub struct Rows {
     pub qd: Vec<Vec<f64>>,
 }
 
-/// Rows left out so far.
+/// Counts of excluded rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Rows used, over all equations.
+    /// Used rows over all equations.
     pub used: u64,
     /// Per joint (or window), too slow.
     pub slow: Vec<u64>,
     /// Per joint (or window), saturated.
     pub saturated: Vec<u64>,
-    /// Rows, before decimation, of stretches between gaps that are shorter than the filters need.
+    /// Rows, before decimation, in segments too short for the filters.
     pub short: u64,
 }
 
@@ -124,7 +124,7 @@ impl Tally {
         }
     }
 
-    /// As entries for a report.
+    /// Returns the counts as entries for a report.
     pub fn masked(&self) -> Vec<Masked> {
         let entries = |list: &[u64], why: &str| {
             list.iter()
@@ -157,7 +157,7 @@ impl Tally {
 /// Streams the rows of `recording` into `take`.
 ///
 /// # Errors
-/// What reading or `take` gives.
+/// Errors of reading and of `take`.
 pub fn each_rows(
     recording: &dyn Recording,
     plan: &Plan,
@@ -181,7 +181,7 @@ pub fn each_rows(
     Ok(tally)
 }
 
-/// The same with all rows of joints that move one way.
+/// The same, with all rows of joints that move in one direction.
 fn each_row_made(
     recording: &dyn Recording,
     plan: &Plan,
@@ -232,14 +232,14 @@ fn make_rows(
         ModelKind::Integral => {
             let maker = Integral::new(plan)?;
             let work = |motion: Motion| counted(&motion, |tally| maker.rows(&motion, tally));
-            // A window's quadrature looks one row beyond it.
+            // A window's quadrature needs one row beyond it.
             worked_motion(recording, treatment, plan.window + 1, &work, &mut give)?;
         }
     }
     Ok(total)
 }
 
-/// Rows of one piece with the count of what was left out.
+/// Computes the rows of one piece and counts the excluded ones.
 fn counted(
     motion: &Motion,
     rows: impl FnOnce(&mut Tally) -> Result<Rows, PrepareError>,
@@ -251,7 +251,7 @@ fn counted(
     Ok((rows(&mut tally)?, tally))
 }
 
-/// Rows of one piece of motion.
+/// Computes the rows of one piece of motion.
 pub(super) fn rows_of(
     motion: &Motion,
     plan: &Plan,

@@ -1,17 +1,17 @@
-//! Rows of the integral model for several joints: impulse against change of momentum, one equation a joint.
+//! Rows of the integral model for several joints: impulse equals change of momentum, one equation per joint.
 //!
-//! Lagrange's equations integrated over a window, ∫τ dt = P(end)·π − P(start)·π + ∫R dt·π, with the momentum P and what
-//! changes it beside the torque, R ([`rig_shared::multibody::momentum_regressor`]): linear in the same parameters as
-//! the differential model, without acceleration. The energy balance needs none either, but it is one equation for all
-//! joints: friction of a heavy joint that is not quite Coulomb and viscous drowns the light ones. On the Stäubli TX40
-//! windows of energy leave 14 to 92 % of the torque, windows of momentum 5 to 11 %, as the differential model does.
+//! Lagrange's equations integrated over a window, ∫τ dt = P(end)·π − P(start)·π + ∫R dt·π. P is the momentum, R its
+//! change without the torque ([`rig_shared::multibody::momentum_regressor`]). They are linear in the parameters of the
+//! differential model and need no acceleration. The energy balance needs none either, but it is one equation for all
+//! joints, and friction errors of a heavy joint hide the light ones. On the Stäubli TX40 windows of energy leave 14 to
+//! 92 % of the torque, windows of momentum 5 to 11 %, as the differential model does.
 //!
-//! The torque and the signs of the velocities pass the position's filter, as for the energy; each row is divided by
-//! the window's duration and so is a mean torque.
+//! The torque and the signs of the velocities pass the position filter, as for the energy. Each row is divided by the
+//! window's duration, which gives a mean torque.
 //!
-//! Torque and loss are summed by trapezia, alike, so that jumps of friction err on both sides and cancel. What they sum a smooth
-//! rate to differs from its integral by dt²/12·(its slope at the end less that at the start) (Euler and Maclaurin), so that
-//! the momentum is taken as trapezia see it: [`as_trapezia_see`].
+//! Torque and loss both use the trapezoidal rule, so that its errors at friction jumps cancel. For a smooth rate the
+//! rule differs from the integral by dt²/12·(slope at the end − slope at the start) (Euler and Maclaurin).
+//! [`as_trapezia_see`] gives the momentum the same error.
 
 use std::collections::VecDeque;
 
@@ -23,9 +23,9 @@ use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
 use super::slow::{HARDLY, slow_motors, stays};
 use rig_data::prepare::{LowPass, Motion, PrepareError};
 
-/// What the motors add to momentum and loss, each joint × motor column (3 a motor). With q̇ in place of the acceleration and
-/// at rest their columns are those of the momentum; of Jᵢ·(J·q̈ + J̇·q̇) the derivative of Jᵢ·(J·q̇) leaves −J̇ᵢ·(J·q̇), zero
-/// where the ratios are constant.
+/// Contribution of the motors to momentum and loss, each joint × motor column (3 per motor). Their columns at rest,
+/// with q̇ as acceleration, are those of the momentum. Of Jᵢ·(J·q̈ + J̇·q̇) the derivative of Jᵢ·(J·q̇) leaves
+/// −J̇ᵢ·(J·q̇), zero for constant ratios.
 pub(super) struct MotorMomentum {
     pub momentum: Vec<f64>,
     pub loss: Vec<f64>,
@@ -45,7 +45,7 @@ impl MotorMomentum {
         }
     }
 
-    /// At position `q` and velocity `qd`.
+    /// Computes both at position `q` and velocity `qd`.
     pub(super) fn at(
         &mut self,
         drives: &Transmission<f64>,
@@ -73,7 +73,7 @@ struct Instant {
     loss: Vec<f64>,
 }
 
-/// What forms the regressors at an instant, with room to work in.
+/// Workspace that computes the regressors at an instant.
 struct Maker<'a> {
     plan: &'a Plan<'a>,
     wide: Vec<f64>,
@@ -91,7 +91,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// `signs` and `motor_signs` are the filtered signs of the joints' and motors' speeds.
+    /// Computes the regressors; `signs` and `motor_signs` are the filtered signs of the joints' and motors' speeds.
     fn at(
         &mut self,
         q: &[f64],
@@ -133,7 +133,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// The motors' part, with the filtered signs of their speeds.
+    /// Adds the motors' part, with the filtered signs of their speeds.
     fn motors_at(
         &mut self,
         q: &[f64],
@@ -165,20 +165,20 @@ impl<'a> Maker<'a> {
     }
 }
 
-/// What trapezia sum the rate of a smooth quantity to, from its values at the row before, at the row and after it:
-/// x + dt²/12·ẍ.
+/// Returns x + dt²/12·ẍ, to which the trapezoidal rule sums the rate of a smooth quantity, from the values at the
+/// previous, the current and the next row.
 pub(super) fn as_trapezia_see([before, now, after]: [f64; 3]) -> f64 {
     now + (after - 2.0 * now + before) / 12.0
 }
 
-/// A window that is under way.
+/// A window that is not yet complete.
 struct Open {
     start: usize,
     momentum: Vec<f64>,
     sum: Vec<f64>,
 }
 
-/// Rows of one piece.
+/// Computes the rows of one piece.
 pub(super) fn momentum_rows(
     motion: &Motion,
     plan: &Plan,
@@ -194,7 +194,7 @@ pub(super) fn momentum_rows(
         qd: vec![Vec::new(); n],
         ..Default::default()
     };
-    // The row before the first and the one after the last are looked at as well.
+    // The row before the first and the row after the last are also needed.
     let (first, last) = (motion.usable.0.max(1), motion.sound.1.saturating_sub(1));
     if first >= motion.usable.1.min(last) {
         return Ok(result);
@@ -281,7 +281,7 @@ pub(super) fn momentum_rows(
                     .y
                     .push((torque[j][k] - torque[j][done.start]) / duration);
                 let over = |c: &[u32]| c[k + 1] - c[done.start];
-                // Half a window without a sign of the velocity says little of friction.
+                // Half a window without a sign of the velocity says little about friction.
                 let most = |[slow, hardly]: &[Vec<u32>; 2]| {
                     let rows = over(slow) as usize;
                     2 * rows > plan.window || stays(rows, over(hardly) as usize, plan.window)
@@ -315,7 +315,7 @@ pub(super) fn momentum_rows(
     Ok(result)
 }
 
-/// Filtered signs of the motors' speeds, where drives are coupled.
+/// Returns the filtered signs of the motors' speeds, for coupled drives.
 fn motor_signs(
     motion: &Motion,
     plan: &Plan,
@@ -341,7 +341,7 @@ fn motor_signs(
     Ok(signs.iter().map(|s| low_pass.zero_phase(s)).collect())
 }
 
-/// ∫ from the first row on, by trapezia.
+/// Returns the integral from the first row by the trapezoidal rule.
 fn running_integral(signal: &[f64], dt: f64) -> Vec<f64> {
     let mut sum = 0.0;
     let mut all = Vec::with_capacity(signal.len());

@@ -1,7 +1,7 @@
-//! Joints that move in one direction only: there dry friction and a constant torque are one constant, and the data tell their sum.
+//! Joints that move in one direction only: dry friction and a constant torque are collinear; the data give their sum.
 //!
-//! Rows near rest would separate the two by the way in which the direction of friction is smoothed there, which is no measurement of
-//! either. They do not count for such a joint, in an identification and in a diagnosis alike.
+//! Rows near rest would separate the two only by the smoothed sign of friction there, which measures neither. They are
+//! not used for such a joint, in an identification and in a diagnosis.
 
 use rig_shared::multibody::{COLUMNS, column};
 
@@ -9,25 +9,25 @@ use super::model::{Plan, Rows, Tally, each_rows};
 use super::{IdentifyError, ModelKind};
 use rig_data::prepare::Recording;
 
-/// Direction of dry friction from which on a joint slides in it: the rest is the smoothed change of direction about a rest.
+/// Smallest smoothed sign of dry friction at which a joint slides; below it the sign is changing near rest.
 pub const SLIDES: f64 = 0.99;
-/// Time that a joint has to slide in each direction for its dry friction to be told from a constant torque, s: as long as a law of the
-/// speed needs in slow motion (`diagnose::testable`).
+/// Smallest sliding time in each direction that separates dry friction from a constant torque, s. A law of the speed
+/// needs the same time in slow motion (`diagnose::testable`).
 const LEAST: f64 = 0.5;
 
-/// Rows in which a joint slides ahead and back.
+/// Counts of rows in which a joint slides forwards and backwards.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Slides([usize; 2]);
 
 impl Slides {
-    /// Takes the direction of dry friction of a row that is used.
+    /// Adds the sign of dry friction of a used row.
     pub fn take(&mut self, direction: f64) {
         self.0[0] += usize::from(direction > SLIDES);
         self.0[1] += usize::from(direction < -SLIDES);
     }
 
-    /// The one direction that a joint moves in, 1 or −1; none where it moves both ways, or hardly at all. `period` is that of the
-    /// rows, s.
+    /// Returns the only direction of a joint, 1 or −1; none if it moves both ways or hardly moves. `period` is that of
+    /// the rows, s.
     pub fn one_way(self, period: f64) -> Option<f64> {
         let [ahead, back] = self.0.map(|rows| rows as f64 * period);
         (ahead.min(back) < LEAST && ahead.max(back) >= LEAST).then_some(if ahead > back {
@@ -41,7 +41,7 @@ impl Slides {
 /// A joint that moves in one direction only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneWay {
-    /// Which, from 0.
+    /// Index of the joint, from 0.
     joint: usize,
     /// Place of its dry friction among the columns.
     place: usize,
@@ -50,7 +50,7 @@ pub struct OneWay {
 }
 
 impl OneWay {
-    /// Leaves out rows of the joint about rests, and counts them. In the others it slides.
+    /// Excludes and counts the joint's rows near rest, so that it slides in all others.
     pub(super) fn apply(&self, rows: &mut Rows, tally: &mut Tally) {
         let Some(equation) = rows.equations.get_mut(self.joint) else {
             return;
@@ -68,10 +68,10 @@ impl OneWay {
     }
 }
 
-/// Joints of the training data that move one way only, of those whose dry friction and constant torque are both among the columns.
+/// Finds the joints that move one way in the training data, if their dry friction and constant torque are both columns.
 ///
 /// # Errors
-/// What reading gives.
+/// Reading errors.
 pub(super) fn one_way(
     training: &[&dyn Recording],
     plan: &Plan,

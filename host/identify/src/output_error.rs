@@ -1,11 +1,11 @@
 //! Closed-loop output error, DIDIM (Gautier, Janot & Vandanjon 2013): only the measured torque is fitted.
 //!
-//! The torque of the simulated closed loop is τs = X(qs, q̇s, q̈s)·β along the simulated motion; each pass is the
-//! Gauss–Newton step in which the motion's own dependence on β is neglected, as DIDIM does: a controller that
-//! tracks makes it small. The measured position takes no part (but for masks and the first state), so its noise
-//! does no harm and it is neither filtered nor differentiated for the fit.
+//! The torque of the simulated closed loop is τs = X(qs, q̇s, q̈s)·β along the simulated motion. Each pass is a
+//! Gauss–Newton step that neglects the dependence of the motion on β, as DIDIM does; a controller that tracks well
+//! makes it small. The measured position is used only for masks and the first state. So its noise does no harm, and the
+//! fit neither filters nor differentiates it.
 //!
-//! Leaves out: the neglected part of the Jacobian; identification of the controller's gains.
+//! Limits: the Jacobian lacks the neglected part; the controller's gains are not identified.
 
 use super::IdentifyError;
 use super::closed::{Source, nearest};
@@ -17,9 +17,9 @@ use super::parts::{LeaveOut, PARTS, Parts, joined, part_of};
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 
-/// Settled when no parameter moves by more than this share of its standard deviation …
+/// Largest change of a parameter at convergence, as a share of its standard deviation.
 const SETTLED: f64 = 0.02;
-/// … or after this many passes; then a warning says so.
+/// Largest number of passes; a warning reports it.
 const MOST_PASSES: usize = 15;
 
 /// Fits the simulated torque to the measured one.

@@ -1,7 +1,7 @@
-//! The training data in stretches of time: every estimate with one stretch left out at a time.
+//! The training data in time segments: every estimate is repeated with one segment left out at a time.
 //!
 //! The same leave-one-out values give the covariance (delete-group jackknife, Shao & Tu 1995, ch. 2) and the
-//! cross-validated error: no model of the residual's correlation is needed for either.
+//! cross-validated error. Neither needs a model of the residual's correlation.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,19 +12,19 @@ use super::model::each_rows;
 use super::problem::Problem;
 use super::{IdentifyError, ModelKind};
 
-/// Stretches into which the training data are cut.
+/// Number of segments of the training data.
 pub(super) const PARTS: usize = 16;
-/// A stretch must be this many times as long as the residual's memory; else neighbours are joined, to …
+/// Minimum length of a segment, in correlation times of the residual; shorter neighbours are joined.
 const MEMORIES_PER_PART: f64 = 10.0;
-/// … this many at least.
+/// Smallest number of segments after joining.
 const FEWEST_PARTS: usize = 8;
 
-/// Stretch of instant `index` among `total`.
+/// Returns the segment of instant `index` among `total`.
 pub(super) fn part_of(index: u64, total: u64) -> usize {
     ((u128::from(index) * PARTS as u128 / u128::from(total.max(1))) as usize).min(PARTS - 1)
 }
 
-/// How many of the finest stretches may count as independent.
+/// Returns the number of segments that are independent enough.
 pub(super) fn part_count(instants: u64, memory_rows: f64) -> usize {
     if instants as f64 >= PARTS as f64 * MEMORIES_PER_PART * memory_rows {
         PARTS
@@ -33,7 +33,7 @@ pub(super) fn part_count(instants: u64, memory_rows: f64) -> usize {
     }
 }
 
-/// One factor a stretch, neighbours joined to `count`.
+/// Joins neighbours to `count` segments, one factor each.
 pub(super) fn joined(parts: Vec<TriangularFactor>, count: usize) -> Vec<TriangularFactor> {
     let each = parts.len().div_ceil(count.max(1)).max(1);
     parts
@@ -48,16 +48,16 @@ pub(super) fn joined(parts: Vec<TriangularFactor>, count: usize) -> Vec<Triangul
         .collect()
 }
 
-/// Factor of all stretches, and of all but each one.
+/// Factor of all segments, and of all but each one.
 pub(super) struct LeaveOut {
-    /// All.
+    /// All segments.
     pub whole: TriangularFactor,
-    /// All but the one of this index.
+    /// All but the segment of this index.
     pub without: Vec<TriangularFactor>,
 }
 
 impl LeaveOut {
-    /// Merges from both ends: three merges a stretch.
+    /// Merges from both ends: three merges per segment.
     pub(super) fn of(parts: &[TriangularFactor]) -> Self {
         let columns = parts.first().map_or(0, TriangularFactor::columns);
         let empty = TriangularFactor::new(columns);
@@ -82,7 +82,7 @@ impl LeaveOut {
         }
     }
 
-    /// The same fit on all and on each remainder.
+    /// Repeats a fit on all segments and on each remainder.
     pub(super) fn refit(
         &self,
         fit: &dyn Fn(&TriangularFactor) -> Result<Vec<f64>, IdentifyError>,
@@ -94,17 +94,17 @@ impl LeaveOut {
     }
 }
 
-/// Values from everything and with each stretch left out.
+/// Values from all data and with each segment left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Refit {
-    /// From everything.
+    /// From all data.
     pub whole: Vec<f64>,
-    /// Without one stretch.
+    /// Without one segment.
     pub without: Vec<Vec<f64>>,
 }
 
 impl Refit {
-    /// The same function of every set of values.
+    /// Applies a function to every set of values.
     pub(super) fn map(&self, of: &dyn Fn(&[f64]) -> Vec<f64>) -> Self {
         Self {
             whole: of(&self.whole),
@@ -112,7 +112,7 @@ impl Refit {
         }
     }
 
-    /// Delete-group jackknife covariance.
+    /// Returns the delete-group jackknife covariance.
     pub(super) fn covariance(&self) -> DMatrix<f64> {
         let (size, groups) = (self.whole.len(), self.without.len() as f64);
         let mut mean = DVector::zeros(size);
@@ -128,22 +128,22 @@ impl Refit {
     }
 }
 
-/// Every stretch's factor by equation, and what the residuals of the weighted fit remember.
+/// Every segment's factor per equation, and the correlation times of the weighted fit's residuals.
 pub(super) struct Parts {
-    /// By stretch, then by equation of the fitted model.
+    /// By segment, then by equation of the fitted model.
     pub fitted: Vec<Vec<TriangularFactor>>,
-    /// By stretch, then by joint, torque against motion: what estimates are judged on.
+    /// By segment, then by joint, torque against motion: the rows that judge estimates.
     pub judged: Vec<Vec<TriangularFactor>>,
-    /// Memory of each equation's residual, rows.
+    /// Correlation time of each equation's residual, rows.
     pub memory: Vec<f64>,
     /// Rows over all equations.
     pub rows: u64,
-    /// Stretches that may count as independent.
+    /// Number of independent segments.
     pub count: usize,
 }
 
 impl Parts {
-    /// One pass over the rows (two for the integral model, which is judged by its torque).
+    /// Passes once over the rows (twice for the integral model, which is judged by its torque).
     pub(super) fn collect(problem: &Problem) -> Result<Self, IdentifyError> {
         let full = problem.start_full();
         let (fitted, memories) = sorted(problem, problem.options.model, &full, problem.instants)?;
@@ -186,7 +186,7 @@ impl Parts {
         })
     }
 
-    /// One factor a stretch, the equations at given weights.
+    /// Returns one factor per segment, with the equations at given weights.
     pub(super) fn weighted(&self, weights: &[f64]) -> Vec<TriangularFactor> {
         self.fitted
             .iter()
@@ -201,8 +201,8 @@ impl Parts {
             .collect()
     }
 
-    /// Cross-validated RMS of each joint's torque residual: every stretch predicted from all the others; not a number where
-    /// no torque of the joint is used.
+    /// Returns the cross-validated RMS of each joint's torque residual: every segment is predicted from all the others.
+    /// Not a number if no torque of the joint is used.
     pub(super) fn cross_validated(&self, full: &Refit) -> Vec<f64> {
         let joints = self.judged.first().map_or(0, Vec::len);
         (0..joints)
@@ -217,7 +217,7 @@ impl Parts {
             .collect()
     }
 
-    /// RMS of each joint's torque over the judged rows.
+    /// Returns the RMS of each joint's torque over the judged rows.
     pub(super) fn torque_rms(&self) -> Vec<f64> {
         let joints = self.judged.first().map_or(0, Vec::len);
         (0..joints)

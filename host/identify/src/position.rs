@@ -1,14 +1,14 @@
-//! Torque that goes with the position of a joint and that the description does not state: the spring of a cable or hose,
-//! and ripple of two to six periods a turn, as eccentric gears and the spokes of torque sensors have it.
+//! Position-dependent joint torque beyond the description: the spring of a cable or hose, and ripple of two to six
+//! periods per turn, as from eccentric gears and the spokes of torque sensors.
 //!
-//! A motion of one frequency ω shows J·q̈ + c·q as (c − Jω²)·q: the data alone cannot tell a spring from an inertia, but the
-//! description's inertia can. Without the spring the fit bends masses, inertias and friction until they pull like one,
-//! and fails at another speed. A term is taken where it makes data and description together so much more likely as is
-//! called very strong (Kass & Raftery 1995), and as many times more as there are terms to choose from; one after the
-//! other, the likeliest first. Before the data a term is as likely as not to make all of the joint's torque.
+//! A motion of one frequency ω shows J·q̈ + c·q as (c − Jω²)·q. The data alone cannot separate a spring from an
+//! inertia; the described inertia can. Without the spring the fit distorts masses, inertias and friction to imitate it,
+//! and fails at another speed. A term is accepted if the evidence for it is "very strong" (Kass & Raftery 1995), times
+//! the number of candidate terms. Terms are added one at a time, the most likely first. The prior deviation of a term
+//! makes all of the joint's torque.
 //!
-//! Leaves out: hysteresis of the cable, stiffness that grows with the stretch, ripple with the load or of other orders
-//! (`rig diagnose` looks for these).
+//! Limits: no hysteresis of the cable, no progressive stiffness, no ripple with the load or of other orders (`rig
+//! diagnose` searches for these).
 
 use rig_shared::effects::{Effect, GAINS, Kind, SHAPES};
 use serde::Serialize;
@@ -18,32 +18,32 @@ use super::terms::terms_of;
 use rig_model::robot::{Robot, RobotEffect};
 use rig_output::format_value;
 
-/// Torque that goes with a joint's position.
+/// A torque that depends on a joint's position.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PositionTorque {
     /// Name of the joint.
     pub joint: String,
-    /// Periods in one turn of the joint; none for a spring.
+    /// Periods per turn of the joint; none for a spring.
     pub periods: Option<usize>,
-    /// Stiffness, N·m/rad or N/m; or amplitudes over the joint's own angle of cosine and sine, N·m.
+    /// Stiffness, N·m/rad or N/m; or amplitudes of cosine and sine over the joint's own angle, N·m.
     pub values: Vec<f64>,
     /// Standard deviations of the values.
     pub std: Vec<f64>,
-    /// Logarithm of how many times more likely the data are with it.
+    /// Logarithm of the likelihood ratio of the data with and without it.
     pub log_evidence: f64,
-    /// As a description states it.
+    /// The effect in the description.
     pub effect: RobotEffect,
 }
 
 impl PositionTorque {
-    /// N·m or N at the joint's position `q`.
+    /// Returns the torque, N·m or N, at the joint's position `q`.
     pub fn torque(&self, q: f64) -> f64 {
         let mut terms = [0.0; 2];
         terms_of(self.periods, q, &mut terms);
         product(&terms, &self.values)
     }
 
-    /// One sentence.
+    /// Returns one sentence.
     pub(super) fn said(&self) -> String {
         let what = match self.periods {
             None => format!(
@@ -65,7 +65,7 @@ impl PositionTorque {
     }
 }
 
-/// As an effect; the gear's law counts the motor's angle, which is `ratio`·q + `zero`. The preload of a spring is the
+/// Converts it to an effect. The gear's law uses the motor's angle, `ratio`·q + `zero`. The preload of a spring is the
 /// joint's offset.
 pub(super) fn effect(
     robot: &Robot,

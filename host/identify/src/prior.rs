@@ -1,4 +1,4 @@
-//! What is known of a robot before its data: the description's inertial values, or a plausible body in their place.
+//! Prior knowledge of a robot: the description's inertial values, or a plausible body in their place.
 
 use nalgebra::{DMatrix, DVector, Matrix4};
 use rig_shared::multibody::{COLUMNS, column};
@@ -9,56 +9,56 @@ use super::pseudo_inertia::{Divergence, INERTIAL, parameters_of};
 use rig_model::robot::{Quantity, Robot, STAND_IN, Worth, worth};
 use rig_output::format_significant;
 
-/// Density of the stand-in bodies, kg/m³: aluminium castings with as much air as metal.
+/// Density of the substitute bodies, kg/m³: aluminium castings with equal volumes of air and metal.
 const DENSITY: f64 = 1300.0;
-/// Least half-width of a stand-in body, m.
+/// Smallest half-width of a substitute body, m.
 const LEAST_HALF_WIDTH: f64 = 0.06;
-/// Where nothing is known of a friction or drive value: this share of what the joint's torque and speed suggest.
+/// Assumed value of unknown friction or drive inertia, as a share of the value that would make all of the torque.
 const SMALL_SHARE: f64 = 0.01;
 
-/// What a standard column must obey.
+/// Constraint on a standard column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rule {
-    /// One of the ten inertial parameters of a link (its index): J positive definite.
+    /// One of the ten inertial parameters of a link (its index): J is positive definite.
     Inertial(usize),
-    /// Friction and drive inertia: not below zero.
+    /// Friction and drive inertia: not negative.
     NotNegative,
-    /// Offsets.
+    /// Offsets: unconstrained.
     Free,
 }
 
-/// Prior values, their natural scales and rules, by standard column.
+/// Prior values, their natural scales and constraints, by standard column.
 #[derive(Clone, Debug)]
 pub(super) struct Prior {
-    /// Centre.
+    /// Prior value of each column.
     pub centre: Vec<f64>,
-    /// Natural size of each column: what "100 %" means.
+    /// Natural size of each column: the meaning of "100 %".
     pub scale: Vec<f64>,
-    /// What a column's value can plausibly be: `scale`, for unstated friction, drive inertia and offset what would make all
-    /// of the joint's torque.
+    /// Largest plausible value of a column: `scale`; for unstated friction, drive inertia and offset the value that
+    /// would make all of the joint's torque.
     pub size: Vec<f64>,
-    /// Friction and drive inertia that would make all of the joint's torque, by column; 0 of the others.
+    /// Friction and drive inertia that would make all of the joint's torque, by column; 0 for the others.
     whole: Vec<f64>,
-    /// Least-squares value of each column of friction or drive inertia; not a number where there is none.
+    /// Least-squares value of each friction or drive inertia column; not a number if there is no value.
     seen: Vec<f64>,
-    /// Relative uncertainty of each column; infinite where nothing is known.
+    /// Relative uncertainty of each column; infinite for unknown values.
     pub uncertainty: Vec<f64>,
-    /// Rules.
+    /// Constraints.
     pub rules: Vec<Rule>,
-    /// What each joint's own columns hold of drives that move it from another joint: π = shares·π', π' the values
-    /// here. Absent where every drive moves its own joint only.
+    /// Contribution of drives that move several joints to each joint's columns: π = shares·π', with π' the values here.
+    /// Absent if every drive moves only its own joint.
     pub shares: Option<DMatrix<f64>>,
-    /// One divergence a link.
+    /// One divergence per link.
     pub bodies: Vec<Divergence>,
-    /// Multiplies every pull: where the path of the solution ends.
+    /// Factor on every pull; the solution path ends at this value.
     pub strength: f64,
-    /// Sentences: what stands in for what.
+    /// Sentences about substituted values.
     pub remarks: Vec<String>,
-    /// Whether the description states inertial values for every link.
+    /// True if the description states inertial values for every link.
     pub stated: bool,
 }
 
-/// What the data suggest for a column that the description does not know.
+/// Estimates from the data for columns that the description does not state.
 pub(super) struct Hints {
     /// Least-squares value of each standard column that is identified on its own, else NaN.
     pub values: Vec<f64>,
@@ -71,13 +71,13 @@ pub(super) struct Hints {
 }
 
 impl Prior {
-    /// From the description; `given` is the relative uncertainty of its values.
+    /// Builds the prior from the description; `given` is the relative uncertainty of its values.
     pub(super) fn of(robot: &Robot, columns: usize, hints: &Hints, given: f64) -> Self {
         let n = robot.joints.len();
         let shares = shares(robot, columns);
         let mut described = described(robot, columns);
         if let Some(shares) = &shares {
-            // Triangular with ones on the diagonal.
+            // Exact inverse: `shares` is the identity plus a matrix whose square is zero.
             described = 2.0 * &described - shares * &described;
         }
         let described = described.as_slice().to_vec();
@@ -131,18 +131,18 @@ impl Prior {
         prior
     }
 
-    /// Takes what stands in the description for no knowledge: it is a first value where the data give none.
+    /// Discards the described value as knowledge; it stays the initial value if the data give none.
     fn forget(&mut self, c: usize) {
         let (size, seen) = (self.whole[c], self.seen[c]);
         self.uncertainty[c] = f64::INFINITY;
-        // Where the motion tells it badly, least squares may give what no torque was there for.
+        // A weakly excited value from least squares may need more torque than there was.
         let value = if seen.is_nan() { self.centre[c] } else { seen };
         self.centre[c] = value.clamp(SMALL_SHARE * size, size);
         self.scale[c] = self.centre[c];
     }
 
-    /// The same without those stated values of friction and drive inertia that the data contradict; `data` has the residual's noise as
-    /// unit, over the standard columns. Each is said.
+    /// Removes stated values of friction and drive inertia that the data contradict, with a remark for each. `data` is
+    /// over the standard columns, in units of the residual's noise.
     pub(super) fn without_contradicted(
         mut self,
         data: &DMatrix<f64>,
@@ -176,7 +176,7 @@ impl Prior {
         self
     }
 
-    /// The same with values behind its own of which nothing is known but their size.
+    /// Appends values of which only the size is known.
     pub(super) fn with_free(&self, sizes: &[f64]) -> Self {
         let mut prior = self.clone();
         let all = prior.centre.len() + sizes.len();
@@ -196,7 +196,7 @@ impl Prior {
         prior
     }
 
-    /// The ten parameters of link `i`: the description's where a body can have them, else a stand-in.
+    /// Sets the ten parameters of link `i`: the described ones if they are physically consistent, else a substitute.
     fn link(&mut self, robot: &Robot, i: usize, given: f64) {
         let at = i * COLUMNS;
         let stated = robot.joints[i].inertial.is_some();
@@ -223,7 +223,7 @@ impl Prior {
                 for c in at..at + INERTIAL {
                     self.uncertainty[c] = STAND_IN.max(given);
                 }
-                // A block of finite size is always a body; the unit block answers for rounding.
+                // A block of finite size is always consistent; the unit block covers rounding errors.
                 match Divergence::new(&stand_in) {
                     Some(divergence) => divergence,
                     None => return self.unit_block(at),
@@ -255,7 +255,7 @@ impl Prior {
         }
     }
 
-    /// A matrix over the standard columns as one over the values here.
+    /// Converts a matrix over the standard columns to the values here.
     pub(super) fn own(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.shares {
             Some(shares) => matrix * shares,
@@ -263,7 +263,7 @@ impl Prior {
         }
     }
 
-    /// Drive inertias of joints that only drives of other joints move: none is stated, and no torque has a place for it.
+    /// Returns the drive inertias of joints that only drives of other joints move: no torque contains them.
     pub(super) fn nothing_of_its_own(&self, own: &DMatrix<f64>) -> impl Iterator<Item = usize> {
         let coupled = self.shares.is_some();
         let links = self.bodies.len() * COLUMNS;
@@ -273,7 +273,7 @@ impl Prior {
         })
     }
 
-    /// Values here as standard parameters.
+    /// Converts the values here to standard parameters.
     pub(super) fn standard(&self, own: &DVector<f64>) -> Vec<f64> {
         match &self.shares {
             Some(shares) => (shares * own).as_slice().to_vec(),
@@ -281,20 +281,20 @@ impl Prior {
         }
     }
 
-    /// Size of the divergence's pull: the inverse square of the relative uncertainty, by standard column.
+    /// Returns the size of the divergence's pull, by standard column: the inverse square of the relative uncertainty.
     pub(super) fn pull(&self, c: usize) -> f64 {
         let u = self.uncertainty[c];
         if u.is_finite() {
             1.0 / (u * u)
         } else {
-            // Barrier only: keeps the value off zero by a share of its own uncertainty.
+            // Barrier only: keeps the value away from zero by a share of its own uncertainty.
             0.1
         }
     }
 }
 
-/// Joint and place among the joint's columns of a standard column. Motor columns follow the standard ones, three a joint: inertia,
-/// viscous, Coulomb.
+/// Returns the joint of a standard column and its place among the joint's columns. Motor columns follow, three per
+/// joint: inertia, viscous, Coulomb.
 fn place_of(c: usize, joints: usize) -> (usize, usize) {
     if c < joints * COLUMNS {
         return (c / COLUMNS, c % COLUMNS);
@@ -308,7 +308,7 @@ fn place_of(c: usize, joints: usize) -> (usize, usize) {
     ((after / MOTOR_COLUMNS).min(joints.saturating_sub(1)), place)
 }
 
-/// What a friction, drive inertia or offset would be if it made all of the joint's torque; 1 where nothing moved.
+/// Returns the friction, drive inertia or offset that would make all of the joint's torque; 1 if nothing moved.
 fn size_of(place: usize, joint: usize, hints: &Hints) -> f64 {
     let motion = match place {
         column::DRIVE_INERTIA => hints.acceleration[joint],
@@ -323,7 +323,7 @@ fn size_of(place: usize, joint: usize, hints: &Hints) -> f64 {
     }
 }
 
-/// The description's standard parameters, those of motors behind them where there are columns for them.
+/// Returns the described standard parameters, followed by those of motors if there are columns for them.
 pub fn described(robot: &Robot, columns: usize) -> DVector<f64> {
     let mut all = robot.standard_parameters().concat();
     all.extend(robot.motor_parameters().concat());
@@ -331,8 +331,8 @@ pub fn described(robot: &Robot, columns: usize) -> DVector<f64> {
     DVector::from_vec(all)
 }
 
-/// Where a drive moves other joints too, their columns hold its inertia and viscous friction by the square of the
-/// ratio; see [`rig_shared::transmission`].
+/// Returns the matrix by which drives that move several joints add inertia and viscous friction to their columns, with
+/// the square of the ratio; see [`rig_shared::transmission`].
 fn shares(robot: &Robot, columns: usize) -> Option<DMatrix<f64>> {
     let n = robot.joints.len();
     if columns <= n * COLUMNS {
@@ -360,7 +360,7 @@ fn shares(robot: &Robot, columns: usize) -> Option<DMatrix<f64>> {
     Some(shares)
 }
 
-/// A uniform block from the link's frame to the next one's (half as far again as wide at the end of the chain).
+/// Returns a uniform block from the link's frame to the next one's; a cube at the end of the chain.
 fn stand_in(
     robot: &Robot,
     i: usize,

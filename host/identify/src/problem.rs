@@ -1,4 +1,4 @@
-//! What every estimator beyond least squares starts from, and what it gives back.
+//! Input and output of every estimator beyond least squares.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,7 +11,7 @@ use super::{IdentifyError, ModelKind, Options};
 use rig_data::prepare::{PrepareError, Recording, Survey};
 use rig_model::robot::Robot;
 
-/// The weighted fit and all that led to it.
+/// The weighted fit and its inputs.
 pub(super) struct Problem<'a> {
     pub robot: &'a Robot,
     pub training: &'a [&'a dyn Recording],
@@ -26,23 +26,23 @@ pub(super) struct Problem<'a> {
     pub weights: &'a [f64],
     /// Weighted least squares: values of the identified combinations.
     pub start: &'a [f64],
-    /// Instants over all training recordings.
+    /// Number of instants over all training recordings.
     pub instants: u64,
 }
 
 impl Problem<'_> {
-    /// Values of the weighted fit over all base columns.
+    /// Returns the values of the weighted fit over all base columns.
     pub(super) fn start_full(&self) -> Vec<f64> {
         spread(self.start, &self.data.kept, self.base.len())
     }
 
-    /// Factor that the rows of each training recording are multiplied by.
+    /// Returns the factor for the rows of each training recording.
     pub(super) fn recording_weights(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.training.len()).map(|r| self.options.row_weight(r))
     }
 
-    /// Every `step`-th instant of the training recordings: its rows of the differential model, which of them it is, and the
-    /// recording's weight.
+    /// Visits every `step`-th instant of the training recordings: its rows of the differential model, its index in
+    /// them, and the recording's weight.
     pub(super) fn each_instant(
         &self,
         step: u64,
@@ -68,7 +68,7 @@ impl Problem<'_> {
         Ok(())
     }
 
-    /// Weights by which rows count as what they are worth when the residual remembers its past: σ·√memory as unit.
+    /// Returns weights in units of σ·√(correlation time), by which correlated rows count as fewer independent ones.
     pub(super) fn tempered(&self, parts: &Parts) -> Vec<f64> {
         self.weights
             .iter()
@@ -77,13 +77,13 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// Covariance of the identified combinations, from that of all base columns.
+    /// Returns the covariance of the identified combinations from that of all base columns.
     pub(super) fn identified_covariance(&self, full: &DMatrix<f64>) -> DMatrix<f64> {
         let k = &self.data.combination;
         k * full * k.transpose()
     }
 
-    /// The identified combinations of values of all base columns.
+    /// Returns the identified combinations for values of all base columns.
     pub(super) fn identified(&self, full: &[f64]) -> Vec<f64> {
         (&self.data.combination * DVector::from_column_slice(full))
             .as_slice()
@@ -91,32 +91,32 @@ impl Problem<'_> {
     }
 }
 
-/// What an estimator gives.
+/// The result of an estimator.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted {
-    /// Values of all base columns, from everything and with one stretch left out at a time.
+    /// Values of all base columns, from all data and with one segment left out at a time.
     pub full: Refit,
     /// Values of the identified combinations, likewise.
     pub kept: Refit,
-    /// Full standard parameters, where the estimator gives them.
+    /// Full standard parameters, if the estimator gives them.
     pub standard: Option<Vec<f64>>,
-    /// Standard deviations that the estimator's own theory gives for white residuals.
+    /// Standard deviations from the estimator's own theory for white residuals.
     pub classical_std: Vec<f64>,
-    /// Covariance of all base columns by the estimator's own theory, where the jackknife does not say what is meant.
+    /// Covariance of all base columns from the estimator's own theory, if the jackknife does not apply.
     pub covariance: Option<DMatrix<f64>>,
-    /// Upper triangle of the regressor as fitted, for condition numbers.
+    /// Upper triangle of the fitted regressor, for condition numbers.
     pub regressor: DMatrix<f64>,
-    /// How it went, sentences for the report.
+    /// Remarks on the fit, sentences for the report.
     pub said: Vec<String>,
     /// What the reader must know.
     pub warnings: Vec<String>,
-    /// Why the estimate is not to be trusted over others, a clause (instruments only).
+    /// Reason to trust other estimates more, a clause (instruments only).
     pub doubtful: Option<String>,
 }
 
 impl Fitted {
-    /// The estimate with its covariance; `beside` is what the uncertainty of terms beyond the description adds to that of
-    /// all base columns.
+    /// Returns the estimate with its covariance; `beside` is the contribution of terms beyond the description to the
+    /// covariance of all base columns.
     pub(super) fn estimate(
         &self,
         parts: &Parts,
@@ -150,7 +150,7 @@ impl Fitted {
     }
 }
 
-/// A sentence about a matrix that cannot be solved with.
+/// Returns the error for a singular matrix.
 pub(super) fn singular(what: &str) -> IdentifyError {
     IdentifyError::Singular {
         column: what.to_owned(),

@@ -1,16 +1,15 @@
-//! The pseudo-inertia of a link, and the divergence that keeps it that of a body.
+//! The pseudo-inertia of a link, and the divergence that keeps it physically consistent.
 //!
-//! J = [[Σ, h], [hᵀ, m]] with Σ = ½·tr(I)·1 − I the second moments about the frame's origin, h = m·c: the ten
-//! inertial parameters are those of a body with some distribution of mass exactly where J is positive
-//! semidefinite (Wensing, Kim & Slotine 2018); mass above zero and the triangle inequality of the principal
-//! moments follow.
+//! J = [[Σ, h], [hᵀ, m]] with Σ = ½·tr(I)·1 − I the second moments about the frame's origin, h = m·c. The ten inertial
+//! parameters belong to a body with some mass distribution exactly if J is positive semidefinite (Wensing, Kim &
+//! Slotine 2018). Positive mass and the triangle inequality of the principal moments follow.
 
 use nalgebra::{Matrix4, SMatrix, SVector};
 
 /// The ten parameters m mx my mz Ixx Ixy Ixz Iyy Iyz Izz, inertia about the frame's origin.
 pub(super) const INERTIAL: usize = 10;
 
-/// J of ten inertial parameters.
+/// Returns J for ten inertial parameters.
 pub fn pseudo_inertia(p: &[f64]) -> Matrix4<f64> {
     let half = 0.5 * (p[4] + p[7] + p[9]);
     let (xx, yy, zz) = (half - p[4], half - p[7], half - p[9]);
@@ -23,7 +22,7 @@ pub fn pseudo_inertia(p: &[f64]) -> Matrix4<f64> {
     )
 }
 
-/// The ten inertial parameters of J.
+/// Returns the ten inertial parameters of J.
 pub(super) fn parameters_of(j: &Matrix4<f64>) -> [f64; INERTIAL] {
     let (xx, yy, zz) = (j[(0, 0)], j[(1, 1)], j[(2, 2)]);
     [
@@ -40,9 +39,8 @@ pub(super) fn parameters_of(j: &Matrix4<f64>) -> [f64; INERTIAL] {
     ]
 }
 
-/// Smallest eigenvalue of J in its own units of length: J is scaled so that mass and second moments count alike
-/// (by the mass and the radius of gyration), so the result has no unit; above zero where a body can have these
-/// parameters. Minus infinity where mass or second moments are not positive.
+/// Returns the smallest eigenvalue of J, scaled by the mass and the radius of gyration so that it has no unit. Positive
+/// if a body can have these parameters; minus infinity if mass or second moments are not positive.
 pub fn least_eigenvalue(p: &[f64]) -> f64 {
     let j = pseudo_inertia(p);
     let (mass, second) = (j[(3, 3)], j[(0, 0)] + j[(1, 1)] + j[(2, 2)]);
@@ -67,9 +65,9 @@ fn direction(k: usize) -> Matrix4<f64> {
     pseudo_inertia(&unit)
 }
 
-/// D(J‖J₀) = tr(J₀⁻¹·J) − ln det(J₀⁻¹·J) − 4, the Bregman divergence of −ln det (Lee, Wensing & Park 2020): convex
-/// in the parameters, zero at the prior, infinite where J stops being positive definite; the same in every frame
-/// and every unit.
+/// D(J‖J₀) = tr(J₀⁻¹·J) − ln det(J₀⁻¹·J) − 4, the Bregman divergence of −ln det (Lee, Wensing & Park 2020). It is
+/// convex in the parameters, zero at the prior, infinite where J stops being positive definite, and independent of
+/// frame and units.
 #[derive(Clone, Debug)]
 pub(super) struct Divergence {
     inverse: Matrix4<f64>,
@@ -79,7 +77,7 @@ pub(super) struct Divergence {
 }
 
 impl Divergence {
-    /// From the prior's ten parameters; `None` where no body has them.
+    /// Builds it from the prior's ten parameters; `None` if they are not consistent.
     pub(super) fn new(prior: &[f64]) -> Option<Self> {
         if least_eigenvalue(prior) <= 1e-9 {
             return None;
@@ -95,14 +93,14 @@ impl Divergence {
         })
     }
 
-    /// Value at `p`; `None` outside the cone.
+    /// Returns the value at `p`; `None` outside the cone.
     pub(super) fn value(&self, p: &[f64]) -> Option<f64> {
         let j = pseudo_inertia(p);
         let cholesky = j.cholesky()?;
         Some((self.inverse * j).trace() - log_det(&cholesky.l()) + self.log_det - 4.0)
     }
 
-    /// Gradient and Hessian at `p`; `None` outside the cone.
+    /// Returns gradient and Hessian at `p`; `None` outside the cone.
     pub(super) fn derivatives(
         &self,
         p: &[f64],
@@ -161,7 +159,7 @@ mod tests {
             assert!(p.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-14));
             // Three points span no volume: on the boundary.
             assert!(least_eigenvalue(&body(seed, 3)).abs() < 1e-12);
-            // A principal moment larger than the other two together.
+            // A principal moment larger than the sum of the other two.
             let mut broken = [0.0; INERTIAL];
             (broken[0], broken[4], broken[7], broken[9]) = (1.0, 0.1, 0.1, 0.21);
             assert!(least_eigenvalue(&broken) < 0.0);

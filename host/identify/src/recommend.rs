@@ -1,23 +1,23 @@
-//! Which estimator's result to trust.
+//! Choice of the recommended estimator.
 
 use super::Estimator;
 use super::compare::Compared;
 use super::endogeneity::{Endogeneity, Verdict};
 use rig_output::format_significant;
 
-/// An estimate agrees with the weighted fit where no parameter is farther from it: within the intervals of that.
+/// Distance to the weighted fit below which an estimate agrees with it, in its standard deviations: the 95 % interval.
 const AGREES: f64 = 2.0;
-/// By how much of its error an estimate must predict worse before that counts against it.
+/// Relative increase of the prediction error that counts against an estimate.
 const WORSE: f64 = 0.02;
 
-/// What errors are taken over.
+/// The data of the prediction errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Judge {
-    /// Another motion than that learnt from.
+    /// A motion that is not in the training data.
     OtherMotion,
-    /// The motion learnt from, once more.
+    /// The training motion, recorded again.
     Repeated,
-    /// Stretches of the motion learnt from.
+    /// Time segments of the training motion.
     Stretches,
 }
 
@@ -30,7 +30,7 @@ impl Judge {
         }
     }
 
-    /// What these errors are no evidence of.
+    /// Returns a sentence about what these errors do not show.
     fn silence(self) -> &'static str {
         match self {
             Self::OtherMotion => "",
@@ -44,7 +44,7 @@ impl Judge {
     }
 }
 
-/// The result to trust, and why: one rule, from what errors are evidence of, what a body can be and what instruments show.
+/// Returns the recommended estimator and the reason, from prediction errors, physical consistency and instruments.
 pub(super) fn recommend(
     rows: &[Compared],
     errors: &[(Estimator, f64)],
@@ -124,7 +124,7 @@ pub(super) fn recommend(
         }
     }
     let shift = of(written).and_then(|row| row.largest_shift);
-    // Agreement says nothing of instruments that noise may have passed into.
+    // Agreement proves nothing if noise may have passed into the instruments.
     let doubted =
         written == Estimator::Iv && !matches!(verdict, Some(Verdict::NoSign | Verdict::Immaterial));
     if let (Some(shift), Some(error)) = (shift.filter(|s| *s < AGREES), error(written))
@@ -162,7 +162,7 @@ pub(super) fn recommend(
 mod tests {
     use super::*;
 
-    /// Errors of weighted and consistent, and whether a body has the weighted fit's parameters.
+    /// Errors of weighted and consistent, and whether the weighted fit is physically consistent.
     fn recommended(plain: f64, bound: f64, possible: bool, shift: f64, judge: Judge) -> Estimator {
         let row = |estimator, possible, shift| Compared {
             estimator,

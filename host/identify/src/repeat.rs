@@ -1,35 +1,35 @@
-//! Whether a recording held back repeats a motion learnt from. Then it shows how well that motion is predicted once more, and
-//! nothing of another one.
+//! Test if a hold-out recording repeats a training motion. Such a hold-out shows how well that motion is predicted
+//! again, but not how well another motion is.
 //!
-//! Its path is cut into windows, and each is looked for in the paths learnt from, at every instant. A window is found where
-//! every joint stays near; the recording repeats the motion where most of them are found.
+//! The path is cut into windows, and each is searched in the training paths at every instant. A window is found if
+//! every joint stays near. The recording repeats the motion if most windows are found.
 
 use rig_data::prepare::{PrepareError, Recording};
 
-/// Windows, at most.
+/// Largest number of windows.
 const WINDOWS: usize = 10;
-/// Samples in a period of the fastest motion: half of one is a twentieth of a radian of it.
+/// Samples per period of the fastest motion: half a sample is a twentieth of a radian of it.
 const SAMPLES_A_PERIOD: usize = 60;
-/// One in so many of them is compared.
+/// Distance between compared samples, in samples.
 const STRIDE: usize = 6;
-/// Periods of the fastest motion in a window, at least.
+/// Smallest number of periods of the fastest motion in a window.
 const LEAST_PERIODS: usize = 2;
-/// Samples of a path, at most; what follows is not looked at.
+/// Largest number of samples of a path; the rest is ignored.
 const MOST_SAMPLES: usize = 40_000;
-/// RMS distance within a window, as a share of the joint's spread, up to which a joint is near.
+/// RMS distance within a window below which a joint is near, as a share of the joint's spread.
 const NEAR: f64 = 0.1;
 /// Share of the windows that must be found.
 const MOSTLY: f64 = 0.8;
-/// A joint of less than this share of the widest spread, in rad and m alike, stands still.
+/// Share of the widest spread below which a joint stands still (rad and m compared directly).
 const STILL: f64 = 1e-3;
 
-/// Positions joint by joint at even instants.
+/// Joint positions at equally spaced instants.
 pub(super) struct Path {
     joints: Vec<Vec<f64>>,
 }
 
 impl Path {
-    /// Of `recording`, whose motion has no frequency above `frequency` (Hz).
+    /// Samples `recording`, whose motion has no frequency above `frequency` (Hz).
     pub(super) fn of(recording: &dyn Recording, frequency: f64) -> Result<Self, PrepareError> {
         let period = 1.0 / (SAMPLES_A_PERIOD as f64 * frequency.max(f64::MIN_POSITIVE));
         let mut joints: Vec<Vec<f64>> = Vec::new();
@@ -66,7 +66,7 @@ impl Path {
         self.joints.first().map_or(0, Vec::len)
     }
 
-    /// Standard deviation of each joint's position.
+    /// Returns the standard deviation of each joint's position.
     fn spread(&self) -> Vec<f64> {
         let of = |path: &Vec<f64>| {
             let count = path.len().max(1) as f64;
@@ -76,7 +76,7 @@ impl Path {
         self.joints.iter().map(of).collect()
     }
 
-    /// Whether most of it lies along some of `others`, paths of the same joints and sampling.
+    /// Returns true if most windows are found in one of `others`, paths of the same joints and sampling.
     pub(super) fn repeats(&self, others: &[Self]) -> bool {
         let windows = (self.len() / (LEAST_PERIODS * SAMPLES_A_PERIOD)).clamp(1, WINDOWS);
         let length = self.len() / windows;
@@ -119,7 +119,7 @@ mod tests {
     use rig_data::prepare::InMemory;
     use rig_data::{Block, JointColumns};
 
-    /// Two joints along sums of sines, `rate` rows a second from `from` to `to`, with noise of `noise` rad.
+    /// Two joints along sums of sines, `rate` rows per second from `from` to `to`, with noise of `noise` rad.
     fn run(seed: f64, rate: f64, from: f64, to: f64, faster: f64, noise: f64) -> InMemory {
         let t: Vec<f64> = (0..((to - from) * rate) as usize)
             .map(|i| from + i as f64 / rate)
@@ -153,9 +153,9 @@ mod tests {
     fn the_same_motion_is_known_and_another_is_not() {
         let path = |recording: InMemory| Path::of(&recording, 0.7).unwrap();
         let learnt = [path(run(0.3, 200.0, 0.0, 60.0, 1.0, 0.0))];
-        // Begun later, at another rate, with noise.
+        // Starts later, has another rate and noise.
         assert!(path(run(0.3, 130.0, 17.37, 52.0, 1.0, 0.05)).repeats(&learnt));
-        // Longer than what was learnt by a tenth.
+        // A tenth longer than the training motion.
         assert!(path(run(0.3, 200.0, 0.0, 66.0, 1.0, 0.0)).repeats(&learnt));
         for (what, other) in [
             ("other phases", run(1.1, 200.0, 0.0, 60.0, 1.0, 0.0)),

@@ -1,18 +1,18 @@
-//! What the residuals of one joint look like: size, memory, distribution, dependence on the motion.
+//! Residual statistics of a joint: size, correlation time, distribution, dependence on the motion.
 
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::covariance::{FINEST_GROUPS, Memory, group_of};
 
-/// Bins of a dependence plot.
+/// Number of bins of a dependence plot.
 const BINS: usize = 20;
-/// Lags of the whiteness test.
+/// Number of lags of the whiteness test.
 const TEST_LAGS: usize = 20;
-/// Most points of a time series that is kept for plots.
+/// Largest number of points of a time series for plots.
 pub(super) const SERIES_POINTS: usize = 4000;
 
-/// Mean residual over one coordinate.
+/// Mean residual as a function of one coordinate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Dependence {
     /// `position`, `velocity`, `load` (the measured torque) or `direction`.
@@ -21,7 +21,7 @@ pub struct Dependence {
     pub middle: Vec<f64>,
     /// Mean residual in each bin.
     pub mean: Vec<f64>,
-    /// Standard deviation of that mean, with stretches of time as the independent units.
+    /// Standard deviation of that mean, with time segments as the independent units.
     pub std: Vec<f64>,
     /// Smallest p-value over the bins (t-test against zero), multiplied by the number of bins (Bonferroni).
     pub p_value: f64,
@@ -29,14 +29,14 @@ pub struct Dependence {
     pub text: String,
 }
 
-/// What is left over all rows of a joint, those that its report leaves out among them: slow ones, and ones at the torque limit.
+/// Residual over all rows of a joint, including the slow and torque-limited rows that its report excludes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct AllRows {
-    /// Rows.
+    /// Number of rows.
     pub rows: u64,
-    /// RMS of the residual, N·m or N; not a number where there are none.
+    /// RMS of the residual, N·m or N; not a number without rows.
     pub rms: f64,
-    /// That over the RMS of the torque.
+    /// `rms` over the RMS of the torque.
     pub relative_error: f64,
 }
 
@@ -49,7 +49,7 @@ pub struct ResidualReport {
     pub torque_rms: f64,
     /// `rms / torque_rms`.
     pub relative_error: f64,
-    /// Rows.
+    /// Number of rows.
     pub rows: u64,
     /// The same over all rows.
     pub all: AllRows,
@@ -63,24 +63,24 @@ pub struct ResidualReport {
     pub skewness: f64,
     /// Excess kurtosis.
     pub kurtosis: f64,
-    /// p-value of Jarque & Bera's test (1987), with the effective instead of the plain number of rows.
+    /// p-value of Jarque & Bera's test (1987), with the effective number of rows.
     pub normality_p: f64,
     /// One sentence.
     pub normality: String,
     /// Dependence on position, velocity, load and direction.
     pub dependence: Vec<Dependence>,
-    /// Every so many rows: time, measured torque, predicted torque.
+    /// Decimated time, measured torque and predicted torque.
     pub series: Series,
 }
 
 /// Curves for a plot, at most `SERIES_POINTS` points.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Series {
-    /// s
+    /// Time, s.
     pub t: Vec<f64>,
-    /// N·m or N
+    /// Measured torque, N·m or N.
     pub measured: Vec<f64>,
-    /// N·m or N
+    /// Predicted torque, N·m or N.
     pub predicted: Vec<f64>,
 }
 
@@ -178,7 +178,7 @@ impl Binned {
     }
 }
 
-/// A small p-value in words; below the smallest number it is not zero.
+/// Writes a small p-value in words; values below the smallest number are not shown as zero.
 fn p_text(p: f64) -> String {
     if p < 1e-300 {
         "p < 1e-300".to_owned()
@@ -187,7 +187,7 @@ fn p_text(p: f64) -> String {
     }
 }
 
-/// Ranges that the bins span.
+/// Ranges of the bins.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ranges {
     /// Lowest and highest position.
@@ -198,21 +198,21 @@ pub(super) struct Ranges {
     pub torque: [f64; 2],
 }
 
-/// Collects the residuals of one joint.
+/// Collector of the residuals of one joint.
 pub(super) struct ResidualStream {
     total: u64,
     every: u64,
     moments: [f64; 5],
     torque_squares: f64,
     memory: Memory,
-    /// Of all rows: their number, squares of the residual and of the torque.
+    /// Over all rows: their number, squares of the residual and of the torque.
     all: (u64, f64, f64),
     binned: Vec<Binned>,
     series: Series,
 }
 
 impl ResidualStream {
-    /// For `total` instants.
+    /// Creates a collector for `total` instants.
     pub(super) fn new(total: u64, ranges: Ranges) -> Self {
         Self {
             total: total.max(1),
@@ -231,8 +231,8 @@ impl ResidualStream {
         }
     }
 
-    /// Takes instant `index`: time, position, velocity, measured and predicted torque; `used` is false for
-    /// rows that are masked, which are only drawn.
+    /// Adds instant `index`: time, position, velocity, measured and predicted torque. `used` is false for masked rows,
+    /// which are only plotted.
     pub(super) fn push(
         &mut self,
         index: u64,
@@ -272,7 +272,7 @@ impl ResidualStream {
         }
     }
 
-    /// Sums up.
+    /// Computes the report.
     pub(super) fn report(self) -> ResidualReport {
         let n = self.moments[0].max(1.0);
         let rms = (self.moments[2] / n).sqrt();
@@ -323,7 +323,7 @@ impl ResidualStream {
                 )
             },
             dependence: self.binned.iter().map(|b| b.report(rms)).collect(),
-            // Of no rows nothing is known.
+            // Without rows the error is unknown.
             relative_error: if self.moments[0] > 0.0 {
                 rms / torque_rms.max(f64::MIN_POSITIVE)
             } else {

@@ -1,10 +1,10 @@
-//! Ridge regression towards the description: Bayes' estimate with the CAD values as prior ([`super::evidence`]).
+//! Ridge regression towards the description: Bayesian estimate with the CAD values as prior ([`super::evidence`]).
 //!
-//! The relative uncertainty of the description's inertial values is given, the same for all, or what makes the data most
-//! likely: large where the data contradict the description. Rows count as what they are worth when the residual remembers
-//! its past, so the prior is not outvoted by repetition. Intervals are those of the posterior.
+//! The relative uncertainty of the described inertial values is given, equal for all, or maximises the evidence. The
+//! evidence makes it large if the data contradict the description. Correlated rows count as fewer independent ones, so
+//! that repetition does not outweigh the prior. Intervals are those of the posterior.
 //!
-//! Leaves out: that inertial values are those of a body (`consistent` does that).
+//! Limits: no physical consistency (use `consistent`).
 
 use nalgebra::DVector;
 
@@ -16,7 +16,7 @@ use super::parts::{LeaveOut, Parts, Refit};
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 
-/// Candidates of the relative uncertainty, evenly spaced in the logarithm.
+/// Number of candidates of the relative uncertainty, evenly spaced in the logarithm.
 const STEPS: usize = 17;
 
 /// Fits by ridge regression.

@@ -1,4 +1,4 @@
-//! Iteratively reweighted least squares (Huber 1964; Holland & Welsch 1977), one pass an iteration.
+//! Iteratively reweighted least squares (Huber 1964; Holland & Welsch 1977), one pass per iteration.
 
 use super::factor::TriangularFactor;
 use super::least::from_factors;
@@ -9,7 +9,7 @@ use super::problem::{Fitted, Problem};
 use super::{IdentifyError, Options};
 use rig_data::prepare::Recording;
 
-/// Absolute residuals in logarithmic bins of 1 %: the median of any number of them in constant memory.
+/// Absolute residuals in logarithmic bins of 1 %: gives the median of any number in constant memory.
 #[derive(Clone)]
 struct Median {
     counts: Vec<u64>,
@@ -30,7 +30,7 @@ impl Median {
         self.counts[bin.min(last)] += 1;
         self.total += 1;
     }
-    /// Standard deviation by the median of absolute residuals, which outliers do not move.
+    /// Returns the standard deviation from the median of absolute residuals, which is insensitive to outliers.
     fn sigma(&self) -> f64 {
         let mut sum = 0;
         for (bin, count) in self.counts.iter().enumerate() {
@@ -43,7 +43,7 @@ impl Median {
     }
 }
 
-/// Spread of the residuals of each equation under given parameters.
+/// Returns the spread of each equation's residuals for given parameters.
 pub(super) fn spread_of(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -66,7 +66,7 @@ pub(super) fn spread_of(
     Ok(medians.iter().map(Median::sigma).collect())
 }
 
-/// One pass of iteratively reweighted least squares, and the spread of the residuals it started from.
+/// Runs one pass of iteratively reweighted least squares; also returns the spread of its initial residuals.
 pub(super) fn reweighted(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -99,10 +99,10 @@ pub(super) fn reweighted(
     Ok((factor, medians.iter().map(Median::sigma).collect()))
 }
 
-/// Passes of the fit that is only compared with others.
+/// Number of passes of a fit for the comparison.
 const COMPARED_PASSES: usize = 15;
 
-/// Robust least squares with one stretch left out at a time: the weights of all rows are those of the whole fit.
+/// Fits robustly with one segment left out at a time; the weights of all rows are those of the whole fit.
 pub(super) fn robust(problem: &Problem, parts: &Parts) -> Result<Fitted, IdentifyError> {
     let (training, plan, options) = (problem.training, problem.plan, problem.options);
     let p = problem.base.len();

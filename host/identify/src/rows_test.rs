@@ -1,4 +1,4 @@
-//! Rows against a plain second way to them, and motors' columns through both models.
+//! Rows compared with a simple second implementation, and motor columns in both models.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::Path;
@@ -19,7 +19,7 @@ const RATE: f64 = 500.0;
 fn robot(text: &str) -> Robot {
     let mut robot = Robot::from_toml(text, Path::new("robot.toml")).unwrap();
     for joint in &mut robot.joints {
-        // The made torques are not those of the real arm.
+        // The simulated torques are not those of the real arm.
         if let Some(limits) = &mut joint.limits {
             limits.torque = None;
         }
@@ -27,7 +27,7 @@ fn robot(text: &str) -> Robot {
     robot
 }
 
-/// Made parameters, no two alike: of the links, and of the motors.
+/// Synthetic parameters, all different: of the links, and of the motors.
 fn parameters(n: usize) -> (Vec<[f64; COLUMNS]>, Vec<[f64; MOTOR_COLUMNS]>) {
     let links = (0..n)
         .map(|j| {
@@ -53,7 +53,7 @@ fn parameters(n: usize) -> (Vec<[f64; COLUMNS]>, Vec<[f64; MOTOR_COLUMNS]>) {
     (links, motors)
 }
 
-/// Four sines a joint about the middle of its range, torque by Newton and Euler and the motors' columns; `gap` rows
+/// Four sines per joint about the middle of its range, torque by Newton and Euler and the motors' columns; `gap` rows
 /// are missing in the middle.
 fn recording(robot: &Robot, seconds: f64, gap: usize) -> InMemory {
     recording_at(RATE, robot, seconds, gap)
@@ -123,7 +123,7 @@ fn recording_at(rate: f64, robot: &Robot, seconds: f64, gap: usize) -> InMemory 
     }
 }
 
-/// What the motors add, and drive inertia that they state taken away.
+/// Adds the motors' torque and subtracts the drive inertia that they replace.
 fn add_motors(
     transmission: &Transmission<f64>,
     links: &[[f64; COLUMNS]],
@@ -149,8 +149,8 @@ fn add_motors(
     }
 }
 
-/// The rows as their definition says: every column at the full rate, each through the sections forward and backward, from
-/// where the position's filter has settled.
+/// Computes the rows by their definition: every column at the full rate, each filtered forward and backward, from the
+/// row where the position filter has settled.
 fn plain_rows(motion: &Motion, plan: &Plan) -> Vec<(Vec<Vec<f64>>, Vec<f64>)> {
     let n = motion.joints.len();
     let rows = motion.t.len();
@@ -280,7 +280,7 @@ fn threads_change_no_bit() {
             };
             let mut found = identify(&robot, &[&made], &[&made], &options).unwrap();
             found.details.treatment.threads = 0;
-            // NaN differs from itself: as text it does not.
+            // NaN differs from itself, but not as text.
             format!("{found:?}")
         };
         let one = with(1);
@@ -290,8 +290,8 @@ fn threads_change_no_bit() {
     }
 }
 
-/// Largest error of the base parameters identified from `made`, in units of `share` of the value plus `least` of a
-/// coefficient of one, and where; among the parameters has to be one with `named` in it.
+/// Returns the largest error of the base parameters identified from `made`, in units of `share` of the value plus
+/// `least` of a coefficient of one, with its parameter. Asserts that a parameter with `named` in its name exists.
 fn worst_error(
     robot: &Robot,
     made: &InMemory,
@@ -326,7 +326,7 @@ fn worst_error(
     worst
 }
 
-/// The TX40 with an inertia of gear and shaft on its coupled joint 6, which turns with the joint and not with the motor.
+/// The TX40 with an inertia of gear and shaft on its coupled joint 6; it turns with the joint, not with the motor.
 fn with_joint_inertia() -> Robot {
     let mut robot = robot(TX40);
     robot.joints[5].drive.as_mut().unwrap().joint_inertia = 0.1;
@@ -355,7 +355,7 @@ fn an_inertia_beside_a_coupled_motor_is_a_parameter_where_it_is_stated() {
     }
 }
 
-/// A momentum's rate summed by trapezia is not the momentum: at 50 Hz that had cost 8e-4 of an inertia and 2 % of friction.
+/// The trapezoidal sum of a momentum's rate is inexact: at 50 Hz this cost 8e-4 of an inertia and 2 % of friction.
 #[test]
 fn the_integral_model_is_right_at_a_low_rate() {
     let robot = robot(EDDA_TEMPLATE);
@@ -364,7 +364,7 @@ fn the_integral_model_is_right_at_a_low_rate() {
     assert!(worst < 1.0, "{worst} at {of}");
 }
 
-/// A command held until the next, recorded where it begins to act: half a sample before it acts on average.
+/// A command is held until the next one and recorded when it begins to act: on average half a sample too early.
 #[test]
 fn a_torque_recorded_before_it_acts_is_said() {
     let robot = robot(EDDA_TEMPLATE);

@@ -1,5 +1,5 @@
-//! Identification beside effects that go by the friction of their joint: what they take off a recording hangs on what is identified
-//! from the rest.
+//! Identification with effects that depend on the friction of their joint: their torque depends on the identified
+//! parameters.
 
 use rig_shared::multibody::{COLUMNS, column};
 
@@ -8,13 +8,13 @@ use super::{Identification, IdentifyError, Options, identified_robot};
 use rig_data::prepare::Recording;
 use rig_model::robot::Robot;
 
-/// Friction and inertia of the drives are settled when none moves by more than this share of itself …
+/// Largest relative change of the drives' friction and inertia at convergence.
 const SETTLED: f64 = 1e-3;
-/// … and given up after this many passes.
+/// Largest number of passes.
 const MOST_PASSES: usize = 12;
 
-/// Identifies `robot` from `training` and checks the result on `holdout`. Beside effects that go by the friction of their joint it
-/// is done again with the friction found, until that stands.
+/// Identifies `robot` from `training` and checks the result on `holdout`. With effects that depend on the friction of
+/// their joint, it repeats the identification with the new friction until it converges.
 ///
 /// # Errors
 /// [`IdentifyError`]: recordings that cannot be used, a motion that excites nothing, a singular problem.
@@ -47,7 +47,7 @@ pub fn identify(
     })
 }
 
-/// Largest share by which friction or the drive's inertia of a joint has moved.
+/// Returns the largest relative change of a joint's friction or drive inertia.
 fn moved(from: &[[f64; COLUMNS]], to: &[[f64; COLUMNS]]) -> f64 {
     let columns = [column::VISCOUS, column::COULOMB, column::DRIVE_INERTIA];
     let pairs = from.iter().zip(to);

@@ -1,18 +1,18 @@
-//! Where friction has no known sign: where the motor of a coupled drive is slow, though every joint may move fast, and where
-//! a shaft stays instead of passing through zero.
+//! Rows in which friction has no known sign: the motor of a coupled drive is slow, although every joint may be fast, or
+//! a shaft dwells instead of passing through zero.
 
 use super::model::{Plan, failed};
 use rig_data::prepare::{Motion, PrepareError};
 
-/// Share of the least speed below which a shaft hardly moves: as large a share of the rows in which it passes through zero
-/// is of such.
+/// Share of the speed threshold below which a shaft hardly moves. A shaft that passes through zero spends the same
+/// share of its slow rows below it.
 pub(super) const HARDLY: f64 = 1.0 / 3.0;
-/// Share of a window that a shaft may stay in it: friction there is whatever holds the shaft, anything between its two signs.
-/// By judgement: of a three-joint arm that sticks up to half a second 79 % of the 95 % intervals hold the truth without this, 86 %
-/// with it and 88 % at a third of it, where the TX40's friction then leaves its published values.
+/// Largest share of a window in which a shaft may dwell: friction then has any value between its two signs. Chosen by
+/// judgement on a three-joint arm that sticks for up to half a second. 95 % intervals hold the truth in 79 % without
+/// this limit, 86 % with it, and 88 % at a third of it. At a third, the TX40's friction leaves its published values.
 const STAYING: f64 = 0.15;
 
-/// Whether a shaft stays for long within `all` rows, of which it is slow in `slow` and hardly moves in `hardly`.
+/// Returns true if a shaft dwells within `all` rows, of which it is slow in `slow` and hardly moves in `hardly`.
 pub(super) fn stays(slow: usize, hardly: usize, all: usize) -> bool {
     let beyond_passing = hardly as f64 - HARDLY * slow as f64;
     beyond_passing > STAYING * (1.0 - HARDLY) * all as f64
@@ -20,18 +20,18 @@ pub(super) fn stays(slow: usize, hardly: usize, all: usize) -> bool {
 
 /// Rows in which a motor is slow, and the joints that it moves.
 pub(super) struct SlowMotor {
-    /// Per row of the piece.
+    /// Per row of the piece, true if the motor is slow.
     pub slow: Vec<bool>,
-    /// Per row, whether the motor hardly moves.
+    /// Per row, true if the motor hardly moves.
     pub hardly: Vec<bool>,
-    /// Per joint, whether the motor's friction is in its torque.
+    /// Per joint, true if the motor's friction is in its torque.
     pub moves: Vec<bool>,
 }
 
-/// One entry a motor that moves more than its own joint or does it at a changing ratio.
+/// Returns one entry per motor that moves several joints or has a varying ratio.
 ///
-/// Motor k runs at Σ J_kj·q̇_j. It counts as slow below √Σ(J_kj·v_j)², v_j the joints' own thresholds: what the noise of
-/// these velocities, or friction that is not Coulomb and viscous up to these speeds, comes to at the motor.
+/// Motor k runs at Σ J_kj·q̇_j. It counts as slow below √Σ(J_kj·v_j)², with v_j the joints' own thresholds. This is the
+/// motor speed that corresponds to the noise of these velocities, or to friction that is not yet Coulomb and viscous.
 pub(super) fn slow_motors(motion: &Motion, plan: &Plan) -> Result<Vec<SlowMotor>, PrepareError> {
     if plan.transmission.is_simple() {
         return Ok(Vec::new());
@@ -73,7 +73,7 @@ pub(super) fn slow_motors(motion: &Motion, plan: &Plan) -> Result<Vec<SlowMotor>
 mod tests {
     use super::*;
 
-    /// Whether a shaft with this speed over time stays within 0.4 s.
+    /// Returns true if a shaft with this speed over time dwells within 0.4 s.
     fn of(speed: &dyn Fn(f64) -> f64) -> bool {
         let below = |threshold: f64| {
             let speeds = (0..400).map(|k| speed(k as f64 * 1e-3 - 0.2));
@@ -87,7 +87,7 @@ mod tests {
         for acceleration in [0.6, 2.0, 50.0] {
             assert!(!of(&|t| acceleration * t), "{acceleration}");
         }
-        // Stuck for 80 ms at a reversal; the same smoothed, so that it never quite stands; stopping and going on.
+        // Sticks for 80 ms at a reversal; the same, smoothed, so that it never stands; stops and moves on.
         assert!(of(&|t: f64| t.signum() * (t.abs() - 0.04).max(0.0) * 5.0));
         assert!(of(&|t| 100.0 * t.powi(3)));
         assert!(of(&|t: f64| (t.abs() - 0.04).max(0.0) * 5.0));

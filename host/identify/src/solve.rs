@@ -1,4 +1,4 @@
-//! The way from recordings to an [`Identification`].
+//! The steps from recordings to an [`Identification`].
 
 use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMNS, column};
@@ -33,12 +33,13 @@ use rig_data::prepare::{
 use rig_model::effects::Effects;
 use rig_model::robot::Robot;
 
-/// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
+/// Smallest number of kept rows per parameter, over all joints of the shortest recording, in a narrower band.
 const ROWS_A_PARAMETER: usize = 10;
-/// Looks at what the description does not state: one finds it, each further one fits it together with all parameters.
+/// Largest number of passes over effects beyond the description: the first finds them, each further one refits jointly.
 const MOST_LOOKS: usize = 8;
 
-/// Identifies `robot` from `training` and checks the result on `holdout`; its effects stand beside these parameters, one row a joint.
+/// Identifies `robot` from `training`, checks the result on `holdout`. Its effects use these parameters, one row per
+/// joint.
 ///
 /// # Errors
 /// [`IdentifyError`]: recordings that cannot be used, a motion that excites nothing, a singular problem.
@@ -72,7 +73,7 @@ pub(super) fn identify_beside(
     })
 }
 
-/// An identification, or what it has to begin anew with.
+/// An identification, or the effects with which it starts again.
 enum Solved {
     Whole(Box<Identification>),
     Anew(Beyond),
@@ -95,7 +96,7 @@ fn solve(
     let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
-    // What is spooled has no references any more.
+    // Spooled recordings contain no references.
     let sources = training;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
     let (surveys, training) = surveyed(&as_recordings(&training), joints)?;
@@ -105,7 +106,7 @@ fn solve(
     let (holdout_surveys, holdout) = surveyed(&as_recordings(&holdout), joints)?;
     let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
     let (training, holdout) = (training.as_slice(), holdout.as_slice());
-    // References do not line up with rows that were interpolated: what needs them then says that they are missing.
+    // References do not match interpolated rows, so users of references are told that they are missing.
     let sources = if surveys.iter().any(|survey| survey.note.is_some()) {
         training
     } else {
@@ -124,7 +125,7 @@ fn solve(
         columns: &base.columns,
         complete: described.effects.is_empty(),
     };
-    // The recordings are the same at every look, and so is what is done to them.
+    // Recordings and their treatment are the same in every pass.
     let (surveys, decided) = match prepared.take() {
         Some(prepared) => prepared,
         None => decided(equations, training, surveys, &options.prepare, &limits)?,
@@ -182,7 +183,7 @@ fn solve(
     };
     let wide = decided;
     let bands = match options.prepare.decimation {
-        // A narrow band smears the rows that a robust fit is to leave out over their neighbours.
+        // A narrow band spreads the outliers that a robust fit should exclude over their neighbours.
         Choice::Auto if options.estimator != Estimator::Robust => {
             let rows = (ROWS_A_PARAMETER * base.len()).div_ceil(joints) as u64;
             let narrowed = |band| wide.narrowed(band, rows, &surveys, &options.prepare, &limits);
@@ -249,7 +250,7 @@ fn solve(
     let own = further::own(&problem, beside.as_ref())?;
     let (estimate, full) = match &own {
         Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
-        // Second look: residuals of the fitted equations, for the covariance.
+        // Second pass: residuals of the fitted equations, for the covariance.
         None => {
             let loss = (fit.scales.as_ref()).map(|s| (options.loss, s.as_slice()));
             let estimate = covariance(
@@ -410,7 +411,7 @@ fn solve(
     })))
 }
 
-/// Whether an identified combination is friction or drive inertia alone, which cannot lie below zero.
+/// Returns true if an identified combination is only friction or only drive inertia, which cannot be negative.
 fn not_below_zero(combination: &DMatrix<f64>, row: usize, column: usize) -> bool {
     let alone = combination
         .row(row)

@@ -1,4 +1,4 @@
-//! From which speed on friction is Coulomb and viscous, read from the recordings themselves.
+//! The speed above which friction is Coulomb and viscous, found from the recordings.
 
 use super::covariance::Memory;
 use super::cutoff::{factors_of, kept};
@@ -9,43 +9,43 @@ use super::model::{Plan, Rows, each_rows};
 use super::{IdentifyError, ModelKind};
 use rig_data::prepare::Recording;
 
-/// Rows faster than this share of the RMS speed are believed from the start; no threshold lies higher.
+/// Share of the RMS speed above which rows are always used; no threshold is higher.
 const BELIEVED: f64 = 0.5;
-/// Where several joints move, no threshold lies below this share of the RMS speed: slower rows are few, and their friction is seldom
-/// Coulomb and viscous. Rows up to half the RMS speed are left out only where they are noisier ([`NOISIER`]), not where their friction
-/// differs: the rows of a joint also say what the inertia of the others is, and friction of fast rows alone would be that of fast
-/// motion alone. On the Stäubli TX40, whose friction grows less than in proportion to speed, half the RMS speed leaves 43 of 60
-/// parameters within two standard deviations of the published ones, 0.1 rad/s (4 % of its RMS speed) 58.
+/// Smallest threshold with several joints, as a share of the RMS speed: slower rows are few, and their friction is
+/// seldom Coulomb and viscous. Rows up to half the RMS speed are excluded only if they are noisier ([`NOISIER`]), not
+/// if their friction differs: they also determine the inertia of the other joints. On the Stäubli TX40 friction grows
+/// less than in proportion to speed. There half the RMS speed leaves 43 of 60 parameters within two standard deviations
+/// of the published ones; 0.1 rad/s (4 % of its RMS speed) leaves 58.
 const SHARE_OF_SEVERAL: f64 = 0.04;
-/// Mean square of a bin's residuals, as a multiple of that of faster rows, from which its rows are left out: more than half of it is
-/// then no noise, but friction that sticks, and what the filters carry of it into the rows around.
+/// Mean square of a bin's residuals, as a multiple of that of faster rows, above which the bin's rows are excluded.
+/// More than half of the residual is then stiction, including its filter tails in nearby rows, instead of noise.
 const NOISIER: f64 = 2.0;
-/// … by more than this many standard deviations of the bin's mean square.
+/// Number of standard deviations of the bin's mean square by which it must exceed that of faster rows.
 const SURELY: f64 = 3.0;
-/// Looks at the bins: leaving out rows unbends the fit that the next look starts from.
+/// Number of passes over the bins. Each pass starts from a fit without the rows excluded so far.
 const LOOKS: usize = 4;
-/// Ratio of neighbouring bounds between bins of speed: half an octave.
+/// Ratio of neighbouring bin bounds: half an octave.
 const STEP: f64 = std::f64::consts::SQRT_2;
-/// Columns of a bin's own friction: braking and gathering speed.
+/// Number of a bin's own friction columns: deceleration and acceleration.
 const OWN: usize = 2;
-/// A bin is refused where its own friction explains this many variances: the 99 % quantile of χ² with [`OWN`]
+/// A bin is refused if its own friction explains more than this many variances: the 99 % quantile of χ² with [`OWN`]
 /// degrees of freedom. Under a true model one bin in 100 is refused by chance, which costs rows but moves no value.
 const REFUSED: f64 = 9.21;
-/// The threshold lies this many times above the fastest bin that was refused. What weakens with speed does not
-/// end where it sinks into the noise of one bin; after doubling the speed a quarter is left of a tail that
-/// falls with its square (Hess & Soom 1990), and less of an exponential one.
+/// Ratio of the threshold to the speed of the fastest refused bin. A decaying friction term extends beyond the bin in
+/// which noise hides it. At twice the speed a quarter of a tail that falls with its square remains (Hess & Soom 1990),
+/// and less of an exponential one.
 const MARGIN: f64 = 2.0;
-/// A bin whose own Coulomb friction is independent of the other columns by less than this share tells nothing.
+/// Relative independence of a bin's own Coulomb column from the other columns, below which the bin is skipped.
 const INDEPENDENT: f64 = 1e-3;
 
-/// Upper bounds of the bins below the believed speeds, fastest first; the last bin ends at `least`.
+/// Returns the upper bounds of the bins below the always-used speeds, fastest first; the last bin ends at `least`.
 fn bounds(top: f64, least: f64) -> Vec<f64> {
     std::iter::successors(Some(top), |v| Some(v / STEP))
         .take_while(|v| *v > least)
         .collect()
 }
 
-/// Adds what is behind `bin` to `to`, with the column of the bin's own Coulomb friction or without.
+/// Adds the rows of `bin` to `to`, with or without the bin's own Coulomb columns.
 fn add(to: &mut TriangularFactor, bin: &TriangularFactor, own: bool) {
     let r = bin.triangle();
     let width = bin.columns() + 1;
@@ -58,23 +58,23 @@ fn add(to: &mut TriangularFactor, bin: &TriangularFactor, own: bool) {
     }
 }
 
-/// The speeds from which on rows count, per joint, rad/s or m/s.
+/// Lowest speeds at which rows count, per joint, rad/s or m/s.
 pub(super) struct Thresholds {
-    /// In the fit.
+    /// For the fit.
     pub fitted: Vec<f64>,
-    /// Where what was fitted is judged.
+    /// For the judgement of the fit.
     pub judged: Vec<f64>,
-    /// How they were found, a sentence.
+    /// Their derivation, a sentence.
     pub reason: String,
 }
 
-/// Per joint, the speed from which on one Coulomb and one viscous coefficient describe its friction. `plan` brings the lowest thresholds that make sense, those of noise.
+/// Finds, per joint, the speed above which one Coulomb and one viscous coefficient describe its friction. `plan` brings
+/// the lowest sensible thresholds, set by noise.
 ///
-/// Of one joint: from the believed speeds downwards each bin of speed in turn is given a Coulomb friction of its own beside the
-/// full model (the test of Chow 1960 for a changed parameter); the first bin where it differs significantly,
-/// memory of the residuals allowed for, ends the range. Braking and gathering speed have one each: friction that
-/// lags behind a reversal is too high before and too low after it, and would cancel in a common one. No friction
-/// law is assumed for what lies below.
+/// One joint: every bin of speed, from fast to slow, gets its own Coulomb friction beside the full model (test of Chow
+/// 1960). The first bin with a significant difference ends the range; the test allows for correlated residuals.
+/// Deceleration and acceleration have separate values: friction that lags behind a reversal is too high before it and
+/// too low after it, and would cancel in a common value. No friction law is assumed below the range.
 pub(super) fn speed_thresholds(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -117,7 +117,7 @@ pub(super) fn speed_thresholds(
             Ok(())
         })?;
     }
-    // The believed rows alone, each joint for itself: a pseudo-inverse, as one joint need not show every parameter.
+    // Fits the always-used rows, each joint alone. Pseudo-inverse: one joint may not excite every parameter.
     let beta: Vec<Vec<f64>> = factors
         .iter()
         .map(|list| {
@@ -163,9 +163,9 @@ pub(super) fn speed_thresholds(
     })
 }
 
-/// Thresholds of several joints: from the believed speeds downwards the first bin of speed whose residuals are [`NOISIER`] than
-/// those of all faster rows ends the range, where the faster rows are then predicted better from others of their kind alone. Slow
-/// rows that are noisy for another reason, such as noise of the position in the acceleration, bend nothing and stay.
+/// Finds the thresholds of several joints. From fast to slow, the first bin that is [`NOISIER`] than all faster rows
+/// ends the range, provided that fast rows alone then predict other fast rows better. Rows that are noisy for another
+/// reason, such as position noise in the acceleration, do not bias the fit and stay.
 fn of_several(training: &[&dyn Recording], plan: &Plan) -> Result<Thresholds, IdentifyError> {
     let spectra = &plan.treatment.spectra;
     let lowest: Vec<f64> = (spectra.iter().zip(&plan.treatment.speed_threshold))
@@ -189,7 +189,7 @@ fn of_several(training: &[&dyn Recording], plan: &Plan) -> Result<Thresholds, Id
     })
 }
 
-/// Thresholds without the slow rows that bend the fit; `lowest` where none do.
+/// Returns thresholds that exclude the slow rows that bias the fit; `lowest` if no rows do.
 fn unbent(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -205,7 +205,7 @@ fn unbent(
     if least >= sorted(lowest)?.error(&judge) - BETTER {
         return Ok(lowest.to_vec());
     }
-    // The rows of a joint that bend nothing come back.
+    // Restore the rows of joints that do not bias the fit.
     for (j, lowest_one) in lowest.iter().enumerate() {
         if thresholds[j] == *lowest_one {
             continue;
@@ -220,7 +220,7 @@ fn unbent(
     Ok(thresholds)
 }
 
-/// Thresholds above every bin of speed that is noisier than faster ones, from `lowest` on.
+/// Raises the thresholds from `lowest` above every bin of speed that is noisier than faster ones.
 fn raised(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -245,7 +245,7 @@ fn raised(
     Ok(thresholds)
 }
 
-/// Whether a row (of the rows, joint, row) is usable and no slower than the joint's threshold.
+/// Tests (rows, joint, row): true if the row is usable and at least as fast as the joint's threshold.
 fn faster(thresholds: &[f64]) -> impl Fn(&Rows, usize, usize) -> bool + Sync {
     |rows, j, i| kept(rows, j, i) && rows.qd[j][i].abs() >= thresholds[j]
 }
@@ -258,7 +258,7 @@ struct Bin {
     fourths: f64,
 }
 
-/// Number of the fastest bin whose residuals are noisier than those of all faster bins.
+/// Returns the index of the fastest bin whose residuals are noisier than those of all faster bins.
 fn first_noisier((bins, memory): &(Vec<Bin>, f64)) -> Option<usize> {
     let mut faster = bins.first()?.clone();
     for (k, bin) in bins.iter().enumerate().skip(1) {
@@ -276,7 +276,7 @@ fn first_noisier((bins, memory): &(Vec<Bin>, f64)) -> Option<usize> {
     None
 }
 
-/// Per joint, the residuals in each bin of speed of a fit to all rows above `thresholds`, and their memory in rows.
+/// Fits all rows above `thresholds`. Returns, per joint, the residuals in each bin and their correlation time in rows.
 fn squares_by_speed(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -313,7 +313,7 @@ fn squares_by_speed(
         .collect())
 }
 
-/// Number of the fastest bin whose own Coulomb friction differs.
+/// Returns the index of the fastest bin whose own Coulomb friction differs significantly.
 fn first_refused(bins: &[TriangularFactor], memory: f64) -> Option<usize> {
     let columns = bins.first()?.columns();
     let width = columns + 1;
@@ -323,7 +323,7 @@ fn first_refused(bins: &[TriangularFactor], memory: f64) -> Option<usize> {
     for (k, bin) in bins.iter().enumerate().skip(1) {
         let mut tried = faster.clone();
         add(&mut tried, bin, true);
-        // The bin's own columns come last, so their entries of R and Qᵀy belong to what the others leave of them.
+        // The bin's own columns come last, so their entries of R and Qᵀy belong to the part independent of the others.
         let r = tried.triangle();
         let residual = r[columns * width + columns];
         rows += bin.rows();

@@ -1,4 +1,4 @@
-//! The physically consistent full set of standard parameters that goes with an estimate.
+//! The physically consistent full set of standard parameters that belongs to an estimate.
 
 use nalgebra::DVector;
 use rig_shared::multibody::COLUMNS;
@@ -22,45 +22,45 @@ use rig_output::format_significant;
 /// One standard parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StandardParameter {
-    /// As the literature names it, with the joint's number.
+    /// Name as in the literature, with the joint's number.
     pub name: String,
-    /// SI
+    /// Value, SI.
     pub value: f64,
-    /// ASCII
+    /// Unit, ASCII.
     pub unit: String,
-    /// Whether the data determine it alone; else its combination with others is, and the prior decides the split.
+    /// True if the data determine it alone; if false, they determine a combination and the prior decides the split.
     pub determined: bool,
 }
 
-/// A set of standard parameters that a robot can have: every link a body, friction and drive inertia not negative.
+/// A physically consistent set of standard parameters: every link is a possible body, friction and drive inertia ≥ 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StandardSet {
-    /// Joint by joint, then those of coupled drives.
+    /// Parameters joint by joint, followed by those of coupled drives.
     pub parameters: Vec<StandardParameter>,
-    /// Per joint (one entry for the integral model), by how much more the residual's RMS is than with the
-    /// weighted fit, which is free to give links that cannot exist, %.
+    /// Per joint (one entry for the integral model), increase of the residual RMS over the weighted fit, which is not
+    /// constrained to be consistent, %.
     pub residual_increase_percent: Vec<f64>,
-    /// Per joint, what the set leaves of the torque of the training recordings: RMS of the residual over RMS of the torque.
+    /// Per joint, RMS of the residual over RMS of the torque in the training recordings.
     pub train_relative_error: Vec<f64>,
-    /// The same of the hold-out, where given.
+    /// The same for the hold-out, if given.
     pub holdout_relative_error: Option<Vec<f64>>,
-    /// Per link, smallest eigenvalue of the pseudo-inertia scaled to mass and radius of gyration one.
+    /// Per link, smallest eigenvalue of the pseudo-inertia scaled to unit mass and unit radius of gyration.
     pub least_eigenvalue: Vec<f64>,
-    /// What decided where the data do not, sentences.
+    /// Sentences about the prior that decided what the data do not determine.
     pub prior: Vec<String>,
 }
 
 impl StandardSet {
-    /// Values in the order of the standard columns.
+    /// Returns the values in the order of the standard columns.
     pub fn values(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| p.value).collect()
     }
 }
 
-/// A joint that is slower than this share of the fastest (in rad/s and m/s alike) hardly moves.
+/// Share of the fastest joint's speed below which a joint hardly moves (rad/s and m/s compared directly).
 const HARDLY: f64 = 1e-4;
 
-/// Prior of `robot`, with hints from a fit of all base columns.
+/// Builds the prior of `robot`, with hints from a fit of all base columns.
 pub(super) fn prior_of(
     robot: &Robot,
     base: &Base,
@@ -75,7 +75,7 @@ pub(super) fn prior_of(
             .collect::<Vec<f64>>()
     };
     let speed = over(&|s, j| s.joints[j].spectrum.velocity_rms());
-    // An order of magnitude is all that is wanted: a motion of that speed at its highest frequency.
+    // Only the order of magnitude is needed: a motion of that speed at its highest frequency.
     let acceleration = over(&|s, j| {
         let spectrum = &s.joints[j].spectrum;
         std::f64::consts::TAU * spectrum.motion * spectrum.velocity_rms()
@@ -94,7 +94,7 @@ pub(super) fn prior_of(
     )
 }
 
-/// What data suggest for the `columns` standard ones: base columns with the values of a fit, and how joints move.
+/// Collects hints for the `columns` standard columns: base columns with fitted values, and the joints' motion.
 pub(super) fn hints(columns: usize, (base, full): (&[usize], &[f64]), sizes: Sizes) -> Hints {
     let mut values = vec![f64::NAN; columns];
     for (&c, &value) in base.iter().zip(full) {
@@ -102,7 +102,7 @@ pub(super) fn hints(columns: usize, (base, full): (&[usize], &[f64]), sizes: Siz
             values[c] = value;
         }
     }
-    // What hardly moves says nothing of sizes: it could move like the others.
+    // A joint that hardly moves gives no scale; it is assumed to move like the others.
     let like_others = |list: Vec<f64>| -> Vec<f64> {
         let most = list.iter().copied().fold(0.0, f64::max);
         list.into_iter()
@@ -117,7 +117,7 @@ pub(super) fn hints(columns: usize, (base, full): (&[usize], &[f64]), sizes: Siz
     }
 }
 
-/// The problem of a factor whose rows have the residual's noise as unit.
+/// Builds the problem from a factor whose rows are in units of the residual's noise.
 pub(super) fn quadratic(factor: &TriangularFactor, base: &Base) -> Quadratic {
     let (r, right) = factor.system();
     Quadratic {
@@ -126,7 +126,7 @@ pub(super) fn quadratic(factor: &TriangularFactor, base: &Base) -> Quadratic {
     }
 }
 
-/// The same for a given estimate of all base columns in place of the data's own optimum.
+/// The same for a given estimate of all base columns instead of the data's own optimum.
 pub(super) fn quadratic_about(factor: &TriangularFactor, base: &Base, full: &[f64]) -> Quadratic {
     let (r, _) = factor.system();
     let right = &r * DVector::from_column_slice(full);
@@ -136,19 +136,19 @@ pub(super) fn quadratic_about(factor: &TriangularFactor, base: &Base, full: &[f6
     }
 }
 
-/// What a consistent set is judged by.
+/// The rows by which a consistent set is judged.
 pub(super) struct Judges<'a> {
     /// Training rows by equation.
     pub fitted: &'a [TriangularFactor],
     /// Training rows by joint, torque against motion.
     pub training: &'a [TriangularFactor],
-    /// The same of the hold-out.
+    /// The same for the hold-out.
     pub holdout: Option<&'a [TriangularFactor]>,
-    /// RMS torques of both, where the rows do not hold all of it.
+    /// RMS torques of both, if the rows do not contain all of the torque.
     pub measured: Option<&'a [Vec<f64>; 2]>,
 }
 
-/// The report of a consistent set, compared with the weighted fit.
+/// Reports a consistent set, compared with the weighted fit.
 pub(super) fn standard_set(
     problem: &Problem,
     prior: &Prior,
@@ -163,8 +163,8 @@ pub(super) fn standard_set(
         .as_slice()
         .to_vec();
     let combination = &data.combination * &base.combination;
-    // A standard column is determined where its unit vector is a combination of what is identified: where it stands
-    // alone in a row of the reduced combinations.
+    // A standard column is determined if its unit vector is a combination of identified parameters, that is, if it
+    // stands alone in a row of the reduced combinations.
     let alone = |c: usize| {
         (0..combination.nrows()).any(|row| {
             combination

@@ -1,5 +1,5 @@
-//! The regressors of a robot with its drives at states of one's choice, and at random ones, of which the rank says what can be
-//! told apart. As wide as the parameters: 14 a joint and, where a drive moves more than its own joint, 3 a motor.
+//! Regressors of a robot with its drives at given and at random states; the rank at random states shows what is
+//! identifiable. They have 14 columns per joint and, if a drive moves several joints, 3 per motor.
 
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
@@ -14,11 +14,11 @@ use super::momentum::MotorMomentum;
 use super::{IdentifyError, ModelKind};
 use rig_model::robot::Robot;
 
-/// A robot whose regressors are asked for.
+/// A robot whose regressors are evaluated.
 pub(super) struct States {
     chain: Chain<f64>,
     transmission: Transmission<f64>,
-    /// About where the joints move: the middle of their ranges, and how far random states go from there.
+    /// Centre of the random states (the middle of the joint ranges), and their distance from it.
     middle: Vec<f64>,
     reach: f64,
 }
@@ -34,7 +34,7 @@ impl States {
         let (middle, reach) = if transmission.is_constant() {
             (vec![0.0; n], 3.0)
         } else {
-            // A screw has no length beyond its reach; its ratio changes enough within this, rad or m.
+            // A screw has no length outside its range; its ratio varies enough within this distance, rad or m.
             (robot.middle_position(), 0.3)
         };
         Ok(Self {
@@ -49,7 +49,7 @@ impl States {
         self.middle.len()
     }
 
-    /// Number of the links' columns and of the motors'.
+    /// Returns the numbers of the links' columns and of the motors'.
     fn widths(&self) -> [usize; 2] {
         let motors = if self.transmission.is_simple() {
             0
@@ -59,7 +59,7 @@ impl States {
         [self.joints() * COLUMNS, motors]
     }
 
-    /// The links' and the motors' columns, each joint × its own, side by side; zero where a motor states the same.
+    /// Joins the links' and the motors' columns, each joint × its own; zero for replaced link columns.
     fn joined(&self, links: &[f64], motors: &[f64]) -> DMatrix<f64> {
         let [width, more] = self.widths();
         DMatrix::from_fn(self.joints(), width + more, |j, c| {
@@ -71,12 +71,12 @@ impl States {
         })
     }
 
-    /// Whether column `c` of the links is not what a motor's own states.
+    /// Returns true if no motor column replaces the links' column `c`.
     fn stated(&self, c: usize) -> bool {
         c % COLUMNS != column::DRIVE_INERTIA || self.transmission.has_joint_inertia(c / COLUMNS)
     }
 
-    /// Regressor of the torque.
+    /// Returns the regressor of the torque.
     pub(super) fn torque(
         &self,
         q: &[f64],
@@ -93,7 +93,7 @@ impl States {
         Ok(self.joined(&links, &motors))
     }
 
-    /// Regressors of the momentum, and of what the torque does beside changing it.
+    /// Returns the regressors of the momentum and of the torque that does not change it.
     pub(super) fn momentum(
         &self,
         q: &[f64],
@@ -112,7 +112,7 @@ impl States {
         ])
     }
 
-    /// Three times as many rows at random states as there are columns: a chance dependence has probability zero.
+    /// Returns three times as many rows at random states as columns: a chance dependence has probability zero.
     pub(super) fn rows(&self, model: ModelKind, seed: u64) -> Result<DMatrix<f64>, IdentifyError> {
         let n = self.joints();
         let width: usize = self.widths().iter().sum();
@@ -141,7 +141,7 @@ impl States {
                     let [before, _] = self.momentum(&start, &qd_start)?;
                     let [mut rows, _] = self.momentum(&end, &qd_end)?;
                     rows -= before;
-                    // The rest acts on the whole way, not at its ends: a few states of it.
+                    // The loss acts along the whole path, not at its ends: a few states of it.
                     for _ in 0..3 {
                         let (q, qd, _) = state();
                         let [_, loss] = self.momentum(&q, &qd)?;
@@ -156,7 +156,7 @@ impl States {
                         let (q, qd, _) = state();
                         row += self.power(&q, &qd)?;
                     }
-                    // A constant torque does its work over the distance between the ends.
+                    // The work of a constant torque is proportional to the distance between the ends.
                     row[column::OFFSET] = end[0] - start[0];
                     row
                 }
@@ -166,7 +166,7 @@ impl States {
         Ok(matrix)
     }
 
-    /// Row of the energy of one joint.
+    /// Returns the row of the energy of one joint.
     fn energy(&self, q: &[f64], qd: &[f64]) -> Result<DMatrix<f64>, IdentifyError> {
         let mut links = [0.0; COLUMNS];
         let mut motors = [0.0; MOTOR_COLUMNS];
@@ -177,7 +177,7 @@ impl States {
         Ok(self.joined(&links, &motors))
     }
 
-    /// Row of the power that friction takes from one joint.
+    /// Returns the row of the friction power of one joint.
     fn power(&self, q: &[f64], qd: &[f64]) -> Result<DMatrix<f64>, IdentifyError> {
         let mut links = [0.0; COLUMNS];
         let mut motors = [0.0; MOTOR_COLUMNS];

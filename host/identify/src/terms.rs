@@ -1,4 +1,4 @@
-//! Columns beyond the description's parameters, and how likely they make the data.
+//! Regressor columns beyond the description's parameters, and the evidence for them.
 
 use nalgebra::DVector;
 
@@ -13,19 +13,19 @@ use super::prior::Prior;
 use super::problem::Problem;
 use super::tilt::{Axes, TiltColumns};
 
-/// Periods of ripple that are looked for in one turn of the joint. One is gravity's.
+/// Periods per turn of the joint that are searched for ripple. One period is gravity's.
 pub(super) const PERIODS: std::ops::RangeInclusive<usize> = 2..=6;
-/// Columns of a joint: its position, cosine and sine of each ripple, then a base not level about two axes.
+/// Columns of a joint: its position, cosine and sine of each ripple, then a base tilt about two axes.
 const TERMS: usize = 1 + 2 * (*PERIODS.end() + 1 - *PERIODS.start()) + 2;
-/// Angle, rad, within which a base that is called level is believed to be so before the data (standard deviation).
+/// Prior standard deviation of the tilt of a base described as level, rad.
 const LEVEL: f64 = 0.1;
 
-/// Instants that are looked at, evenly spread over all recordings: at six joints some 10⁵ rows for some 100 columns. More
-/// tell the same more surely, which terms of a size that matters do not need; a term's values are known to the share of its
-/// own size that the root of so many rows gives.
+/// Largest number of instants used, evenly spread over all recordings: with six joints some 10⁵ rows for some 100
+/// columns. More would only reduce the uncertainty, which terms of relevant size do not need: it falls with the root of
+/// the number of rows.
 const ENOUGH: u64 = 20_000;
 
-/// A term that may be taken.
+/// A candidate term.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Term {
     /// Spring or ripple of a joint.
@@ -33,12 +33,12 @@ pub(super) enum Term {
         joint: usize,
         periods: Option<usize>,
     },
-    /// A base that is not level, of all joints.
+    /// Base tilt, acting on all joints.
     Tilt,
 }
 
 impl Term {
-    /// Where its columns stand among [`TERMS`].
+    /// Returns the range of its columns among [`TERMS`].
     pub(super) fn columns(self) -> std::ops::Range<usize> {
         match self {
             Self::Position { periods: None, .. } => 0..1,
@@ -57,7 +57,7 @@ impl Term {
         matches!(self, Self::Position { periods: None, .. })
     }
 
-    /// Whether joint `j` has its columns.
+    /// Returns true if joint `j` has its columns.
     fn at(self, j: usize) -> bool {
         match self {
             Self::Position { joint, .. } => joint == j,
@@ -66,7 +66,7 @@ impl Term {
     }
 }
 
-/// The columns of a term at position `q`; one or two are filled.
+/// Computes the columns of a term at position `q`; fills one or two.
 pub(super) fn terms_of(periods: Option<usize>, q: f64, out: &mut [f64]) -> usize {
     match periods {
         None => {
@@ -81,18 +81,18 @@ pub(super) fn terms_of(periods: Option<usize>, q: f64, out: &mut [f64]) -> usize
     }
 }
 
-/// Rows of the training recordings with the columns of all terms, joint by joint.
+/// Rows of the training recordings with the columns of all terms, per joint.
 pub(super) struct Evidence {
     parts: Vec<TriangularFactor>,
-    /// By joint, RMS of each term's columns about their mean.
+    /// Per joint, RMS of each term's columns about their mean.
     spread: Vec<[f64; TERMS]>,
-    /// By joint, one over the residual's standard deviation and the root of what it remembers.
+    /// Per joint, one over the residual's standard deviation and the root of its correlation time.
     weights: Vec<f64>,
 }
 
 impl Evidence {
-    /// `factors` are those of the fitted equations; they and the prior say what masses a tilt acts on, about axes that are
-    /// level where gravity is `described`.
+    /// Collects the rows. `factors` are those of the fitted equations; with the prior they give the masses on which a
+    /// tilt acts. The tilt axes are horizontal for the `described` gravity.
     pub(super) fn collect(
         problem: &Problem,
         factors: &[TriangularFactor],
@@ -107,7 +107,7 @@ impl Evidence {
             instants,
         } = Noise::of(problem)?;
         let step = instants.div_ceil(ENOUGH).max(1);
-        // Of rows further apart each says more.
+        // Rows that are further apart are less correlated, so each counts more.
         let weight_at = |step: u64| -> Vec<f64> {
             let one = |(s, m): (&f64, &f64)| 1.0 / (s * (m / step as f64).max(1.0).sqrt());
             deviation.iter().zip(&memory).map(one).collect()
@@ -172,7 +172,7 @@ impl Evidence {
         })
     }
 
-    /// By joint, squares that these values of the base columns and of `terms` leave.
+    /// Returns, per joint, the residual squares for these values of the base columns and of `terms`.
     pub(super) fn left(&self, terms: &[Term], values: &DVector<f64>) -> Vec<f64> {
         let p = self.parts.first().map_or(0, TriangularFactor::columns) - TERMS;
         let of = |(j, part): (usize, &TriangularFactor)| {
@@ -190,12 +190,12 @@ impl Evidence {
         self.parts.iter().enumerate().map(of).collect()
     }
 
-    /// Squares of the torque of a joint.
+    /// Returns the squares of a joint's torque.
     pub(super) fn squares(&self, joint: usize) -> f64 {
         self.parts[joint].right_side_squares()
     }
 
-    /// All joints' rows at their weights, with the columns of `terms` behind the base's.
+    /// Joins all joints' rows with their weights; the columns of `terms` follow those of the base.
     pub(super) fn joined(&self, terms: &[Term]) -> Seen {
         let p = self.parts.first().map_or(0, TriangularFactor::columns) - TERMS;
         let more: usize = terms.iter().map(|t| t.columns().len()).sum();
@@ -222,7 +222,7 @@ impl Evidence {
         Seen::of(&all)
     }
 
-    /// What a term's values would be if it made all of the joint's torque, or a level base is taken to be off by; none where the joint stands still.
+    /// Returns a term's values that would make all of the joint's torque, or the prior tilt; none for a still joint.
     pub(super) fn sizes(&self, term: Term) -> Option<Vec<f64>> {
         let Term::Position { joint, .. } = term else {
             return Some(vec![LEVEL; term.columns().len()]);
@@ -237,11 +237,11 @@ impl Evidence {
     }
 }
 
-/// What the weighted fit leaves.
+/// Residual of the weighted fit.
 struct Noise {
-    /// By joint, standard deviation; one where nothing is left.
+    /// Per joint, standard deviation; one if there is no residual.
     deviation: Vec<f64>,
-    /// By joint, rows that it remembers.
+    /// Per joint, correlation time in rows.
     memory: Vec<f64>,
     /// Instants of all recordings.
     instants: u64,
@@ -279,7 +279,7 @@ impl Noise {
     }
 }
 
-/// One over the RMS of what `squares` sum up to over so many rows.
+/// Returns one over the RMS for a sum of `squares` over `rows` rows.
 fn unit(squares: f64, rows: u64) -> f64 {
     let rms = (squares / rows.max(1) as f64).sqrt();
     if rms > 0.0 { 1.0 / rms } else { 1.0 }

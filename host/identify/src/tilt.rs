@@ -1,12 +1,12 @@
-//! Gravity that does not stand where the description says: a base that is not level.
+//! Base tilt: gravity that deviates from the described direction.
 //!
-//! Two angles θ about level axes turn gravity by g·(θ₁·e₁ + θ₂·e₂), e₁ and e₂ level; what that does to every joint is the
-//! torque that holds the links in a field along e₁ or e₂. Unlike a spring or a ripple it shows at all joints at once, each
-//! with its own first moments, and moves joints that turn about the vertical: one degree under 25 N·m of another joint is
-//! 0.4 N·m there.
+//! Two angles θ about horizontal axes change gravity by g·(θ₁·e₁ + θ₂·e₂), with e₁ and e₂ horizontal. Their effect on
+//! each joint is the torque that holds the links in a field along e₁ or e₂. Unlike a spring or a ripple, a tilt shows
+//! at all joints, each with its own first moments. It also moves joints with a vertical axis: one degree under 25 N·m
+//! of another joint is 0.4 N·m there.
 //!
-//! Leaves out: that gravity keeps its size when it turns, which masses and gains make up for; where the first joint's axis
-//! is level, an error of its zero, which does the same as a turn of gravity about it.
+//! Limits: gravity grows slightly when it turns, which masses and gains compensate. If the first joint's axis is
+//! horizontal, a tilt about it is collinear with an error of its zero.
 
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 use rig_shared::multibody::{COLUMNS, Chain, gravity_vector};
@@ -15,24 +15,24 @@ use serde::Serialize;
 use rig_data::prepare::PrepareError;
 use rig_output::format_value;
 
-/// Gravity as the data show it.
+/// Gravity identified from the data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BaseTilt {
-    /// m/s² in the base frame, of the size that the description states.
+    /// Gravity, m/s² in the base frame, with the described magnitude.
     pub gravity: [f64; 3],
-    /// Between it and the description's, rad.
+    /// Angle to the described gravity, rad.
     pub angle: f64,
     /// Standard deviation of the angle, rad.
     pub std: f64,
-    /// Logarithm of how many times more likely the data are with it.
+    /// Logarithm of the likelihood ratio of the data with and without the tilt.
     pub log_evidence: f64,
-    /// About the two level axes: what gravity gains sideways, over its size.
+    /// Tilt about the two horizontal axes: horizontal components of gravity over its magnitude.
     #[serde(skip)]
     pub(super) angles: [f64; 2],
 }
 
 impl BaseTilt {
-    /// From what gravity gains along the two level axes, over its size, and the covariance of that.
+    /// Builds the tilt from the horizontal components of gravity over its magnitude, and their covariance.
     pub(super) fn of(
         axes: &Axes,
         angles: [f64; 2],
@@ -40,7 +40,7 @@ impl BaseTilt {
         log_evidence: f64,
     ) -> Self {
         let along = Vector2::from(angles);
-        // What is fitted is how far gravity's tip moves sideways, over its length: the tangent of the angle.
+        // The fitted value is the horizontal component over the magnitude: the tangent of the angle.
         let tangent = along.norm();
         let level = axes.level[0] * angles[0] + axes.level[1] * angles[1];
         let turned = (axes.gravity / axes.size + level).normalize() * axes.size;
@@ -55,7 +55,7 @@ impl BaseTilt {
         }
     }
 
-    /// One sentence.
+    /// Returns one sentence.
     pub(super) fn said(&self) -> String {
         let [x, y, z] = self.gravity;
         format!(
@@ -66,7 +66,7 @@ impl BaseTilt {
     }
 }
 
-/// Gravity of a description and two unit vectors level with respect to it.
+/// Described gravity and two horizontal unit vectors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axes {
     gravity: Vector3<f64>,
@@ -75,7 +75,7 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// None where there is no gravity.
+    /// Returns none if there is no gravity.
     pub(super) fn of(gravity: [f64; 3]) -> Option<Self> {
         let gravity = Vector3::from(gravity);
         let down = Unit::try_new(gravity, 1e-9)?;
@@ -91,7 +91,7 @@ impl Axes {
     }
 }
 
-/// Torque of an angle of one radian about each axis, for links of given inertial values.
+/// Torque of a tilt of one radian about each axis, for given inertial values.
 pub(super) struct TiltColumns {
     fields: [Chain<f64>; 2],
     parameters: Vec<[f64; COLUMNS]>,
@@ -100,7 +100,7 @@ pub(super) struct TiltColumns {
 }
 
 impl TiltColumns {
-    /// `standard` are the parameters of all joints, [`COLUMNS`] each.
+    /// Builds the columns; `standard` holds the parameters of all joints, [`COLUMNS`] each.
     pub(super) fn new(chain: &Chain<f64>, axes: &Axes, standard: &[f64]) -> Self {
         let n = chain.joint_count();
         let parameters = standard
@@ -118,7 +118,7 @@ impl TiltColumns {
         }
     }
 
-    /// Both angles' torques at all joints at the position of row `i`.
+    /// Returns both angles' torques at all joints at the position of row `i`.
     pub(super) fn at(&mut self, q: &[Vec<f64>], i: usize) -> Result<&[Vec<f64>; 2], PrepareError> {
         for (to, of) in self.q.iter_mut().zip(q) {
             *to = of[i];

@@ -1,15 +1,15 @@
 //! Total least squares: noise in the regressor as well as in the torque (Golub & Van Loan 1980; generalised to
 //! correlated columns of unequal noise, Van Huffel & Vandewalle 1991).
 //!
-//! What noise the columns carry is measured, not assumed: white noise of the level that the position's spectrum
-//! shows is added to the recording once more, and what it does to the rows, through all filters and differences, is
-//! collected as a triangular factor G. With R that of [X | y] and the torque's own noise variance beside G, the
-//! estimate is the direction v = [β; −1] that maximises ‖G·v‖/‖R·v‖: the largest singular value of G·R⁻¹, so no
-//! covariance is formed or inverted and columns without noise (offsets) need no special case. The torque's noise is
-//! what the residual has beyond that of the columns, found by iteration.
+//! The noise of the columns is measured: white noise of the level in the position's spectrum is added to the recording
+//! once more. Its effect on the rows, through all filters and differences, is collected as a triangular factor G. Let R
+//! be the factor of [X | y], and add the torque's noise variance to G. The estimate is the direction v = [β; −1] that
+//! maximises ‖G·v‖/‖R·v‖: the largest singular value of G·R⁻¹. So no covariance is formed or inverted, and columns
+//! without noise (offsets) need no special case. The torque's noise is the residual variance beyond that of the
+//! columns, found by iteration.
 //!
-//! Leaves out: torque noise that the position's noise causes through the controller (instrumental variables are for
-//! that); position noise that is not white below the cut-off; errors of second order in the noise.
+//! Limits: no torque noise that the position noise causes through the controller (use instrumental variables); no
+//! position noise that is not white below the cut-off; no second-order errors in the noise.
 
 use std::cell::RefCell;
 
@@ -27,13 +27,13 @@ use super::twin::{Companion, Twin, each_pair};
 use rig_data::Block;
 use rig_data::prepare::PrepareError;
 
-/// Passes over the torque's noise level; it converges geometrically.
+/// Number of iterations of the torque's noise level, which converges geometrically.
 const PASSES: usize = 50;
-/// The torque keeps at least this share of the residual's variance: where the columns' noise would explain more,
-/// their level was read too high.
+/// Smallest share of the residual's variance attributed to the torque. If the columns' noise would explain more, its
+/// level was overestimated.
 const LEAST_TORQUE_SHARE: f64 = 0.01;
 
-/// The measured position with as much noise again.
+/// Companion that adds the same amount of noise to the measured position once more.
 struct Disturbed {
     sigma: Vec<f64>,
     generator: rand_pcg::Pcg64,
@@ -59,7 +59,7 @@ impl Companion for Disturbed {
     }
 }
 
-/// Standard deviation of the position's noise, joint by joint, as its spectrum shows it, rad or m.
+/// Returns the standard deviation of each joint's position noise, from its spectrum, rad or m.
 fn noise_levels(problem: &Problem) -> Vec<f64> {
     let treatment = problem.plan.treatment;
     // A one-sided density of d over half the rate is a variance of d·rate/2.
@@ -69,7 +69,7 @@ fn noise_levels(problem: &Problem) -> Vec<f64> {
         .collect()
 }
 
-/// By how much that noise is expected to move weighted least squares off `values`: (XᵀX)⁻¹·N·β with N the noise of the
+/// Returns the expected bias of weighted least squares at `values` from that noise: (XᵀX)⁻¹·N·β with N the noise of the
 /// columns (Fuller 1987, sec. 1.1).
 pub(super) fn moved_by_noise(
     problem: &Problem,
@@ -95,7 +95,7 @@ pub(super) fn moved_by_noise(
         .ok_or_else(|| singular("of the regressor"))
 }
 
-/// What the columns' noise amounts to, equation by equation: factor of the differences, rows counted.
+/// Returns the columns' noise per equation: factor of the differences, with the number of rows.
 fn column_noise(problem: &Problem, sigma: &[f64]) -> Result<Vec<TriangularFactor>, IdentifyError> {
     let kept = &problem.data.kept;
     let p = problem.base.len();
@@ -134,7 +134,7 @@ fn column_noise(problem: &Problem, sigma: &[f64]) -> Result<Vec<TriangularFactor
     Ok(factors.into_inner())
 }
 
-/// Data of one fit: factors by equation.
+/// Data of one fit: factors per equation.
 struct Rows<'a> {
     weighted: &'a TriangularFactor,
     equations: Vec<TriangularFactor>,
@@ -145,7 +145,7 @@ struct Solved {
     torque: Vec<f64>,
 }
 
-/// Solves with the noise factors scaled to the rows at hand.
+/// Solves with the noise factors scaled to these rows.
 fn solve(
     problem: &Problem,
     rows: &Rows,

@@ -1,7 +1,7 @@
-//! Every recording with a companion: the same rows of the model formed from two motions side by side.
+//! Every recording with a companion motion: rows of the model from two motions side by side.
 //!
-//! The companion's positions pass the very filters, differences and decimation of the measured ones, so that
-//! simulated or disturbed regressors line up with the measured ones row by row. Memory as for one recording.
+//! The companion's positions pass the same filters, differences and decimation as the measured ones. So simulated or
+//! disturbed regressors match the measured ones row by row. Memory is that of one recording.
 
 use super::model::{Rows, Tally, rows_of};
 use super::problem::Problem;
@@ -12,21 +12,21 @@ use rig_data::prepare::{
 };
 use rig_data::{Block, JointColumns};
 
-/// Gives the companion's positions, block by block, from the first row of a recording on.
+/// Source of the companion's positions, block by block from the first row of a recording.
 pub(super) trait Companion {
-    /// Positions of every joint over the rows of `block`.
+    /// Returns the positions of every joint over the rows of `block`.
     fn positions(&mut self, block: &Block) -> Result<Vec<Vec<f64>>, PrepareError>;
 }
 
-/// Where the companion's motion comes from.
+/// Origin of the companion's motion.
 pub(super) enum Twin<'a> {
-    /// A new companion for each pass over the recording of this number.
+    /// A new companion for each pass over the recording of this index.
     Made(&'a dyn Fn(usize) -> Result<Box<dyn Companion + 'a>, IdentifyError>),
-    /// The measured motion behind a further low-pass.
+    /// The measured motion after a further low-pass.
     Smoothed(LowPass),
 }
 
-/// A recording with the companion's joints after the robot's.
+/// A recording with the companion's joints appended to the robot's.
 struct Doubled<'a> {
     inner: &'a dyn Recording,
     companion: std::cell::RefCell<Box<dyn Companion + 'a>>,
@@ -64,7 +64,7 @@ impl Recording for Doubled<'_> {
     }
 }
 
-/// Calls `take` with the number of the recording, the measured rows and the companion's, piece by piece.
+/// Calls `take` with the recording's index, the measured rows and the companion's rows, piece by piece.
 pub(super) fn each_pair(
     problem: &Problem,
     twin: &Twin,
@@ -112,13 +112,13 @@ pub(super) fn each_pair(
     Ok(())
 }
 
-/// The treatment of a robot and its companion: the same twice.
+/// Returns the treatment of a robot and its companion: the same twice.
 fn twice(treatment: &Treatment) -> Treatment {
     let mut both = treatment.clone();
     both.speed_threshold.extend(&treatment.speed_threshold);
     both.judged_speed.extend(&treatment.judged_speed);
     both.saturation.extend(&treatment.saturation);
-    // The companion has positions only; both motions get their derivatives in the same way.
+    // The companion has positions only, so both motions get their derivatives from positions.
     both.measured_derivatives = false;
     both
 }

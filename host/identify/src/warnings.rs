@@ -1,4 +1,4 @@
-//! What an identification warns of.
+//! Warnings of an identification.
 
 use std::f64::consts::TAU;
 
@@ -12,24 +12,24 @@ use rig_data::prepare::{Survey, Treatment};
 use rig_model::robot::{Joint, JointKind, Robot};
 use rig_output::{Finding, format_significant, format_unit, one_a_kind};
 
-/// Share of a joint's range, by judgement, up to which its motion may be a gear that twists: 0.4 degrees of a turn.
+/// Share of a joint's range below which its motion may be gear twist, by judgement: 0.4 degrees of a turn.
 const CREEP: f64 = 1e-3;
-/// Samples of a lead beyond which it is questioned: drives and buses take a few.
+/// Lead in samples above which it is questioned: drives and buses take a few.
 const MOST_LED: f64 = 10.0;
 
-/// What an identification knows of its recordings and of its fit.
+/// Recordings and fit of an identification.
 pub(super) struct Heard<'a> {
     pub robot: &'a Robot,
     pub options: &'a Options,
     pub surveys: &'a [Survey],
     pub holdout_surveys: &'a [Survey],
     pub treatment: &'a Treatment,
-    /// Of each recording held back.
+    /// Treatment of each hold-out recording.
     pub treatments: &'a [Treatment],
     /// Samples between the windows of the integral model.
     pub stride: usize,
     pub lag: Option<Lag>,
-    /// Whether a robust fit stopped moving.
+    /// True if a robust fit converged.
     pub converged: bool,
     pub instants: u64,
     pub estimate: &'a Estimate,
@@ -38,7 +38,7 @@ pub(super) struct Heard<'a> {
 }
 
 impl Heard<'_> {
-    /// One sentence or more each.
+    /// Returns the warnings, one or more sentences each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let treatment = self.treatment;
         let mut warnings = cutoff::doubts(treatment, self.robot);
@@ -152,7 +152,7 @@ impl Heard<'_> {
         findings
     }
 
-    /// A joint of which no row is left to fit or to judge by.
+    /// Reports a joint without usable rows for the fit or the judgement.
     fn unjudged(&self, j: usize, report: &ResidualReport) -> Vec<Finding> {
         let name = &self.robot.joints[j].name;
         let (length, _) = self.robot.joints[j].kind.units();
@@ -189,7 +189,7 @@ impl Heard<'_> {
     }
 }
 
-/// How far the joint at `place` moves in any recording, in words, where that is but a creep.
+/// Describes the largest travel of the joint at `place` in any recording, if it only creeps.
 fn creep(joint: &Joint, surveys: &[Survey], place: usize) -> Option<String> {
     let travel = surveys
         .iter()

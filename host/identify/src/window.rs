@@ -1,19 +1,20 @@
-//! Length of the windows over which the integral model takes its means.
+//! Window length of the integral model.
 
 use super::{IdentifyError, ModelKind, Options};
 use rig_data::prepare::{Survey, Treatment};
 
-/// A mean over T passes half of the power at this over T: sin²(πx)/(πx)² = ½.
+/// Frequency times window length at which a mean passes half of the power: sin²(πx)/(πx)² = ½.
 const HALF_POWER: f64 = 0.443;
 
-/// Samples of a window, and why so many.
+/// Returns the window length in samples, and its reason.
 ///
-/// Several joints: what passes the band of the differential model. One: a sixteenth of the period of the fastest motion: many
-/// samples, so that the work of noise averages out, yet short enough that speeding up and slowing down fall into different windows.
-/// On EMPS, where friction is not quite Coulomb and viscous, a window of 0.4 s moves the offset by 13 %, this one by 1.5 %.
+/// Several joints: the mean passes the band of the differential model. One joint: a sixteenth of the period of the
+/// fastest motion, with many samples to average out noise, but short enough to separate acceleration from deceleration.
+/// On EMPS, where friction is not quite Coulomb and viscous, a window of 0.4 s moves the offset by 13 %, this one by
+/// 1.5 %.
 ///
 /// # Errors
-/// [`IdentifyError::Window`]: one that is given and does not fit the recordings.
+/// [`IdentifyError::Window`]: a given window does not fit the recordings.
 pub(super) fn choose_window(
     options: &Options,
     treatment: &Treatment,

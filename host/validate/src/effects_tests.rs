@@ -34,7 +34,7 @@ fn with(mut robot: Robot, kind: Kind, gains: &[f64], shapes: &[f64]) -> Robot {
     robot
 }
 
-/// Torques of one joint, each of a size that a rig may have.
+/// Effects of one joint, each of a realistic size.
 const TORQUES: [(Kind, &[f64], &[f64]); 19] = [
     (Kind::Stribeck, &[0.3], &[0.2]),
     (Kind::StribeckExponential, &[0.3], &[0.2]),
@@ -69,7 +69,7 @@ const GEARS: [(Kind, &[f64], &[f64]); 2] = [
     (Kind::JointElasticity, &[], &[2000.0, 3.0]),
 ];
 
-/// Runs under a constant torque: the final state, and the energy that the books do not account for.
+/// Runs under a constant torque; returns the final state and the energy that the balance does not explain.
 fn books(robot: &Robot, dt: f64, seconds: f64) -> ([f64; 2], f64, f64) {
     let model = Model::from_robot(robot).unwrap();
     let bare = {
@@ -141,7 +141,7 @@ fn energy_that_each_effect_takes_is_its_torque_times_the_way() {
             missing.abs() < 2e-4 * turnover,
             "{kind:?}: {missing} of {turnover}"
         );
-        // And it does something.
+        // The effect must change the motion.
         let (free, _, _) = books(&rig(), 1e-4, 1.2);
         assert!(
             (end[0] - free[0]).abs() > 1e-4,
@@ -208,7 +208,7 @@ fn checked(robot: &Robot, recording: &InMemory) -> Validation {
     checked_at(robot, recording, Choice::Auto)
 }
 
-/// The same with a cut-off of the position filter.
+/// The same with a given cut-off of the position filter.
 fn checked_at(robot: &Robot, recording: &InMemory, cutoff: Choice<f64>) -> Validation {
     let options = Options {
         substeps: Some(8),
@@ -232,7 +232,7 @@ fn a_recording_with_each_effect_is_explained_by_it_and_by_nothing_less() {
         let robot = with(rig(), kind, gains, shapes);
         let recording = recorded(&robot);
         let right = checked(&robot, &recording);
-        // Left by itself it would take another cut-off, which hides some of what it lacks.
+        // Its own cut-off would differ and hide part of the missing effect.
         let wrong = checked_at(&rig(), &recording, Choice::Fixed(right.treatment.cutoff));
         let (right_rms, wrong_rms) = (rms(&right), rms(&wrong));
         assert!(
@@ -250,7 +250,7 @@ fn a_recording_with_each_effect_is_explained_by_it_and_by_nothing_less() {
     }
 }
 
-/// Simulation and what is taken off a recording are written apart; both bend the contact before such friction turns round.
+/// Simulation and subtraction are implemented separately; in both, the contact deflects before such friction reverses.
 #[test]
 fn friction_of_load_and_position_beside_presliding_turns_round_as_that_does() {
     let contacts: [(Kind, &[f64], &[f64]); 2] = [
@@ -268,7 +268,7 @@ fn friction_of_load_and_position_beside_presliding_turns_round_as_that_does() {
             let recording = recorded(&robot);
             let right = rms(&checked(&robot, &recording));
             assert!(right < 0.02, "{contact:?} {kind:?}: {right}");
-            // The same friction at once, as it is where the contact is stiff: what the two differ by is seen.
+            // The same friction with a stiff contact reverses at once: the difference must show.
             let mut stiff = robot.clone();
             stiff.effects[0].effect.shapes[0] = 1e-4;
             let wrong = rms(&checked(&stiff, &recording));
@@ -320,7 +320,7 @@ fn what_is_identified_is_the_robot_without_its_effects() {
     }
 }
 
-/// The friction that effects go by is that of the joint, not what its description took it for.
+/// Effects use the joint's identified friction, not the described one.
 #[test]
 fn effects_go_by_the_friction_that_is_identified() {
     for (kind, gains, shapes) in [
@@ -356,7 +356,7 @@ fn effects_go_by_the_friction_that_is_identified() {
     }
 }
 
-/// Fifty milliseconds that a log has lost leave a joint as warm as it was, but for what it cools in that time.
+/// A gap of fifty milliseconds in a log keeps the joint's temperature, apart from cooling in that time.
 #[test]
 fn heat_goes_on_over_a_gap() {
     let robot = with(rig(), Kind::ViscousWarmupHeat, &[0.1], &[3.0]);
@@ -453,7 +453,7 @@ fn two_masses_keep_their_energy_without_friction_and_never_gain_any() {
     }
 }
 
-/// Two links with a coupled inertia in both.
+/// Two links with an inertia that couples both.
 fn coupled(centripetal: f64) -> Robot {
     let mut robot = rig();
     robot.joints[0].friction = None;
@@ -528,7 +528,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
             .unwrap()
             .to_string()
     };
-    // More of a tight spot than there is Coulomb friction, more difference.
+    // Position friction or asymmetry above the Coulomb friction gives a larger difference.
     for (kind, gains, shapes) in [
         (Kind::PositionFriction, &[0.6, 0.0][..], &[2.0][..]),
         (Kind::AsymmetricCoulomb, &[0.6], &[]),
@@ -563,8 +563,8 @@ fn what_cannot_be_simulated_is_refused_by_name() {
     );
 }
 
-/// Whether a stiff gear has its share of the joint's friction on the link's side or all of it on the motor's, teeth are loaded by the
-/// share that friction under load states, once.
+/// Gear teeth carry load-dependent friction once, whether a stiff gear has part of the joint's friction on the link's
+/// side or all of it on the motor's side.
 #[test]
 fn a_stiff_gear_is_loaded_as_none_is() {
     let swung = |robot: &Robot| {
@@ -588,8 +588,8 @@ fn a_stiff_gear_is_loaded_as_none_is() {
     }
 }
 
-/// A fit finds a little more memory than dry friction as easily as a little less: what is beyond it cannot be, and the rig slides,
-/// sticks and comes back as with just as much.
+/// A fit may give a little more presliding friction than dry friction. The excess is impossible: the rig slides, sticks
+/// and returns as with equal amounts.
 #[test]
 fn memory_holds_no_more_than_the_dry_friction_there_is() {
     let moved = |coulomb: f64| {
@@ -613,7 +613,7 @@ fn memory_holds_no_more_than_the_dry_friction_there_is() {
     };
     assert!(apart(&less, &just) < 0.01, "{}", apart(&less, &just));
     assert!(apart(&more, &just) < 1e-6, "{}", apart(&more, &just));
-    // On what is left of its memory it swings, no more than it has slid.
+    // On the remaining presliding deflection it swings, by at most its sliding distance.
     let last = more[3999];
     assert!(last[1].abs() < 0.05 * 2.0, "{last:?}");
 }
@@ -649,7 +649,7 @@ fn every_kind_is_tried_here() {
 
 #[test]
 fn a_measured_temperature_takes_viscous_friction_down() {
-    // Friction that was half a newton metre a radian a second less by the end: the recording says so, no simulation.
+    // Viscous friction fell by half a N·m·s/rad until the end: seen in the recording, not in a simulation.
     let mut recording = recorded(&rig());
     let joint = &mut recording.blocks[0].joints[0];
     let rows = joint.q.len();
@@ -673,12 +673,12 @@ fn a_measured_temperature_takes_viscous_friction_down() {
 #[test]
 fn a_wave_outruns_its_samples_from_half_a_wave_a_sample_on() {
     let shapes = [84.0, 0.0, 0.0, 0.0];
-    // 84 waves a turn, 1 kHz: half a wave a sample at 37.4 rad/s of the motor.
+    // 84 waves per turn, 1 kHz: half a wave per sample at 37.4 rad/s of the motor.
     for (velocity, outrun) in [(37.0, false), (-37.0, false), (38.0, true), (-38.0, true)] {
         assert_eq!(outruns(Kind::Cogging, &shapes, velocity, 1e-3), outrun);
         assert_eq!(outruns(Kind::TorqueRipple, &shapes, velocity, 1e-3), outrun);
     }
-    // What an encoder misreads its samples hold, however fast it turns; friction along the joint has no motor's wave.
+    // An encoder error is in its samples at any speed; position friction of the joint has no motor waves.
     for kind in [Kind::EncoderEccentricityMotor, Kind::PositionFriction] {
         assert!(!outruns(kind, &shapes, 1e3, 1e-3));
     }

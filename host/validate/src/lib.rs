@@ -1,22 +1,22 @@
-//! Validation: what a description predicts for recordings that it was not fitted to. Nothing is refitted.
+//! Validation: predictions of a description for recordings that were not used for its fit. Nothing is refitted.
 //!
-//! Two checks a recording. *Torque*: the model's torque for the measured motion against the measured torque,
-//! prepared and evaluated as [`rig_identify`] evaluates its hold-out, so that both figures can be compared.
-//! *Motion*: the closed loop of model and controller, driven by the recorded reference from the recording's
-//! first state, against the measured position and torque; here errors of the model add up over time. Where the description has
-//! no controller for a joint, the motion of another one would say more of that than of the model: there the recorded torques
-//! drive the model, and a controller answers what it departs from the recorded motion by, as [`replay`]
-//! simulates, which a warning says.
+//! Two checks per recording. *Torque*: the model's torque for the measured motion is compared with the measured torque.
+//! Preparation and evaluation are those of [`rig_identify`]'s hold-out, so that both figures are comparable. *Motion*:
+//! the closed loop of model and controller, driven by the recorded reference from the recording's first state, is
+//! compared with the measured position and torque; model errors accumulate over time here. If the description lacks the
+//! controller of a joint, a substitute controller would affect the result more than the model. Then the recorded
+//! torques drive the model and a controller corrects deviations from the recorded motion ([`replay`]); a warning
+//! reports it.
 //!
-//! A recording may say that the drive applied more than its controller asked for. Column `added<k>`: torque or
-//! force on joint k beside the controller's, N·m or N. Column `pulses`: added to the output of the first joint's
-//! controller, in its unit, and so multiplied by the description's `torque_gain`. Both are part of `tau<k>`, the
-//! whole torque of the drive: measured and simulated torque are compared as wholes, and the description's torque
-//! limit acts on the whole. (For the pulses of EMPS this was measured: `u1` less what the controller's law gives for
-//! `ref1` and `q1` is the column `pulses`, and the torque balance has no room for a further force.)
+//! A recording may state that the drive applied more than its controller's output. Column `added<k>`: torque or force
+//! on joint k beside the controller's, N·m or N. Column `pulses`: added to the output of the first joint's controller,
+//! in its unit, and so multiplied by the description's `torque_gain`. Both are part of `tau<k>`, the whole torque of
+//! the drive: measured and simulated torque are compared as wholes, and the description's torque limit acts on the
+//! whole. (For the pulses of EMPS this was measured: `u1` minus the controller's law for `ref1` and `q1` is the column
+//! `pulses`, and the torque balance has no room for a further force.)
 //!
-//! Effects beyond the standard model: their torque along the measured motion is taken off the measured torque, their
-//! errors of a sensor off its readings; the simulated motion has them all. Payloads are masses of the model.
+//! Effects beyond the standard model: their torque along the measured motion is subtracted from the measured torque,
+//! sensor errors from the readings; the simulated motion contains all of them. Payloads are masses of the model.
 //!
 //! ```no_run
 //! use rig_data::Source;
@@ -32,8 +32,8 @@
 //! # }
 //! ```
 //!
-//! Leaves out: in the torque check, what acts between motor and link or on the voltage (a warning says so); uncertainty
-//! of the description's parameters; measured inputs other than reference and added torque.
+//! Limits: the torque check excludes effects between motor and link or on the voltage (a warning reports it); no
+//! uncertainty of the description's parameters; no measured inputs other than reference and added torque.
 
 #[cfg(test)]
 mod effects_tests;
@@ -61,9 +61,9 @@ use rig_output::{Finding, one_a_kind};
 pub struct Options {
     /// Filters, decimation, masks of the torque check.
     pub prepare: PrepareOptions,
-    /// Steps of the simulation within one sample; doubled until halving the step no longer matters where absent.
+    /// Simulation steps per sample; if absent, doubled until halving the step no longer matters.
     pub substeps: Option<u32>,
-    /// Most samples of one recording whose motion is simulated; memory grows with it.
+    /// Largest number of simulated samples per recording; memory grows with it.
     pub most_samples: usize,
 }
 
@@ -72,19 +72,19 @@ impl Default for Options {
         Self {
             prepare: PrepareOptions::default(),
             substeps: None,
-            // Ten minutes at 1 kHz; about 50 MB a joint.
+            // Ten minutes at 1 kHz; about 50 MB per joint.
             most_samples: 600_000,
         }
     }
 }
 
-/// Why a description cannot be validated.
+/// Reasons why a description cannot be validated.
 #[derive(Debug, thiserror::Error)]
 pub enum ValidateError {
     /// No recording.
     #[error("No recording was given; name at least one.")]
     NoRecording,
-    /// Nothing to predict with.
+    /// The description predicts no torque.
     #[error(
         "The description of {robot} states neither inertia nor friction, so it predicts no torque; `rig identify` writes a description that does."
     )]
@@ -92,7 +92,7 @@ pub enum ValidateError {
         /// Name of the robot.
         robot: String,
     },
-    /// Reading or preparing has failed.
+    /// Reading or preparing a recording failed.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
     /// The torque could not be predicted.
@@ -103,19 +103,19 @@ pub enum ValidateError {
     Simulate(#[from] SimulateError),
 }
 
-/// Torque of one joint, predicted and measured.
+/// Predicted and measured torque of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TorqueCheck {
     /// Name of the joint.
     pub joint: String,
     /// `N*m` or `N`
     pub unit: String,
-    /// What is left, and what it looks like.
+    /// Residual and its statistics.
     #[serde(flatten)]
     pub residual: ResidualReport,
 }
 
-/// Motion of one joint, simulated and measured.
+/// Simulated and measured motion of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MotionCheck {
     /// Name of the joint.
@@ -124,24 +124,24 @@ pub struct MotionCheck {
     pub position_unit: String,
     /// `N*m` or `N`
     pub torque_unit: String,
-    /// RMS of simulated less measured position.
+    /// RMS of simulated minus measured position.
     pub position_rms_error: f64,
-    /// Largest such difference.
+    /// Largest absolute value of this difference.
     pub position_max_error: f64,
     /// RMS error over the RMS of the measured position about its mean.
     pub position_relative_error: f64,
-    /// RMS of the measured tracking error, reference less position.
+    /// RMS of the measured tracking error, reference minus position.
     pub tracking_rms: f64,
-    /// RMS error over the RMS of the tracking error: a controller hides what a model gets wrong in the position,
-    /// not in this.
+    /// RMS error over the RMS of the tracking error: a controller hides model errors in the position, but not in this
+    /// ratio.
     pub tracking_relative_error: f64,
-    /// RMS of simulated less measured torque.
+    /// RMS of simulated minus measured torque.
     pub torque_rms_error: f64,
-    /// Largest such difference.
+    /// Largest absolute value of this difference.
     pub torque_max_error: f64,
     /// RMS error over the RMS of the measured torque.
     pub torque_relative_error: f64,
-    /// Samples at which the torque limit cut the simulated controller's wish.
+    /// Number of samples at which the torque limit acts on the simulated controller.
     pub saturated: u64,
     /// RMS change of the simulated position when the step is halved.
     pub position_step_change: f64,
@@ -155,7 +155,7 @@ pub struct MotionCheck {
 /// Curves for a plot, at most 4000 points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionSeries {
-    /// s
+    /// Time, s.
     pub t: Vec<f64>,
     /// Reference position.
     pub reference: Vec<f64>,
@@ -169,45 +169,45 @@ pub struct MotionSeries {
     pub torque_simulated: Vec<f64>,
 }
 
-/// Simulated motion, or why there is none.
+/// Simulated motion, or the reason why it is missing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 pub enum Motion {
     /// Simulated and compared.
     Simulated {
-        /// One a joint.
+        /// One entry per joint.
         joints: Vec<MotionCheck>,
-        /// Samples simulated.
+        /// Number of simulated samples.
         samples: u64,
-        /// Samples of the recording.
+        /// Number of samples of the recording.
         of: u64,
-        /// Stretches without a gap in time, each from its own first state.
+        /// Stretches without a gap in time, each with its own initial state.
         stretches: usize,
-        /// Steps within one sample.
+        /// Simulation steps per sample.
         substeps: u32,
-        /// Joints that the description has no controller for; where there are any, no closed loop was simulated, but what the
-        /// recorded torques make of the model.
+        /// Joints without a described controller. If there are any, the recorded torques drive the model instead of a
+        /// closed loop.
         uncontrolled: Vec<String>,
-        /// Sentences: what drives the simulation, initial state, step, added torque, what was left out.
+        /// Sentences: input of the simulation, initial state, step, added torque, omissions.
         remarks: Vec<String>,
     },
     /// Not simulated.
     NotSimulated {
-        /// A sentence.
+        /// Reason, a sentence.
         why: String,
     },
 }
 
-/// One recording.
+/// Results for one recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Checked {
     /// Name of the recording.
     pub recording: String,
-    /// Rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Hz
+    /// Sample rate, Hz.
     pub sample_rate: f64,
-    /// One a joint.
+    /// One entry per joint.
     pub torque: Vec<TorqueCheck>,
     /// The closed loop.
     pub motion: Motion,
@@ -220,26 +220,26 @@ pub struct Validation {
     pub schema: String,
     /// Name of the robot.
     pub robot: String,
-    /// One a recording.
+    /// One entry per recording.
     pub recordings: Vec<Checked>,
     /// Sentences.
     pub warnings: Vec<String>,
-    /// What of the description was taken off the recordings, a sentence; none without such effects.
+    /// Effects of the description that were subtracted from the recordings, a sentence; none without such effects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub taken_off: Option<String>,
-    /// What was done to the recordings for the torque check.
+    /// Treatment of the recordings for the torque check.
     #[serde(skip)]
     pub treatment: Treatment,
 }
 
-/// Share of the torque unexplained above which a warning says so; [`rig_identify`] uses the same.
+/// Share of unexplained torque above which a warning is given; [`rig_identify`] uses the same.
 const UNEXPLAINED: f64 = 0.3;
 
-/// Checks what `robot` predicts against `recordings`. `progress` is told the share that is done.
+/// Compares the predictions of `robot` with `recordings`. `progress` receives the completed share.
 ///
 /// # Errors
-/// [`ValidateError`]: nothing to check or to check with, recordings that cannot be prepared. A motion that cannot
-/// be simulated is no error but a [`Motion::NotSimulated`] that says why.
+/// [`ValidateError`]: no recording, a description without inertia and friction, recordings that cannot be prepared. A
+/// motion that cannot be simulated is no error but a [`Motion::NotSimulated`] with the reason.
 pub fn validate(
     robot: &Robot,
     recordings: &[&dyn Recording],
@@ -251,12 +251,12 @@ pub fn validate(
     }
     let chain = chain_of(robot)?;
     let model = Model::from_robot(robot)?;
-    // Those of coupled drives follow the joints'.
+    // Parameters of coupled drives follow those of the joints.
     let motors = model
         .motors
         .as_ref()
         .map_or(&[][..], |m| m.parameters.as_flattened());
-    // Parameters that are zero add nothing to the torque: their columns are not formed.
+    // Zero parameters add no torque, so their columns are not computed.
     let (columns, values): (Vec<usize>, Vec<f64>) = model
         .parameters
         .iter()
@@ -368,7 +368,7 @@ pub fn validate(
     })
 }
 
-/// Joints of a recording whose torque the description does not explain, or of which no row is left to check.
+/// Reports the joints whose torque the description does not explain, or that have no usable row.
 fn unexplained(recording: &str, torque: &[TorqueCheck]) -> Vec<Finding> {
     let of = |check: &TorqueCheck| {
         let (joint, left) = (&check.joint, 100.0 * check.residual.relative_error);
@@ -397,8 +397,8 @@ fn unexplained(recording: &str, torque: &[TorqueCheck]) -> Vec<Finding> {
     torque.iter().filter_map(of).collect()
 }
 
-/// What is not given is as it was when the description was identified, where it says so: a model is judged in the band that
-/// it was fitted in, and its error is that of `identify` on the same recording. Else it is chosen from the recordings.
+/// Decides the treatment. Settings that are not given are those of the description's identification, if it states them:
+/// the error is then that of `identify` on the same recording. Otherwise they are chosen from the recordings.
 fn treatment(
     robot: &Robot,
     recordings: &[&dyn Recording],
@@ -444,7 +444,7 @@ fn treatment(
     Ok((surveys, treatment, None))
 }
 
-/// What the description itself gives reason to say.
+/// Returns warnings about the description itself.
 fn prior_warnings(robot: &Robot, columns: &[usize]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (j, joint) in robot.joints.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! The closed loop of model and controller against the recorded motion; where a joint's controller is not described, the
-//! motion that the recorded torques make of the model.
+//! The simulated closed loop of model and controller compared with the recorded motion. Without a described controller,
+//! the recorded torques drive the model.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,18 +13,18 @@ use rig_identify::added_torque;
 use rig_model::robot::{Controller, Robot};
 use rig_model::simulate::{Inputs, Model, SimulateError, closed_loop, controllers};
 
-/// Rows at the start of a stretch through which a parabola is laid for the first state.
+/// Number of rows in the parabola that gives the initial state of a stretch.
 const FIRST_ROWS: usize = 21;
-/// Shorter stretches between gaps are left out: the first state would decide over most of them.
+/// Shortest usable stretch between gaps, rows: in shorter ones the initial state dominates.
 const FEWEST_ROWS: usize = 5 * FIRST_ROWS;
-/// Steps within a sample to begin with, and the most that are tried.
+/// Initial and largest number of simulation steps per sample.
 const SUBSTEPS: [u32; 2] = [4, 64];
-/// The step is fine enough when halving it changes the motion by less than this share of the error reported.
+/// Change of the motion on halving the step, as a share of the reported error, below which the step is fine enough.
 const STEP_SHARE: f64 = 0.01;
-/// Most points of a curve that is kept for plots.
+/// Largest number of points of a curve for plots.
 const SERIES_POINTS: usize = 4000;
 
-/// A stretch without a gap, joint by joint.
+/// A stretch without a gap, per joint.
 struct Stretch {
     t: Vec<f64>,
     reference: Vec<Vec<f64>>,
@@ -34,26 +34,26 @@ struct Stretch {
     first_velocity: Vec<Option<f64>>,
 }
 
-/// What `recording` holds for a simulation.
+/// Content of a recording for a simulation.
 struct Gathered {
     stretches: Vec<Stretch>,
-    /// Per joint, what was added, in words.
+    /// Per joint, description of the added torque.
     added: Vec<String>,
     short: usize,
 }
 
-/// Recorded torques that drive the model, as no closed loop is known.
+/// Recorded torques that drive the model without a known closed loop.
 struct Replay {
-    /// They answer what a joint departs from the recorded motion by.
+    /// Controllers that correct deviations from the recorded motion.
     controllers: Vec<Controller>,
-    /// Which, a sentence.
+    /// Their origin, a sentence.
     how: String,
     /// The stretches.
     runs: Vec<Run>,
 }
 
 impl Replay {
-    /// Of stretches; the error says why there is none.
+    /// Builds the replay from stretches; the error states why it is impossible.
     fn of(
         robot: &Robot,
         stretches: &[Stretch],
@@ -87,7 +87,7 @@ impl Replay {
         }
     }
 
-    /// Motion of the model over stretch `k`, with the whole torque that its drives give.
+    /// Simulates the model over stretch `k`, with the whole torque of its drives.
     fn over(
         &self,
         robot: &Robot,
@@ -104,7 +104,7 @@ impl Replay {
     }
 }
 
-/// Simulates `recording` and compares; `progress` is told the share done.
+/// Simulates `recording` and compares; `progress` receives the completed share.
 pub(super) fn check(
     robot: &Robot,
     model: &Model,
@@ -168,8 +168,8 @@ pub(super) fn check(
                 continue;
             }
             let (q, v) = first_state(stretch, period);
-            // The drive's limit acts on its whole torque. Added torque therefore enters before the limit, as the
-            // shift of the reference that makes the controller ask for just as much more.
+            // The drive's limit acts on its whole torque. So added torque enters before the limit, as a shift of the
+            // reference that makes the controller request the same additional torque.
             let reference: Vec<Vec<f64>> = stretch
                 .reference
                 .iter()
@@ -205,12 +205,12 @@ pub(super) fn check(
     };
     let [begin, most] = match replay {
         None => SUBSTEPS,
-        // A torque held over a whole sample is not worth sixteen times the work.
+        // A torque held over a whole sample does not justify sixteen times the work.
         Some(_) => [(period / REPLAY_STEP).ceil().max(1.0) as u32; 2],
     };
     let mut substeps = options.substeps.unwrap_or(begin).max(1);
     let last = options.substeps.unwrap_or(most).max(1);
-    // The work doubles from run to run: the first ones are a small share of it.
+    // The work doubles from run to run, so the first ones are a small share of it.
     let outcome = (|| {
         let mut coarse = run(substeps, &mut |p| progress(0.3 * p))?;
         loop {
@@ -316,12 +316,12 @@ pub(super) fn check(
     })
 }
 
-/// Torque that a controller answers a position error with, N·m/rad or N/m.
+/// Returns the controller's torque per position error, N·m/rad or N/m.
 fn stiffness(c: &Controller) -> f64 {
     c.torque_gain * c.velocity_gain * c.position_gain
 }
 
-/// A message of another room as a sentence of its own.
+/// Turns a message of another crate into a sentence.
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters
@@ -330,8 +330,8 @@ fn sentence(text: &str) -> String {
         .unwrap_or_default()
 }
 
-/// Reference of every joint in the first row, at which a stand-in is designed as where the motion was made; the inner error
-/// is the sentence that says why a motion that follows the references would be none of the recording's.
+/// Returns the reference of every joint in the first row, where a substitute controller is designed. The inner error is
+/// the sentence on why a motion along the references would not be that of the recording.
 fn first_reference(
     robot: &Robot,
     recording: &dyn Recording,
@@ -369,7 +369,7 @@ fn of_block(robot: &Robot, block: &Block) -> Result<Vec<f64>, String> {
     }
 }
 
-/// Reads what the simulation needs; the inner error is the sentence that says what is missing.
+/// Reads the input of the simulation; the inner error is a sentence about missing data.
 fn gather(
     robot: &Robot,
     controllers: &[Controller],
@@ -438,7 +438,7 @@ fn gather(
     }))
 }
 
-/// Position and velocity at the first row of a stretch.
+/// Returns position and velocity at the first row of a stretch.
 fn first_state(stretch: &Stretch, period: f64) -> (Vec<f64>, Vec<f64>) {
     let n = stretch.q.len();
     let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
@@ -447,7 +447,7 @@ fn first_state(stretch: &Stretch, period: f64) -> (Vec<f64>, Vec<f64>) {
     let svd = a.svd(true, true);
     for j in 0..n {
         let y = DVector::from_fn(rows, |i, _| stretch.q[j][i]);
-        // A parabola over distinct instants always has a solution; the first row stands in otherwise.
+        // A parabola over distinct instants always has a solution; the first row is the fallback.
         let (position, slope) = svd
             .solve(&y, 1e-12)
             .map_or((stretch.q[j][0], 0.0), |x| (x[0], x[1] / period));
@@ -467,7 +467,7 @@ struct Sums {
     torque_max: f64,
     torque_squares: f64,
     tracking: f64,
-    // About the first sample, so that the mean of a distant position costs no digits.
+    // Relative to the first sample, so that a large mean position loses no digits.
     origin: f64,
     first: f64,
     second: f64,

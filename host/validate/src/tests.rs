@@ -42,7 +42,7 @@ fn pendulum() -> Robot {
     robot
 }
 
-/// Twenty seconds at 1 kHz of the robot's own closed loop, with a test signal added where `added` is not zero.
+/// Records twenty seconds at 1 kHz of the robot's own closed loop, plus a test signal if `added` is not zero.
 fn simulated(robot: &Robot, added: f64) -> Block {
     let period = 1e-3;
     let t: Vec<f64> = (0..20_000).map(|k| f64::from(k) * period).collect();
@@ -83,7 +83,7 @@ fn simulated(robot: &Robot, added: f64) -> Block {
     block
 }
 
-/// The rows with the numbers that `at` gives.
+/// Returns the rows with the indices `at`.
 fn picked(block: &Block, at: impl Fn(usize) -> usize) -> Block {
     let rows: Vec<usize> = (0..).map(at).take_while(|k| *k < block.len()).collect();
     let of = |column: &Vec<f64>| rows.iter().map(|k| column[*k]).collect::<Vec<f64>>();
@@ -122,7 +122,7 @@ fn a_recording_of_the_description_itself_leaves_nothing() {
     for added in [0.0, 1.5] {
         let found = run(&robot, simulated(&robot, added));
         let torque = &found.recordings[0].torque[0].residual;
-        // What the filters and differences leave at reversals of dry friction, and where pulses switch.
+        // Errors of filters and differences at reversals of dry friction, and at the edges of pulses.
         assert!(torque.relative_error < 0.05, "{}", torque.relative_error);
         let motion = motion_of(&found);
         assert!(motion.tracking_rms > 0.05);
@@ -134,7 +134,7 @@ fn a_recording_of_the_description_itself_leaves_nothing() {
     }
 }
 
-/// Rows 8 to 16 ms apart, as a loaded PC writes them: the same errors as of even rows, the torque that was added among them.
+/// Rows 8 to 16 ms apart, as a loaded PC writes them: the same errors as for even rows, with the added torque.
 #[test]
 fn uneven_rows_are_judged_as_even_ones_are() {
     let robot = pendulum();
@@ -177,14 +177,14 @@ fn a_wrong_friction_shows_in_torque_and_motion() {
     wrong.joints[0].friction.as_mut().unwrap().coulomb += 0.3;
     let found = run(&wrong, block);
     let rms = found.recordings[0].torque[0].residual.rms;
-    // 0.3 N·m too much, opposing the motion throughout.
+    // 0.3 N·m too much, always against the motion.
     assert!((rms / 0.3 - 1.0).abs() < 0.1, "{rms}");
     let (a, b) = (motion_of(&right), motion_of(&found));
     assert!(
         b.position_rms_error > 100.0 * a.position_rms_error,
         "{a:?} {b:?}"
     );
-    // At the controller's stiffness, 0.3 N·m are this far.
+    // The position error of 0.3 N·m at the controller's stiffness.
     let stiff = 0.17 * 60.0 * 16.0;
     assert!(
         (b.position_rms_error * stiff / 0.3 - 1.0).abs() < 0.3,
@@ -198,7 +198,7 @@ fn a_torque_that_was_added_and_not_recorded_shows() {
     let mut block = simulated(&robot, 1.5);
     block.extra.clear();
     let found = run(&robot, block);
-    // The torque explains the motion all the same; the controller alone does not make it.
+    // The torque still explains the motion, but the controller alone does not produce it.
     assert!(found.recordings[0].torque[0].residual.relative_error < 0.05);
     assert!(motion_of(&found).tracking_relative_error > 0.05);
 }
@@ -220,7 +220,7 @@ fn what_is_missing_is_said() {
     assert!(json["recordings"][0]["torque"][0]["relative_error"].is_number());
 }
 
-/// Two joints of an arm and its recording as `rig simulate` makes it, without a controller in the description.
+/// Two joints of an arm and its recording by `rig simulate`, without a controller in the description.
 #[test]
 fn what_the_stand_in_made_it_makes_again() {
     let mut robot = Robot::from_toml(
@@ -273,7 +273,7 @@ fn what_the_stand_in_made_it_makes_again() {
             "{} {} {}",
             joint.joint, joint.position_relative_error, joint.torque_relative_error
         );
-        // The stand-in is hardly off its reference, so that this is measured by the way the joint goes.
+        // The substitute is very close to its reference, so the error is relative to the joint's travel.
         assert!(joint.position_relative_error < 1e-4, "{joint:?}");
     }
     let mut other = robot.clone();
@@ -287,7 +287,7 @@ fn what_the_stand_in_made_it_makes_again() {
     }
 }
 
-/// What moved the joint is in the recorded torque: of a controller that nobody describes nothing need be known.
+/// The recorded torque moves the joint, so the controller need not be known.
 #[test]
 fn without_a_controller_the_recorded_torque_drives_the_model() {
     let robot = pendulum();
@@ -310,7 +310,7 @@ fn without_a_controller_the_recorded_torque_drives_the_model() {
     assert!(wrong.position_rms_error > 4.0 * right.position_rms_error);
 }
 
-/// References in another unit are none that a stand-in can follow.
+/// A substitute controller cannot follow references in another unit.
 #[test]
 fn a_stand_in_does_not_follow_references_of_another_unit() {
     let robot = pendulum();
@@ -367,7 +367,7 @@ fn a_long_recording_is_cut_and_says_so() {
     assert!(remarks.iter().any(|r| r.contains("first 5000 of 20000")));
 }
 
-/// The published description on the published recordings, as the literature processes them.
+/// The published description on the published recordings, processed as in the literature.
 #[test]
 fn emps_moves_as_published() {
     let Some(folder) = rig_output::data_dir() else {
@@ -415,6 +415,6 @@ fn emps_moves_as_published() {
         assert!(m.tracking_relative_error < 0.01, "{m:?}");
         assert_eq!(m.saturated, 0);
     }
-    // The figure that an independent refit of the same data reached.
+    // The value of an independent refit of the same data.
     assert!((found.recordings[0].torque[0].residual.relative_error - 0.0404).abs() < 5e-4);
 }

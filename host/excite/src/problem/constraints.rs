@@ -1,4 +1,4 @@
-//! Limits as penalties, and the way of all derivatives back to the motion.
+//! Limits as penalties, and the derivatives by the motion.
 
 use rig_shared::lanes::Lanes;
 use rig_shared::multibody::{
@@ -10,19 +10,19 @@ use rig_shared::transmission::MOTOR_COLUMNS;
 use super::{L, LANES, Problem, soft_sign, soft_sign_slope};
 use crate::ExciteError;
 
-/// Part of each limit that the optimiser leaves free for what happens between its samples: with 48 of them per period
-/// of the fastest harmonic a peak between two hides at most (π/48)²/2 = 0.2 % of that harmonic's amplitude.
+/// Share of each limit that the optimiser keeps free for peaks between its samples. With 48 samples per period of the
+/// fastest harmonic, such a peak adds at most (π/48)²/2 = 0.2 % of that harmonic's amplitude.
 const MARGIN: f64 = 0.003;
-/// What a pass over the constraints does with them.
+/// Purpose of a pass over the constraints.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Pass {
     /// Adds penalties and their derivatives.
     Penalise,
-    /// Renews the multipliers.
+    /// Updates the multipliers.
     Renew,
 }
 
-/// One constraint c ≤ 0 with its multiplier: what it adds to the value, and the derivative of that by c.
+/// Returns the penalty of one constraint c ≤ 0 with its multiplier, and its derivative by c.
 fn penalty(c: f64, multiplier: &mut f64, weight: f64, pass: Pass) -> (f64, f64) {
     if pass == Pass::Renew {
         *multiplier = (*multiplier + weight * c).max(0.0);
@@ -37,7 +37,7 @@ fn penalty(c: f64, multiplier: &mut f64, weight: f64, pass: Pass) -> (f64, f64) 
     }
 }
 
-/// Both sides of |away| ≤ limit·keep.
+/// Penalises both sides of |away| ≤ limit·keep.
 fn both_sides(share: f64, multipliers: &mut [f64; 2], weight: f64, pass: Pass) -> (f64, f64) {
     let keep = 1.0 - MARGIN;
     let [above, below] = multipliers;
@@ -47,7 +47,7 @@ fn both_sides(share: f64, multipliers: &mut [f64; 2], weight: f64, pass: Pass) -
 }
 
 impl Problem<'_> {
-    /// Penalties of position, velocity and acceleration.
+    /// Returns the penalties of position, velocity and acceleration.
     fn kinematic(&mut self, pass: Pass) -> f64 {
         let mut sum = 0.0;
         let samples = self.basis.samples();
@@ -75,7 +75,7 @@ impl Problem<'_> {
         sum
     }
 
-    /// Penalties of the cranks' ranges.
+    /// Returns the penalties of the cranks' ranges.
     fn cranks(&mut self, pass: Pass) -> f64 {
         let (n, samples) = (self.joints(), self.basis.samples());
         let mut sum = 0.0;
@@ -94,7 +94,7 @@ impl Problem<'_> {
         sum
     }
 
-    /// Penalties of the torque, and the derivatives of these and of the criterion by the motion.
+    /// Returns the penalties of the torque, and adds the derivatives of penalties and criterion by the motion.
     fn torque_and_rows(&mut self, pass: Pass) -> Result<f64, ExciteError> {
         let (n, frame, samples) = (self.joints(), self.frame, self.basis.samples());
         let width = n * COLUMNS;
@@ -212,7 +212,7 @@ impl Problem<'_> {
         Ok(sum)
     }
 
-    /// Penalties of the points that must stay within planes.
+    /// Returns the penalties of the points that must stay within planes.
     fn cartesian(&mut self, pass: Pass) -> Result<f64, ExciteError> {
         let (n, samples) = (self.joints(), self.basis.samples());
         let mut sum = 0.0;

@@ -1,9 +1,9 @@
-//! What a design is judged by, with its exact gradient.
+//! The objective of a design, with its exact gradient.
 //!
 //! The criterion depends on the information matrix M = YᵀY/S, and its derivative by the regressor's entries is
-//! 2/S·Y·∂f/∂M; the limits on torque add λ·πᵀ. Both are weights on the regressor's entries, and one sweep backwards
-//! through the chain ([`regressor_gradient`](rig_shared::multibody::regressor_gradient)) turns them into derivatives by position, velocity and acceleration of
-//! each sample; the Fourier functions turn these into derivatives by the coefficients.
+//! 2/S·Y·∂f/∂M. The limits on torque add λ·πᵀ. Both are weights on the regressor's entries. One backward sweep through
+//! the chain ([`regressor_gradient`](rig_shared::multibody::regressor_gradient)) gives derivatives by position,
+//! velocity and acceleration of each sample. The Fourier functions turn these into derivatives by the coefficients.
 
 mod constraints;
 
@@ -20,15 +20,15 @@ use super::optimise::{Objective, Round};
 use super::schedule::{Basis, JointMotion};
 use constraints::Pass;
 
-/// Samples computed side by side.
+/// Number of samples computed in parallel lanes.
 pub(super) const LANES: usize = 4;
 pub(super) type L = Lanes<LANES>;
 
-/// Within this share of the velocity limit the sign of the velocity is rounded off for the optimiser alone, so
-/// that its gradient sees the Coulomb column; the values that are reported use the sign itself.
+/// Share of the velocity limit within which the optimiser smooths the sign of the velocity, so that its gradient
+/// includes the Coulomb column. The reported values use the exact sign.
 pub(super) const SIGN_WIDTH: f64 = 0.01;
 
-/// One start's view of the frame.
+/// The optimisation problem of one start.
 pub(super) struct Problem<'a> {
     frame: &'a Frame,
     basis: Basis,
@@ -44,19 +44,19 @@ pub(super) struct Problem<'a> {
     motion: [DMatrix<f64>; 3],
     /// Derivative of the objective by each of them.
     adjoint: [DMatrix<f64>; 3],
-    /// Per joint the scaled rows of the whole period, one a column; only columns of links that load the joint.
+    /// Per joint the scaled rows of the whole period, one per column; only columns of links that load the joint.
     rows: Vec<DMatrix<f64>>,
     /// Derivative of the criterion by each of these entries.
     pulls: Vec<DMatrix<f64>>,
     /// First base column of each joint's rows.
     first: Vec<usize>,
     out: Vec<L>,
-    /// The same of the motors, n × 3n.
+    /// The same for the motors, n × 3n.
     motors: Vec<L>,
 }
 
 impl<'a> Problem<'a> {
-    /// With `density` samples per period of the fastest harmonic.
+    /// Creates the problem with `density` samples per period of the fastest harmonic.
     pub(super) fn new(frame: &'a Frame, density: usize, smoothing: Smoothing) -> Self {
         let basis = Basis::new(&frame.schedule, density);
         let n = frame.bounds.len();
@@ -90,7 +90,7 @@ impl<'a> Problem<'a> {
         self.frame.bounds.len()
     }
 
-    /// Variables: per joint where it starts, then its coefficients, each relative to what its limits suggest.
+    /// Variables per joint: start position and coefficients, each relative to a unit from its limits.
     fn block(&self) -> usize {
         1 + 2 * self.frame.schedule.harmonics
     }
@@ -99,7 +99,7 @@ impl<'a> Problem<'a> {
         self.joints() * self.block()
     }
 
-    /// What one unit of a variable means.
+    /// Returns the unit of a variable.
     fn unit(&self, joint: usize, within: usize) -> f64 {
         let bounds = &self.frame.bounds[joint];
         if within == 0 {
@@ -127,7 +127,7 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// The variables of a motion; scaling a start to its limits goes through here.
+    /// Converts a motion to variables; also used to scale a start to its limits.
     pub(super) fn encode(&self, motions: &[JointMotion]) -> DVector<f64> {
         let block = self.block();
         let mut x = DVector::zeros(self.size());
@@ -154,7 +154,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// By how much to scale a motion about where it starts so that position, velocity and acceleration fit.
+    /// Returns the factor that scales a motion about its start so that position, velocity and acceleration fit.
     fn room(&mut self, x: &DVector<f64>) -> f64 {
         self.place(x);
         let mut room = f64::INFINITY;
@@ -174,7 +174,7 @@ impl<'a> Problem<'a> {
             let (up, down) = (bounds.high - motion.base, bounds.low - motion.base);
             for s in 0..self.basis.samples() {
                 let away = self.motion[0][(s, j)] - motion.base;
-                // Where it starts and ends it is not away at all.
+                // At its start and end the deviation is zero.
                 if away != 0.0 {
                     room = room.min(if away > 0.0 { up / away } else { down / away });
                 }
@@ -187,8 +187,8 @@ impl<'a> Problem<'a> {
         room
     }
 
-    /// The motion scaled about where it starts to `share` of the limits of position, velocity and acceleration; with
-    /// all of them only where it exceeds them.
+    /// Scales the motion about its start to `share` of the limits of position, velocity and acceleration; a share of
+    /// one only reduces a motion that exceeds them.
     pub(super) fn shrunk(&mut self, x: &DVector<f64>, share: f64) -> DVector<f64> {
         let factor = share * self.room(x);
         let factor = if share < 1.0 { factor } else { factor.min(1.0) };
@@ -201,7 +201,7 @@ impl<'a> Problem<'a> {
         self.encode(&motions)
     }
 
-    /// The criterion alone, at `x`; not finite where undefined.
+    /// Returns the criterion alone, at `x`; not finite if undefined.
     pub(super) fn judge(&mut self, x: &DVector<f64>) -> f64 {
         self.place(x);
         match self.fill_rows() {
@@ -210,14 +210,14 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Samples `s` to `s + LANES` of position, velocity or acceleration of all joints.
+    /// Returns samples `s` to `s + LANES` of position, velocity or acceleration of all joints.
     fn state(&self, order: usize, s: usize) -> Vec<L> {
         (0..self.joints())
             .map(|j| Lanes(core::array::from_fn(|k| self.motion[order][(s + k, j)])))
             .collect()
     }
 
-    /// Regressor rows of the whole period.
+    /// Computes the regressor rows of the whole period.
     fn fill_rows(&mut self) -> Result<(), ExciteError> {
         let n = self.joints();
         let frame = self.frame;
@@ -247,14 +247,14 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    /// The criterion at the rows; with `pull` also its derivative by them.
+    /// Returns the criterion of the rows; with `pull` also computes its derivative by them.
     fn criterion(&mut self, pull: bool) -> f64 {
         let p = self.frame.columns.len();
         let samples = self.basis.whole as f64;
         let mut information = DMatrix::zeros(p, p);
         for (rows, &first) in self.rows.iter().zip(&self.first) {
             let size = p - first;
-            // Written out, so that the product runs through the fast kernel.
+            // Transposed explicitly, so that the product uses the fast kernel.
             let transposed = rows.transpose();
             information.view_mut((first, first), (size, size)).gemm(
                 1.0 / samples,
@@ -289,7 +289,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// The sign of a velocity, rounded off about zero.
+/// Returns the sign of a velocity, smoothed about zero.
 fn soft_sign(velocity: L, limit: f64) -> L {
     let width = L::splat(SIGN_WIDTH * limit);
     velocity / (velocity * velocity + width * width).sqrt()
@@ -303,7 +303,7 @@ fn soft_sign_slope(velocity: L, limit: f64) -> L {
 
 impl Objective for Problem<'_> {
     fn value(&mut self, x: &DVector<f64>, gradient: &mut DVector<f64>) -> f64 {
-        // The only errors are those of lengths, which are the frame's own.
+        // Only wrong lengths give errors, and the lengths are the frame's own.
         let Ok(value) = self.objective(x) else {
             return f64::INFINITY;
         };
@@ -333,7 +333,7 @@ impl Objective for Problem<'_> {
     fn update(&mut self, x: &DVector<f64>, next: &Round) {
         self.place(x);
         if self.weight > 0.0 {
-            // An error leaves the multipliers as they were; `value` then reports it as not finite.
+            // An error leaves the multipliers unchanged; `value` then returns a value that is not finite.
             let _ = self.penalties(Pass::Renew);
         }
         self.weight = next.weight;
@@ -343,7 +343,7 @@ impl Objective for Problem<'_> {
 
 #[cfg(test)]
 impl Problem<'_> {
-    /// Makes every constraint count, so that a test of the gradient sees all of them.
+    /// Activates every constraint, so that a test of the gradient covers all of them.
     pub(super) fn press(&mut self, multiplier: f64) {
         for list in &mut self.multipliers {
             list.fill([multiplier, 0.7 * multiplier]);

@@ -33,7 +33,7 @@ fn limits_hold_at_every_instant_and_are_used() {
         for ((joint, s), proved) in robot.joints.iter().zip(&sampled).zip(&found.reach) {
             let limits = joint.limits.as_ref().unwrap();
             let torque = proved.torque.unwrap();
-            // The samples lie within the proof, the proof within the limits …
+            // The samples lie within the proved bounds, and these within the limits.
             assert!(proved.position[0] <= s[0] && s[1] <= proved.position[1]);
             assert!(s[2] <= proved.velocity && s[3] <= proved.acceleration && s[4] <= torque);
             assert!(
@@ -43,7 +43,7 @@ fn limits_hold_at_every_instant_and_are_used() {
             assert!(proved.velocity <= limits.velocity);
             assert!(proved.acceleration <= limits.acceleration.unwrap());
             assert!(torque <= limits.torque.unwrap());
-            // … and the proof is not wasteful.
+            // The proved bounds are tight.
             assert!(
                 proved.velocity < 1.01 * s[2] && torque < 1.05 * s[4],
                 "{proved:?} {s:?}"
@@ -69,7 +69,7 @@ fn starts_and_stops_at_rest() {
     }
 }
 
-/// The criterion of a motion of one joint, by the frame that a design uses.
+/// Returns the values of a motion of one joint, with the frame of a design.
 fn judged(options: &Options, motions: &[JointMotion]) -> Values {
     let (frame, _, _) = frame_of(&one_link(), options).unwrap();
     values_of(&frame, motions, 1000).unwrap()
@@ -124,7 +124,7 @@ fn the_printed_condition_number_is_that_of_the_regressor() {
     else {
         panic!("not a Fourier series");
     };
-    // The model written out by hand: gravity acts along −z, the joint axis lies along −y of the base.
+    // An explicit model: gravity acts along −z, the joint axis lies along −y of the base.
     let count = 20_000;
     let mut rows = DMatrix::zeros(count, 6);
     for k in 0..count {
@@ -154,7 +154,7 @@ fn the_printed_condition_number_is_that_of_the_regressor() {
         found.base_parameters,
         ["mx1", "my1", "Izz1 + Ia1", "fv1", "fc1", "off1"]
     );
-    // Scaling by the hand-made sizes of evenly drawn states gives the other one.
+    // Scaling by explicit sizes of uniformly drawn states gives the other value.
     let fastest = 5.0 * core::f64::consts::TAU / (1e-6 * f64::from(*period_us)) * 6.0;
     let mean_cos2 = 0.5 + (6.2_f64).sin() / (4.0 * 3.1);
     let sizes = [
@@ -282,7 +282,7 @@ fn a_prismatic_joint_without_prior_is_designed_and_says_what_was_not_checked() {
     assert!(found.values.condition_number < 3.0);
 }
 
-/// A round of the optimiser with that weight.
+/// Returns an optimiser round with that weight.
 fn round(weight: f64) -> Round {
     Round {
         weight,
@@ -291,8 +291,8 @@ fn round(weight: f64) -> Round {
     }
 }
 
-/// Absurdly large numbers stand for "no limit" in descriptions of others: what a joint can do within its range is what
-/// a motion is sized by then.
+/// In other projects' descriptions huge numbers mean "no limit". A motion is then sized by what a joint can do within
+/// its range.
 #[test]
 fn limits_that_nothing_reaches_do_not_size_a_motion() {
     let known = designed(&one_link(), &quick(Criterion::ConditionNumber));

@@ -22,7 +22,7 @@ pub(super) fn one_link() -> Robot {
     Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
 }
 
-/// Two of these links in a row, the second 0.4 m out.
+/// Two of these links in series, the second at 0.4 m.
 pub(super) fn two_links() -> Robot {
     let mut robot = one_link();
     let mut second = robot.joints[0].clone();
@@ -45,7 +45,7 @@ pub(super) fn designed(robot: &Robot, options: &Options) -> Design {
     design(robot, options, |_, _| ()).unwrap()
 }
 
-/// The furthest that position, velocity, acceleration and torque go at many instants of the whole motion.
+/// Returns the extremes of position, velocity, acceleration and torque at many instants of the whole motion.
 pub(super) fn sampled_reach(robot: &Robot, file: &TrajectoryFile) -> Vec<[f64; 5]> {
     let n = robot.joints.len();
     let model = Model::from_robot(robot).unwrap();
@@ -77,7 +77,7 @@ pub(super) fn sampled_reach(robot: &Robot, file: &TrajectoryFile) -> Vec<[f64; 5
     most
 }
 
-/// Holds the problem's gradient at `x` against central differences, `tolerance` relative to its largest entry.
+/// Compares the problem's gradient at `x` with central differences, `tolerance` relative to its largest entry.
 pub(super) fn gradient_is_that_of_differences(
     problem: &mut Problem,
     x: &DVector<f64>,

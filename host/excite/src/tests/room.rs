@@ -1,11 +1,11 @@
-//! Room that is left to the controller, and motions of one joint to order.
+//! Margins for the controller, and motions of one joint with options.
 
 use rig_shared::trajectory::Trajectory;
 
 use super::*;
 use rig_model::robot::JointFriction;
 
-/// What of its limits a motion reaches.
+/// Returns the extremes of a motion.
 fn reached(robot: &Robot, file: &TrajectoryFile) -> [f64; 4] {
     let [low, high, v, a, _] = sampled_reach(robot, file)[0];
     [low, high, v, a]
@@ -50,7 +50,7 @@ fn margin_and_speed_share_are_left_free_by_every_kind() {
             );
         }
     }
-    // The motion that was asked for uses what it may: half of the speed, not less.
+    // The motion uses its full allowance: half of the speed, not less.
     let options = Options {
         speed_share: 0.5,
         ..quick(Criterion::ConditionNumber)
@@ -141,7 +141,7 @@ fn a_motion_of_one_joint_is_what_was_asked_for() {
     assert!((high - low - 0.6).abs() < 0.01, "{low} {high}");
 }
 
-/// The sweep of the command's defaults begins below the speeds at which friction of gears weakens.
+/// The default sweep begins below the speeds at which friction of gears weakens.
 #[test]
 fn a_sweep_spans_speeds_from_creeping_to_near_the_limit() {
     let robot = one_link();
@@ -156,7 +156,7 @@ fn a_sweep_spans_speeds_from_creeping_to_near_the_limit() {
     assert!((fast / slow / 200.0 - 1.0).abs() < 1e-3, "{slow} {fast}");
 }
 
-/// Many files state 10 000 rad/s and no acceleration limit: what the drive can do is then in its torque and in what it has to move.
+/// Many files state 10 000 rad/s and no acceleration limit: torque limit and inertia then bound the motion.
 #[test]
 fn without_an_acceleration_limit_the_period_is_what_the_torque_allows() {
     let mut robot = one_link();
@@ -170,16 +170,16 @@ fn without_an_acceleration_limit_the_period_is_what_the_torque_allows() {
     let limits = joint.limits.as_mut().unwrap();
     (limits.position, limits.soft_position) = ([-1.5, 1.5], None);
     (limits.velocity, limits.acceleration, limits.torque) = (9000.0, None, Some(5.0));
-    // 5 N·m against 2 N·m·s/rad are 2.5 rad/s, and 1.5 rad at that speed are a period of 3.77 s.
+    // 5 N·m against 2 N·m·s/rad give 2.5 rad/s, and 1.5 rad at that speed give a period of 3.77 s.
     assert_eq!(period(&robot), 3.8);
-    // A fifth of the torque, a fifth of the speed: what the inertia takes is still less, 2.7 s.
+    // A fifth of the torque gives a fifth of the speed: the period due to inertia is still smaller, 2.7 s.
     robot.joints[0].limits.as_mut().unwrap().torque = Some(1.0);
     assert_eq!(period(&robot), 18.9);
     robot.joints[0].limits.as_mut().unwrap().torque = Some(9e3);
     assert_eq!(period(&robot), 1.0);
     robot.joints[0].inertial = None;
     assert_eq!(period(&robot), 1.0);
-    // A limit that is stated counts alone.
+    // A stated limit takes precedence.
     let limits = robot.joints[0].limits.as_mut().unwrap();
     (limits.velocity, limits.acceleration) = (3.0, Some(20.0));
     assert_eq!(period(&robot), 4.8);

@@ -31,7 +31,7 @@ fn the_simulated_run_conserves_energy_and_reads_back() {
         kinetic_energy(&model.chain, &model.parameters, q, qd).unwrap()
             + potential_energy(&model.chain, &model.parameters, q).unwrap()
     };
-    // Work put in, less what friction takes and the offset holds, is the energy gained.
+    // Work done minus friction loss and work of the offset equals the gained energy.
     let (mut put_in, mut lost) = (0.0, 0.0);
     let last = motion.q[0].len() - 1;
     for k in 0..last {
@@ -73,7 +73,7 @@ fn the_simulated_run_conserves_energy_and_reads_back() {
     }
 }
 
-/// A loop that ran once a recorded sample was not stable where an arm stood otherwise than at the start, and made torques from limit
+/// A loop that ran once per recorded sample was not stable in other poses than the start, and gave torques from limit
 /// to limit.
 #[test]
 fn the_rate_of_the_recorder_does_not_change_the_motion() {
@@ -134,7 +134,7 @@ fn a_noiseless_run_gives_its_parameters_back() {
     let reference = file.sampled(1000.0).unwrap();
     let run = replay(&robot, &reference, Noise::default(), 1, |_, _| ()).unwrap();
     let (q, qd, tau) = (&run.motion.q[0], &run.motion.qd[0], &run.motion.tau[0]);
-    // The whole periods, by the model written out; acceleration by central differences.
+    // The whole periods, by the explicit model; acceleration by central differences.
     let used: Vec<usize> = (3300..q.len() - 3300)
         .filter(|k| qd[*k].abs() > 0.05)
         .collect();
@@ -193,7 +193,7 @@ fn noise_has_its_deviation_and_its_seed_and_saturation_is_said() {
     assert!(cut.motion.tau[0].iter().all(|t| t.abs() <= 2.5));
 }
 
-/// A wrist that is light beside its dry friction, as most URDFs describe one: feedback by its inertia alone leaves it where it is.
+/// A wrist that is light compared with its dry friction, as in most URDFs: feedback by inertia alone does not move it.
 #[test]
 fn a_light_link_with_much_dry_friction_follows_and_what_does_not_is_said() {
     let mut robot = one_link();
@@ -225,7 +225,7 @@ fn a_light_link_with_much_dry_friction_follows_and_what_does_not_is_said() {
         "{:?}",
         free.notes
     );
-    // Less torque than friction takes: it stays, and that is said.
+    // The torque is below friction: the joint stays, and a note reports it.
     robot.joints[0].limits.as_mut().unwrap().torque = Some(0.9);
     let held = run(&robot);
     assert!(

@@ -119,7 +119,7 @@ fn few_starts() -> Options {
     }
 }
 
-/// Instants ten times as dense as the finest grid of the optimiser, over the whole motion.
+/// Returns instants ten times as dense as the optimiser's finest grid, over the whole motion.
 fn instants(file: &TrajectoryFile) -> Vec<f64> {
     let count = 10 * 48 * 5 * 7;
     (0..=count)
@@ -154,7 +154,7 @@ fn the_gradient_is_that_of_central_differences() {
             steps: 1,
         };
         problem.update(&x, &round);
-        // Every constraint acts.
+        // Every constraint is active.
         problem.press(30.0);
         gradient_is_that_of_differences(&mut problem, &x, 1e-6);
     }
@@ -254,7 +254,7 @@ fn points_stay_within_their_regions_and_staged_motions_say_that_they_may_not() {
         low[2] - 0.15,
         wall,
     ];
-    // In the order in which a box is taken apart: below and above along each axis.
+    // In the order of a box's planes: below and above along each axis.
     assert_eq!(found.clearances.len(), 5);
     for (clearance, sampled) in found.clearances.iter().zip(sampled) {
         assert_eq!(clearance.joint, "joint6");
@@ -262,13 +262,13 @@ fn points_stay_within_their_regions_and_staged_motions_say_that_they_may_not() {
             sampled >= 0.0 && clearance.distance >= 0.0,
             "{clearance:?} {sampled}"
         );
-        // The proof lies below what is sampled, but not by much: the bound is of second order.
+        // The proved bound is below the samples, but close: it is of second order.
         assert!(
             clearance.distance <= sampled && sampled < clearance.distance + 2e-3,
             "{clearance:?} {sampled}"
         );
     }
-    // Without the regions the point leaves them: they were what kept it.
+    // Without the regions the point leaves them, so they are effective.
     let free = designed(&arm(), &few_starts());
     assert!(
         instants(&free.file)
@@ -336,8 +336,8 @@ fn links_alone_are_fewer_and_unscaled_is_what_the_si_number_says() {
     assert!((values.condition_number / values.si_condition_number - 1.0).abs() < 1e-9);
 }
 
-/// Base parameters fitted to noisy torques along one period: root mean square of their errors, each times its column's
-/// size (so in shares of torque limits).
+/// Fits base parameters to noisy torques along one period; returns the root mean square of their errors, each times its
+/// column's size (so in shares of torque limits).
 fn error_of(frame: &Frame, robot: &Robot, motions: &[JointMotion], noise: u64) -> f64 {
     let model = Model::from_robot(robot).unwrap();
     let mut random = rand_pcg::Pcg64::seed_from_u64(noise);
@@ -413,7 +413,7 @@ fn parameters_come_out_better_than_with_random_motions_of_the_same_limits() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(77);
     let others: Vec<f64> = (0..6)
         .map(|_| {
-            // Up to the limits of position, velocity and acceleration; the torque's are not even kept.
+            // Up to the limits of position, velocity and acceleration, regardless of the torque limits.
             let x = random_motion(&mut problem, &frame, &mut random);
             mean(&problem.decode(&x))
         })

@@ -14,33 +14,33 @@ use rig_output::write_whole;
 
 pub use samples::{SampledReference, load_reference};
 
-/// Largest trajectory file; a thousand joints would fit.
+/// Size limit of a trajectory file; a thousand joints would fit.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Time recorded after the drive is switched off, s: a geared joint comes to rest within one, a free link swings some times.
+/// Recorded time after the drive is switched off, s: a geared joint stops within one, a free link swings several times.
 pub const COASTING: f64 = 5.0;
 
 /// The motion of all joints of a robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryFile {
-    /// Name of the robot it was made for.
+    /// Name of its robot.
     pub robot: String,
-    /// How it was optimised, where it was.
+    /// The optimisation, if the motion was optimised.
     pub design: Option<DesignRecord>,
-    /// When the drive is switched off in the middle of the motion, so that the joint coasts, s after the start.
+    /// Time after the start at which the drive is switched off so that the joint coasts, s.
     pub drive_off: Option<f64>,
-    /// One entry a joint, in the robot's order.
+    /// One entry per joint, in the robot's order.
     pub joints: Vec<JointTrajectory>,
 }
 
-/// How a motion was optimised.
+/// Record of a motion's optimisation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DesignRecord {
-    /// What was optimised.
+    /// Optimised criterion.
     pub criterion: Criterion,
     /// The criterion's value.
     pub value: f64,
-    /// Condition number of the regressor as it was judged, see [`Values`](crate::Values).
+    /// Condition number of the weighted and scaled regressor, see [`Values`](crate::Values).
     pub condition_number: f64,
     /// Seed of the starts.
     pub seed: u64,
@@ -51,14 +51,14 @@ pub struct DesignRecord {
 pub struct JointTrajectory {
     /// Name of the joint.
     pub name: String,
-    /// Position at which it starts and ends, rad or m; the trajectory is relative to it.
+    /// Position at its start and end, rad or m; the trajectory is relative to it.
     pub start: f64,
     /// The motion.
     pub trajectory: Trajectory<f64>,
 }
 
 impl TrajectoryFile {
-    /// Length of the longest joint's motion, s.
+    /// Returns the duration of the longest joint motion, s.
     pub fn duration(&self) -> f64 {
         self.joints
             .iter()
@@ -69,7 +69,7 @@ impl TrajectoryFile {
     /// Reads a `.toml` trajectory.
     ///
     /// # Errors
-    /// [`ExciteError`] with line and column of what is wrong.
+    /// [`ExciteError`] with line and column of the error.
     pub fn load(path: &Path) -> Result<Self, ExciteError> {
         let failed = |source| ExciteError::Read {
             path: path.into(),
@@ -82,11 +82,11 @@ impl TrajectoryFile {
         Self::from_toml(&text, path)
     }
 
-    /// Writes `.toml` (parameters) or `.csv` (samples at `rate`, Hz): columns t, and per joint q, qd, qdd and the
-    /// same positions again as ref, so that it reads as a recording too. The file appears whole or not at all.
+    /// Writes `.toml` (parameters) or `.csv` (samples at `rate`, Hz): columns t, and per joint q, qd, qdd and the same
+    /// positions again as ref, so that it can be read as a recording. The file is written completely or not at all.
     ///
     /// # Errors
-    /// [`ExciteError`]: another ending, or what the system says.
+    /// [`ExciteError`]: another file extension, or an error of the operating system.
     pub fn save(&self, path: &Path, robot: &Robot, rate: f64) -> Result<(), ExciteError> {
         let extension = path
             .extension()
@@ -99,7 +99,7 @@ impl TrajectoryFile {
         }
     }
 
-    /// Whether the file's joints are the robot's, by name and in order.
+    /// Checks that the file's joints are the robot's, by name and in order.
     ///
     /// # Errors
     /// [`ExciteError::OtherRobot`]; `path` names the file in it.

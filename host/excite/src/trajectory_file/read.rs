@@ -1,4 +1,4 @@
-//! The TOML text of a trajectory, read.
+//! Reader of a trajectory's TOML text.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use super::{DesignRecord, JointTrajectory, TrajectoryFile};
 use crate::{Criterion, ExciteError};
 use rig_model::robot::Place;
 
-/// The file as TOML has it; all times in seconds.
+/// The file's TOML structure; all times in seconds.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FileText {
@@ -89,7 +89,7 @@ enum MotionText {
     },
 }
 
-/// Whole microseconds of a time in a file, exactly.
+/// Converts a time to whole microseconds, exactly.
 fn micros(name: &str, seconds: f64) -> Result<u32, String> {
     let whole = (seconds * 1e6).round();
     if !(0.0..=f64::from(u32::MAX)).contains(&whole) {
@@ -97,7 +97,7 @@ fn micros(name: &str, seconds: f64) -> Result<u32, String> {
             "{name} is {seconds} s, but times lie between 0 and 4294 s"
         ));
     }
-    // Rounding of the decimal number itself is far below a thousandth of a microsecond.
+    // Rounding errors of the decimal number are far below a thousandth of a microsecond.
     if (seconds * 1e6 - whole).abs() > 1e-3 {
         return Err(format!(
             "{name} is {seconds} s, but the rig counts whole microseconds; round it to 6 decimals"

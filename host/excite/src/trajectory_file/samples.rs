@@ -15,14 +15,14 @@ pub struct SampledReference {
     pub period: f64,
     /// Per joint, rad or m.
     pub position: Vec<Vec<f64>>,
-    /// Per joint, rad/s or m/s; empty where the file does not say.
+    /// Per joint, rad/s or m/s; empty if the file does not contain it.
     pub velocity: Vec<Vec<f64>>,
-    /// Per joint, rad/s² or m/s²; empty where the file does not say.
+    /// Per joint, rad/s² or m/s²; empty if the file does not contain it.
     pub acceleration: Vec<Vec<f64>>,
 }
 
 impl SampledReference {
-    /// Positions alone: `way(joint, t)` from the middle of each joint's range.
+    /// Creates positions only: `way(joint, t)` from the middle of each joint's range.
     pub fn about_middle(
         robot: &Robot,
         period: f64,
@@ -44,8 +44,8 @@ impl SampledReference {
         }
     }
 
-    /// `count` sines of `size` rad or m a joint, the slowest of `slowest` seconds and of `phase(joint, harmonic)` rad, eased
-    /// in over two seconds: at rest in the middle where it begins.
+    /// Creates `count` sines of `size` rad or m per joint, the slowest of `slowest` seconds, with phases `phase(joint,
+    /// harmonic)` in rad. They fade in over two seconds, from rest in the middle of the range.
     pub fn eased_sines(
         robot: &Robot,
         [period, seconds]: [f64; 2],
@@ -65,12 +65,12 @@ impl SampledReference {
 }
 
 impl TrajectoryFile {
-    /// The reference at evenly spaced instants, from the first to the last within the motion and one beyond, where
-    /// all joints stand again.
+    /// Samples the reference at evenly spaced instants, from the first to the last within the motion and one beyond,
+    /// where all joints are at rest again.
     ///
     /// # Errors
-    /// [`ExciteError::Option`] for a rate that is not between 1 Hz and 1 MHz, and a motion in which the drive is switched off:
-    /// how the joint coasts is the rig's to say.
+    /// [`ExciteError::Option`] for a rate that is not between 1 Hz and 1 MHz, and for a motion in which the drive is
+    /// switched off, because only the rig determines how the joint coasts.
     pub fn sampled(&self, rate: f64) -> Result<SampledReference, ExciteError> {
         if !(1.0..=1e6).contains(&rate) {
             return Err(ExciteError::Option {
@@ -86,7 +86,7 @@ impl TrajectoryFile {
                 right: "samples are of a motion that is driven to its end; run this file with `rig record`, which switches the drive off".into(),
             });
         }
-        // A duration that is a whole number of samples must not gain one by rounding.
+        // Rounding errors must not add a sample to a duration of a whole number of samples.
         let last = (self.duration() * rate - 1e-6).ceil().max(0.0) as usize;
         let each = |pick: fn(&rig_shared::trajectory::Reference<f64>) -> f64, offset: bool| {
             self.joints
@@ -137,10 +137,10 @@ impl TrajectoryFile {
     }
 }
 /// Reads a trajectory as samples: a `.toml` trajectory sampled at `rate` (Hz), or the `ref` columns of a sampled one
-/// (its `q` columns where there are none) at the rate it has.
+/// (its `q` columns if there are none) at its own rate.
 ///
 /// # Errors
-/// [`ExciteError`] with the place of what is wrong.
+/// [`ExciteError`] with the place of the error.
 pub fn load_reference(
     path: &Path,
     robot: &Robot,

@@ -1,4 +1,4 @@
-//! The TOML text of a trajectory, written.
+//! Writer of a trajectory's TOML text.
 
 use std::fmt::Write as _;
 
@@ -174,7 +174,7 @@ fn write_motion(out: &mut String, trajectory: &Trajectory<f64>, unit: &str) {
 }
 
 impl TrajectoryFile {
-    /// As TOML with units in comments; [`TrajectoryFile::from_toml`] reads it back equal.
+    /// Writes TOML with units in comments; [`TrajectoryFile::from_toml`] reads back an equal file.
     pub fn to_toml(&self, robot: &Robot) -> String {
         let mut out = String::new();
         line(

@@ -1,42 +1,42 @@
-//! Whether a sweep belongs to the recordings from which gravity and inertia are known, and whether its map can be friction.
+//! Checks that a sweep fits the identified gravity and inertia, and that its map can be friction.
 //!
-//! The map takes what identified gravity and inertia leave of the sweep's torque. That is friction only if the torque is given by
-//! the sweep's own clock, and if both recordings have one scale of torque and position. Within a pass friction is constant and
-//! gravity is not: its share shows the scale. Over all passes and the ramps between them the whole model shows the clock.
+//! The map is the sweep's torque minus identified gravity and inertia. It is friction only if torque and position share
+//! one clock and both recordings have the same scales. Within a pass friction is constant and gravity changes, which
+//! shows the scale. The whole model over all passes and the ramps between them shows the clock.
 
 use super::super::covariance::t_quantile;
 use super::{FrictionFit, FrictionPoint, PARTS, Rows, tenths};
 use rig_output::{format_significant, format_value};
 
-/// Longest shift between torque and position that is looked for, s.
+/// Largest searched shift between torque and position, s.
 const LONGEST: f64 = 0.2;
-/// Share of the fastest speed from which a row says something of the clock: below it friction is not what the model says.
+/// Share of the highest speed above which a row is used for the clock test. Below it the friction model is wrong.
 const IN_MOTION: f64 = 0.05;
-/// Rows that are compared at each shift; more of them change nothing but the time it takes.
+/// Number of rows compared at each shift; more rows only take more time.
 const MOST: usize = 20_000;
-/// The shift must leave at most this share of the variance that is left as recorded. The same as of the clock test of
-/// recordings that are fitted.
+/// Largest ratio of the residual variance with the shift to the one as recorded. The clock test of fitted recordings
+/// has the same value.
 const LESS: f64 = 0.7;
-/// Departure of the gravity in the sweep from the identified one above which both are of different scales. Sound sweeps of
-/// 5 emulated rigs depart by up to 0.009; the smallest mistake of a unit or a ratio is a factor of 1.3.
+/// Relative deviation of the sweep's gravity from the identified one above which the scales differ. Sound sweeps of 5
+/// emulated rigs deviate by up to 0.009; the smallest mistake of a unit or a ratio is a factor of 1.3.
 const OTHER_SCALE: f64 = 0.1;
-/// Standard deviations by which something must be beyond what is allowed.
+/// Number of standard deviations by which a value must exceed its limit.
 const CLEAR: f64 = 3.0;
-/// Share of the torque's variance within passes that a scaled gravity must explain to be called scaled.
+/// Share of the torque variance within passes that a scaled gravity must explain to be called scaled.
 const FOLLOWS: f64 = 0.5;
 
 /// A torque that was recorded by another clock than the position.
 pub(super) struct Late {
-    /// By how much the torque is behind the position, s; below zero where it is ahead.
+    /// Delay of the torque behind the position, s; negative if it is ahead.
     pub by: f64,
-    /// Share of the torque's variance that the model leaves as recorded.
+    /// Share of the torque variance that the model leaves as recorded.
     pub recorded: f64,
-    /// The same with the torque moved.
+    /// The same with the shifted torque.
     pub moved: f64,
 }
 
 impl Rows {
-    /// Finds the shift of the torque that fits the whole model best; none where the torque as recorded fits about as well.
+    /// Finds the torque shift with the smallest residual; none if the recorded torque fits about as well.
     pub(super) fn late(&self) -> Option<Late> {
         let t = &self.position.t;
         let fastest = self.speed.iter().fold(0.0f64, |most, v| most.max(v.abs()));
@@ -62,7 +62,7 @@ impl Rows {
             .filter(|(_, left)| left.is_finite())
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
         let recorded = left[reach as usize];
-        // Its end is no least, and neither is what is hardly better.
+        // A shift at the end of the range is no minimum; a small improvement does not count either.
         if at == 0 || at + 1 == left.len() || !(least < LESS * recorded) {
             return None;
         }
@@ -80,7 +80,7 @@ impl Rows {
         })
     }
 
-    /// Mean time from row to row within stretches, s.
+    /// Returns the mean time between rows within stretches, s.
     fn step(&self) -> Option<f64> {
         let (mut time, mut count) = (0.0, 0usize);
         for [from, to] in self.position.stretches() {
@@ -92,7 +92,7 @@ impl Rows {
         (count > 0 && time > 0.0).then(|| time / count as f64)
     }
 
-    /// First row and one past the last of the stretch of each row.
+    /// Returns the first row and one past the last of the stretch of each row.
     fn bounds(&self) -> Vec<[usize; 2]> {
         let mut bounds = Vec::with_capacity(self.tau.len());
         for [from, to] in self.position.stretches() {
@@ -101,7 +101,7 @@ impl Rows {
         bounds
     }
 
-    /// The same rows with the torque taken `by` seconds later: what a torque that is late by that much should have been.
+    /// Returns the rows with the torque read `by` seconds later, which corrects a torque that is late by that much.
     pub(super) fn earlier(&self, by: f64) -> Option<Self> {
         let rows = by / self.step()?;
         let bounds = self.bounds();
@@ -120,8 +120,8 @@ impl Rows {
         })
     }
 
-    /// How much of the identified gravity the torque shows within the passes of `points`, and what the identified model leaves
-    /// there.
+    /// Compares the torque within the passes of `points` with the identified gravity, and returns the residual of the
+    /// identified model there.
     pub(super) fn gravity_shown(&self, points: &[FrictionPoint]) -> Shown {
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
         let mut passes = Vec::with_capacity(points.len());
@@ -132,7 +132,7 @@ impl Rows {
                 let mean = parts.iter().sum::<f64>() / parts.len() as f64;
                 parts.map(|v| v - mean)
             };
-            // A pass is one witness, however long it takes.
+            // Every pass has the same weight, whatever its duration.
             let (x, y) = (about(&self.weight[rows.clone()]), about(&self.tau[rows]));
             let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let own = [sum(&x, &x), sum(&x, &y), sum(&y, &y)];
@@ -163,7 +163,7 @@ impl Rows {
     }
 }
 
-/// Share of the variance of the second that the first leaves, scale and mean free.
+/// Returns the share of the second value's variance that the first leaves, with free scale and mean.
 fn unexplained(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (a, b) in pairs {
@@ -178,32 +178,32 @@ fn unexplained(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     1.0 - xy * xy / (xx * yy)
 }
 
-/// The identified gravity as it shows in a sweep, by means over tenths of each pass.
+/// Identified gravity compared with the sweep's torque, by means over tenths of each pass.
 pub(super) struct Shown {
-    /// Torque within passes over identified gravity; 1 would be right.
+    /// Ratio of the torque within passes to the identified gravity; 1 for equal scales.
     factor: f64,
     /// Its standard deviation over the passes.
     std: f64,
-    /// Share of the torque's variance within passes that the gravity explains, scaled by the factor.
+    /// Share of the torque variance within passes that the scaled gravity explains.
     explained: f64,
-    /// How much the identified gravity changes within passes, N·m or N rms.
+    /// Change of the identified gravity within passes, N·m or N rms.
     gravity: f64,
-    /// What the gravity as identified leaves of the torque within passes, N·m or N rms.
+    /// Residual of the torque within passes with the identified gravity, N·m or N rms.
     left: f64,
-    /// The same as a share of the torque's variance within passes.
+    /// The same as a share of the torque variance within passes.
     share: f64,
-    /// Whether the torque is never negative, and never positive.
+    /// True if the torque is never negative, and never positive.
     never: [bool; 2],
 }
 
 impl Shown {
-    /// A sentence about a torque or position of another scale than that of the identification; none where it is the same.
-    /// `noise` is what the model leaves of the torque in its own recordings, N·m or N rms.
+    /// Returns a sentence if torque or position has another scale than in the identification. `noise` is the model's
+    /// residual in its own recordings, N·m or N rms.
     pub(super) fn doubt(&self, noise: f64, sweep: &str, joint: &str, n: usize) -> Option<String> {
-        // A joint about a vertical axis has no gravity to compare.
+        // A joint with a vertical axis has no gravity to compare.
         let scaled =
             self.gravity > noise && (self.factor - 1.0).abs() - OTHER_SCALE > CLEAR * self.std;
-        // A position of hardly any travel shows none either, and leaves a torque that changes all the same.
+        // Very little travel also gives no gravity, although the torque still changes.
         let strange = self.share > FOLLOWS && self.left > CLEAR * noise;
         if !scaled && !strange {
             return None;
@@ -242,13 +242,13 @@ impl Shown {
     }
 }
 
-/// Half of the 95 % interval as a standard deviation.
+/// Converts half a 95 % interval to a standard deviation.
 fn std_of(half: f64, fit: &FrictionFit, points: usize) -> f64 {
     let parameters = fit.half_interval.len() + 1 + usize::from(fit.stribeck_velocity.is_some());
     half / t_quantile(points.saturating_sub(parameters).max(1))
 }
 
-/// A sentence about friction below zero, which drives instead of braking; none where all can be friction.
+/// Returns a sentence if friction is negative, that is, if it drives instead of braking.
 pub(super) fn impossible(
     fit: &FrictionFit,
     points: usize,
@@ -275,7 +275,7 @@ pub(super) fn impossible(
     })
 }
 
-/// A sentence about a torque that is late; none where both laws agree within their intervals.
+/// Returns a sentence about a late torque; none if both laws agree within their intervals.
 pub(super) fn late_doubt(
     late: &Late,
     [recorded, moved]: [&FrictionFit; 2],

@@ -6,36 +6,36 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::super::covariance::t_quantile;
 use super::{FrictionFit, FrictionPoint};
 
-/// p-value below which the Stribeck term is taken in. Its velocity exists only if the term does, which makes
-/// the F distribution too optimistic (Davies 1977); a thousandth leaves room for that.
+/// p-value below which the Stribeck term is accepted. Its velocity exists only if the term does, so the F distribution
+/// is too optimistic (Davies 1977); a thousandth allows for that.
 pub(super) const WARRANT: f64 = 1e-3;
-/// Points from which both laws are compared: the larger one has five parameters.
+/// Smallest number of points for a comparison of both laws: the larger one has five parameters.
 const FEWEST: usize = 7;
-/// Stribeck velocities that are tried, evenly spaced in their logarithm.
+/// Number of trial Stribeck velocities, evenly spaced in their logarithm.
 const GRID: usize = 60;
-/// Highest of them as a share of the fastest pass. Beyond it the term is a parabola over all speeds, which viscous and
-/// Coulomb friction take up.
+/// Highest trial velocity as a share of the fastest pass. Above it the term is a parabola over all speeds, collinear
+/// with viscous and Coulomb friction.
 const HIGHEST: f64 = 0.5;
-/// Halvings of the interval in which the common variance is sought.
+/// Number of halvings of the interval that contains the common variance.
 const HALVINGS: usize = 60;
 
-/// What the points say of the laws.
+/// Fitted laws and the choice between them.
 pub(super) struct Decision {
     pub simple: FrictionFit,
     pub stribeck: Option<FrictionFit>,
     pub profile: Vec<[f64; 2]>,
     pub p_value: Option<f64>,
     pub warranted: bool,
-    /// Standard deviation of the points beyond their own, N·m or N.
+    /// Standard deviation between points beyond their own, N·m or N.
     pub scatter: f64,
 }
 
-/// Fits both laws and decides between them; none where all points have one speed.
+/// Fits both laws and decides between them; none if all points have the same speed.
 ///
-/// The points' own standard deviations know the noise within a pass, but not what all passes share: an error of gravity
-/// over the sweep's range, cogging, friction that depends on position. One variance for all of this is added to each, such
-/// that the larger law leaves as much as the points' deviations say (Paule & Mandel 1982). A slow pass with much
-/// noise then counts less; it is not left out.
+/// The points' own standard deviations contain the noise within a pass but not errors between passes: gravity errors
+/// over the sweep's range, cogging, friction that depends on position. One common variance is added to all points. It
+/// makes the larger law's residual match the points' deviations (Paule & Mandel 1982). A noisy slow pass then has less
+/// weight but is not removed.
 pub(super) fn decide(points: &[FrictionPoint]) -> Option<Decision> {
     let speeds = points.iter().map(|p| p.speed.abs());
     let (slow, fast) = speeds.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
@@ -76,7 +76,7 @@ pub(super) fn decide(points: &[FrictionPoint]) -> Option<Decision> {
     })
 }
 
-/// One over the standard deviation of each point with `scatter` added.
+/// Returns one over the standard deviation of each point with `scatter` added.
 fn weights(points: &[FrictionPoint], scatter: f64) -> Vec<f64> {
     points
         .iter()
@@ -84,7 +84,7 @@ fn weights(points: &[FrictionPoint], scatter: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The best Stribeck velocity, and the sum of squares over all that were tried.
+/// Returns the fit with the best Stribeck velocity, and the sum of squares for all trial velocities.
 fn best(
     points: &[FrictionPoint],
     weights: &[f64],
@@ -104,8 +104,8 @@ fn best(
     (best, profile)
 }
 
-/// Standard deviation that, added to every point's own, makes the larger law's sum of squares its degrees of freedom;
-/// 0 where the points' own are enough.
+/// Returns the standard deviation that, added to every point's own, makes the larger law's sum of squares equal to its
+/// degrees of freedom; 0 if the points' own suffice.
 fn scatter(points: &[FrictionPoint], grid: &[f64]) -> f64 {
     let law = if grid.is_empty() { 3 } else { 5 };
     let freedom = points.len().saturating_sub(law).max(1) as f64;
@@ -132,7 +132,7 @@ fn scatter(points: &[FrictionPoint], grid: &[f64]) -> f64 {
     high
 }
 
-/// Least squares of a law with a constant; none where its columns are not independent.
+/// Fits a law with a constant by least squares; none if its columns are collinear.
 fn fit(points: &[FrictionPoint], weights: &[f64], vs: Option<f64>) -> Option<FrictionFit> {
     let columns = if vs.is_some() { 4 } else { 3 };
     let law = |v: f64, c: usize| match (c, vs) {
@@ -152,7 +152,7 @@ fn fit(points: &[FrictionPoint], weights: &[f64], vs: Option<f64>) -> Option<Fri
     let x = &inverse * (qr.q().transpose() * &y);
     let residual = &y - &a * &x;
     let squares = residual.norm_squared();
-    // Leaving one out by the leverage: e/(1 − h).
+    // Leave-one-out error by the leverage: e/(1 − h).
     let q = qr.q();
     let left_out: f64 = (0..n)
         .map(|i| {
@@ -161,7 +161,7 @@ fn fit(points: &[FrictionPoint], weights: &[f64], vs: Option<f64>) -> Option<Fri
         })
         .sum();
     let freedom = n.saturating_sub(columns + usize::from(vs.is_some())).max(1);
-    // Never below what the points' own spread says.
+    // At least one, the points' own standard deviation.
     let sigma = (squares / freedom as f64).max(1.0).sqrt();
     let quantile = t_quantile(freedom);
     let half = |c: usize| quantile * sigma * inverse.row(c).norm();

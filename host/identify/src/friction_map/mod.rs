@@ -1,13 +1,13 @@
 //! Friction against speed, from a recording with stretches of constant speed.
 //!
-//! Passes come from the recorded reference of the joint, which is computed and has no noise; without one from the measured
-//! position. A pass gives one point: its mean speed, its mean friction and the standard deviation of that mean. Noise makes
-//! a point less certain and takes no point away. What is left out is listed with its reason.
+//! Passes are found in the recorded reference of the joint, which has no noise, or else in the measured position. A
+//! pass gives one point: its mean speed, its mean friction and the standard deviation of that mean. Noise makes a point
+//! less certain but never removes it. Every dropped pass is listed with its reason.
 //!
-//! The sweep has its own sample rate, band, clipping and time stamps; only parameters come from the identification. Whether both
-//! belong together is checked ([`FrictionMap::doubts`]).
+//! The sweep has its own sample rate, band, clipping and time stamps; only the parameters come from the identification.
+//! [`FrictionMap::doubts`] tells whether the sweep and the identification are consistent.
 //!
-//! Leaves out: friction that depends on position, load or temperature; memory: all rows of a sweep are held.
+//! Limits: no friction that depends on position, load or temperature; all rows of a sweep are held in memory.
 
 mod consistency;
 mod law;
@@ -27,17 +27,17 @@ use rig_data::prepare::{
 use rig_model::robot::{JointKind, Robot};
 use rig_output::format_significant;
 
-/// How stretches of constant speed are found.
+/// Settings for finding stretches of constant speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionMapOptions {
-    /// Speed of a measured position may leave its mean over the stretch by this share.
+    /// Largest relative deviation of a measured position's speed from its mean over the stretch.
     pub tolerance: f64,
-    /// Shortest stretch that is left behind the start that is left out, s.
+    /// Shortest usable stretch after its start is excluded, s.
     pub shortest: f64,
-    /// Start of a stretch that is left out, s: the controller settles.
+    /// Excluded start of a stretch, in which the controller settles, s.
     pub settle: f64,
-    /// Share of a stretch that is left out at its start at least: friction builds up over a distance after a reversal
-    /// (presliding), which slow passes take long to cover.
+    /// Smallest excluded share at the start of a stretch. Friction builds up over a distance after a reversal
+    /// (presliding), and slow passes take long to cover it.
     pub settle_share: f64,
 }
 
@@ -57,15 +57,15 @@ impl Default for FrictionMapOptions {
 pub struct FrictionPoint {
     /// Mean measured speed, rad/s or m/s.
     pub speed: f64,
-    /// Torque less gravity, inertia and offset as identified, N·m or N.
+    /// Torque minus the identified gravity, inertia and offset, N·m or N.
     pub friction: f64,
-    /// Standard deviation of that mean, correlation in time allowed for.
+    /// Standard deviation of that mean; allows for correlation in time.
     pub std: f64,
     /// Start, s.
     pub start: f64,
-    /// s
+    /// Duration, s.
     pub duration: f64,
-    /// First row that counts and one past the last.
+    /// First row used and one past the last.
     #[serde(skip)]
     pub rows: (usize, usize),
 }
@@ -73,73 +73,73 @@ pub struct FrictionPoint {
 /// A stretch of constant speed that gave no point.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DroppedPass {
-    /// rad/s or m/s
+    /// Speed, rad/s or m/s.
     pub speed: f64,
     /// Start, s.
     pub start: f64,
-    /// s
+    /// Duration, s.
     pub duration: f64,
-    /// Why, a phrase.
+    /// Reason, a phrase.
     pub why: String,
 }
 
 /// A fitted law.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrictionFit {
-    /// N·m or N
+    /// Coulomb friction, N·m or N.
     pub coulomb: f64,
-    /// N·m·s/rad or N·s/m
+    /// Viscous coefficient, N·m·s/rad or N·s/m.
     pub viscous: f64,
-    /// Breakaway friction above Coulomb's, N·m or N; 0 without the Stribeck term.
+    /// Breakaway friction minus Coulomb friction, N·m or N; 0 without the Stribeck term.
     pub breakaway_excess: f64,
-    /// Constant torque that the sweep has beyond the identified one, N·m or N.
+    /// Constant torque of the sweep minus the identified one, N·m or N.
     pub offset: f64,
     /// Stribeck velocity, rad/s or m/s.
     pub stribeck_velocity: Option<f64>,
     /// 95 % half intervals in the order coulomb, viscous, breakaway excess.
     pub half_interval: Vec<f64>,
-    /// Weighted sum of squares of what is left.
+    /// Weighted sum of squared residuals.
     pub squares: f64,
-    /// RMS error on points that were left out of the fit one by one, N·m or N.
+    /// RMS error on points that were left out of the fit one at a time, N·m or N.
     pub leave_one_out_rms: f64,
 }
 
-/// Points, laws and the choice between them.
+/// Points, fitted laws and the choice between them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrictionMap {
     /// Name of the joint.
     pub joint: String,
-    /// One a stretch, by speed.
+    /// One point per stretch, sorted by speed.
     pub points: Vec<FrictionPoint>,
-    /// Stretches of constant speed that gave no point, by time.
+    /// Stretches of constant speed that gave no point, sorted by time.
     pub dropped: Vec<DroppedPass>,
-    /// Whether the stretches come from the recorded reference; else from the measured position.
+    /// True if the stretches come from the recorded reference, false if from the measured position.
     pub from_reference: bool,
-    /// Standard deviation of the points beyond their own, N·m or N: what differs from pass to pass.
+    /// Standard deviation between passes beyond that of the points themselves, N·m or N.
     pub scatter: f64,
     /// fc·sgn v + fv·v + a constant.
     pub simple: FrictionFit,
-    /// The same and breakaway·exp(−(v/vs)²)·sgn v (Armstrong-Hélouvry, Dupont & Canudas de Wit 1994), where the points
+    /// The same plus breakaway·exp(−(v/vs)²)·sgn v (Armstrong-Hélouvry, Dupont & Canudas de Wit 1994), if the points
     /// warrant it.
     pub stribeck: Option<FrictionFit>,
-    /// Sum of squares over the Stribeck velocity: what the choice of vs rests on.
+    /// Sum of squares as a function of the Stribeck velocity vs, which decides the choice of vs.
     pub profile: Vec<[f64; 2]>,
     /// p-value of the F-test of the Stribeck law against the simple one.
     pub p_value: Option<f64>,
-    /// RMS error of the Stribeck law on points left out, warranted or not, N·m or N.
+    /// RMS error of the Stribeck law on left-out points, N·m or N; given even if the law is not warranted.
     pub stribeck_left_out_rms: Option<f64>,
-    /// Whether the Stribeck term is warranted.
+    /// True if the Stribeck term is warranted.
     pub warranted: bool,
     /// One or two sentences.
     pub text: String,
-    /// What was done to the sweep's time stamps, a sentence.
+    /// Corrections to the sweep's time stamps, a sentence.
     pub note: Option<String>,
-    /// Why the map cannot be trusted, a sentence each: a torque of another clock or scale than the position or than the
-    /// recordings of the identification, friction below zero. Empty for a sound sweep.
+    /// Reasons not to trust the map, a sentence each: the torque has another clock or scale than the position or than
+    /// the identification, or friction is negative. Empty for a sound sweep.
     pub doubts: Vec<String>,
 }
 
-/// The rows of a sweep, whether the joint moved in them or not.
+/// All rows of a sweep, moving or not.
 #[derive(Clone, Default)]
 struct Rows {
     position: Signal,
@@ -147,21 +147,21 @@ struct Rows {
     speed: Vec<f64>,
     /// Torque, N·m or N.
     tau: Vec<f64>,
-    /// All that the identified model has of it but the joint's own friction, N·m or N.
+    /// Torque of the identified model without the joint's own friction, N·m or N.
     model: Vec<f64>,
     /// The same with the joint's own friction.
     whole: Vec<f64>,
-    /// What the identified model holds at rest: gravity and the constant torque, N·m or N.
+    /// Torque of the identified model at rest: gravity and the constant torque, N·m or N.
     weight: Vec<f64>,
     saturated: Vec<bool>,
 }
 
-/// Draws the friction map of joint `joint` (from 0) out of `recording`, with gravity and inertia as in
-/// `identification`. The recording may have another sample rate than those of the identification.
+/// Computes the friction map of joint `joint` (from 0) from `recording`, with gravity and inertia of `identification`.
+/// The recording may have another sample rate than those of the identification.
 ///
 /// # Errors
-/// [`IdentifyError::FrictionMap`] where fewer than four stretches of constant speed are found, or all lie in
-/// one direction; what reading gives.
+/// [`IdentifyError::FrictionMap`] if fewer than four stretches of constant speed are found or all have the same
+/// direction; reading errors.
 pub fn friction_map(
     robot: &Robot,
     identification: &Identification,
@@ -227,21 +227,21 @@ pub fn friction_map(
     })
 }
 
-/// The error where no law can be fitted.
+/// Returns the error for stretches without different speeds.
 fn one_speed(joint: &str) -> IdentifyError {
     IdentifyError::FrictionMap(format!(
         "All stretches of joint {joint} have the same speed; a friction map needs several."
     ))
 }
 
-/// What the checks of a map look at.
+/// The input of a map's checks.
 struct Check<'a> {
     rows: &'a Rows,
     stretches: &'a [Stretch],
     options: &'a FrictionMapOptions,
     sweep: &'a str,
     joint: &'a str,
-    /// What the identified model leaves of the joint's torque in the recordings that it was fitted to, N·m or N rms.
+    /// Residual of the joint's torque in the recordings of the fit, N·m or N rms.
     noise: f64,
     /// Number of the joint, from 1.
     number: usize,
@@ -249,7 +249,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Why the map cannot be trusted: the clock first, as a late torque looks like another scale too.
+    /// Returns the reasons not to trust the map. The clock comes first, because a late torque looks like a wrong scale.
     fn doubts(&self, points: &[FrictionPoint], decision: &Decision) -> Vec<String> {
         let units = match self.kind {
             JointKind::Revolute => ["N·m", "N·m·s/rad"],
@@ -281,7 +281,7 @@ impl Check<'_> {
     }
 }
 
-/// Whether speeds are enough for a map: four or more, in both directions.
+/// Returns true if the speeds suffice for a map: at least four, in both directions.
 fn both_ways(speeds: impl Iterator<Item = f64> + Clone) -> bool {
     let back = speeds.clone().filter(|v| *v < 0.0).count();
     let forth = speeds.filter(|v| *v > 0.0).count();
@@ -306,8 +306,8 @@ fn too_few(joint: &str, points: &[FrictionPoint], dropped: &[DroppedPass]) -> Id
     ))
 }
 
-/// What is done to the sweep: the band of the identification as far as the sweep's own rate and noise have it, its own clipping.
-/// Means over passes are taken, so nothing is decimated.
+/// Decides the treatment of the sweep: the band of the identification, limited by the sweep's own rate and noise, and
+/// the sweep's own clipping. There is no decimation, because means over passes are taken.
 fn treatment_of(
     robot: &Robot,
     fitted: &Treatment,
@@ -315,7 +315,7 @@ fn treatment_of(
     recording: &dyn Recording,
 ) -> Result<Treatment, IdentifyError> {
     let rate = sweep.sample_rate;
-    // A position with noise or time stamps of its own must not be differentiated in the band of a better one.
+    // A noisier position, or one with worse time stamps, must not be differentiated in the band of a better one.
     let (_, own) = treatment_for(
         robot,
         &[recording],
@@ -340,13 +340,13 @@ fn treatment_of(
         decimation: 1,
         parallel_edge: cutoff,
         saturation,
-        // One period of the filter: a pass may end with the recording.
+        // One period of the filter, because a pass may end with the recording.
         trimmed: (rate / cutoff).ceil() as usize,
         ..fitted.clone()
     })
 }
 
-/// The recorded reference of the joint; empty where there is none.
+/// Returns the recorded reference of the joint; empty if there is none.
 fn reference_of(recording: &dyn Recording, joint: usize) -> Result<Signal, IdentifyError> {
     let mut signal = Signal::default();
     recording.each_block(1 << 16, &mut |block| {
@@ -361,7 +361,7 @@ fn reference_of(recording: &dyn Recording, joint: usize) -> Result<Signal, Ident
     Ok(signal)
 }
 
-/// Torque of the joint less all that the identified model has but its friction.
+/// Computes the joint's torque and the identified model's torque with and without the joint's friction.
 fn rows_of(
     robot: &Robot,
     identification: &Identification,
@@ -415,11 +415,11 @@ fn rows_of(
     Ok(rows)
 }
 
-/// Parts of a pass in each of which the joint has to go on.
+/// Number of parts of a pass; the joint must advance in each.
 const PARTS: usize = 10;
 
 impl Rows {
-    /// The points of all passes, by speed, and the passes that give none.
+    /// Returns the points of all passes, sorted by speed, and the dropped passes.
     fn points(
         &self,
         stretches: &[Stretch],
@@ -441,13 +441,13 @@ impl Rows {
         (points, dropped)
     }
 
-    /// The mean of a pass, or why it has none.
+    /// Returns the mean of a pass, or the reason why it has none.
     fn point(&self, pass: &Stretch, options: &FrictionMapOptions) -> Result<FrictionPoint, String> {
         let t = &self.position.t;
         let duration = pass.to - pass.from;
         let settle = options.settle.max(options.settle_share * duration);
         let first = t.partition_point(|t| *t < pass.from + settle);
-        // The position's filter smears what comes after a pass as far into it.
+        // The position filter also spreads the motion after a pass into its end.
         let end = t.partition_point(|t| *t <= pass.to - options.settle);
         let rows = first..end.max(first);
         let left = match rows.clone().next_back() {
@@ -477,7 +477,7 @@ impl Rows {
         let x = &self.position.x;
         let speed = slope(&t[rows.clone()], &x[rows.clone()])
             .ok_or_else(|| "its rows have one time".to_owned())?;
-        // Between ten rows are nine parts.
+        // Ten rows have nine intervals.
         let parts = PARTS.min(rows.len() - 1);
         let edge = |part: usize| first + part * (rows.len() - 1) / parts;
         let stopped = (0..parts)
@@ -504,7 +504,7 @@ impl Rows {
     }
 }
 
-/// Means over tenths.
+/// Returns the means over tenths.
 fn tenths(values: &[f64]) -> [f64; PARTS] {
     std::array::from_fn(|part| {
         let edge = |part: usize| part * values.len() / PARTS;
@@ -513,8 +513,8 @@ fn tenths(values: &[f64]) -> [f64; PARTS] {
     })
 }
 
-/// Mean and its standard deviation: the larger of what the correlation from row to row gives, and what the means of the
-/// tenths differ by, which sees what changes slowly over the pass.
+/// Returns the mean and its standard deviation: the larger of the one from the correlation of rows and the one from the
+/// means of the tenths. The second detects slow changes over the pass.
 fn mean_of(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -532,7 +532,7 @@ fn mean_of(values: &[f64]) -> (f64, f64) {
     (mean, by_rows.max(by_tenths))
 }
 
-/// The decision in words.
+/// Describes the decision in words.
 fn text_of(decision: &Decision, points: &[FrictionPoint], kind: JointKind) -> String {
     let (velocity, torque) = match kind {
         JointKind::Revolute => ("rad/s", "N·m"),
@@ -571,7 +571,7 @@ fn text_of(decision: &Decision, points: &[FrictionPoint], kind: JointKind) -> St
     let less = if p >= law::WARRANT {
         format!("(p = {})", format_significant(p, 2))
     } else {
-        // The squares alone say yes: what says no is named.
+        // The F-test alone accepts the term, so the text names the failed criterion.
         format!(
             "(p = {p:.1e}, but its size is less certain than it is large, or points left out are predicted no better: {} against {} {torque})",
             format_significant(b.leave_one_out_rms, 3),

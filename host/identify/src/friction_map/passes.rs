@@ -1,27 +1,27 @@
-//! Passes of a sweep: stretches of constant speed of the reference, or of the position where there is no reference.
+//! Passes of a sweep: stretches of constant speed in the reference, or in the position if there is no reference.
 
 use std::ops::Range;
 
 use super::FrictionMapOptions;
 
-/// Half lengths of the windows over which a speed is taken, s, longest first.
+/// Half lengths of the windows for the speed, s, longest first.
 ///
-/// Noise of a speed falls with the length of its window: the slowest passes, which last for seconds, are found by the
-/// longest window, short fast ones by the shortest.
+/// Noise of a speed falls with the window length. The longest window finds the slowest passes, which last for seconds;
+/// the shortest finds short fast ones.
 const WINDOWS: [f64; 3] = [0.4, 0.1, 0.025];
-/// A pass lasts at least this many half windows, so that most of its windows lie within it and the top of a quintic move of 1 s,
-/// which is straight for 0.1 s, is none.
+/// Minimum length of a pass in half windows, so that most of its windows lie within it. It excludes the peak of a
+/// quintic move of 1 s, which is straight for 0.1 s.
 const HALVES_PER_PASS: f64 = 6.0;
-/// Share by which the speed of a reference may leave its mean. References are computed, so this covers rounding and the
-/// jitter of time stamps; the top of a quintic move of 1 s is this constant for 0.1 s, shorter than any pass.
+/// Largest relative deviation of a reference's speed from its mean. References are computed, so this covers rounding
+/// and the jitter of time stamps. The peak of a quintic move of 1 s is this constant for 0.1 s, shorter than any pass.
 const REFERENCE_TOLERANCE: f64 = 0.01;
 
-/// A signal over time in stretches without a gap.
+/// A signal over time, in stretches without gaps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Signal {
-    /// s
+    /// Times, s.
     pub t: Vec<f64>,
-    /// rad or m
+    /// Values, rad or m.
     pub x: Vec<f64>,
     /// First row of each stretch.
     pub starts: Vec<usize>,
@@ -48,7 +48,7 @@ impl Signal {
         self.x.push(x);
     }
 
-    /// First row and one past the last of each stretch without a gap.
+    /// Returns the first row and one past the last of each stretch without a gap.
     pub(super) fn stretches(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         let ends = self.starts.iter().skip(1).copied().chain([self.t.len()]);
         self.starts
@@ -58,12 +58,12 @@ impl Signal {
             .map(|(from, to)| [from, to])
     }
 
-    /// The stretches of constant speed of a computed reference, in order of time.
+    /// Returns the stretches of constant speed of a computed reference, in order of time.
     pub(super) fn passes_of_reference(&self, options: &FrictionMapOptions) -> Vec<Stretch> {
         self.passes(REFERENCE_TOLERANCE, options.shortest)
     }
 
-    /// The stretches of constant speed of a measured position, in order of time.
+    /// Returns the stretches of constant speed of a measured position, in order of time.
     pub(super) fn passes_of_position(&self, options: &FrictionMapOptions) -> Vec<Stretch> {
         self.passes(options.tolerance, options.shortest + options.settle)
     }
@@ -101,7 +101,7 @@ impl Signal {
         all
     }
 
-    /// Neighbours that are one pass: a joint that creeps leaves its mean speed for moments, and its way is one line all the same.
+    /// Joins neighbours that form one pass: a creeping joint leaves its mean speed briefly but stays on one line.
     fn joined(&self, found: Vec<(Range<usize>, f64)>, tolerance: f64) -> Vec<(Range<usize>, f64)> {
         let mut joined: Vec<(Range<usize>, f64)> = Vec::new();
         for (run, speed) in found {
@@ -118,7 +118,7 @@ impl Signal {
         joined
     }
 
-    /// Runs of rows whose speed over windows stays within a share of its mean over the run.
+    /// Returns runs of rows whose speed over windows stays within a share of its mean over the run.
     fn runs(
         &self,
         rows: Range<usize>,
@@ -162,8 +162,8 @@ impl Signal {
         runs
     }
 
-    /// The line on which rows lie to within a share of the way gone. A window as long as a period of an oscillation sees no
-    /// change of speed; the line does.
+    /// Returns the line of a run if its rows lie on it to within a share of the travel. A window as long as the period
+    /// of an oscillation shows no change of speed; the line does.
     fn straight(&self, run: Range<usize>, tolerance: f64) -> Option<Line> {
         let speed = slope(&self.t[run.clone()], &self.x[run.clone()])?;
         let n = run.len() as f64;
@@ -177,15 +177,15 @@ impl Signal {
         line.off = run
             .map(|k| line.distance(self.t[k], self.x[k]))
             .fold(0.0, f64::max);
-        // What tolerance in speed lets the position run off in the shortest window.
+        // Deviation of the position that the speed tolerance allows in the shortest window.
         let shortest = WINDOWS.iter().copied().fold(f64::INFINITY, f64::min);
         let fits = line.off <= tolerance.max(0.02) * way;
         line.off = line.off.max(tolerance * speed.abs() * shortest);
         fits.then_some(line)
     }
 
-    /// The run with the rows before and behind it that lie on its line as well: a long window sees the end of a pass from
-    /// half its length away.
+    /// Extends the run by adjacent rows that also lie on its line: a long window detects the end of a pass from half
+    /// its length away.
     fn extended(
         &self,
         run: Range<usize>,
@@ -211,7 +211,7 @@ struct Line {
     speed: f64,
     t: f64,
     x: f64,
-    /// How far from it its own rows are at most, rad or m.
+    /// Largest distance of its own rows from it, rad or m.
     off: f64,
 }
 
@@ -221,7 +221,7 @@ impl Line {
     }
 }
 
-/// Slope of the least-squares line through points; none of fewer than two instants.
+/// Returns the slope of the least-squares line through points; none for fewer than two instants.
 pub(super) fn slope(t: &[f64], x: &[f64]) -> Option<f64> {
     let n = t.len().min(x.len()) as f64;
     let (mt, mx) = (t.iter().sum::<f64>() / n, x.iter().sum::<f64>() / n);
@@ -239,7 +239,7 @@ pub(super) fn slope(t: &[f64], x: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Position at rest, over a pass each way and a quintic move; rounded to `resolution`.
+    /// Position with dwells, a pass each way per speed and quintic moves; rounded to `resolution`.
     fn made(speeds: &[f64], travel: f64, rate: f64, resolution: f64) -> Signal {
         let mut signal = Signal::default();
         let (mut t, mut x) = (0.0, 0.0);
@@ -292,7 +292,7 @@ mod tests {
         let mut signal = Signal::default();
         for k in 0..20_000 {
             let t = f64::from(k) * 1e-3;
-            // A drift under an oscillation whose period is one of the windows.
+            // A drift plus an oscillation whose period equals one of the windows.
             signal.push(
                 t,
                 0.05 * t + 0.1 * (t * std::f64::consts::TAU / 0.8).sin(),

@@ -1,4 +1,4 @@
-//! Right angles written with few digits: the same base parameters as with all of them, and a remark for each.
+//! Right angles written with few digits: the same base parameters as with all digits, and a remark for each.
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -8,7 +8,7 @@ use std::path::Path;
 use crate::{Base, ModelKind, agree, grouped};
 use rig_model::robot::{Description, JointKind, Original};
 
-/// Angles off a right one by less are written with all their digits, rad.
+/// Deviation of an angle from a right angle below which it was written with all digits, rad.
 const ROUNDING: f64 = 1e-10;
 
 /// One joint: kind, alpha as text, a, theta as text, d.
@@ -31,7 +31,7 @@ fn toml(rows: &[Row]) -> String {
     text
 }
 
-/// The same chain as URDF: of each joint one fixed joint that turns it and shifts it along x, and one that does so by z.
+/// The same chain as URDF: per joint one fixed joint that turns and shifts it along x, and one along z.
 fn urdf(rows: &[Row]) -> String {
     let mut text = String::from("<robot name='arm'>\n<link name='l0'/>\n");
     for (k, (kind, alpha, a, theta, d)) in rows.iter().enumerate() {
@@ -64,7 +64,7 @@ fn base(description: &Description) -> Base {
     base
 }
 
-/// A UR5 whose right angles are written as `right`.
+/// A UR5 with right angles written as `right`.
 fn ur5(right: &str) -> Vec<Row> {
     vec![
         revolute("0.0", 0.0, 0.0892),
@@ -100,7 +100,7 @@ fn right_angles_of_few_digits_give_the_base_parameters_of_right_angles() {
             let base = base(&found);
             assert_eq!(base.columns, expected.columns, "{ending} {digits}");
             let off = (&base.combination - &expected.combination).amax();
-            // Lengths of a URDF file lie along axes as they are written: microns of a metre.
+            // Lengths of a URDF file lie along axes as written: microns of a metre.
             assert!(off < 1e-5, "{ending} {digits}: {off:e}");
             let value: f64 = digits.parse().unwrap();
             let remarks = if (value - FRAC_PI_2).abs() > ROUNDING {
@@ -129,7 +129,7 @@ fn a_half_turn_of_few_digits_leaves_axes_parallel() {
         for (ending, write) in [("toml", toml as fn(&[Row]) -> String), ("urdf", urdf)] {
             for (rows, joint) in [(&scara, "joint_1"), (&folded, "joint_2")] {
                 let found = read(&write(rows), ending);
-                // Upright axes: Izz, mx and my of the second link, Izz of the first with Ia, Ia of the second.
+                // Vertical axes: Izz, mx and my of the second link, Izz of the first with Ia, Ia of the second.
                 assert_eq!(base(&found).len(), 5 + 6, "{ending} {half} {joint}");
                 assert!(found.remarks[0].contains(joint), "{:?}", found.remarks);
                 for link in &found.robot.joints {
@@ -163,7 +163,7 @@ fn the_turn_of_a_slide_is_an_angle_between_axes() {
             assert_eq!(base(&both).columns, expected.columns, "{ending} {digits}");
         }
     }
-    // Of a revolute joint it is an offset of the position.
+    // For a revolute joint it is an offset of the position.
     let mut offset = ur5(&all);
     offset[1].3 = DIGITS[0].into();
     let found = read(&toml(&offset), "toml");
@@ -216,7 +216,7 @@ fn chain(joints: &[String]) -> String {
     )
 }
 
-/// A lift whose turn stands against no axis: nothing is before it.
+/// A lift without a preceding axis: its turn has no reference.
 #[test]
 fn what_is_written_of_a_slide_goes_back_into_its_urdf() {
     let right = "1.5707963267948966 0 0";
@@ -232,8 +232,8 @@ fn what_is_written_of_a_slide_goes_back_into_its_urdf() {
     assert_eq!(original.with_values(&back.robot).unwrap().text, text);
 }
 
-/// Parallel axes but for a twist across the 0.4 m between them: their common normal lies 400 or 4000 m away. The links are
-/// what they were.
+/// Axes parallel except for a twist over their distance of 0.4 m: the common normal lies 400 or 4000 m away. The links
+/// are unchanged.
 #[test]
 fn a_common_normal_far_away_is_said_and_no_link_is_taken_for_a_point() {
     let arm = |twist: &str| {

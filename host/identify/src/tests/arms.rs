@@ -1,4 +1,4 @@
-//! Arms of several joints, recorded by an integration of their own.
+//! Arms of several joints, recorded by a separate integration.
 
 use super::*;
 use rig_model::robot::{Controller, Inertial, JointFriction};
@@ -19,7 +19,7 @@ impl Chance {
     }
 }
 
-/// The ten parameters of six point masses: a body that can exist.
+/// Ten parameters of six point masses: a possible body.
 pub(super) fn body(chance: &mut Chance, mass: f64, size: f64) -> [f64; 10] {
     let mut p = [0.0; 10];
     for _ in 0..6 {
@@ -43,7 +43,7 @@ pub(super) fn body(chance: &mut Chance, mass: f64, size: f64) -> [f64; 10] {
     p
 }
 
-/// An arm of `n` revolute joints, right angles between neighbours in turn, with everything that a simulation needs.
+/// An arm of `n` revolute joints, alternating right angles between neighbours, complete for simulation.
 pub(super) fn arm(n: usize, seed: u64) -> Robot {
     let mut chance = Chance::new(seed);
     let right = std::f64::consts::FRAC_PI_2;
@@ -101,14 +101,14 @@ pub(super) struct Noise {
     pub position: f64,
     /// Torque as a share of 1 N·m, white part.
     pub torque: f64,
-    /// First-order autoregressive part of the torque: size and memory a sample.
+    /// First-order autoregressive part of the torque: size and memory per sample.
     pub coloured: [f64; 2],
-    /// Share of the coloured part that all joints have in common.
+    /// Share of the coloured part that is common to all joints.
     pub common: f64,
 }
 
-/// Continuous control along sums of sines, fourth-order Runge–Kutta at a fraction of the sample; recorded every
-/// sample with its reference.
+/// Continuous control along sums of sines, fourth-order Runge–Kutta at a fraction of the sample; recorded every sample
+/// with its reference.
 pub(super) fn record(robot: &Robot, seconds: f64, rate: f64, noise: Noise, seed: u64) -> InMemory {
     let mut chance = Chance::new(seed);
     let n = robot.joints.len();
@@ -203,7 +203,7 @@ pub(super) fn record(robot: &Robot, seconds: f64, rate: f64, noise: Noise, seed:
     }
 }
 
-/// True values of what was identified.
+/// Returns the true values of the identified parameters.
 pub(super) fn truth(robot: &Robot, found: &Identification) -> Vec<f64> {
     let mut flat = robot.standard_parameters().concat();
     flat.resize(found.details.combination.ncols(), 0.0);
@@ -212,7 +212,7 @@ pub(super) fn truth(robot: &Robot, found: &Identification) -> Vec<f64> {
         .to_vec()
 }
 
-/// The arm without what is to be found: geometry and controllers.
+/// Returns the arm with geometry and controllers only.
 pub(super) fn blank(robot: &Robot) -> Robot {
     let mut known = robot.clone();
     for joint in &mut known.joints {
@@ -233,7 +233,7 @@ fn arms_of_two_to_seven_joints_by_every_estimator() {
         };
         let recording = record(&robot, 40.0, 500.0, noise, n as u64);
         for estimator in Estimator::ALL {
-            // The cheaper ones at every size, all at two.
+            // The cheaper estimators at every size, all at two.
             let dear = matches!(
                 estimator,
                 Estimator::OutputError | Estimator::Tls | Estimator::Robust
@@ -274,7 +274,7 @@ fn arms_of_two_to_seven_joints_by_every_estimator() {
                 found.warnings,
             );
             if estimator == Estimator::OutputError {
-                // The simulated loop holds its torque over a sample and the recorded one does not.
+                // The simulated loop holds its torque over a sample, the recorded one does not.
                 continue;
             }
             assert!(
@@ -299,14 +299,14 @@ pub(super) fn bodies(chance: &mut Chance, n: usize) -> Vec<[f64; 10]> {
     (0..n).map(|_| body(chance, 2.0, 0.2)).collect()
 }
 
-/// Friction and drive inertia that the data hardly touch come out at zero; how far from it they may lie is for the data to
-/// say, not for the barrier that keeps them above it.
+/// Weakly excited friction and drive inertia end at zero; their uncertainty must come from the data, not from the
+/// barrier that keeps them positive.
 #[test]
 fn intervals_at_zero_are_those_of_the_data() {
     let (mut inside, mut all, mut at_zero) = (0, 0, 0);
     for seed in 0..10 {
         let robot = arm(3, 80 + seed);
-        // More than friction and drives make.
+        // More than the torque of friction and drives.
         let noise = Noise {
             position: 2e-6,
             torque: 5.0,
@@ -337,12 +337,12 @@ fn intervals_at_zero_are_those_of_the_data() {
         }
     }
     println!("{inside} of {all} inside, {at_zero} near zero");
-    // The barrier's own bend at a value x alone is one of 3.2·x.
+    // The barrier's own curvature at a value x alone gives an interval of 3.2·x.
     assert!(at_zero >= 2, "{at_zero} of {all}: nothing was at its bound");
     assert!(inside as f64 >= 0.9 * all as f64, "{inside} of {all}");
 }
 
-/// A joint that moves too slowly for any of its rows to count: that is said and not called a fit.
+/// A joint too slow for any usable row: reported, and not called a fit.
 #[test]
 fn a_joint_without_rows_is_not_called_explained() {
     let robot = arm(3, 90);

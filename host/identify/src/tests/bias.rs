@@ -1,11 +1,11 @@
-//! What a difference between least squares and instrumental variables is taken for, on simulated arms with drives.
+//! Interpretation of a difference between least squares and instrumental variables, on simulated arms with drives.
 
 use super::arms::Chance;
 use super::*;
 use rig_model::robot::JointLimits;
 use rig_model::simulate::{Inputs, Model, closed_loop, controllers};
 
-/// Seconds and rows a second.
+/// Duration, s, and rate, Hz.
 const LENGTH: (f64, f64) = (25.0, 400.0);
 
 fn shipped(file: &str) -> Robot {
@@ -13,7 +13,7 @@ fn shipped(file: &str) -> Robot {
     Robot::load(&folder.join(file)).unwrap()
 }
 
-/// Four sines a joint within half of its limits.
+/// Four sines per joint within half of its limits.
 fn reference(limits: &JointLimits, chance: &mut Chance) -> Vec<f64> {
     let [lower, upper] = limits.position;
     let waves: Vec<[f64; 3]> = (1..5)
@@ -36,8 +36,8 @@ fn reference(limits: &JointLimits, chance: &mut Chance) -> Vec<f64> {
         .collect()
 }
 
-/// The robot with the controllers that drove it, and a recording of it with noise: `position` in rad, `torque` as a share of
-/// each joint's limit.
+/// The robot with its controllers, and a recording of it with noise: `position` in rad, `torque` as a share of each
+/// joint's limit.
 fn driven(mut robot: Robot, seed: u64, position: f64, torque: f64) -> (Robot, InMemory) {
     let mut chance = Chance::new(seed);
     let limits: Vec<JointLimits> = (robot.joints.iter())
@@ -95,8 +95,8 @@ fn compared(robot: &Robot, recording: &InMemory, prepare: PrepareOptions) -> Com
     comparison
 }
 
-/// Arms whose position is exact, whose torque has noise or next to none: what instruments give otherwise than least squares is
-/// not noise of the position, whether they come from the loop or from the bare reference.
+/// Arms with exact positions and torque noise of 0.4 % or almost none. A difference of instrumental variables from
+/// least squares is then not position noise, whether the instruments come from the loop or from the reference.
 #[test]
 fn exact_positions_bias_nothing() {
     for (file, seeds) in [("edda.toml", 6), ("irp6.toml", 3)] {
@@ -112,7 +112,7 @@ fn exact_positions_bias_nothing() {
                 }
                 robot.joints.iter_mut().for_each(|j| j.controller = None);
                 let found = compared(&robot, &recording, PrepareOptions::default());
-                // The loop lags by more than a fiftieth: its reference is no instrument.
+                // The loop lags by more than a fiftieth, so its reference is no instrument.
                 let verdict = found.endogeneity.unwrap().verdict;
                 assert_eq!(verdict, Verdict::Undecided, "{file} {seed} {torque}");
                 assert_ne!(found.recommended, Estimator::Iv, "{file} {seed} {torque}");

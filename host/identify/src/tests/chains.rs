@@ -1,8 +1,8 @@
-//! Random chains of 1 to 12 joints, revolute and prismatic, with drives coupled towards base and tip, rotor inertias, and a
-//! screw in some: their parameters come back, to rounding from exact rows, within their intervals from noisy recordings.
+//! Random chains of 1 to 12 joints, revolute and prismatic, with coupled drives, rotor inertias, and a screw in some.
+//! Their parameters are recovered: to rounding from exact rows, within their intervals from noisy recordings.
 //!
-//! The torque is that of the description: links by Newton and Euler without their drives, motors by their own motion
-//! (Ψ̇, Ψ̈, τ = Jᵀ·τ_motor). No regressor makes it.
+//! The torque comes from the description: links by Newton and Euler without their drives, motors by their own motion
+//! (Ψ̇, Ψ̈, τ = Jᵀ·τ_motor). No regressor is used for it.
 
 use super::super::base::independent_columns;
 use super::super::linear::least_squares;
@@ -33,7 +33,7 @@ fn screw(chance: &mut Chance, own: &str, other: &str) -> Screw {
     }
 }
 
-/// A chain of `n` joints; angles and lengths often zero or right, as in what is built.
+/// A chain of `n` joints; angles and lengths are often zero or right angles, as in real arms.
 fn chain(n: usize, seed: u64) -> Robot {
     let mut chance = Chance::new(seed);
     let right = std::f64::consts::FRAC_PI_2;
@@ -85,7 +85,7 @@ fn chain(n: usize, seed: u64) -> Robot {
                 }
                 x if x < 0.0 => {
                     for _ in 0..2 {
-                        // Of its own joint the ratio is stated already.
+                        // The ratio of its own joint is already set.
                         let other = any(&mut chance);
                         if other != k {
                             drive.couples.insert(name(other), ratio * chance.even());
@@ -110,7 +110,7 @@ fn has_screw(robot: &Robot) -> bool {
     robot.joints.iter().any(screw)
 }
 
-/// The description's torque.
+/// The torque of the description.
 struct Physics {
     chain: Chain<f64>,
     transmission: Transmission<f64>,
@@ -192,7 +192,7 @@ const NODES: [[f64; 2]; 4] = [
     [0.960_289_856_497_536_3, 0.101_228_536_290_376_3],
 ];
 
-/// Impulses over short windows in which no speed changes its sign, against change of momentum and the rest.
+/// Impulses over short windows without a sign change of any speed, equal to change of momentum plus loss.
 fn momentum_rows(robot: &Robot, base: &Base, seed: u64) -> (DMatrix<f64>, DVector<f64>) {
     let (states, physics) = (States::of(robot).unwrap(), Physics::of(robot));
     let (n, half) = (robot.joints.len(), 0.03);
@@ -236,7 +236,7 @@ fn momentum_rows(robot: &Robot, base: &Base, seed: u64) -> (DMatrix<f64>, DVecto
     })
 }
 
-/// Base columns of twice as many equations as there are parameters.
+/// Base columns of twice as many equations as parameters.
 fn stacked(
     base: &Base,
     n: usize,
@@ -261,7 +261,7 @@ fn exact_rows_of_random_chains_give_their_parameters_to_rounding() {
         for draw in 0..4 {
             let seed = 1000 + 10 * n as u64 + draw;
             let robot = chain(n, seed);
-            // A description that can be read.
+            // The description can be read back.
             let text = robot.to_toml().unwrap();
             Robot::from_toml(&text, std::path::Path::new("chain.toml")).unwrap();
             coupled += usize::from(!transmission_of(&robot).unwrap().is_simple());
@@ -288,7 +288,7 @@ fn exact_rows_of_random_chains_give_their_parameters_to_rounding() {
                 assert_eq!(all.kept, order);
                 let found = DVector::from_vec(least_squares(&factor, &all, base).unwrap());
                 let truth = values(&robot, &base.combination);
-                // Each by what it moves, of the largest of all rows.
+                // Each error by its effect on the torque, relative to the largest torque of all rows.
                 let size = y.amax();
                 let worst = (0..base.len())
                     .map(|k| (found[k] - truth[k]).abs() * x.column(k).amax() / size)
@@ -353,16 +353,16 @@ fn noisy(robot: &Robot, seconds: f64, share: f64, seed: u64) -> InMemory {
     }
 }
 
-/// How often 95 % intervals hold the truth. Parameters of one recording err together, so that the recordings are what is
-/// counted: their mean share may be below 95 % by three standard deviations of such a mean. It may be somewhat above: leaving out
-/// groups errs on the wide side (MacKinnon, Nielsen & Webb 2023, of CV₃).
+/// Coverage of 95 % intervals. Parameters of one recording err together, so recordings are the unit: their mean
+/// coverage may be below 95 % by three standard deviations of such a mean. It may be somewhat above, because leaving
+/// out groups gives wide intervals (MacKinnon, Nielsen & Webb 2023, of CV₃).
 #[test]
 fn intervals_of_random_chains_hold_the_truth_as_often_as_they_say() {
     for model in [ModelKind::Differential, ModelKind::Integral] {
         let mut shares = Vec::new();
         let (mut inside, mut all) = (0, 0);
         for draw in 0..96u64 {
-            // Every size twice, and small ones, which are cheap, more often.
+            // Every size twice; small chains more often, because they are cheap.
             let n = 1 + draw as usize / 4 % if draw % 4 == 0 { 12 } else { 4 };
             let robot = chain(n, 5000 + draw);
             let recording = noisy(&robot, 20.0, 0.05, draw);

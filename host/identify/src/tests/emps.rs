@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// The robot and a recording, or None with a plain word where the recordings are not at hand.
+/// Opens the robot and a recording; prints a note and returns None if the recordings are missing.
 fn emps(file: &str) -> Option<(Robot, rig_data::Source)> {
     let Some(folder) = rig_output::data_dir() else {
         println!("SKIPPED: the folder of real recordings is not there; set RIG_DATA to it.");
@@ -58,7 +58,7 @@ fn emps_with_the_published_processing_gives_the_published_values() {
         .collect();
     assert_eq!(names, ["m1 + Ia1", "fv1", "fc1", "off1"]);
     assert_near(&found, &PUBLISHED, 0.5);
-    // An independent repetition printed these relative standard deviations and this condition number.
+    // Relative standard deviations and condition number of an independent repetition.
     for (b, percent) in found.base_parameters.iter().zip([0.11, 0.56, 0.49, 1.39]) {
         assert!(
             (b.classical_relative_std_percent - percent).abs() < 0.02,
@@ -77,8 +77,8 @@ fn emps_with_the_published_processing_gives_the_published_values() {
     assert_near(&refit, &[94.06, 210.3, 20.87, -3.21], 0.5);
 }
 
-/// Whether the pulses are a force beside `tau1`: then adding them, in the unit of the force or of the
-/// controller's output, would leave less. It leaves more.
+/// If the pulses were a force beside `tau1`, adding them, in the unit of the force or of the controller's output, would
+/// reduce the residual. It increases the residual.
 #[test]
 fn emps_pulses_are_no_force_beside_the_measured_one() {
     let Some((robot, test)) = emps("test_pulses.csv") else {
@@ -179,7 +179,7 @@ fn emps_with_the_defaults_both_models_agree() {
 }
 
 /// Simulated closed loop of the identified model: instrumental variables and output error agree with the published
-/// values, from the reference and the torque alone for the latter.
+/// values; output error uses only reference and torque.
 #[test]
 fn emps_by_instrumental_variables_and_output_error() {
     let (Some((robot, train)), Some((_, test))) = (emps("train.csv"), emps("test_pulses.csv"))
@@ -199,7 +199,7 @@ fn emps_by_instrumental_variables_and_output_error() {
             let expected = if std::ptr::eq(recording, &train) {
                 PUBLISHED
             } else {
-                // What least squares finds on this recording; the file with the data names the same.
+                // Least-squares values of this recording, also given in the file with the data.
                 [94.06, 210.3, 20.87, -3.21]
             };
             assert_near(&found, &expected, 3.0);

@@ -1,4 +1,4 @@
-//! The convex problem on rows without noise, and what its solution obeys.
+//! The convex problem on rows without noise, and properties of its solution.
 
 use super::super::consistent::{Quadratic, consistent};
 use super::super::prior::{Hints, Prior};
@@ -9,7 +9,7 @@ use super::*;
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, differential_regressor};
 
-/// Factor of the base columns' rows at random states, torques those of `pi`.
+/// Factor of the base columns' rows at random states, with the torques of `pi`.
 fn factor(robot: &Robot, base: &Base, pi: &[f64], weight: f64) -> TriangularFactor {
     let n = robot.joints.len();
     let chain = chain_of(robot).unwrap();
@@ -51,7 +51,7 @@ fn exact_rows_give_the_exact_combinations_and_bodies_for_the_rest() {
         let robot = arm(n, 40 + n as u64);
         let base = Base::structural(&robot, ModelKind::Differential, 1).unwrap();
         let pi = robot.standard_parameters().concat();
-        // Rows as from a sensor of a ten-millionth of a newton metre.
+        // Rows of a sensor with a noise of a ten-millionth of a newton metre.
         let rows = factor(&robot, &base, &pi, 1e7);
         let prior = unknown(&robot, base.combination.ncols());
         let found = consistent(&quadratic(&rows, &base), &prior).unwrap();
@@ -68,7 +68,7 @@ fn exact_rows_give_the_exact_combinations_and_bodies_for_the_rest() {
     }
 }
 
-/// Data of links that cannot exist: the solution lies on the edge of what can, and no admissible direction from it
+/// Data of impossible links: the solution lies on the boundary of the consistent set, and no admissible direction
 /// lowers the objective.
 #[test]
 fn impossible_data_lead_to_the_nearest_possible_set() {
@@ -77,7 +77,7 @@ fn impossible_data_lead_to_the_nearest_possible_set() {
         let base = Base::structural(&robot, ModelKind::Differential, 1).unwrap();
         let columns = base.combination.ncols();
         let mut pi = robot.standard_parameters().concat();
-        // The last link's inertia below what its first moments need; a friction that drives.
+        // The last link's inertia is below what its first moments require; a friction coefficient is negative.
         let last = (n - 1) * COLUMNS;
         for c in [4, 7, 9] {
             pi[last + c] *= 0.2;
@@ -105,7 +105,7 @@ fn impossible_data_lead_to_the_nearest_possible_set() {
         )
         .unwrap()
         .parameters;
-        // Mixtures with other possible sets are possible (the set is convex) and none is better by more than the pull.
+        // Mixtures with other consistent sets are consistent (convexity), and none is better by more than the pull.
         for _ in 0..200 {
             let mut mixed = found.parameters.clone();
             for (i, link) in super::arms::bodies(&mut chance, n).iter().enumerate() {

@@ -1,15 +1,15 @@
-//! Recordings whose position has noise that is not white: the cut-off must follow what moves, not what is noisy.
+//! Recordings with position noise that is not white: the cut-off must follow the motion, not the noise.
 
 use super::made::{TRUTH, swing};
 use super::*;
 use rig_data::prepare::{PrepareOptions, Survey, Treatment};
 
-/// A flaw of a recorder, put into the position of a recording.
+/// A recorder flaw, applied to the position of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Flaw {
     /// White noise of this standard deviation behind a low-pass of the drive: means over 10 rows, three times.
     Filtered(f64),
-    /// Rows taken up to 0.3 ms off their time stamps.
+    /// Rows sampled up to 0.3 ms off their time stamps.
     Jitter,
     /// An encoder of this many counts a turn.
     Counts(f64),
@@ -17,7 +17,7 @@ enum Flaw {
     White(f64),
 }
 
-/// Means over `reach` rows to both sides.
+/// Returns means over `reach` rows on both sides.
 fn smooth(x: &[f64], reach: usize) -> Vec<f64> {
     (0..x.len())
         .map(|k| {
@@ -50,7 +50,7 @@ fn flawed(flaw: Flaw, seed: u64) -> InMemory {
                     (q[b] - q[a]) / (2e-3 * (b - a) as f64)
                 })
                 .collect();
-            // Of this standard deviation: even between -0.3 and 0.3 ms has the same.
+            // The standard deviation of a uniform distribution between -0.3 and 0.3 ms.
             let late = 0.3e-3 / 3f64.sqrt();
             (q.iter_mut().zip(speed)).for_each(|(q, v)| *q += late * normal() * v);
         }
@@ -84,7 +84,7 @@ fn noise_that_is_not_white_is_not_taken_for_motion() {
     }
 }
 
-/// The first of these recordings with the cut-off of the spectrum: what the choice by the torque is for.
+/// The first of these recordings with the spectrum's cut-off: shows the need for the choice by torque.
 #[test]
 fn the_spectrum_alone_takes_filtered_noise_for_motion() {
     let recording = flawed(Flaw::Filtered(1e-2), 2);
@@ -121,7 +121,7 @@ fn white_noise_leaves_the_cut_off_to_the_spectrum() {
     }
 }
 
-/// A decimation that lets itself grow asks for no more rows than there are.
+/// A decimation that grows never requires more rows than there are.
 #[test]
 fn no_decimation_refuses_its_own_recording() {
     let recording = |rows: usize| {

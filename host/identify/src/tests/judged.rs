@@ -1,11 +1,11 @@
-//! Estimators on the noise that each of them is made for, and what they claim.
+//! Estimators on the noise for which each is made, and their claims.
 
 use super::arms::{Noise, arm, blank, record, truth};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::*;
 
-/// One joint, position so noisy and so little filtered that half of the acceleration is noise.
+/// One joint; the position is so noisy and so weakly filtered that half of the acceleration is noise.
 fn noisy(seed: u64) -> (Robot, InMemory, Options) {
     let robot = arm(1, 3);
     let noise = Noise {
@@ -26,7 +26,7 @@ fn noisy(seed: u64) -> (Robot, InMemory, Options) {
     (robot, recording, options)
 }
 
-/// Index of the inertia seen at the joint.
+/// Index of the inertia at the joint.
 fn inertia_of(found: &Identification) -> usize {
     found
         .base_parameters
@@ -104,7 +104,7 @@ fn the_comparison_sees_the_bias_and_says_which_to_trust() {
     assert_eq!(comparison.recommended, Estimator::Iv);
     assert_eq!(comparison.estimators.len(), 9);
     assert!(comparison.estimators.iter().all(|row| row.values.is_some()));
-    // Without that noise there is nothing to see.
+    // Without that noise no bias is detected.
     let quiet = record(
         &robot,
         20.0,
@@ -191,7 +191,7 @@ fn maximum_likelihood_is_the_more_exact_one_on_the_noise_it_models() {
     assert!((0.9..=0.99).contains(&share(1)), "{}", share(1));
 }
 
-/// How often 95 % intervals hold the truth, a hundred recordings of one joint.
+/// Coverage of 95 % intervals, a hundred recordings of one joint.
 #[test]
 fn every_estimators_intervals_cover_as_often_as_they_say() {
     let robot = arm(1, 4);
@@ -285,7 +285,7 @@ fn ridge_goes_from_the_description_to_the_data() {
     let prior = &weighted.details.combination * nalgebra::DVector::from_vec(described);
     for (k, b) in weighted.base_parameters.iter().enumerate() {
         let near = |found: &Identification| found.base_parameters[k].value;
-        // Friction is not in the description: free in all of them.
+        // Friction is not in the description and is therefore free in all of them.
         if !b.expression.starts_with(['f', 'o']) {
             assert!(
                 (near(&bound) - prior[k]).abs() < 1e-3 * (1e-3 + prior[k].abs()),
@@ -297,7 +297,7 @@ fn ridge_goes_from_the_description_to_the_data() {
             "{b:?} {}",
             near(&free)
         );
-        // What the data know well they decide.
+        // Well-identified parameters follow the data.
         if b.relative_std_percent < 1.0 {
             assert!(
                 (near(&evident) - b.value).abs() < 3.0 * b.std,
@@ -308,8 +308,8 @@ fn ridge_goes_from_the_description_to_the_data() {
     }
 }
 
-/// Of little or much belief in the description alike: close to the edge of what a body can be, rounding may make a Hessian look
-/// indefinite that is not.
+/// For weak and strong priors: near the boundary of physical consistency, rounding may make a positive definite Hessian
+/// look indefinite.
 #[test]
 fn a_consistent_fit_ends_whatever_the_description_counts_for() {
     let robot = arm(3, 31);
@@ -340,7 +340,7 @@ fn a_consistent_fit_ends_whatever_the_description_counts_for() {
     for uncertainty in [1e-8, 1e-4, 30.0, 1e4] {
         let found = run(uncertainty);
         let found = found.unwrap_or_else(|error| panic!("{uncertainty}: {error}"));
-        // The description is right here, so that belief in it takes nothing away.
+        // The description is right here, so a strong prior does no harm.
         for (a, b) in found.base_parameters.iter().zip(&usual.base_parameters) {
             let apart = (a.value - b.value).abs();
             assert!(apart < 4.0 * b.std + 1e-9, "{uncertainty}: {a:?} {b:?}");
@@ -348,8 +348,8 @@ fn a_consistent_fit_ends_whatever_the_description_counts_for() {
     }
 }
 
-/// Little motion and much noise: least squares gives links that cannot exist, the consistent fit never does, and it
-/// predicts other motions better.
+/// Little motion and much noise: least squares gives impossible links, the consistent fit never does, and it predicts
+/// other motions better.
 #[test]
 fn consistent_parameters_are_those_of_bodies_also_where_least_squares_is_not() {
     let (mut gained, mut impossible) = (0, 0);
@@ -401,7 +401,7 @@ fn consistent_parameters_are_those_of_bodies_also_where_least_squares_is_not() {
                 .sum()
         };
         gained += usize::from(total(&rows[1]) < total(&rows[0]));
-        // The description written from it is a robot that can be simulated and read back.
+        // The description written from it can be simulated and read back.
         let (written, _) = identified_robot(&blank(&robot), &found);
         let text = written.to_toml().unwrap();
         let back = Robot::from_toml(&text, std::path::Path::new("identified.toml")).unwrap();
@@ -460,7 +460,7 @@ fn a_recordings_weight_is_how_often_it_counts() {
         println!(
             "{estimator:?}: weight 2 against twice {weight:.1e}, against once {counted:.1e}; 1e9 against alone {ignored:.1e}, both against alone {both:.1e}"
         );
-        // A model of the noise, a loss and a prior are found from the rows too, which a weight does not make more.
+        // A noise model, a loss and a prior also depend on the number of rows, which a weight does not change.
         let [most, most_ignored] = match estimator {
             Estimator::Ols => [1e-9, 1e-6],
             Estimator::Robust | Estimator::Ml | Estimator::Ridge | Estimator::Consistent => {
@@ -497,7 +497,7 @@ fn output_error_says_what_it_lacks() {
     assert!(error.to_string().contains("ref<k>"), "{error}");
 }
 
-/// What is left out was not needed: the residual stays, and nothing that is known to a per cent goes.
+/// The removed parameters were not needed: the residual stays, and no parameter known to a per cent is removed.
 #[test]
 fn essential_parameters_are_few_and_enough() {
     let robot = arm(3, 9);
@@ -512,8 +512,8 @@ fn essential_parameters_are_few_and_enough() {
     println!("{} of {}: {set:?}", set.parameters.len(), found.rank);
     assert_eq!(set.parameters.len() + set.left_out.len(), found.rank);
     assert!(!set.left_out.is_empty());
-    // Squares grow by chance alone, even where nothing was needed: by F(q, n − p) times the q parameters' worth of
-    // noise, n the rows as what they are worth. The fewer rows the band of the fit leaves, the more that is.
+    // Squares grow by chance, even if no parameter was needed: by F(q, n − p) times the noise of q parameters, with n
+    // independent rows. With fewer rows in the band of the fit the growth is larger.
     let estimate = &found.details.estimate;
     let (gone, rows) = (set.left_out.len() as f64, estimate.effective_rows);
     let freedom = rows - found.rank as f64;
@@ -523,7 +523,7 @@ fn essential_parameters_are_few_and_enough() {
     let by_chance = 100.0 * ((1.0 + gone * f / freedom).sqrt() - 1.0);
     println!("{rows:.0} rows: by chance up to {by_chance:.3} %");
     assert!(set.residual_increase_percent < by_chance);
-    // What the fit of all knows to differ from zero is not left out.
+    // Parameters that differ significantly from zero in the full fit are not removed.
     for b in &found.base_parameters {
         assert!(
             b.value.abs() < 5.0 * b.std || !set.left_out.contains(&b.expression),

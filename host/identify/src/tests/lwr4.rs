@@ -1,9 +1,9 @@
-//! The KUKA LWR4+ (data and source: README beside the recordings): a motion that excites little, and another one to
+//! The KUKA LWR4+ (data and source: README beside the recordings): one motion with weak excitation and another one to
 //! predict.
 
 use super::*;
 
-/// A run at an even 200 Hz: the recording's clock jitters by a few milliseconds, its torque is smooth (8 Hz).
+/// A run resampled to 200 Hz: the recording's clock jitters by a few milliseconds, its torque is smooth (8 Hz).
 fn run(number: usize) -> Option<(Robot, InMemory)> {
     let Some(folder) = rig_output::data_dir() else {
         println!("SKIPPED: the folder of real recordings is not there; set RIG_DATA to it.");
@@ -51,8 +51,8 @@ fn run(number: usize) -> Option<(Robot, InMemory)> {
     ))
 }
 
-/// Run 1 hardly excites joints 1, 3 and 5 to 7: the plain fit gives links that no body can be and fails on run 3;
-/// bodies predict it better on every joint, and the comparison says so without having seen run 3.
+/// Run 1 hardly excites joints 1, 3 and 5 to 7. The plain fit gives impossible links and fails on run 3. The consistent
+/// fit predicts run 3 better on every joint, and the comparison recommends it without run 3.
 #[test]
 fn bodies_predict_another_motion_where_least_squares_fails() {
     let (Some((robot, train)), Some((_, other))) = (run(1), run(3)) else {
@@ -103,7 +103,7 @@ fn bodies_predict_another_motion_where_least_squares_fails() {
     assert!(set.least_eigenvalue.iter().all(|e| *e > 0.0));
 }
 
-/// A run as it was recorded, references and all.
+/// A run as recorded, with references.
 fn recorded(number: usize) -> Option<(Robot, rig_data::Source)> {
     let folder = rig_output::data_dir()?.join("kuka_lwr4");
     let robot = Robot::load(&folder.join("kuka_lwr4.urdf")).unwrap();
@@ -112,7 +112,7 @@ fn recorded(number: usize) -> Option<(Robot, rig_data::Source)> {
     Some((robot, source))
 }
 
-/// As `rig identify` runs where nothing is asked for.
+/// Runs `rig identify` with default options.
 fn by_default(robot: &Robot, training: &[usize], holdout: &[usize]) -> Identification {
     let open = |list: &[usize]| -> Vec<rig_data::Source> {
         list.iter().map(|n| recorded(*n).unwrap().1).collect()
@@ -132,8 +132,8 @@ fn by_default(robot: &Robot, training: &[usize], holdout: &[usize]) -> Identific
     identify(robot, &training, &holdout, &options).unwrap()
 }
 
-/// Its references are 57 times too small: they are no instruments, and the estimate by instrumental variables stays near the
-/// weighted one. Smoothed positions have the noise still in them, so nothing is concluded from them.
+/// The references are 57 times too small, so they are no instruments; the estimate by instrumental variables stays near
+/// the weighted one. Smoothed positions still contain the noise, so no conclusion is drawn from them.
 #[test]
 fn references_that_are_not_the_motions_are_no_instruments() {
     let Some((robot, _)) = recorded(1) else {
@@ -158,8 +158,8 @@ fn references_that_are_not_the_motions_are_no_instruments() {
     assert!(said.text.contains("not known"), "{}", said.text);
 }
 
-/// Run 2 repeats run 1 and run 3 does not: whichever is held back, or none, the result given is the one to trust, and no
-/// warning says otherwise.
+/// Run 2 repeats run 1, run 3 does not. For either hold-out, or none, the returned result is the recommended one,
+/// without a contradicting warning.
 #[test]
 fn one_recommendation_whichever_run_is_held_back() {
     let Some((robot, _)) = recorded(1) else {
@@ -188,7 +188,7 @@ fn one_recommendation_whichever_run_is_held_back() {
             unseen,
             "{training:?} {holdout:?}"
         );
-        // Friction, drive inertia and what a body has are not below zero here either.
+        // Friction, drive inertia and masses are not negative here either.
         let essential = found.essential.unwrap();
         for own in &essential.parameters {
             println!("   {} {}", own.expression, own.value);

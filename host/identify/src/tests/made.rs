@@ -1,4 +1,4 @@
-//! Recordings made by a simulation of their own.
+//! Simulated recordings.
 
 use super::*;
 
@@ -40,17 +40,17 @@ fn base_parameters_group_as_papers_group_them() {
     }
 }
 
-/// Truth of the made pendulum in the order of its base parameters: mx my Izz+Ia fv fc off.
+/// True base parameters of the simulated pendulum, in order: mx my Izz+Ia fv fc off.
 pub(super) const TRUTH: [f64; 6] = [0.30, 0.04, 0.35, 0.30, 0.40, 0.10];
 
-/// A pendulum under PD control, integrated twenty times as fine as it is sampled, friction holding it at rest as
-/// dry friction does; torque noise coloured, position noisy and rounded to encoder steps. It shares nothing
-/// with the regressor that is fitted.
+/// A pendulum under PD control, integrated at twenty times the sample rate, with dry friction that holds it at rest.
+/// Torque noise is coloured; the position is noisy and rounded to encoder steps. The simulation shares no code with the
+/// fitted regressor.
 pub(super) fn swing(seed: u64, seconds: f64, held: bool) -> InMemory {
     swing_along(seed, seconds, held, |t| t)
 }
 
-/// The same along a reference whose time runs as told (its second argument to the sines).
+/// The same along a reference with the time `clock(t)` (second argument of the sines).
 fn swing_along(seed: u64, seconds: f64, held: bool, clock: impl Fn(f64) -> f64) -> InMemory {
     let mut g = rand_pcg::Pcg64::seed_from_u64(seed);
     let mut normal = move || (0..12).map(|_| g.random::<f64>()).sum::<f64>() - 6.0;
@@ -95,7 +95,7 @@ fn swing_along(seed: u64, seconds: f64, held: bool, clock: impl Fn(f64) -> f64) 
         for _ in 0..fine {
             let drive = torque - 9.81 * (mx * q.cos() - my * q.sin()) - off;
             let free = v + h * (drive - fv * v) / inertia;
-            // Dry friction takes speed away and never turns it round.
+            // Dry friction reduces the speed but never reverses it.
             v = free.signum() * (free.abs() - h * fc / inertia).max(0.0);
             q += h * v;
         }
@@ -106,8 +106,7 @@ fn swing_along(seed: u64, seconds: f64, held: bool, clock: impl Fn(f64) -> f64) 
     }
 }
 
-/// How often 95 % intervals hold the truth: between 92 and 98 % for every parameter of both models (200 draws
-/// scatter by 1.5 %).
+/// Coverage of 95 % intervals: between 92 and 98 % for every parameter of both models (200 draws scatter by 1.5 %).
 #[test]
 fn intervals_cover_the_truth_as_often_as_they_say() {
     let draws = 200;
@@ -151,7 +150,7 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
     }
 }
 
-/// A command that is held leads its effect by half a period: saying so removes the bias that it causes.
+/// A held command leads its effect by half a period; the given lead removes the bias.
 #[test]
 fn a_held_command_biases_viscous_friction_unless_its_lead_is_given() {
     let recording = swing(5, 30.0, true);
@@ -216,7 +215,7 @@ fn robust_fit_withstands_rows_that_are_not_the_robots() {
 
 #[test]
 fn what_the_motion_does_not_excite_is_named_and_the_rest_is_right() {
-    // Two degrees to and fro: gravity is a constant there, and cannot be told from the offset.
+    // Motion of two degrees: gravity is constant there and collinear with the offset.
     let mut recording = swing(3, 30.0, false);
     let block = &mut recording.blocks[0];
     let [mx, my, inertia, fv, fc, off] = TRUTH;
@@ -288,7 +287,7 @@ fn description_of_the_identified_robot_has_the_identified_dynamics() {
         let [xx, xy, _, yy, _, zz] = link.inertia;
         let moment = link.first_moment[0].hypot(link.first_moment[1]);
         assert!(link.mass > 0.0 && zz >= moment * moment / link.mass * (1.0 - 1e-12));
-        // A body that can exist: the triangle inequality, and a positive second moment about the centre of mass.
+        // A possible body: the triangle inequality, and a positive second moment about the centre of mass.
         assert!(
             xx >= 0.0
                 && yy >= 0.0
@@ -331,7 +330,7 @@ fn description_of_the_identified_robot_has_the_identified_dynamics() {
     }
 }
 
-/// A sweep: each speed forth and back, friction with or without a Stribeck term.
+/// A sweep: each speed in both directions, friction with or without a Stribeck term.
 fn sweep(excess: f64) -> InMemory {
     let mut g = rand_pcg::Pcg64::seed_from_u64(11);
     let mut normal = move || (0..12).map(|_| g.random::<f64>()).sum::<f64>() - 6.0;
@@ -477,7 +476,7 @@ fn settings_that_would_change_nothing_are_refused() {
     }
 }
 
-/// Pieces far shorter than the recording, cut anywhere: the same result as in one piece, for both models.
+/// Pieces far shorter than the recording, with arbitrary cuts: the same result as in one piece, for both models.
 #[test]
 fn streaming_gives_the_same_parameters() {
     let whole = swing(4, 60.0, false);
@@ -505,8 +504,8 @@ fn streaming_gives_the_same_parameters() {
     }
 }
 
-/// Two links in a vertical plane, torques by the multibody kernels of the other side (inverse dynamics), the
-/// second joint's sensor ten times as noisy: both models find every base parameter.
+/// Two links in a vertical plane, torques by inverse dynamics, the second joint's sensor ten times as noisy: both
+/// models find every base parameter.
 #[test]
 fn two_links_are_identified_by_both_models() {
     use rig_shared::multibody::{COLUMNS, inverse_dynamics};
@@ -589,8 +588,8 @@ fn two_links_are_identified_by_both_models() {
     }
 }
 
-/// Half of the time the link rests, held by dry friction anywhere inside its band: torque that Coulomb's law
-/// says nothing about. Masked, it does not touch the estimate; left in, it does.
+/// Half of the time the link dwells, held by dry friction anywhere inside its band: Coulomb's law does not apply.
+/// Masked, these rows leave the estimate unchanged; unmasked, they bias it.
 #[test]
 fn standing_still_does_not_bias_friction() {
     let clock = |t: f64| (t / 4.0).floor() * 2.0 + (t % 4.0).min(2.0);
@@ -631,7 +630,7 @@ fn standing_still_does_not_bias_friction() {
     assert!((careless.base_parameters[4].value / TRUTH[4] - 1.0).abs() > 0.1);
 }
 
-/// A pendulum's recording that exists nowhere: every pass makes it anew, and notes the largest block asked for.
+/// A pendulum's recording that is never stored: every pass computes it again and notes the largest requested block.
 struct Endless {
     rows: usize,
     largest: std::cell::Cell<usize>,
@@ -680,7 +679,7 @@ impl rig_data::prepare::Recording for Endless {
     }
 }
 
-/// A million rows in blocks: what is held at once does not depend on their number.
+/// A million rows in blocks: the memory does not depend on their number.
 #[test]
 fn a_recording_larger_than_what_is_held_at_once() {
     let recording = Endless {

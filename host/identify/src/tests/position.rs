@@ -1,4 +1,4 @@
-//! Torques with position that the description does not state.
+//! Position-dependent torques that the description lacks.
 
 use super::arms::{Noise, arm, record};
 use super::*;
@@ -7,8 +7,8 @@ use crate::identified_robot;
 const STIFFNESS: f64 = 0.4;
 const RIPPLE: [f64; 2] = [0.15, -0.10];
 
-/// Three joints, described wrong by a fifth and without friction; where `pulled`, a cable at the third joint and a sensor
-/// of four spokes at the second.
+/// Three joints, described wrong by a fifth and without friction; if `pulled`, with a cable at the third joint and a
+/// sensor with four spokes at the second.
 fn made(seed: u64, pulled: bool) -> (Robot, InMemory) {
     let mut robot = arm(3, 40 + seed);
     let drive = robot.joints[1].drive.as_mut().unwrap();
@@ -74,7 +74,7 @@ fn cables_and_ripple_are_found_where_they_are_and_only_there() {
                             assert!((value - truth).abs() < 4.0 * std, "{t:?} {truth}");
                         }
                     }
-                    // What is written says the same of the motors' angles.
+                    // The written description states the same for the motors' angles.
                     let (written, _) = identified_robot(&robot, &found);
                     let effects = rig_model::effects::Effects::of(&written).unwrap();
                     assert_eq!(effects.placed().len(), 2);
@@ -83,7 +83,7 @@ fn cables_and_ripple_are_found_where_they_are_and_only_there() {
                 }
                 found.joints
             });
-            // As if they were not there, but for what their own standard deviations, 0.02 N·m, leave.
+            // The residual is as without these torques, apart from their own standard deviations, 0.02 N·m.
             for (without, with) in left[0].iter().zip(&left[1]) {
                 let ratio = with.train_residual_rms / without.train_residual_rms;
                 assert!((0.95..1.2).contains(&ratio), "{} {ratio}", with.name);
@@ -99,7 +99,7 @@ fn nothing_is_looked_for_unasked() {
     assert!(found.position_torques.is_empty());
 }
 
-/// A base turned by 1.5 degrees, and one that is level as described.
+/// A base tilted by 1.5 degrees, and a level one as described.
 #[test]
 fn a_tilted_base_is_found_and_a_level_one_is_not() {
     for (seed, degrees) in [(0, 1.5f64), (1, 1.5), (2, 0.0), (3, 0.0)] {

@@ -1,13 +1,13 @@
-//! A hold-out recorded at another rate than what was learnt from.
+//! A hold-out with another sample rate than the training data.
 
 use super::arms::arm;
 use super::*;
 use rig_shared::multibody::inverse_dynamics;
 
-/// What the model does not explain, N·m: slow enough for every band here, and too fast for any.
+/// Torque outside the model, N·m and rad/s: inside every band here, and outside every band.
 const MISSING: [[f64; 2]; 2] = [[0.3, 2.9], [2.0, 70.0]];
 
-/// One motion, whatever the rate in Hz that it is recorded at.
+/// The same motion for every sample rate, Hz.
 fn record(robot: &Robot, rate: f64, phase: f64) -> InMemory {
     let n = robot.joints.len();
     let chain = chain_of(robot).unwrap();
@@ -47,7 +47,7 @@ fn record(robot: &Robot, rate: f64, phase: f64) -> InMemory {
     }
 }
 
-/// The same motion is left at the same error at whatever rate it was recorded: the band is that of the fit.
+/// The same motion has the same error at every sample rate: the band is that of the fit.
 #[test]
 fn a_holdout_of_another_rate_is_judged_in_the_band_of_the_fit() {
     let robot = arm(2, 3);

@@ -4,7 +4,7 @@ use super::arms::{Chance, arm};
 use super::*;
 use rig_shared::multibody::inverse_dynamics;
 
-/// Sums of sines; joint `locked` stands, and its brake carries what nobody knows.
+/// Sums of sines; joint `locked` stands still and its brake carries an unknown torque.
 fn record(robot: &Robot, locked: usize, seed: u64) -> InMemory {
     let mut chance = Chance::new(seed);
     let n = robot.joints.len();
@@ -99,7 +99,7 @@ fn an_arm_is_identified_beside_a_joint_that_stands_still() {
                         );
                         continue;
                     }
-                    // At the noise, whose white 0.02 the low-pass makes smaller.
+                    // At the noise level: the low-pass reduces the white noise of 0.02.
                     assert!(
                         figures.holdout_residual_rms.unwrap() < 0.02,
                         "{locked} {estimator:?} {model:?}: {figures:?}"
@@ -152,7 +152,7 @@ fn a_recording_in_which_nothing_moves_is_refused() {
     assert!(said.contains("no other joint moves"), "{said}");
 }
 
-/// What is not used has no error, and a mean of errors is that of the joints that have one.
+/// An unused joint has no error, and the mean of errors covers the joints that have one.
 #[test]
 fn a_joint_that_stands_still_is_no_perfect_prediction() {
     let robot = arm(3, 3);
@@ -176,7 +176,7 @@ fn a_joint_that_stands_still_is_no_perfect_prediction() {
     );
 }
 
-/// A gear that twists under a brake: followed by the motor's encoder, it is no motion of the joint.
+/// A gear that twists under a brake: the motor encoder moves, the joint does not.
 #[test]
 fn a_joint_that_only_creeps_is_said_and_nothing_of_it_recommended() {
     let robot = arm(3, 3);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Names and coefficients of an expression, both ways of writing: `1.0*Ia1`, `0.07 mz3`, `fs1` for `fc1`.
+/// Names and coefficients of an expression in both notations: `1.0*Ia1`, `0.07 mz3`, `fs1` for `fc1`.
 fn terms(expression: &str) -> Vec<(String, f64)> {
     let mut list = Vec::new();
     let (mut sign, mut size) = (1.0, 1.0);
@@ -27,7 +27,7 @@ fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && pairs.all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-6)
 }
 
-/// The essential parameters hold the 25 that were published as such, of 60.
+/// The essential parameters include the 25 published as essential, of 60.
 #[test]
 fn the_published_essential_parameters_are_essential() {
     let Some(folder) = rig_output::data_dir() else {

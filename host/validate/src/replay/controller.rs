@@ -1,4 +1,4 @@
-//! The controllers with which a simulated motion stays at the recorded one.
+//! Controllers that hold a simulated motion at the recorded one.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,15 +7,15 @@ use rig_model::robot::{Controller, Robot};
 use rig_model::simulate::{Model, STAND_IN_BANDWIDTH, SimulateError, controllers};
 use rig_output::format_unit;
 
-/// Share of the torque's power that a controller and what it feeds forward have to explain.
+/// Share of the torque's power that a controller with its feed-forward must explain.
 const EXPLAINED: f64 = 0.98;
-/// Rows at most that it is regressed from.
+/// Largest number of rows in the regression.
 const ROWS: usize = 20_000;
-/// What the torque is regressed on: position and velocity error, integral of the former, velocity and acceleration of the
-/// reference, its sine and cosine (a weight fed forward), a constant.
+/// Regressors of the torque: position and velocity error, integral of the position error, velocity and acceleration of
+/// the reference, its sine and cosine (gravity feed-forward), a constant.
 const COLUMNS: usize = 8;
-/// Controllers that are tried, by their columns, the simplest first: where a motion has few frequencies, many columns say the
-/// same. With the reference's velocity beside the velocity error, feedback of the velocity alone is among them.
+/// Trial controllers by their columns, the simplest first: if a motion has few frequencies, many columns are collinear.
+/// The reference's velocity beside the velocity error also covers pure velocity feedback.
 const SETS: [&[usize]; 4] = [
     &[0, 1, 7],
     &[0, 1, 3, 7],
@@ -23,8 +23,8 @@ const SETS: [&[usize]; 4] = [
     &[0, 1, 2, 3, 4, 5, 6, 7],
 ];
 
-/// The controllers of all joints, and where they come from, a sentence; where there are none, why. `moving` is the robot with
-/// the inertia that stand-ins are made for.
+/// Returns the controllers of all joints and a sentence on their origin, or on why there are none. `moving` is the
+/// robot with the inertia for which substitutes are designed.
 pub fn of_joints(robot: &Robot, moving: &Robot, runs: &[Run]) -> (Option<Vec<Controller>>, String) {
     let none = |why: &str| (None, format!("The motion was not simulated: {why}"));
     let joints = || robot.joints.iter().enumerate();
@@ -88,7 +88,7 @@ pub fn of_joints(robot: &Robot, moving: &Robot, runs: &[Run]) -> (Option<Vec<Con
     (Some(list), how)
 }
 
-/// Slow controllers for what the description says moves, one a joint.
+/// Designs slow controllers for the described inertia, one per joint.
 fn stand_ins(robot: &Robot, runs: &[Run]) -> Result<Vec<Controller>, SimulateError> {
     let mut bare = robot.clone();
     bare.joints.iter_mut().for_each(|j| j.controller = None);
@@ -100,7 +100,7 @@ fn stand_ins(robot: &Robot, runs: &[Run]) -> Result<Vec<Controller>, SimulateErr
     Ok(controllers(&bare, &model, &q)?.0)
 }
 
-/// The controller of a joint that the references and torques of the runs show; none where there are none, or they do not.
+/// Fits a joint's controller to the references and torques of the runs; none if there are none or the fit is poor.
 pub(super) fn regressed(runs: &[Run], joint: usize) -> Option<Controller> {
     let every = runs
         .iter()
@@ -148,7 +148,7 @@ pub(super) fn regressed(runs: &[Run], joint: usize) -> Option<Controller> {
     }
     let constant = mean * mean / f64::max(count, 1.0);
     SETS.iter().find_map(|set| {
-        // Columns of very different units, some of them nothing at all.
+        // Columns have very different units, and some may be zero.
         let scale = |i: usize| {
             let size = normal[(i, i)].sqrt();
             if size > 0.0 { 1.0 / size } else { 0.0 }

@@ -1,14 +1,14 @@
-//! What each model makes of the motion: the recorded torques drive it, and each joint's controller answers where it departs
-//! from the recorded motion.
+//! Simulated motion of a model under the recorded torques, with controllers that correct deviations from the recorded
+//! motion.
 //!
-//! A joint's controller that is linear in position and velocity gives, for the motion q of a model instead of the recorded
-//! q_m, its recorded torque and kp·(q_m − q) + kd·(q̇_m − q̇): whatever it feeds forward is in the recorded torque
-//! already. So the closed loop is simulated without knowing more of it than kp and kd. They are those of [joint.controller]
-//! where the description has one, else regressed from the recording where a reference stands in it and explains the
-//! torque, else those of a slow stand-in, with which a joint that would fall or drift stays at the recorded motion.
+//! If a joint's controller is linear in position and velocity, then for the model's motion q instead of the recorded
+//! q_m it gives its recorded torque plus kp·(q_m − q) + kd·(q̇_m − q̇). All feed-forward terms are already in the
+//! recorded torque. So the closed loop is simulated with kp and kd alone. They come from [joint.controller] if
+//! described; else from a regression, if the recording has a reference that explains the torque; else from a slow
+//! substitute, which holds a joint that would fall or drift at the recorded motion.
 //!
-//! Leaves out: integral action (part of the recorded torque), controllers that couple joints, temperatures, what acts on the
-//! voltage.
+//! Limits: no integral action (it is part of the recorded torque), no controllers that couple joints, no temperatures,
+//! no effects on the voltage.
 
 use rig_data::runs::{JointRun, Run};
 use rig_model::robot::{Controller, Placed, Robot};
@@ -19,8 +19,8 @@ mod controller;
 
 pub use controller::of_joints;
 
-/// Motion of `model` under the torques of a run and the controllers' answers to what it departs by, which alone its torques are;
-/// `substeps` within a sample.
+/// Simulates `model` under the torques of a run plus the controllers' corrections; only the corrections are returned as
+/// its torques. `substeps` is per sample.
 ///
 /// # Errors
 /// Those of [`rig_model::simulate::closed_loop`].
@@ -44,7 +44,7 @@ pub fn replayed(
     let added: Vec<Vec<f64>> = (run.joints.iter().enumerate())
         .map(|(j, joint)| {
             let applied = model.effects.applied_effort(j, &joint.tau, period);
-            // A torque held over a sample acts as in its middle.
+            // A torque held over a sample acts on average in its middle.
             (0..applied.len())
                 .map(|k| 0.5 * (applied[k] + applied[(k + 1).min(applied.len() - 1)]))
                 .collect()

@@ -22,7 +22,7 @@ fn robot(coulomb: f64) -> Robot {
     robot
 }
 
-/// 10 s of the robot under `controllers`, as they would be recorded. Each joint follows two sines, the further out the faster.
+/// Records 10 s of the robot under `controllers`. Each joint follows two sines; outer joints are faster.
 fn recorded(robot: &Robot, controllers: &[Controller]) -> Run {
     let t: Vec<f64> = (0..10_000).map(|k| k as f64 / RATE).collect();
     let sine = |rate: f64| move |t: &f64| 1.0 - (rate * t).cos();
@@ -49,7 +49,7 @@ fn recorded(robot: &Robot, controllers: &[Controller]) -> Run {
         q_raw: motion.q[j].clone(),
         q: motion.q[j].clone(),
         qd: motion.qd[j].clone(),
-        // Held over the sample after it: as in the middle between two.
+        // Held over the following sample: as in the middle between two samples.
         tau: motion.tau[j].clone(),
         reference: Some(reference),
         ..JointRun::default()
@@ -70,7 +70,7 @@ fn own() -> Controller {
     }
 }
 
-/// RMS by which each joint of the robot, as simulated, departs from the run.
+/// Returns the RMS deviation of each simulated joint from the run.
 fn off(robot: &Robot, controllers: &[Controller], run: &Run) -> Vec<f64> {
     let model = Model::from_robot(robot).unwrap();
     let q = replayed(robot, &model, controllers, run, 1).unwrap().q;
@@ -101,7 +101,7 @@ fn the_true_model_moves_as_recorded_and_a_wrong_one_does_not() {
             [0.4, 0.6].map(|fc| off(&robot(fc), controllers.as_ref().unwrap(), run)[0]);
         assert!(right < 0.05 * wrong, "{right} {wrong}");
     }
-    // Friction too high by 0.2 N·m is a position error of 0.2 N·m over the stiffness of 100 N·m/rad.
+    // A friction error of 0.2 N·m is a position error of 0.2 N·m over the stiffness of 100 N·m/rad.
     let wrong = off(&robot(0.6), &[own()], &run)[0];
     assert!((1.0e-3..3.0e-3).contains(&wrong), "{wrong}");
 }
@@ -145,7 +145,7 @@ fn of_two_joints_the_one_with_wrong_friction_moves_wrongly() {
         how.contains("(joint shoulder); a stand-in of 5 Hz"),
         "{how}"
     );
-    // Without a torque there is nothing to drive it with.
+    // Without a torque there is no input.
     run.joints[0].tau.clear();
     let (none, how) = of_joints(&truth, &truth, &[run]);
     assert!(
@@ -170,7 +170,7 @@ fn a_controller_is_read_off_its_references() {
     assert!(regressed(&[run], 0).is_none());
 }
 
-/// A recording cut in two by a pause of its clock: what follows begins as warm as it was left.
+/// A recording cut in two by a pause of its clock: the second part starts with the temperature of the end of the first.
 #[test]
 fn what_goes_on_in_a_session_moves_as_warm_as_it_is() {
     let mut truth = robot(0.4);
