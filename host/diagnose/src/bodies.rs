@@ -5,8 +5,8 @@
 //! consistent bodies in the metric of the data; held base parameters take part in this fit. The effects' gains are then
 //! refitted. A single link is consistent with any base parameters.
 //!
-//! Leaves out: effects are formed with the base parameters of the free fit. The gravity torque of a tilted arm is too
-//! small by the cosine.
+//! Leaves out: effects formed anew with the consistent bodies; the cosine by which a tilted arm's gravity torque is too
+//! small.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

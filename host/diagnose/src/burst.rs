@@ -1,4 +1,4 @@
-//! Disturbances: a few short stretches with most of a torque residual, from a touch, a knock or damaged data.
+//! Disturbances: a few short stretches with most of a torque residual, from contact, an impact or damaged data.
 //!
 //! Unmodelled physics repeats with the motion; a few far larger residuals are not from the rig. With two runs of a
 //! motion, their difference is noise. Without a repeat, this test finds disturbances.

@@ -5,8 +5,8 @@
 //! noise does not. Where their coherence (Welch; Bendat and Piersol, Random Data, 2010, chapter 6) is below a half,
 //! less than half of the acceleration is real. The best linear filter (Wiener) then passes at most half.
 //!
-//! Leaves out: torque noise, friction and coupling also lower the coherence, so motion may reach further. The test is
-//! used only where the spectrum takes noise for motion.
+//! Leaves out: torque noise, friction and coupling, which also lower the coherence: motion may reach further. So the
+//! test is used only where the spectrum takes noise for motion.
 
 use std::f64::consts::PI;
 

@@ -19,7 +19,7 @@ const LEAST: usize = 10;
 /// Returns the mean of the recorded effort and its standard deviation, joint by joint, N·m or N.
 ///
 /// # Errors
-/// [`DiagnoseError::DriveOff`] if it is too short or says that the drive was on; errors of reading.
+/// [`DiagnoseError::DriveOff`] if it is too short, was driven or moves without a column `mode`; errors of reading.
 pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, DiagnoseError> {
     let label = recording.label();
     let wrong = |what: String| DiagnoseError::DriveOff {

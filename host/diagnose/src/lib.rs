@@ -130,7 +130,7 @@ impl Options {
     }
 }
 
-/// Why a diagnosis is not possible.
+/// Reasons why a diagnosis is not possible.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
     /// Reading or preparing has failed.

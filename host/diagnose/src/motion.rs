@@ -110,7 +110,7 @@ impl<'a> Replay<'a> {
         all.map_err(|e| e.to_string())
     }
 
-    /// Returns sentences: how the motion was simulated, and why the first model that failed could not be. The first
+    /// Returns sentences: how the motion was simulated, and why the first failed model could not be. The first
     /// `described` effects are from the description.
     ///
     /// # Errors
@@ -217,7 +217,7 @@ impl<'a> Replay<'a> {
         ])
     }
 
-    /// Returns the first found effect that makes its joint's motion worse, both when it was added and, if that can be
+    /// Returns the first found effect that makes its joint's motion worse: when it was added and, if that can be
     /// simulated, in the full model. An RMS increase by more than the share `most` is worse even if it is not
     /// significant.
     ///

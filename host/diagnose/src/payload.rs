@@ -1,8 +1,8 @@
 //! Mass on the last link, from its effect on all joints.
 //!
 //! A point mass m at p in the last link's frame adds m·(1, p, −[p]×²) to the link's inertial parameters. It changes
-//! base parameters of every joint that carries it, in ratios given by p (Khalil, Gautier & Lemoine 2007,
-//! "Identification of the payload inertial parameters of industrial manipulators"). Mass and place are fitted to the
+//! base parameters of every joint that carries it, in ratios given by p: Khalil, Gautier & Lemoine 2007,
+//! "Identification of the payload inertial parameters of industrial manipulators". Mass and place are fitted to the
 //! residual of the description without a refit.
 //!
 //! Leaves out: the payload's inertia about its own centre of mass; other errors of the description.
@@ -94,7 +94,7 @@ fn value(value: f64, std: f64, unit: &str) -> Value {
     }
 }
 
-/// Returns one kilogram's inertial parameters at a place of the last link's own frame, and their derivatives by its
+/// Returns inertial parameters of one kilogram at a place of the last link's own frame. Adds their derivatives by its
 /// first moment along that frame's axes, kg·m. The parameters are in the frame of the last joint.
 fn kilogram(place: Vector3<f64>, link: &Isometry3<f64>) -> [[f64; 10]; 4] {
     let p = (link * Point3::from(place)).coords;

@@ -33,8 +33,7 @@ enum Reading {
 }
 
 impl Reading {
-    /// Returns the reading error of a joint; `None` without steps and white noise. Larger white noise includes the
-    /// steps'.
+    /// Returns a joint's reading error; `None` without steps and white noise. White noise above the steps' includes it.
     fn of(run: &Run, joint: usize) -> Option<Self> {
         let step = resolution(std::slice::from_ref(run), joint);
         match white(&run.joints[joint].q_raw) {

@@ -1,10 +1,10 @@
-//! Disturbances in only one of two runs of a motion: a touch, a knock, a moved zero.
+//! Disturbances in only one of two runs of a motion: contact, an impact, a moved zero.
 //!
 //! The difference of two runs is noise for any model. A few short stretches with most of it are an event and would hide
 //! all else. They are excluded from both runs and reported.
 //!
-//! Leaves out: events in both runs at the same place of the motion, which belong to the rig; lasting events; a touch in
-//! a commanded dwell, where friction may hold it.
+//! Leaves out: events in both runs at the same place of the motion, which belong to the rig; lasting events; contact in
+//! a commanded dwell, where friction may hold the joint.
 
 use std::ops::Range;
 
@@ -53,7 +53,7 @@ fn asked(run: &Run, joint: usize, rows: &Rows, length: usize) -> Vec<bool> {
 pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded) -> Vec<String> {
     let rows = &loaded.rows;
     let mut told = Vec::new();
-    // Run, and rows from its first on.
+    // Run, and rows counted from its first.
     let mut out: Vec<(usize, Range<usize>)> = Vec::new();
     for (a, b) in floor::repeats(&loaded.runs) {
         for (j, joint) in robot.joints.iter().enumerate() {

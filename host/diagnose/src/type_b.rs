@@ -1,9 +1,9 @@
 //! Systematic uncertainty of parameters: laws are inexact, position noise reduces inertia estimates, and the instants
 //! of reading within a sample are unknown.
 //!
-//! It is an uncertainty of type B (JCGM 100:2008, Guide to the expression of uncertainty in measurement, 4.3), added in
-//! squares to the spread between stretches. The shares are errors on emulated rigs with other laws and steps than the
-//! library's, where intervals were too narrow by that. A real rig may deviate more.
+//! It is an uncertainty of type B (JCGM 100:2008, Guide to the expression of uncertainty in measurement, 4.3). It is
+//! added in squares to the spread between stretches. The shares are errors on emulated rigs with other laws and steps
+//! than the library's, where intervals were too narrow by that. A real rig may deviate more.
 //!
 //! Leaves out: laws of another form, whose parameters are not the rig's; a wrong torque constant, which scales
 //! everything.

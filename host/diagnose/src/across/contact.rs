@@ -105,7 +105,7 @@ pub(super) fn contact(equation: &Equation, nominal: &[f64]) -> Option<Contact> {
         simplex.told(-explained);
     }
     let (_, gap, zero) = best;
-    // Reduction by the gap beside the law without one.
+    // RMS reduction by the gap, compared with the law without a gap.
     let base = fit(scale, memory, &rigid);
     let own = law(gap, zero);
     let side = combined(1, [(&rigid[0], 1.0), (&own[0], -1.0)]);

@@ -33,7 +33,7 @@ impl Gear {
 }
 
 impl Between<'_, '_> {
-    /// Returns the gear by the coefficients; `None` without elasticity and backlash.
+    /// Returns the gear that the coefficients represent; `None` without elasticity and backlash.
     pub(super) fn gear(
         &self,
         solved: &Solved,

@@ -154,7 +154,7 @@ struct Between<'a, 's> {
     options: &'a Options,
 }
 
-/// All coefficients, with the places of the laws'.
+/// All coefficients, those of the laws after the nominal ones.
 struct Solved {
     solution: Solution,
     /// Columns fitted beside the nominal ones, in their order.

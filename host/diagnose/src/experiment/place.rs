@@ -149,8 +149,8 @@ impl Place {
         if self.revolute { "N*m" } else { "N" }
     }
 
-    /// Returns position, velocity and acceleration of the coasting joint in the middle of each of `count` periods (s),
-    /// with a share of its dry and viscous friction. It stops where friction holds its weight.
+    /// Returns position, velocity and acceleration of the coasting joint in the middle of each of `count` periods (s).
+    /// A share of its dry and viscous friction acts. It stops where friction holds its weight.
     pub(super) fn coast(
         &self,
         [mut position, mut velocity]: [f64; 2],

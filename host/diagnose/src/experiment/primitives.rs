@@ -139,8 +139,8 @@ impl Primitive {
         (self.drive_off).map_or_else(|| self.trajectory.duration(), |off| off + COASTING)
     }
 
-    /// Returns position, velocity and acceleration from the start in the middle of `rows` pieces of a pass; and if it
-    /// drives.
+    /// Returns position, velocity and acceleration from the start in the middle of each of `rows` pieces of a pass. The
+    /// flag is true if the drive is on.
     pub(super) fn way(&self, place: &Place, rows: usize) -> Vec<(Reference<f64>, bool)> {
         let period = self.duration() / rows as f64;
         let time = |k: usize| (k as f64 + 0.5) * period;

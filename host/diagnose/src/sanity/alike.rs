@@ -2,7 +2,7 @@
 //!
 //! A payload or a worn or cold gear changes weight, inertia or friction. Only a ratio changes all of them alike. If a
 //! torque is f times too large, weight, inertia, viscous and dry friction are f times the described. If a position is f
-//! times too large, inertia and viscous friction are 1/f of it, dry friction is as described, and gravity has another
+//! times too large, inertia and viscous friction are 1/f of it. Dry friction is as described, and gravity has another
 //! period.
 //!
 //! Leaves out: joints without described friction or links; motors that move several joints; positions of prismatic

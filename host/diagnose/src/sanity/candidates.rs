@@ -61,8 +61,7 @@ impl Before {
 }
 
 impl Judge<'_> {
-    /// Returns the transformations that explain the recording, the likeliest first; none for a single joint (other
-    /// tests).
+    /// Returns the transformations that explain the recording, the likeliest first; none for a single joint.
     pub(super) fn transformed(&self) -> Result<Vec<Found>, DiagnoseError> {
         let rows = self.rows.thinned(TRIAL);
         let ranges: Vec<f64> = rows.q.iter().map(|q| range(q)).collect();

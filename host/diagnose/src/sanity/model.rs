@@ -319,8 +319,7 @@ impl<'a> Judge<'a> {
                 .iter()
                 .map(|(_, own)| *own)
                 .fold(f64::INFINITY, f64::min);
-            // Over a small range gravity is a parabola, also for every smaller factor. A described inertia decides
-            // then.
+            // Over a small range gravity is a parabola for every smaller factor too. A described inertia decides.
             tried.retain(|(_, own)| *own <= 1.5 * least + 0.002);
             let mut misses = Vec::new();
             for (factor, own) in tried {

@@ -32,7 +32,7 @@ const DESCRIBED: f64 = 0.3;
 const LIGHTEST: f64 = 0.1;
 /// Precision of a coefficient without prior knowledge: its torque is at most of the measured size.
 const RIDGE: f64 = UNCERTAIN * UNCERTAIN / INDEPENDENT;
-/// RMS torque of a spring and of friction, as shares of the strongest torque of the described bodies.
+/// Prior RMS torque of either-sign columns and of friction, as shares of the described bodies' strongest torque.
 const BESIDE: [f64; 2] = [0.3, 1.0];
 /// Rounds of the fit to all stretches, and to all but one, which starts from the former.
 const ROUNDS: [usize; 2] = [60, 5];

@@ -16,7 +16,7 @@ const RATE: f64 = 50.0;
 /// Most rows; a column's fault is the same in all of them.
 const MOST: usize = 6000;
 
-/// Robot for the regressors: links, and drives that move more than their own joint.
+/// Structure of the regressors: links, and drives that move more than their own joint.
 pub(super) struct Form {
     chain: ChainBatch,
     drives: Option<Transmission<f64>>,

@@ -6,8 +6,8 @@
 //! decisively better than every explanation without a fault: the description, a payload, or masses and friction within
 //! the description's uncertainty. It is also certain if it removes most of the description's misfit, and free
 //! parameters do no better with the recorded data. They can mirror every link, but one sign explains it. A certain
-//! fault is undone and the search repeats, which removes its consequences. If none is certain, explanations as good as
-//! the best are reported as open.
+//! fault is undone and the search repeats, which removes its consequences. If none is certain, faults that explain as
+//! well as the best are reported as open.
 //!
 //! Leaves out: two faults that hide each other, each without effect alone.
 

@@ -57,7 +57,7 @@ pub(crate) struct Reference {
 /// Reasons why a description gives no model under voltage, or none that can be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum DrivenError {
-    /// The description or a recording.
+    /// An error of the description or of a recording.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
     /// Parameters are missing.

@@ -86,7 +86,7 @@ impl Part {
 
 /// Torques of one step without back-EMF and viscous friction.
 struct Torques {
-    /// Of drive, gravity and effects, N·m.
+    /// Torque of drive, gravity and effects, N·m.
     torque: f64,
     /// Bounds of dry friction at rest, N·m.
     dry: [f64; 2],
@@ -104,7 +104,7 @@ pub(super) struct Stepper<'a> {
     /// Delay of a voltage after its row, s.
     late: f64,
     parts: Vec<Part>,
-    /// Index of presliding.
+    /// Index of the presliding effect, if any.
     contact: Option<usize>,
     q: f64,
     v: f64,
@@ -112,7 +112,7 @@ pub(super) struct Stepper<'a> {
     drive_torque: f64,
     /// Integral of the position error, rad·s or m·s.
     integral: f64,
-    /// Last row of the recording for the time.
+    /// Recording row of the last lookup.
     row: usize,
 }
 
