@@ -1,11 +1,11 @@
-//! Nominal parameters that a motion does not tell apart.
+//! Collinear nominal parameters.
 //!
-//! A motion in one direction shows Coulomb friction and the constant torque as their sum, one at a single speed viscous friction as
-//! well. Such a parameter is held where the description has it (at zero where it states none), and the others get the
-//! combination, which the motion does show: as `rig identify` does, by the same measure.
+//! A motion in one direction shows only the sum of Coulomb friction and constant torque; at a single speed viscous
+//! friction is part of it too. Such a parameter is held at its described value, or at zero without one. The others take
+//! the combination, which the motion does show. `rig identify` does the same, with the same criterion.
 //!
-//! Leaves out: several joints, of which [`super::refit::open`] holds what the description knows better; effects that are like a
-//! parameter of the model, which the search refuses one by one.
+//! Leaves out: several joints, where [`super::refit::open`] holds what the description knows better; effects that are
+//! collinear with a model parameter, which the search rejects one by one.
 
 use rig_shared::multibody::{COLUMNS, column};
 
@@ -14,33 +14,33 @@ use super::fit::dot;
 use super::refit::weighed;
 use super::rows::Rows;
 
-/// A column that differs from a combination of the others by a smaller share of its length tells nothing of its own: the measure of
-/// `rig identify`, where a value would rest on a thousandth of the torque.
+/// Length share below which a column is collinear with the others. As in `rig identify`: its value would rest on a
+/// thousandth of the torque.
 const OF_ITS_OWN: f64 = 1.0e-3;
 
-/// A base parameter that rows do not tell from others.
+/// A base parameter that is collinear with others.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Alike {
-    /// Which is held.
+    /// The held parameter.
     pub(super) parameter: usize,
-    /// Those whose values have the combination with it.
+    /// Parameters whose values include it.
     with: Vec<usize>,
 }
 
-/// A column that tells something of its own.
+/// A column that is not collinear with others.
 struct Kept {
-    /// Among the free directions.
+    /// Index among the free directions.
     direction: usize,
-    /// Of the column.
+    /// Length of the column.
     length: f64,
-    /// What it adds to the columns kept before it, of length one.
+    /// Its part that is orthogonal to the columns kept before it, of length one.
     along: Vec<f64>,
-    /// That as a sum of the columns kept so far, itself the last.
+    /// That part as a sum of the columns kept so far, itself the last.
     of: Vec<f64>,
 }
 
-/// Free base parameters of a single joint whose torque is a combination of that of others in these rows, so that all the others can be
-/// fitted.
+/// Finds free base parameters of a single joint that are collinear with others in these rows. With them held, all
+/// others can be fitted.
 pub(super) fn alike(bench: &Bench, rows: &Rows) -> Vec<Alike> {
     let anchor = &bench.anchor;
     if rows.joints() > 1 {
@@ -49,7 +49,7 @@ pub(super) fn alike(bench: &Bench, rows: &Rows) -> Vec<Alike> {
     let free = anchor.columns(rows);
     let (fit, _) = weighed(rows, &free);
     let mut order: Vec<usize> = (0..free.len()).collect();
-    // Those that a plain motion tells least are held first: the constant, then friction, then drive and link.
+    // The least identifiable are held first: the constant, then friction, then drive and link.
     order.sort_by_key(|k| {
         let columns = anchor.free[*k]
             .iter()
@@ -61,7 +61,7 @@ pub(super) fn alike(bench: &Bench, rows: &Rows) -> Vec<Alike> {
     for k in order {
         let mut own = fit.weighted(&free[k]);
         let whole = dot(&own, &own).sqrt();
-        // How much of each kept column is in this one.
+        // Share of each kept column in this one.
         let mut of = vec![0.0; kept.len()];
         for one in &kept {
             let share = dot(&own, &one.along);
@@ -85,7 +85,7 @@ pub(super) fn alike(bench: &Bench, rows: &Rows) -> Vec<Alike> {
             });
             continue;
         }
-        // A direction of several parameters, as gravity's of a single link, is not held by itself.
+        // A direction of several parameters, such as gravity's of a single link, is not held by itself.
         if let [(parameter, _)] = anchor.free[k].as_slice() {
             let with = (kept.iter().zip(&of))
                 .filter(|(one, share)| share.abs() * one.length > OF_ITS_OWN * whole)
@@ -99,7 +99,7 @@ pub(super) fn alike(bench: &Bench, rows: &Rows) -> Vec<Alike> {
     found
 }
 
-/// The later, the sooner held.
+/// Returns the rank of a column; the highest is held first.
 fn rank(column: usize) -> usize {
     match column {
         column::OFFSET => 3,
@@ -110,7 +110,7 @@ fn rank(column: usize) -> usize {
 }
 
 impl Alike {
-    /// As a sentence.
+    /// Returns a sentence.
     pub(super) fn said(&self, bench: &Bench) -> String {
         let name = |k: usize| bench.nominal.base.expression(k);
         let own = name(self.parameter);

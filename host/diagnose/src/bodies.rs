@@ -1,12 +1,12 @@
-//! The description with what was found, the links of an arm bodies that can exist.
+//! Description with the found effects; the links of an arm are physically consistent bodies.
 //!
-//! Base parameters of several links that are fitted freely need be no bodies': what a motion tells badly comes out as noise
-//! has it, the inertia matrix is then not positive and nothing can be simulated. So an arm gets the bodies nearest in the
-//! measure of the data, those of its base parameters among them that were held, and the effects' gains are fitted again
-//! beside them. One link is a body whatever its base parameters are.
+//! Freely fitted base parameters of several links need not be physically consistent. Noise dominates the weakly excited
+//! ones. The inertia matrix is then not positive definite and nothing can be simulated. So an arm gets the nearest
+//! consistent bodies in the metric of the data; held base parameters take part in this fit. The effects' gains are then
+//! refitted. A single link is consistent with any base parameters.
 //!
-//! Leaves out: that effects are formed with the base parameters of the free fit; of a tilted arm, that its moments are by the
-//! cosine too small in what gravity does alone.
+//! Leaves out: effects formed anew with the consistent bodies; the cosine by which a tilted arm's gravity torque is too
+//! small.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -28,30 +28,30 @@ use rig_identify::{Combinations, Sizes, as_bodies};
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 
-/// Share of the residual from which on what the bodies cost is said.
+/// Relative increase of the residual above which the cost of consistent bodies is reported.
 const SAID: f64 = 1e-3;
 
 /// A model that was fitted to the training data.
 pub(super) struct Standing {
-    /// Base parameters, as columns formed with the description's gravity take them.
+    /// Base parameters in the form of columns with the description's gravity.
     values: Vec<f64>,
-    /// The same as a description takes them.
+    /// The same in the form of a description.
     described: Vec<f64>,
-    /// Of the effects' columns.
+    /// Gains of the effects' columns.
     gains: Vec<f64>,
-    /// The description with all of it.
+    /// Description with base parameters and effects.
     pub(super) model: Robot,
-    /// What has to be said of it, sentences.
+    /// Remarks on the model, sentences.
     pub(super) remarks: Vec<String>,
 }
 
 impl Standing {
-    /// Base parameters and gains.
+    /// Returns base parameters and gains.
     pub(super) fn fitted(&self) -> [&[f64]; 2] {
         [&self.values, &self.gains]
     }
 
-    /// Coefficients of the free nominal directions, then of the effects' columns.
+    /// Returns the coefficients of the free nominal directions, then of the effects' columns.
     pub(super) fn coefficients(&self, anchor: &Anchor) -> Vec<f64> {
         let along =
             |direction: &Direction| direction.iter().map(|&(k, f)| f * self.described[k]).sum();
@@ -60,24 +60,24 @@ impl Standing {
     }
 }
 
-/// What models are fitted to. Each is fitted once: it is asked for by those who judge, simulate, draw and write it.
+/// Data that models are fitted to. Each fit is cached for judging, simulation, drawing and writing.
 pub(super) struct Fitting<'a, 'r> {
-    /// Robot and treatment.
+    /// Robot and data treatment.
     pub(super) bench: &'a Bench<'a>,
     refit: &'a Refit<'r>,
     /// The training data.
     runs: &'a [Run],
-    /// Base parameters that the effects' columns are formed with.
+    /// Base parameters that formed the effects' columns.
     formed_at: &'a [f64],
-    /// By the columns of its effects.
+    /// Fitted models by the columns of their effects.
     known: Mutex<Vec<(Vec<Arc<Vec<Column>>>, Arc<Standing>)>>,
 }
 
-/// Base parameters as columns and as a description take them, gains, and the description with its links.
+/// Base parameters in the form of columns and of a description, gains, and the description with its remarks.
 type Linked = ([Vec<f64>; 2], Vec<f64>, (Robot, Vec<String>));
 
 impl<'a, 'r> Fitting<'a, 'r> {
-    /// To `runs`.
+    /// Prepares fits to `runs`.
     pub(super) fn new(
         bench: &'a Bench<'a>,
         refit: &'a Refit<'r>,
@@ -93,10 +93,10 @@ impl<'a, 'r> Fitting<'a, 'r> {
         }
     }
 
-    /// The model of these effects.
+    /// Returns the model of these effects.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the motion does not tell its parameters apart.
+    /// [`DiagnoseError::Model`] if its parameters are not identifiable.
     pub(super) fn of(&self, chosen: &[Profile]) -> Result<Arc<Standing>, DiagnoseError> {
         let same = |known: &[Arc<Vec<Column>>]| {
             known.len() == chosen.len()
@@ -112,14 +112,14 @@ impl<'a, 'r> Fitting<'a, 'r> {
         Ok(standing)
     }
 
-    /// Takes `standing` for the model of these effects.
+    /// Stores `standing` as the model of these effects.
     pub(super) fn adopt(&self, chosen: &[Profile], standing: Standing) {
         let key = chosen.iter().map(|p| p.columns.clone()).collect();
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.insert(0, (key, Arc::new(standing)));
     }
 
-    /// RMS that the model of these effects leaves of other recordings, joint by joint.
+    /// Returns the RMS residual of this model on other recordings, joint by joint.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -154,7 +154,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
         })
     }
 
-    /// The model of one joint with these coefficients of free directions and effects' columns.
+    /// Builds the model of one joint from coefficients of free directions and effects' columns.
     pub(super) fn alone(&self, coefficients: &[f64], chosen: &[Profile]) -> Standing {
         let Bench {
             robot,
@@ -177,14 +177,14 @@ impl<'a, 'r> Fitting<'a, 'r> {
         }
     }
 
-    /// Gravity turned as the effects say, and `values` for it.
+    /// Returns gravity turned by the effects, and adapts `values` to it.
     fn turned(&self, chosen: &[Profile], gains: &[f64], values: &mut [f64]) -> [f64; 3] {
         let effects = with_gains(chosen, gains);
         let Bench { robot, nominal, .. } = self.bench;
         gravity_with(robot, nominal, self.formed_at, &effects, values)
     }
 
-    /// The nearest bodies to base parameters of a free fit, and the gains beside them.
+    /// Fits the nearest bodies to the base parameters of a free fit, and refits the gains.
     fn embodied(
         &self,
         coefficients: &[f64],
@@ -200,7 +200,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
             .map(|(column, _)| *column)
             .collect();
         let (fit, mut information) = measure(self.refit, chosen, &fitted);
-        // By what the columns take the moments smaller than they are.
+        // Ratio of the moments in the form of columns to those of the description.
         let taken: Vec<f64> = (values.iter().zip(&upright))
             .map(|(as_taken, value)| if *value == 0.0 { 1.0 } else { as_taken / value })
             .collect();
@@ -226,7 +226,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
                 return ([values, upright], gains, (model, remarks));
             }
         };
-        // What the bodies change of the torque, and what effects make up of it.
+        // Torque change caused by the bodies, and the part that effects compensate.
         let n = robot.joints.len();
         let free = (self.refit.free.iter()).chain(effects.iter().map(|(c, _)| *c));
         let mut rest = fit;
@@ -261,7 +261,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
     }
 }
 
-/// The data with what the effects leave of each joint as unit, and what they tell of the base parameters beside `fitted` columns.
+/// Returns the data scaled by residual RMS, and the information on the base parameters beside `fitted` columns.
 fn measure<'r>(
     refit: &Refit<'r>,
     chosen: &[Profile],
@@ -289,7 +289,7 @@ fn measure<'r>(
     (fit, information)
 }
 
-/// How the joints move, and what moves them.
+/// Returns the RMS torque, speed and acceleration of the joints.
 fn sizes(runs: &[Run]) -> Sizes {
     let joints = 0..runs.first().map_or(0, |run| run.joints.len());
     let rms = |of: fn(&JointRun) -> &[f64]| -> Vec<f64> {

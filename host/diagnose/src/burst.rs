@@ -1,10 +1,9 @@
-//! What is left of a torque in a few short stretches: a touch, a knock, a damaged piece of a recording.
+//! Disturbances: a few short stretches with most of a torque residual, from contact, an impact or damaged data.
 //!
-//! Physics that goes with the motion is left wherever the motion comes back; a few stretches that are far louder than all
-//! others are not of the rig. Where a motion was recorded twice, what differs is noise by itself; where it was not, this is
-//! how it shows.
+//! Unmodelled physics repeats with the motion; a few far larger residuals are not from the rig. With two runs of a
+//! motion, their difference is noise. Without a repeat, this test finds disturbances.
 //!
-//! Leaves out: disturbances that last as long as the motion, or that are no louder than what else is left.
+//! Leaves out: disturbances that last as long as the motion, or are no larger than the other residual.
 
 use std::ops::Range;
 
@@ -12,34 +11,34 @@ use rig_data::runs::Run;
 
 /// Length of a stretch, s.
 const STRETCH: f64 = 0.5;
-/// Fewest stretches to compare.
+/// Fewest stretches for a comparison.
 const FEWEST: usize = 20;
-/// Mean square over the middle one's from which a stretch is loud.
+/// Mean square of a stretch over the median one, above which it is an outlier.
 const LOUD: f64 = 25.0;
-/// Share of the stretches that may be loud, at most: more is not a few.
+/// Largest share of the stretches that may be outliers.
 const A_FEW: f64 = 0.2;
-/// Share of the squares that they must hold.
+/// Least share of the squares in outliers.
 const MOST: f64 = 0.5;
 
-/// A few stretches that hold most of what is left.
+/// A few stretches with most of the residual.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Burst {
-    /// Share of the squares that they hold beyond what the others would.
+    /// Share of the squares in these stretches beyond the level of the others.
     pub(super) share: f64,
-    /// How many.
+    /// Number of stretches.
     pub(super) count: usize,
-    /// Name of the recording with the loudest.
+    /// Recording with the largest one.
     pub(super) label: String,
-    /// From when to when the loudest lasts, s.
+    /// Start and end of the largest one, s.
     pub(super) time: [f64; 2],
-    /// RMS of the loudest over that of the middle one.
+    /// RMS of the largest one over the median.
     pub(super) times: f64,
     /// Rows of each.
     pub(super) rows: Vec<Range<usize>>,
 }
 
-/// The bursts of a joint's residual; none where there are none. Rows are `period` s apart, those of each run begin at its
-/// entry of `starts`, which ends one past the last, and `keep` says which are used.
+/// Returns the disturbance in a joint's residual, if any. Rows are `period` s apart and begin at each run's entry of
+/// `starts`, which ends one past the last. `keep` marks the used rows.
 pub(super) fn burst(
     residual: &[f64],
     keep: &[bool],
@@ -101,7 +100,7 @@ mod tests {
 
     const PERIOD: f64 = 0.01;
 
-    /// A minute of a residual that is three times as loud in fast motion, and what is added between 20 and 21 s.
+    /// A minute of a residual that is three times larger in fast motion, with `more` added between 20 and 21 s.
     fn found(more: f64) -> Option<Burst> {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(3);
         let residual: Vec<f64> = (0..6000)

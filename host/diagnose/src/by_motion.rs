@@ -1,12 +1,12 @@
-//! All parameters of one joint fitted once more, to the simulated motion: the closed-loop output error (Gautier, Janot and
-//! Vandanjon 2013) of the positions, by Gauss and Newton.
+//! Refit of all parameters of one joint to the simulated motion: closed-loop output error of the positions (Gautier,
+//! Janot and Vandanjon 2013), by Gauss-Newton.
 //!
-//! Where the model is right, torque and motion ask for the same values. Noise of the position, which the torque's regressors hold,
-//! is in no simulated motion; what the controller does not let through is in no motion at all, so that waves are known worse by it.
-//! The torque's values stand unless the motion gets clearly better and the torque no worse, away from rests and reversals: a simulated
-//! joint sticks and turns back when it does, where filters blur what a torque says of it.
+//! With a correct model, torque and motion give the same values. Position noise is in the torque's regressors but in no
+//! simulated motion. Effects that the controller suppresses are in no motion, so it identifies waves less well. The
+//! torque's values stay unless the motion improves significantly and the torque is no worse away from dwells and
+//! reversals. Near these a simulated joint sticks and turns back at its own time, and filters blur the torque.
 //!
-//! Leaves out: robots of several joints; gears, whose link is followed from the torque; whole numbers.
+//! Leaves out: robots of several joints; gears, whose link is observed from the torque; whole numbers.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,21 +25,21 @@ use super::search::is_gear;
 use rig_model::batch::each_by;
 use rig_output::format_significant;
 
-/// Passes of Gauss and Newton at most.
+/// Most Gauss-Newton passes.
 const PASSES: usize = 4;
-/// Standard deviations by which a pass may still move a parameter, and the derivatives stay as they are.
+/// Largest parameter change of the last pass, in standard deviations; the derivatives are then kept.
 const SETTLED: f64 = 0.5;
-/// Times a step may be damped more.
+/// Most increases of the damping in a pass.
 const DAMPED: usize = 5;
-/// What the torque may be left worse by for the motion's values to stand …
+/// Relative increase of the torque RMS up to which the motion's values are adopted …
 const TORQUE_WORSE: f64 = 0.005;
-/// … and where they leave this share of what the motion was off by: so much a filter's blur takes up.
+/// … and share of the motion's RMS below which `BLURRED` replaces it, to allow for the filters' blur.
 const FAR_BETTER: f64 = 0.5;
 const BLURRED: f64 = 0.05;
-/// Standard deviations from which on two values of a parameter are said to differ.
+/// Standard deviations above which two values of a parameter are reported as different.
 const APART: f64 = 4.0;
 
-/// Values that are fitted: coefficients of nominal directions and effects' columns, then shapes.
+/// Fitted values: coefficients of nominal directions and effects' columns, then shapes.
 struct Values {
     coefficients: usize,
     /// Effect and place of each shape.
@@ -47,7 +47,7 @@ struct Values {
 }
 
 impl Values {
-    /// The effects with the shapes among `values`.
+    /// Returns the effects with the shapes among `values`.
     fn effects(&self, chosen: &[Profile], values: &[f64]) -> Vec<Profile> {
         let mut effects = chosen.to_vec();
         for ((k, place), value) in self.shapes.iter().zip(&values[self.coefficients..]) {
@@ -56,7 +56,7 @@ impl Values {
         effects
     }
 
-    /// Whether physics allows them.
+    /// Returns true if the values are within their physical bounds.
     fn possible(&self, chosen: &[Profile], free: usize, values: &[f64]) -> bool {
         let within = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
         let mut gains = values[free..self.coefficients].iter();
@@ -76,15 +76,15 @@ impl Values {
     }
 }
 
-/// What came of it.
+/// Result of the refit.
 pub(super) struct Again {
-    /// For the reader.
+    /// Report for the user.
     pub(super) told: ByMotion,
-    /// The model and its effects, where they are to stand.
+    /// Model and effects to adopt, if any.
     pub(super) adopted: Option<(Standing, Vec<Profile>)>,
 }
 
-/// Fits `joint`'s values of the effects `chosen` to the simulated training motion; none where that is not done.
+/// Fits `joint`'s values of the effects `chosen` to the simulated training motion; `None` if that is not possible.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -194,8 +194,8 @@ pub(super) fn by_motion(
     }))
 }
 
-/// The values at which the motion departs least, and their standard deviations, robust to what lasts within a stretch of a second;
-/// none where the motion does not tell them apart.
+/// Returns the values with the least motion error, and their standard deviations, robust to correlation within
+/// one-second blocks. `None` if the values are not identifiable.
 fn nearest(
     mut theta: Vec<f64>,
     stds: &[f64],
@@ -217,7 +217,7 @@ fn nearest(
                     .map(|(a, b)| (a - b) / step)
                     .collect()
             };
-            // At the edge of what can be there is one side only.
+            // At a bound only one side exists.
             match [at(stds[k]), at(-stds[k])] {
                 [Some(up), Some(down)] => Some(difference(&up, &down, 2.0 * stds[k])),
                 [Some(up), None] => Some(difference(&up, &found, stds[k])),
@@ -228,7 +228,7 @@ fn nearest(
         .into_iter()
         .collect();
         let columns = columns?;
-        // In units of the deviations, which differ by orders.
+        // In units of the standard deviations, which differ by orders of magnitude.
         let slopes = DMatrix::from_fn(found.of.len(), n, |row, k| stds[k] * columns[k][row]);
         let information = slopes.tr_mul(&slopes);
         let pull = slopes.tr_mul(&DVector::from_column_slice(&found.of));

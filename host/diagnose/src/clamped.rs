@@ -1,20 +1,20 @@
-//! Recordings of a clamped joint: a motor at rest has no back-EMF and its friction moves nothing, so that all of its voltage
-//! stands against its current.
+//! Recordings of a clamped joint. A motor at rest has no back-EMF and no friction losses, so its voltage depends on its
+//! current alone.
 //!
-//! Leaves out: what the joint moves within its clamp.
+//! Leaves out: motion of the joint within its clamp.
 
 use super::DiagnoseError;
 use rig_data::prepare::Recording;
 use rig_data::runs::{Run, at_rest};
 
-/// How far a joint may go within its clamp, rad or m: a motor behind a gear of a hundred turns a radian, at a speed at which its
-/// back-EMF is nothing.
+/// Largest motion of a joint within its clamp, rad or m. A motor behind a gear of 100 turns 0.5 rad then, at a speed
+/// with negligible back-EMF.
 const GIVES: f64 = 5e-3;
 
-/// The recording stretch by stretch.
+/// Returns the recording stretch by stretch.
 ///
 /// # Errors
-/// [`DiagnoseError::Clamped`] where a joint moves, or a voltage was not recorded; what reading gives.
+/// [`DiagnoseError::Clamped`] if a joint moves or no voltage was recorded; errors of reading.
 pub fn clamped(recording: &dyn Recording) -> Result<Vec<Run>, DiagnoseError> {
     let wrong = |what: String| DiagnoseError::Clamped {
         label: recording.label(),

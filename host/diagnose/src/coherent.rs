@@ -1,12 +1,12 @@
-//! How far up in frequency torque and motion of a joint go together.
+//! Highest frequency at which torque and acceleration of a joint are coherent.
 //!
-//! The spectrum of a position shows where it sinks into noise only if the noise is white. Time stamps with jitter and positions that
-//! were filtered before make noise that rises with the frequency once it is differentiated, and looks like motion. An acceleration
-//! takes torque, noise takes none: where the coherence of the two (Welch; Bendat and Piersol, Random Data, 2010, chapter 6) falls
-//! below a half, less than half of the acceleration is one, and the best linear filter (Wiener) passes no more than half.
+//! The spectrum of a position shows its noise limit only for white noise. After differentiation, noise from jittered
+//! time stamps and from filtered positions rises with the frequency and looks like motion. Acceleration needs torque,
+//! noise does not. Where their coherence (Welch; Bendat and Piersol, Random Data, 2010, chapter 6) is below a half,
+//! less than half of the acceleration is real. The best linear filter (Wiener) then passes at most half.
 //!
-//! Leaves out: noise of the torque, friction and coupling of joints, which lower the coherence too: motion reaches at least as far as
-//! it says. So it is asked only where the spectrum takes noise for motion.
+//! Leaves out: torque noise, friction and coupling, which also lower the coherence: motion may reach further. So the
+//! test is used only where the spectrum takes noise for motion.
 
 use std::f64::consts::PI;
 
@@ -15,18 +15,18 @@ use realfft::num_complex::Complex;
 
 use rig_data::prepare::{PrepareError, Recording};
 
-/// Coherence from which on acceleration and torque go together.
+/// Coherence above which acceleration and torque belong together.
 const TOGETHER: f64 = 0.5;
-/// Segments that a coherence is formed of at least: of 16 independent ones chance makes 0.18 in one of twenty frequencies.
+/// Least number of segments; with 16 independent ones, noise exceeds 0.18 at one of twenty frequencies.
 const SEGMENTS: usize = 16;
-/// Lengths of a segment, samples.
+/// Shortest and longest segment, samples.
 const SEGMENT: [usize; 2] = [64, 1024];
-/// Ratio of a frequency to the ends of the band that its coherence is averaged over, a third of an octave in all.
+/// Ratio of a frequency to the ends of the band over which its coherence is averaged: a third of an octave in all.
 const BAND: f64 = 1.12;
 /// Rows of a block.
 const ROWS: usize = 1 << 16;
 
-/// Sums of the cross-spectra of a joint's acceleration and torque.
+/// Sums of power and cross-spectra of a joint's acceleration and torque.
 #[derive(Clone)]
 struct Spectra {
     acceleration: Vec<f64>,
@@ -35,8 +35,8 @@ struct Spectra {
     segments: usize,
 }
 
-/// The highest frequency at which the torque of some joint goes with its acceleration, Hz; none where none does, or where the
-/// recordings are too short to tell. `longest` are the rows of the longest stretch.
+/// Returns the highest frequency at which some joint's torque and acceleration are coherent, Hz. `None` if no joint's
+/// are, or if the recordings are too short. `longest` is the number of rows of the longest stretch.
 ///
 /// # Errors
 /// [`PrepareError`] of reading.
@@ -69,7 +69,7 @@ pub(super) fn highest(
 }
 
 impl Spectra {
-    /// Takes a stretch, in half overlapping segments under a Hann window.
+    /// Adds a stretch, in half-overlapping segments with a Hann window.
     fn take(&mut self, q: &[f64], torque: &[f64], length: usize) {
         let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
         let window = |k: usize| 0.5 - 0.5 * (2.0 * PI * k as f64 / length as f64).cos();
@@ -81,7 +81,7 @@ impl Spectra {
                 let own = |k: usize| window(k) * (value(from + k) - mean);
                 let mut input: Vec<f64> = (0..length).map(own).collect();
                 let mut output = fft.make_output_vec();
-                // The lengths are those of the plan; the only error of this call is another length.
+                // The lengths are those of the plan; this call fails only for another length.
                 let done = fft.process(&mut input, &mut output).is_ok();
                 done.then_some(output)
             };
@@ -99,8 +99,8 @@ impl Spectra {
         }
     }
 
-    /// The last place about which the coherence is no less than [`TOGETHER`] on average: a line that both sensors read, such as a mains
-    /// hum, is no motion.
+    /// Returns the last frequency index with a mean coherence of at least [`TOGETHER`] around it. The mean rejects a
+    /// single line in both sensors, such as mains hum.
     fn end(&self) -> Option<usize> {
         let coherence = |k: usize| {
             let both = self.acceleration[k] * self.torque[k];
@@ -129,8 +129,8 @@ mod tests {
     use rig_data::prepare::InMemory;
     use rig_data::{Block, JointColumns};
 
-    /// A mass of 2 kg under a force with as much power up to 60 Hz, its position read with noise whose acceleration rises with the
-    /// square of the frequency.
+    /// A mass of 2 kg under a force with equal power up to 60 Hz. Its position noise becomes acceleration noise that
+    /// rises with the square of the frequency.
     #[test]
     fn noise_of_the_position_takes_no_torque() {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(3);
@@ -161,7 +161,7 @@ mod tests {
             blocks: vec![block],
         };
         let end = highest(&[&made], 1, 1000.0, 30_000).unwrap().unwrap();
-        // Force and noise are as loud in the acceleration where the four stages let so much pass.
+        // The four filter stages determine where force and noise are equally strong in the acceleration.
         println!("{end} Hz");
         assert!((40.0..160.0).contains(&end), "{end} Hz");
         let mut other = made.clone();

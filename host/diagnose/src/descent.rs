@@ -1,4 +1,4 @@
-//! The RMS of the torque residual from model to model.
+//! RMS of the torque residual, model by model.
 
 use super::DiagnoseError;
 use super::bench::Loaded;
@@ -14,56 +14,56 @@ use rig_model::robot::{Robot, title_of};
 
 /// RMS on one set of recordings, joint by joint.
 pub(super) struct Fall {
-    /// What the description as it stands leaves.
+    /// RMS of the description without a refit.
     pub(super) frozen: Vec<f64>,
-    /// What the refitted description leaves, then each model with one more effect.
+    /// RMS of the refitted description, then of each model with one more effect.
     pub(super) models: Vec<Vec<f64>>,
 }
 
 impl Fall {
-    /// A model more.
+    /// Adds the RMS of one more model.
     fn push(&mut self, found: Vec<f64>) {
         for (list, rms) in self.models.iter_mut().zip(found) {
             list.push(rms);
         }
     }
 
-    /// Before and after the `k`-th effect found.
+    /// Returns the RMS before and after the `k`-th found effect.
     pub(super) fn step(&self, joint: usize, k: usize) -> [f64; 2] {
         [self.models[joint][k], self.models[joint][k + 1]]
     }
 
-    /// Of the last model, joint by joint.
+    /// Returns the RMS of the last model, joint by joint.
     pub(super) fn last(&self) -> Vec<f64> {
         (0..self.models.len()).map(|j| self.whole(j)[1]).collect()
     }
 
-    /// Of the refitted description, and of the last model.
+    /// Returns the RMS of the refitted description and of the last model.
     pub(super) fn whole(&self, joint: usize) -> [f64; 2] {
         let list = &self.models[joint];
         [list[0], list[list.len() - 1]]
     }
 }
 
-/// RMS on the training data and on those that nothing was fitted to.
+/// RMS on the training data and on the hold-out.
 pub(super) struct Descent {
-    /// Each model refitted jointly.
+    /// Training RMS, each model refitted jointly.
     pub(super) train: Fall,
-    /// With the coefficients of the training data; none without a hold-out.
+    /// Hold-out RMS with the coefficients of the training data; `None` without a hold-out.
     pub(super) holdout: Option<Fall>,
-    /// Noise of the rows held back in units of that of the training's: of a slower recording fewer samples make up a row.
+    /// Noise of hold-out rows divided by that of training rows. At a lower sample rate fewer samples form a row.
     louder: f64,
-    /// What the floor of the training data has of the reading of its positions, joint by joint, which goes by the inertia of the poses.
+    /// Part of the training noise floor from position readings, joint by joint. It depends on the inertia of the poses.
     added: Vec<f64>,
-    /// What that of the rows held back leaves in them.
+    /// Torque error of the hold-out from its position readings.
     position_reading: PositionReading,
-    /// Noise of the rows held back by two runs of one motion among them, joint by joint.
+    /// Hold-out noise from two of its runs of one motion, joint by joint.
     repeated: Vec<Option<f64>>,
 }
 
 impl Descent {
-    /// Through the effects in the order that they were found in; the first `described` are the description's. `added` is what the
-    /// training's floor has of the reading of its positions, joint by joint.
+    /// Computes the RMS for effects in the order found; the first `described` are from the description. `added` is the
+    /// part of the training floor that comes from position readings, joint by joint.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -88,7 +88,7 @@ impl Descent {
         let mut train = frozen(loaded)?;
         for count in described..=chosen.len() {
             let part = &chosen[..count];
-            // Of one link the free fit is what stands.
+            // A single link keeps its free fit.
             let found = if n == 1 {
                 let fit = with(refit.footing(part)[1], part, None);
                 vec![fit.even_rms(0)]
@@ -134,33 +134,33 @@ impl Descent {
         })
     }
 
-    /// Whether two runs of one motion among the data held back say what their noise is at a joint.
+    /// Returns true if two hold-out runs of one motion give the noise of a joint.
     pub(super) fn is_held_twice(&self, joint: usize) -> bool {
         self.repeated[joint].is_some()
     }
 
-    /// Noise of the data held back where two runs among them repeat one motion, else that of the training data, as loud as
-    /// their rate makes it.
+    /// Returns the hold-out noise from two of its runs of one motion, else the training noise scaled to the hold-out's
+    /// rate.
     fn noise(&self, floors: &[f64]) -> impl Iterator<Item = f64> {
         (floors.iter().zip(&self.repeated)).map(|(floor, own)| own.unwrap_or(self.louder * floor))
     }
 
-    /// Noise floors of the data that a share of the gap is of, the training's given.
+    /// Returns the noise floors of the data that determine the closed share of the gap, from the training floors.
     pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
-        // Of an unknown floor the steps of an encoder say nothing.
+        // Encoder steps do not replace an unknown floor.
         self.with_positions(floors, |floor, steps| match floor.is_nan() {
             true => floor,
             false => steps.max(floor),
         })
     }
 
-    /// Noise of the data held back with what the reading of the positions leaves besides: less than that is no finding.
+    /// Returns the hold-out noise including position readings; a smaller effect is not a finding.
     pub(super) fn noise_held(&self, floors: &[f64]) -> Vec<f64> {
         self.with_positions(floors, f64::hypot)
     }
 
-    /// Noise of the data held back with what the reading of their positions leaves: in its place where the training's floor has that
-    /// added; else their noise is in it, and the steps are taken with it as `both` says.
+    /// Returns the hold-out noise including position readings. They replace those in the training floor, if it has any.
+    /// Else `both` combines the noise with the encoder steps.
     fn with_positions(&self, floors: &[f64], both: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         let (added, held) = (&self.added, &self.position_reading);
         (self.noise(floors).enumerate())
@@ -174,9 +174,9 @@ impl Descent {
             .collect()
     }
 
-    /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal
-    /// parameters count as a step. 1 at most: below the floor there is nothing to explain. None where there is no gap, it has grown, or
-    /// no joint's floor is known.
+    /// Returns the share of the gap that all steps close, each joint in units of its floor. `changed` counts the
+    /// nominal parameters as a step. The share is at most 1: nothing below the floor needs an explanation. `None` if
+    /// there is no gap, it has grown, or no floor is known.
     pub(super) fn gap_closed(&self, floors: &[f64], changed: bool) -> Option<f64> {
         let fall = self.holdout.as_ref().unwrap_or(&self.train);
         let (mut gap, mut closed) = (0.0, 0.0);
@@ -196,7 +196,7 @@ impl Descent {
         (gap > 0.0 && closed >= 0.0).then(|| (closed / gap).min(1.0))
     }
 
-    /// As a result has it; `found` are the effects that the description does not state.
+    /// Returns the waterfall of a result; `found` are the effects that the description does not state.
     pub(super) fn waterfall(
         &self,
         robot: &Robot,

@@ -1,25 +1,25 @@
-//! What the sensor of the current reads while the drive is off: no current flows, so that all of it is the sensor's own.
+//! Readings of the current sensor with the drive off. No current flows, so the reading is the sensor's zero.
 //!
-//! Leaves out: sensors of torque, which read what rests on the joint whether the drive is on or off.
+//! Leaves out: torque sensors, which read the load on the joint with the drive on or off.
 
 use rig_shared::safety::Mode;
 
 use super::DiagnoseError;
 use rig_data::prepare::Recording;
 
-/// Shortest recording, s: what changes slowly must have had time to change.
+/// Shortest recording, s: slow changes need time to appear.
 const SHORTEST: f64 = 0.5;
-/// How far a joint may swing whose recording does not say that its drive was off, rad or m.
+/// Largest motion of a joint whose recording does not say that its drive was off, rad or m.
 const SWINGS: f64 = 0.05;
-/// Pieces whose means tell how well the whole mean is known, however the noise is correlated within one.
+/// Pieces whose means give the uncertainty of the whole mean, for any correlation of noise within one.
 const PIECES: usize = 10;
-/// Samples of a piece, at least.
+/// Least samples of a piece.
 const LEAST: usize = 10;
 
-/// Mean of the recorded effort and its standard deviation, joint by joint, N·m or N.
+/// Returns the mean of the recorded effort and its standard deviation, joint by joint, N·m or N.
 ///
 /// # Errors
-/// [`DiagnoseError::DriveOff`] where it is too short, or says itself that the drive was on; what reading gives.
+/// [`DiagnoseError::DriveOff`] if it is too short, was driven or moves without a column `mode`; errors of reading.
 pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, DiagnoseError> {
     let label = recording.label();
     let wrong = |what: String| DiagnoseError::DriveOff {
@@ -120,7 +120,7 @@ mod tests {
         }
     }
 
-    /// Noise that is correlated over ten samples: its mean is three times less sure than that of white noise.
+    /// Noise that is correlated over ten samples: its mean is three times less certain than that of white noise.
     #[test]
     fn the_mean_is_as_sure_as_it_says() {
         const RUNS: u64 = 300;

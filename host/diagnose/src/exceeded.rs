@@ -1,21 +1,21 @@
-//! Torque limits of the description that the recorded torque goes beyond, which are none.
+//! Described torque limits that the recorded torque exceeds.
 //!
-//! A limit cuts the torque: rows at it tell nothing and are left out, and a simulation goes no further. Taken for true where it
-//! is not, it leaves out just the rows that tell most, and holds back the simulated motion.
+//! Rows at a limit carry no information and are excluded, and a simulation stays within the limit. A wrong limit would
+//! exclude the most informative rows and restrict the simulated motion.
 
 use super::stated::Stated;
 use rig_data::runs::Run;
 use rig_output::{format_significant, format_unit};
 
-/// How far beyond the limit a torque has to be, as a factor …
+/// Factor by which a torque must exceed the limit …
 const BEYOND: f64 = 1.05;
-/// … and in standard deviations of its reading: readings of a torque that is at its limit spread about it.
+/// … and excess in standard deviations of its reading, as readings scatter about a true limit.
 const SIGMAS: f64 = 4.0;
-/// Share of all samples that have to be there.
+/// Least share of all samples beyond the limit.
 const LEAST: f64 = 0.005;
 
 impl Stated {
-    /// Leaves limits out of the description that the recorded torque goes beyond; whether there was one.
+    /// Removes described limits that the recorded torque exceeds. Returns true if there was one.
     pub(super) fn lift_limits(&mut self, runs: &[Run]) -> bool {
         let mut lifted = false;
         for (j, joint) in self.robot.joints.iter_mut().enumerate() {

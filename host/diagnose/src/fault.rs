@@ -1,11 +1,11 @@
-//! The diagnosis of recordings that cannot be what they say.
+//! Diagnosis of recordings with a certain fault.
 
 use super::outcome::{About, Before, DataFault, Diagnosis, Residual, Verdict};
 use super::sentences;
 use rig_data::prepare::PrepareError;
 use rig_model::robot::Robot;
 
-/// What keeps a recording from being prepared, where that is a fault of the recording.
+/// Returns the fault of a recording that prevents its preparation.
 pub(super) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
     let (kind, label) = match error {
         PrepareError::TooShort { label, .. } => ("too-short", label),
@@ -25,7 +25,7 @@ pub(super) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
     })
 }
 
-/// Says what is wrong and nothing else: no model means anything on such data.
+/// Returns a diagnosis with the faults alone: on such data no model is meaningful.
 pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),

@@ -1,4 +1,4 @@
-//! What follows from a finished search: pictures, sentences, limits.
+//! Pictures, sentences and limits of a finished search.
 
 use super::anchor::Anchor;
 use super::fit::Fit;
@@ -14,35 +14,35 @@ use super::{DiagnoseError, limits, pictures, sentences};
 use rig_data::runs::Run;
 use rig_model::robot::Robot;
 
-/// What the search has left behind.
+/// Results of the search.
 pub(super) struct Found<'a, 'r> {
-    /// As it was given.
+    /// Robot as given.
     pub(super) robot: &'a Robot,
-    /// Its base parameters.
+    /// Base parameters of the robot.
     pub(super) nominal: &'a Nominal,
-    /// Which of them were free.
+    /// Free base parameters.
     pub(super) anchor: &'a Anchor,
-    /// The library with the training data.
+    /// Candidate library with the training data.
     pub(super) search: &'a Search<'r>,
-    /// The training data, less what held parameters give.
+    /// Training data minus the torque of held parameters.
     pub(super) rows: &'a Rows,
-    /// The nominal model on them.
+    /// Nominal model fitted to them.
     pub(super) base: &'a Fit<'r>,
-    /// The description with what was found.
+    /// Description with the found effects.
     pub(super) model: &'a Robot,
-    /// The effects, those of the description first.
+    /// All effects, those of the description first.
     pub(super) chosen: &'a [Profile],
-    /// How many of them are the description's.
+    /// Number of effects from the description.
     pub(super) described: usize,
     /// Coordinates of the training data, joint by joint.
     pub(super) coordinates: &'a [Vec<Coordinate>],
     /// Noise floor, joint by joint.
     pub(super) floors: &'a [f64],
-    /// … that no model made; NaN where none is known.
+    /// … obtained without a model; NaN if unknown.
     pub(super) known: &'a [f64],
-    /// Of the bootstrap.
+    /// Seed of the bootstrap.
     pub(super) seed: u64,
-    /// What the sensors read with the drive off, where that was recorded.
+    /// Sensor readings with the drive off, if recorded.
     pub(super) sensor_zeros: &'a [[f64; 2]],
     /// Joints that move in one direction only.
     pub(super) one_way: &'a [OneWay],
@@ -51,25 +51,25 @@ pub(super) struct Found<'a, 'r> {
 }
 
 impl<'a> Found<'a, '_> {
-    /// The effects that the description does not state.
+    /// Returns the effects that the description does not state.
     pub(super) fn found(&self) -> &'a [Profile] {
         &self.chosen[self.described..]
     }
 }
 
-/// Recordings with what the models leave of their torque, joint by joint over the rows.
+/// Recordings and the models' torque residuals, joint by joint over the rows.
 pub(super) struct Drawn<'a> {
     /// In the order of the rows.
     pub(super) runs: &'a [Run],
-    /// Where the rows are.
+    /// Rows of the recordings.
     pub(super) rows: &'a Rows,
-    /// Left by the refitted description and by the model with all effects.
+    /// Residuals of the refitted description and of the model with all effects.
     pub(super) left: [Vec<Vec<f64>>; 2],
-    /// Positions that the same models give when simulated, run by run; empty where they are not.
+    /// Simulated positions of the same models, run by run; empty if not simulated.
     pub(super) motion: [Vec<Positions>; 2],
 }
 
-/// Fills what the search itself does not.
+/// Fills in the results that the search does not produce.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -91,10 +91,10 @@ pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<(), Dia
     Ok(())
 }
 
-/// What the recordings did not test although it decides what a verdict is worth, a sentence; none where they did.
+/// Returns a sentence on what the recordings did not test although a verdict depends on it; `None` if they tested all.
 ///
-/// Friction near standstill is not tested where a law of it as large as the joint's dry friction would not have shown at some of its
-/// shapes: presliding turns all of the dry friction into one.
+/// Friction near standstill is untested if, for some shape, a law as large as the dry friction would not have been
+/// detected. Presliding turns all dry friction into such a law.
 fn untested(found: &Found, diagnosis: &Diagnosis, repeated: bool) -> Option<String> {
     let near_rest = ["presliding", "stribeck"];
     let friction = |name: &str| {

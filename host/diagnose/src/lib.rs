@@ -1,5 +1,5 @@
-//! The gap workflow: where simulation and data disagree, which physical effect is missing, what it takes away on data not
-//! used, and when to stop.
+//! Diagnosis of the gap between simulation and data: which physical effect is missing, how much it reduces the hold-out
+//! residual, and when to stop.
 //!
 //! ```no_run
 //! use rig_data::Source;
@@ -108,18 +108,18 @@ use rig_data::runs::Run;
 pub struct Options {
     /// Effects that are left out of the library.
     pub without: Vec<Kind>,
-    /// Whether recordings that cannot be what they say are fitted all the same.
+    /// True to fit recordings even if their data have certain faults.
     pub even_if_wrong: bool,
-    /// Threads; 0 for as many as the machine has.
+    /// Number of threads; 0 for all that the machine has.
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
-    /// What the sensors read with the drive off, by [`sensor_zeros`]; empty where it was not recorded.
+    /// Zero of each joint's sensor and its standard deviation, from [`sensor_zeros`]; empty if not recorded.
     pub sensor_zeros: Vec<[f64; 2]>,
-    /// Recordings of clamped joints, by [`clamped`]; their voltage alone is learnt from.
+    /// Recordings of clamped joints, from [`clamped`]; only their voltage is fitted.
     pub clamped: Vec<Run>,
-    /// Whether the description comes from a format without a place for a constant torque, so that its having none says
-    /// nothing: the constant is then fitted beside the friction, as in an identification.
+    /// True if the description's format has no field for a constant torque. The constant is then fitted with the
+    /// friction, as in an identification.
     pub no_offsets: bool,
 }
 
@@ -130,7 +130,7 @@ impl Options {
     }
 }
 
-/// Why a diagnosis is not possible.
+/// Reasons why a diagnosis is not possible.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
     /// Reading or preparing has failed.
@@ -142,25 +142,25 @@ pub enum DiagnoseError {
     /// The robot has no valid model.
     #[error("The robot's model cannot be built: {0}")]
     Model(String),
-    /// A recording that says nothing of the drive at rest.
+    /// A recording that is not usable as one with the drive off.
     #[error(
         "{label} cannot be taken as recorded with the drive off: {what}; record a few seconds with the rig disarmed."
     )]
     DriveOff {
         /// Name of the recording.
         label: String,
-        /// Why, a clause.
+        /// Reason, a clause.
         what: String,
     },
-    /// A recording that says nothing of a motor at rest.
+    /// A recording that is not usable as one with clamped joints.
     #[error("{label} cannot be taken as recorded with the joints clamped: {what}.")]
     Clamped {
         /// Name of the recording.
         label: String,
-        /// Why and what would be right, a clause.
+        /// Reason and remedy, a clause.
         what: String,
     },
-    /// A recording given twice, under two names.
+    /// Two recordings that hold the same samples.
     #[error(
         "{again} holds samples of {label}: a copy, or a piece cut out of it, says nothing of the noise, and is no motion that was not learnt from; give each sample once."
     )]
@@ -170,7 +170,7 @@ pub enum DiagnoseError {
         /// Name of the second.
         again: String,
     },
-    /// A recording without a voltage.
+    /// A recording without torque, current and voltage.
     #[error(
         "{0} has neither torque nor current (a column tau1 or i1), and no motor voltage to go by instead (u1, or duty1 with supply); record one of them, or give its column that name."
     )]

@@ -1,6 +1,6 @@
-//! What the recordings cannot show, from which size on they would have shown an effect, and what to record next.
+//! Effects that the recordings cannot show, detectable sizes of the others, and the next experiment.
 //!
-//! Leaves out: sizes of what acts between motor and link, which are shapes and not gains.
+//! Leaves out: sizes of transmission effects, which are shapes and not gains.
 
 use nalgebra::DMatrix;
 use rig_shared::effects::{Effect, Kind, Need};
@@ -19,12 +19,12 @@ use rig_model::robot::Robot;
 use rig_model::simulate::Model;
 use rig_output::{format_unit, format_value};
 
-/// Most points of a grid that are looked at.
+/// Most grid points that are evaluated.
 const POINTS: usize = 12;
-/// How often a size called detectable is found.
+/// Probability of finding an effect of detectable size.
 const POWER: f64 = 0.9;
 
-/// Effects that the recordings cannot show.
+/// Returns the effects that the recordings cannot show.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -48,7 +48,7 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
                 .chosen
                 .iter()
                 .any(|p| p.candidate.joint == j && p.candidate.kind.about().name == name);
-            // An encoder on the link has shown it or not.
+            // A link encoder decides on a transmission effect by itself.
             let across = is_gear(kind) && (runs.iter()).any(|r| r.joints[j].link.is_some());
             if taken || across || known(&list) {
                 continue;
@@ -85,7 +85,7 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
     Ok(list)
 }
 
-/// An effect whose torque is what other parameters give as well.
+/// Describes an effect whose torque is collinear with other parameters.
 fn disguised(found: &Found, kind: Kind, joint: usize) -> NotTestable {
     let about = kind.about();
     let runs = found.search.source.runs;
@@ -102,14 +102,14 @@ fn disguised(found: &Found, kind: Kind, joint: usize) -> NotTestable {
     }
 }
 
-/// Numbers of points spread over an effect's grid.
+/// Returns indices of points spread over an effect's grid.
 fn places(kind: Kind) -> impl Iterator<Item = usize> {
     let count = grid(kind).len();
     (0..count).step_by(count.div_ceil(POINTS).max(1))
 }
 
-/// The smallest size of each effect that was tested and not found: the median over its shapes of the gain that would have
-/// taken away the least share that counts and been found nine times in ten at the level that counts.
+/// Returns the smallest detectable size of each effect that was tested and not found: the median gain over its shapes.
+/// Such a gain gives the minimum RMS reduction and is significant nine times in ten.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -167,11 +167,11 @@ pub(super) fn detectable(
     Ok(list)
 }
 
-/// Gain of a projected column from which on it is taken. `count` columns are judged together.
+/// Returns the smallest accepted gain of a projected column; `count` columns are tested together.
 pub(super) fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -> Option<f64> {
     let left = fit.left();
     let length = dot_self(column);
-    // The RMS that is to fall by the least gain is that with the effect in it.
+    // The minimum reduction refers to the RMS with the effect in the residual.
     let kept = (1.0 - LEAST_GAIN).powi(2);
     let visible = (dot_self(left) * (1.0 - kept) / kept / length).sqrt();
     let inverse = DMatrix::from_element(1, 1, 1.0 / length);
@@ -187,7 +187,7 @@ pub(super) fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -
     (size.is_finite() && size > 0.0).then_some(size)
 }
 
-/// What to record next: what separates the first step whose name is open, else what makes the first effect testable.
+/// Returns the next experiment: for the rivals of the first undecided step, else for the first untestable effect.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -249,7 +249,7 @@ pub(super) fn next(
         }))
 }
 
-/// That what is asked for has been given and was not enough, where it has; a sentence with a space after it.
+/// Returns a sentence, with a space after it, if the requested data were given and were not sufficient.
 fn given_already(found: &Found, joint: usize, kind: &str) -> Option<String> {
     if kind == OFF_LOG {
         let [zero, std] = *found.sensor_zeros.get(joint)?;
@@ -264,7 +264,7 @@ fn given_already(found: &Found, joint: usize, kind: &str) -> Option<String> {
     })
 }
 
-/// An effect with its estimate. What is fitted of a tilt is an angle, which turns gravity's torque.
+/// Returns an effect with its estimate. A tilt is fitted as an angle, which turns gravity's torque.
 fn effect(profile: &Profile, nominal: &Nominal) -> Effect<f64> {
     let (kind, gains) = (profile.candidate.kind, &profile.evidence.gains);
     match (kind, gains.as_slice()) {
@@ -276,7 +276,7 @@ fn effect(profile: &Profile, nominal: &Nominal) -> Effect<f64> {
     }
 }
 
-/// Parameters of a joint while the others stand in the middle of their ranges; none for a description without dynamics.
+/// Returns the parameters of a joint with the others in mid-range; `None` if it has no inertia.
 fn nominal_of(model: &Robot, joint: usize) -> Result<Option<Nominal>, DiagnoseError> {
     let failed = |e: rig_model::simulate::SimulateError| DiagnoseError::Model(e.to_string());
     let dynamics = Model::from_robot(model).map_err(failed)?;

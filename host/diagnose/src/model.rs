@@ -1,6 +1,6 @@
-//! The description with what was found in it.
+//! Description with the found effects.
 //!
-//! Leaves out: second order in the angle of a tilted base where there is more than one joint.
+//! Leaves out: second-order terms in the angle of a tilted base for more than one joint.
 
 use nalgebra::{DVector, Rotation3, Vector3};
 use rig_shared::effects::{Effect, Kind, SHAPES};
@@ -15,14 +15,14 @@ use rig_identify::{Combinations, described as standard, redistributed};
 use rig_model::robot::{Origin, Robot, RobotEffect, sane};
 use rig_output::{format_significant, format_unit};
 
-/// Share of the largest value of a kind that a parameter of that kind may at least move by in one unit of change.
+/// Least weight of a standard parameter, as a share of the largest value of its kind.
 const LEAST_WEIGHT: f64 = 0.1;
-/// A transmission's share further from 1 than this is said.
+/// Deviation of a transmission's torque factor from 1 above which it is reported.
 const UNEVEN: f64 = 0.1;
 
-/// An effect with its fitted gains (as many as its columns) and shapes.
+/// An effect with its fitted gains (one per column) and shapes.
 pub(super) struct Fitted<'a> {
-    /// Which, and where.
+    /// Effect and joint.
     pub(super) candidate: Candidate,
     /// In the order of its columns.
     pub(super) gains: &'a [f64],
@@ -30,7 +30,7 @@ pub(super) struct Fitted<'a> {
     pub(super) shapes: [f64; SHAPES],
 }
 
-/// `robot` with these base parameters, and what had to be said of it.
+/// Returns `robot` with these base parameters, and remarks on it.
 pub(super) fn redistributed_over(
     robot: &Robot,
     nominal: &Nominal,
@@ -45,7 +45,7 @@ pub(super) fn redistributed_over(
     redistributed(robot, &base, Some(&weights))
 }
 
-/// Gravity turned as an effect among these says, and `values` for it.
+/// Returns gravity turned by a tilt among the effects, and adapts `values` to it.
 pub(super) fn gravity_with(
     robot: &Robot,
     nominal: &Nominal,
@@ -60,7 +60,7 @@ pub(super) fn gravity_with(
         })
 }
 
-/// A description with new base parameters, `robot` the one given, and what had to be said of it: with gravity and effects.
+/// Adds gravity and effects to a description with new base parameters and its remarks. `robot` is the one given.
 pub(super) fn completed(
     (mut model, mut remarks): (Robot, Vec<String>),
     robot: &Robot,
@@ -68,7 +68,7 @@ pub(super) fn completed(
     effects: &[Fitted],
 ) -> (Robot, Vec<String>) {
     model.gravity = gravity;
-    // What its values were identified from before says nothing about the new ones.
+    // The identification record describes the old values.
     model.identified = None;
     model.origin = Origin::Own;
     for fitted in effects {
@@ -93,7 +93,7 @@ pub(super) fn completed(
     (model, remarks)
 }
 
-/// Effects with their gains.
+/// Returns the effects with their gains.
 pub(super) fn with_gains<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fitted<'g>> {
     let mut effects = Vec::new();
     for profile in chosen {
@@ -108,9 +108,9 @@ pub(super) fn with_gains<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fi
     effects
 }
 
-/// Gravity turned as the fitted angles say, and the first moments among `values` with it: what a fit calls turned is a part of
-/// gravity added across it, so that its moments are by the cosine too small. The torque of gravity is that of the fit, whose angle
-/// multiplies the moments that its column was formed with.
+/// Turns gravity by the fitted angles and scales the first moments among `values`. A fit adds the tilt as gravity
+/// across the axis, so its moments are too small by the cosine. The gravity torque stays that of the fit: its angle
+/// multiplies the moments that formed its column.
 fn turned(
     nominal: &Nominal,
     gravity: [f64; 3],
@@ -147,7 +147,7 @@ fn turned(
     (turned.inverse() * Vector3::from(gravity)).into()
 }
 
-/// The effect as a table of the description, its values within what a description may hold.
+/// Returns the effect as a table of the description, with values limited to its permitted range.
 fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<String>) -> RobotEffect {
     let Candidate {
         kind, joint, other, ..
@@ -179,7 +179,7 @@ fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<Strin
     }
 }
 
-/// How easily each standard parameter moves: as large as it is, at least a share of the largest of its kind.
+/// Returns the weight of each standard parameter: its size, at least a share of the largest of its kind.
 pub(super) fn weights(robot: &Robot, columns: usize) -> DVector<f64> {
     let prior = standard(robot, columns);
     let links = robot.joints.len() * COLUMNS;
@@ -198,7 +198,7 @@ pub(super) fn weights(robot: &Robot, columns: usize) -> DVector<f64> {
             .filter(|o| kind(*o) == kind(c))
             .fold(0.0, |m: f64, o| m.max(prior[o].abs()));
         let own = prior.get(c).map_or(0.0, |p| p.abs());
-        // Nothing of the kind is stated: all of it moves alike.
+        // No parameter of this kind is described: all get the same weight.
         if largest > 0.0 {
             own.max(LEAST_WEIGHT * largest)
         } else {

@@ -1,4 +1,4 @@
-//! Which model moves as recorded: errors of simulated motions ([`rig_validate::replay`]), model by model.
+//! Position errors of simulated motions ([`rig_validate::replay`]), model by model.
 
 use super::DiagnoseError;
 use super::bench::Loaded;
@@ -10,31 +10,31 @@ use rig_model::robot::{Controller, Robot, title_of};
 use rig_model::simulate::{Model, SimulateError};
 use rig_validate::replay::{of_joints, replayed};
 
-/// Longest step, s.
+/// Longest integration step, s.
 const STEP: f64 = 1.0e-3;
-/// Departures a second: the positions that joints depart by are smooth.
+/// Rate at which position errors are kept, 1/s; they are smooth.
 const DEPARTURES: f64 = 100.0;
 /// Length of the blocks that are compared, s.
 const BLOCK: f64 = 1.0;
-/// A motion is worse when its RMS grows by more than this share …
+/// Relative increase of the RMS above which a motion is worse …
 const WORSE: f64 = 0.02;
-/// … and its squares by more than so many standard deviations of their change from block to block.
+/// … and increase of its squares, in standard deviations between blocks.
 const SIGMAS: f64 = 3.0;
 
 /// Positions, joint by joint.
 pub(super) type Positions = Vec<Vec<f64>>;
 
-/// Errors of the simulated motion, joint by joint and block by block: sum of squares and rows.
+/// Errors of the simulated motion by joint and block: sum of squares and number of rows.
 pub(super) struct Errors(Vec<Vec<[f64; 2]>>);
 
 impl Errors {
-    /// Of a joint, rad or m.
+    /// Returns the RMS error of a joint, rad or m.
     pub(super) fn rms(&self, joint: usize) -> f64 {
         let [sum, rows] = (self.0[joint].iter()).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         (sum / f64::max(rows, 1.0)).sqrt()
     }
 
-    /// Whether those of a joint are larger than `before` by more than noise makes them.
+    /// Returns true if the errors of a joint are significantly larger than in `before`.
     pub(super) fn worse_than(&self, before: &Self, joint: usize) -> bool {
         let changes: Vec<f64> = (self.0[joint].iter().zip(&before.0[joint]))
             .map(|(a, b)| a[0] - b[0])
@@ -47,27 +47,27 @@ impl Errors {
     }
 }
 
-/// By how much the simulated positions of a single joint depart from those recorded, rad or m, a hundred times a second.
+/// Simulated minus recorded position of a robot's only joint, rad or m, 100 times a second.
 pub(super) struct Departures {
     pub(super) of: Vec<f64>,
-    /// Motion and stretch of it, a second long; runs of one motion share theirs.
+    /// Motion and one-second block of each error; runs of one motion share their blocks.
     pub(super) stretch: Vec<(usize, usize)>,
 }
 
 /// Recordings to be simulated.
 pub(super) struct Replay<'a> {
     fitting: &'a Fitting<'a, 'a>,
-    /// What models are judged on.
+    /// Data that models are judged on.
     pub(super) judged: &'a Loaded,
     runs: &'a [Run],
-    /// One a joint; none where nothing is simulated.
+    /// One per joint; `None` if nothing is simulated.
     controllers: Option<Vec<Controller>>,
-    /// Which controllers, or why nothing is simulated, a sentence.
+    /// Which controllers are simulated, or why none is; a sentence.
     how: String,
 }
 
 impl<'a> Replay<'a> {
-    /// Of the recordings that models are judged on.
+    /// Prepares the simulation of the recordings that models are judged on.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -86,7 +86,7 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Positions of a model, run by run; the error says why there are none.
+    /// Simulates the positions of a model, run by run. The error says why it failed.
     fn simulated(&self, robot: &Robot) -> Result<Vec<Positions>, String> {
         let Some(controllers) = &self.controllers else {
             return Err(self.how.clone());
@@ -110,8 +110,8 @@ impl<'a> Replay<'a> {
         all.map_err(|e| e.to_string())
     }
 
-    /// How the motion was simulated, and why not from the first model on that could not be, sentences. The first `described`
-    /// effects are the description's.
+    /// Returns sentences: how the motion was simulated, and why the first failed model could not be. The first
+    /// `described` effects are from the description.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -135,7 +135,7 @@ impl<'a> Replay<'a> {
         Ok(self.how.clone())
     }
 
-    /// What a description's motion is off by; none where it cannot be simulated.
+    /// Returns the position errors of a description; `None` if it cannot be simulated.
     pub(super) fn errors_of(&self, robot: &Robot) -> Option<Errors> {
         let simulated = self.simulated(robot).ok()?;
         let joints = 0..robot.joints.len();
@@ -155,7 +155,7 @@ impl<'a> Replay<'a> {
         Some(Errors(joints.map(of_joint).collect()))
     }
 
-    /// What a description of one joint departs by; none where it cannot be simulated.
+    /// Returns the position errors of a one-joint description over time; `None` if it cannot be simulated.
     pub(super) fn departures(&self, robot: &Robot) -> Option<Departures> {
         let simulated = self.simulated(robot).ok()?;
         let repeats = floor::repeats(self.runs);
@@ -178,7 +178,7 @@ impl<'a> Replay<'a> {
         Some(found)
     }
 
-    /// The same of the model with `chosen`.
+    /// Returns the position errors of the model with `chosen`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -189,8 +189,8 @@ impl<'a> Replay<'a> {
         Ok(self.errors_of(&self.fitting.of(chosen)?.model))
     }
 
-    /// Simulated positions with the `described` first and with all of `chosen`, run by run; empty where they cannot be
-    /// simulated.
+    /// Simulates positions with the first `described` effects and with all of `chosen`, run by run. Each is empty if
+    /// that fails, the second also if no effect was found.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -217,8 +217,9 @@ impl<'a> Replay<'a> {
         ])
     }
 
-    /// The first effect beyond the `described` first that makes the motion of its joint worse where it came in, and among all as far as
-    /// these can be simulated. Worse by more than a share of `most` counts whatever it differs by between stretches.
+    /// Returns the first found effect that makes its joint's motion worse: when it was added and, if that can be
+    /// simulated, in the full model. An RMS increase by more than the share `most` is worse even if it is not
+    /// significant.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -262,7 +263,7 @@ mod tests {
         let before = errors(&[1.0, 1.2, 0.9, 1.1, 1.0, 1.0]);
         assert!(errors(&[1.5, 1.8, 1.4, 1.6, 1.5, 1.6]).worse_than(&before, 0));
         assert!(!errors(&[0.5, 0.6, 0.4, 0.5, 0.5, 0.5]).worse_than(&before, 0));
-        // One bad block is chance.
+        // A single bad block is not significant.
         assert!(!errors(&[1.0, 1.2, 0.9, 4.1, 1.0, 1.0]).worse_than(&before, 0));
     }
 }

@@ -1,6 +1,6 @@
-//! Joints that move in one direction only: there dry friction and a constant torque are one constant, and the data tell their sum.
+//! Joints that move in one direction only. Their dry friction and constant torque are collinear: the data show the sum.
 //!
-//! By the rule of an identification ([`rig_identify::Slides`]).
+//! Uses the rule of an identification ([`rig_identify::Slides`]).
 
 use rig_shared::multibody::{COLUMNS, column};
 
@@ -14,26 +14,26 @@ use rig_output::{format_significant, format_unit, format_value};
 /// A joint that moves in one direction only.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OneWay {
-    /// Which, from 0.
+    /// Index, from 0.
     pub(super) joint: usize,
-    /// Its dry friction and its constant torque among the base parameters.
+    /// Base parameters of its dry friction and its constant torque.
     parameters: [usize; 2],
-    /// Direction that it moves in, 1 or −1.
+    /// Direction of motion, 1 or −1.
     direction: f64,
 }
 
 impl OneWay {
-    /// The base parameter of its constant torque, which is to be held.
+    /// Returns the base parameter of its constant torque, which is held.
     pub(super) fn constant(&self) -> usize {
         self.parameters[1]
     }
 
-    /// The base parameter of its dry friction, which the constant is part of.
+    /// Returns the base parameter of its dry friction, which includes the constant.
     pub(super) fn friction(&self) -> usize {
         self.parameters[0]
     }
 
-    /// What the dry friction is called, with the constant `held` in it or beside it.
+    /// Returns the name of the dry friction, with the constant `held` in it or beside it.
     pub(super) fn named(&self, held: f64) -> String {
         let number = self.joint + 1;
         let sign = if self.direction < 0.0 { '-' } else { '+' };
@@ -49,7 +49,7 @@ impl OneWay {
 }
 
 impl OneWay {
-    /// Leaves out rows of the joint about rests, in which the direction of friction is smoothed.
+    /// Excludes rows of the joint near rests, where the direction of friction is smoothed.
     pub(super) fn leave_out_rests(&self, rows: &mut Rows) {
         let Some(directions) = &rows.nominal[self.friction()][self.joint] else {
             return;
@@ -60,7 +60,7 @@ impl OneWay {
     }
 }
 
-/// Joints whose rows show one direction only, of those whose dry friction and constant torque are base parameters of their own.
+/// Returns joints that move in one direction only, if dry friction and constant torque are separate base parameters.
 pub(super) fn one_way(nominal: &Nominal, rows: &Rows) -> Vec<OneWay> {
     let place = |joint: usize, own: usize| {
         let column = joint * COLUMNS + own;
@@ -84,7 +84,7 @@ pub(super) fn one_way(nominal: &Nominal, rows: &Rows) -> Vec<OneWay> {
         .collect()
 }
 
-/// What the recordings tell of the joints that move in one direction only, sentences.
+/// Returns sentences on the joints that move in one direction only.
 pub(super) fn told(
     list: &[OneWay],
     robot: &Robot,

@@ -1,40 +1,40 @@
-//! Orders of waves beyond those that are looked for one by one: read from the spectrum of the torque along the position.
+//! Wave orders beyond those that are searched one by one, from the torque spectrum over the position.
 //!
-//! A motor behind a gear whose ratio nobody states makes hundreds or thousands of waves in a turn of the joint. The spectrum is taken
-//! over the position, not over time: at a speed that varies a wave of the position has no frequency.
+//! A motor behind a gear of unknown ratio makes hundreds or thousands of waves per joint turn. The spectrum is taken
+//! over position, not time: at varying speed a wave has no fixed frequency.
 //!
-//! Leaves out: waves of which more than half passes between two samples at the speed that half of the rows exceed; amplitudes,
-//! which the fit beside all else gives.
+//! Leaves out: waves that advance by more than half between two samples at the median speed; amplitudes, which a later
+//! joint fit gives.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
 use rig_data::runs::Run;
 
-/// Most samples of the recordings that the spectrum is taken of: it then costs a tenth of a second.
+/// Most samples in the spectrum; it then takes a tenth of a second.
 const MOST_SAMPLES: usize = 20_000;
-/// Highest order that is looked for, waves in a turn of the angle.
+/// Highest order, waves per turn.
 const HIGHEST: usize = 4000;
-/// Most orders that are given, the loudest first.
+/// Most orders that are returned, largest first.
 const MOST_ORDERS: usize = 12;
-/// Share of the median speed below which a sample tells nothing of a wave: it is at rest.
+/// Share of the median speed below which a sample is at rest and shows no wave.
 const AT_REST: f64 = 0.1;
-/// Natural logarithm of one over the probability that the loudest of all orders is as loud by chance, in white noise.
+/// Negative natural logarithm of the probability that white noise causes the largest of all orders.
 const BEYOND_CHANCE: f64 = 7.0;
 
-/// Orders of a joint that stand out.
+/// Significant orders of a joint.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Orders {
-    /// Waves in a turn of the motor, whole numbers, loudest first.
+    /// Waves per motor turn, whole numbers, largest first.
     pub(super) loud: Vec<f64>,
-    /// How many were looked at.
+    /// Number of tested orders.
     pub(super) scanned: usize,
 }
 
-/// A sample of a joint that moves: the angle in rad and the torque less what is slow.
+/// A sample of a moving joint: angle in rad and torque minus its slow part.
 type Sample = (f64, f64);
 
 impl Orders {
-    /// Those above `beyond` of a joint whose motor turns `ratio` times as far as it does.
+    /// Finds orders above `beyond`; the joint's motor turns `ratio` times as far as the joint.
     pub(super) fn of(runs: &[Run], joint: usize, ratio: f64, beyond: usize) -> Self {
         let Some(speed) = median_speed(runs, joint) else {
             return Self::default();
@@ -47,7 +47,7 @@ impl Orders {
         }
         let mut samples: Vec<Sample> = Vec::new();
         for run in runs {
-            // As long as the longest of the waves.
+            // The length of the longest wave.
             let window = (TAU / (per_sample(run) * beyond as f64)).ceil() as usize;
             samples.extend(moving(run, joint, ratio, AT_REST * speed, window));
         }
@@ -58,7 +58,7 @@ impl Orders {
         });
         let power = spectrum(&samples, beyond + 1, most);
         Self {
-            // Over a part of a turn neighbouring orders are alike.
+            // Over part of a turn neighbouring orders are similar.
             loud: peaks(&power, (2.0 * TAU / (high - low)).ceil().max(1.0) as usize)
                 .into_iter()
                 .map(|k| (beyond + 1 + k) as f64)
@@ -68,13 +68,13 @@ impl Orders {
     }
 }
 
-/// The speed that half of the samples of a joint exceed; none where it stands.
+/// Returns the median speed of a joint; `None` if it stands.
 fn median_speed(runs: &[Run], joint: usize) -> Option<f64> {
     let speeds = (runs.iter()).flat_map(|run| run.joints[joint].qd.iter().map(|v| v.abs()));
     median(speeds.collect())
 }
 
-/// What half of the values exceed; none where that is nothing.
+/// Returns the median; `None` if it is not positive.
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (values.len() > 1)
@@ -82,7 +82,7 @@ pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
         .filter(|value| *value > 0.0)
 }
 
-/// Samples of a run at more than a speed, the torque less its mean over a window.
+/// Returns samples of a run above a speed, with the torque minus its mean over a window.
 fn moving(run: &Run, joint: usize, ratio: f64, least: f64, window: usize) -> Vec<Sample> {
     let own = &run.joints[joint];
     let torque = own.recorded();
@@ -103,7 +103,7 @@ fn moving(run: &Run, joint: usize, ratio: f64, least: f64, window: usize) -> Vec
         .collect()
 }
 
-/// Power of the orders from `first` to `last` in samples.
+/// Returns the power of the orders from `first` to `last` in samples.
 pub(super) fn spectrum(samples: &[Sample], first: usize, last: usize) -> Vec<f64> {
     let mut sums = vec![[0.0; 2]; last + 1 - first];
     for (angle, torque) in samples {
@@ -118,7 +118,7 @@ pub(super) fn spectrum(samples: &[Sample], first: usize, last: usize) -> Vec<f64
     sums.iter().map(|[a, b]| a * a + b * b).collect()
 }
 
-/// Places of the maxima that no noise makes, loudest first, at least `apart` from each other.
+/// Returns the places of maxima above white noise, largest first, at least `apart` from each other.
 fn peaks(power: &[f64], apart: usize) -> Vec<usize> {
     let mut sorted = power.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,11 +1,11 @@
-//! A mass on the last link, from what it does to all joints.
+//! Mass on the last link, from its effect on all joints.
 //!
-//! A point mass m at the place p of the last link's frame adds m·(1, p, −[p]×²) to the link's inertial parameters, and so moves base
-//! parameters of every joint that carries it, all in ratios that p gives (Khalil, Gautier & Lemoine 2007, "Identification of the
-//! payload inertial parameters of industrial manipulators"). Mass and place are fitted to the torque that the description as it
-//! stands leaves.
+//! A point mass m at p in the last link's frame adds m·(1, p, −[p]×²) to the link's inertial parameters. It changes
+//! base parameters of every joint that carries it, in ratios given by p: Khalil, Gautier & Lemoine 2007,
+//! "Identification of the payload inertial parameters of industrial manipulators". Mass and place are fitted to the
+//! residual of the description without a refit.
 //!
-//! Leaves out: the payload's inertia about its own centre of mass, and what was wrong with the description before it.
+//! Leaves out: the payload's inertia about its own centre of mass; other errors of the description.
 
 use std::collections::BTreeMap;
 
@@ -23,16 +23,16 @@ use rig_identify::independent_columns;
 use rig_model::robot::{Inertial, JointKind, Robot};
 use rig_output::{format_significant, format_value};
 
-/// Rounds of the fit; each takes the place from the one before, and the place settles within three or four.
+/// Most rounds of the fit; each starts at the last place, which converges in three or four.
 const ROUNDS: usize = 12;
-/// Change of the place, m, from which on it has settled.
+/// Change of the place, m, below which it has converged.
 const SETTLED: f64 = 1e-6;
-/// Share of a column that has to be left beside the others for the motion to tell its parameter.
+/// Share of a column that must be independent of the others for its parameter to be identifiable.
 const TOLD: f64 = 1e-3;
-/// Nearest and farthest place of a payload, m: a mass on a link lies within some metres of its axis, and on it adds no inertia.
+/// Range of a payload's distance, m: a link's mass is within some metres of its axis, and adds no inertia on it.
 const NEAREST: f64 = 0.01;
 const FARTHEST: f64 = 3.0;
-/// Share of the largest torque that a payload makes at a joint, from which on the joint is told.
+/// Torque at a joint, as a share of the payload's largest, above which the report names the joint.
 const SHOWN: f64 = 0.02;
 /// Names of a place's coordinates.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -41,14 +41,14 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 pub(super) struct Load {
     /// kg
     pub(super) mass: Value,
-    /// m, in the last link's frame as its file has it; none of a coordinate that the motion does not tell.
+    /// m, in the last link's frame as in its file; `None` for a coordinate that is not identifiable.
     place: [Option<Value>; 3],
-    /// RMS of the torque that it makes, by joint.
+    /// RMS torque of the load, by joint.
     torque: Vec<f64>,
 }
 
 impl Load {
-    /// As an effect's.
+    /// Returns mass and place as parameters of an effect.
     pub(super) fn parameters(&self) -> BTreeMap<String, Value> {
         let told = AXES.iter().zip(&self.place);
         told.filter_map(|(axis, value)| Some(((*axis).to_owned(), value.clone()?)))
@@ -56,7 +56,7 @@ impl Load {
             .collect()
     }
 
-    /// What it is, where, and which joints show it.
+    /// Returns a sentence: mass, place and the joints that show them.
     pub(super) fn words(&self, robot: &Robot) -> String {
         let last = robot.joints.last().map_or("", |joint| joint.name.as_str());
         let at: Vec<String> = (AXES.iter().zip(&self.place))
@@ -94,15 +94,15 @@ fn value(value: f64, std: f64, unit: &str) -> Value {
     }
 }
 
-/// Inertial parameters of one kilogram at a place of the last link's own frame, and their derivatives with respect to its first
-/// moment along that frame's axes, kg·m; the parameters in the frame of the last joint.
+/// Returns inertial parameters of one kilogram at a place of the last link's own frame. Adds their derivatives by its
+/// first moment along that frame's axes, kg·m. The parameters are in the frame of the last joint.
 fn kilogram(place: Vector3<f64>, link: &Isometry3<f64>) -> [[f64; 10]; 4] {
     let p = (link * Point3::from(place)).coords;
     let point = |at: Vector3<f64>| Inertial::point(at.into()).parameters();
     let along = |axis: usize| {
         let unit = link.rotation * Vector3::ith(axis, 1.0);
         let [both, one, other] = [p + unit, p, unit].map(point);
-        // Inertia is quadratic in the place: its slope is what both together have beyond each.
+        // Inertia is quadratic in the place: its slope is the value at the sum minus both single values.
         std::array::from_fn(|k| match k {
             0 => 0.0,
             1..=3 => unit[k - 1],
@@ -112,7 +112,7 @@ fn kilogram(place: Vector3<f64>, link: &Isometry3<f64>) -> [[f64; 10]; 4] {
     [point(p), along(0), along(1), along(2)]
 }
 
-/// The torque of a change of the last link's inertial parameters.
+/// Returns the torque of a change of the last link's inertial parameters.
 fn column_of(bench: &Bench, rows: &Rows, change: &[f64; 10]) -> Column {
     let base = &bench.nominal.base;
     let first = (bench.robot.joints.len() - 1) * COLUMNS;
@@ -124,8 +124,8 @@ fn column_of(bench: &Bench, rows: &Rows, change: &[f64; 10]) -> Column {
     combined(rows.joints(), terms.filter(|(_, factor)| *factor != 0.0))
 }
 
-/// Mass and place of a payload on the last link of several that explains best what the description leaves, `frozen`, and what that
-/// explains; none where the motion does not tell a mass.
+/// Fits mass and place of a payload on the last of several links to the description's residual `frozen`. Returns them
+/// with their evidence; `None` if the mass is not identifiable.
 pub(super) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(Load, Evidence)> {
     let n = bench.robot.joints.len();
     if n < 2 {
@@ -188,7 +188,7 @@ pub(super) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
     None
 }
 
-/// What coefficients of these columns would be off by where each joint's described torque is off by [`LINK`].
+/// Returns the error of these columns' coefficients if each joint's described torque is wrong by [`LINK`].
 fn systematic(bench: &Bench, rows: &Rows, frozen: &Fit, columns: &[Vec<f64>]) -> Option<Vec<f64>> {
     let size = columns.len();
     let gram = DMatrix::from_fn(size, size, |r, c| dot(&columns[r], &columns[c])).cholesky()?;
@@ -209,8 +209,8 @@ fn systematic(bench: &Bench, rows: &Rows, frozen: &Fit, columns: &[Vec<f64>]) ->
     Some(squares.into_iter().map(f64::sqrt).collect())
 }
 
-/// Mass and distance of a payload on a single link that changes gravity and inertia by a share of `least` at least, and the free
-/// directions that it moves.
+/// Returns mass and distance of a payload on a single link, and the free directions that it changes. `None` unless
+/// gravity and inertia change by a share of `least` or more.
 pub(super) fn on_single_link(
     bench: &Bench,
     after: &Solution,

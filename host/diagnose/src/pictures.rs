@@ -1,4 +1,4 @@
-//! Pictures of a diagnosis: the residual over the coordinate that gives an effect away, and curves over time.
+//! Pictures of a diagnosis: residuals over the coordinate that shows an effect, and curves over time.
 
 use rig_shared::effects::Kind;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -19,7 +19,7 @@ const STRETCH: f64 = 4.0;
 /// Most points of one curve.
 const MOST_POINTS: usize = 2000;
 
-/// Residual maps: one a step, and one a joint of what is left.
+/// Returns residual maps: one per step, and one per joint for the final residual.
 pub(super) fn maps(found: &Found) -> Vec<Map> {
     let rows = found.rows;
     let joints = &found.robot.joints;
@@ -50,13 +50,13 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
             found.floors[j],
             found.seed,
         );
-        // What goes with nothing is drawn over the first, the velocity.
+        // A residual without a dependence is drawn over the first coordinate, the velocity.
         let most = places.first().map(|p| p.coordinate.clone());
         let coordinate = (all.iter())
             .find(|c| Some(&c.name) == most.as_ref())
             .or(all.first());
         list.extend(coordinate.map(|c| Map {
-            // Without a step its law would be the sum of all.
+            // Without a step, the law would be the sum of all effects.
             law: Vec::new(),
             ..map(rows, c, [&first, &last], j).of(joint)
         }));
@@ -65,7 +65,7 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
 }
 
 impl Map {
-    /// Of the torque of a joint.
+    /// Adds the name and torque unit of a joint.
     fn of(self, joint: &Joint) -> Self {
         Self {
             joint: joint.name.clone(),
@@ -75,7 +75,7 @@ impl Map {
     }
 }
 
-/// The coordinate over which an effect shows.
+/// Returns the coordinate that shows an effect.
 fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Coordinate> {
     let Candidate {
         kind, joint, other, ..
@@ -126,8 +126,8 @@ fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Co
     all.iter().find(|c| c.name == name).cloned()
 }
 
-/// Mean residuals of a joint over a coordinate, name and unit left empty; what lies between them is the law as far as the rest of the model does not
-/// take it up.
+/// Computes mean residuals of a joint over a coordinate; the joint's name and unit stay empty. Their difference is the
+/// law, except for the part that other parameters compensate.
 pub(super) fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize) -> Map {
     let (place, edges) = bins(&over.values, &rows.keep[joint], BINS);
     let group = told_apart(&edges);
@@ -157,12 +157,12 @@ pub(super) fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize)
     map
 }
 
-/// Narrowest bin that is drawn by itself, as a share of the mean width and of its distance from zero. Where a joint is driven at
-/// one speed for long, that speed varies by noise, and so does the torque of the controller that hears it: narrower bins would draw
-/// how the two go together, which is no law of the joint.
+/// Narrowest bin that is drawn by itself, as a share of the mean width and of its distance from zero. At a constant
+/// commanded speed, noise changes the speed and, through the controller, the torque. Narrower bins would show that
+/// correlation, which is no law of the joint.
 const NARROWEST: [f64; 2] = [0.2, 0.1];
 
-/// Numbers of bins, the same for neighbours that are too narrow to be drawn by themselves.
+/// Returns the numbers of bins; neighbours that are too narrow share one.
 fn told_apart(edges: &[f64]) -> Vec<usize> {
     let mean = (edges[edges.len() - 1] - edges[0]) / (edges.len() - 1) as f64;
     let wide = |low: f64, high: f64| {
@@ -182,8 +182,8 @@ fn told_apart(edges: &[f64]) -> Vec<usize> {
     list
 }
 
-/// Mean of each bin and half the width of its 95 % interval from the spread between blocks; none where fewer than two
-/// blocks have rows in it.
+/// Returns the mean of each bin and half the width of its 95 % interval from the spread between blocks. `None` if fewer
+/// than two blocks have rows in it.
 fn means(place: &[Option<usize>], residual: &[f64], block: &[usize]) -> Vec<Option<[f64; 2]>> {
     let blocks = block.iter().max().map_or(0, |b| b + 1);
     let mut sums = vec![vec![[0.0; 2]; BINS]; blocks];
@@ -212,8 +212,8 @@ fn means(place: &[Option<usize>], residual: &[f64], block: &[usize]) -> Vec<Opti
         .collect()
 }
 
-/// For each joint with an effect (else the one that leaves the most over its floor) the stretch of a recording where the
-/// effects change the prediction most.
+/// Returns, for each joint with an effect, the stretch of a recording where effects change the prediction most. Without
+/// effects it uses the joint with the largest residual over its floor.
 pub(super) fn curves(found: &Found) -> Vec<Curves> {
     let mut joints: Vec<usize> = found.found().iter().map(|p| p.candidate.joint).collect();
     joints.sort_unstable();
@@ -234,7 +234,7 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let [without, with] = [0, 1].map(|k| &drawn.left[k][joint]);
     let length = ((STRETCH / rows.period).ceil() as usize).max(2);
     let keep = &rows.keep[joint];
-    // Without effects both are the same: where the model misses most.
+    // Without effects both are the same: the largest residual counts.
     let weight = |k: usize| {
         if !keep[k] {
             0.0
@@ -272,7 +272,7 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let picked: Vec<usize> = (from..to).step_by(step).collect();
     let start = rows.starts[r];
     let measured: Vec<f64> = picked.iter().map(|k| torque[k - start]).collect();
-    // Rows that are not used, where the joint stands or is at its limit, stay open.
+    // Unused rows, at standstill or at a limit, stay empty.
     let predicted = |left: &[f64]| -> Vec<f64> {
         let pairs = picked.iter().zip(&measured);
         pairs

@@ -1,9 +1,9 @@
-//! Torque that is in the reading of the positions alone: a position that is read in steps is off by up to half of one, or has noise, and
-//! its second derivative by more than any noise of the current. What the steps make comes back with the motion, so that two runs of it
-//! do not tell.
+//! Torque error from reading the positions. A position has an error of up to half an encoder step, or noise. In the
+//! second derivative this error exceeds any noise of the current. Errors from steps repeat with the motion, so two runs
+//! of it do not show them.
 //!
-//! Leaves out: steps that are not even; noise that is not white, or that a recorder has filtered, which is not told from the motion;
-//! what a controller makes of them, which moves the joint and is in both.
+//! Leaves out: uneven steps; noise that is not white or that a recorder filtered, which cannot be separated from the
+//! motion; the controller's response to both, which moves the joint.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -16,14 +16,14 @@ use super::rows::Rows;
 use rig_data::prepare::{LowPass, central_difference, second_difference};
 use rig_data::runs::{Run, resolution};
 
-/// Of the noise that a position is read with once more.
+/// Seed of the noise that is added to a position.
 const SEED: u64 = 1;
 
-/// Variance of a position's noise by differences of the fifth order over that by those of the fourth, between which it counts as white:
-/// of white noise they are equal. Less has a reading that was filtered, more one whose noise rises with the frequency.
+/// Ratio of position noise variances from fifth- and fourth-order differences in which the noise counts as white. White
+/// noise gives 1. Filtered readings give less, noise that rises with the frequency more.
 const WHITE: std::ops::Range<f64> = 0.96..1.04;
 
-/// What a position's reading has beside the motion.
+/// Error of a position reading.
 #[derive(Clone, Copy)]
 enum Reading {
     /// Counts of this size, rad or m.
@@ -33,7 +33,7 @@ enum Reading {
 }
 
 impl Reading {
-    /// That of a joint; none of one that is neither in steps nor white. White noise above that of the steps holds theirs.
+    /// Returns a joint's reading error; `None` without steps and white noise. White noise above the steps' includes it.
     fn of(run: &Run, joint: usize) -> Option<Self> {
         let step = resolution(std::slice::from_ref(run), joint);
         match white(&run.joints[joint].q_raw) {
@@ -43,8 +43,8 @@ impl Reading {
     }
 }
 
-/// Standard deviation of white noise of a position; none where it is not white. A motion leaves less in differences of the fourth
-/// and fifth order than in lower ones.
+/// Returns the standard deviation of white position noise; `None` if it is not white. A motion contributes less to
+/// fourth- and fifth-order differences than to lower ones.
 fn white(position: &[f64]) -> Option<f64> {
     let differences = |x: &[f64]| -> Vec<f64> { x.windows(2).map(|w| w[1] - w[0]).collect() };
     let square = |x: &[f64]| x.iter().map(|d| d * d).sum::<f64>() / x.len().max(1) as f64;
@@ -59,16 +59,16 @@ fn white(position: &[f64]) -> Option<f64> {
         .then(|| variances[1].sqrt())
 }
 
-/// RMS that the reading of the positions leaves in each joint's torque, N·m or N.
+/// RMS torque error of each joint from position readings, N·m or N.
 pub(super) struct PositionReading {
-    /// By the steps of encoders, which comes back with the motion.
+    /// From encoder steps; it repeats with the motion.
     pub(super) steps: Vec<f64>,
-    /// By white noise, which does not.
+    /// From white noise; it does not repeat.
     pub(super) noise: Vec<f64>,
 }
 
 impl PositionReading {
-    /// By white noise alone, or by nothing.
+    /// Returns the error of white noise alone.
     pub(super) fn of_noise(noise: Vec<f64>) -> Self {
         Self {
             steps: vec![0.0; noise.len()],
@@ -76,8 +76,8 @@ impl PositionReading {
         }
     }
 
-    /// On the rows of the first run: the filtered motion read once more in the steps, half a step away, or with the noise of the
-    /// positions, and filtered as it was. What its velocity then says of the direction of friction is in it.
+    /// Computes both on the rows of the first run. The filtered motion is read again with steps, half a step away, or
+    /// with noise, and filtered again. The effect on the direction of friction is included.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -102,13 +102,13 @@ impl PositionReading {
         })
     }
 
-    /// By both, of one joint.
+    /// Returns both combined, for one joint.
     pub(super) fn whole(&self, joint: usize) -> f64 {
         self.steps[joint].hypot(self.noise[joint])
     }
 }
 
-/// What such readings leave in each joint's torque.
+/// Returns the torque error of such readings, joint by joint.
 fn left(
     source: &Source,
     rows: &Rows,
@@ -118,7 +118,7 @@ fn left(
     let (Some(run), true) = (source.runs.first(), readings.iter().any(Option::is_some)) else {
         return Ok(vec![0.0; readings.len()]);
     };
-    // The motion passes the filter twice either way: what that takes off it is not of the reading.
+    // Both motions pass the filter twice, so its loss does not count as a reading error.
     let filtered = |read: &mut dyn FnMut(f64, Reading) -> f64| {
         let mut again = run.clone();
         for (own, reading) in again.joints.iter_mut().zip(readings) {
@@ -139,7 +139,7 @@ fn left(
             q + std * unit
         }
     });
-    // The source's own prediction may hold effects.
+    // The source's own prediction may include effects.
     let [before, after] =
         [&smooth, &read].map(|run| predict(source.nominal, source.robot, &source.values, run));
     let (before, after) = (before?, after?);
@@ -158,7 +158,7 @@ fn left(
 mod tests {
     use super::*;
 
-    /// Noise of 10 µrad beside motions that second differences tell from nothing; a count in its place, and a filtered noise.
+    /// Finds noise of 10 µrad beside a motion; filtered noise is not white.
     #[test]
     fn noise_of_a_position_is_told_from_its_motion() {
         let mut random = rand_pcg::Pcg64::seed_from_u64(3);

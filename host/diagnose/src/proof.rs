@@ -1,8 +1,8 @@
-//! Whether the model that is written explains the torque: what it leaves of data that it was not fitted to, against a noise floor
-//! that no model made.
+//! Test of the written model: its residual on data that it was not fitted to, against a noise floor that no model
+//! determined.
 //!
-//! A floor that is the residual of the last model proves every last model. Where no such floor is known, only a fall of the residual
-//! by [`NEARLY_ALL`] itself shows that nearly all is explained: whatever the noise, the gap above it is then closed at least as far.
+//! A floor from the last model's residual would confirm any last model. Without an independent floor, only a fall of
+//! the residual by [`NEARLY_ALL`] itself is a proof: for any noise, the gap above it is then closed at least as far.
 
 use super::DiagnoseError;
 use super::bench::Loaded;
@@ -16,29 +16,29 @@ use super::search::with;
 use rig_model::robot::{Joint, Robot};
 use rig_output::{format_significant, format_unit};
 
-/// Least share of the gap between the refitted description and the noise floor, in RMS, that effects have to close for a joint to
-/// count as explained. 0.9: on 15 emulated rigs with one effect each (`rig benchmark --seeds 1 --first-seed 4300`, 26 November 2026)
-/// right names closed 0.921 (play) to 1; the emulated rig without slow reversals, and so without the name of its presliding, 0.58.
+/// Least share of the gap between refitted description and noise floor, in RMS, that effects must close to explain a
+/// joint. 0.9: on 15 emulated rigs with one effect each (`rig benchmark --seeds 1 --first-seed 4300`, 26 November 2026)
+/// right names closed 0.921 (backlash) to 1. The rig without slow reversals, and so without presliding, closed 0.58.
 pub(super) const NEARLY_ALL: f64 = 0.9;
 
-/// What the written model is judged by.
+/// Models and data of the test.
 pub(super) struct Proof<'a, 'r> {
-    /// As it was given.
+    /// Robot as given.
     pub(super) robot: &'a Robot,
-    /// Its models with effects.
+    /// Models of the robot with effects.
     pub(super) fitting: &'a Fitting<'a, 'r>,
     /// The nominal model on the training data.
     pub(super) base: &'a Fit<'r>,
     /// The training data.
     pub(super) loaded: &'a Loaded,
-    /// Those held back.
+    /// The hold-out.
     pub(super) sealed: Option<&'a Loaded>,
-    /// The residual from model to model.
+    /// RMS residual, model by model.
     pub(super) descent: &'a Descent,
 }
 
 impl Proof<'_, '_> {
-    /// What the written model leaves, joint by joint; the first `described` of the effects are the description's.
+    /// Returns the residual of the written model, joint by joint; the first `described` effects are described ones.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -84,9 +84,9 @@ impl Proof<'_, '_> {
     }
 }
 
-/// Whether the RMS `after` is noise, or nearly all of the gap between `before` and the floor is closed. `treated` are squares that
-/// neither noise nor a missing effect leaves. A joint without a name, whose gap nothing closes, is compared with a floor from repeated
-/// runs elsewhere, and with a lower limit of it not at all.
+/// Returns true if the RMS `after` is at the noise floor, or nearly all of the gap between `before` and the floor is
+/// closed. `treated` is a mean square that is neither noise nor a missing effect. A joint without a found effect passes
+/// with any known floor: repeated runs are compared elsewhere, a lower limit not at all.
 fn explained(
     [before, after]: [f64; 2],
     floor: f64,
@@ -105,7 +105,7 @@ fn explained(
         }
 }
 
-/// RMS of a joint's torque as recorded.
+/// Returns the RMS of a joint's recorded torque.
 fn torque_of(data: &Loaded, joint: usize) -> f64 {
     let (mut squares, mut count) = (0.0, 0_usize);
     for run in &data.runs {
@@ -116,8 +116,8 @@ fn torque_of(data: &Loaded, joint: usize) -> f64 {
     (squares / count.max(1) as f64).sqrt()
 }
 
-/// The remainder of the joint whose residual is the largest share of its torque among those that are not explained; none where all
-/// are.
+/// Returns the remainder of the unexplained joint with the largest residual relative to its torque; `None` if all are
+/// explained.
 pub(super) fn unexplained(left: &[Left], named: &dyn Fn(&str) -> bool) -> Option<Remainder> {
     let worst = (left.iter().filter(|left| !left.explained))
         .max_by(|a, b| a.percent_of_torque.total_cmp(&b.percent_of_torque))?;
@@ -167,7 +167,7 @@ pub(super) fn unexplained(left: &[Left], named: &dyn Fn(&str) -> bool) -> Option
     })
 }
 
-/// What a joint was judged on.
+/// Returns the data that a joint was judged on.
 pub(super) fn data_of(left: &Left) -> &'static str {
     match left.on_holdout {
         true => "the hold-out",
@@ -175,7 +175,7 @@ pub(super) fn data_of(left: &Left) -> &'static str {
     }
 }
 
-/// How much the written model leaves of each joint's torque, a sentence.
+/// Returns a sentence on the residual of each joint's torque.
 pub(super) fn sizes(left: &[Left]) -> Option<String> {
     let first = left.first()?;
     let of = |l: &Left| {
@@ -197,7 +197,7 @@ pub(super) fn sizes(left: &[Left]) -> Option<String> {
     ))
 }
 
-/// The noise floor of a joint's torque in the residual's rows that its own reading shows, or none.
+/// Returns the noise floor of a joint's torque from its own reading, in the residual's rows.
 pub(super) fn of_torque(runs: &[rig_data::runs::Run], joint: usize, period: f64) -> Option<f64> {
     floor::of_reading(runs, joint, period).or_else(|| floor::beyond_band(runs, joint, period))
 }

@@ -1,30 +1,29 @@
-//! What pulls on a joint from outside the rig: hoses, cables, springs. With all of it taken off, what they give is gone, and
-//! what the rig gives itself stays.
+//! External loads on a joint: hoses, cables, springs. Without them their torque is gone, and the rig's own stays.
 //!
-//! Leaves out: the weight of what is taken off, which may look like a spring; what is taken off in part, of which the rest looks
-//! like the rig's own.
+//! Leaves out: the weight of removed parts, which may look like a spring; partly removed loads, whose rest looks like
+//! the rig's own.
 
 use rig_shared::effects::Kind;
 
 use super::floor;
 use rig_data::runs::Run;
 
-/// Stretches whose means tell how well a mean is known, s.
+/// Length of stretches whose means give the uncertainty of a mean, s.
 const STRETCH: f64 = 1.0;
 
-/// Whether an effect does nothing during a run.
+/// Returns true if an effect is absent during a run.
 pub(super) fn is_gone(kind: Kind, run: &Run) -> bool {
     run.unburdened && kind.is_external()
 }
 
-/// Whether the runs show what comes from outside and what does not: some with it, some without.
+/// Returns true if some runs have external loads and some have none.
 pub(super) fn told_apart(runs: &[Run]) -> bool {
     runs.iter().any(|run| run.unburdened) && runs.iter().any(|run| !run.unburdened)
 }
 
-/// How much more is left of a joint on average in the runs with nothing that pulls on it than in the others, and its standard
-/// deviation; none where there are not enough of both. Rows are `period` s apart, those of each run begin at its entry of
-/// `starts`, which ends one past the last, and `keep` says which are used.
+/// Returns the mean residual of a joint without external loads minus that with them, and its standard deviation. `None`
+/// if either has too few rows. Rows are `period` s apart and begin at each run's entry of `starts`, which ends one past
+/// the last. `keep` marks the used rows.
 pub(super) fn step(
     residual: &[f64],
     keep: &[bool],
@@ -60,7 +59,7 @@ mod tests {
     use rig_excite::TrajectoryFile;
     use rig_scenario::{Effect, Made, Scenario};
 
-    /// The rig with and without what pulls on it, which moves as proposed.
+    /// Diagnoses a rig with and without external loads on the proposed motion.
     fn separated(effects: &[Effect], seed: u64) -> (Diagnosis, Diagnosis, Made) {
         let scenario = Scenario::short(effects.iter().copied(), seed);
         let mut made: Made = scenario.make().unwrap();
@@ -79,7 +78,7 @@ mod tests {
         (diagnosis.steps.iter()).map(|s| s.set.clone()).collect()
     }
 
-    /// No motion of the rig as it stands tells friction that differs with the direction from a torque from outside.
+    /// The loaded rig cannot separate friction that differs with the direction from an external torque.
     #[test]
     fn a_torque_from_outside_is_told_from_the_rig_s_own_once_it_is_taken_off() {
         let torque = Effect::TorqueOffset { torque: 0.12 };
@@ -94,7 +93,7 @@ mod tests {
             assert!(both.iter().all(|n| set.iter().any(|s| s == n)), "{set:?}");
             assert_eq!(sets(&after), [[name]], "{name}");
         }
-        // As it stands they are one constant, of which half is gone.
+        // With loads they are one constant; half of it disappears without them.
         let (before, after, _) = separated(&[torque, friction], 43);
         assert_eq!(before.steps.len(), 1);
         let mut names: Vec<_> = after.steps.iter().map(|s| s.effect.as_str()).collect();
@@ -105,7 +104,7 @@ mod tests {
         assert!((value - 0.12).abs() < 0.012, "{value}");
     }
 
-    /// An identification states the constant as the joint's own, whosever it is.
+    /// An identification describes the constant as the joint's own, whatever its cause.
     #[test]
     fn a_stated_constant_is_not_held_where_the_recordings_tell_what_of_it_comes_from_outside() {
         let torque = Effect::TorqueOffset { torque: 0.12 };
@@ -119,7 +118,7 @@ mod tests {
         assert!(left.abs() < 0.2 * value.abs(), "{left} of {value}");
     }
 
-    /// What is there only once everything is taken off was not taken off.
+    /// A torque that appears only without loads shows exchanged recordings.
     #[test]
     fn recordings_in_each_other_s_place_are_a_remainder_that_says_so() {
         let (.., made) = separated(&[Effect::TorqueOffset { torque: 0.12 }], 45);

@@ -1,10 +1,10 @@
-//! What happened in one of two runs of a motion and not in the other: a touch, a knock, a zero that has moved.
+//! Disturbances in only one of two runs of a motion: contact, an impact, a moved zero.
 //!
-//! What differs between two runs is noise as far as any model goes. But a few short stretches that hold most of it are an
-//! event, and would drown all else: they are left out of both, and said to be.
+//! The difference of two runs is noise for any model. A few short stretches with most of it are an event and would hide
+//! all else. They are excluded from both runs and reported.
 //!
-//! Leaves out: events in both runs at the same place of the motion, which are of the rig; events that last; what touches a joint in a
-//! rest that is asked for, where friction holds what it may.
+//! Leaves out: events in both runs at the same place of the motion, which belong to the rig; lasting events; contact in
+//! a commanded dwell, where friction may hold the joint.
 
 use std::ops::Range;
 
@@ -16,13 +16,13 @@ use rig_data::runs::Run;
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 
-/// Left out on either side of a loud stretch, s: what a filter carries beyond it.
+/// Time that is excluded on either side of a disturbance, s: the reach of a filter.
 const BESIDE: f64 = 0.25;
 
-/// Least time that a joint has to stand for to be at rest, s; in a reversal it stands for less.
+/// Least duration of a standstill, s; a reversal is shorter.
 const LASTING: f64 = 0.3;
 
-/// Rows in which a joint stands, of those that are used or not.
+/// Marks rows in which a joint stands: unused for at least [`LASTING`].
 fn lasting(keep: &[bool], period: f64) -> Vec<bool> {
     keep.chunk_by(|a, b| a == b)
         .flat_map(|part| {
@@ -32,7 +32,7 @@ fn lasting(keep: &[bool], period: f64) -> Vec<bool> {
         .collect()
 }
 
-/// Rows of a run's first `length` at which its reference moves; all where it has none.
+/// Marks a run's first `length` rows in which its reference moves; all without a reference.
 fn asked(run: &Run, joint: usize, rows: &Rows, length: usize) -> Vec<bool> {
     let period = rows.period;
     let own = run.joints[joint].reference.as_ref();
@@ -48,12 +48,12 @@ fn asked(run: &Run, joint: usize, rows: &Rows, length: usize) -> Vec<bool> {
         .collect()
 }
 
-/// Marks in runs of one motion what is to be left out of them; sentences on that, none where nothing is. `residuals` are what the
-/// refitted model leaves of each joint on their rows.
+/// Excludes disturbances from runs of one motion and returns sentences on them. `residuals` are those of the refitted
+/// model, joint by joint.
 pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded) -> Vec<String> {
     let rows = &loaded.rows;
     let mut told = Vec::new();
-    // Rows of a run from its first on.
+    // Run, and rows counted from its first.
     let mut out: Vec<(usize, Range<usize>)> = Vec::new();
     for (a, b) in floor::repeats(&loaded.runs) {
         for (j, joint) in robot.joints.iter().enumerate() {
@@ -66,7 +66,7 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
                 let mut rows = (out.iter()).filter(|(known, _)| *known == run);
                 rows.any(|(_, part)| part.contains(&row))
             };
-            // Where both come to rest a little earlier or later makes them differ, and is no touch.
+            // Runs that come to rest at slightly different times differ without a disturbance.
             let resting =
                 starts.map(|start| lasting(&rows.keep[j][start..start + length], rows.period));
             let asked = asked(&loaded.runs[a], j, rows, length);
@@ -76,7 +76,7 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
             for k in 0..length {
                 let [x, y] = starts.map(|start| start + k);
                 let rests = resting.iter().all(|rests| rests[near(k)].contains(&true));
-                // In a rest that is asked for each comes to stand on another side of its friction.
+                // In a commanded dwell, each run may stop on another side of its friction.
                 let at_rest = rests || commanded[near(k)].contains(&true);
                 let known = known(a, k) || known(b, k);
                 keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;

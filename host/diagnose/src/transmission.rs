@@ -1,12 +1,12 @@
-//! The torque of an elastic gear or of one with play, driven by the motor's measured motion.
+//! Torque of an elastic gear or of one with backlash, driven by the motor's measured motion.
 //!
-//! With the twist x = θm/ratio − q of joint j, and the load λ that the rigid gear would transmit for the motor's motion,
-//! the link's equation linearised about the motor's position is M·ẍ = λ + f − K·x − τc(x, ẋ): M the joint's own inertia
-//! without the drive, K the slope of gravity, f the share of the friction that acts on the link, which sticks (Moreau's
-//! time stepping), τc what spring, damping and play transmit. The drive's torque then differs from the rigid model's by
-//! τc − λ − f(θ̇m/ratio). Play only pushes: [`transmitted`] has the law.
+//! x = θm/ratio − q is the twist of joint j; λ is the load that a rigid gear would transmit for the motor's motion. The
+//! link's equation, linearised about the motor's position, is M·ẍ = λ + f − K·x − τc(x, ẋ). M is the joint's own
+//! inertia without the drive and K the slope of gravity. f is the share of friction on the link, which sticks (Moreau's
+//! time stepping). τc is the torque of spring, damping and backlash. The drive's torque then differs from the rigid
+//! model's by τc − λ − f(θ̇m/ratio). Contacts only push: [`transmitted`] has the law.
 //!
-//! Leaves out: what the twist of one joint does to the others.
+//! Leaves out: effects of one joint's twist on the others.
 
 use rig_shared::effects::{Kind, SHAPES, transmitted};
 use rig_shared::lanes::Lanes;
@@ -21,21 +21,21 @@ mod observer;
 
 pub(super) use observer::{STRETCH, Seen};
 
-/// Sets of shapes that go side by side.
+/// Sets of shapes that are computed side by side.
 pub(super) const ABREAST: usize = 4;
-/// Steps a sample, at least: contact begins and ends within one.
+/// Least steps per sample; contact begins and ends within one.
 const FEWEST_STEPS: usize = 4;
-/// Most steps a sample, where stiffness asks for more the column is not formed.
+/// Most steps per sample; a stiffer column is not formed.
 const MOST_STEPS: usize = 64;
-/// Step times natural frequency, at most.
+/// Upper bound of step time times natural frequency.
 const STEP: f64 = 0.2;
-/// Most twist that the load may wind up, rad: beyond it the equation, linearised about the motor's position, says nothing,
-/// and a gear so soft is none.
+/// Largest twist under load, rad. Beyond it the equation, linearised about the motor's position, is not valid, and no
+/// real gear is so soft.
 const MOST_TWIST: f64 = 0.2;
-/// Error of the position at which the slope of gravity is taken, rad.
+/// Position difference for the slope of gravity, rad.
 const NUDGE: f64 = 1e-4;
 
-/// What the twist of a joint obeys over a run.
+/// Coefficients of a joint's twist equation over a run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Driven {
     mass: Vec<f64>,
@@ -43,7 +43,7 @@ pub(super) struct Driven {
 }
 
 impl Driven {
-    /// Of joint `joint` over `run`.
+    /// Computes them for `joint` over `run`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -70,13 +70,13 @@ impl Driven {
         })
     }
 
-    /// The link's own inertia on average over the run.
+    /// Returns the link's own mean inertia over the run.
     pub(super) fn mean_mass(&self) -> f64 {
         self.mass.iter().sum::<f64>() / self.mass.len().max(1) as f64
     }
 
-    /// What the drive's torque differs by from a rigid gear's, one signal for each of the shapes; none where the link has no
-    /// inertia of its own, the contact is too stiff for the steps or the gear softer than [`MOST_TWIST`] allows.
+    /// Returns the drive torque minus that of a rigid gear, one signal per set of shapes. `None` if the link has no own
+    /// inertia, the contact is too stiff for the steps or the gear is softer than [`MOST_TWIST`] allows.
     pub(super) fn excess(
         &self,
         kind: Kind,
@@ -115,7 +115,7 @@ impl Driven {
         signals
     }
 
-    /// Steps a sample that these shapes ask for, a power of two so that several can go side by side.
+    /// Returns the steps per sample for these shapes: a power of two, so that sets can share it.
     fn steps(&self, kind: Kind, shapes: &[f64; SHAPES], of: &Load) -> Option<usize> {
         let [_, stiffness, damping] = kind.transmission(shapes)?;
         let least = self.mass.iter().copied().fold(f64::INFINITY, f64::min);
@@ -128,7 +128,7 @@ impl Driven {
         (steps <= MOST_STEPS).then(|| steps.next_power_of_two())
     }
 
-    /// The torque, one lane a set of shapes.
+    /// Returns the torque, one lane per set of shapes.
     fn driven<T: Real>(
         &self,
         kind: Kind,
@@ -144,7 +144,7 @@ impl Driven {
         Some(out)
     }
 
-    /// The torque on average from sample `k` − 1 to `k`, with the twist going on.
+    /// Returns the mean torque from sample `k` − 1 to `k` and advances the twist.
     #[inline]
     fn sample<T: Real>(&self, gear: &Gear<T>, of: &Load, k: usize, twist: &mut Twist<T>) -> T {
         let Gear {
@@ -160,7 +160,7 @@ impl Driven {
         let (from, to) = (of.load[k - 1], of.load[k]);
         let (before, after) = (of.speed[k - 1], of.speed[k]);
         let slope = number(self.slope[k]);
-        // Divisions once a sample: a step waits for the one before it, and they would be most of the wait.
+        // Divides once per sample: each step waits for the one before it, so divisions would take most of the time.
         let per_torque = number(h / self.mass[k]);
         let slides = T::ONE / (T::ONE + viscous * per_torque);
         let sticks = coulomb * per_torque;
@@ -168,11 +168,11 @@ impl Driven {
         let mut sum = T::ZERO;
         for s in 0..steps {
             let part = (s as f64 + 0.5) * per_step;
-            // Half a step of the twist, the torque in the middle, the other half: second order.
+            // Half a step of the twist, torque at the midpoint, second half: second order.
             let middle = x + half * v;
             let torque = transmitted(gap, stiffness, damping, middle, v);
             let pull = number(from + part * (to - from)) - slope * middle - torque;
-            // The link's own velocity after the step, before and after its friction.
+            // The link's own velocity after the step, without and with its friction.
             let motor = number(before + part * (after - before));
             let slid = (motor - v - per_torque * pull) * slides;
             v = motor - slid + slid.clamp_to(-sticks, sticks);
@@ -185,14 +185,14 @@ impl Driven {
     }
 }
 
-/// A gear of certain shapes.
+/// A gear with given shapes.
 #[derive(Clone, Copy, Debug)]
 struct Gear<T> {
     /// Gap, stiffness and damping, as [`transmitted`] takes them.
     law: [T; 3],
-    /// Of the joint's friction that acts on the link.
+    /// Share of the joint's friction that acts on the link.
     share: T,
-    /// Steps a sample.
+    /// Steps per sample.
     steps: usize,
 }
 
@@ -214,7 +214,7 @@ struct Twist<T> {
 }
 
 impl<T: Real> Twist<T> {
-    /// At rest on the side that a load presses to.
+    /// Returns the twist at rest against the flank that the load presses on.
     fn at_rest(gear: &Gear<T>, load: f64) -> Self {
         let number = T::from_f64;
         let [gap, stiffness, _] = gear.law;
@@ -225,11 +225,11 @@ impl<T: Real> Twist<T> {
     }
 }
 
-/// What drives the twist of a joint over a run.
+/// Inputs that drive the twist of a joint over a run.
 pub(super) struct Load<'a> {
-    /// Distance of the samples, s.
+    /// Sample period, s.
     pub(super) period: f64,
-    /// Velocity of the motor over the ratio, rad/s.
+    /// Motor velocity divided by the ratio, rad/s.
     pub(super) speed: &'a [f64],
     /// Torque that a rigid gear would transmit, N·m.
     pub(super) load: &'a [f64],

@@ -1,4 +1,4 @@
-//! How recordings were treated before anything was compared, as a report says it.
+//! Treatment of the recordings before the comparison, for a report.
 
 use super::bench::Loaded;
 use super::outcome::{Rows, Treated};
@@ -6,7 +6,7 @@ use super::rows::Rows as Regression;
 use rig_data::prepare::Treatment;
 use rig_model::robot::Robot;
 
-/// What was done to the training recordings and, where there is one, the hold-out.
+/// Returns the treatment of the training recordings and of the hold-out.
 pub(super) fn treated(robot: &Robot, training: &Loaded, holdout: Option<&Loaded>) -> Treated {
     let treatment = &training.treatment;
     let rows = &training.rows;
@@ -34,7 +34,7 @@ pub(super) fn treated(robot: &Robot, training: &Loaded, holdout: Option<&Loaded>
     }
 }
 
-/// Upper end of the rows' band, Hz: the lower of both filters'.
+/// Returns the upper end of the rows' band, Hz: the lower one of both filters.
 fn band(treatment: &Treatment) -> f64 {
     treatment.parallel_edge.min(treatment.cutoff)
 }

@@ -1,31 +1,31 @@
-//! What an interval has to hold besides noise: no law is quite the rig's, noise of the position makes inertia come out too small, and
-//! no recording says when within a sample its columns were read.
+//! Systematic uncertainty of parameters: laws are inexact, position noise reduces inertia estimates, and the instants
+//! of reading within a sample are unknown.
 //!
-//! Uncertainties of type B (JCGM 100:2008, Guide to the expression of uncertainty in measurement, 4.3) that are added in squares to
-//! what stretches of the recordings say. The shares are what emulated rigs of other laws and steps than the library's came out
-//! wrong by, on recordings whose intervals were too narrow by that; a real rig may be further off.
+//! It is an uncertainty of type B (JCGM 100:2008, Guide to the expression of uncertainty in measurement, 4.3). It is
+//! added in squares to the spread between stretches. The shares are errors on emulated rigs with other laws and steps
+//! than the library's, where intervals were too narrow by that. A real rig may deviate more.
 //!
-//! Leaves out: laws of another form than the rig's, whose parameters are not the rig's at all; a torque constant that is wrong,
-//! which scales everything alike.
+//! Leaves out: laws of another form, whose parameters are not the rig's; a wrong torque constant, which scales
+//! everything.
 
 use rig_shared::effects::{Kind, Parameter, Scale};
 
-/// Share of a value that its law is off by.
+/// Relative error of a value from its law.
 const LAW: f64 = 0.01;
-/// … of the share of friction that a gear carries beside its load: of six rigs with 0.25 it came out 0.02 off, RMS, with intervals of
-/// half as much.
+/// … of a gear's share of friction on the link: six rigs with 0.25 had an RMS error of 0.02, with intervals of half as
+/// much.
 const SHARE: f64 = 0.07;
-/// … of inertia and gravity of a link: eight rigs with nothing hidden gave inertias 0.1 to 0.4 % too small.
+/// … of inertia and gravity of a link: eight rigs without hidden effects gave inertias 0.1 to 0.4 % too small.
 pub(super) const LINK: f64 = 0.003;
 
-/// Standard deviation of a parameter with what its law is off by; `slack` is what the instants of sampling alone may make a torque
-/// late by, s. Whole numbers are exact.
+/// Returns the standard deviation of a parameter with its systematic error. `slack` is the largest torque delay from
+/// sampling instants alone, s. Whole numbers are exact.
 pub(super) fn widened(kind: Kind, parameter: &Parameter, value: f64, std: f64, slack: f64) -> f64 {
     if parameter.scale == Scale::Whole {
         return std;
     }
     let instants = match kind {
-        // Anywhere within it, none likelier than another (4.3.7).
+        // Uniformly distributed within it (4.3.7).
         Kind::MeasurementDelay => slack / 3.0_f64.sqrt(),
         _ => 0.0,
     };

@@ -1,8 +1,8 @@
-//! Waves along a joint's position: which of them a motion shows.
+//! Waves along a joint's position that a motion shows.
 //!
-//! Over less than its length a wave is a parabola, or less: offset, Coulomb friction and the wave then hold each other up, each
-//! of them far from what it is. Friction that varies with the position of a revolute joint is left out of this: it repeats with
-//! the turn by its nature, and changes its sign with the direction.
+//! Over less than its length a wave looks like a parabola, or less. It is then nearly collinear with offset and Coulomb
+//! friction, and all three are far from their true values. Position-dependent friction of a revolute joint is exempt:
+//! it repeats with the turn by its nature, and changes its sign with the direction.
 
 use core::f64::consts::TAU;
 
@@ -12,10 +12,10 @@ use super::profile::grid;
 use rig_data::runs::Run;
 use rig_model::robot::{Joint, JointKind};
 
-/// Lengths of a wave that a motion has to span before the wave is looked for: one to know it, the rest to see that it repeats.
+/// Wave lengths that a motion must span before the wave is tried: one to identify it, the rest to see it repeat.
 pub(super) const SPANNED: f64 = 1.5;
 
-/// Lowest to highest position of a joint, rad or m.
+/// Returns the position range of a joint, rad or m.
 pub(super) fn span(runs: &[Run], joint: usize) -> f64 {
     let all = || {
         (runs.iter())
@@ -28,7 +28,7 @@ pub(super) fn span(runs: &[Run], joint: usize) -> f64 {
     (high - low).max(0.0)
 }
 
-/// Whether an effect repeats with the motor's angle.
+/// Returns true if an effect repeats with the motor's angle.
 pub(super) fn is_of_the_motor(kind: Kind) -> bool {
     matches!(
         kind.periodic(),
@@ -36,17 +36,17 @@ pub(super) fn is_of_the_motor(kind: Kind) -> bool {
     )
 }
 
-/// Whether the motor's angle is known: a turn of a joint is at least one of a motor that drives it directly, a way is no turn.
+/// Returns true if the motor's angle is known. A revolute joint without a described ratio counts as driven directly.
 pub(super) fn motor_is_known(joint: &Joint) -> bool {
     ratio_is_described(joint) || joint.kind == JointKind::Revolute
 }
 
-/// Whether the description says how far the motor turns; else the angle of a revolute joint stands for its motor's.
+/// Returns true if the description has a gear ratio; else a revolute joint's angle stands for its motor's.
 pub(super) fn ratio_is_described(joint: &Joint) -> bool {
     (joint.drive.as_ref()).is_some_and(|drive| drive.gear_ratio != 0.0)
 }
 
-/// Length of the wave of an effect on a joint, rad or m; none of what is none.
+/// Returns the wave length of an effect on a joint, rad or m; `None` if it is no wave.
 fn length(kind: Kind, joint: &Joint, order: f64) -> Option<f64> {
     let ratio = if is_of_the_motor(kind) {
         joint.gear_ratio().abs()
@@ -58,13 +58,13 @@ fn length(kind: Kind, joint: &Joint, order: f64) -> Option<f64> {
     Some(TAU / (ratio * order))
 }
 
-/// Whether a motion that spans so much shows an effect with these shapes; true of all that is no wave.
+/// Returns true if a motion over `span` shows an effect with these shapes, or if it is no wave.
 pub(super) fn shown(kind: Kind, joint: &Joint, shapes: &[f64; SHAPES], span: f64) -> bool {
     length(kind, joint, shapes[0]).is_none_or(|length| span >= SPANNED * length)
         && (motor_is_known(joint) || !is_of_the_motor(kind))
 }
 
-/// The length of the shortest wave that is looked for, where a motion that spans so much shows none of them.
+/// Returns the length of the shortest tried wave if a motion over `span` shows none of them.
 pub(super) fn none_shown(kind: Kind, joint: &Joint, span: f64) -> Option<f64> {
     let points = grid(kind);
     let lengths = (points.iter()).filter_map(|shapes| length(kind, joint, shapes[0]));
@@ -122,7 +122,7 @@ mod tests {
         assert!(!shown(kind, &slide, &order(4.0), 0.25));
         assert_eq!(none_shown(kind, &slide, 0.25), Some(TAU / 4.0));
         assert!(shown(kind, &slide, &order(4.0), 3.0));
-        // Of a turn, part of it shows the rest.
+        // On a revolute joint part of a turn is enough.
         assert!(shown(kind, &joint(ONE_LINK_TEMPLATE), &order(1.0), 3.0));
         assert_eq!(none_shown(kind, &joint(ONE_LINK_TEMPLATE), 3.0), None);
     }
@@ -136,7 +136,7 @@ mod tests {
         assert!(!shown(kind, &link, &order(1.0), 3.4));
         assert!(!shown(kind, &link, &order(1.0), TAU));
         assert!(shown(kind, &link, &order(2.0), 5.0));
-        // What is no wave is not measured by it.
+        // An effect that is no wave needs no span.
         assert!(shown(Kind::Stribeck, &link, &order(0.01), 0.0));
     }
 }

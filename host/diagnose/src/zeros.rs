@@ -1,8 +1,8 @@
-//! Recordings whose positions have different zeros: gravity, and whatever else stands at a position, acts at another place in one
-//! of them. An incremental encoder is told its zero anew each time, often by eye.
+//! Recordings with different position zeros: gravity and other position-dependent effects act at another place in one
+//! of them. An incremental encoder gets a new zero each time, often by eye.
 //!
-//! Leaves out: robots of several joints, whose encoders know where they are; joints across which nothing pulls that depends on
-//! the position; zeros that drift.
+//! Leaves out: robots of several joints, whose encoders are absolute; joints without a position-dependent torque; zeros
+//! that drift.
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
@@ -18,24 +18,24 @@ use rig_data::runs::Run;
 use rig_model::robot::{Joint, JointKind};
 use rig_output::format_value;
 
-/// Least share of the RMS that another zero takes off for it to be said.
+/// Least RMS reduction by another zero for a report …
 const LEAST: f64 = 0.2;
-/// … and of what the effects take off.
+/// … and least share of the effects' RMS reduction.
 const IN_THEIR_PLACE: f64 = 0.8;
-/// Least shift that is said, rad or m: less is what a spirit level leaves.
+/// Least reported shift, rad or m: a spirit level leaves less.
 const SHIFT: f64 = 0.01;
-/// Shifts in standard deviations.
+/// Least shift in standard deviations.
 const SURE: f64 = 6.0;
 
-/// Zeros of a whole turn that are tried where a shift is no small one …
+/// Zeros over a whole turn that are tried for a large shift …
 const TURNS: u32 = 24;
-/// … and share of the RMS that one has to take off.
+/// … and least RMS reduction by one of them.
 const MOST_OF_IT: f64 = 0.5;
 
-/// What one recording's zero says.
+/// Estimated zero shift of a recording.
 struct Shift {
     label: String,
-    /// With its deviation.
+    /// Shift and its standard deviation, rad or m.
     by: [f64; 2],
     gain: f64,
 }
@@ -46,7 +46,7 @@ impl Shift {
         Self { label, by, gain }
     }
 
-    /// The one that takes more off.
+    /// Returns the shift with the larger RMS reduction.
     fn or(self, other: Option<Self>) -> Self {
         match other {
             Some(other) if other.gain >= self.gain => other,
@@ -66,8 +66,8 @@ impl Shift {
     }
 }
 
-/// That another zero of one of the recordings would do most of what the effects found do, a sentence; `base` is the refitted model
-/// on them, of whose RMS the effects take the share `taken` off.
+/// Returns a sentence if another zero of one recording would do most of what the found effects do. `base` is the
+/// refitted model; the effects reduce its RMS by the share `taken`.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -97,7 +97,7 @@ pub(super) fn another_zero(
     Ok(most.map(|shift| shift.told(joint, "the other recordings")))
 }
 
-/// The same of recordings held back, of which the model leaves `residual`.
+/// The same for a hold-out with the model's `residual`.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -119,7 +119,7 @@ pub(super) fn another_zero_held(
         let by = xy / xx;
         let left: Vec<f64> = own.iter().zip(residual).map(|(x, r)| r - by * x).collect();
         let [before, after] = [residual, &left].map(|r| floor::rms(r, keep));
-        // Noise of a row counts as independent once in ten rows at least.
+        // Counts one row in ten as independent.
         let std = after * (10.0 / xx).sqrt();
         let gain = 1.0 - after / before;
         if by.abs() > SHIFT.max(SURE * std) && gain > LEAST {
@@ -132,7 +132,7 @@ pub(super) fn another_zero_held(
     Ok(most.map(|shift| shift.told(joint, "those to learn from")))
 }
 
-/// The same for a single joint that turns, where the zero is far off.
+/// The same for a large shift of a single revolute joint.
 fn turned(
     bench: &Bench,
     sealed: &Loaded,
@@ -171,7 +171,7 @@ fn turned(
     Ok(most)
 }
 
-/// Torque per rad or m by which the joint's zero is off in one recording, or all of them.
+/// Returns the torque per rad or m of zero shift in one recording, or in all of them.
 fn shifted(source: &Source, recording: Option<usize>) -> Result<Vec<f64>, DiagnoseError> {
     let mut column = Vec::new();
     for (r, run) in source.runs.iter().enumerate() {

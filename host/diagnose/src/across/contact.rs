@@ -1,8 +1,8 @@
-//! Play by the torque that closed teeth pass: λ = K·b + D·ḃ − φ·sgn q̇ − f·q̇, with b = x − clamp(x, ±gap/2) what the two
-//! encoders read apart beyond the gap (the law of [`rig_shared::effects::transmitted`]).
+//! Backlash from the torque that closed contacts transmit: λ = K·b + D·ḃ − φ·sgn q̇ − f·q̇. b = x − clamp(x, ±gap/2) is
+//! the encoder difference beyond the gap (the law of [`rig_shared::effects::transmitted`]).
 //!
-//! The side on which the teeth touch is read off x itself, at the recording's own rate and before anything is filtered, so
-//! that impacts and the time between them, in which nothing is passed, are where they were.
+//! The flank in contact follows from x itself, at the recording's rate and unfiltered. So impacts and the times between
+//! them, without torque, keep their place.
 
 use super::equation::Equation;
 use super::law::{LEAST_SHARE, LEAST_SIGMAS, least};
@@ -14,12 +14,12 @@ use crate::simplex::Simplex;
 use crate::solve::jackknifed;
 use rig_data::prepare::central_difference;
 
-/// Gaps that the search begins with, from the least that is told to the whole of what the encoders read apart.
+/// Gaps at which the search starts, from the least resolvable to the whole encoder difference.
 const STARTS: usize = 12;
-/// Step of the difference quotients over gap and zero, by the gap.
+/// Step of the difference quotients over gap and zero, relative to the gap.
 const DIFFERENCE: f64 = 0.01;
 
-/// Play with the values of its law and their standard deviations.
+/// Backlash with the values of its law and their standard deviations.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     pub(super) gap: [f64; 2],
@@ -31,7 +31,7 @@ pub(super) struct Contact {
     pub(super) trials: usize,
 }
 
-/// The play of a joint; none where it has none. `nominal` are the coefficients of the equation's nominal columns.
+/// Fits the backlash of a joint, if it has any. `nominal` are the coefficients of the equation's nominal columns.
 pub(super) fn contact(equation: &Equation, nominal: &[f64]) -> Option<Contact> {
     let apart = equation.apart_of(nominal);
     let rows = Rows {
@@ -82,7 +82,7 @@ pub(super) fn contact(equation: &Equation, nominal: &[f64]) -> Option<Contact> {
             .and_then(|b| plain.explained(&b, &bounds));
         explained.map_or(0.0, |(share, _)| share)
     };
-    // From the least gap that is told to all that x goes through.
+    // From the least resolvable gap to the whole range of x.
     let mut all: Vec<f64> = apart.iter().flatten().map(|x| x.abs()).collect();
     all.sort_by(f64::total_cmp);
     let most = 2.0 * all.get(all.len() * 99 / 100)?;
@@ -105,7 +105,7 @@ pub(super) fn contact(equation: &Equation, nominal: &[f64]) -> Option<Contact> {
         simplex.told(-explained);
     }
     let (_, gap, zero) = best;
-    // What the gap takes away from what passes without one.
+    // RMS reduction by the gap, compared with the law without a gap.
     let base = fit(scale, memory, &rigid);
     let own = law(gap, zero);
     let side = combined(1, [(&rigid[0], 1.0), (&own[0], -1.0)]);

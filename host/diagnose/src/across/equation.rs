@@ -1,4 +1,4 @@
-//! What lies between motor and link of one joint as rows of a regression.
+//! Regression rows for the deflection between motor and link of one joint.
 
 use std::f64::consts::TAU;
 
@@ -14,28 +14,28 @@ use rig_data::prepare::{LowPass, central_difference};
 use rig_data::runs::{JointRun, Run, across_band, resolution};
 use rig_model::robot::JointKind;
 
-/// Place of the torque on the gear among the coordinates.
+/// Index of the gear torque among the coordinates.
 pub(super) const ACROSS: usize = 0;
-/// Widths of the torque's change of sign over which teeth go from one side to the other, by its RMS: an impact and what the
-/// filters make of it.
+/// Widths of the torque's sign change over which contact changes flanks, relative to its RMS: an impact, blurred by
+/// filters.
 const WIDTHS: [f64; 5] = [0.02, 0.05, 0.1, 0.2, 0.35];
-/// Shares of the joint's Coulomb friction that act on the link and press the teeth besides.
+/// Shares of the joint's Coulomb friction that act on the link and load the contact.
 const SHARES: [f64; 4] = [0.0, 0.25, 0.5, 1.0];
 /// Orders of waves over a turn of the motor and over one of the joint.
 const ORDERS: [f64; 2] = [1.0, 2.0];
 
-/// A change from side to side: width and Coulomb friction of the link, N·m or N.
+/// A change between flanks: width and Coulomb friction of the link, N·m or N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Side {
     pub(super) width: f64,
     pub(super) friction: f64,
 }
 
-/// What repeats with an angle.
+/// A wave over an angle.
 pub(super) struct Wave {
-    /// Of the encoder on the motor, or on the joint.
+    /// Wave of the motor encoder or of the joint encoder.
     pub(super) kind: Kind,
-    /// Periods to a turn.
+    /// Periods per turn.
     pub(super) order: f64,
     /// Cosine and sine.
     pub(super) columns: [Column; 2],
@@ -43,43 +43,43 @@ pub(super) struct Wave {
 
 /// Rows of one joint's q − ql.
 pub(super) struct Equation {
-    /// q − ql stands for the torque, rad or m; nominal are a constant a recording, the position and the velocity of the link.
+    /// q − ql takes the torque's place, rad or m. Nominal: a constant per recording, position and velocity of the link.
     pub(super) rows: Rows,
-    /// How many of the nominal columns are constants.
+    /// Number of constants among the nominal columns.
     pub(super) constants: usize,
-    /// Torque on the gear, N·m or N: as the model has it for the link's measured motion.
+    /// Gear torque by the model for the link's measured motion, N·m or N.
     pub(super) load: Column,
     /// Its rate of change.
     pub(super) change: Column,
     /// Direction of the link's motion.
     pub(super) direction: Column,
-    /// The side on which the teeth touch, −½ to ½, for each of `sides`.
+    /// Flank in contact, −½ to ½, for each of `sides`.
     pub(super) levels: Vec<Column>,
     pub(super) sides: Vec<Side>,
     pub(super) waves: Vec<Wave>,
-    /// What each base parameter gives to the load: parameter and values.
+    /// Part of the load by each base parameter: parameter and values.
     pub(super) parts: Vec<(usize, Column)>,
-    /// Least step of either encoder, rad or m.
+    /// Larger step of both encoders, rad or m.
     pub(super) resolution: f64,
     /// Inertia that the gear carries, kg·m² or kg.
     pub(super) mass: f64,
     /// Coulomb friction of the joint, N·m or N.
     pub(super) friction: f64,
-    /// Repeated runs among those that are here.
+    /// Pairs of these runs that repeat one motion.
     pub(super) pairs: Vec<(usize, usize)>,
-    /// What positions pass, and what is read across the transmission besides.
+    /// Filter of the positions, and additional filter across the transmission.
     pub(super) filters: [LowPass; 2],
-    /// Of each run, Hz.
+    /// Rate of each run, Hz.
     pub(super) rates: Vec<f64>,
-    /// Of each run at its own rate: which constant is its own, q − ql as recorded, position and velocity of the link.
+    /// Each run at its own rate: index of its constant, q − ql as recorded, position and velocity of the link.
     runs: Vec<(usize, [Vec<f64>; 3])>,
     coordinates: [Vec<f64>; 4],
     kind: JointKind,
 }
 
 impl Equation {
-    /// Of a joint; none where no run has an encoder on its link. `filter` is that of the positions, which everything passes
-    /// that is not formed from filtered ones; `sides` are those of the training data.
+    /// Builds the rows of a joint; `None` without a link encoder. `filter` is that of the positions; signals from
+    /// unfiltered data pass it too. `sides` are those of the training data.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -244,7 +244,7 @@ impl Equation {
         }))
     }
 
-    /// q − ql as recorded, run by run at its own rate, less what nominal columns with these coefficients give.
+    /// Returns q − ql as recorded, run by run at its own rate, minus the nominal columns with these coefficients.
     pub(super) fn apart_of(&self, nominal: &[f64]) -> Vec<Vec<f64>> {
         let [scale, instant] = [0, 1].map(|k| nominal[self.constants + k]);
         (self.runs.iter())
@@ -256,7 +256,7 @@ impl Equation {
             .collect()
     }
 
-    /// What q − ql may depend on; the torque on the gear stands at [`ACROSS`].
+    /// Returns the coordinates that q − ql may depend on; the gear torque is at [`ACROSS`].
     pub(super) fn coordinates(&self) -> Vec<Coordinate> {
         let (p, f) = self.kind.units();
         let v = match self.kind {
@@ -278,8 +278,8 @@ impl Equation {
             .collect()
     }
 
-    /// What is left of q − ql of recordings that nothing was fitted to, RMS: each gets a constant of its own. `terms` are
-    /// columns with coefficients, the constants left out.
+    /// Returns the RMS residual of q − ql on a hold-out; each recording gets its own constant. `terms` are columns with
+    /// coefficients, without the constants.
     pub(super) fn rms(&self, terms: &[(&Column, f64)]) -> f64 {
         let mut left = self.rows.torque[0].clone();
         for (column, factor) in terms {
@@ -297,7 +297,7 @@ impl Equation {
         (squares / left.len().max(1) as f64).sqrt()
     }
 
-    /// Noise of q − ql from one row to the next: what a floor is where nothing was repeated.
+    /// Returns the noise of q − ql between adjacent rows: the noise floor without repeated runs.
     pub(super) fn short_time(&self, residual: &[f64]) -> f64 {
         let (mut squares, mut count) = (0.0, 0_u32);
         for pair in self.rows.starts.windows(2) {
@@ -309,7 +309,7 @@ impl Equation {
         (squares / f64::from(count.max(1))).sqrt()
     }
 
-    /// The width's neighbours at the same friction, so that its being unknown widens the interval of the rest.
+    /// Returns the neighbours in width at the same friction: the unknown width increases the other uncertainties.
     pub(super) fn around(&self, k: usize) -> Option<[&Column; 2]> {
         let own = self.sides.get(k)?;
         let of = |wider: bool| {
@@ -340,7 +340,7 @@ fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// The changes from side to side that are tried, by the loads that occur.
+/// Returns the tried changes between flanks, for these loads.
 fn sides_of(loads: &[Vec<f64>], friction: f64) -> Vec<Side> {
     let (squares, count) =
         (loads.iter().flatten()).fold((0.0, 0_usize), |(s, n), l| (s + l * l, n + 1));
@@ -361,7 +361,7 @@ fn sides_of(loads: &[Vec<f64>], friction: f64) -> Vec<Side> {
         .collect()
 }
 
-/// The two encoders of a joint as two joints, of which the steps are looked at.
+/// Returns the two encoders of a joint as two joints, to find their steps.
 fn apart(run: &Run, joint: usize) -> Run {
     let own = &run.joints[joint];
     let of = |raw: &[f64]| JointRun {
@@ -377,7 +377,7 @@ fn apart(run: &Run, joint: usize) -> Run {
     }
 }
 
-/// What each base parameter gives to the load of a joint, over the rows.
+/// Returns the part of a joint's load by each base parameter, over the rows.
 fn parts_of(
     source: &Source,
     joint: usize,

@@ -1,4 +1,4 @@
-//! The gear that the coefficients of a transmission's equation stand for.
+//! Gear parameters from the coefficients of a transmission's equation.
 
 use rig_shared::effects::{Kind, SHAPES};
 
@@ -7,11 +7,11 @@ use super::law::{self, Law, Laws};
 use super::{Between, Solved, Term};
 use crate::fit::Fit;
 
-/// Teeth that are closed carry their link at more than so many Hz; where it swings more slowly, something gives beside them.
+/// Least natural frequency of a link on closed contacts, Hz; a lower one shows another elasticity beside them.
 pub(crate) const CLOSED_TEETH: f64 = 16.0;
-/// Standard deviations from which stiffness, damping and friction of the link count as told.
+/// Standard deviations above which stiffness, damping and link friction are identifiable.
 const TOLD: f64 = 3.0;
-/// Damping ratio that stands where the motion does not tell one.
+/// Default damping ratio if the motion does not determine one.
 const USUAL_DAMPING: f64 = 0.03;
 
 /// A gear with the standard deviations of its shapes.
@@ -19,7 +19,7 @@ pub(super) struct Gear {
     pub(super) kind: Kind,
     pub(super) shapes: [f64; SHAPES],
     pub(super) stds: [f64; SHAPES],
-    /// Stiffness, damping and share of the link's friction of what gives beside play, each with its standard deviation.
+    /// Elasticity beside backlash: stiffness, damping and link friction share, each with its standard deviation.
     pub(super) gives: Option<[[f64; 2]; 3]>,
 }
 
@@ -33,7 +33,7 @@ impl Gear {
 }
 
 impl Between<'_, '_> {
-    /// The gear as the coefficients have it; none where it neither gives nor has play.
+    /// Returns the gear that the coefficients represent; `None` without elasticity and backlash.
     pub(super) fn gear(
         &self,
         solved: &Solved,
@@ -59,7 +59,7 @@ impl Between<'_, '_> {
             let share = (equation.friction > 0.0)
                 .then(|| touch.friction.map(|f| f / equation.friction))
                 .map_or([0.0, f64::INFINITY], |[s, std]| [s.clamp(0.0, 1.0), std]);
-            // Closed teeth give, too, but less.
+            // Closed contacts are elastic too, but less.
             let mass = equation.mass.max(f64::MIN_POSITIVE);
             let swing = (stiffness / mass).sqrt() / std::f64::consts::TAU;
             return Some(Gear {
@@ -79,7 +79,7 @@ impl Between<'_, '_> {
                 let load = self.of_the_load(base, solved);
                 [a, std.hypot(a * load)]
             }
-            // Too stiff to tell: as stiff as that.
+            // Too stiff to identify: takes the least detectable stiffness.
             None => {
                 let [a, std] = of(&|t| *t == Term::Load).unwrap_or([0.0, 0.0]);
                 let least = equation.resolution / law::spread(equation, &equation.load);

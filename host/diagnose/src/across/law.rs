@@ -1,4 +1,4 @@
-//! Which laws q − ql follows, one after the other.
+//! Selection of the laws of q − ql, one after the other.
 
 use rig_shared::effects::Kind;
 
@@ -10,29 +10,29 @@ use crate::profile::SIGNIFICANT;
 use crate::rows::Column;
 use rig_model::robot::title_of;
 
-/// Least share of what is left that a law takes away: one of half the size of the noise takes as much.
+/// Least RMS share that a law removes: one of half the noise's size removes as much.
 pub(super) const LEAST_SHARE: f64 = 0.1;
-/// … a wave over the joint's turn.
+/// … for a wave over the joint's turn.
 const LEAST_SHARE_OF_THE_JOINT: f64 = 0.3;
-/// … and so many standard deviations.
+/// … and in standard deviations.
 pub(super) const LEAST_SIGMAS: f64 = 2.0;
-/// Steps of the coarser encoder within which a play or a twist is none.
+/// Least size of backlash or twist, in steps of the coarser encoder.
 const LEAST_STEPS: f64 = 2.0;
-/// Share of what a law takes away below which another beside it is what that one is off by.
+/// Share of a law's reduction below which another law beside it only corrects its error.
 const SHADOW: f64 = 0.05;
-/// Most laws that are taken, those that go again among them.
+/// Most accepted laws, including those removed again.
 const MOST: usize = 6;
-/// Peak to peak of a signal by its RMS, roughly, whatever its form.
+/// Approximate ratio of peak-to-peak to RMS, for any form of signal.
 const SWING: f64 = 3.0;
 
 /// A law of q − ql.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Law {
-    /// In proportion to the torque on the gear.
+    /// Proportional to the gear torque.
     Twist,
-    /// From side to side with its sign: which of the [`Equation::levels`].
+    /// Change of flanks with the sign of the gear torque: index in [`Equation::levels`].
     Play(usize),
-    /// Which of the [`Equation::waves`].
+    /// Index in [`Equation::waves`].
     Wave(usize),
 }
 
@@ -53,7 +53,7 @@ impl Law {
         }
     }
 
-    /// Whether two of them exclude each other.
+    /// Returns true if both exclude each other.
     fn excludes(&self, other: &Self) -> bool {
         matches!((self, other), (Self::Play(_), Self::Play(_))) || self == other
     }
@@ -68,14 +68,14 @@ impl Law {
     }
 }
 
-/// A law with what speaks for it.
+/// A law with its evidence.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
     pub(super) law: Law,
     pub(super) evidence: Evidence,
 }
 
-/// What was looked for and what was found of it.
+/// Tried and found laws.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Laws {
     pub(super) found: Vec<Found>,
@@ -83,7 +83,7 @@ pub(super) struct Laws {
     pub(super) trials: usize,
 }
 
-/// The laws of q − ql of a joint called `name`; `base` holds the nominal columns.
+/// Finds the laws of q − ql of the joint `name`; `base` holds the nominal columns.
 pub(super) fn laws(equation: &Equation, base: &Fit, name: &str, without: &[Kind]) -> Laws {
     let all: Vec<Law> = (std::iter::once(Law::Twist))
         .chain((0..equation.levels.len()).map(Law::Play))
@@ -110,7 +110,7 @@ pub(super) fn laws(equation: &Equation, base: &Fit, name: &str, without: &[Kind]
                 evidence,
             };
             let why = refused(equation, &laws.found, &found, trials);
-            // The best of each kind speaks for it.
+            // The best of each kind represents it.
             let like =
                 |(other, _): &&mut (Found, _)| other.law.kind(equation) == law.kind(equation);
             match best.iter_mut().find(like) {
@@ -143,7 +143,7 @@ pub(super) fn laws(equation: &Equation, base: &Fit, name: &str, without: &[Kind]
     laws
 }
 
-/// Each law at its best beside all others; what does not stand beside them goes.
+/// Refits each law beside all others; removes those that are no longer significant.
 fn settle(equation: &Equation, base: &Fit, laws: &mut Laws, all: &[Law]) {
     let mut i = 0;
     while i < laws.found.len() {
@@ -167,7 +167,7 @@ fn settle(equation: &Equation, base: &Fit, laws: &mut Laws, all: &[Law]) {
                 laws.found[i] = found;
                 i += 1;
             }
-            // The last one was just taken beside the others, so that this ends.
+            // The last law was just accepted beside the others, so this ends.
             _ if i + 1 < laws.found.len() => {
                 laws.found.remove(i);
                 i = 0;
@@ -177,7 +177,7 @@ fn settle(equation: &Equation, base: &Fit, laws: &mut Laws, all: &[Law]) {
     }
 }
 
-/// The nominal columns with those of the laws, but for one.
+/// Returns the nominal columns with those of the laws, except one.
 pub(super) fn beside<'f>(
     equation: &Equation,
     base: &Fit<'f>,
@@ -199,14 +199,14 @@ fn evidence(equation: &Equation, fit: &Fit, law: Law) -> Option<Evidence> {
     fit.evidence(&fit.distinct(law.columns(equation))?, law.bounds())
 }
 
-/// Why a law is not taken beside others.
+/// Returns the reason why a law is rejected beside others.
 fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) -> Option<String> {
     let e = &found.evidence;
     let p = e.corrected(trials);
     if p > SIGNIFICANT {
         return Some(format!("p = {p:.2}, corrected for {trials} trials"));
     }
-    // Over the joint's turn gravity has the same waves.
+    // Gravity has the same waves over the joint's turn.
     let least_share = match found.law {
         Law::Wave(k) if equation.waves[k].kind == Kind::EncoderEccentricityJoint => {
             LEAST_SHARE_OF_THE_JOINT
@@ -233,7 +233,7 @@ fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) 
     let size = match found.law {
         Law::Play(_) => e.gains[0],
         Law::Twist => e.gains[0] * swing(equation),
-        // A wave of many turns is known to less than a step.
+        // A wave of many turns is identifiable below one step.
         Law::Wave(_) => return None,
     };
     let least = least(equation);
@@ -241,17 +241,17 @@ fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) 
         .then(|| format!("its {size:.1e} are less than two steps of the encoders, {least:.1e}"))
 }
 
-/// Play or twist, peak to peak, that is none.
+/// Returns the least peak-to-peak backlash or twist.
 pub(super) fn least(equation: &Equation) -> f64 {
     LEAST_STEPS * equation.resolution
 }
 
-/// The torque on the gear, peak to peak, N·m or N.
+/// Returns the peak-to-peak gear torque, N·m or N.
 pub(super) fn swing(equation: &Equation) -> f64 {
     SWING * spread(equation, &equation.load)
 }
 
-/// RMS of a column about its mean.
+/// Returns the RMS of a column about its mean.
 pub(super) fn spread(equation: &Equation, column: &Column) -> f64 {
     let n = equation.rows.count.max(1) as f64;
     let of = || column[0].iter().flatten();
@@ -260,12 +260,12 @@ pub(super) fn spread(equation: &Equation, column: &Column) -> f64 {
 }
 
 impl Laws {
-    /// Puts play among the laws, or takes it out, as the torque that passes says.
+    /// Adds backlash to the laws or removes it, by the result from the transmitted torque.
     pub(super) fn play_is(&mut self, equation: &Equation, base: &Fit, touch: Option<&Contact>) {
         let is_play = |f: &Found| matches!(f.law, Law::Play(_));
         let Some(touch) = touch else {
             self.found.retain(|f| !is_play(f));
-            // What looked like it is twist.
+            // Apparent backlash is then twist.
             if !self.found.iter().any(|f| f.law == Law::Twist)
                 && let Some(evidence) = evidence(equation, base, Law::Twist)
             {

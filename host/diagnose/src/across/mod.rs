@@ -1,14 +1,14 @@
-//! What an encoder on the link says of the transmission: residuals of position across it.
+//! Transmission analysis with a link encoder: position residuals across the transmission.
 //!
-//! x = q − ql = c + ε·q + δ·q̇ + (λ + φ·sgn q̇)/K − D·λ̇/K² + (gap/2)·s(λ + φ·sgn q̇) + Σ cos, sin of motor or joint angle, with
-//! λ the torque that the model has the gear transmit for the link's *measured* motion, so that what the gear does to it is in it
-//! (Spong 1987; play: Nordin and Gutman 2002; errors of encoders and gears as orders over a turn). s is the side on
-//! which the teeth touch; it changes with the sign of the torque, over a width that is fitted, because impacts and
-//! filters blur it. ε takes up a ratio that is a little off, δ two encoders that are read at different instants. No friction of the
-//! motor and no error of the torque's sensor is in x: presliding and Stribeck friction bend the torque alone.
+//! x = q − ql = c + ε·q + δ·q̇ + (λ + φ·sgn q̇)/K − D·λ̇/K² + (gap/2)·s(λ + φ·sgn q̇) + Σ cos, sin of motor or joint
+//! angle. λ is the gear torque by the model for the link's *measured* motion, so it includes the gear's effect (Spong
+//! 1987; backlash: Nordin and Gutman 2002; errors of encoders and gears as orders over a turn). s is the flank in
+//! contact. It changes with the sign of the torque over a fitted width, because impacts and filters blur it. ε allows
+//! for a small ratio error, δ for different reading instants. x contains no motor friction and no torque sensor error:
+//! presliding and Stribeck friction affect the torque alone.
 //!
-//! Leaves out: stiffness that grows with the twist; hysteresis of the gear; what teeth do while they are apart, but for
-//! the mean; drives that move several joints; that friction in the link's bearing may wind the gear up at rest.
+//! Leaves out: stiffness that grows with the twist; hysteresis of the gear; the motion inside the gap, except its mean;
+//! drives that move several joints; friction in the link's bearing that winds up the gear at rest.
 
 mod contact;
 mod equation;
@@ -47,17 +47,17 @@ use rig_model::robot::unit_of;
 
 pub(super) use self::tell::tell;
 
-/// Relative difference of the two encoders' scales that is said, in standard deviations and by itself.
+/// Least reported scale difference of the encoders: in standard deviations, and relative.
 const SURE: f64 = 5.0;
 const SCALE_OFF: f64 = 1e-3;
 
-/// What the encoder on the link of one joint says.
+/// Results from the link encoder of one joint.
 pub(super) struct Across {
     /// From 0.
     pub(super) joint: usize,
-    /// Effects that it names, the gear's first, with what stands for them in the result.
+    /// Named effects, the gear's first, with their entries in the result.
     named: Vec<Named>,
-    /// Shapes of the gear, where it has play or gives.
+    /// Shapes of the gear, if it has backlash or elasticity.
     gear: Option<(Kind, [f64; SHAPES])>,
     places: Vec<Place>,
     tried: Vec<Tried>,
@@ -71,8 +71,8 @@ struct Named {
     map: Map,
 }
 
-/// What the encoders on the links say, joint by joint where there are any. `after` are the coefficients of the free nominal
-/// directions, with their covariance.
+/// Analyses the link encoders, joint by joint. `after` are the coefficients of the free nominal directions, with their
+/// covariance.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -113,7 +113,7 @@ pub(super) fn across(
     Ok(list)
 }
 
-/// Whether what was found across a transmission excludes a candidate of the search by torque.
+/// Returns true if the analysis across a transmission excludes a candidate of the torque search.
 pub(super) fn refutes(across: &[Across], candidate: &Candidate) -> bool {
     let Some(own) = across.iter().find(|a| a.joint == candidate.joint) else {
         return false;
@@ -126,7 +126,7 @@ pub(super) fn refutes(across: &[Across], candidate: &Candidate) -> bool {
     }
 }
 
-/// The gears that were found, with their shapes.
+/// Returns the found gears, with their shapes.
 pub(super) fn gears(across: &[Across]) -> Vec<(Candidate, [f64; SHAPES])> {
     let of = |a: &Across| {
         let (kind, shapes) = a.gear?;
@@ -136,14 +136,14 @@ pub(super) fn gears(across: &[Across]) -> Vec<(Candidate, [f64; SHAPES])> {
     across.iter().filter_map(of).collect()
 }
 
-/// Whether they name something that the description does not state.
+/// Returns true if any named effect is not in the description.
 pub(super) fn names_something(across: &[Across], stated: &dyn Fn(&Candidate) -> bool) -> bool {
     across
         .iter()
         .any(|a| (a.named.iter()).any(|n| !stated(&Candidate::on(n.kind, a.joint))))
 }
 
-/// One joint's transmission.
+/// Analysis of one joint's transmission.
 struct Between<'a, 's> {
     source: &'a Source<'s>,
     anchor: &'a Anchor,
@@ -154,10 +154,10 @@ struct Between<'a, 's> {
     options: &'a Options,
 }
 
-/// All coefficients with where the laws' stand.
+/// All coefficients, those of the laws after the nominal ones.
 struct Solved {
     solution: Solution,
-    /// Columns that were fitted beside the nominal ones, in their order.
+    /// Columns fitted beside the nominal ones, in their order.
     terms: Vec<Term>,
 }
 
@@ -194,7 +194,7 @@ impl Between<'_, '_> {
             if settled {
                 break (last, floor, solved);
             }
-            // Which of the two it is, or both, the torque that passes says more sharply than its sign.
+            // Gear torque separates backlash from elasticity better than its sign does.
             settled = true;
             let is_gear = |f: &Found| matches!(f.law, Law::Twist | Law::Play(_));
             if laws.found.iter().any(is_gear) {
@@ -205,7 +205,7 @@ impl Between<'_, '_> {
         };
         let gear = self.gear(&solved, &base, &laws, touch.as_ref());
         let mut named = self.named(&base, &laws, &solved, gear.as_ref(), floor);
-        // What acts between motor and link comes first.
+        // Effects between motor and link come first.
         named.sort_by_key(|n| !is_gear(n.kind));
         let coordinates = equation.coordinates();
         let places = locate(
@@ -238,7 +238,7 @@ impl Between<'_, '_> {
         })
     }
 
-    /// Everything fitted together; torque on the gear and the link's friction stand beside play as well.
+    /// Fits everything together; beside backlash too, gear torque and link friction are fitted.
     fn solved(&self, plain: &Fit, base: &Fit, laws: &Laws) -> Option<Solved> {
         let equation = self.training;
         let mut fit = base.clone();
@@ -281,8 +281,7 @@ impl Between<'_, '_> {
         Some(Solved { solution, terms })
     }
 
-    /// Relative standard deviation of the torque on the gear as far as it goes along q − ql: that of the parameters that it is
-    /// computed with.
+    /// Returns the relative standard deviation of the gear torque along q − ql, from the parameters that determine it.
     fn of_the_load(&self, base: &Fit, solved: &Solved) -> f64 {
         let equation = self.training;
         let mut fit = base.clone();
@@ -331,7 +330,7 @@ impl Between<'_, '_> {
                 (Law::Twist, Some(gear)) if gear.kind == Kind::JointElasticity => gear.values(),
                 (Law::Twist, Some(gear)) => match gear.gives {
                     Some(values) => values.to_vec(),
-                    // It is the teeth's own.
+                    // It is the contact's own elasticity.
                     None => continue,
                 },
                 (Law::Play(_), Some(gear)) => gear.values(),
@@ -342,7 +341,7 @@ impl Between<'_, '_> {
                     };
                     vec![cosine, sine, [equation.waves[w].order, 0.0]]
                 }
-                // Of the joint's turn it may be the second encoder's own.
+                // A wave over the joint's turn may be an error of the second encoder.
                 _ => continue,
             };
             let parameters = (about.gains.iter().chain(about.shapes).zip(values))
@@ -352,7 +351,7 @@ impl Between<'_, '_> {
                     (p.name.to_owned(), Value { value, std, unit })
                 })
                 .collect();
-            // What it takes away beside all others.
+            // RMS reduction beside all others.
             let without = beside(equation, base, &laws.found, Some(k));
             let with = beside(equation, base, &laws.found, None);
             let train = [without.rms(0), with.rms(0)];
@@ -438,13 +437,13 @@ impl Between<'_, '_> {
 }
 
 impl Solved {
-    /// Coefficient and standard deviation of the first term that is wanted.
+    /// Returns coefficient and standard deviation of the first wanted term.
     fn of(&self, equation: &Equation, wanted: &dyn Fn(&Term) -> bool) -> Option<[f64; 2]> {
         let at = equation.rows.nominal.len() + self.terms.iter().position(wanted)?;
         Some([self.solution.values[at], self.solution.std(at)])
     }
 
-    /// Columns of other recordings with the coefficients of these; `wanted` of the laws' terms.
+    /// Returns the columns of other recordings with these coefficients, for the `wanted` terms of the laws.
     fn terms_on<'h>(
         &self,
         equation: &Equation,
@@ -475,7 +474,7 @@ fn column(equation: &Equation, term: Term) -> &Column {
     }
 }
 
-/// Whether a term belongs to a law.
+/// Returns true if a term belongs to a law.
 fn term_of(law: Law, term: &Term) -> bool {
     match law {
         Law::Twist => matches!(term, Term::Load | Term::Change | Term::Direction),

@@ -1,4 +1,4 @@
-//! What the encoder on a link says, in results.
+//! Results of the link encoder in the report.
 
 use rig_shared::effects::{Effect, Kind};
 
@@ -11,7 +11,7 @@ use rig_model::robot::{JointKind, Robot, RobotEffect};
 use rig_output::{format_significant, format_unit, format_value};
 
 impl Between<'_, '_> {
-    /// Why to believe a law, one sentence.
+    /// Returns the reason to believe a law, one sentence.
     pub(super) fn why(
         &self,
         found: &Found,
@@ -38,7 +38,7 @@ impl Between<'_, '_> {
         )
     }
 
-    /// What is said of the joint, found or not.
+    /// Returns sentences on the joint, whether or not a law was found.
     pub(super) fn words(
         &self,
         base: &Fit,
@@ -122,7 +122,7 @@ impl Between<'_, '_> {
         words
     }
 
-    /// A small length or angle.
+    /// Formats a small length or angle.
     fn length(&self, x: f64) -> String {
         let unit = match self.source.robot.joints[self.joint].kind {
             JointKind::Revolute => "mrad",
@@ -132,7 +132,7 @@ impl Between<'_, '_> {
     }
 }
 
-/// Adds what the encoders on the links say to a result and to its description.
+/// Adds the results of the link encoders to a result and to its description.
 pub(crate) fn tell(across: Vec<Across>, diagnosis: &mut Diagnosis, model: &mut Robot) {
     for own in across {
         let name = model.joints[own.joint].name.clone();
@@ -157,7 +157,7 @@ pub(crate) fn tell(across: Vec<Across>, diagnosis: &mut Diagnosis, model: &mut R
     }
 }
 
-/// Puts one name into the result; whether it is no effect of the description.
+/// Adds one name to the result. Returns true if the description does not have the effect.
 fn one(
     found: Named,
     name: &str,
@@ -189,7 +189,7 @@ fn one(
         ..map
     });
     match place {
-        // The torque shows it, the encoder on the link what it is.
+        // The torque shows the effect, the link encoder its values.
         Some(k) => {
             let known = &mut diagnosis.steps[k];
             for (key, value) in step.parameters {
@@ -210,7 +210,7 @@ fn one(
     true
 }
 
-/// Puts an effect into a description in the place of those of its joint that are `like` it.
+/// Puts an effect into a description instead of its joint's effects that are `like` it.
 fn replace(model: &mut Robot, joint: usize, effect: Effect<f64>, like: &dyn Fn(Kind) -> bool) {
     let placed = model.placed_effects();
     let mut others = placed

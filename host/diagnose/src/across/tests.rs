@@ -1,5 +1,5 @@
-//! The emulated rig's own gears, seen by an encoder on the link in counts and with noise: impacts, friction of the link and a
-//! finer step than the laws have.
+//! Gears of the emulated rig with a noisy link encoder with counts: impacts, friction of the link and a finer step than
+//! the laws have.
 
 #![allow(clippy::unwrap_used)]
 
@@ -35,7 +35,7 @@ fn names(found: &Diagnosis) -> Vec<&str> {
     found.steps.iter().map(|s| s.effect.as_str()).collect()
 }
 
-/// Relative error of a parameter, and whether its 95 % interval holds the truth.
+/// Returns a parameter's relative error, and true if its 95 % interval contains the truth.
 fn off(step: &Step, parameter: &str, truth: f64) -> (f64, bool) {
     let value = &step.parameters[parameter];
     println!("{parameter}: {} ± {}, {truth}", value.value, value.std);
@@ -108,7 +108,7 @@ fn with_nothing_hidden_it_says_what_it_would_have_shown() {
         let of = found.detectable.iter().find(|d| d.effect == name);
         of.map(|d| d.size).unwrap()
     };
-    // Of the order of its count, 0.05 mrad; 3 N·m across it.
+    // About one count, 0.05 mrad; 3 N·m on the gear.
     assert!(size("backlash") < 2e-4, "{}", size("backlash"));
     assert!(
         size("joint_elasticity") > 2e4,
@@ -117,7 +117,7 @@ fn with_nothing_hidden_it_says_what_it_would_have_shown() {
     );
 }
 
-/// A recording without the encoder on the link takes part in everything else; its gear moves as the law has it.
+/// A recording without a link encoder is used for all else; its gear moves by the law.
 #[test]
 fn a_recording_without_it_stands_beside_one_with_it() {
     let mut made = made(&[SOFT], 28);
@@ -133,7 +133,7 @@ fn a_recording_without_it_stands_beside_one_with_it() {
     assert!(error < 0.03 && holds, "{error}");
 }
 
-/// What a description states of a gear is fitted again, or contradicted.
+/// A described gear is refitted or contradicted.
 #[test]
 fn a_described_gear_is_fitted_again_or_goes() {
     let described = |made: &Made| Robot {

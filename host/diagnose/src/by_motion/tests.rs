@@ -46,7 +46,7 @@ fn torque_and_motion_agree_where_the_model_is_right() {
             "{name}: {p:?}, {truth}"
         );
     }
-    // The one effect's own, which is half the difference between the directions.
+    // The effect's own value, half the difference between directions.
     let p = of(&found, "asymmetric_coulomb.asymmetry");
     assert!(
         (p.motion.abs() / (0.1 * truth["coulomb"]) - 1.0).abs() < 0.05,
@@ -54,7 +54,7 @@ fn torque_and_motion_agree_where_the_model_is_right() {
     );
 }
 
-/// Noise of the position is in the torque's regressors and in no simulated motion.
+/// Position noise is in the torque's regressors and in no simulated motion.
 #[test]
 fn a_noisy_position_costs_the_motion_less_than_the_torque() {
     let mut made = Scenario::short([ASYMMETRIC], 62).make().unwrap();
@@ -68,7 +68,7 @@ fn a_noisy_position_costs_the_motion_less_than_the_torque() {
     }
     let found = diagnosed(&made);
     println!("{:#?}", found.by_motion);
-    // The noise is white, so that the spectrum of the position tells how fast the motion is, which the cut-off does not bend.
+    // The noise is white, so the position's spectrum shows the motion's frequency, which the cut-off does not change.
     let treated = found.treatment.as_ref().unwrap();
     let why = &treated.position_cutoff_why;
     assert!(
@@ -86,7 +86,7 @@ fn a_noisy_position_costs_the_motion_less_than_the_torque() {
     );
 }
 
-/// Values that are off come back to where the torque has them, and then stand: the motion gets better by far, the torque too.
+/// Wrong values return to those of the torque and are adopted: the motion improves by far, and the torque too.
 #[test]
 fn values_that_are_off_are_mended_by_the_motion() {
     let made = Scenario::short([], 63).make().unwrap();
@@ -119,14 +119,14 @@ fn values_that_are_off_are_mended_by_the_motion() {
             "{k}: {mended}, {right}"
         );
     }
-    // As it should be, nothing is adopted.
+    // Nothing is adopted, as expected.
     let same = by_motion(&fitting, &replay, &source, &[], &right, 2)
         .unwrap()
         .unwrap();
     assert!(same.adopted.is_none());
 }
 
-/// A line with noise that lasts: least squares and their deviations, counted by stretches.
+/// A line with correlated noise: least squares, with deviations by stretches.
 #[test]
 fn the_nearest_values_are_least_squares_and_their_deviations_count_stretches() {
     let rows = 4000;
@@ -150,7 +150,7 @@ fn the_nearest_values_are_least_squares_and_their_deviations_count_stretches() {
     let left = departs(&theta).unwrap();
     let sum: f64 = left.of.iter().sum();
     assert!(sum.abs() < 1e-6 * rows as f64, "{sum}");
-    // Of a mean and a slope over 40 independent values of variance 1/3.
+    // For mean and slope over 40 independent values of variance 1/3.
     let spread = (1.0_f64 / 3.0 / 40.0).sqrt();
     assert!((std[0] / (2.0 * spread) - 1.0).abs() < 0.4, "{std:?}");
     assert!(
@@ -158,7 +158,7 @@ fn the_nearest_values_are_least_squares_and_their_deviations_count_stretches() {
         "{std:?}"
     );
     assert!((theta[0] - 2.0).abs() < 4.0 * std[0] && (theta[1] - 3.0).abs() < 4.0 * std[1]);
-    // What moves nothing is not told.
+    // A parameter without effect is not identifiable.
     let blind = |theta: &[f64]| departs(&[theta[0] + theta[1], 0.0]);
     let first = blind(&[0.0, 0.0]).unwrap();
     assert!(nearest(vec![0.0, 0.0], &[1.0, 1.0], first, &blind, 1).is_none());

@@ -1,4 +1,4 @@
-//! How far apart two rivals' predictions lie along a motion (T-optimality, Atkinson and Fedorov 1975).
+//! Separation of two rivals' predictions along a motion (T-optimality, Atkinson and Fedorov 1975).
 //!
 //! Leaves out: effects between motor and link and of the voltage, which are no torque along a given motion; the
 //! controller's errors.
@@ -9,14 +9,14 @@ use rig_shared::effects::{Channel, Effect, GAINS, Instant, Kind, MEMORY, SHAPES,
 use super::place::{Nominal, Place};
 use super::primitives::Primitive;
 
-/// Independent values of torque a second that a noise floor stands for: a low-pass at 40 to 50 Hz leaves as many.
+/// Independent torque values per second of a noise floor, as after a low-pass at 40 to 50 Hz.
 pub const FLOOR_RATE: f64 = 100.0;
-/// Rows of one motion.
+/// Most rows of one motion.
 const MOST: usize = 4000;
-/// Values tried of each of the rival's shapes.
+/// Values tried for each of the rival's shapes.
 const STEPS: usize = 12;
 
-/// What of a joint's standard model a refit leaves as the description states it.
+/// Nominal parameters of a joint that a refit keeps as described.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Held {
     /// The direction of gravity.
@@ -28,14 +28,14 @@ pub struct Held {
 /// A motion as instants, pass after pass.
 pub(super) struct Course {
     instants: Vec<Vec<Instant<f64>>>,
-    /// Independent values that one row stands for.
+    /// Independent values per row.
     weight: f64,
     pub(super) held: Held,
-    /// Gravity's torque with cos q and with sin q as described, of length 1.
+    /// Described gravity torque with cos q and with sin q, of length 1.
     gravity: [f64; 2],
 }
 
-/// Whether an effect's torque along a given motion can be written down.
+/// Returns true if an effect's torque along a given motion can be computed.
 pub(super) fn predictable(kind: Kind) -> bool {
     !matches!(
         kind.about().channel,
@@ -103,7 +103,7 @@ impl Course {
         }
     }
 
-    /// Rows that count: at rest friction may be anything up to its bounds.
+    /// Returns the moving rows: at rest, friction may have any value within its bounds.
     fn moving(&self) -> Vec<(usize, usize)> {
         let all = self.instants.iter().enumerate();
         all.flat_map(|(p, pass)| {
@@ -114,8 +114,8 @@ impl Course {
         .collect()
     }
 
-    /// What the standard model can take up: its columns, those of the load once a pass. What is changed by hand changes
-    /// gravity's direction as well.
+    /// Returns the columns of the standard model, those of the load once per pass. Manual work also changes gravity's
+    /// direction.
     fn nominal(&self, rows: &[(usize, usize)], revolute: bool) -> DMatrix<f64> {
         let passes = self.instants.len();
         let own = if revolute { 3 } else { 1 };
@@ -142,7 +142,7 @@ impl Course {
         x
     }
 
-    /// Torque per unit of each gain.
+    /// Returns the torque per unit of each gain.
     pub(super) fn columns(
         &self,
         kind: Kind,
@@ -172,7 +172,7 @@ impl Course {
         })
     }
 
-    /// Squared distance in units of the noise between what the truth gives and what the best rival of that kind would.
+    /// Returns the squared distance, in units of the noise, between the truth and the best rival of that kind.
     pub(super) fn separation(
         &self,
         truth: &(Effect<f64>, Nominal),
@@ -204,7 +204,7 @@ impl Basis {
         basis
     }
 
-    /// What is left of a vector beside the columns; taken off twice, which is enough (Kahan).
+    /// Returns a vector's part outside the columns; two projections are enough (Kahan).
     fn rest(&self, mut vector: DVector<f64>) -> DVector<f64> {
         for b in self.0.iter().chain(&self.0) {
             let along = b.dot(&vector);
@@ -224,12 +224,12 @@ impl Basis {
         }
     }
 
-    /// Sum of squares that these and `more` columns together leave of `y`, which these leave untouched.
+    /// Returns the squared residual of `y`, which is orthogonal to these columns, after a fit of `more` columns.
     fn left(&self, more: &DMatrix<f64>, y: &DVector<f64>) -> f64 {
         let beside: Vec<DVector<f64>> = more
             .column_iter()
             .map(|c| self.rest(c / c.norm().max(f64::MIN_POSITIVE)))
-            // What the standard model holds already leaves rounding alone.
+            // A column of the standard model leaves only rounding.
             .filter(|rest| rest.norm() > 1e-8)
             .collect();
         if beside.is_empty() {
@@ -240,7 +240,7 @@ impl Basis {
     }
 }
 
-/// Torque by which a wrong position misleads: that of the motion as read less that of the motion as it is.
+/// Returns the torque error of a wrong position: the torque of the motion as read minus that of the true motion.
 fn misread(errors: &[[f64; GAINS]], pass: &[Instant<f64>], nominal: &Nominal) -> Vec<[f64; GAINS]> {
     let [inertia, cosine, sine, viscous, ..] = *nominal;
     let last = errors.len().saturating_sub(1);
@@ -259,7 +259,7 @@ fn misread(errors: &[[f64; GAINS]], pass: &[Instant<f64>], nominal: &Nominal) ->
         .collect()
 }
 
-/// Shapes that the rival may take: its own and a grid over its range.
+/// Returns the shapes to try for the rival: its own and a grid over its range.
 fn shapes_of(rival: &Effect<f64>) -> Vec<[f64; SHAPES]> {
     let mut list = vec![rival.shapes];
     for (s, shape) in rival.kind.about().shapes.iter().enumerate() {
@@ -272,7 +272,7 @@ fn shapes_of(rival: &Effect<f64>) -> Vec<[f64; SHAPES]> {
                 Scale::Whole => (from + share * (to - from)).round(),
                 Scale::Logarithmic => from * (to / from).powf(share),
             };
-            // A narrow range of whole numbers has fewer of them than steps.
+            // A narrow range of whole numbers has fewer values than steps.
             if !list.contains(&shapes) {
                 list.push(shapes);
             }
@@ -283,11 +283,11 @@ fn shapes_of(rival: &Effect<f64>) -> Vec<[f64; SHAPES]> {
 
 #[cfg(test)]
 pub(super) mod access {
-    //! What tests simulate noise on.
+    //! Access for tests with simulated noise.
 
     use super::*;
 
-    /// Rows of the standard model and of an effect along a motion.
+    /// Returns the rows of the standard model and of an effect along a motion.
     pub(in super::super) fn rows(
         course: &Course,
         effect: &Effect<f64>,
@@ -301,7 +301,7 @@ pub(super) mod access {
         )
     }
 
-    /// Sum of squares of `y` that the standard model and the best rival leave.
+    /// Returns the squared residual of `y` with the standard model and the best rival.
     pub(in super::super) fn best(
         course: &Course,
         rival: &Effect<f64>,

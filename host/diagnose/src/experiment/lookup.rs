@@ -1,25 +1,25 @@
-//! Pairs that no motion splits by its torque, and what does.
+//! Pairs that torque along a motion cannot separate, with their remedies.
 
 use rig_shared::effects::{Confusion, Kind};
 
 use super::primitives::Family;
 
-/// What splits a pair.
+/// The remedy for a pair.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Split {
     /// Name in results.
     pub(super) kind: &'static str,
-    /// What to do, record and expect, sentences; `{k}` stands for the joint's number.
+    /// Sentences: what to do, to record and to expect; `{k}` is the joint's number.
     pub(super) text: String,
-    /// The motion to run for it, where there is one.
+    /// Motion to run, if any.
     pub(super) motion: Option<Family>,
-    /// Whether it asks for more than the rig does by itself: a load, the base turned, another sensor.
+    /// True if it needs more than the rig alone: a load, a turned base, another sensor.
     pub(super) hands: bool,
 }
 
-/// What the log with the drive off is called in results.
+/// Name in results of the log with the drive off …
 pub const OFF_LOG: &str = "drive-off-log";
-/// … and a motion with everything taken off that pulls on the joint.
+/// … and of a motion without external loads.
 pub const PULLS_OFF: &str = "pulls-taken-off";
 
 const DRIVE_OFF: &str = "Record two seconds with the drive off (`rig record` without a trajectory leaves the rig disarmed) and give them with --drive-off. The mean of tau{k} (or i{k}) there is the sensor's own offset, because no current flows: about the size in question, it is current_offset; about zero, it is not. With u{k} recorded in motion the same shows as R times the offset between the voltage and what current and speed account for.";
@@ -37,7 +37,7 @@ const WIDE: &str = "Run the sine over the whole range; record t, q{k} and tau{k}
 const SPEEDS: &str = "Run the constant speeds; record t, q{k} and tau{k}. What depends on the speed shows at constant speed, what remembers the last reversal has died out there.";
 const LOAD_OR_SPEED: &str = "Run the constant speeds; record t, q{k} and tau{k}. At constant speed no acceleration asks for torque, so that what is left belongs to the speed; what belongs to load or current shows where gravity is lifted slowly.";
 
-/// What the registry says of the two.
+/// Returns the registry's entry on the pair.
 pub(super) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
     let of = |x: Kind, y: Kind| {
         let mut all = x.about().confused.iter();
@@ -46,7 +46,7 @@ pub(super) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
     of(a, b).or_else(|| of(b, a))
 }
 
-/// What splits the two, names from the registry.
+/// Returns the remedy for the pair, by names of the registry.
 pub(super) fn split([a, b]: [Kind; 2]) -> Split {
     let [a_name, b_name] = [a.about().name, b.about().name];
     let is = |x: &str, y: &str| (a_name == x && b_name == y) || (a_name == y && b_name == x);

@@ -1,12 +1,12 @@
-//! What to record next so that rivals come apart.
+//! Next experiment that separates rival effects.
 //!
-//! From a library of safe motions, each over amplitudes and speeds within the robot's limits, the one along which the
-//! rivals' predictions lie farthest apart, the loser refitted each time (T-optimality: Atkinson and Fedorov 1975,
-//! Biometrika 62). Pairs that are the same function of torque and motion stand together there; what splits them is another
-//! channel, another load, another direction of gravity, and is asked for once nothing else is left.
+//! The library has safe motions over amplitudes and speeds within the robot's limits. The chosen motion separates the
+//! rivals' predictions most, the loser refitted each time (T-optimality: Atkinson and Fedorov 1975, Biometrika 62).
+//! Pairs that are the same function of torque and motion need another channel, another load or another direction of
+//! gravity. These are requested last.
 //!
-//! Leaves out: ranges of cranks and regions of the workspace; the posteriors of the rivals' parameters, of which the
-//! estimates stand for all; the other joints, which stand in the middle of their ranges.
+//! Leaves out: ranges of cranks and regions of the workspace; the posteriors of the rivals' parameters, which the
+//! estimates represent; the other joints, which stand in mid-range.
 
 mod criterion;
 mod lookup;
@@ -35,30 +35,30 @@ use lookup::{confused, split};
 use place::Place;
 use primitives::{Primitive, clamped, of_family};
 
-/// The file that the experiment's text speaks of; the caller writes it beside `diagnosis.json`.
+/// Motion file named in the experiment's text; the caller writes it beside `diagnosis.json`.
 pub const FILE: &str = "next_experiment.toml";
-/// Fewer standard deviations than this decide nothing.
+/// Least separation that decides, in standard deviations.
 const DECIDES: f64 = 5.0;
-/// What needs hands must do so much better than what does not.
+/// Least ratio of separations that justifies manual work.
 const WORTH_HANDS: f64 = 2.0;
 
-/// What to do next, with the motion for it.
+/// The next experiment, with its motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proposal {
-    /// For the diagnosis.
+    /// Text and figures for the diagnosis.
     pub experiment: NextExperiment,
-    /// To be written as [`FILE`]; none where no motion helps.
+    /// Motion to write as [`FILE`]; `None` if no motion helps.
     pub trajectory: Option<TrajectoryFile>,
 }
 
-/// The experiment that tells `rivals` of one joint (from 0) apart: each an effect with its estimate and the joint's
-/// nominal parameters estimated beside it; `held` is what the refit of the nominal model left as described. `floor` is the
-/// noise of its torque, N·m or N, as RMS after the low-pass, so of about [`FLOOR_RATE`] independent values a second.
+/// Returns the experiment that separates `rivals` of one joint (from 0): each an effect with its estimate, and the
+/// nominal parameters estimated with it. `held` are parameters that the refit kept as described. `floor` is the torque
+/// noise, N·m or N, as RMS after the low-pass, so of about [`FLOOR_RATE`] independent values a second.
 ///
-/// None where there are fewer than two rivals.
+/// `None` for fewer than two rivals.
 ///
 /// # Errors
-/// [`DiagnoseError::Model`] where the description's geometry is no chain.
+/// [`DiagnoseError::Model`] if the description's geometry is no chain.
 pub fn next(
     robot: &Robot,
     joint: usize,
@@ -78,7 +78,7 @@ pub fn next(
         return Ok(Some(lookup(*pair)));
     }
     let by = |pair: &Pair| split(kinds(*pair));
-    // What the rig does by itself comes first, and first of all what it does without moving.
+    // Experiments without manual work come first, and before them the one without motion.
     let alone = same.iter().find(|p| !by(p).hands);
     if apart.is_empty() || alone.is_some_and(|p| by(p).kind == OFF_LOG) {
         return Ok(alone.or(same.first()).map(|p| lookup(*p)));
@@ -91,7 +91,7 @@ pub fn next(
                 let course = Course::of(place, &primitive);
                 nearest(&course, rivals, place.revolute, floor).map(|(_, pair)| pair)
             });
-        // Partners of the nearest pair lie as near; the registry may speak of theirs.
+        // Collinear partners of the nearest pair are as near; the registry may list theirs.
         let told = nearest.and_then(|pair| {
             let like = |a: Kind, b: Kind| a == b || exact([a, b]);
             apart.iter().find(|p| {
@@ -105,8 +105,8 @@ pub fn next(
         return Ok(pair.or(apart.first().copied()).map(lookup));
     };
     let stand = place.as_ref().map_or_else(Vec::new, |p| p.stand.clone());
-    // What pulls from outside is taken off for the same motion. A spring is told from a constant by that, too: gravity and
-    // friction are then known without either.
+    // External loads are removed for the same motion. This also separates a spring from a constant: gravity and
+    // friction are then known without both.
     let (pulled, same): (Vec<Pair>, Vec<Pair>) =
         (same.into_iter()).partition(|p| primitive.hands == Hands::None && by(p).kind == PULLS_OFF);
     let pulls_off = (pulled.first()).map(|p| by(p).text.replace("{k}", &(joint + 1).to_string()));
@@ -165,39 +165,39 @@ fn names(rivals: &[(Effect<f64>, Nominal)]) -> Vec<String> {
     list
 }
 
-/// Two rivals by their places.
+/// Indices of two rivals.
 type Pair = [usize; 2];
 
-/// Every pair of so many once.
+/// Returns all pairs.
 fn pairs(count: usize) -> impl Iterator<Item = Pair> {
     (0..count).flat_map(|b| (0..b).map(move |a| [a, b]))
 }
 
-/// Whether the registry has the two as the same function of torque and motion.
+/// Returns true if the registry has both as the same function of torque and motion.
 pub(super) fn exact(pair: [Kind; 2]) -> bool {
     confused(pair).is_some_and(|c| c.exact)
 }
 
-/// Whether an effect is one constant torque as long as the joint moves.
+/// Returns true if an effect is a constant torque while the joint moves.
 fn constant(kind: Kind) -> bool {
     kind == Kind::TorqueOffset || exact([kind, Kind::TorqueOffset])
 }
 
-/// A motion and how far apart the closest rivals lie along it, standard deviations.
+/// A motion and the separation of its closest rivals, standard deviations.
 type Apart = (Primitive, f64);
 
-/// Distance that the same motion would give in one second: what lasts longer decides more by lasting alone.
+/// Returns the separation per second of motion, since a longer motion separates more by its duration alone.
 fn rate((primitive, apart): &Apart) -> f64 {
     let passes = primitive.hands.passes().len() as f64;
     apart / (passes * primitive.duration()).max(1.0).sqrt()
 }
 
-/// The motion that takes the closest pair apart fastest, of those that decide; where none does, the one that takes them
-/// farthest.
+/// Returns the motion that separates the closest pair fastest, of those that decide. If none decides, it returns the
+/// one with the largest separation.
 fn best(place: &Place, rivals: &[(Effect<f64>, Nominal)], floor: f64) -> Option<Apart> {
     let mut chosen: Option<Apart> = None;
     for hands in [Hands::None, Hands::Payload, Hands::BaseOnItsSide] {
-        // What decides without hands is not asked for with them.
+        // Manual work is not requested if a motion decides without it.
         if chosen.as_ref().is_some_and(|(_, apart)| *apart >= DECIDES) {
             break;
         }
@@ -228,12 +228,12 @@ fn best(place: &Place, rivals: &[(Effect<f64>, Nominal)], floor: f64) -> Option<
     chosen
 }
 
-/// Standard deviations between the closest two rivals that a motion can tell apart, whichever of them is true.
+/// Returns the separation of the closest two rivals in standard deviations, for either as the truth.
 fn closest(course: &Course, rivals: &[(Effect<f64>, Nominal)], revolute: bool, floor: f64) -> f64 {
     nearest(course, rivals, revolute, floor).map_or(0.0, |(apart, _)| apart)
 }
 
-/// The same with the pair; none where no motion tells any apart.
+/// Returns the same with the pair; `None` if no motion separates any.
 fn nearest(
     course: &Course,
     rivals: &[(Effect<f64>, Nominal)],
@@ -242,8 +242,7 @@ fn nearest(
 ) -> Option<(f64, Pair)> {
     let told = pairs(rivals.len()).filter(|[a, b]| !exact([rivals[*a].0.kind, rivals[*b].0.kind]));
     told.map(|[a, b]| {
-        // A constant that the standard model or a spring holds as well shows along no motion, but what is more than a constant
-        // shows.
+        // No motion shows a constant that the standard model or a spring can represent; any other part shows.
         let between = |truth: usize, rival: usize| {
             let spring = rivals[rival].0.kind == Kind::Spring;
             if constant(rivals[truth].0.kind) && (spring || !course.held.constant) {
@@ -257,7 +256,7 @@ fn nearest(
     .min_by(|x, y| x.0.total_cmp(&y.0))
 }
 
-/// How the motion is run, sentences.
+/// Returns sentences on how to run the motion.
 fn running(robot: &Robot, joint: usize, primitive: &Primitive) -> String {
     let (start, seconds) = (primitive.start, primitive.duration());
     let own = &robot.joints[joint];
@@ -315,7 +314,7 @@ fn file_of(robot: &Robot, joint: usize, stand: &[f64], primitive: &Primitive) ->
     }
 }
 
-/// By what splits the pair, with the widest motion of the family that it asks for.
+/// Returns the remedy of the pair, with the widest motion of its family.
 fn by_lookup(
     robot: &Robot,
     joint: usize,
@@ -328,7 +327,7 @@ fn by_lookup(
     let motion = found.motion.zip(place).and_then(|(family, place)| {
         let first = |family| of_family(place, family, Hands::None).into_iter().next();
         let primitive = match family {
-            // Steps of the torque where they are known, else of the friction.
+            // Torque steps if they are known, else friction.
             Family::LockedRotor => clamped(place).or_else(|| first(Family::NestedReversals)),
             other => first(other),
         };

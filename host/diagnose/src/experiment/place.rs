@@ -1,4 +1,4 @@
-//! The joint as the experiments see it: limits, gravity, drive; the other joints stand.
+//! Setup of a joint for experiments: limits, gravity, drive; the other joints stand.
 
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::trajectory::Trajectory;
@@ -16,18 +16,18 @@ use rig_plant::emulated::Nameplate;
 /// Coulomb friction, offset; SI.
 pub type Nominal = [f64; 6];
 
-/// Share of the torque limit that may be used.
+/// Usable share of the torque limit.
 const TORQUE: f64 = 0.8;
-/// Steps of half a period of a joint that coasts.
+/// Integration steps in half a period of a coasting joint.
 const COAST_STEPS: u32 = 10;
-/// Period in which such a joint is looked at, s.
+/// Period of a coasting joint's samples, s.
 const COAST_PERIOD: f64 = 0.01;
-/// Share of the friction that is counted on to keep a joint within its range.
+/// Share of the friction assumed to keep a joint within its range.
 const SURE_OF_FRICTION: f64 = 0.5;
-/// Instants at which the torque is looked at.
+/// Instants at which the torque is checked.
 const LOOKS: usize = 2000;
 
-/// One joint among joints that stand.
+/// One joint, with the others standing.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     pub(super) low: f64,
@@ -35,30 +35,30 @@ pub(super) struct Place {
     pub(super) velocity: f64,
     pub(super) acceleration: f64,
     pub(super) torque: Option<f64>,
-    /// Torque per position error that the rig's controller answers with, where it is known; N·m/rad or N/m.
+    /// Torque per position error of the rig's controller, if known; N·m/rad or N/m.
     pub(super) stiffness: Option<f64>,
-    /// Whether the robot has no other joint.
+    /// True if the robot has no other joint.
     pub(super) alone: bool,
-    /// Where all joints stand.
+    /// Positions of all standing joints.
     pub(super) stand: Vec<f64>,
     /// Middle of the range.
     pub(super) middle: f64,
-    /// Where gravity is strongest, with room to both sides.
+    /// Position of the strongest gravity, with room on both sides.
     pub(super) heavy: f64,
     pub(super) revolute: bool,
-    /// Motor turns per joint turn; 0 where not stated.
+    /// Motor turns per joint turn; 0 if not described.
     pub(super) ratio: f64,
     /// Inertia of the drive at the joint.
     pub(super) drive_inertia: f64,
     /// Torque of gravity per first moment along x: with cos q, with sin q, constant; m/s².
     pub(super) pull: [f64; 3],
     pub(super) nominal: Nominal,
-    /// What of it a refit leaves as described.
+    /// Nominal parameters that a refit keeps as described.
     pub(super) held: Held,
 }
 
 impl Place {
-    /// Of a joint (from 0); none where the description states no finite limits of position and velocity.
+    /// Returns the setup of a joint (from 0); `None` without limits, or for a prismatic joint without finite ones.
     pub(super) fn of(
         robot: &Robot,
         joint: usize,
@@ -72,7 +72,7 @@ impl Place {
             return Ok(None);
         };
         let revolute = own.kind == JointKind::Revolute;
-        // A joint that turns endlessly is asked for one turn.
+        // An endless joint moves over one turn.
         let [low, high] = match limits.for_motions() {
             [l, h] if l.is_finite() && h.is_finite() => [l, h],
             _ if revolute => [-core::f64::consts::PI, core::f64::consts::PI],
@@ -149,8 +149,8 @@ impl Place {
         if self.revolute { "N*m" } else { "N" }
     }
 
-    /// Position, velocity and acceleration of the joint with its drive off at the middles of so many periods (s), with a share of
-    /// its dry and viscous friction: it stops where friction holds its weight.
+    /// Returns position, velocity and acceleration of the coasting joint in the middle of each of `count` periods (s).
+    /// A share of its dry and viscous friction acts. It stops where friction holds its weight.
     pub(super) fn coast(
         &self,
         [mut position, mut velocity]: [f64; 2],
@@ -173,7 +173,7 @@ impl Place {
             let acceleration =
                 -(pull + friction * viscous.abs() * velocity + held * direction) / inertia;
             let next = velocity + acceleration * step;
-            // Dry friction turns nothing round.
+            // Dry friction reverses no motion.
             velocity = if next * direction < 0.0 { 0.0 } else { next };
             position += velocity * step;
             [position, velocity, acceleration]
@@ -188,7 +188,7 @@ impl Place {
             .collect()
     }
 
-    /// Whether a joint whose drive is switched off stays within its range on half its friction.
+    /// Returns true if a joint with its drive off stays within its range with half its friction.
     pub(super) fn stops(&self, primitive: &Primitive) -> bool {
         let Some(off) = primitive.drive_off else {
             return true;
@@ -200,13 +200,13 @@ impl Place {
         self.nominal[0] > 0.0 && (way.iter()).all(|[q, ..]| (self.low..=self.high).contains(q))
     }
 
-    /// Torque of gravity per first moment along x.
+    /// Returns the torque of gravity per first moment along x.
     pub(super) fn pull_at(&self, q: f64) -> f64 {
         let (sine, cosine) = q.sin_cos();
         self.pull[0] * cosine + self.pull[1] * sine + self.pull[2]
     }
 
-    /// Nominal torque of gravity.
+    /// Returns the nominal torque of gravity.
     pub(super) fn weight(&self, q: f64) -> f64 {
         let (sine, cosine) = q.sin_cos();
         if self.revolute {
@@ -216,7 +216,7 @@ impl Place {
         }
     }
 
-    /// Whether the torque limit allows the motion in every pass, Coulomb friction counted in full.
+    /// Returns true if the torque limit allows the motion in every pass, with full Coulomb friction.
     pub(super) fn bears(&self, motion: &Trajectory<f64>, start: f64, hands: Hands) -> bool {
         let Some(limit) = self.torque else {
             return true;
@@ -236,7 +236,7 @@ impl Place {
     }
 }
 
-/// What the controller answers a position error with: as `rig record` tells the rig, else as the description states it.
+/// Returns the controller's torque per position error: as `rig record` sets it on the rig, else as described.
 fn stiffness(robot: &Robot, joint: usize) -> Option<f64> {
     let own = robot.joints.get(joint)?;
     let told = Nameplate::from_robot(robot)

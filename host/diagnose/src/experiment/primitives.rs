@@ -1,4 +1,4 @@
-//! The motions to choose from: safe, within the limits, and such that the rig runs them from a file.
+//! Library of motions: safe, within the limits, and in a file that the rig runs.
 
 use core::f64::consts::TAU;
 
@@ -10,52 +10,52 @@ use rig_shared::trajectory::{
 
 use super::place::Place;
 
-/// Share of each limit that is used.
+/// Used share of each limit.
 const SHARE: f64 = 0.8;
-/// Shares of the acceleration limit that are tried until the torque limit is kept.
+/// Shares of the acceleration limit that are tried to stay within the torque limit.
 const BRISKNESS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
-/// Longest motion, s; the warm-up alone takes longer.
+/// Longest motion, s; only the warm-up is longer.
 const LONGEST: f64 = 120.0;
 const WARM_UP: f64 = 600.0;
-/// Shortest time at constant speed on either side of it, s: a host on a slow line is late by less.
+/// Shortest time at constant speed before and after switching off, s: a host on a slow line is late by less.
 const CRUISE: f64 = 0.25;
-/// Share of the amplitude with which a chirp is repeated.
+/// Share of the amplitude in the second chirp.
 const AGAIN: f64 = 0.3;
-/// Levels of a clamped joint, in shares of the torque that may be used: up and down on either side, so that what depends on
-/// the direction shows.
+/// Torque levels of a clamped joint, as shares of the usable torque: up and down in both directions, to show what
+/// depends on the direction.
 const LEVELS: [f64; 13] = [
     0.2, 0.5, 1.0, 0.5, 0.2, 0.05, -0.05, -0.2, -0.5, -1.0, -0.5, -0.2, -0.05,
 ];
-/// Share of the torque limit that a clamp and a winding at rest are asked to bear.
+/// Share of the torque limit on a clamp and a winding at rest.
 const CLAMPED: f64 = 0.4;
-/// Peaks of the quintic's velocity and acceleration, in distance over time and over time squared.
+/// Peak velocity and acceleration of the quintic, per distance over time and over time squared.
 const QUINTIC: [f64; 2] = [1.875, 5.773_502_691_896_26];
 
-/// What a motion is made for.
+/// Purpose of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
-    /// Forth and back at each of several constant speeds.
+    /// Forth and back at several constant speeds.
     ConstantSpeeds,
-    /// Slow triangles of ever smaller amplitude.
+    /// Slow triangles of decreasing amplitude.
     NestedReversals,
-    /// The same where gravity is strongest, so that it closes a gap.
+    /// The same at the strongest gravity, which closes a gap.
     ReversalsUnderLoad,
     /// Swept sine, and again at a third of its amplitude.
     Chirp,
-    /// A slow way to each of several levels after a rest.
+    /// A slow move to each of several levels after a dwell.
     RampsAfterRest,
     /// A sine at one frequency.
     Sine,
     /// A sine repeated for ten minutes from cold.
     WarmUp,
-    /// A constant speed, and in the middle of it the drive is switched off.
+    /// A constant speed; the drive is switched off in the middle.
     CoastDown,
-    /// Levels of the position that a clamped joint cannot reach, and so of the torque and the voltage.
+    /// Position levels that a clamped joint cannot reach, which become levels of torque and voltage.
     LockedRotor,
 }
 
 impl Family {
-    /// All along which a joint moves.
+    /// All families in which the joint moves.
     pub const MOVING: [Self; 8] = [
         Self::ConstantSpeeds,
         Self::NestedReversals,
@@ -67,7 +67,7 @@ impl Family {
         Self::CoastDown,
     ];
 
-    /// Name in results.
+    /// Returns the name in results.
     pub fn name(self) -> &'static str {
         match self {
             Self::ConstantSpeeds => "constant-speed-pairs",
@@ -83,29 +83,29 @@ impl Family {
     }
 }
 
-/// What is done by hand between the passes of one motion.
+/// Manual work between the passes of one motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hands {
     /// Nothing: one pass.
     None,
     /// A second pass with a payload.
     Payload,
-    /// A second pass with the base turned so that gravity does nothing.
+    /// A second pass with the base turned so that gravity has no effect.
     BaseOnItsSide,
 }
 
 impl Hands {
-    /// Factors on inertia and gravity of the link in each pass.
+    /// Returns the factors on inertia and gravity of the link in each pass.
     pub(super) fn passes(self) -> &'static [[f64; 2]] {
         match self {
             Self::None => &[[1.0, 1.0]],
-            // A payload that adds half of what is there moves well within the limits' reserve.
+            // A payload of half the link's mass stays well within the reserve of the limits.
             Self::Payload => &[[1.0, 1.0], [1.5, 1.5]],
             Self::BaseOnItsSide => &[[1.0, 1.0], [1.0, 0.0]],
         }
     }
 
-    /// What to do and how to use it, sentences.
+    /// Returns sentences: the work, and how to use the recordings.
     pub(super) fn text(self) -> &'static str {
         match self {
             Self::None => "Give what it records with --data beside the others.",
@@ -124,22 +124,23 @@ impl Hands {
 pub(super) struct Primitive {
     pub(super) family: Family,
     pub(super) hands: Hands,
-    /// Where it starts, rad or m.
+    /// Start position, rad or m.
     pub(super) start: f64,
     pub(super) trajectory: Trajectory<f64>,
-    /// When the drive is switched off, s after the start.
+    /// Time at which the drive is switched off, s after the start.
     pub(super) drive_off: Option<f64>,
-    /// Its figures in words.
+    /// Figures in words.
     pub(super) figures: String,
 }
 
 impl Primitive {
-    /// How long one pass is recorded, s.
+    /// Returns the recorded duration of one pass, s.
     pub(super) fn duration(&self) -> f64 {
         (self.drive_off).map_or_else(|| self.trajectory.duration(), |off| off + COASTING)
     }
 
-    /// Position, velocity and acceleration from the start at the middles of so many pieces of one pass, and whether the drive is on.
+    /// Returns position, velocity and acceleration from the start in the middle of each of `rows` pieces of a pass. The
+    /// flag is true if the drive is on.
     pub(super) fn way(&self, place: &Place, rows: usize) -> Vec<(Reference<f64>, bool)> {
         let period = self.duration() / rows as f64;
         let time = |k: usize| (k as f64 + 0.5) * period;
@@ -175,7 +176,7 @@ fn micros(seconds: f64) -> Option<u32> {
     (whole >= 1.0 && whole <= f64::from(u32::MAX)).then_some(whole as u32)
 }
 
-/// What one motion may use.
+/// Limits of one motion.
 struct Allowance {
     distance: f64,
     velocity: f64,
@@ -285,7 +286,7 @@ impl Allowance {
                     WARM_UP
                 };
                 let periods = (long / period).clamp(5.0, f64::from(u16::MAX)) as u16;
-                // Leaves room for what the envelope adds at the ends.
+                // Leaves room for the envelope at the ends.
                 let amplitude = 0.9 * a;
                 let text = format!(
                     "{periods} periods of a sine of {amplitude:.4} {unit} at {:.3} Hz",
@@ -306,7 +307,7 @@ impl Allowance {
     }
 }
 
-/// When a coast-down's drive is switched off, s after the start: half way through its first pass.
+/// Returns the switch-off time of a coast-down, s after the start: half-way through its first pass.
 fn half_way(trajectory: &Trajectory<f64>) -> Option<f64> {
     let Trajectory::FrictionSweep(sweep) = trajectory else {
         return None;
@@ -315,7 +316,7 @@ fn half_way(trajectory: &Trajectory<f64>) -> Option<f64> {
     Some(f64::from(sweep.lead_us + sweep.ramp_us + cruise / 2) * 1e-6)
 }
 
-/// The staircase of a clamped joint; none where the controller's gain or the torque limit is not known.
+/// Returns the staircase of a clamped joint; `None` without a known controller gain or torque limit.
 pub(super) fn clamped(place: &Place) -> Option<Primitive> {
     let highest = CLAMPED * place.torque?;
     let levels = LEVELS.map(|share| share * highest / place.stiffness.unwrap_or(0.0));
@@ -341,7 +342,7 @@ pub(super) fn clamped(place: &Place) -> Option<Primitive> {
     })
 }
 
-/// All motions of a family at a place, over amplitudes and speeds.
+/// Returns all motions of a family at a place, over amplitudes and speeds.
 pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Primitive> {
     let heavy = family == Family::ReversalsUnderLoad;
     let start = if heavy { place.heavy } else { place.middle };
@@ -354,7 +355,7 @@ pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Prim
         Family::WarmUp => (&[1.0], &[1.0]),
         Family::Chirp | Family::RampsAfterRest => (&[1.0, 0.2], &[1.0, 0.2]),
         Family::ConstantSpeeds => (&[1.0], &[1.0, 0.4, 0.15, 0.05, 0.02]),
-        // What is done by hand between two passes is not done to a joint that coasts: weight may carry it anywhere then.
+        // Coasting is not combined with manual work: weight may then carry the joint anywhere.
         Family::CoastDown if place.alone && hands == Hands::None => (&[1.0], &[1.0, 0.4, 0.15]),
         Family::CoastDown | Family::LockedRotor => (&[], &[]),
     };
@@ -373,7 +374,7 @@ pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Prim
             } else {
                 LONGEST
             };
-            // As briskly as the torque limit allows.
+            // The highest acceleration within the torque limit.
             let found = BRISKNESS.iter().find_map(|brisk| {
                 let allowance = Allowance {
                     distance: distance * room,
@@ -381,7 +382,7 @@ pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Prim
                     acceleration: brisk * SHARE * place.acceleration,
                 };
                 let (trajectory, figures) = allowance.build(family, place.unit())?;
-                // In single precision, as the rig runs it.
+                // In single precision, as on the rig.
                 let runs = trajectory.to_f32().to_f64().check(&limits, start).is_ok();
                 let fits = runs && trajectory.duration() <= long;
                 let drive_off = half_way(&trajectory).filter(|_| family == Family::CoastDown);

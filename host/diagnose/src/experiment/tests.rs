@@ -15,7 +15,7 @@ fn robot() -> Robot {
     Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
 }
 
-/// About what the template states.
+/// Approximate values of the template.
 const NOMINAL: Nominal = [0.17, 2.94, 0.0, 0.3, 0.4, 0.0];
 
 fn effect(kind: Kind, gains: &[f64], shapes: &[f64]) -> (Effect<f64>, Nominal) {
@@ -57,7 +57,7 @@ fn what_is_found_for_stribeck_against_presliding_separates_them_as_predicted() {
         effect(Kind::Stribeck, &[0.25], &[0.05]),
         effect(Kind::PreslidingDahl, &[0.4], &[0.01]),
     ];
-    // So much noise that the distance is moderate and the rival's freedom would show in it.
+    // Noise for a moderate distance, in which the rival's freedom shows.
     let floor = 0.5;
     let place = Place::of(&robot, 0, NOMINAL, Held::default())
         .unwrap()
@@ -75,7 +75,7 @@ fn what_is_found_for_stribeck_against_presliding_separates_them_as_predicted() {
         let (standard, own) = access::rows(&course, truth, &NOMINAL, true);
         let nominal = DVector::from_fn(standard.ncols(), |c, _| 0.3 + 0.1 * c as f64);
         let clean = &standard * nominal + own * DVector::from_column_slice(&truth.gains[..1]);
-        // One row stands for `weight` independent values.
+        // One row represents `weight` independent values.
         let weight = primitive.trajectory.duration() * FLOOR_RATE
             / (primitive.trajectory.duration() * FLOOR_RATE)
                 .ceil()
@@ -169,7 +169,7 @@ fn motions_of_every_family_respect_limits_and_torque() {
         println!("{name}: {count} motions");
         assert!(count > 10 * robot.joints.len());
     }
-    // A link too heavy for its motor is not asked to move.
+    // A link too heavy for its motor gets no motion.
     let mut weak = robot();
     weak.joints[0].limits.as_mut().unwrap().torque = Some(0.5);
     let place = Place::of(&weak, 0, NOMINAL, Held::default())
@@ -193,7 +193,7 @@ fn hands_are_asked_for_only_where_no_motion_decides() {
         .unwrap();
     println!("{} {}", easy.experiment.kind, easy.experiment.text);
     assert!(!easy.experiment.kind.contains("payload"));
-    // In noise that no motion overcomes the answer is what grows with the load.
+    // With noise above every motion's separation, a payload decides.
     let rivals = [
         effect(Kind::Cogging, &[0.02, 0.0], &[12.0]),
         effect(Kind::TorqueRipple, &[0.007, 0.0], &[12.0]),
@@ -233,7 +233,7 @@ fn every_confused_pair_of_the_registry_has_an_answer() {
             assert!(e.text.len() > 40 && !e.text.contains('{'));
             assert_eq!(e.file.is_some(), found.trajectory.is_some());
             if confusion.exact {
-                // No motion is promised to do it.
+                // No motion is promised to separate them.
                 assert_eq!(e.separation, None);
             }
             if let Some(file) = &found.trajectory {
@@ -264,7 +264,7 @@ fn exact_pairs_ask_for_another_channel_or_another_load() {
     assert!(off.experiment.text.contains("i1") && off.trajectory.is_none());
     let taken = pair(Kind::TorqueOffset, Kind::AsymmetricCoulomb);
     assert_eq!(taken.experiment.kind, PULLS_OFF);
-    // The torque domain agrees that no motion splits them.
+    // Torque along a motion does not separate them either.
     let place = Place::of(&robot, 0, NOMINAL, Held::default())
         .unwrap()
         .unwrap();
@@ -275,7 +275,7 @@ fn exact_pairs_ask_for_another_channel_or_another_load() {
     assert!(best(&place, &rivals, 0.05).is_none_or(|(_, apart)| apart < 1e-3));
 }
 
-/// One experiment for all names: the motion that tells a third one from exact partners, with what tells the partners apart.
+/// One experiment for all names: a motion separates a third effect from collinear partners, with the partners' remedy.
 #[test]
 fn exact_partners_and_what_a_motion_tells_from_them_share_an_experiment() {
     let constants = [
@@ -299,13 +299,13 @@ fn exact_partners_and_what_a_motion_tells_from_them_share_an_experiment() {
     assert_eq!((e.kind.as_str(), e.hands), (PULLS_OFF, true));
     assert!(e.separation.unwrap() > DECIDES && found.trajectory.is_some());
     assert!(e.text.contains("--pulls-off"), "{}", e.text);
-    // The rig does first what it can do by itself.
+    // What the rig can do alone comes first.
     let found = with(effect(Kind::CurrentOffset, &[0.2], &[]));
     assert_eq!(found.experiment.kind, OFF_LOG);
     assert!(!found.experiment.hands);
 }
 
-/// Where nothing decides, the pair that is least told apart is looked up, in whatever order the rivals come.
+/// If nothing decides, the remedy is for the closest pair, for any order of the rivals.
 #[test]
 fn what_is_looked_up_is_the_closest_pair() {
     let rivals = [
@@ -353,8 +353,8 @@ fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
     assert!(found.experiment.separation.unwrap() > DECIDES);
 }
 
-/// Where the description states which way gravity acts and what is constant, a wide motion tells a tilt from a constant, and
-/// nobody has to turn the base.
+/// With described gravity direction and constant, a wide motion separates a tilt from a constant, without turning the
+/// base.
 #[test]
 fn a_tilt_is_told_from_a_constant_by_a_motion_where_neither_is_in_the_standard_model() {
     let rivals = [
@@ -375,7 +375,7 @@ fn a_tilt_is_told_from_a_constant_by_a_motion_where_neither_is_in_the_standard_m
     assert_eq!(ask(Held::default()).experiment.kind, "base-turned");
 }
 
-/// What a joint loses while it coasts is what friction takes, and it stays where that holds its weight.
+/// A coasting joint loses the energy of friction, and stops where friction holds its weight.
 #[test]
 fn a_joint_that_coasts_keeps_its_energy_balance_and_its_range() {
     let robot = robot();
@@ -407,12 +407,12 @@ fn a_joint_that_coasts_keeps_its_energy_balance_and_its_range() {
         );
         assert!(balance.abs() < 2e-3 * lost, "{balance} of {lost}");
         assert!((way.iter()).all(|[q, ..]| (place.low..=place.high).contains(q)));
-        // It stands where friction holds its weight, and only there.
+        // It stands exactly where friction holds its weight.
         assert_eq!(speed == 0.0, place.weight(end).abs() <= coulomb);
         count += 1;
     }
     assert!(count > 1);
-    // It would fall through the end of a narrow range, and an arm's controller has no such file.
+    // It would leave a narrow range, and an arm's controller has no such file.
     let mut narrow = place.clone();
     (narrow.low, narrow.high) = (-1.0, 1.0);
     assert!(of_family(&narrow, Family::CoastDown, Hands::None).is_empty());
@@ -453,7 +453,7 @@ fn a_clamped_joint_is_asked_for_steps_of_the_torque_within_its_limit() {
         "{torques:?}"
     );
     assert!(torques.contains(&-highest));
-    // Whose gain nobody states is asked for slow reversals.
+    // Without a described gain, slow reversals are proposed.
     let emps = Robot::from_toml(EMPS, Path::new("emps.toml")).unwrap();
     let mut unknown = emps.clone();
     unknown.joints[0].controller = None;

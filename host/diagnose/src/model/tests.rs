@@ -1,4 +1,4 @@
-//! The description written is the fit.
+//! The written description equals the fit.
 
 #![allow(clippy::unwrap_used)]
 
@@ -23,12 +23,12 @@ fn found(effect: Effect, seed: u64) -> (Made, Diagnosis, Robot) {
     .make()
     .unwrap();
     let options = Options {
-        // A torque check leaves these out.
+        // A torque check does not include these.
         without: vec![Kind::Backlash, Kind::JointElasticity],
         ..Options::default()
     };
     let (diagnosis, model) = made.diagnosed(&made.robot, &options);
-    // As it is read from the file.
+    // As read from the file.
     let text = model.to_toml().unwrap();
     let read = Robot::from_toml(&text, Path::new("model.toml")).unwrap();
     assert_eq!(read, model);
@@ -54,7 +54,7 @@ fn left(robot: &Robot, made: &Made) -> f64 {
     (0.5 * squares).sqrt()
 }
 
-/// RMS that a diagnosis leaves of a description as it stands, on the rows that it uses.
+/// Returns the RMS residual of a description without a refit, on the diagnosis' rows.
 fn frozen(robot: &Robot, made: &Made) -> f64 {
     let (found, _) = made.diagnosed(robot, &Options::default());
     found.waterfall[0].train[0]
@@ -72,8 +72,8 @@ fn the_description_predicts_what_the_fit_does_with_weakening_friction() {
     assert_eq!(model.effects.len(), 1);
     let [before, after] = diagnosis.steps[0].train_rms;
     let own = left(&model, &made);
-    // The torque check and the diagnosis choose the rows that they judge by rules of their own: single rows there, their
-    // neighbourhood here. How much of what is allowed comes from that was not measured.
+    // Torque check and diagnosis select rows differently: single rows there, their neighbourhood here. The share of the
+    // tolerance that this needs was not measured.
     assert!((own / after - 1.0).abs() < 0.2, "{own} {after}");
     assert!(own < 0.7 * before, "{own} {before}");
     assert!(left(&made.robot, &made) > 1.3 * own);
@@ -100,9 +100,9 @@ fn a_tilted_base_is_gravity_turned() {
     assert!((pull.after / truth - 1.0).abs() < 0.03, "{pull:?} {truth}");
     let [_, after] = diagnosis.steps[0].train_rms;
     let own = left(&model, &made);
-    // The diagnosis leaves rows about rests out, which are in this …
+    // The diagnosis excludes rows near rests, which this includes …
     assert!((own / after - 1.0).abs() < 0.08, "{own} {after}");
-    // … and not in what it leaves of the description that came out.
+    // … unlike the diagnosis of the resulting description.
     let again = frozen(&model, &made);
     assert!((again / after - 1.0).abs() < 1e-3, "{again} {after}");
     assert!(left(&made.robot, &made) > 1.3 * own);

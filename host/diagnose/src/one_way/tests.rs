@@ -17,7 +17,7 @@ use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 /// Dry friction and constant torque of the joint, N·m.
 const TRUTH: [f64; 2] = [2.0, 0.15];
 
-/// Speeds from 0 to 3 rad/s, with two rests, in one direction, or the other way every second time.
+/// Speeds from 0 to 3 rad/s, with two rests, in one direction, or with `both` reversed every second time.
 fn moved(seed: u64, direction: f64, both: bool) -> InMemory {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -53,7 +53,7 @@ fn moved(seed: u64, direction: f64, both: bool) -> InMemory {
     }
 }
 
-/// Of a description that has no place for a constant torque, as a URDF.
+/// Diagnoses a description without a field for a constant torque, such as a URDF.
 fn diagnosed(direction: f64, both: bool) -> (Diagnosis, Robot) {
     let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
     robot.joints[0].limits = None;

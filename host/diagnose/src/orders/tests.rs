@@ -1,4 +1,4 @@
-//! Motors with many waves, made by a few lines of their own, and real ones.
+//! Motors with many waves: simulated independently, and real ones.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ use rig_output::data_dir;
 
 const INERTIA: f64 = 5e-6;
 
-/// A motor without load, and the same where nothing is said of its drive.
+/// A motor without load; without `drive`, its drive is not described.
 fn motor(drive: bool) -> Robot {
     let mut text = "name = 'motor'\ngravity = [0.0, 0.0, -9.81]\n[[joint]]\nname = 'axis'\nkind = 'revolute'\nalpha = 0.0\na = 0.0\ntheta = 0.0\nd = 0.0\n".to_owned();
     text += if drive {
@@ -27,8 +27,8 @@ fn motor(drive: bool) -> Robot {
     Robot::from_toml(&text, Path::new("motor.toml")).unwrap()
 }
 
-/// Cosines over the angle, each of an order and an amplitude, under a swing whose speed has these amplitudes at 0.21, 0.37 and 0.9 Hz;
-/// inertia, viscous and dry friction, and the noise of the torque.
+/// Cosines over the angle, each with an order and an amplitude, under a swing with these speed amplitudes at 0.21, 0.37
+/// and 0.9 Hz; then inertia, viscous and dry friction, and torque noise.
 fn waving(
     waves: &[(f64, f64)],
     swing: [f64; 3],
@@ -75,7 +75,7 @@ fn diagnosed(robot: &Robot, recording: &InMemory) -> (Diagnosis, Robot) {
     diagnose(robot, &[recording], &[], &Options::default(), &mut |_| ()).unwrap()
 }
 
-/// Order and amplitude of each wave of the motor that a description has, by order.
+/// Returns order and amplitude of each described motor wave, by order.
 fn waves_of(robot: &Robot) -> Vec<(f64, f64)> {
     let effects = robot.effects.iter().map(|e| e.effect);
     let mut waves: Vec<(f64, f64)> = effects
@@ -86,7 +86,7 @@ fn waves_of(robot: &Robot) -> Vec<(f64, f64)> {
     waves
 }
 
-/// Asserts that these waves are found with these amplitudes within 10 %.
+/// Asserts that these waves are found, with amplitudes within 10 %.
 fn assert_near(found: &[(f64, f64)], made: &[(f64, f64)]) {
     println!("{found:?}");
     for (order, size) in made {
@@ -96,7 +96,7 @@ fn assert_near(found: &[(f64, f64)], made: &[(f64, f64)]) {
     }
 }
 
-/// The amplitudes of a real motor, in N·m at 0.025 N·m/A.
+/// Amplitudes of a real motor, in N·m at 0.025 N·m/A.
 const REAL: [(f64, f64); 5] = [
     (12.0, 7.75e-4),
     (18.0, 1.05e-3),
@@ -116,12 +116,12 @@ fn five_orders_of_one_motor_are_found_written_and_read() {
     assert_eq!(names, ["cogging"; 5], "{:?}", found.words);
     let read = Robot::from_toml(&model.to_toml().unwrap(), Path::new("model.toml")).unwrap();
     assert_near(&waves_of(&read), &REAL);
-    // The description states them now, and nothing is missing.
+    // The description now states them, and nothing is missing.
     let (again, _) = diagnosed(&read, &waving(&REAL, [3.0, 4.0, 1.5], friction, 5));
     assert!(again.steps.is_empty(), "{:?}", again.words);
 }
 
-/// Behind a gear whose ratio is not stated, over a third of a turn.
+/// Behind a gear of unknown ratio, over a third of a turn.
 #[test]
 fn twelve_hundred_periods_a_turn_are_found() {
     let made = [(400.0, 0.03), (1200.0, 0.2)];
@@ -134,7 +134,7 @@ fn twelve_hundred_periods_a_turn_are_found() {
     assert_eq!(found.steps.len(), 2, "{:?}", found.words);
 }
 
-/// Order of each wave of a gear that is found where its teeth have these errors.
+/// Returns the orders that are found for a gear with these errors.
 fn of_a_gear(errors: &[(f64, f64)], seed: u64) -> Vec<f64> {
     let friction = [0.01, 0.05, 0.1, 0.01];
     let recording = waving(errors, [8.0, 6.0, 2.0], friction, seed);
@@ -150,7 +150,7 @@ fn of_a_gear(errors: &[(f64, f64)], seed: u64) -> Vec<f64> {
     orders
 }
 
-/// The error of an eccentric gear over its turn is no pure sine; two periods a turn as large as the half of it are another error.
+/// The error of an eccentric gear is no pure sine; two periods per turn with half its size are another error.
 #[test]
 fn a_harmonic_of_an_eccentric_gear_is_no_second_effect_and_a_second_error_is_one() {
     for seed in [11, 12, 13] {
@@ -160,7 +160,7 @@ fn a_harmonic_of_an_eccentric_gear_is_no_second_effect_and_a_second_error_is_one
     assert_eq!(of_a_gear(&[(1.0, 0.2), (2.0, 0.1)], 14), [1.0, 2.0]);
 }
 
-/// Columns of a text file by their names, each row's in this order.
+/// Returns columns of a text file by name, row by row in this order.
 fn columns(file: &str, names: [&str; 3]) -> Option<Vec<[f64; 3]>> {
     let Some(folder) = data_dir() else {
         println!("SKIPPED: the folder of real recordings is not there; set RIG_DATA to it.");
@@ -177,7 +177,7 @@ fn columns(file: &str, names: [&str; 3]) -> Option<Vec<[f64; 3]>> {
     Some(lines.map(row).collect())
 }
 
-/// Rows of time, position and torque at 1 kHz, interpolated where the stamps are rounded.
+/// Returns rows of time, position and torque at 1 kHz, interpolated between rounded stamps.
 fn recording(rows: &[[f64; 3]]) -> InMemory {
     let mut joint = JointColumns::default();
     let mut t = Vec::new();
@@ -205,8 +205,8 @@ fn recording(rows: &[[f64; 3]]) -> InMemory {
     }
 }
 
-/// Andrade's ODRI motor (heitor-andrade/laas_anti_cogging), turning slowly without compensation: order, amplitude of the map of held
-/// positions, and by plain least squares on this recording with the torque as it is stamped, A. The truth is not known better.
+/// Andrade's ODRI motor (heitor-andrade/laas_anti_cogging), turning slowly without compensation: order, amplitude from
+/// the map of held positions and by least squares on this recording as stamped, A. The truth is not known better.
 const MEASURED: [(f64, f64, f64); 5] = [
     (12.0, 0.031, 0.036),
     (18.0, 0.042, 0.045),
@@ -244,7 +244,7 @@ fn the_orders_of_a_real_motor_are_found_and_no_others() {
     );
 }
 
-/// Joint 7 of a Kinova Gen3 (SedkiLmm/dynamic-identification): 12 periods a turn of the motor behind a gear of 100 : 1.
+/// Joint 7 of a Kinova Gen3 (SedkiLmm/dynamic-identification): 12 periods per motor turn behind a gear of 100 : 1.
 #[test]
 fn the_wave_of_a_real_arms_joint_is_found() {
     let Some(mut rows) = columns(

@@ -7,8 +7,8 @@ use crate::outcome::Detectable;
 use crate::test_made::Diagnosed as _;
 use rig_scenario::{Effect, Hidden, Scenario};
 
-/// What shows weakening friction is the speed: before the step the residual leaves its own band, after it it does not, and
-/// the curves of the hold-out lie closer with the effect than without.
+/// Weakening friction shows over the speed: only before the step does the residual leave its band. With the effect, the
+/// hold-out's curves are closer.
 #[test]
 fn weakening_friction_is_drawn_over_the_speed() {
     let effect = Effect::Stribeck {
@@ -44,7 +44,7 @@ fn weakening_friction_is_drawn_over_the_speed() {
     };
     assert!(error(2) < 0.5 * error(1), "{} {}", error(1), error(2));
 
-    // Words with figures, and limits of the data.
+    // Sentences with figures, and limits of the data.
     assert!(found.words.iter().any(|w| w.contains("stribeck at joint")));
     assert!(found.steps[0].why.contains("hold-out"));
     assert!(found.noise_floor_how.contains("train and repeat"));
@@ -64,7 +64,7 @@ fn weakening_friction_is_drawn_over_the_speed() {
         .iter()
         .find(|d| d.effect == "cogging")
         .unwrap();
-    // The noise floor is some 0.05 N·m: a hundredth of it cannot show, and thirty times it cannot hide.
+    // The noise floor is about 0.05 N·m: a hundredth of it cannot show, and thirty times it cannot hide.
     assert!((5e-4..1.5).contains(&cogging.size), "{}", cogging.size);
     println!(
         "{:#?}\n{:#?}\n{:#?}",
@@ -73,8 +73,8 @@ fn weakening_friction_is_drawn_over_the_speed() {
     println!("{:#?}\n{:#?}", found.not_testable, found.next_experiment);
 }
 
-/// Bins by equal numbers of rows, of a joint that is driven at 0.05 rad/s for long: those within the noise of that speed are drawn as
-/// one, those near rest, however narrow, and those far out stand alone.
+/// Bins by equal numbers of rows, for a joint that runs at 0.05 rad/s for long. Those within the noise of that speed
+/// are drawn as one; those near rest and far out stay separate.
 #[test]
 fn bins_within_the_noise_of_one_speed_are_drawn_as_one() {
     let edges = [
@@ -82,6 +82,6 @@ fn bins_within_the_noise_of_one_speed_are_drawn_as_one() {
     ];
     let group = super::told_apart(&edges);
     assert_eq!(group, [0, 1, 2, 3, 4, 5, 6, 6, 6, 7, 8]);
-    // Twice the same edge, as of a quantity that is mostly zero, is no width.
+    // Equal edges, as of a mostly zero quantity, give no width.
     assert_eq!(super::told_apart(&[0.0, 0.0, 0.0, 1.0]), [0, 1, 2]);
 }

@@ -1,4 +1,4 @@
-//! When a joint counts as explained.
+//! Conditions for an explained joint.
 
 #![allow(clippy::unwrap_used)]
 
@@ -6,30 +6,30 @@ use super::*;
 
 const REPEATED: FloorFrom = FloorFrom::RepeatedRuns;
 
-/// Whether a named joint without squares of the treatment is explained.
+/// Returns true if a joint with an effect is explained, without an allowance for the treatment.
 fn named(rms: [f64; 2], floor: f64, from: FloorFrom) -> bool {
     explained(rms, floor, 0.0, true, from)
 }
 
-/// The rig without slow reversals, whose presliding stays: 58 % of the gap closed, 1.19 times the floor left.
+/// The rig without slow reversals, whose presliding remains: 58 % of the gap closed, residual 1.19 times the floor.
 #[test]
 fn a_gap_that_is_half_closed_is_not_explained() {
     assert!(!named([0.0440, 0.0362], 0.0304, REPEATED));
     assert!(named([0.0440, 0.0310], 0.0304, REPEATED));
-    // What lies at the floor is explained however small the gap was.
+    // A residual at the floor is explained, however small the gap was.
     assert!(named([0.0350, 0.0330], 0.0304, REPEATED));
     // Far above the floor, with nearly all of a large gap closed.
     assert!(named([1.0, 0.05], 0.0304, REPEATED));
     assert!(!named([20.0, 14.0], 0.5, REPEATED));
 }
 
-/// Without a floor that no model made, no residual is noise by itself: it has to fall by nearly all of itself.
+/// Without a floor from data alone, the residual must fall by nearly all of itself.
 #[test]
 fn without_a_floor_the_residual_itself_has_to_fall() {
     let unknown = |rms| named(rms, f64::NAN, FloorFrom::Unknown);
     assert!(!unknown([0.0440, 0.0310]));
     assert!(unknown([0.44, 0.031]));
-    // A residual that filters and differences make is no remainder.
+    // A residual from filters and differences is no remainder.
     assert!(explained(
         [0.01, 0.01],
         f64::NAN,
@@ -66,7 +66,7 @@ fn left(joint: &str, rms: [f64; 2], floor: f64, torque: f64) -> Left {
     }
 }
 
-/// The largest share of its torque speaks, with its size and no share of a gap.
+/// The joint with the largest share of its torque is reported, with its size and no share of a gap.
 #[test]
 fn the_remainder_is_that_of_the_joint_that_is_explained_least() {
     let all = [

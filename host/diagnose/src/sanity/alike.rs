@@ -1,12 +1,12 @@
-//! Factors of a ratio, too small for a unit, that all the description states shows alike.
+//! Small ratio errors that change all described parameters by one factor.
 //!
-//! A payload, a worn gear or a cold one changes weight, inertia or friction. Nothing but a ratio changes all of them by one
-//! factor: of a torque that is f times too large weight, inertia, viscous and dry friction are f times what is described; of a
-//! position that is f times too large inertia and viscous friction are 1/f of it, dry friction is as described and gravity has
-//! another period.
+//! A payload or a worn or cold gear changes weight, inertia or friction. Only a ratio changes all of them alike. If a
+//! torque is f times too large, weight, inertia, viscous and dry friction are f times the described. If a position is f
+//! times too large, inertia and viscous friction are 1/f of it. Dry friction is as described, and gravity has another
+//! period.
 //!
-//! Leaves out: joints whose friction or links are not described, those whose motors move other joints too, and slides'
-//! positions, which have no period.
+//! Leaves out: joints without described friction or links; motors that move several joints; positions of prismatic
+//! joints, which have no period.
 
 use super::super::DiagnoseError;
 use super::super::outcome::About;
@@ -18,22 +18,22 @@ use super::trial::Suspicion;
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
 
-/// A wrong ratio is no smaller factor of a position.
+/// Least factor of a position by a wrong ratio.
 const LEAST: f64 = 1.5;
-/// … or of a torque, as a payload in a cold rig comes near.
+/// … of a torque; a payload in a cold rig comes near.
 const LEAST_OF_TORQUE: f64 = 1.8;
-/// Weight and inertia are off by one ratio alike within this factor; a payload adds to each what it will.
+/// Ratio up to which weight and inertia agree with one factor; a payload changes each differently.
 const ALIKE: f64 = 1.15;
-/// Weight and inertia of a description are right within this factor, its friction within the square of it.
+/// Ratio up to which a description's weight and inertia are right; friction within its square.
 const RIGHT: f64 = 1.25;
-/// Share of what is left that gravity of another period has to leave, at most; that all else fits is what decides.
+/// Least improvement by another period of gravity, as ratio of residuals; the agreement of all else decides.
 const BETTER: f64 = 0.95;
-/// Standard deviations that each has to stand from zero.
+/// Least distance of each value from zero, standard deviations.
 const CLEAR: f64 = 5.0;
-/// Farthest factor of a position in steps of 3 %; units are farther.
+/// Largest factor of a position in steps of 3 %; units are larger.
 const FARTHEST: i32 = 55;
 
-/// What is measured over what is described.
+/// Measured over described values.
 struct Shares {
     dry: f64,
     viscous: f64,
@@ -42,7 +42,7 @@ struct Shares {
     unexplained: f64,
 }
 
-/// How far apart two shares are, as a factor of at least one.
+/// Returns the distance of two shares, as a factor of at least one.
 fn apart(a: f64, b: f64) -> f64 {
     if a <= 0.0 || b <= 0.0 {
         return f64::INFINITY;
@@ -51,10 +51,10 @@ fn apart(a: f64, b: f64) -> f64 {
 }
 
 impl Judge<'_> {
-    /// The ratio that all that is described of joint `j` is off by.
+    /// Returns the ratio error that all described values of joint `j` show.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the description is no chain.
+    /// [`DiagnoseError::Model`] if the description is no chain.
     pub(super) fn alike(
         &self,
         j: usize,
@@ -72,12 +72,12 @@ impl Judge<'_> {
         self.position_alike(j, &recorded)
     }
 
-    /// A torque that is a multiple of the joint's.
+    /// Suspects a torque that is a multiple of the joint's.
     fn torque_alike(&self, j: usize, shares: &Shares) -> Result<Option<Suspicion>, DiagnoseError> {
         let three = [shares.weight, shares.viscous, shares.dry];
         let factor = three.iter().product::<f64>().cbrt();
         let drive = self.robot.joints[j].drive.as_ref();
-        // Where the ratio of the description is wrong, so is its reflected rotor, by the square.
+        // A wrong described ratio changes the reflected rotor by its square.
         let rotor = drive.map_or(0.0, |d| d.rotor_inertia * d.gear_ratio * d.gear_ratio);
         let parameters = self.robot.standard_parameters().concat();
         let own = self.inertia(j)?;
@@ -101,12 +101,12 @@ impl Judge<'_> {
                     format_significant(shares.dry, 3),
                 ),
             );
-            // Four values by one factor: no trial of masses alone sees that.
+            // A trial of masses alone cannot show four values with one factor.
             Suspicion { fault, undo: None }
         }))
     }
 
-    /// A position that is a multiple of the joint's.
+    /// Suspects a position that is a multiple of the joint's.
     fn position_alike(
         &self,
         j: usize,
@@ -143,7 +143,7 @@ impl Judge<'_> {
             }))
     }
 
-    /// Measured over described of joint `j`; none where something is not described or does not show.
+    /// Returns measured over described values of joint `j`; `None` if any is not described or not identifiable.
     fn shares(&self, data: &Rows, j: usize, described: &Described) -> Option<Shares> {
         let friction = self.robot.joints[j].friction.as_ref()?;
         if !described.motors.is_empty() || friction.coulomb <= 0.0 || friction.viscous <= 0.0 {

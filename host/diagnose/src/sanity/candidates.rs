@@ -1,8 +1,8 @@
-//! Transformations of a recording that would make the description explain it: columns in another order, counted the other way
-//! round, from another zero or by another factor, and gravity of another direction.
+//! Transformations of a recording that make the description explain it: another order of columns, a reversed sense,
+//! another zero or factor, and another direction of gravity.
 //!
-//! Each transformation is undone in turn and the torques of all joints are explained anew; what makes the data by far the most
-//! likely is suspected. The trial ([`super::trial`]) decides.
+//! Each transformation is undone in turn and the torques of all joints are fitted again. The ones that make the data by
+//! far the likeliest are suspected; the trial ([`super::trial`]) decides.
 
 use nalgebra::DMatrix;
 
@@ -15,45 +15,45 @@ use super::senses::{Described, friction};
 use super::trial::Suspicion;
 use super::undo::{Columns, Undo};
 
-/// Rise of the logarithm of the residuals' variances, summed over the joints, from which on an undone fault is believed: as
-/// if one joint's variance fell to a tenth. A description may be far off, and a fault undone may by chance bring it nearer.
+/// Least fall of the log residual variances, summed over joints, to believe a transformation: one joint's falls to a
+/// tenth. A description may be far off, and a transformation may improve it by chance.
 const CONVINCING_TO_DESCRIPTION: f64 = 2.3;
-/// The same where all parameters are fitted, so that only the model's form speaks: a fall to less than a quarter.
+/// The same if all parameters are fitted, so that only the model's form counts: a fall to less than a quarter.
 const CONVINCING_TO_FIT: f64 = 1.5;
-/// How many are tried.
+/// Most transformations that are suspected.
 const SUSPECTS: usize = 4;
-/// Joints that move less than this share of the widest do not count, rad or m.
+/// Share of the widest motion, rad or m, below which a joint does not count.
 const STILL: f64 = 1e-4;
 
-/// A transformation, and shares of the torques' variance that are left of the joints it concerns, as recorded and without it.
+/// A transformation, and the residual variance shares of its joints, as recorded and without it.
 pub(super) struct Found {
     pub(super) undo: Undo,
     gain: f64,
     left: [f64; 2],
-    /// Whether the other columns of the same joints would explain it, too.
+    /// True if the other columns of the same joints explain it too.
     twin: bool,
 }
 
-/// What a recording leaves of the torques as it stands, which transformations are compared with.
+/// Residuals of the recording as it is, for comparison with transformations.
 pub(super) struct Before {
     /// Rows of the trial.
     rows: Rows,
     /// Joints that move.
     pub(super) moving: Vec<usize>,
-    /// Share of each torque's variance.
+    /// Residual share of each torque's variance.
     left: Vec<f64>,
-    /// Gain from which on a transformation is believed.
+    /// Least gain to believe a transformation.
     pub(super) enough: f64,
 }
 
 impl Before {
-    /// Rise of the logarithm of the residuals' variances, summed over the joints that move.
+    /// Returns the fall of the log residual variances, summed over the moving joints.
     fn gain(&self, after: &[f64]) -> f64 {
         let of = |j: &usize| (self.left[*j].max(EXACT) / after[*j].max(EXACT)).ln();
         self.moving.iter().map(of).sum()
     }
 
-    /// Joints that the recording leaves poor and the transformation explains at least twice as well.
+    /// Returns the poorly explained joints whose residual variance the transformation at least halves.
     fn mended(&self, after: &[f64]) -> Vec<usize> {
         let mends = |j: &usize| self.left[*j] > POOR && after[*j] < 0.5 * self.left[*j];
         self.moving.iter().copied().filter(mends).collect()
@@ -61,7 +61,7 @@ impl Before {
 }
 
 impl Judge<'_> {
-    /// Those that would explain the recording, the likeliest first; none of a single joint, of which others speak.
+    /// Returns the transformations that explain the recording, the likeliest first; none for a single joint.
     pub(super) fn transformed(&self) -> Result<Vec<Found>, DiagnoseError> {
         let rows = self.rows.thinned(TRIAL);
         let ranges: Vec<f64> = rows.q.iter().map(|q| range(q)).collect();
@@ -91,7 +91,7 @@ impl Judge<'_> {
         for undo in self.candidates(&before)? {
             let after = self.left_without(&undo, &before.rows)?;
             let concerned = concerned(&undo, &before, &after);
-            // One joint's gravity is turned by its own columns as well.
+            // One joint's own columns explain turned gravity as well.
             if concerned.is_empty() || concerned.len() < 2 && matches!(undo, Undo::Gravity(_)) {
                 continue;
             }
@@ -117,7 +117,7 @@ impl Judge<'_> {
         Ok(all)
     }
 
-    /// What is tried.
+    /// Returns the transformations to try.
     fn candidates(&self, before: &Before) -> Result<Vec<Undo>, DiagnoseError> {
         let mut all = Vec::new();
         for which in [Columns::Torques, Columns::Positions, Columns::Joints] {
@@ -142,7 +142,7 @@ impl Judge<'_> {
         Ok(all)
     }
 
-    /// Rise of the logarithm of the residuals' variances by taking a transformation back.
+    /// Returns the fall of the log residual variances when a transformation is undone.
     pub(super) fn gain_without(&self, undo: &Undo, before: &Before) -> Result<f64, DiagnoseError> {
         Ok(before.gain(&self.left_without(undo, &before.rows)?))
     }
@@ -154,7 +154,7 @@ impl Judge<'_> {
         }
     }
 
-    /// As a fault of the recording.
+    /// Returns the transformation as a fault of the recording.
     pub(super) fn said(&self, found: &Found) -> Option<Suspicion> {
         let fault = match &found.undo {
             Undo::Order(which, order) => self.order_said(*which, order, found),
@@ -202,8 +202,8 @@ impl Judge<'_> {
         self.say("sign", About::Motion, j, text)
     }
 
-    /// Share of each torque's variance that is left: by the description as it stands where it states every link, which has few
-    /// numbers to fit, else by one set of parameters for all joints.
+    /// Returns the residual share of each torque's variance: by the description, which has few free numbers, if it
+    /// states every link; else by one set of parameters for all joints.
     fn left(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
         if self.states_from(0) {
             self.left_of_description(rows, self.robot.gravity)
@@ -262,8 +262,8 @@ impl Judge<'_> {
 }
 
 impl Found {
-    /// Whether the recording is poor as it stands, good without the fault, and by far the better. What has a value of its own that
-    /// was fitted has to be better by more.
+    /// Returns true if the recording is poor as it is, good without the fault, and much better. A transformation with a
+    /// fitted value must be better by more.
     fn convinces(&self, enough: f64) -> bool {
         let [recorded, without] = self.left;
         let fitted = match self.undo {
@@ -277,7 +277,7 @@ impl Found {
             && self.gain > enough
     }
 
-    /// Whether it is about one joint's sense alone.
+    /// Returns true if it concerns one joint's sense alone.
     pub(super) fn is_sense(&self) -> bool {
         matches!(
             self.undo,
@@ -285,7 +285,7 @@ impl Found {
         )
     }
 
-    /// Whether both scale the position of the same joint.
+    /// Returns true if both scale the position of the same joint.
     pub(super) fn is_of(&self, other: &Undo) -> bool {
         match (&self.undo, other) {
             (Undo::Position(Some(a), _), Undo::Position(Some(b), _)) => a == b,
@@ -293,17 +293,17 @@ impl Found {
         }
     }
 
-    /// Whether it is a joint's zero.
+    /// Returns true if it is a joint's zero.
     pub(super) fn is_zero(&self) -> bool {
         matches!(self.undo, Undo::Zero(..))
     }
 
-    /// Whether the other columns of the same joints would explain it, too.
+    /// Returns true if the other columns of the same joints explain it too.
     pub(super) fn has_twin(&self) -> bool {
         self.twin
     }
 
-    /// How much better the recording is explained without it, a clause.
+    /// Returns how much better the fit is without it, a clause.
     pub(super) fn compared(&self) -> String {
         let [recorded, without] = self.left.map(|share| 100.0 * share);
         format!(
@@ -311,11 +311,11 @@ impl Found {
         )
     }
 
-    /// Whether both say the same of torque and position of the same joints.
+    /// Returns true if both mean the same for torque and position of the same joints.
     fn is_twin(&self, other: &Self) -> bool {
         match (&self.undo, &other.undo) {
             (Undo::Order(own, a), Undo::Order(other, b)) => {
-                // Where the torques' order is one, the positions' is its inverse.
+                // The positions' order is the inverse of the torques'.
                 let columns = [own, other];
                 let both =
                     columns.contains(&&Columns::Torques) && columns.contains(&&Columns::Positions);
@@ -333,7 +333,7 @@ fn range(values: &[f64]) -> f64 {
     most - values.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// The joints whose torques show a transformation.
+/// Returns the joints whose torques show a transformation.
 fn concerned(undo: &Undo, before: &Before, after: &[f64]) -> Vec<usize> {
     match undo {
         Undo::Gravity(_) | Undo::Zero(..) | Undo::Position(None, _) => before.mended(after),

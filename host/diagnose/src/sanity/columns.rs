@@ -1,4 +1,4 @@
-//! What the columns say about themselves and each other, without a model.
+//! Faults that columns show by themselves and against each other, without a model.
 
 use std::ops::Range;
 
@@ -13,36 +13,36 @@ use rig_data::{
 };
 use rig_model::robot::{JointKind, Robot};
 
-/// Less than this cannot hold a reversal and a repetition of it, s.
+/// Shortest recording, s, with a reversal and its repetition.
 const SHORTEST: f64 = 1.0;
-/// Less than this in all holds too few stretches of a motion to learn a name from some and to try it on others, s.
+/// Least training time in all, s: some stretches give a name and others test it.
 const LEAST_TO_LEARN: f64 = 5.0;
-/// … and to judge by.
+/// … and least time to judge by.
 const LEAST_TO_JUDGE: f64 = 2.0;
-/// Fewer rows than this cannot hold the parameters of one joint.
+/// Fewest rows for the parameters of one joint.
 const FEWEST: usize = 100;
-/// Share of the moving time at the torque limit that leaves too little to learn from.
+/// Share of the moving time at the torque limit above which too little data remains.
 const AT_LIMIT: f64 = 0.2;
 
-/// No joint moves that spans less, rad or m.
+/// Least range of a joint that moves, rad or m.
 const LEAST_MOTION: f64 = 1e-5;
-/// … or less than this times what the filter takes for noise.
+/// … and as a multiple of the noise that the filter removes.
 const ABOVE_NOISE: f64 = 8.0;
-/// Within a second, of the steps in which its encoder reads.
+/// Least range within a second, in steps of the encoder.
 const STEPS: f64 = 3.0;
 
-/// Whether a column has no derivative, or no size, that could be held against a model: every joint would look wrong.
+/// Returns true if a column has no derivative or no size to compare with a model: every joint would look wrong.
 pub(super) fn spoils_the_model(fault: &DataFault) -> bool {
     fault.certain && ["jump", "held", "unsigned"].contains(&fault.kind.as_str())
 }
 
-/// The name of the recording.
+/// Returns the name of the recording.
 pub(super) fn label(runs: &[&Run]) -> String {
     runs.first()
         .map_or_else(String::new, |run| run.label.clone())
 }
 
-/// A fault of the recording.
+/// Returns a fault of the recording.
 pub(super) fn fault(
     runs: &[&Run],
     kind: &str,
@@ -65,7 +65,7 @@ fn span(values: &[f64]) -> (f64, f64) {
     (values.iter()).fold(ends, |(low, high), v| (low.min(*v), high.max(*v)))
 }
 
-/// Furthest distance between filtered positions, over what the filter takes for noise.
+/// Returns the range of filtered positions, and the noise that the filter removes.
 fn motion(run: &Run, joint: usize) -> (f64, f64) {
     let Some(own) = run.joints.get(joint) else {
         return (0.0, 0.0);
@@ -76,13 +76,13 @@ fn motion(run: &Run, joint: usize) -> (f64, f64) {
     ((high - low).max(0.0), noise.sqrt())
 }
 
-/// Whether a joint moves at all: by more than its noise and than a hundredth of a millirad.
+/// Returns true if a joint moves by more than its noise and a hundredth of a millirad.
 pub(crate) fn moves(run: &Run, joint: usize) -> bool {
     let (range, noise) = motion(run, joint);
     range > LEAST_MOTION && range > ABOVE_NOISE * noise
 }
 
-/// The time covered, or what stands in the way of judging anything.
+/// Returns a fault if the recording is too short to judge.
 pub(super) fn too_short(runs: &[&Run]) -> Option<DataFault> {
     let rows: usize = runs.iter().map(|run| run.len()).sum();
     let time: f64 = runs
@@ -102,8 +102,8 @@ pub(super) fn too_short(runs: &[&Run]) -> Option<DataFault> {
     })
 }
 
-/// Seconds of a run in which some joint moves: those over which a filtered position spans more than its noise and than the
-/// steps in which it is read.
+/// Returns the seconds of a run in which some joint moves: a filtered position spans more than its noise and its
+/// encoder steps.
 fn in_motion(run: &Run) -> f64 {
     let window = (run.rate.round() as usize).max(1);
     let still = |own: &JointRun, floor: f64, rows: Range<usize>| {
@@ -125,7 +125,7 @@ fn in_motion(run: &Run) -> f64 {
     windows.sum::<f64>() / run.rate.max(f64::MIN_POSITIVE)
 }
 
-/// Training data that hold too little motion for names, together, or those of them with everything taken off that pulls.
+/// Returns a fault if the training data, or those without external loads, hold too little motion for names.
 pub(crate) fn too_short_to_learn(runs: &[Run]) -> Option<DataFault> {
     let all: Vec<&Run> = runs.iter().collect();
     let free: Vec<&Run> = runs.iter().filter(|run| run.unburdened).collect();
@@ -133,7 +133,7 @@ pub(crate) fn too_short_to_learn(runs: &[Run]) -> Option<DataFault> {
     too_short_as("training data", &all).or_else(|| (!free.is_empty()).then(of_free).flatten())
 }
 
-/// Recordings held back in which hardly anything moves, so that nothing is to be judged by.
+/// Returns a fault if the hold-out holds too little motion to judge by.
 pub(crate) fn too_short_to_judge(runs: &[Run]) -> Option<DataFault> {
     let all: Vec<&Run> = runs.iter().collect();
     let moving: f64 = 0.0 + runs.iter().map(in_motion).sum::<f64>();
@@ -154,7 +154,7 @@ fn too_short_as(what: &str, runs: &[&Run]) -> Option<DataFault> {
     let time: f64 = (runs.iter())
         .map(|run| run.len() as f64 / run.rate.max(f64::MIN_POSITIVE))
         .sum();
-    // A sum of nothing is −0.
+    // The sum of an empty list is −0.
     let moving = 0.0 + runs.iter().map(|run| in_motion(run)).sum::<f64>();
     let (kind, held) = match () {
         () if time < LEAST_TO_LEARN => ("too-short", format!("{time:.2} s in all")),
@@ -177,7 +177,7 @@ fn too_short_as(what: &str, runs: &[&Run]) -> Option<DataFault> {
     ))
 }
 
-/// The unit of time by its steps.
+/// Returns a fault of the time unit by its steps.
 pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
     let mut steps: Vec<f64> = runs
         .iter()
@@ -203,11 +203,10 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
     })
 }
 
-/// Columns of recordings with uneven rows that have no derivative or no size: once the rows are brought to an even step nothing tells
-/// of them.
+/// Returns columns of uneven recordings without a derivative or a size, which resampling would hide.
 ///
 /// # Errors
-/// What reading gives.
+/// Errors of reading.
 pub(crate) fn spoilt_columns(
     robot: &Robot,
     recordings: &[&dyn Recording],
@@ -227,7 +226,7 @@ pub(crate) fn spoilt_columns(
     Ok(found)
 }
 
-/// What the plausibility of units says, once a joint.
+/// Returns implausible units, one per joint and certainty.
 pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
     let mut found: Vec<(usize, DataFault)> = Vec::new();
     for run in runs {
@@ -258,7 +257,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
     found
 }
 
-/// What is wrong with a joint's position or torque by itself as a fault; none of other columns.
+/// Returns an implausible position or torque of a joint as a fault; `None` for other columns.
 fn of_column(robot: &Robot, problem: &Implausible) -> Option<(usize, DataFault)> {
     let (joint, about) = match problem {
         Implausible::HeldPosition { joints, .. } => (joints[0], About::Motion),
@@ -299,13 +298,13 @@ fn of_column(robot: &Robot, problem: &Implausible) -> Option<(usize, DataFault)>
     Some((joint, fault))
 }
 
-/// A measured velocity that is not the rate of change of the position.
+/// Returns a fault if a measured velocity is not the rate of the position.
 pub(super) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault> {
     let joint = robot.joints.get(k)?;
     let run = runs.iter().max_by_key(|run| run.len())?;
     let own = run.joints.get(k)?;
     let factor = velocity_scale(&run.t, &own.q_raw, own.measured_velocity.as_ref()?)?;
-    // A filter or another joint's share may take a part of it; units and ratios take more.
+    // A filter or another joint's share may change a part of it; units and ratios change more.
     if (0.5..2.0).contains(&factor) {
         return None;
     }
@@ -353,7 +352,7 @@ pub(super) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
     ))
 }
 
-/// A torque that stays at its limit while the joint moves.
+/// Returns a fault if a torque stays at its limit while the joint moves.
 pub(super) fn at_limit(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault> {
     let joint = robot.joints.get(k)?;
     let limit = joint.limits.as_ref()?.torque?;

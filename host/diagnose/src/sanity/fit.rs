@@ -1,14 +1,14 @@
-//! Least squares of one joint's torque, with functionals of the parameters and their honest uncertainty.
+//! Least squares of one joint's torque, with linear functions of the parameters and their uncertainty.
 
 use nalgebra::{DMatrix, DVector};
 
 use rig_identify::independent_columns;
 
-/// A column counts as excited where more than this share of it is left beside the others.
+/// Share of a column that must be independent of the others to be excited.
 const EXCITED: f64 = 1e-5;
-/// Most stretches that are taken as independent of each other.
+/// Most stretches that count as independent.
 const STRETCHES: usize = 60;
-/// Rows of a stretch at least: what residuals remember of each other is shorter.
+/// Least rows of a stretch, more than the correlation length of residuals.
 const LEAST_STRETCH: usize = 25;
 
 /// Share of a direction that may be rounding.
@@ -16,13 +16,13 @@ const ROUNDING: f64 = 1e-10;
 
 /// A fitted model of one torque.
 pub(super) struct Fit {
-    /// Columns that count.
+    /// Columns in use.
     kept: Vec<usize>,
-    /// Orthonormal basis of them.
+    /// Orthonormal basis of the columns.
     basis: DMatrix<f64>,
     values: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Stretches less one.
+    /// Number of stretches minus one.
     freedom: f64,
     /// Measured minus predicted.
     pub(super) residual: DVector<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Fit {
     total: f64,
 }
 
-/// A number and its standard deviation, which so many degrees of freedom have shown.
+/// A value with its standard deviation and degrees of freedom.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured {
     pub(super) value: f64,
@@ -47,8 +47,8 @@ impl Measured {
         }
     }
 
-    /// In standard deviations of a normal distribution that are as rare: Student's t at its degrees of freedom, turned into
-    /// them by Wallace's formula (1959).
+    /// Returns the equally rare number of normal standard deviations: Student's t, converted by Wallace's formula
+    /// (1959).
     pub(super) fn sigmas(self) -> f64 {
         let (t, f) = (self.value / self.std.max(f64::MIN_POSITIVE), self.freedom);
         let normal = (8.0 * f + 1.0) / (8.0 * f + 3.0) * (f * (t * t / f).ln_1p()).sqrt();
@@ -63,13 +63,13 @@ pub(super) fn about_mean(x: impl Iterator<Item = f64> + Clone) -> f64 {
     x.map(|v| (v - mean) * (v - mean)).sum()
 }
 
-/// Covariance of the coordinates in an orthonormal `basis`, from what leaving out one stretch of time at a time does to them,
-/// and the number of stretches.
+/// Returns the covariance of the coordinates in an orthonormal `basis`, by leaving out one stretch at a time, and the
+/// number of stretches.
 ///
-/// The cluster jackknife (Bell & McCaffrey 2002; MacKinnon, Nielsen & Webb 2023, "CV₃"). With Q_g the basis' rows of stretch g
-/// and e_g their residual, leaving it out moves the coordinates by (1 − Q_gᵀ·Q_g)⁻¹·Q_gᵀ·e_g. The residuals alone, without
-/// the inverse, would be far too small where parameters are nearly as many as stretches: the fit has bent to them. What one
-/// stretch alone shows has no bounds.
+/// The cluster jackknife (Bell & McCaffrey 2002; MacKinnon, Nielsen & Webb 2023, "CV₃"). Q_g are the basis' rows of
+/// stretch g and e_g their residual. Leaving it out moves the coordinates by (1 − Q_gᵀ·Q_g)⁻¹·Q_gᵀ·e_g. Residuals
+/// without the inverse are far too small with nearly as many parameters as stretches, as the fit adapts to them. A
+/// direction in only one stretch has no bounds.
 fn jackknife(basis: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, usize) {
     let (rows, size) = basis.shape();
     let length = rows.div_ceil(STRETCHES).max(LEAST_STRETCH);
@@ -81,7 +81,7 @@ fn jackknife(basis: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, us
         let score = own.transpose() * residual.rows(from, count);
         let mut rest = -(own.transpose() * own);
         for k in 0..size {
-            // Rounding must not make it less than nothing.
+            // Rounding must not make it negative.
             rest[(k, k)] += 1.0 + ROUNDING;
         }
         let moved = rest.cholesky().map(|c| c.solve(&score));
@@ -94,7 +94,7 @@ fn jackknife(basis: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, us
 }
 
 impl Fit {
-    /// Of `torque` by the columns of `matrix`, preferred in `order`; none where there are too few rows.
+    /// Fits `torque` by the columns of `matrix`, preferred in `order`; `None` if there are too few rows.
     pub(super) fn of(matrix: &DMatrix<f64>, torque: &[f64], order: &[usize]) -> Option<Self> {
         let kept = independent_columns(matrix, order, EXCITED).kept;
         let rows = matrix.nrows();
@@ -122,12 +122,12 @@ impl Fit {
         })
     }
 
-    /// Share of the torque's variance that is left.
+    /// Returns the residual share of the torque's variance.
     pub(super) fn unexplained(&self) -> f64 {
         self.residual.norm_squared() / self.total.max(f64::MIN_POSITIVE)
     }
 
-    /// Σ weights · parameters, weights over all columns of the matrix.
+    /// Returns Σ weights · parameters, with weights over all columns of the matrix.
     pub(super) fn functional(&self, weights: &DVector<f64>) -> Measured {
         let own = DVector::from_iterator(self.kept.len(), self.kept.iter().map(|c| weights[*c]));
         Measured {
@@ -137,7 +137,7 @@ impl Fit {
         }
     }
 
-    /// The parameter of a column; none where it is not excited.
+    /// Returns the parameter of a column; `None` if it is not excited.
     pub(super) fn parameter(&self, column: usize) -> Option<Measured> {
         let at = self.kept.iter().position(|c| *c == column)?;
         Some(Measured {
@@ -147,13 +147,13 @@ impl Fit {
         })
     }
 
-    /// What the parameters say of other rows.
+    /// Returns the torque of other rows by these parameters.
     pub(super) fn predict(&self, matrix: &DMatrix<f64>) -> DVector<f64> {
         matrix.select_columns(&self.kept) * &self.values
     }
 
-    /// Share of the variance that is left of the torque moved by each number of rows from `-reach` to `reach` against the
-    /// motion, all judged on the same stretch of the motion; none where that is too short.
+    /// Returns the residual share of variance with the torque moved by each number of rows from `-reach` to `reach`
+    /// against the motion. All use the same stretch of the motion; `None` if that is too short.
     pub(super) fn unexplained_moved(&self, torque: &[f64], reach: usize) -> Option<Vec<f64>> {
         let span = self.basis.nrows().checked_sub(2 * reach)?;
         if span < 3 * self.kept.len() {

@@ -1,4 +1,4 @@
-//! The direction of gravity that all torques together show, for an arm or a single link that hangs or stands otherwise than described.
+//! Direction of gravity from all torques together, for an arm or a single link with another mounting than described.
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -15,36 +15,35 @@ use super::trial::Suspicion;
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
 
-/// Gravity that stands off by less is left to the search for a base that is not level, degrees.
+/// Least angle to the described gravity, degrees; less is left to the search for a tilted base.
 const LEAST: f64 = 45.0;
-/// From this angle on it is said to point the other way, degrees.
+/// Angle above which gravity is said to point the other way, degrees.
 const OTHER_WAY: f64 = 135.0;
-/// Directions in which gravity acts on the joints with less than this share of the strongest, squared, are not determined.
+/// Squared share of the strongest direction below which gravity's component is not identifiable.
 const DETERMINED: f64 = 1e-3;
-/// Gravity that comes out weaker or stronger than described by more than this is something else.
+/// Largest factor between found and described strength of gravity.
 const STRENGTH: f64 = 2.0;
 
-/// A joint on which gravity acts with less than this share of what is measured has its axis upright in the description.
+/// Share of the measured gravity below which the described axis is upright.
 const UPRIGHT: f64 = 0.3;
-/// Standard deviations of gravity's direction, rad, that leave it open.
+/// Standard deviation of gravity's direction, rad, above which it is undecided.
 const OPEN: f64 = 0.1;
 
-/// An angle as far as such a fit tells it.
+/// Formats an angle with the resolution of such a fit.
 fn hundredths(angle: f64) -> String {
     format_significant((100.0 * angle).round() / 100.0, 3)
 }
 
 impl Judge<'_> {
-    /// A single revolute joint on which gravity acts from elsewhere than described: its zero is not where the description has it, or its
-    /// axis does not stand so. The link's weight is as described within a factor; a spring may pull beside it. Gravity the other way
-    /// round is a matter of signs.
+    /// Suspects a wrong zero or axis of a single revolute joint, by the direction of gravity on it. The link's weight
+    /// must be as described within a factor; a spring may act too. Reversed gravity is a matter of signs.
     pub(super) fn single_zero(&self) -> Result<Option<Suspicion>, DiagnoseError> {
         let ([joint], true) = (&self.robot.joints[..], self.states_from(0)) else {
             return Ok(None);
         };
         let moment = joint.inertial.as_ref().map_or([0.0; 3], |i| i.first_moment);
         let gravity = Vector3::from(self.robot.gravity).norm();
-        // About the axis of the joint, the third.
+        // About the joint's third axis.
         let most = gravity * moment[0].hypot(moment[1]);
         if joint.kind != JointKind::Revolute || most == 0.0 {
             return Ok(None);
@@ -71,7 +70,7 @@ impl Judge<'_> {
         let mut sideways = DVector::zeros(first + 4);
         (sideways[first + 2], sideways[first + 3]) = (-b / strength, a / strength);
         let across = fit.functional(&sideways).std;
-        // One wave: what it is anywhere follows from two places.
+        // One wave is determined by two places.
         let places = Rows {
             q: vec![vec![0.0, FRAC_PI_2]],
             qd: vec![vec![0.0; 2]],
@@ -108,12 +107,12 @@ impl Judge<'_> {
             )
         };
         let fault = self.say("gravity", About::Recording, 0, text);
-        // The wave's own direction shows it; no trial of masses does.
+        // The wave's direction shows it; a trial of masses does not.
         Ok(Some(Suspicion { fault, undo: None }))
     }
 
-    /// Gravity as strong as described along the direction that the torques show (in frame 0), where that is far from the described
-    /// one. Every joint has a constant torque and friction of its own; masses and inertias are those of the description.
+    /// Returns gravity of described strength in the direction that the torques show (in frame 0), if that is far from
+    /// the described. Every joint has its own constant torque and friction; masses and inertias are the described.
     pub(super) fn gravity_shown(&self, rows: &Rows) -> Result<Option<[f64; 3]>, DiagnoseError> {
         let stated = Vector3::from(self.robot.gravity);
         let here = self.described(rows)?;
@@ -151,7 +150,7 @@ impl Judge<'_> {
         let Ok(inverse) = normal.pseudo_inverse(DETERMINED * normal.norm()) else {
             return Ok(None);
         };
-        // Of an arm whose axes are parallel gravity along them does not show.
+        // An arm with parallel axes does not show gravity along them.
         let (shown, seen) = (inverse * right, inverse * normal * stated);
         let strength = shown.norm() / seen.norm();
         let far = shown.angle(&seen).to_degrees() > LEAST;
@@ -160,7 +159,7 @@ impl Judge<'_> {
         Ok((far && alike).then(|| (shown * (stated.norm() / shown.norm())).into()))
     }
 
-    /// Gravity of another direction as a fault; shares of the torques' variance that are left, as recorded and with it.
+    /// Returns another direction of gravity as a fault; `left` are residual variance shares as recorded and with it.
     pub(super) fn gravity_said(&self, gravity: [f64; 3], left: [f64; 2]) -> DataFault {
         let stated = Vector3::from(self.robot.gravity);
         let angle = stated.angle(&Vector3::from(gravity)).to_degrees();

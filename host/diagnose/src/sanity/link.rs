@@ -1,4 +1,4 @@
-//! An encoder on the link's side that cannot be one.
+//! Faults of a link encoder.
 
 use super::super::outcome::{About, DataFault};
 use super::{columns, names};
@@ -6,10 +6,10 @@ use rig_data::jumps;
 use rig_data::runs::Run;
 use rig_model::robot::{JointKind, Robot};
 
-/// How far the link may move per move of the joint's own encoder: play and twist take a part of a small motion, no more.
+/// Range of link motion per joint encoder motion; backlash and twist take at most a part of a small motion.
 const TOGETHER: [f64; 2] = [0.8, 1.25];
 
-/// What is wrong with the link's encoder of joint `k`, whose own position is in order.
+/// Returns a fault of joint `k`'s link encoder; the joint's own position is right.
 pub(super) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault> {
     let joint = robot.joints.get(k)?;
     let n = k + 1;
@@ -20,7 +20,7 @@ pub(super) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
         let Some(reading) = run.joints.get(k).and_then(|j| j.link_raw.as_ref()) else {
             continue;
         };
-        // Its zero is free, so that only a jump is a fault.
+        // Its zero is free, so only a jump is a fault.
         if jumps(&run.t, reading) {
             return named(
                 "jump",
@@ -66,7 +66,7 @@ pub(super) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
     )
 }
 
-/// How far the link's encoder moves per move of the joint's own; none where either was not recorded or does not move.
+/// Returns the link encoder's motion per motion of the joint's own; `None` if either is missing or does not move.
 fn moves_by(runs: &[&Run], k: usize) -> Option<f64> {
     let (mut along, mut squares) = (0.0, 0.0);
     for run in runs.iter().filter(|run| columns::moves(run, k)) {

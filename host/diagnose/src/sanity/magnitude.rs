@@ -1,10 +1,10 @@
-//! A torque of which only the magnitude was recorded.
+//! Torques recorded as magnitudes.
 //!
-//! Such a torque is never negative though the joint turns both ways. A joint on which weight always pulls one way has such a torque
-//! by itself; so the sense of every row is guessed and the joint fitted until both agree, and the trial decides whether the size of
-//! what a robot needs predicts the recording better than what it needs.
+//! Such a torque is never negative although the joint turns both ways. A joint with weight on one side has such a
+//! torque by itself. So the sense of every row is guessed and the joint fitted until both agree. The trial then decides
+//! whether the magnitude of the model's torque predicts the recording better.
 //!
-//! Leaves out: a sign that is lost above a level only.
+//! Leaves out: a sign that is lost only above a level.
 
 use super::super::outcome::About;
 use super::fit::Fit;
@@ -13,19 +13,19 @@ use super::senses::Described;
 use super::trial::Suspicion;
 use super::undo::Undo;
 
-/// Share of the rows in motion that each way of turning has at least.
+/// Least share of the moving rows in each direction.
 const BOTH_WAYS: f64 = 0.1;
-/// Share of the fastest speed from which on a joint turns.
+/// Share of the highest speed above which a joint turns.
 const TURNS: f64 = 0.05;
-/// Share of the largest torque that noise may carry to the other side.
+/// Share of the largest torque by which noise may reach the other sign.
 const NOISE: f64 = 0.02;
-/// Share of the squares left as recorded that the signed torque has to leave at most to be suspected.
+/// Ratio of squared residuals below which a signed torque is suspected.
 const LESS: f64 = 0.5;
-/// Rounds of guessing and fitting.
+/// Rounds of guess and fit.
 const ROUNDS: usize = 20;
 
 impl Judge<'_> {
-    /// Joint `j`'s torque as one that has lost its sign, where it looks like that.
+    /// Suspects that joint `j`'s torque lost its sign.
     pub(super) fn magnitude(&self, j: usize, described: Option<&Described>) -> Option<Suspicion> {
         let (tau, qd) = (&self.rows.tau[j], &self.rows.qd[j]);
         let most = tau.iter().fold(0.0f64, |most, v| most.max(v.abs()));
@@ -40,7 +40,7 @@ impl Judge<'_> {
         if most == 0.0 || least < -NOISE * most || !both {
             return None;
         }
-        // Friction's sense, and that of weight and inertia where they are described: which of them rules is not known.
+        // Starts from the sense of friction, and of described weight and inertia: which dominates is unknown.
         let begins = [Some(qd), described.map(|own| &own.all[j])];
         let (senses, left) = (begins.into_iter().flatten())
             .filter_map(|begin| self.senses_of(j, begin))
@@ -63,8 +63,8 @@ impl Judge<'_> {
         Some(Suspicion::new(fault, Undo::Magnitude(j, senses)))
     }
 
-    /// The sense that the torque of joint `j` has in each row, where all that is known is its size: that of what is fitted to the
-    /// torque with these senses, from that of `begin` on; and the squares that are left.
+    /// Returns the sense of joint `j`'s torque in each row if only its size is known, and the squared residual. It
+    /// starts from `begin` and repeats the fit with the fitted senses.
     fn senses_of(&self, j: usize, begin: &[f64]) -> Option<(Vec<f64>, f64)> {
         let tau = &self.rows.tau[j];
         let mut senses: Vec<f64> = begin.iter().map(|v| sense(*v)).collect();

@@ -1,14 +1,12 @@
-//! Recordings that cannot be what they say: sign, unit, ratio, clock, saturation.
+//! Recordings with a wrong sign, unit, ratio, clock or saturation.
 //!
-//! Friction and inertia are positive in every robot, gravity's period is one turn, and the description's own values are
-//! right within a small factor. What breaks these by a factor that units, ratios or senses have is a fault of the data
-//! and is named; nothing is explained by it. A factor below five that no unit has is a change of the robot, and for
-//! others to judge.
+//! Every robot has positive friction and inertia, and gravity repeats once per turn. The description's values are right
+//! within a small factor. A deviation by a factor of units, ratios or senses is a data fault and is named; no effect
+//! explains it. A factor below five that no unit has is a change of the robot, which other modules judge.
 //!
-//! Leaves out: faults that leave the data consistent in themselves where the description states nothing (both signs
-//! reversed, one factor on everything); a late torque of a slow arm whose motion has few harmonics, which the
-//! model's many parameters take up; a fault that comes and goes within a recording; a sign that a short motion does not
-//! show beyond what its many parameters take up.
+//! Leaves out: faults in consistent data where the description states nothing (both signs reversed, one factor on
+//! everything); a late torque of a slow arm with few harmonics, as many parameters compensate it; intermittent faults;
+//! a sign that many parameters compensate in a short motion.
 
 mod alike;
 mod candidates;
@@ -43,16 +41,16 @@ use rig_data::runs::Run;
 use rig_data::runs::runs_of;
 use rig_model::robot::Robot;
 
-/// Cut-off of the positions that are judged, Hz.
+/// Cut-off of the judged positions, Hz.
 const BAND: f64 = 20.0;
 
-/// What is wrong with each recording; empty where all is well.
+/// Returns the faults of each recording; empty if there are none.
 ///
-/// A recording at rest is a fault only where no recording moves: a log with the drive off belongs to the experiments.
-/// Of long recordings the first 6000 rows of 20 ms are judged against the model.
+/// A recording at rest is a fault only if no recording moves: a log with the drive off belongs to the experiments. Only
+/// the first 6000 rows of 20 ms are compared with the model.
 ///
 /// # Errors
-/// [`DiagnoseError::Model`] where the description's geometry is no chain.
+/// [`DiagnoseError::Model`] if the description's geometry is no chain.
 pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseError> {
     let recordings = runs.iter().map(|run| run.recording + 1).max().unwrap_or(0);
     let n = robot.joints.len();
@@ -64,7 +62,7 @@ pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseErr
         if own.is_empty() {
             continue;
         }
-        // By its clock a recording is as long as it says.
+        // The clock determines the length of a recording.
         if let Some(fault) = columns::clock(robot, &own).or_else(|| columns::too_short(&own)) {
             found.push(fault);
             continue;
@@ -86,11 +84,11 @@ pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseErr
     Ok(found)
 }
 
-/// What is wrong with the beginning of a recording, its first `rows` rows, before it is fitted: signs, units, ratios, clocks
-/// and columns in each other's place. Saturation is said and no reason to stop: a fit leaves such rows out.
+/// Returns faults in the first `rows` rows of a recording, before a fit: signs, units, ratios, clocks and exchanged
+/// columns. Saturation is reported as not certain: a fit excludes such rows.
 ///
 /// # Errors
-/// What reading gives, and [`DiagnoseError::Model`].
+/// Errors of reading, and [`DiagnoseError::Model`].
 pub fn faults_at_start(
     robot: &Robot,
     source: &Source,
@@ -101,7 +99,7 @@ pub fn faults_at_start(
     let Some(low_pass) = LowPass::butterworth(4, f64::min(BAND, 0.2 * rate), rate) else {
         return Ok(Vec::new());
     };
-    // Uneven rows have no derivative before they are brought to an even step.
+    // Uneven rows must be resampled before differentiation.
     let even = Resampled::new(source, sampling.period);
     let recording: &dyn Recording = if sampling.irregular { &even } else { source };
     let runs = runs_of(&Beginning { recording, rows }, 0, rate, &low_pass)?;
@@ -111,7 +109,7 @@ pub fn faults_at_start(
     }
     let mut found = faults(robot, &runs)?;
     found.retain(|fault| !["not-moving", "too-short"].contains(&fault.kind.as_str()));
-    // The fit leaves rows at a limit out.
+    // The fit excludes rows at a limit.
     for fault in found.iter_mut().filter(|fault| fault.kind == "saturation") {
         fault.certain = false;
     }
@@ -138,13 +136,12 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
     let (doubts, units): (Vec<_>, Vec<_>) =
         units.into_iter().partition(|(_, fault)| !fault.certain);
     if !units.is_empty() {
-        // What a wrong unit of one joint does to the others is its consequence, as is what a wrong position makes of the
-        // torque.
+        // Drops consequences: faults of other joints from a wrong unit, and torque faults from a wrong position.
         let own = |f: &DataFault| units.iter().find(|(_, fault)| fault.joint == f.joint);
         let of_torque = |f: &DataFault| f.about == About::Torque;
         judged.retain(|f| own(f).is_some_and(|(_, unit)| of_torque(unit) || !of_torque(f)));
     }
-    // The model says more closely what the limits only notice.
+    // Faults by the model are more precise than those by plausibility limits.
     let mut found: Vec<DataFault> = units
         .into_iter()
         .map(|(_, fault)| fault)
@@ -153,7 +150,7 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
     found.extend(judged);
     found.extend(doubts.into_iter().map(|(_, fault)| fault));
     for j in 0..n {
-        // A wrong position belongs to no measured velocity either; that says nothing new.
+        // A wrong position also contradicts the measured velocity.
         if found.iter().all(|f| f.joint != robot.joints[j].name) {
             found.extend(columns::velocity(robot, runs, j));
         }

@@ -1,4 +1,4 @@
-//! What a refitted simple model says of clocks, cuts and the scales of positions.
+//! Faults of clocks, torque cuts and position scales, by a refitted simple model.
 
 use nalgebra::DMatrix;
 
@@ -16,44 +16,44 @@ use rig_identify::preference;
 use rig_model::robot::{JointKind, Robot};
 use rig_output::format_trimmed;
 
-/// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
+/// Residual share of the torque's variance above which other units or times are tried.
 pub(super) const POOR: f64 = 0.1;
-/// The same of a single joint, whose model has few parameters to make up for a wrong unit or time with; and of a shift in time at
-/// any robot, of which the many parameters of a slow arm leave little.
+/// The same for a single joint, whose few parameters cannot compensate a wrong unit or time; and for a shift in time of
+/// any robot, as many parameters of a slow arm compensate most of it.
 const POOR_ALONE: f64 = 0.01;
-/// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
+/// … and ratio of residuals below which a trial is believed, if its own is below [`GOOD`] too.
 const BETTER: f64 = 0.35;
-/// Share of what was left that a shift has to leave at most to be suspected; the trial decides.
+/// Ratio of residuals below which a shift is suspected; the trial decides.
 const LESS: f64 = 0.7;
-/// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
+/// The same for factors that no unit has and for a reversed position, which any model may prefer by chance.
 pub(super) const MUCH_BETTER: f64 = 0.2;
 /// … and for a small misfit.
 const FAR_BETTER: f64 = 0.1;
 pub(super) const GOOD: f64 = 0.2;
-/// Shifts up to this belong to filters and buses, not to clocks, s: half a row. Those of several joints up to the second,
-/// because their many parameters like a small one by chance.
+/// Largest shift from filters and buses instead of clocks, s: half a row. The second is for several joints, whose many
+/// parameters may prefer a small shift by chance.
 const SHIFT: [f64; 2] = [0.01, 0.03];
-/// Shifts up to this are small, s.
+/// Largest shift that counts as small, s.
 const SMALL: f64 = 0.1;
-/// Farthest shift that is tried, s; no more than a quarter of the recording.
+/// Largest shift that is tried, s; at most a quarter of the recording.
 const FARTHEST: f64 = 5.0;
-/// Times its length that a joint must move for to show a shift: a single short motion is explained by one as well as by
-/// anything (the last second of the Stäubli TX40's fifth joint).
+/// Time in motion that shows a shift, as a multiple of it. A shift can explain any single short motion (the last second
+/// of the Stäubli TX40's fifth joint).
 const SHOWN_BY: f64 = 5.0;
 /// Share of a joint's highest speed above which it moves.
 const IN_MOTION: f64 = 0.05;
-/// Way from which on a joint moves, rad or m.
+/// Position range above which a joint moves, rad or m.
 const STIRS: f64 = 0.01;
 /// Share of a joint's range by which a position may lie outside it: limits are described with some care.
 const OUTSIDE: f64 = 0.2;
-/// A factor that differs by less from another is the same.
+/// Relative difference below which two factors are the same.
 const SAME: f64 = 0.1;
 /// Rows of one trial.
 pub(super) const TRIAL: usize = 500;
-/// Share of a torque's variance that any rounding leaves: data without noise have no scale below it.
+/// Share of a torque's variance that rounding leaves, the least scale of data without noise.
 pub(super) const EXACT: f64 = 1e-6;
 
-/// One recording against models of the robot.
+/// One recording, compared with models of the robot.
 pub(super) struct Judge<'a> {
     pub(super) robot: &'a Robot,
     pub(super) runs: &'a [&'a Run],
@@ -95,8 +95,8 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Everything that the torque says and that no other explanation says better. What is certain is taken back, and what is left
-    /// is looked through again: what followed from it is gone.
+    /// Returns the faults in the torque that no other explanation fits better. A certain fault is undone and the search
+    /// repeats without its consequences.
     pub(super) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
         let n = self.robot.joints.len();
         let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
@@ -109,7 +109,7 @@ impl<'a> Judge<'a> {
         }
         let mut rows = self.rows.clone();
         for _ in 0..n {
-            // Without a fault of the description it is another robot.
+            // Undoing a fault of the description gives another robot.
             let Some(one) = undo.filter(|undo| !undo.is_of_robot()) else {
                 break;
             };
@@ -124,16 +124,16 @@ impl<'a> Judge<'a> {
         Ok(found)
     }
 
-    /// What may be wrong by what the torque says.
+    /// Returns the faults that the torque suggests.
     fn suspicions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
         let n = self.robot.joints.len();
-        // What states any joint's torque states the last's.
+        // The last joint's torque needs the fewest described links.
         let described = self.stated(&self.rows, n.saturating_sub(1))?;
         let described = described.as_ref();
         let mut all: Vec<Suspicion> = (0..n)
             .filter_map(|j| self.magnitude(j, described))
             .collect();
-        // What the torques alone say of a factor, whatever the description.
+        // Factors that the torques show without a description.
         let free = self.positions()?;
         let known = |found: &Found| {
             let of_free = |own: &Suspicion| own.undo.as_ref().is_some_and(|undo| found.is_of(undo));
@@ -159,10 +159,10 @@ impl<'a> Judge<'a> {
             }
             all.extend(self.heavy_rotor(j)?);
         }
-        // A zero off is less likely than what else explains a recording as well.
+        // Senses and zeros come last: other explanations of a recording are likelier.
         let last = turned.iter().chain(&zeros);
         all.extend(last.filter_map(|found| self.said(found)));
-        // What is suspected for two reasons is tried once.
+        // A suspicion with two reasons is tried once.
         let mut once: Vec<Suspicion> = Vec::new();
         for own in all {
             if once.iter().all(|other| !other.is_like(&own)) {
@@ -180,7 +180,7 @@ impl<'a> Judge<'a> {
         fault(self.runs, kind, about, self.name(joint), text)
     }
 
-    /// A torque that was cut where the motion needs more: a fit to the rest goes on beyond the cut.
+    /// Returns a fault if a torque was cut where the motion needs more: a fit to the other rows exceeds the cut.
     fn clipped(&self, j: usize) -> Option<DataFault> {
         let cut = &self.rows.cut[j];
         let (at, free): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
@@ -188,7 +188,7 @@ impl<'a> Judge<'a> {
             return None;
         }
         let tau = &self.rows.tau[j];
-        // Rows that hold part of a cut are neither.
+        // Rows with part of a cut belong to neither.
         let free: Vec<usize> = free.into_iter().filter(|k| cut[*k] == 0.0).collect();
         let rest: Vec<f64> = free.iter().map(|k| tau[*k]).collect();
         let fit = Fit::of(&self.matrices[j].select_rows(&free), &rest, &self.order)?;
@@ -218,7 +218,7 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// A torque that belongs to another time than the motion.
+    /// Suspects a torque that is shifted in time against the motion.
     fn shifted(&self, j: usize) -> Option<Suspicion> {
         let fit = self.fits[j].as_ref()?;
         if fit.unexplained() < POOR_ALONE {
@@ -231,7 +231,7 @@ impl<'a> Judge<'a> {
         if left[reach] < POOR_ALONE || least > LESS * left[reach] {
             return None;
         }
-        // Of a periodic motion the nearest period.
+        // For a periodic motion, the nearest period.
         let at = (0..left.len())
             .filter(|k| left[*k] <= 1.3 * least)
             .min_by_key(|k| k.abs_diff(reach))?;
@@ -262,7 +262,7 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Positions of which gravity and coupling say that they are multiples of the joint's.
+    /// Suspects positions that gravity and coupling show as multiples of the joint's.
     fn positions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
         let n = self.robot.joints.len();
         let left: Vec<f64> = self
@@ -271,7 +271,7 @@ impl<'a> Judge<'a> {
             .map(|f| f.as_ref().map_or(0.0, Fit::unexplained))
             .collect();
         let mean = |left: &[f64]| left.iter().sum::<f64>() / left.len().max(1) as f64;
-        // Of a single joint, whose gravity has a period, a factor shows in whatever the model leaves.
+        // For a single joint, whose gravity has a period, any residual may show a factor.
         let poor = if n == 1 { EXACT } else { POOR };
         if left.iter().all(|u| *u < poor) {
             return Ok(Vec::new());
@@ -303,7 +303,7 @@ impl<'a> Judge<'a> {
             for factor in self.factors(j).into_iter().filter(|f| self.reaches(j, *f)) {
                 let all = try_out(Some(j), factor)?;
                 let own = all[j];
-                // What misfits by a little more than a quarter is an effect's business.
+                // A factor of up to 1.4 is left to effects.
                 let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
                 let unit = !(0.4..2.5).contains(&factor) && factor > 0.0;
                 let least = match unit {
@@ -319,8 +319,7 @@ impl<'a> Judge<'a> {
                 .iter()
                 .map(|(_, own)| *own)
                 .fold(f64::INFINITY, f64::min);
-            // Over a small range gravity is a parabola, which every smaller factor leaves one: where the description
-            // knows the inertia, that decides.
+            // Over a small range gravity is a parabola for every smaller factor too. A described inertia decides.
             tried.retain(|(_, own)| *own <= 1.5 * least + 0.002);
             let mut misses = Vec::new();
             for (factor, own) in tried {
@@ -344,22 +343,22 @@ impl<'a> Judge<'a> {
         Ok(found)
     }
 
-    /// How far gravity and inertia of these rows are from the description's, as the sum of their logarithms; 0 where
-    /// it states none.
+    /// Returns the distance of these rows' gravity and inertia from the described, as the sum of their logarithms; 0 if
+    /// none is described.
     fn misses(&self, rows: &Rows, j: usize) -> Result<f64, DiagnoseError> {
         let (gravity, inertia) = self.scales(rows, j, self.stated(rows, j)?.as_ref());
         let miss = |m: Option<Measured>| m.map_or(0.0, |m| m.value.abs().max(1e-9).ln().abs());
         Ok(miss(gravity) + miss(inertia))
     }
 
-    /// Whether a joint moves enough for its friction and inertia to have a sense: one that is held gives way a little.
+    /// Returns true if a joint moves enough to show the sense of friction and inertia; a held joint gives way a little.
     fn stirs(&self, j: usize) -> bool {
         let q = &self.rows.q[j];
         extreme(q, f64::max) - extreme(q, f64::min) > STIRS
     }
 
-    /// Whether a joint could be where it is recorded times a factor. Where it cannot, its torque goes with such a multiple of its
-    /// position for another reason: an eccentric gear's once a turn of the motor.
+    /// Returns true if the joint's limits allow its recorded position times `factor`. Otherwise the torque depends on
+    /// such a multiple for another reason, as with an eccentric gear once a motor turn.
     pub(super) fn reaches(&self, j: usize, factor: f64) -> bool {
         let limits = self.robot.joints[j].limits.as_ref();
         limits.map(|l| l.position).is_none_or(|[low, high]| {
@@ -369,10 +368,10 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Factors by which a joint's position is tried.
+    /// Returns the factors that are tried for a joint's position.
     fn factors(&self, j: usize) -> Vec<f64> {
         if self.robot.joints.len() == 1 {
-            // In steps of 3 %: closer than gravity's period over a turn needs.
+            // In steps of 3 %: finer than gravity's period over a turn needs.
             return (-160..=160).map(|k| 1.03f64.powi(k)).collect();
         }
         let mut list = names::factors_of_position(&self.robot.joints[j]);
@@ -380,7 +379,7 @@ impl<'a> Judge<'a> {
         list
     }
 
-    /// A position that is a multiple of the joint's: what the factors that fit, the best first, are called.
+    /// Suspects a scaled position and names it by the best factor with a name.
     pub(super) fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> Suspicion {
         let named = factors
             .iter()

@@ -1,15 +1,15 @@
-//! What a factor between a column and what it should hold is called.
+//! Names of the factors between a column and its right value.
 
 use rig_model::robot::{Joint, JointKind};
 use rig_output::format_trimmed;
 
-/// What makes a factor.
+/// A cause of a factor.
 struct Named {
     factor: f64,
-    /// How often that happens beside the others.
+    /// Relative frequency of the cause.
     weight: f64,
     name: String,
-    /// Whether it is about the gear ratio.
+    /// True if it concerns the gear ratio.
     ratio: bool,
 }
 
@@ -23,7 +23,7 @@ impl Named {
         }
     }
 
-    /// One that is met more seldom.
+    /// Makes a cause less frequent.
     fn seldom(self) -> Self {
         Self {
             weight: 0.15,
@@ -39,45 +39,44 @@ impl Named {
     }
 }
 
-/// What a factor is called.
+/// The name of a factor.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Name {
-    /// All that make a factor like it, the likeliest first, joined.
+    /// All likely causes, the likeliest first, joined.
     pub(crate) text: String,
-    /// Whether the likeliest is about the gear ratio.
+    /// True if the likeliest concerns the gear ratio.
     pub(super) ratio: bool,
 }
 
 impl Name {
-    /// Kind of the fault.
+    /// Returns the kind of the fault.
     pub(crate) fn kind(&self) -> &'static str {
         if self.ratio { "ratio" } else { "unit" }
     }
 }
 
-/// Standard deviation of the logarithm of a torque's factor: what a description is worth (`robot::worth`).
+/// Standard deviation of the logarithm of a torque factor: the uncertainty of a description (`robot::worth`).
 const SPREAD: f64 = core::f64::consts::LN_2;
-/// Standard deviations of a name's factor from that of the torque at most.
+/// Largest distance of a name's factor from the torque's, standard deviations.
 const NEAR: f64 = 1.2;
-/// Likelihood that a name needs as a share of the best name's.
+/// Least likelihood of a name, as a share of the best one's.
 const LIKELY: f64 = 1.0 / 3.0;
-/// Gravity's period or the velocity tell a factor within this ratio.
+/// Ratio within which gravity's period or the velocity determine a factor.
 const CLOSE: f64 = 1.12;
 
-/// Turns of the motor per turn of the joint, where the description states a ratio that tells.
+/// Returns motor turns per joint turn, if the described ratio is far enough from one.
 fn ratio(joint: &Joint) -> Option<f64> {
     let ratio = joint.drive.as_ref()?.gear_ratio.abs();
     (ratio > 1.5 || (ratio > 0.0 && ratio < 0.67)).then_some(ratio)
 }
 
-/// Whether a torque that is recorded `factor` times too large may be one that the joint's ratio was left out of or applied
-/// twice to.
+/// Returns true if a torque `factor` times too large may come from a ratio that was left out or applied twice.
 pub(super) fn is_ratio(joint: &Joint, factor: f64) -> bool {
     let apart = |r: f64| (factor.abs() / r).ln().abs() <= 1.6f64.ln();
     ratio(joint).is_some_and(|r| apart(r) || apart(1.0 / r))
 }
 
-/// What is said of a ratio that seems to stand upside down.
+/// Returns the text on a ratio that seems inverted.
 fn upside_down(ratio: f64) -> String {
     format!(
         "as if gear_ratio stood upside down: it is {}, motor turns per joint turn are wanted, and {} fits",
@@ -86,7 +85,7 @@ fn upside_down(ratio: f64) -> String {
     )
 }
 
-/// Names joined, the likeliest first.
+/// Joins names, the likeliest first.
 fn joined(mut likely: Vec<(f64, Named)>) -> Option<Name> {
     likely.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let ratio = likely.first()?.1.ratio;
@@ -97,7 +96,7 @@ fn joined(mut likely: Vec<(f64, Named)>) -> Option<Name> {
     })
 }
 
-/// Names of a factor that is known closely, the nearest first.
+/// Returns the names of a closely known factor, the nearest first.
 fn close(factor: f64, list: Vec<Named>) -> Option<Name> {
     let near = |named: Named| {
         let apart = (factor.abs() / named.factor).ln().abs();
@@ -106,7 +105,7 @@ fn close(factor: f64, list: Vec<Named>) -> Option<Name> {
     joined(list.into_iter().filter_map(near).collect())
 }
 
-/// A torque that is recorded `factor` times too large, a factor that is uncertain by what the description's own values are.
+/// Returns the names of a torque factor; its uncertainty is that of the description's values.
 pub(super) fn of_torque(joint: &Joint, factor: f64) -> Option<Name> {
     let (small, large) = match joint.kind {
         JointKind::Revolute => ("mN·m (N·mm)", "kN·m"),
@@ -152,7 +151,7 @@ pub(super) fn of_torque(joint: &Joint, factor: f64) -> Option<Name> {
     joined(list.into_iter().filter_map(likely).collect())
 }
 
-/// Factors that a position has to be multiplied by and what makes them.
+/// Returns factors that correct a position, and their causes.
 fn positions(joint: &Joint) -> Vec<Named> {
     let mut list = match joint.kind {
         JointKind::Revolute => vec![
@@ -188,17 +187,17 @@ fn positions(joint: &Joint) -> Vec<Named> {
     list
 }
 
-/// Factors of a position that have a name.
+/// Returns the named factors of a position.
 pub(crate) fn factors_of_position(joint: &Joint) -> Vec<f64> {
     positions(joint).iter().map(|named| named.factor).collect()
 }
 
-/// A position that has to be multiplied by `factor`.
+/// Returns the name of a position that must be multiplied by `factor`.
 pub(crate) fn of_position(joint: &Joint, factor: f64) -> Option<Name> {
     close(factor, positions(joint))
 }
 
-/// A measured velocity that has to be multiplied by `factor`.
+/// Returns the name of a measured velocity that must be multiplied by `factor`.
 pub(super) fn of_velocity(joint: &Joint, factor: f64) -> Option<Name> {
     let mut list = match joint.kind {
         JointKind::Revolute => vec![
@@ -218,7 +217,7 @@ pub(super) fn of_velocity(joint: &Joint, factor: f64) -> Option<Name> {
     close(factor, list)
 }
 
-/// A clock that advances `factor` times as fast as it should.
+/// Returns the name of a clock that runs `factor` times too fast.
 pub(super) fn of_clock(factor: f64) -> &'static str {
     let seconds = [
         (1e6, "microseconds; give it in s"),

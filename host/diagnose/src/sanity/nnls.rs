@@ -1,18 +1,18 @@
-//! Least squares with coefficients that cannot be negative, from normal equations.
+//! Least squares with non-negative coefficients, from normal equations.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rounds after which one coefficient at a time changes sides, which ends.
+/// Rounds after which only one coefficient at a time changes sides, which guarantees an end.
 const PATIENCE: usize = 3;
 /// Share of the largest slope below which it is rounding.
 const FLAT: f64 = 1e-9;
 
-/// The x of least ½·xᵀ·H·x − gᵀ·x with x ≥ 0 where `bounded`, starting from the coefficients of `free`, which is left as those
-/// that are not at their bound.
+/// Returns the x that minimizes ½·xᵀ·H·x − gᵀ·x with x ≥ 0 for `bounded`. Starts from the coefficients in `free`, which
+/// receives those not at their bound.
 ///
-/// Block principal pivoting (Portugal, Júdice & Vicente 1994; Kim & Park 2011): all that violate change sides at once, and where
-/// that does not lessen the violations for some rounds the last one alone. After `rounds` what is still negative is zero. H is positive definite by its priors;
-/// none where it is not.
+/// Block principal pivoting (Portugal, Júdice & Vicente 1994; Kim & Park 2011): all violations change sides at once. If
+/// that does not reduce them for some rounds, only the last changes. After `rounds`, negative values become zero. H is
+/// positive definite by its priors; `None` if it is not.
 pub(crate) fn nnls(
     h: &DMatrix<f64>,
     g: &DVector<f64>,
@@ -62,7 +62,7 @@ pub(crate) fn nnls(
             free[*last] = !free[*last];
         }
     }
-    // A few may be undecided; they carry little.
+    // A few undecided ones may remain; they matter little.
     x.iter_mut()
         .zip(bounded)
         .filter(|(_, bounded)| **bounded)
@@ -75,7 +75,7 @@ pub(crate) fn nnls(
 mod tests {
     use super::*;
 
-    /// The conditions of Karush, Kuhn and Tucker hold, also where many bounds are met.
+    /// The Karush-Kuhn-Tucker conditions hold, also with many active bounds.
     #[test]
     fn slopes_are_zero_inside_and_point_outwards_at_the_bounds() {
         let size = 30;

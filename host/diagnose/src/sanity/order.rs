@@ -1,4 +1,4 @@
-//! Columns of joints in another order than the description's.
+//! Joint columns in another order than the description's.
 
 use super::super::DiagnoseError;
 use super::super::outcome::{About, DataFault};
@@ -8,13 +8,13 @@ use super::undo::{Columns, Undo};
 use rig_output::listed;
 
 impl Judge<'_> {
-    /// The order in which these columns explain the recording best, and the best exchange of two alone; none where that is the
-    /// description's.
+    /// Returns the order in which these columns explain the recording best, and the best exchange of two alone; nothing
+    /// for the description's order.
     ///
-    /// From the description's order on, joints are exchanged as long as that explains convincingly more.
+    /// Starts from the description's order and exchanges joints while that explains convincingly more.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the description is no chain.
+    /// [`DiagnoseError::Model`] if the description is no chain.
     pub(super) fn orders(
         &self,
         which: Columns,
@@ -49,7 +49,7 @@ impl Judge<'_> {
         Ok(found)
     }
 
-    /// Another order as a fault of the recording.
+    /// Returns another order as a fault of the recording.
     pub(super) fn order_said(&self, which: Columns, order: &[usize], found: &Found) -> DataFault {
         let moved: Vec<usize> = (0..order.len()).filter(|j| order[*j] != *j).collect();
         let first = moved.first().copied().unwrap_or(0);
@@ -101,7 +101,7 @@ impl Judge<'_> {
     }
 }
 
-/// Orders in which two or three of `joints` have changed their places, or all of them: by so many columns, or from last to first.
+/// Returns orders with two or three of `joints` exchanged, all of them rotated, or all reversed.
 fn exchanges(count: usize, joints: &[usize]) -> Vec<Vec<usize>> {
     let placed = |own: &[usize], others: &[usize]| {
         let mut places: Vec<usize> = (0..count).collect();

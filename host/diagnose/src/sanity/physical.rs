@@ -1,12 +1,12 @@
-//! What any robot of this geometry may do: links of positive mass, drives of positive inertia, friction that takes.
+//! Models of any robot with this geometry: links of positive mass, drives of positive inertia, dissipative friction.
 //!
-//! A link is what the description says of it times a number, and point masses about its frame, none of them negative: every such
-//! sum is a body that there can be, and every such body is near one. Friction may be viscous, dry, fall with speed (Stribeck),
-//! rise with its root or its square, go with the load, and differ between the directions; beside it a constant, a spring, and one
-//! wave over the motor's turn ([`super::wave`]), as cogging, ripple and eccentric gears make it. So the data are explained by
-//! least squares with coefficients that cannot be negative, over the whole robot at once.
+//! A link is its description times a number plus point masses about its frame, none of them negative. Every such sum is
+//! a possible body, and every possible body is near one. Friction may be viscous, dry, fall with speed (Stribeck), rise
+//! with its root or its square, depend on the load, and differ between directions. Further terms are a constant, a
+//! spring, and one wave over the motor's turn ([`super::wave`]), as from cogging, ripple and eccentric gears.
+//! Non-negative least squares fits all of them to the whole robot at once.
 //!
-//! Leaves out: elastic joints, play, further waves, and bodies wider than the box of their points.
+//! Leaves out: elastic joints, backlash, further waves, and bodies wider than the box of their points.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
@@ -20,43 +20,43 @@ use super::wave;
 use rig_model::robot;
 use rig_model::robot::{Inertial, Robot};
 
-/// Stretches of time that are left out in turn.
+/// Number of stretches that are left out in turn.
 pub(super) const BLOCKS: usize = 8;
-/// Rows that tell as much as all of them do: a recording has so many independent ones.
+/// Effective number of independent rows in a recording.
 pub(super) const INDEPENDENT: f64 = 50.0;
-/// Share of the torque that no model of rigid bodies explains, which its rows are taken to be uncertain by.
+/// Share of the torque that no rigid-body model explains: the uncertainty of its rows.
 const UNCERTAIN: f64 = 0.1;
-/// Standard deviation of what a description says of a link or a rotor, as a share of it, where it is believed.
+/// Relative standard deviation of a described link or rotor, if the description is believed.
 const DESCRIBED: f64 = 0.3;
-/// Share of its described mass that a link has at least, and of its inertia a rotor: stand-in values are right to one decade.
+/// Least link mass and rotor inertia, as shares of the described: stand-in values are right to one decade.
 const LIGHTEST: f64 = 0.1;
-/// Precision of a coefficient of which nothing is known: it makes a torque of the size that was measured, or less.
+/// Precision of a coefficient without prior knowledge: its torque is at most of the measured size.
 const RIDGE: f64 = UNCERTAIN * UNCERTAIN / INDEPENDENT;
-/// What a spring and friction make as a share of the strongest torque of the description's bodies, in the RMS.
+/// Prior RMS torque of either-sign columns and of friction, as shares of the described bodies' strongest torque.
 const BESIDE: [f64; 2] = [0.3, 1.0];
-/// Rounds of the fit to all stretches and to all but one, which begins where the former has ended.
+/// Rounds of the fit to all stretches, and to all but one, which starts from the former.
 const ROUNDS: [usize; 2] = [60, 5];
-/// Half the side of a payload's box as a share of the arm's reach, and at least, m.
+/// Half the side of a payload's box as a share of the arm's reach, and its least value, m.
 const LOAD_BOX: (f64, f64) = (0.4, 0.1);
-/// Speeds, as shares of the RMS, at which friction may have fallen.
+/// Decay speeds of Stribeck friction, as shares of the RMS speed.
 const STRIBECK: [f64; 2] = [0.1, 0.4];
-/// Columns of one joint's drive: those that may have either sign first.
+/// Columns of one joint's drive; those of either sign come first.
 const OWN: usize = 13;
-/// How many of them.
+/// Number of columns of either sign.
 const EITHER: usize = 5;
-/// Place of the wave's two among them.
+/// Index of the wave's two columns.
 const WAVE: usize = 3;
-/// Place of the drive's inertia.
+/// Index of the drive's inertia.
 const INERTIA: usize = 5;
 
-/// What is known beside the data.
+/// Prior knowledge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Belief {
     /// The description.
     Described,
-    /// The description and something on the last link.
+    /// The description and a payload on the last link.
     Loaded,
-    /// The geometry, and masses and rotors as far as a description is worth it (`robot::worth`).
+    /// The geometry, and masses and rotors within the uncertainty of a description (`robot::worth`).
     Free,
 }
 
@@ -69,39 +69,38 @@ pub(super) struct Load {
     pub(super) place: [f64; 3],
 }
 
-/// How well left-out stretches are predicted.
+/// Prediction of left-out stretches.
 #[derive(Clone, Debug)]
 pub(super) struct Score {
-    /// Share of each joint's variance by stretch and joint; 0 of joints without torque.
+    /// Residual share of each joint's variance by stretch and joint; 0 for joints without torque.
     pub(super) errors: Vec<Vec<f64>>,
-    /// How far data and what is known beside them are from the model of all rows: their logarithm of probability, negative, but
-    /// for what all models of these joints have in common.
+    /// Negative log-likelihood of data and prior under the model of all rows, without terms that all models share.
     pub(super) cost: f64,
-    /// What the model has on the last link.
+    /// The model's payload on the last link.
     pub(super) load: Load,
 }
 
 impl Score {
-    /// Share of the variance of joint `j`'s torque that is left, mean over the stretches.
+    /// Returns the residual share of the variance of joint `j`'s torque, mean over the stretches.
     pub(super) fn left(&self, j: usize) -> f64 {
         let all = self.errors.iter().map(|stretch| stretch[j]);
         all.sum::<f64>() / self.errors.len().max(1) as f64
     }
 }
 
-/// Columns and rows of one reading of a recording.
+/// Columns and rows of a recording, as recorded or with a fault undone.
 pub(super) struct Physical {
     /// Joint by joint: the shared columns (bodies, points, motors), then the joint's own.
     matrices: Vec<DMatrix<f64>>,
     tau: Vec<Vec<f64>>,
-    /// Whether only the size of that joint's torque is known.
+    /// True for joints whose torque has an unknown sign.
     magnitude: Vec<bool>,
     /// RMS of the torque about its mean.
     size: Vec<f64>,
     /// Number of columns that joints share.
     shared: usize,
     points: Points,
-    /// Mass, rotor's inertia as described, by shared column or joint; 0 where nothing is.
+    /// Described mass and rotor inertia, by shared column or joint; 0 if there is none.
     masses: Vec<f64>,
     rotors: Vec<f64>,
     motors: Vec<f64>,
@@ -109,7 +108,7 @@ pub(super) struct Physical {
     edge: usize,
 }
 
-/// Places of point masses about each frame.
+/// Places of point masses in each frame.
 struct Points {
     places: Vec<Vec<[f64; 3]>>,
 }
@@ -146,7 +145,7 @@ impl Points {
     }
 }
 
-/// Centre and corners of a box, and where `full` its faces.
+/// Returns centre and corners of a box, with `full` also the centres of its faces.
 fn grid(half: f64, full: bool) -> Vec<[f64; 3]> {
     let ends = [-half, 0.0, half];
     let mut all = Vec::new();
@@ -164,11 +163,11 @@ fn grid(half: f64, full: bool) -> Vec<[f64; 3]> {
 }
 
 impl Physical {
-    /// Of rows of a robot; `magnitude` names the joints whose torques have lost their sign, and `edge` rows at either end are no
-    /// measurement.
+    /// Builds the rows of a robot. `magnitude` marks joints whose torques have lost their sign; `edge` rows at either
+    /// end are invalid.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the description is no chain.
+    /// [`DiagnoseError::Model`] if the description is no chain.
     pub(super) fn of(
         robot: &Robot,
         form: &Form,
@@ -198,7 +197,7 @@ impl Physical {
                     .columns_mut(map.ncols(), coupled)
                     .copy_from(&of_motors);
                 matrix.columns_mut(shared, OWN).copy_from(&own);
-                // A screw beyond its reach has no column.
+                // A screw beyond its reach has no valid column.
                 for mut column in matrix.column_iter_mut() {
                     if column.iter().any(|x| !x.is_finite()) {
                         column.fill(0.0);
@@ -240,7 +239,7 @@ impl Physical {
         })
     }
 
-    /// How well a belief predicts what it was not fitted to; none where it has nothing to go by.
+    /// Scores a belief by its prediction of left-out stretches; `None` without enough rows or a description.
     pub(super) fn score(&self, belief: Belief) -> Option<Score> {
         if belief != Belief::Free && !self.described {
             return None;
@@ -275,7 +274,7 @@ impl Physical {
         })
     }
 
-    /// Stretches of rows.
+    /// Returns the stretches of rows; `None` if there are too few rows.
     fn blocks(&self) -> Option<Vec<std::ops::Range<usize>>> {
         let rows = self.tau.first()?.len().checked_sub(2 * self.edge)?;
         (rows >= 5 * BLOCKS).then(|| {
@@ -284,18 +283,18 @@ impl Physical {
         })
     }
 
-    /// What a share of one of a joint's squares weighs.
+    /// Returns the weight of a joint's squared torque.
     fn weight(&self, j: usize) -> f64 {
         INDEPENDENT / (self.tau[j].len() as f64 * (UNCERTAIN * self.size[j]).powi(2))
     }
 
-    /// Weighted squares of a joint's torque.
+    /// Returns the weighted squares of a joint's torque.
     fn squares(&self, j: usize) -> f64 {
         let inner = self.edge..self.tau[j].len().saturating_sub(self.edge);
         self.weight(j) * self.tau[j][inner].iter().map(|tau| tau * tau).sum::<f64>()
     }
 
-    /// Normal equations of a stretch.
+    /// Returns the normal equations of a stretch.
     fn gram(
         &self,
         live: &[usize],
@@ -323,7 +322,7 @@ impl Physical {
         (h, g)
     }
 
-    /// Share of the variance of a joint's torque that is left of a stretch.
+    /// Returns the residual share of a joint's torque variance in a stretch.
     fn error(&self, j: usize, block: &std::ops::Range<usize>, x: &DVector<f64>) -> f64 {
         let own = x.rows(self.shared + j * OWN, OWN);
         let shared = x.rows(0, self.shared);
@@ -339,13 +338,13 @@ impl Physical {
         squares / (block.len() as f64 * self.size[j].powi(2))
     }
 
-    /// RMS of a column of a joint's own.
+    /// Returns the RMS of one of a joint's own columns.
     fn rms(&self, joint: usize, own: usize) -> f64 {
         let column = self.matrices[joint].column(self.shared + own);
         (column.norm_squared() / column.len().max(1) as f64).sqrt()
     }
 
-    /// RMS of what the description's bodies need of the joint that carries most.
+    /// Returns the RMS torque of the described bodies at the joint that carries most.
     fn strongest(&self) -> f64 {
         let n = self.matrices.len();
         let of = |j: usize| {
@@ -375,7 +374,7 @@ impl Physical {
     }
 }
 
-/// Standard parameters of all links from the described bodies, then the points: links × COLUMNS × columns.
+/// Returns standard parameters of all links from described bodies, then points: links × COLUMNS × columns.
 fn bodies(parameters: &[[f64; COLUMNS]], points: &Points) -> DMatrix<f64> {
     let n = parameters.len();
     let mut map = DMatrix::zeros(n * COLUMNS, n + points.count());
@@ -394,8 +393,8 @@ fn bodies(parameters: &[[f64; COLUMNS]], points: &Points) -> DMatrix<f64> {
     map
 }
 
-/// Columns of one joint's drive: constant, difference between the directions, spring, room for a wave; inertia, viscous, dry,
-/// then what the library has of friction beside them, each with a sign that takes.
+/// Returns the columns of one joint's drive: constant, difference between directions, spring, space for a wave;
+/// inertia, viscous, dry, then other friction of the library, each with a dissipative sign.
 fn own(q: &[f64], qd: &[f64], qdd: &[f64], weight: &[f64]) -> DMatrix<f64> {
     let count = qd.len().max(1) as f64;
     let rms = (qd.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
@@ -419,16 +418,16 @@ fn own(q: &[f64], qd: &[f64], qdd: &[f64], weight: &[f64]) -> DMatrix<f64> {
     })
 }
 
-/// Normal equations with what a belief adds, in columns of one size.
+/// Normal equations with a belief's prior, columns scaled to one size.
 struct Problem {
     kept: Vec<usize>,
     scale: DVector<f64>,
     precision: DVector<f64>,
     pull: DVector<f64>,
-    /// Half the squares of the means of what is known, in their standard deviations.
+    /// Half the squared prior means, in their standard deviations.
     offset: f64,
     bounded: Vec<bool>,
-    /// Bounds of those that are bounded.
+    /// Lower bounds of the bounded columns.
     least: DVector<f64>,
     size: usize,
 }
@@ -442,7 +441,7 @@ impl Problem {
         let kept: Vec<usize> = (0..size)
             .filter(|k| h[(*k, *k)] > f64::EPSILON * f64::EPSILON * most)
             .collect();
-        // The link of each point.
+        // Link of each point.
         let links: Vec<usize> = (physical.points.places.iter().enumerate())
             .flat_map(|(link, places)| std::iter::repeat_n(link, places.len()))
             .collect();
@@ -451,7 +450,7 @@ impl Problem {
             Belief::Described | Belief::Loaded => DESCRIBED,
             Belief::Free => robot::DESCRIBED,
         };
-        // Mean and standard deviation of what is known of a coefficient, and the least that it can be.
+        // Prior mean, standard deviation and lower bound of a coefficient.
         let known = |k: usize| -> Option<(f64, f64, f64)> {
             let stated =
                 |value: f64| (value > 0.0).then_some((value, share * value, LIGHTEST * value));
@@ -507,7 +506,7 @@ impl Problem {
         }
     }
 
-    /// How far coefficients are from what is known of them, half the squares in standard deviations.
+    /// Returns the distance of coefficients from the prior, half the squares in standard deviations.
     fn cost(&self, x: &DVector<f64>) -> f64 {
         let own = x.select_rows(&self.kept).component_mul(&self.scale);
         let squares = own.component_mul(&own).dot(&self.precision);

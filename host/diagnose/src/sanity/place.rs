@@ -1,9 +1,9 @@
-//! Positions counted from another zero or by another factor, by what the description makes of them.
+//! Position zeros and factors, from their effect on the described torques.
 //!
-//! Gravity, inertia and coupling of a described robot all depend on where its joints are. The zero or the factor that lets the
-//! description explain the torques best is searched on a grid and then closely.
+//! Gravity, inertia and coupling of a described robot depend on its joint positions. A grid search and then a fine
+//! search find the zero or factor with which the description explains the torques best.
 //!
-//! Leaves out: the zero of a joint on which gravity does not act and which nothing behind it shows; a base or a tool that leans
+//! Leaves out: the zero of a joint without gravity, if no joint behind it shows it; a tilted base or tool
 //! (`gravity_tilt` and the payload are other names for that).
 
 use core::f64::consts::{PI, TAU};
@@ -18,24 +18,24 @@ use super::undo::Undo;
 use rig_model::robot::JointKind;
 use rig_output::{format_significant, format_trimmed};
 
-/// Steps of the grid of a whole turn.
+/// Steps of the grid over a whole turn.
 const DIRECTIONS: u32 = 24;
-/// A zero that is off by less is a calibration, which `identify` and `diagnose` look for themselves, rad.
+/// Least zero error, rad; a smaller one is a calibration, which `identify` and `diagnose` estimate themselves.
 const LEAST_TURN: f64 = 0.35;
-/// Factors of a position from a tenth to ten times, so many a decade.
+/// Factors per decade on the grid of a position, from a tenth to ten times.
 const A_DECADE: i32 = 12;
-/// Steps of the close search, each of which narrows it to two thirds.
+/// Steps of the fine search; each narrows it to two thirds.
 const CLOSER: usize = 12;
-/// A found factor is a named one within this share.
+/// Relative difference below which a found factor is a named one.
 const NAMED: f64 = 0.04;
-/// A factor closer to one is an effect's business.
+/// Least factor; one closer to one is left to effects.
 const LEAST_FACTOR: f64 = 1.4;
 
 impl Judge<'_> {
-    /// The zero of joint `j` with which the description explains the recording best; none where that is its own.
+    /// Returns the zero of joint `j` with which the description explains the recording best; `None` for its own zero.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the description is no chain.
+    /// [`DiagnoseError::Model`] if the description is no chain.
     pub(super) fn zero(&self, j: usize, before: &Before) -> Result<Option<Undo>, DiagnoseError> {
         if self.robot.joints[j].kind == JointKind::Prismatic {
             return Ok(None);
@@ -51,8 +51,8 @@ impl Judge<'_> {
         Ok((turn.abs() > LEAST_TURN).then_some(Undo::Zero(j, turn)))
     }
 
-    /// The factor of joint `j`'s position, or of all positions, with which the description explains the recording best; none
-    /// where that is one.
+    /// Returns the factor of joint `j`'s position, or of all positions, with which the description explains the
+    /// recording best; `None` for one.
     ///
     /// # Errors
     /// As for [`Self::zero`].
@@ -61,7 +61,7 @@ impl Judge<'_> {
         j: Option<usize>,
         before: &Before,
     ) -> Result<Option<Undo>, DiagnoseError> {
-        // Of positions beyond the limits these tell the unit, and a description is too rough to know better.
+        // Limits show the unit of positions beyond them better than a rough description does.
         if j.is_some_and(|j| !self.reaches(j, 1.0)) {
             return Ok(None);
         }
@@ -75,7 +75,7 @@ impl Judge<'_> {
             Some(j) => self.reaches(j, *factor),
             None => (0..self.robot.joints.len()).all(|j| self.reaches(j, *factor)),
         };
-        // All positions by a factor that has no name are those of another robot.
+        // A common factor of all positions without a name would mean another robot.
         let decades = if j.is_some() { A_DECADE } else { 0 };
         let grid = (-decades..=decades).flat_map(|k| [step.powi(k), -step.powi(k)]);
         let far = |factor: &f64| factor.ln().abs() > LEAST_FACTOR.ln() || *factor < 0.0;
@@ -100,7 +100,7 @@ impl Judge<'_> {
         Ok((far(&factor) && reached(&factor)).then_some(Undo::Position(j, factor)))
     }
 
-    /// Another zero as a fault of the recording; shares of the torques' variance that are left, as recorded and with it.
+    /// Returns another zero as a fault; `left` are residual variance shares as recorded and with it.
     pub(super) fn zero_said(&self, j: usize, angle: f64, left: [f64; 2]) -> DataFault {
         let (n, name) = (j + 1, self.name(j));
         let [recorded, without] = left.map(|share| 100.0 * share);
@@ -113,7 +113,7 @@ impl Judge<'_> {
         self.say("zero", About::Motion, j, text)
     }
 
-    /// One factor of all positions as a fault of the recording.
+    /// Returns one factor of all positions as a fault of the recording.
     pub(super) fn all_scaled(&self, factor: f64, left: [f64; 2]) -> DataFault {
         let [recorded, without] = left.map(|share| 100.0 * share);
         let what = match factor {
@@ -134,7 +134,7 @@ impl Judge<'_> {
     }
 }
 
-/// The value of the largest gain above zero.
+/// Returns the value with the largest positive gain.
 fn best(
     values: impl Iterator<Item = f64>,
     gain: &dyn Fn(f64) -> Result<f64, DiagnoseError>,
@@ -149,7 +149,7 @@ fn best(
     Ok(found.map(|(value, _)| value))
 }
 
-/// The value of the largest gain between two, of which there is one.
+/// Returns the value with the largest gain between two; the gain has one maximum there.
 fn closely(
     mut low: f64,
     mut high: f64,

@@ -1,10 +1,10 @@
-//! A rotor that the description makes heavier than all that was seen to move.
+//! A described rotor with more inertia than the whole joint.
 //!
-//! A rotor acts on its joint by the square of the gear ratio. Where a current was recorded a ratio k times too large makes the
-//! recorded torque, and with it all inertia, k times too large, and the described rotor k² times: sooner or later more than the
-//! whole joint shows. No change of the links, the friction or the payload does that; a description of the rotor that is wrong does.
+//! A rotor acts on its joint by the square of the gear ratio. With a recorded current, a ratio k times too large makes
+//! torque and all inertia k times too large, but the described rotor k² times. For a large k it exceeds the inertia of
+//! the whole joint. No change of links, friction or payload does that, only a wrong description of the rotor.
 //!
-//! Leaves out: motors that move several joints, and ratios too small, which make the rotor lighter than it is.
+//! Leaves out: motors that move several joints; ratios that are too small, which make the rotor lighter.
 
 use super::super::DiagnoseError;
 use super::super::outcome::About;
@@ -14,18 +14,18 @@ use super::undo::Undo;
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
 
-/// How many times the inertia of the whole joint the rotor's has to be.
+/// Least ratio of the rotor's inertia to that of the whole joint.
 const HEAVIER: f64 = 1.5;
-/// Standard deviations of the joint's inertia between both.
+/// Least difference of both, in standard deviations of the joint's inertia.
 const CLEAR: f64 = 5.0;
-/// Share of the torque's variance that the model may leave.
+/// Largest residual share of the torque's variance.
 const LEFT: f64 = 0.2;
 
 impl Judge<'_> {
-    /// The described rotor of joint `j` that is more than the joint.
+    /// Suspects a described rotor of joint `j` that exceeds the joint.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the description is no chain.
+    /// [`DiagnoseError::Model`] if the description is no chain.
     pub(super) fn heavy_rotor(&self, j: usize) -> Result<Option<Suspicion>, DiagnoseError> {
         let joint = &self.robot.joints[j];
         let alone = (self.robot.joints.iter().filter_map(|j| j.drive.as_ref()))

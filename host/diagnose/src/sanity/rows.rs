@@ -1,4 +1,4 @@
-//! A recording as a few thousand rows: means over short stretches, which treat regressor and torque alike.
+//! A recording as a few thousand rows: means over short stretches, for regressor and torque alike.
 
 use nalgebra::DMatrix;
 use rig_shared::multibody::COLUMNS;
@@ -11,22 +11,22 @@ use rig_identify::{chain_of, transmission_of};
 use rig_model::batch::ChainBatch;
 use rig_model::robot::Robot;
 
-/// Rows a second that are kept: slow against the noise, fast against what drives are asked to do.
+/// Rows per second: slow against the noise, fast against the motion of drives.
 const RATE: f64 = 50.0;
-/// Rows that are looked at; what is wrong with a column is wrong all along it.
+/// Most rows; a column's fault is the same in all of them.
 const MOST: usize = 6000;
 
-/// What the regressors are formed for: links, and the drives where they move more than their own joint.
+/// Structure of the regressors: links, and drives that move more than their own joint.
 pub(super) struct Form {
     chain: ChainBatch,
     drives: Option<Transmission<f64>>,
 }
 
 impl Form {
-    /// That of a description.
+    /// Returns the form of a description.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where geometry or drives are none.
+    /// [`DiagnoseError::Model`] if geometry or drives are not valid.
     pub(super) fn of(robot: &Robot) -> Result<Self, DiagnoseError> {
         let drives = transmission_of(robot).map_err(model_error)?;
         Ok(Self {
@@ -35,7 +35,7 @@ impl Form {
         })
     }
 
-    /// Number of columns: the joints' own, then the motors'.
+    /// Returns the number of columns: the joints' own, then the motors'.
     pub(super) fn width(&self) -> usize {
         let motors = self.drives.as_ref().map_or(0, |_| MOTOR_COLUMNS);
         self.chain.joint_count() * (COLUMNS + motors)
@@ -57,7 +57,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// The rows of one recording with torque.
+    /// Returns the rows of one recording with torque.
     pub(super) fn of(runs: &[&Run], joints: usize) -> Self {
         let rate = runs.first().map_or(RATE, |run| run.rate);
         let stride = (rate / RATE).round().max(1.0) as usize;
@@ -103,12 +103,12 @@ impl Rows {
         rows
     }
 
-    /// How many there are.
+    /// Returns the number of rows.
     pub(super) fn len(&self) -> usize {
         self.q.first().map_or(0, Vec::len)
     }
 
-    /// The rows as if the joint (all of them where none is named) had moved `factor` times as far.
+    /// Returns the rows as if the joint, or all joints for `None`, had moved `factor` times as far.
     pub(super) fn rescaled(&self, joint: Option<usize>, factor: f64) -> Self {
         let mut rows = self.clone();
         for columns in [&mut rows.q, &mut rows.qd, &mut rows.qdd] {
@@ -121,7 +121,7 @@ impl Rows {
         rows
     }
 
-    /// Every `step`-th row, so that many trials are cheap.
+    /// Returns every n-th row, at most `most`, so that many trials are cheap.
     pub(super) fn thinned(&self, most: usize) -> Self {
         let step = self.len().div_ceil(most.max(1)).max(1);
         let thin = |columns: &[Vec<f64>]| {
@@ -140,8 +140,8 @@ impl Rows {
         }
     }
 
-    /// The regressor of each joint's torque, rows × [`Form::width`]: the joints' standard parameters, then the motors' own
-    /// where drives are coupled.
+    /// Returns the regressor of each joint's torque, rows × [`Form::width`]: the joints' standard parameters, then the
+    /// motors' own for coupled drives.
     pub(super) fn regressors(&self, form: &Form) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
         let (n, rows) = (form.chain.joint_count(), self.len());
         let links = n * COLUMNS;
@@ -164,8 +164,8 @@ impl Rows {
             .collect())
     }
 
-    /// The motors' columns in each joint's torque, rows × [`MOTOR_COLUMNS`] n; empty where every drive moves its own joint
-    /// alone. A screw beyond its reach has none: they are not numbers there, and no fit takes such a column.
+    /// Returns the motors' columns in each joint's torque, rows × [`MOTOR_COLUMNS`] n; empty without coupled drives. A
+    /// screw beyond its reach has no valid numbers there, and no fit uses such a column.
     pub(super) fn of_motors(&self, form: &Form) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
         let Some(drives) = &form.drives else {
             return Ok(Vec::new());

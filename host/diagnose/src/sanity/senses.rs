@@ -1,4 +1,4 @@
-//! What friction, inertia and gravity say of signs, and the description's own values of scales.
+//! Signs by friction, inertia and gravity, and scales by the description's values.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
@@ -19,28 +19,27 @@ use rig_model::batch::ModelBatch;
 use rig_model::robot::Joint;
 use rig_output::{format_significant, format_unit};
 
-/// Parameters change by less than this factor; units and ratios by more.
+/// Largest factor of a parameter change; units and ratios change more.
 const CHANGE: f64 = 5.0;
-/// Factors between torques and description that are this far from a thousand or less are a thousand: what stand-in masses
-/// are off by.
+/// Factors within this ratio of a thousand, or a thousandth, count as that: stand-in masses are wrong by as much.
 const THOUSAND_APART: f64 = 2.5;
-/// Standard deviations that a sign must stand from zero.
+/// Least distance of a sign from zero, standard deviations.
 const CLEAR: f64 = 4.0;
 
-/// Measured over stated gravity and inertia, where they show.
+/// Measured over described gravity and inertia, if identifiable.
 pub(super) type Scales = (Option<Measured>, Option<Measured>);
 
-/// What the description says of rows, joint by joint; no friction.
+/// Described torques of rows, joint by joint, without friction.
 pub(super) struct Described {
     pub(super) weight: Vec<Vec<f64>>,
-    /// Weight and all that links and rotors need beside it.
+    /// Weight and all other torques of links and rotors.
     pub(super) all: Vec<Vec<f64>>,
     /// The motors' columns, see [`Rows::of_motors`].
     pub(super) motors: Vec<DMatrix<f64>>,
 }
 
-/// Columns of what friction may do to a joint: offset, dry and viscous friction of its own, then those of the motors that
-/// move it beside others.
+/// Returns the friction columns of a joint: its own offset, dry and viscous friction, then those of motors that move it
+/// together with others.
 pub(super) fn friction(qd: &[f64], motors: Option<&DMatrix<f64>>) -> DMatrix<f64> {
     let of_motors: Vec<(&DMatrix<f64>, usize)> = motors
         .iter()
@@ -62,8 +61,8 @@ pub(super) fn friction(qd: &[f64], motors: Option<&DMatrix<f64>>) -> DMatrix<f64
     })
 }
 
-/// Columns of [`friction`], then the description's weight and its inertia with all that goes with it: shares of what is
-/// described.
+/// Returns the columns of [`friction`], then the described weight and the described inertial torque, so that their
+/// coefficients are shares of the described.
 pub(super) fn columns(data: &Rows, j: usize, described: &Described) -> DMatrix<f64> {
     let (weight, all) = (&described.weight[j], &described.all[j]);
     let lost = friction(&data.qd[j], described.motors.get(j));
@@ -76,7 +75,7 @@ pub(super) fn columns(data: &Rows, j: usize, described: &Described) -> DMatrix<f
 }
 
 impl Judge<'_> {
-    /// Mean of the joint's own inertia over its motion, as weights of the parameters.
+    /// Returns the joint's mean own inertia over its motion, as weights of the parameters.
     pub(super) fn inertia(&self, j: usize) -> Result<DVector<f64>, DiagnoseError> {
         let mut still = self.rows.thinned(200);
         for column in still.qd.iter_mut().chain(&mut still.qdd) {
@@ -91,7 +90,7 @@ impl Judge<'_> {
         }))
     }
 
-    /// Power lost in the joint's friction, W, that over the variation of torque and speed, and the joint's own inertia.
+    /// Returns the friction power, W, its share of the variation of torque and speed, and the joint's own inertia.
     fn senses(&self, j: usize, fit: &Fit) -> Result<(Measured, f64, Measured), DiagnoseError> {
         let qd = &self.rows.qd[j];
         let count = qd.len().max(1) as f64;
@@ -99,8 +98,8 @@ impl Judge<'_> {
         let mut friction = DVector::zeros(self.form.width());
         friction[j * COLUMNS + column::VISCOUS] = squares;
         friction[j * COLUMNS + column::COULOMB] = qd.iter().map(|v| v.abs()).sum::<f64>() / count;
-        // What a coupled motor's dry friction takes it takes from all its joints; its column in this joint's torque stands for
-        // all of that. Its viscous part is in the joints' own but for what goes from one to the other, of either sign.
+        // A coupled motor's dry friction takes power from all its joints; its column in this joint's torque stands for
+        // all of it. Its viscous part is in the joints' own, but for an exchange between them, of either sign.
         let motors = self.robot.joints.len() * COLUMNS..self.form.width();
         for c in motors.skip(motor_column::COULOMB).step_by(MOTOR_COLUMNS) {
             let power = (self.matrices.iter().zip(&self.rows.qd))
@@ -114,7 +113,7 @@ impl Judge<'_> {
         Ok((loss, share, fit.functional(&self.inertia(j)?)))
     }
 
-    /// Friction that drives and inertia that pulls: torque and motion are counted in opposite senses.
+    /// Suspects opposite senses of torque and motion if friction drives and inertia is negative.
     pub(super) fn sign(
         &self,
         j: usize,
@@ -125,7 +124,7 @@ impl Judge<'_> {
         };
         let (loss, share, inertia) = self.senses(j, fit)?;
         let (l, i) = (loss.sigmas(), inertia.sigmas());
-        // Each may be hidden by what the motion does not show; then the other has to be the clearer.
+        // The motion may hide one of them; the other must then be clearer.
         let both = l < -1.5 && i < -1.5 && (l + i) / core::f64::consts::SQRT_2 < -CLEAR;
         let by_friction = l < -CLEAR && share < -0.1 && i < 3.0;
         let by_inertia = i < -1.5 * CLEAR && share < -0.02 && l < 3.0;
@@ -135,7 +134,7 @@ impl Judge<'_> {
         let n = j + 1;
         let (torque, position) = (Undo::Torque(Some(j), -1.0), Undo::Position(Some(j), -1.0));
         let (undo, which) = match self.scales(&self.rows, j, described).0 {
-            // A witness that needs no description.
+            // The reference is evidence without a description.
             _ if self.reference_against(j) => (
                 position,
                 format!("ref{n} runs against q{n} as well, so reverse q{n}"),
@@ -165,7 +164,7 @@ impl Judge<'_> {
         Ok(Some(Suspicion::new(fault, undo)))
     }
 
-    /// Whether the joint's reference is counted against its position.
+    /// Returns true if the joint's reference runs against its position.
     pub(super) fn reference_against(&self, j: usize) -> bool {
         let longest = self.runs.iter().max_by_key(|run| run.len());
         let joint = longest.and_then(|run| run.joints.get(j));
@@ -173,8 +172,7 @@ impl Judge<'_> {
         scale.is_some_and(|s| s < 0.0)
     }
 
-    /// Measured gravity and measured inertia over the description's, where the description states them and the motion
-    /// shows them.
+    /// Returns measured gravity and inertia over the described ones, if they are described and the motion shows them.
     pub(super) fn scales(&self, data: &Rows, j: usize, described: Option<&Described>) -> Scales {
         let Some(described) = described.filter(|_| self.states_from(j)) else {
             return (None, None);
@@ -190,7 +188,7 @@ impl Judge<'_> {
             fit.parameter(c)
                 .filter(|m| m.sigmas().abs() > 5.0 && without - fit.unexplained() > 0.05)
         };
-        // A description that explains little of the torque is no scale for it.
+        // A description that explains little of the torque gives no scale.
         let whole = fit.unexplained() < 0.2;
         (
             shown(first).filter(|_| whole),
@@ -198,13 +196,13 @@ impl Judge<'_> {
         )
     }
 
-    /// Whether the description states the links from joint `j` outwards, all that its torque moves.
+    /// Returns true if the description states all links from joint `j` outwards, which its torque moves.
     pub(super) fn states_from(&self, j: usize) -> bool {
         let stated = |joint: &Joint| joint.inertial.as_ref().is_some_and(|i| i.mass > 0.0);
         self.robot.joints[j..].iter().all(stated)
     }
 
-    /// What the description says of these rows; none where there are none or it does not state joint `j`'s torque.
+    /// Returns the described torques of these rows; `None` without rows, or if joint `j`'s torque is not described.
     pub(super) fn stated(&self, data: &Rows, j: usize) -> Result<Option<Described>, DiagnoseError> {
         if data.len() == 0 || !self.states_from(j) {
             return Ok(None);
@@ -212,12 +210,12 @@ impl Judge<'_> {
         self.described(data).map(Some)
     }
 
-    /// What the description says of these rows.
+    /// Returns the described torques of these rows.
     pub(super) fn described(&self, data: &Rows) -> Result<Described, DiagnoseError> {
         self.described_under(data, self.robot.gravity)
     }
 
-    /// What it would say under another gravity, m/s² in frame 0.
+    /// Returns the described torques under another gravity, m/s² in frame 0.
     pub(super) fn described_under(
         &self,
         data: &Rows,
@@ -249,7 +247,7 @@ impl Judge<'_> {
             for (motor, rotor) in rotors.iter().enumerate() {
                 let column = columns.column(motor * MOTOR_COLUMNS + motor_column::INERTIA);
                 let inertia = rotor[motor_column::INERTIA];
-                // Of a rotor that is not stated nothing comes, also where its column is no number.
+                // A rotor that is not described adds nothing, even if its column is no number.
                 if inertia != 0.0 {
                     for (to, y) in own.iter_mut().zip(column.iter()) {
                         *to += y * inertia;
@@ -264,8 +262,8 @@ impl Judge<'_> {
         })
     }
 
-    /// Torques of several joints that are all a thousand times as large or as small as the description needs: no description is
-    /// that far off everywhere.
+    /// Suspects torques of several joints that are all a thousand times too large or small: no description is that
+    /// wrong everywhere.
     pub(super) fn thousandfold(&self, described: Option<&Described>) -> Option<Suspicion> {
         let mut shown = Vec::new();
         let mut weighed = false;
@@ -314,7 +312,7 @@ impl Judge<'_> {
         Some(Suspicion::new(fault, Undo::Torque(None, factor)))
     }
 
-    /// Factors between the recording and the description that no change of the robot makes.
+    /// Suspects factors between recording and description that no change of the robot causes.
     pub(super) fn against_description(
         &self,
         j: usize,
@@ -322,7 +320,7 @@ impl Judge<'_> {
     ) -> Result<Option<Suspicion>, DiagnoseError> {
         let joint = &self.robot.joints[j];
         let (gravity, inertia) = self.scales(&self.rows, j, described);
-        // What the description does not state of the drive makes the inertia larger, never smaller.
+        // Drive parts that are not described make the inertia larger, never smaller.
         let complete = joint
             .drive
             .as_ref()
@@ -335,9 +333,9 @@ impl Judge<'_> {
         let n = j + 1;
         let torque = |factor: f64, of: &str| {
             let name = names::of_torque(joint, factor);
-            // Between a parameter's change and what has a name there is room for an odd robot.
+            // Between a parameter change and a named factor an unusual robot is possible.
             (name.is_some() || !(0.125..8.0).contains(&factor.abs())).then(|| {
-                // On a light last link a tool weighs many times what the link does.
+                // On a light last link a tool may weigh many times the link.
                 let tool = match factor {
                     1.0..100.0 => ", or as a tool or payload that the description does not state would make it",
                     _ => "",

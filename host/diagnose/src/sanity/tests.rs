@@ -87,7 +87,7 @@ fn all(set: &Set) -> Vec<Run> {
     files.flat_map(|(k, f)| read(&set.robot, f, k)).collect()
 }
 
-/// The same runs with something done to a joint's columns, filtered and differentiated again.
+/// Returns the runs with changed columns of a joint, filtered and differentiated again.
 fn injured(runs: &[Run], change: impl Fn(&mut Run)) -> Vec<Run> {
     let mut runs = runs.to_vec();
     for run in &mut runs {
@@ -106,7 +106,7 @@ fn times(column: &mut [f64], factor: f64) {
     column.iter_mut().for_each(|v| *v *= factor);
 }
 
-/// The emulated rig of the laboratory: two designed motions and a friction sweep, as its telemetry gives them.
+/// The emulated rig of the laboratory: two designed motions and a friction sweep, as in its telemetry.
 fn emulated() -> (Robot, Vec<Run>) {
     let folder = tempfile::tempdir().unwrap();
     let plant = PlantConfig::laboratory(7);
@@ -145,12 +145,12 @@ fn emulated() -> (Robot, Vec<Run>) {
     (robot, runs)
 }
 
-/// The one fault that is found of a joint, and is certain in a recording at least.
+/// Asserts the only fault of a joint, certain in at least one recording.
 fn only(robot: &Robot, runs: &[Run], kind: &str, joint: usize, words: &str) {
     named(robot, runs, kind, joint, words, true);
 }
 
-/// The one fault that is found of a joint, which something else explains as well.
+/// Asserts the only fault of a joint, which something else explains as well.
 fn open(robot: &Robot, runs: &[Run], kind: &str, joint: usize, words: &str) {
     named(robot, runs, kind, joint, words, false);
 }
@@ -194,7 +194,7 @@ fn healthy_recordings_raise_nothing() {
     assert_eq!(faults(&robot, &runs).unwrap(), []);
 }
 
-/// The set of that name with its recordings; none where there are no real recordings.
+/// Returns the named set with its recordings; `None` without real recordings.
 fn one(name: &str) -> Option<(Robot, Vec<Run>)> {
     let set = measured().into_iter().find(|set| set.name == name)?;
     let runs = all(&set);
@@ -209,7 +209,7 @@ fn q(runs: &[Run], j: usize, factor: f64) -> Vec<Run> {
     injured(runs, |r| times(&mut r.joints[j].q_raw, factor))
 }
 
-/// A position that jumps by 0.3 rad or m halfway: the joint is named, and nothing that follows from it.
+/// A position that jumps by 0.3 rad or m halfway: the joint is named, without consequences.
 fn jumps(robot: &Robot, runs: &[Run], joint: usize) {
     let jumps = injured(runs, |r| {
         let half = r.len() / 2;
@@ -220,12 +220,12 @@ fn jumps(robot: &Robot, runs: &[Run], joint: usize) {
     only(robot, &jumps, "jump", joint, "jumps by 0.");
 }
 
-/// A torque that comes late.
+/// A torque that is late.
 fn late(robot: &Robot, runs: &[Run], joint: usize) {
     let late = injured(runs, |r| {
         let by = (0.7 * r.rate) as usize;
         let tau = &mut r.joints[joint].tau;
-        // A remnant behind a gap is shorter than the shift.
+        // A remainder behind a gap is shorter than the shift.
         if by < tau.len() {
             tau.rotate_right(by);
         }
@@ -284,7 +284,7 @@ fn faults_of_a_real_arm_with_torque_sensors_are_named() {
     only(&robot, &tau(&runs, 3, 1000.0), "unit", 3, "");
     jumps(&robot, &runs, 3);
     only(&robot, &q(&runs, 1, 57.296), "unit", 1, "degrees");
-    // A late torque is taken up here: a few slow harmonics, shifted, are other sums of the same columns.
+    // Parameters compensate a late torque here: a few shifted slow harmonics are other sums of the same columns.
     cut(&robot, &runs, 1);
 }
 
@@ -302,7 +302,7 @@ fn faults_of_a_real_arm_with_geared_motors_are_named() {
     cut(&robot, &runs, 0);
 }
 
-/// Columns of two joints in each other's place.
+/// Exchanges columns of two joints.
 fn swapped(runs: &[Run], pair: [usize; 2], torque: bool, ratio: [f64; 2]) -> Vec<Run> {
     injured(runs, |run| {
         let [i, j] = pair;
@@ -325,7 +325,7 @@ fn swapped(runs: &[Run], pair: [usize; 2], torque: bool, ratio: [f64; 2]) -> Vec
     })
 }
 
-/// Whether the one fault that is found has these words; prints it where not.
+/// Returns true if the only fault has these words; else prints it.
 fn says(robot: &Robot, runs: &[Run], kind: &str, words: &str) -> bool {
     let found = faults(robot, runs).unwrap();
     let right = !found.is_empty()
@@ -338,7 +338,7 @@ fn says(robot: &Robot, runs: &[Run], kind: &str, words: &str) -> bool {
     right
 }
 
-/// Pairs, of torques and of positions, that are not named by both their columns.
+/// Returns pairs of torques and positions that are not named by both columns.
 fn unnamed(
     robot: &Robot,
     runs: &[Run],
@@ -358,7 +358,7 @@ fn unnamed(
     wrong
 }
 
-/// Pairs of joints that are not named where all their columns are exchanged.
+/// Returns pairs of joints that are not named if all their columns are exchanged.
 fn unordered(robot: &Robot, runs: &[Run], pairs: &[[usize; 2]]) -> Vec<String> {
     let exchanged = |pair: [usize; 2]| {
         let ratio = pair.map(|j| robot.joints[j].gear_ratio());
@@ -379,7 +379,7 @@ fn columns_of_real_arms_in_each_others_place_are_named() {
     let mut wrong = Vec::new();
     if let Some((robot, runs)) = one("kuka") {
         let first: Vec<Run> = runs.into_iter().filter(|r| r.recording == 0).collect();
-        // Joint 6 hardly carries anything, and its friction is a sensor's spokes: nothing tells its sense.
+        // Joint 6 carries hardly any load; its friction is from a sensor's spokes, so its sense is not identifiable.
         for j in [0, 1, 2, 3, 4, 6] {
             if !says(&robot, &tau(&first, j, -1.0), "sign", &format!("{}", j + 1)) {
                 wrong.push(format!("tau{} reversed", j + 1));
@@ -419,13 +419,13 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
         times(&mut r.joints[0].q_raw, -1.0);
         times(&mut r.joints[0].tau, -1.0);
     });
-    // A link whose mass lies on the other side of its axis is as likely.
+    // A link with its mass on the other side of its axis is as likely.
     open(&robot, &both, "sign", 0, "both counted");
     only(&robot, &tau(1000.0), "unit", 0, "");
     only(&robot, &tau(1e-3), "unit", 0, "");
     open(&robot, &tau(9.549), "unit", 0, "rpm");
     open(&robot, &tau(9.549), "unit", 0, "a tool or payload that");
-    // A reference that runs against the position is a witness against it.
+    // A reference that runs against the position is evidence against it.
     let against = injured(&runs, |r| {
         let joint = &mut r.joints[0];
         times(&mut joint.tau, -1.0);
@@ -439,7 +439,7 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
         "ref1 runs against q1 as well, so reverse q1",
     );
     only(&robot, &tau(1.0 / 50.0), "ratio", 0, "before its gear");
-    // The sweep's few degrees leave the factor open, so that only its existence is certain there.
+    // The sweep's few degrees do not determine the factor; only its existence is certain there.
     let wide = |factor: f64| -> Vec<Run> {
         let all = q(factor).into_iter();
         all.filter(|r| r.recording < 2).collect()
@@ -450,7 +450,7 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
     only(&robot, &wide(0.5), "ratio", 0, "gear ratio");
     let sweep: Vec<Run> = q(57.296).into_iter().filter(|r| r.recording == 2).collect();
     assert!(!faults(&robot, &sweep).unwrap().is_empty());
-    // Changes of the robot, for others to judge.
+    // Changes of the robot, which other modules judge.
     for factor in [0.7, 1.3] {
         assert_eq!(faults(&robot, &tau(factor)).unwrap(), [], "{factor}");
     }
@@ -486,7 +486,7 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
     assert_eq!(faults(&robot, &two).unwrap(), []);
 }
 
-/// Recordings with what an encoder on the link makes of the joint's position.
+/// Returns recordings with a link encoder, computed from the joint's position.
 fn with_link(runs: &[Run], change: impl Fn(usize, f64) -> f64) -> Vec<Run> {
     let mut runs = runs.to_vec();
     for run in &mut runs {
@@ -501,7 +501,7 @@ fn with_link(runs: &[Run], change: impl Fn(usize, f64) -> f64) -> Vec<Run> {
 fn an_encoder_on_the_link_is_checked_like_the_joint_s_own() {
     let (robot, mut runs) = emulated();
     runs.truncate(1);
-    // Its zero is free; a little twist or play is what it is there for.
+    // Its zero is free; a little twist or backlash is allowed.
     let fine = with_link(&runs, |k, q| {
         0.98 * q + 40.0 + 1e-3 * f64::from((k % 7) as u32)
     });
@@ -528,7 +528,7 @@ fn an_encoder_on_the_link_is_checked_like_the_joint_s_own() {
         let wrong = with_link(&runs, change);
         assert!(says(&robot, &wrong, kind, words), "{kind} {words}");
     }
-    // Beside one that has none, one that has is judged by itself.
+    // A recording with one is judged by itself, beside one without.
     let mut both = runs.clone();
     both.extend(with_link(&runs, |_, q| -q));
     both[1].recording = 1;

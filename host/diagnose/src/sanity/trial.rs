@@ -1,13 +1,13 @@
-//! A suspected fault against the best other explanation.
+//! Test of a suspected fault against the best other explanation.
 //!
-//! Each suspicion is taken back on the data, and the whole robot is fitted anew: with the description as prior, with a payload
-//! beside it, and by any masses and friction that there can be ([`super::physical`]). The same is done with the data as recorded.
-//! What is compared is how well stretches of time are predicted that were left out, stretch by stretch. A fault is certain where
-//! without it the data are predicted decisively better than by every explanation that needs no fault: the description, a payload,
-//! and masses and friction as far from the description as it is worth. It is certain, too, where the description without the fault
-//! closes most of its own misfit, and free parameters do no better with the data as recorded: they can mirror every link, but one
-//! sign explains it. What is certain is taken back, and what is left is looked through again: consequences fall. Where nothing is
-//! certain, what explains as well as the best is told as open.
+//! Each suspected fault is undone in the data and the whole robot is refitted: with the description as prior, with an
+//! added payload, and with any masses and friction ([`super::physical`]). The same is done with the data as recorded.
+//! The test compares the prediction of left-out stretches, one by one. A fault is certain if its undoing predicts
+//! decisively better than every explanation without a fault: the description, a payload, or masses and friction within
+//! the description's uncertainty. It is also certain if it removes most of the description's misfit, and free
+//! parameters do no better with the recorded data. They can mirror every link, but one sign explains it. A certain
+//! fault is undone and the search repeats, which removes its consequences. If none is certain, faults that explain as
+//! well as the best are reported as open.
 //!
 //! Leaves out: two faults that hide each other, each without effect alone.
 
@@ -21,24 +21,24 @@ use super::undo::Undo;
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 
-/// Rows that are looked at, over all joints, and of each at least.
+/// Rows in the test: over all joints, and least of each.
 const ROWS: (usize, usize) = (4000, 500);
-/// Fall of the logarithm of the left-out variance, summed over the joints, that is worth a fault: one joint's falls to a half.
+/// Least fall of the log left-out variance, summed over joints, for a fault: one joint's variance halves.
 const WORTH: f64 = core::f64::consts::LN_2;
-/// Standard deviations by which stretches have to show it: by chance one in a hundred does.
+/// Standard deviations between stretches that are clear; chance reaches them once in a hundred.
 const CLEAR: f64 = 2.33;
-/// Logarithm of the odds that a fault has to have: as rare as a thousand to one.
+/// Least log odds of a fault, as its prior odds are one to a thousand.
 const ODDS: f64 = 6.9;
-/// Shares of a torque's variance below this are as good as none: no model is closer to a real robot.
+/// Variance share that counts as none: no model is closer to a real robot.
 const EXACT: f64 = 1e-4;
-/// Heaviest payload as a multiple of the links' mass: a tool weighs many times what a light link does.
+/// Heaviest payload as a multiple of the links' mass: a tool may weigh many times a light link.
 const CARRIED: f64 = 30.0;
 
-/// Something that may be wrong.
+/// A suspected fault.
 #[derive(Clone, Debug)]
 pub(super) struct Suspicion {
     pub(super) fault: DataFault,
-    /// How it is taken back; none where it is shown by columns alone, without a model.
+    /// How it is undone; `None` if columns alone show it, without a model.
     pub(super) undo: Option<Undo>,
 }
 
@@ -50,14 +50,14 @@ impl Suspicion {
         }
     }
 
-    /// Whether both take back the same.
+    /// Returns true if both are undone alike.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         let both = self.undo.as_ref().zip(other.undo.as_ref());
         both.is_some_and(|(own, other)| own.is_like(other))
     }
 }
 
-/// What one reading of a recording is worth under each belief.
+/// Scores of a recording under each belief.
 struct Reading {
     described: Option<Score>,
     loaded: Option<Score>,
@@ -82,7 +82,7 @@ impl Reading {
         })
     }
 
-    /// By the description, with or without a payload.
+    /// Returns the scores of the description, without and with a payload.
     fn stated(&self) -> impl Iterator<Item = &Score> {
         self.described.iter().chain(&self.loaded)
     }
@@ -92,7 +92,7 @@ impl Reading {
     }
 }
 
-/// How much better `a` predicts than `b`: the fall of the logarithm of the left-out variance, summed over the joints, mean over
+/// Returns how much better `a` predicts than `b`: the fall of the log left-out variance, summed over joints, mean over
 /// the stretches.
 fn gain(a: &Score, b: &Score) -> Measured {
     let gains: Vec<f64> = (a.errors.iter().zip(&b.errors))
@@ -111,23 +111,23 @@ fn gain(a: &Score, b: &Score) -> Measured {
     )
 }
 
-/// Whether `a` predicts decisively better than `b`: stretch by stretch, or where few of them are alike, by the likelihood of all.
+/// Returns true if `a` predicts decisively better than `b`, by stretches or by the likelihood of all data.
 fn beats(a: &Score, b: &Score) -> bool {
     gain(a, b).value > WORTH && (clearly(a, b) || odds(a, b) > ODDS)
 }
 
-/// Logarithm of how much likelier the data are under `a`, at the noise that each leaves.
+/// Returns the log odds of the data under `a` against `b`, each with its own noise level.
 fn odds(a: &Score, b: &Score) -> f64 {
     let joints = a.errors.first().map_or(0, Vec::len) as f64;
     0.5 * joints * INDEPENDENT * (b.cost / a.cost).ln()
 }
 
-/// Whether `a` predicts better than `b`, be it by little.
+/// Returns true if `a` predicts clearly better than `b`, even if by little.
 fn clearly(a: &Score, b: &Score) -> bool {
     gain(a, b).sigmas() > CLEAR
 }
 
-/// Whether neither predicts better than the other by what a fault is worth, nor clearly; also of one and the same.
+/// Returns true if neither predicts better by the worth of a fault or clearly; also if both are the same.
 fn equals(a: &Score, b: &Score) -> bool {
     gain(a, b).value.abs() < WORTH && !clearly(a, b) && !clearly(b, a)
 }
@@ -136,24 +136,24 @@ fn best<'a>(scores: impl Iterator<Item = &'a Score>) -> Option<&'a Score> {
     scores.reduce(|a, b| if gain(b, a).value > 0.0 { b } else { a })
 }
 
-/// Whether the description without the fault, `own`, explains decisively more of what the description as `recorded` does not than
-/// free parameters explain beyond it, and predicts no worse: one fault is likelier than that every link is other than described.
+/// Returns true if undoing the fault improves the description (`recorded` to `own`) decisively more than `free`
+/// parameters improve it further, and predicts no worse. One fault is likelier than a wrong description of every link.
 fn explains(own: &Score, recorded: &Score, free: &Score) -> bool {
     let (gained, beyond) = (recorded.cost - own.cost, own.cost - free.cost);
     gained - beyond > ODDS && gain(own, recorded).value > 0.0
 }
 
-/// What came of a suspicion.
+/// Result of testing a suspicion.
 enum Outcome {
-    /// It is the only explanation, which predicts so well.
+    /// It is the only explanation with such a prediction.
     Certain(Score),
-    /// Something else explains as well.
+    /// Another explanation is as good.
     Open,
-    /// Something else explains better.
+    /// Another explanation is better.
     Refuted,
 }
 
-/// A suspicion without which the data read so, against the data as recorded.
+/// Judges a suspicion by the data without it and as recorded.
 fn outcome(undo: &Undo, without: &Reading, recorded: &Reading) -> Outcome {
     let (Some(own), Some(other)) = (best(without.all()), best(recorded.all())) else {
         return Outcome::Open;
@@ -169,14 +169,14 @@ fn outcome(undo: &Undo, without: &Reading, recorded: &Reading) -> Outcome {
             .any(|as_recorded| (without.free.iter()).all(|without| beats(as_recorded, without)));
         !contradicted && recorded.stated().all(explained)
     });
-    // Senses that were guessed row by row fit noise, too.
+    // Senses that were guessed row by row also fit noise.
     let shown = |own: &&Score| undo.guessed().is_none_or(|j| own.left(j) < GOOD);
     match (
         Some(own).filter(|_| alone).filter(shown),
         stated.filter(shown),
     ) {
         (Some(own), _) | (_, Some(own)) => Outcome::Certain(own.clone()),
-        // What predicts worse and is less likely tells nobody anything, by however little.
+        // A suspicion that predicts worse and is less likely is refuted, by however little.
         _ if gain(own, other).value < 0.0 && odds(own, other) < 0.0 => Outcome::Refuted,
         _ if beats(other, own) => Outcome::Refuted,
         _ => Outcome::Open,
@@ -184,10 +184,10 @@ fn outcome(undo: &Undo, without: &Reading, recorded: &Reading) -> Outcome {
 }
 
 impl Judge<'_> {
-    /// Of suspicions the one that is certain, or where there is none those that are open; and how the certain one is taken back.
+    /// Returns the certain suspicion and how it is undone, or, if none is certain, the open ones.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] where the description is no chain.
+    /// [`DiagnoseError::Model`] if the description is no chain.
     pub(super) fn tried(
         &self,
         suspicions: Vec<Suspicion>,
@@ -216,7 +216,7 @@ impl Judge<'_> {
             |a: &(usize, Score), b: &(usize, Score)| gain(&a.1, &b.1).value.total_cmp(&0.0);
         if let Some(best) = certain.iter().max_by(|a, b| better(a, b)) {
             let mut equal = certain.iter().filter(|one| equals(&one.1, &best.1));
-            // Of equals the one that is suspected first.
+            // Among equals the first suspicion counts.
             let first = equal.next().unwrap_or(best);
             let (mut fault, undo) = left[first.0].clone();
             if let Some((other, _)) = equal.next() {
@@ -241,7 +241,7 @@ impl Judge<'_> {
         Reading::of(&robot, &rows.thinned(most), magnitude, edge.div_ceil(step))
     }
 
-    /// The robot and the data without a fault, and the joints whose torques have no sign.
+    /// Returns robot and data without a fault, and the joints whose torques have no sign.
     fn without(&self, undo: Option<&Undo>) -> (Robot, Rows, Vec<bool>) {
         let lost = |j: usize| matches!(undo, Some(Undo::Magnitude(k, _)) if *k == j);
         let magnitude = (0..self.robot.joints.len()).map(lost).collect();
@@ -255,7 +255,7 @@ impl Judge<'_> {
         }
     }
 
-    /// What explains the data as recorded best, a clause.
+    /// Returns the best explanation of the data as recorded, a clause.
     fn other(&self, recorded: &Reading) -> String {
         let best = best(recorded.all());
         let is = |score: &Option<Score>| {
@@ -284,7 +284,7 @@ fn loaded(load: Load, robot: &Robot) -> String {
     )
 }
 
-/// A fault that something else explains as well.
+/// Marks a fault that something else explains as well.
 fn opened(mut fault: DataFault, other: &str) -> DataFault {
     fault.certain = false;
     fault.text = format!("{} This is not certain: {other}.", fault.text);

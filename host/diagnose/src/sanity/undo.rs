@@ -1,12 +1,12 @@
-//! What may have been done to a recording, and the recording without it.
+//! Possible faults of a recording, and the recording without them.
 
 use super::rows::Rows;
 use rig_model::robot::Robot;
 
-/// Fitted factors within this ratio are the same.
+/// Ratio up to which fitted factors are the same.
 const ALIKE: f64 = 1.12;
 
-/// Which columns of the joints stand in another order.
+/// Columns of the joints that are in another order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Columns {
     /// The torques alone.
@@ -17,33 +17,33 @@ pub(super) enum Columns {
     Joints,
 }
 
-/// A way to take a suspected fault back.
+/// A way to undo a suspected fault.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Undo {
-    /// A joint's torque times a factor; that of all joints where none is named.
+    /// A joint's torque times a factor; all joints for `None`.
     Torque(Option<usize>, f64),
-    /// A joint's position times a factor; that of all joints where none is named.
+    /// A joint's position times a factor; all joints for `None`.
     Position(Option<usize>, f64),
-    /// Position and torque of a joint both counted the other way round.
+    /// Position and torque of a joint, both reversed.
     Both(usize),
-    /// Columns in another order: those of joint j stand in the place of joint `order[j]`.
+    /// Columns in another order: those of joint j are in the place of joint `order[j]`.
     Order(Columns, Vec<usize>),
-    /// A joint's position counted from another zero: the angle to add, rad.
+    /// A joint's position from another zero: the angle to add, rad.
     Zero(usize, f64),
-    /// A joint's torque that many rows earlier.
+    /// A joint's torque earlier by a number of rows.
     Earlier(usize, i64),
-    /// Seconds that each unit of the clock lasts.
+    /// Seconds per unit of the clock.
     Clock(f64),
     /// Gravity of another direction, m/s² in frame 0.
     Gravity([f64; 3]),
-    /// The rotor of a joint that the description gets wrong.
+    /// A joint's rotor with a wrong description.
     Rotor(usize),
-    /// A torque of which only the magnitude was recorded, and the sense that it probably had in each row.
+    /// A torque recorded as a magnitude, and its probable sense in each row.
     Magnitude(usize, Vec<f64>),
 }
 
 impl Undo {
-    /// The rows without the fault.
+    /// Returns the rows without the fault.
     pub(super) fn applied(&self, robot: &Robot, rows: &Rows) -> Rows {
         let mut rows = rows.clone();
         match *self {
@@ -80,13 +80,13 @@ impl Undo {
                     *tau *= sense;
                 }
             }
-            // Of this the model speaks, not the rows.
+            // These change the model, not the rows.
             Self::Gravity(_) | Self::Rotor(_) => {}
         }
         rows
     }
 
-    /// The robot without it.
+    /// Returns the robot without the fault.
     pub(super) fn robot(&self, robot: &Robot) -> Robot {
         let mut robot = robot.clone();
         match *self {
@@ -101,7 +101,7 @@ impl Undo {
         robot
     }
 
-    /// Rows at either end that it has no measurement for.
+    /// Returns the rows at either end without a measurement.
     pub(super) fn edge(&self) -> usize {
         match self {
             Self::Earlier(_, by) => by.unsigned_abs() as usize,
@@ -109,7 +109,7 @@ impl Undo {
         }
     }
 
-    /// Whether both are the same but for a factor that was fitted.
+    /// Returns true if both are the same, except for a fitted factor.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Position(i, a), Self::Position(j, b)) => {
@@ -119,7 +119,7 @@ impl Undo {
         }
     }
 
-    /// The joint whose torques are read as a fit to them has it.
+    /// Returns the joint whose torque signs come from a fit to them.
     pub(super) fn guessed(&self) -> Option<usize> {
         match self {
             Self::Magnitude(j, _) => Some(*j),
@@ -127,7 +127,7 @@ impl Undo {
         }
     }
 
-    /// Whether it is of the robot's description, not of the rows.
+    /// Returns true if it concerns the robot's description, not the rows.
     pub(super) fn is_of_robot(&self) -> bool {
         matches!(self, Self::Gravity(_) | Self::Rotor(_))
     }
@@ -137,7 +137,7 @@ fn scale(column: &mut [f64], factor: f64) {
     column.iter_mut().for_each(|v| *v *= factor);
 }
 
-/// What was measured at the motors went through the ratio of the other joint.
+/// Motor-side measurements passed the ratio of the other joint.
 fn reordered(robot: &Robot, rows: &Rows, which: Columns, order: &[usize]) -> Rows {
     let mut own = rows.clone();
     for (j, &from) in order.iter().enumerate().filter(|(j, from)| j != *from) {

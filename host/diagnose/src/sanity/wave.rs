@@ -1,21 +1,21 @@
-//! The loudest wave of a torque over the turn of its motor: cogging, ripple, an eccentric gear.
+//! Largest wave of a torque over the motor's turn, by cogging, ripple or an eccentric gear.
 //!
-//! Leaves out: waves that the rows do not show, of which half or more passes between two of them at the speed that half of the rows
-//! exceed; waves of less than a motor turn, or two in the whole motion, which gravity and springs are alike to.
+//! Leaves out: waves that advance by half or more between two rows at the median speed; waves of less than one per
+//! motor turn, or two in the whole motion, which resemble gravity and springs.
 
 use std::f64::consts::{PI, TAU};
 
 use super::super::orders::{median, spectrum};
 
-/// Waves in the whole range of the motion, at least.
+/// Least number of waves in the whole range of the motion.
 const LEAST: f64 = 2.0;
-/// Orders that are tried for each that the range tells from the next.
+/// Tried orders for each order that the range resolves.
 const FINER: f64 = 4.0;
-/// Orders that are tried at most.
+/// Most tried orders.
 const MOST: usize = 4000;
 
-/// The order of the loudest wave over the motor's `angle`, rad, in what is left of a torque, waves in a turn; none where the
-/// rows can show none.
+/// Returns the order of the largest wave over the motor's `angle`, rad, in a torque residual, waves per turn; `None` if
+/// the rows can show none.
 pub(super) fn loudest(angle: &[f64], residual: &[f64]) -> Option<f64> {
     let steps = angle.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let step = median(steps.collect())?;
@@ -25,7 +25,7 @@ pub(super) fn loudest(angle: &[f64], residual: &[f64]) -> Option<f64> {
     let least = f64::max(1.0, LEAST / turns);
     let each = f64::min(1.0, 1.0 / (FINER * turns));
     let tried = ((PI / step - least) / each).min(MOST as f64) as usize;
-    // In units of the distance of two orders.
+    // In units of the distance between orders.
     let samples: Vec<(f64, f64)> = (angle.iter().zip(residual))
         .map(|(angle, left)| (each * angle, *left))
         .collect();

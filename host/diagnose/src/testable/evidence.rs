@@ -1,10 +1,10 @@
-//! What recordings hold, in figures.
+//! Content of recordings, in figures.
 
 use rig_data::runs::{JointRun, Run};
 
-/// Length over which speeds are judged, s: what a low-pass of 20 Hz resolves well.
+/// Length of the windows for speeds, s: a low-pass of 20 Hz resolves it well.
 const WINDOW: f64 = 0.1;
-/// Parts of a window that must agree, so that a reversal is no slow motion.
+/// Parts of a window that must agree, so that a reversal does not count as slow motion.
 const PARTS: usize = 4;
 
 /// Mean motion over one window.
@@ -18,7 +18,7 @@ pub(super) struct Window {
     pub(super) load: f64,
 }
 
-/// What the recordings hold of one joint.
+/// Content of the recordings for one joint.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Evidence {
     pub(super) windows: Vec<Window>,
@@ -28,11 +28,11 @@ pub(super) struct Evidence {
     pub(super) range: [f64; 2],
     /// Longest recording, s.
     pub(super) duration: f64,
-    /// Whether the voltage was recorded throughout.
+    /// True if the voltage was recorded throughout.
     pub(super) voltage: bool,
-    /// Rise of the temperature, K; none where it was not recorded.
+    /// Rise of the temperature, K; `None` if it was not recorded.
     pub(super) warming: Option<f64>,
-    /// Whether there is torque.
+    /// True if torque was recorded.
     pub(super) torque: bool,
 }
 
@@ -42,7 +42,7 @@ fn noise(joint: &JointRun) -> f64 {
     (squares / joint.q.len().max(1) as f64).sqrt()
 }
 
-/// Turning points that stand further apart than `least`.
+/// Counts reversals that are more than `least` apart.
 fn reversals(q: &[f64], least: f64) -> u32 {
     let Some(&first) = q.first() else {
         return 0;
@@ -69,7 +69,7 @@ fn reversals(q: &[f64], least: f64) -> u32 {
     count
 }
 
-/// Viscous and Coulomb friction by least squares beside inertia, gravity and a constant.
+/// Returns viscous and Coulomb friction by least squares, fitted with inertia, gravity and a constant.
 fn friction(runs: &[&Run], joint: usize) -> [f64; 2] {
     let own = || runs.iter().filter_map(|run| run.joints.get(joint));
     let rows: usize = own().map(|j| j.tau.len()).sum();
@@ -88,7 +88,7 @@ fn friction(runs: &[&Run], joint: usize) -> [f64; 2] {
             right += j.tau[k] * row;
         }
     }
-    // A joint that moves little leaves gravity and constant alike: the least-norm solution keeps both small.
+    // With little motion, gravity and constant are collinear: the least-norm solution keeps both small.
     let cut = 1e-9 * inner.diagonal().max();
     inner
         .svd(true, true)
@@ -153,7 +153,7 @@ impl Evidence {
                 .clone()
                 .filter_map(|r| r.t.first().copied())
                 .reduce(f64::min);
-            // The last sample stands for a period as the others do.
+            // The last sample also lasts one period.
             let last = own
                 .filter_map(|r| Some(r.t.last()? + 1.0 / r.rate))
                 .reduce(f64::max);
@@ -164,19 +164,19 @@ impl Evidence {
         found
     }
 
-    /// Time in steady motion at less than `speed`, standstill left out, s.
+    /// Returns the time in steady motion below `speed`, without standstill, s.
     pub(super) fn slow(&self, speed: f64) -> f64 {
         let slow = |w: &&Window| w.velocity.abs() > 0.02 * speed && w.fastest < 1.2 * speed;
         WINDOW * self.windows.iter().filter(slow).count() as f64
     }
 
-    /// Time faster than `speed`, s.
+    /// Returns the time above `speed`, s.
     pub(super) fn fast(&self, speed: f64) -> f64 {
         let fast = |w: &&Window| w.velocity.abs() > speed;
         WINDOW * self.windows.iter().filter(fast).count() as f64
     }
 
-    /// Typical (median) and highest (99th percentile) speed in motion.
+    /// Returns the typical (median) and highest (99th percentile) speed in motion.
     pub(super) fn speeds(&self) -> [f64; 2] {
         let mut all: Vec<f64> = self.windows.iter().map(|w| w.velocity.abs()).collect();
         all.sort_by(f64::total_cmp);
@@ -185,13 +185,13 @@ impl Evidence {
         [percentile(&all, 0.5), top]
     }
 
-    /// Way at less than `speed`, rad or m.
+    /// Returns the travel below `speed`, rad or m.
     pub(super) fn slow_way(&self, speed: f64) -> f64 {
         let slow = self.windows.iter().filter(|w| w.fastest < speed);
         slow.fold(0.0, |way, w| way + w.velocity.abs() * WINDOW)
     }
 
-    /// Range of the transmitted torque (5th to 95th percentile), and the mean of its magnitude.
+    /// Returns the range of the transmitted torque (5th to 95th percentile), and the mean of its magnitude.
     pub(super) fn loads(&self) -> [f64; 2] {
         let mut all: Vec<f64> = self.windows.iter().map(|w| w.load).collect();
         let mean = all.iter().map(|v| v.abs()).sum::<f64>() / all.len().max(1) as f64;
@@ -199,7 +199,7 @@ impl Evidence {
         [percentile(&all, 0.95) - percentile(&all, 0.05), mean]
     }
 
-    /// Whether it moves at all.
+    /// Returns true if the joint moves.
     pub(super) fn moves(&self) -> bool {
         self.range[1] - self.range[0] > 1e-3
     }

@@ -1,6 +1,6 @@
-//! Effects that recordings cannot show, each with what is lacking in figures and what would mend it.
+//! Effects that recordings cannot show, with the missing data and the remedy.
 //!
-//! Leaves out: whether the effect is large enough to be seen; that is for the detectable sizes.
+//! Leaves out: whether the effect is large enough; see the detectable sizes.
 
 mod evidence;
 
@@ -20,17 +20,17 @@ use rig_output::format_unit;
 
 use evidence::Evidence;
 
-/// Time in slow and in fast motion that a law of the speed needs, s.
+/// Least time in slow and in fast motion for a law of the speed, s.
 const STEADY: f64 = 0.5;
-/// Turns of the motor after which a period is known as one.
+/// Motor turns that show a period.
 const TURNS: f64 = 2.0;
-/// Rise of a temperature that changes a friction by more than the noise, K.
+/// Temperature rise that changes friction by more than the noise, K.
 const WARMING: f64 = 3.0;
-/// Speed limit of the revolute joints that the registry's speeds are meant for, rad/s: prismatic joints are judged by the
-/// same share of their fastest motion.
+/// Speed limit of the revolute joints for which the registry's speeds are given, rad/s. Prismatic joints use the same
+/// share of their fastest motion.
 const USUAL: f64 = 5.0;
 
-/// Why `runs` cannot show the effect on a joint (index from 0); none where they can.
+/// Returns the reason why `runs` cannot show the effect on a joint (index from 0); `None` if they can.
 pub fn not_testable(kind: Kind, robot: &Robot, joint: usize, runs: &[Run]) -> Option<NotTestable> {
     let about = kind.about();
     let own = robot.joints.get(joint)?;
@@ -65,7 +65,7 @@ pub fn not_testable(kind: Kind, robot: &Robot, joint: usize, runs: &[Run]) -> Op
         .map(|(why, experiment)| found(why, experiment))
 }
 
-/// What a motion that spans so much lacks for a wave along the position.
+/// Returns the missing range and the remedy for a wave along the position.
 fn unspanned(kind: Kind, joint: &Joint, span: f64) -> Option<(String, String)> {
     let shortest = waves::none_shown(kind, joint, span)?;
     let unit = joint.kind.units().0;
@@ -78,8 +78,8 @@ fn unspanned(kind: Kind, joint: &Joint, span: f64) -> Option<(String, String)> {
     ))
 }
 
-/// What no recording of torque and motion tells apart from the effect, and what does; without the pairs that the
-/// recorded voltage of these runs resolves, or a run with nothing that pulls from outside.
+/// Returns the effects that are collinear with this one in torque and motion, and the remedies. Pairs that these runs
+/// resolve by a voltage or by a run without external loads are left out.
 pub fn confounded(kind: Kind, joint: usize, runs: &[Run]) -> Vec<&'static Confusion> {
     let voltage = !runs.is_empty()
         && runs
@@ -93,7 +93,7 @@ pub fn confounded(kind: Kind, joint: usize, runs: &[Run]) -> Vec<&'static Confus
         .collect()
 }
 
-/// What the data lack for one need, and what would mend it.
+/// Returns the missing data for one need, and the remedy.
 fn lacking(
     need: Need,
     robot: &Robot,
@@ -141,7 +141,7 @@ fn lacking(
                 )
             })
         }
-        // A slide has no turns: its range is what it is.
+        // A prismatic joint has no turns; its range is fixed.
         Need::Travel(_) if !revolute => None,
         Need::Travel(turns) => {
             let range = evidence.range[1] - evidence.range[0];

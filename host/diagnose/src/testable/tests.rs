@@ -88,7 +88,7 @@ fn noise_of_the_encoder_is_no_reversal() {
     for (k, q) in joint.q_raw.iter_mut().enumerate() {
         *q += 1e-4 * (1.7 * k as f64).sin();
     }
-    // What the filter leaves of it is a tenth.
+    // The filter passes a tenth of it.
     let raw = joint.q_raw.clone();
     for (k, q) in joint.q.iter_mut().enumerate() {
         *q = 0.1 * k as f64 / RATE + 0.1 * (raw[k] - 0.1 * k as f64 / RATE);
@@ -151,7 +151,7 @@ fn columns_that_are_missing_are_named() {
 
 #[test]
 fn one_load_throughout_shows_no_friction_that_grows_with_it() {
-    // A lift: gravity is the same everywhere; slow, so that inertia adds little.
+    // A lift: constant gravity, and slow, so that inertia adds little.
     let mut lift = run(60.0, |t| 0.5 * (0.5 * t).sin());
     let joint = &mut lift.joints[0];
     joint.tau = joint

@@ -1,20 +1,20 @@
-//! The link behind a gear, followed from the recorded torque.
+//! Observer of the link behind a gear, from the recorded torque.
 //!
-//! A twist that the motor's motion alone drives ([`Driven::excess`]) keeps for as long as the link rings, a second or more,
-//! what the motion's noise and torques on the link have made of it, and with play one tooth that touches too early puts out
-//! all that come after it. So the link is followed by an extended Kalman filter: its states are twist, rate of the twist and a
-//! torque on the link that nobody knows (first-order Gauss-Markov), its reading is what the recorded torque leaves for the
-//! gear. The zone without contact is replaced by the line that is nearest over what the twist may be (Gelb and Vander Velde
-//! 1968, the describing function of a random input). The torque that comes out is *predicted*: it begins anew from the
-//! filter's state every [`SWING`] of the link, [`STRETCH`] at least, and hears nothing of the torque recorded from there on.
+//! A twist driven only by the motor's motion ([`Driven::excess`]) keeps errors while the link rings, a second or more.
+//! They come from the motion's noise and from torques on the link. With backlash, one early contact shifts all later
+//! ones. So an extended Kalman filter follows the link. Its states are the twist, its rate and an unknown torque on the
+//! link (first-order Gauss-Markov). Its reading is the part of the recorded torque that remains for the gear. The zone
+//! without contact is replaced by the nearest line over the distribution of the twist: the describing function of a
+//! random input (Gelb and Vander Velde 1968). The resulting torque is *predicted*: it restarts from the filter's state
+//! every [`SWING`] of the link, not before [`STRETCH`]. It does not use the torque recorded after that.
 //!
-//! Between the flanks no torque tells where the link is, and a torque on it that nobody knows makes it touch some
-//! milliseconds early or late: most of what is left of a play, and no error of its law. So a stretch may be *smoothed*: it
-//! begins where the filter's belief and the stretch's own readings together say most likely that the link was (maximum a
-//! posteriori, two numbers a stretch; a horizon with an arrival cost: Rao, Rawlings and Mayne 2003, IEEE Transactions on
-//! Automatic Control 48). Shapes are fitted to predictions, not to these.
+//! Between the flanks no torque shows the link's position. An unknown torque makes contact some milliseconds early or
+//! late, which causes most of the residual of a backlash. So a stretch may be *smoothed*: it starts at the most likely
+//! state by the filter's belief and the stretch's own readings (maximum a posteriori, two numbers a stretch; a horizon
+//! with an arrival cost: Rao, Rawlings and Mayne 2003, IEEE Transactions on Automatic Control 48). Shapes are fitted to
+//! predictions, not to smoothed stretches.
 //!
-//! Leaves out: what the twist of one joint does to the others; the friction's own uncertainty while the link sticks.
+//! Leaves out: effects of one joint's twist on the others; the uncertainty of friction while the link sticks.
 
 use std::f64::consts::{SQRT_2, TAU};
 use std::ops::Range;
@@ -25,57 +25,57 @@ use statrs::function::erf::erf;
 use super::{Driven, Gear, Load, Twist};
 use crate::simplex::Simplex;
 
-/// Least time between two beginnings of the prediction, s: as long as a torque on the link lasts.
+/// Least time between two restarts of the prediction, s: the duration of a torque on the link.
 pub(crate) const STRETCH: f64 = 0.05;
-/// … and, as a share of the period in which the link swings on its gear: over less of it the state at the beginning would be all
-/// that is predicted.
+/// … and as a share of the link's oscillation period on its gear. A shorter prediction would depend on its initial
+/// state alone.
 const SWING: f64 = 0.5;
 /// Time between two readings, s; the torque is averaged over it.
 const READ_EVERY: f64 = 0.002;
 /// Correlation time of the unknown torque on the link, s.
 const LASTS: f64 = 0.05;
-/// Share of a twist under load that is not known at the beginning.
+/// Relative uncertainty of the initial twist under load.
 const AT_FIRST: f64 = 0.3;
-/// Standard deviation of a twist that nothing says more of, rad.
+/// Least standard deviation of the initial twist, rad.
 const LEAST_TWIST: f64 = 1e-5;
-/// … and of its rate, rad/s.
+/// … and the one of its rate, rad/s.
 const FIRST_RATE: f64 = 0.01;
-/// Standard deviations of a reading, squared, from which on the filter has lost the teeth.
+/// Squared error of a reading, in units of its variance, above which the filter has lost the contact.
 const SURPRISED: f64 = 16.0;
-/// What is not known of the twist then, as a share of half the gap …
+/// Standard deviation added to the twist then, as a share of half the gap …
 const LOST: f64 = 0.3;
-/// … and of its rate, as a share of what the closed teeth would swing through half the gap at.
+/// … and to its rate, as a share of half the gap times the natural frequency of the closed contact.
 const LOST_RATE: f64 = 0.15;
-/// Standard deviations of a reading from which on it says by itself which flank is touched …
+/// Torque, in standard deviations of its noise, above which its sign shows the flank in contact …
 const FLANK: f64 = 3.0;
-/// … and how well the twist is known then, as a share of half the gap.
+/// … and standard deviation of the twist then, as a share of half the gap.
 const KNOWN_BY_FLANK: f64 = 0.1;
 
-/// Beginnings of a smoothed stretch that are tried: of two numbers, known to a tenth of a deviation or better then.
+/// Evaluations per smoothed stretch: they determine its two numbers to a tenth of a standard deviation or better.
 const ANSWERS: usize = 30;
 
-/// What the recorded torque tells of a gear.
+/// Recorded torque as input of the observer.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seen {
-    /// What it leaves for the gear's excess, N·m.
+    /// Torque that remains for the gear's excess, N·m.
     pub(crate) torque: Vec<f64>,
-    /// Whether it is to be believed: the direction is known, nothing saturates.
+    /// True where the torque is valid: the direction is known and nothing saturates.
     pub(crate) sure: Vec<bool>,
     /// Standard deviation of a sample's noise, N·m.
     pub(crate) noise: f64,
     /// Standard deviation of the unknown torque on the link, N·m.
     pub(crate) unrest: f64,
-    /// Whether a stretch begins where its own readings, too, say that the link was.
+    /// True to start each stretch at the state that its own readings support too.
     pub(crate) smoothed: bool,
 }
 
-/// The zone without contact as a line over what the twist may be.
+/// Linear approximation of the zone without contact over the distribution of the twist.
 struct Contact {
-    /// Bend of the teeth, on average.
+    /// Mean deflection of the contact.
     bend: f64,
     /// Its slope: the probability of contact.
     slope: f64,
-    /// Variance of what the line leaves.
+    /// Variance that the line does not explain.
     left: f64,
 }
 
@@ -89,7 +89,7 @@ impl Contact {
             };
         }
         let spread = variance.max(f64::MIN_POSITIVE).sqrt();
-        // Beyond a flank by `beyond`: probability, first and second moment of the way beyond.
+        // For a flank exceeded by `beyond`: probability of contact, first and second moment of the deflection.
         let flank = |beyond: f64| {
             let z = beyond / spread;
             let probability = 0.5 * (1.0 + erf(z / SQRT_2));
@@ -108,7 +108,7 @@ impl Contact {
     }
 }
 
-/// Twist, its rate and the torque on the link, and how well they are known.
+/// Twist, its rate and the torque on the link, with their covariance.
 struct Belief {
     twist: Twist<f64>,
     torque: f64,
@@ -116,11 +116,11 @@ struct Belief {
 }
 
 impl Belief {
-    /// After a step in which the rate becomes `rate`, a linear function of the state with these slopes.
+    /// Advances the covariance by a step. The new rate is a linear function of the state with these slopes.
     fn stepped(&mut self, half_step: f64, [a, b, c]: [f64; 3], keeps: f64) {
         let p = self.covariance;
         let h = half_step;
-        // The new twist is x + h·(v + v'): of the new rate's covariances with the state before, all others are made.
+        // The new twist is x + h·(v + v'). All covariances follow from those of the new rate with the old state.
         let rate: [f64; 3] = std::array::from_fn(|j| a * p[0][j] + b * p[1][j] + c * p[2][j]);
         let own = a * rate[0] + b * rate[1] + c * rate[2];
         let along = rate[0] + h * rate[1];
@@ -134,7 +134,7 @@ impl Belief {
         ];
     }
 
-    /// With a reading that departs by `error`, of which these are the slopes, and this the variance.
+    /// Corrects the state by a reading with this error, these slopes and this variance.
     fn corrected(&mut self, error: f64, slopes: [f64; 2], variance: f64) {
         let p = self.covariance;
         let along: [f64; 3] = std::array::from_fn(|i| p[i][0] * slopes[0] + p[i][1] * slopes[1]);
@@ -149,7 +149,7 @@ impl Belief {
         }
     }
 
-    /// So many standard deviations away: along the twist, with the rate that goes with it, and along what is left of the rate.
+    /// Returns the twist at `away` standard deviations: along twist and correlated rate, and along the remaining rate.
     fn at(&self, away: &[f64]) -> Twist<f64> {
         let [[xx, xv, _], [_, vv, _], _] = self.covariance;
         let twist = xx.max(f64::MIN_POSITIVE).sqrt();
@@ -161,7 +161,7 @@ impl Belief {
         }
     }
 
-    /// Variance of a reading with these slopes.
+    /// Returns the variance of a reading with these slopes.
     fn variance(&self, [a, b]: [f64; 2]) -> f64 {
         let p = &self.covariance;
         a * a * p[0][0] + 2.0 * a * b * p[0][1] + b * b * p[1][1]
@@ -169,7 +169,7 @@ impl Belief {
 }
 
 impl Driven {
-    /// What the drive's torque differs by from a rigid gear's, predicted stretch by stretch from a link that is followed; none
+    /// Returns the drive torque minus that of a rigid gear, predicted stretch by stretch from the observed link. `None`
     /// where [`Driven::excess`] gives none.
     pub(crate) fn followed(
         &self,
@@ -213,8 +213,8 @@ impl Driven {
         out.iter().all(|t| t.is_finite()).then_some(out)
     }
 
-    /// Where a stretch of samples begins: what is most likely by the belief before it and by every so many of its readings,
-    /// whose departures last, as an unknown torque does.
+    /// Returns the most likely initial twist of a stretch, from the belief before it and its readings, each over
+    /// `every` samples. The unknown torque is part of their error.
     fn smoothed(
         &self,
         gear: &Gear<f64>,
@@ -262,7 +262,7 @@ impl Driven {
         })
     }
 
-    /// A sample on, without a reading.
+    /// Advances the belief by a sample without a reading.
     fn filtered(&self, belief: &mut Belief, gear: &Gear<f64>, of: &Load, unrest: f64, k: usize) {
         let Gear {
             law: [gap, stiffness, damping],
@@ -315,8 +315,8 @@ impl Driven {
         }
     }
 
-    /// Takes in that the gear was seen to transmit `torque`, with noise of that variance and such a deviation of the torque on the
-    /// link.
+    /// Corrects the belief by the transmitted `torque`. `noise` is its variance, `unrest` the standard deviation of the
+    /// torque on the link.
     fn read(
         &self,
         belief: &mut Belief,
@@ -359,7 +359,7 @@ mod tests {
 
     use super::*;
 
-    /// Against the product of matrices that it spares.
+    /// Compares with the matrix product that the code avoids.
     #[test]
     fn what_is_known_after_a_step_is_what_its_transition_makes_of_it() {
         let (h, keeps, slopes) = (0.3, 0.8, [-0.7, 0.4, -0.2]);
@@ -384,8 +384,8 @@ mod tests {
         }
     }
 
-    /// A link that crosses its play is seen again only when it touches: from the touch in the stretch follows the rate that it
-    /// set out with, although the belief is off by two deviations.
+    /// A link inside its backlash is observed only at contact. Contact in the stretch determines the initial rate,
+    /// although the belief is off by two standard deviations.
     #[test]
     fn a_smoothed_stretch_begins_at_the_rate_with_which_the_link_touches() {
         let driven = Driven {
@@ -434,7 +434,7 @@ mod tests {
             let torque = transmitted(2.0, 1.0, 0.0, twist, 0.0);
             assert!((known.bend - torque).abs() < 1e-6);
         }
-        // Against sums over the normal density.
+        // Compares with sums over the normal density.
         let (twist, spread) = (0.7, 0.4);
         let (mut weight, mut bend, mut along, mut square) = (0.0, 0.0, 0.0, 0.0);
         for k in -6000..=6000 {

@@ -1,5 +1,5 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
-//! Controllers read off recordings of a servo that another simulator made, and what is predicted with them.
+//! Controllers from recordings of a servo by another simulator, and predictions with them.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn law(servo: &Servo, number: usize) -> VoltageController {
     logs(&[&run]).unwrap()[0].law.unwrap()
 }
 
-/// A recording that its controller does not explain is driven by its voltage.
+/// Returns a recording that its controller does not explain; its voltage drives it.
 fn open(mut run: InMemory) -> InMemory {
     run.blocks[0].joints[0].reference = None;
     run
@@ -54,7 +54,7 @@ fn the_terms_of_a_pid_controller_with_feed_forward_are_recovered() {
                 c.velocity_feedforward,
                 c.acceleration_feedforward,
             ];
-            // The derivative is filtered by 10 ms, which counts with the acceleration.
+            // The derivative's filter of 10 ms adds to the acceleration.
             for ((read, gain), share) in read.iter().zip(gains).zip([0.02, 0.05, 0.05, 0.05, 0.15])
             {
                 assert!(
@@ -97,7 +97,7 @@ fn a_share_that_stays_where_it_is_largest_is_no_limit() {
     assert_eq!(law(&servo, 0).limit, Some(1.0));
 }
 
-/// Trained on two gains and judged at one between them: the diagnosis, the model, and RMS of the hold-out from model to model.
+/// Trains on two gains and judges at one between them: the diagnosis, the model, and hold-out RMS model by model.
 fn between_two_gains(with: impl Fn(f64) -> Servo) -> (Diagnosis, Robot, Vec<f64>) {
     let train: Vec<InMemory> = [2.0, 5.0]
         .into_iter()
@@ -120,7 +120,7 @@ fn a_motion_under_a_gain_never_seen_is_predicted() {
         ..Servo::default()
     });
     assert!(diagnosis.steps.is_empty(), "{:?}", diagnosis.steps);
-    // An encoder leaves 0.29 steps of any prediction.
+    // An encoder causes an error of 0.29 steps for any prediction.
     assert!(rms[0] < 0.4 * STEP, "{rms:?}");
     let (truth, joint) = (Servo::default(), &model.joints[0]);
     let (drive, friction) = (
@@ -149,9 +149,9 @@ fn so_it_is_under_a_pid_controller_with_feed_forward() {
         gains: [kp, 1.5 * kp, 0.03 * kp, 0.04 * kp, 0.0],
         ..Servo::default()
     });
-    // The filter of the servo's derivative, which the model has not, leaves a little more.
+    // The servo's derivative filter, which the model lacks, adds a little.
     assert!(rms.iter().all(|rms| *rms < 0.6 * STEP), "{rms:?}");
-    // An effect that stands in for it has next to no size.
+    // An effect that compensates it is negligible.
     assert!(rms[0] - rms[rms.len() - 1] < 0.1 * STEP, "{rms:?}");
 }
 
@@ -171,7 +171,7 @@ fn a_model_is_read_back_and_validates_as_it_was_diagnosed() {
     let rms = validation.motion.rms().unwrap();
     let last = *diagnosis.waterfall[0].holdout.last().unwrap();
     println!("{rms} {last}");
-    // The steps of the simulation are chosen by the recordings at hand.
+    // The recordings at hand determine the steps of the simulation.
     assert!((rms - last).abs() < 0.1 * last, "{rms} {last}");
 }
 
@@ -203,7 +203,7 @@ fn a_simulation_of_the_model_reproduces_the_recording() {
     assert!(FreeRun::followed(&off).rms().unwrap() < 0.2);
 }
 
-/// A pendulum that its controller holds upright falls under the recorded voltage, whatever the model.
+/// A pendulum that its controller holds upright falls under the recorded voltage with any model.
 #[test]
 fn a_free_run_that_diverges_is_said_to_and_has_no_residual() {
     let servo = Servo {
@@ -264,7 +264,7 @@ fn a_start_on_short_pieces_stands_a_coarse_encoder() {
 
 #[test]
 fn no_unknown_of_the_start_is_negative() {
-    // A link that is heavier in the description than in truth: what is left for the drive would be negative.
+    // A described link heavier than the true one would make the drive's inertia negative.
     let mut heavy = robot();
     heavy.joints[0].inertial.as_mut().unwrap().inertia[5] = 0.02;
     let runs = [0, 1, 2].map(|k| Servo::default().recorded(k, 0.0));

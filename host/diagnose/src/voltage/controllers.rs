@@ -1,23 +1,23 @@
-//! The controllers that recordings of a voltage-driven joint show.
+//! Controllers in recordings of a voltage-driven joint.
 
 use super::log::Log;
 use rig_model::robot::{AntiWindup, VoltageController};
 use rig_output::format_significant;
 
-/// Share by which the proportional gains of one controller differ from recording to recording at most. 10 %: on the XL330 recordings
-/// gains of one setting differed by 1 %, settings by 100 % (November 2026).
+/// Largest relative difference between proportional gains of one controller. 10 %: on the XL330 recordings gains of one
+/// setting differed by 1 %, settings by 100 % (November 2026).
 const ONE: f64 = 0.1;
 
-/// One controller and how many recordings show it.
+/// One controller and its number of recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shown {
     /// Mean of the gains.
     pub controller: VoltageController,
-    /// Recordings.
+    /// Number of recordings.
     pub count: usize,
 }
 
-/// Controllers of recordings, that of the most recordings first; of equals the stiffer.
+/// Returns the controllers of recordings, by number of recordings; among equals the stiffer first.
 pub(super) fn shown(logs: &[Log]) -> Vec<Shown> {
     let mut groups: Vec<Vec<VoltageController>> = Vec::new();
     for law in logs.iter().filter_map(|log| log.law) {
@@ -43,7 +43,7 @@ pub(super) fn shown(logs: &[Log]) -> Vec<Shown> {
     list
 }
 
-/// Means of gains; terms that only some recordings resolve count with all of them.
+/// Returns the mean gains; a term counts with all recordings, even if only some resolve it.
 fn merged(group: &[VoltageController]) -> VoltageController {
     let mean =
         |of: fn(&VoltageController) -> f64| group.iter().map(of).sum::<f64>() / group.len() as f64;
@@ -55,7 +55,7 @@ fn merged(group: &[VoltageController]) -> VoltageController {
         derivative: mean(|c| c.derivative),
         velocity_feedforward: mean(|c| c.velocity_feedforward),
         acceleration_feedforward: mean(|c| c.acceleration_feedforward),
-        // Beside an integral the constant is where that began in one recording.
+        // Beside an integral, the constant is its initial value in one recording.
         bias: match group.iter().any(|c| c.integral != 0.0) {
             true => 0.0,
             false => mean(|c| c.bias),
@@ -74,7 +74,7 @@ fn merged(group: &[VoltageController]) -> VoltageController {
     }
 }
 
-/// A controller in words: its terms with their gains. `unit` is rad or m.
+/// Returns a controller in words: its terms with their gains. `unit` is rad or m.
 pub fn terms(c: &VoltageController, unit: &str) -> String {
     let mut list = vec![format!(
         "proportional {} 1/{unit}",
@@ -101,7 +101,7 @@ pub fn terms(c: &VoltageController, unit: &str) -> String {
     list.join(", ")
 }
 
-/// Sentences on the controllers and the supply that recordings show; empty where they show none.
+/// Returns sentences on the recordings' controllers and supply; empty if they show none.
 pub(super) fn sentences(list: &[Shown], unit: &str) -> Vec<String> {
     let Some(first) = list.first() else {
         return Vec::new();

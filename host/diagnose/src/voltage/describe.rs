@@ -1,4 +1,4 @@
-//! The result of a voltage-driven diagnosis in words, numbers and as a description.
+//! Result of a voltage-driven diagnosis in words, numbers and as a description.
 
 use std::collections::BTreeMap;
 
@@ -16,30 +16,30 @@ use rig_model::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
 use rig_output::format_significant;
 use rig_shared::effects::Effect;
 
-/// Over this many floors something is left.
+/// Multiple of the noise floor above which a residual is unexplained.
 const LEFT: f64 = 1.2;
 
-/// Everything that was found.
+/// All results.
 pub(super) struct Told<'a> {
-    /// The description, and what became of its effects.
+    /// The description, and the fate of its effects.
     pub stated: &'a Stated,
-    /// To draw.
+    /// Curves to draw.
     pub curves: Vec<Curves>,
-    /// rad or m
+    /// Noise floor, rad or m.
     pub floor: f64,
-    /// Free runs over the training recordings, from model to model.
+    /// Free runs over the training recordings, model by model.
     pub train: Vec<FreeRun>,
     /// The same on the hold-out; empty without one.
     pub holdout: Vec<FreeRun>,
-    /// The controllers that the training recordings show.
+    /// Controllers of the training recordings.
     pub controllers: Vec<Shown>,
     pub deviations: Vec<Option<Vec<f64>>>,
-    /// The nominal one first.
+    /// Models, the nominal one first.
     pub models: Vec<Model>,
     pub rounds: Vec<Vec<Trial>>,
-    /// On recordings left out of the fit, before each round.
+    /// RMS on left-out recordings before each round.
     pub unseen: Vec<f64>,
-    /// Which voltage, in words.
+    /// The driving voltage, in words.
     pub driven: String,
 }
 
@@ -48,16 +48,16 @@ impl Told<'_> {
         self.stated.robot.joints[0].name.clone()
     }
 
-    /// How many effects every model has: those of the description.
+    /// Returns the number of described effects, which every model has.
     fn described(&self) -> usize {
         self.models.first().map_or(0, |model| model.effects.len())
     }
 
-    /// What the description's effects are in the last model.
+    /// Returns the fate of the described effects in the last model.
     fn told(&self) -> Vec<Described> {
         let last = self.models.len() - 1;
         let effects = &self.models[last].effects[..self.described()];
-        // Of several under one name in their order.
+        // Effects with one name in their order.
         let mut next = vec![true; effects.len()];
         let now = self.stated.fitted().map(|kind| {
             let place = (0..effects.len()).find(|k| next[*k] && Some(effects[*k]) == kind)?;
@@ -70,7 +70,7 @@ impl Told<'_> {
         self.stated.told(now.collect())
     }
 
-    /// A position error as printed.
+    /// Formats a position error.
     fn thousandths(&self, error: f64) -> String {
         let unit = self.stated.robot.joints[0].kind.units().0;
         format!("{:.2} m{unit}", 1e3 * error)
@@ -84,14 +84,14 @@ impl Told<'_> {
         }
     }
 
-    /// Standard deviation of parameter `p` of model `k`; 0 where it was not fitted.
+    /// Returns the standard deviation of parameter `p` of model `k`; 0 if it was not fitted.
     fn std(&self, k: usize, p: usize) -> f64 {
         let place = self.models[k].free.iter().position(|f| *f == p);
         let list = self.deviations[k].as_ref();
         place.and_then(|c| list?.get(c).copied()).unwrap_or(0.0)
     }
 
-    /// As `diagnosis.json` has it.
+    /// Returns the content of `diagnosis.json`.
     pub(super) fn diagnosis(&self) -> Diagnosis {
         let judged = self.judged();
         let (first, last) = (&judged[0], &judged[judged.len() - 1]);
@@ -174,7 +174,7 @@ impl Told<'_> {
         }
     }
 
-    /// What became of the free runs of the last model `on` the recordings that it is judged by, a sentence.
+    /// Returns a sentence on the free runs of the last model `on` the recordings that judge it.
     fn on_the_whole(&self, on: &str) -> String {
         let judged = self.judged();
         let (first, last) = (&judged[0], &judged[judged.len() - 1]);
@@ -194,7 +194,7 @@ impl Told<'_> {
         }
     }
 
-    /// Says of a run that it diverged, where and why; empty where it did not.
+    /// Returns a sentence on where and why a run diverged; empty if it did not.
     fn diverged(&self, run: &FreeRun) -> String {
         let FreeRun::Diverged {
             recording,
@@ -217,7 +217,7 @@ impl Told<'_> {
         )
     }
 
-    /// What the last model leaves; a run that diverged leaves no number.
+    /// Returns the remainder of the last model; a diverged run has no number.
     fn remainder(&self) -> Remainder {
         let last = &self.judged()[self.judged().len() - 1];
         let excess = |rms: f64| (rms * rms - self.floor * self.floor).max(0.0).sqrt();
@@ -232,7 +232,7 @@ impl Told<'_> {
         }
     }
 
-    /// What the last model leaves, a sentence.
+    /// Returns a sentence on the residual of the last model.
     fn left_over(&self) -> String {
         let last = &self.judged()[self.judged().len() - 1];
         match last.rms() {
@@ -245,7 +245,7 @@ impl Told<'_> {
         }
     }
 
-    /// Says that less inertia of the drive was found than the description gives the rotor, where that is so.
+    /// Returns a sentence if the drive's inertia is less than the described rotor's.
     fn rotor_remark(&self) -> Option<String> {
         let drive = self.stated.robot.joints[0].drive.as_ref()?;
         let found = self.models.last()?.theta[0] / drive.gear_ratio.powi(2);
@@ -306,7 +306,7 @@ impl Told<'_> {
         }
     }
 
-    /// Of the `effect`-th effect of model `k`.
+    /// Returns the parameters of the `effect`-th effect of model `k`.
     fn parameters(&self, k: usize, effect: usize) -> BTreeMap<String, Value> {
         let model = &self.models[k];
         let count =
@@ -363,11 +363,11 @@ impl Told<'_> {
         self.rounds.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The description with what was found.
+    /// Returns the description with the found values.
     pub(super) fn robot(&self, plant: &Plant) -> Robot {
         let mut robot = self.stated.robot.clone();
         robot.effects = self.stated.undriven();
-        // What its values were identified from before says nothing about the new ones.
+        // The identification record describes the old values.
         robot.identified = None;
         let (Some(model), Some(joint)) = (self.models.last(), robot.joints.first_mut()) else {
             return robot;
@@ -383,10 +383,10 @@ impl Told<'_> {
             ..Drive::default()
         });
         let square = plant.ratio * plant.ratio;
-        // No part of a drive has less inertia than none.
+        // No part of a drive has negative inertia.
         drive.rotor_inertia = drive.rotor_inertia.min(t[0] / square);
         drive.joint_inertia = (t[0] - square * drive.rotor_inertia).max(0.0);
-        // Torque and voltage constant of a motor are one number in SI.
+        // A motor's torque and voltage constants are equal in SI units.
         drive.torque_constant = t[2] / plant.ratio.abs();
         drive.resistance = Some(t[2] / t[1]);
         joint.voltage_controller = (self.controllers.first())

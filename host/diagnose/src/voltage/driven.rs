@@ -1,4 +1,4 @@
-//! A joint that its voltage drives, simulated as its description states it.
+//! Simulation of a voltage-driven joint by its description.
 
 use super::free_run::{FreeRun, travel};
 use super::halt::{Cause, Halt};
@@ -14,20 +14,20 @@ use rig_data::prepare::Recording;
 use rig_model::robot::{Robot, VoltageController};
 use rig_shared::effects::Kind;
 
-/// Times that the longest step is halved where there is no residual to compare the steps with: below 0.4 ms.
+/// Halvings of the longest step without a residual to compare with: below 0.4 ms.
 const REPLAY_HALVINGS: i32 = 4;
 
-/// A joint that its voltage drives, with the parameters of a description.
+/// A voltage-driven joint with the parameters of a description.
 pub(crate) struct VoltageModel {
     plant: Plant,
     effects: Vec<Kind>,
     theta: Vec<f64>,
     controller: Option<VoltageController>,
-    /// Effects of the description that the simulation does not have, sentences.
+    /// Described effects that the simulation lacks, sentences.
     pub(crate) remarks: Vec<String>,
 }
 
-/// A recording and the motion that the model makes of it.
+/// A recording and its simulated motion.
 #[derive(Clone, Debug)]
 pub(crate) struct Followed {
     /// Name of the recording.
@@ -36,11 +36,11 @@ pub(crate) struct Followed {
     pub(crate) t: Vec<f64>,
     /// rad or m
     pub(crate) measured: Vec<f64>,
-    /// Up to where the run could go on, rad or m.
+    /// As far as the run went, rad or m.
     pub(crate) simulated: Vec<f64>,
-    /// The controller that closes the loop; none where the recorded voltage drives.
+    /// The controller that closes the loop; `None` if the recorded voltage drives.
     pub(crate) controller: Option<VoltageController>,
-    /// What became of the run.
+    /// Result of the run.
     pub(crate) run: FreeRun,
 }
 
@@ -54,10 +54,10 @@ pub(crate) struct Reference {
     pub(crate) start: [f64; 2],
 }
 
-/// Why no model under voltage can be made of a description, or simulated.
+/// Reasons why a description gives no model under voltage, or none that can be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum DrivenError {
-    /// The description or a recording.
+    /// An error of the description or of a recording.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
     /// Parameters are missing.
@@ -89,10 +89,10 @@ pub enum DrivenError {
 }
 
 impl VoltageModel {
-    /// The model that a description states.
+    /// Builds the model of a description.
     ///
     /// # Errors
-    /// [`DrivenError`] where it does not state one.
+    /// [`DrivenError`] if the description is not sufficient.
     pub(crate) fn of(robot: &Robot) -> Result<Self, DrivenError> {
         let mut stated = Stated::of(robot);
         let plant = plant(&stated.robot)?;
@@ -129,11 +129,11 @@ impl VoltageModel {
         })
     }
 
-    /// The motion over recordings, each from its own first state: in the closed loop of the controller that the recording shows, with
-    /// the supply of the description; under the recorded voltage where it shows none. The second result is of all together.
+    /// Simulates recordings, each from its own first state: in the closed loop of the recording's controller with the
+    /// described supply, or under the recorded voltage if it shows none. The second result is for all together.
     ///
     /// # Errors
-    /// What reading gives.
+    /// Errors of reading.
     pub(crate) fn follow(
         &self,
         recordings: &[&dyn Recording],
@@ -185,7 +185,7 @@ impl VoltageModel {
         }
     }
 
-    /// States at the instants of a reference that the description's controller follows.
+    /// Returns the states at the instants of a reference that the described controller follows.
     ///
     /// # Errors
     /// [`DrivenError::NoController`], [`DrivenError::Halted`].
@@ -215,7 +215,7 @@ impl VoltageModel {
             velocity: reference.start[1],
         };
         let mut states = Vec::with_capacity(rows);
-        // There is no residual that they could be compared with.
+        // There is no residual to compare the steps with.
         let plant = Plant {
             halvings: REPLAY_HALVINGS,
             ..self.plant
@@ -233,10 +233,10 @@ impl VoltageModel {
     }
 }
 
-/// The reference of a recording, row by row, and the state that it begins in.
+/// Returns the reference of a recording, row by row, and its initial state.
 ///
 /// # Errors
-/// What reading gives.
+/// Errors of reading.
 pub(crate) fn reference_of(recording: &dyn Recording) -> Result<Option<Reference>, DrivenError> {
     let mut whole = Reference {
         t: Vec::new(),

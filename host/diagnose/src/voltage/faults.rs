@@ -1,4 +1,4 @@
-//! Recordings of a voltage-driven joint that cannot be what they say.
+//! Faulty recordings of a voltage-driven joint.
 
 use super::fit::WINDOW;
 use super::free_run::travel;
@@ -13,24 +13,24 @@ use rig_data::{Implausible, JUDGED_ROWS, plausibility};
 use rig_model::robot::{Joint, JointKind, Robot};
 use rig_output::{format_significant, format_trimmed};
 
-/// Windows of a fit that the training recordings have to give.
+/// Least length of the training recordings, in windows of a fit.
 const FEWEST_WINDOWS: f64 = 5.0;
-/// Steps of the encoder that the joint has to move by at least.
+/// Least travel of the joint, in encoder steps.
 const FEWEST_STEPS: f64 = 20.0;
 
-/// Share of the travel that each sense has at least where the joint turns both ways.
+/// Least share of the travel in each direction for a joint that turns both ways.
 const BOTH_WAYS: f64 = 0.1;
-/// Share of its largest value by which a voltage changes that is a supply's.
+/// Relative change below which a voltage is that of a supply.
 const STEADY: f64 = 0.1;
-/// Another factor is believed where it leaves less than this share of what the recorded position leaves.
+/// Ratio of residuals below which another factor of the position is believed.
 const BETTER: f64 = 0.35;
-/// A factor within this ratio of a thousand is one: friction adds to the back-EMF, and the torque constant is known to a factor.
+/// Ratio within which a factor is a thousand: friction adds to the back-EMF, the torque constant is uncertain.
 const THOUSAND: f64 = 5.0;
 
-/// What is wrong with the recordings `given` (training, held back), whose rows are `read`; empty where all is well.
+/// Returns the faults of the recordings `given` (training, hold-out) with their rows `read`; empty if there are none.
 ///
 /// # Errors
-/// What reading gives.
+/// Errors of reading.
 pub(super) fn faults(
     robot: &Robot,
     plant: &Plant,
@@ -99,7 +99,7 @@ pub(super) fn faults(
             ..log
         })
         .collect();
-    // A voltage that drives nothing has no sense to be wrong.
+    // A voltage that drives nothing has no wrong sense.
     if start(plant, train, true).is_none() && start(plant, &turned, true).is_some() {
         found.push(fault(
             "sign",
@@ -115,7 +115,7 @@ pub(super) fn faults(
     Ok(found)
 }
 
-/// A voltage that is none: zero throughout, or one value while the joint turns both ways.
+/// Returns a fault if a voltage is always zero, or constant while the joint turns both ways.
 fn dead(logs: &[Log]) -> Option<(&'static str, String)> {
     let all = || logs.iter().flat_map(|log| &log.u);
     let most = all().fold(0.0_f64, |most, u| most.max(u.abs()));
@@ -147,7 +147,7 @@ fn dead(logs: &[Log]) -> Option<(&'static str, String)> {
     (both && high - low < STEADY * most).then(|| ("unit", text()))
 }
 
-/// A position of which gravity's period says that it is a multiple of the joint's.
+/// Returns a fault if gravity's period shows a multiple of the joint's position.
 fn position_scale(joint: &Joint, logs: &[Log]) -> Option<(&'static str, String)> {
     if joint.kind == JointKind::Prismatic {
         return None;
@@ -170,7 +170,7 @@ fn position_scale(joint: &Joint, logs: &[Log]) -> Option<(&'static str, String)>
     })
 }
 
-/// A voltage whose back-EMF is a thousand times what the description makes it.
+/// Returns a fault if the back-EMF is a thousand times the described, or a thousandth.
 fn voltage_scale(joint: &Joint, plant: &Plant, logs: &[Log]) -> Option<(&'static str, String)> {
     let emf = joint.drive.as_ref()?.torque_constant * plant.ratio.abs();
     let found = start(plant, logs, false)?[2];

@@ -1,8 +1,8 @@
-//! Fits of a voltage-driven joint by what its simulation leaves: Levenberg–Marquardt within bounds.
+//! Fits of a voltage-driven joint to its simulated motion: Levenberg–Marquardt within bounds.
 //!
-//! Levenberg 1944, Marquardt 1963; slopes by differences, because sticking and slipping swap places as parameters move.
-//! Short windows first (Bock 1983): each begins where the recording was, so that no motion runs away; then whole
-//! recordings.
+//! Levenberg 1944, Marquardt 1963. Slopes are differences, because sticking and slipping change with the parameters.
+//! Fits start with short windows (Bock 1983), each from the recorded state, so that no motion diverges. Whole
+//! recordings follow.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::Kind;
@@ -13,31 +13,31 @@ use super::plant::Plant;
 
 /// Length of the windows that a fit begins with, s.
 pub(super) const WINDOW: f64 = 1.0;
-/// Relative step of the differences: far above rounding, within the width of any law.
+/// Relative step of the differences: far above rounding, smaller than the width of any law.
 const DIFFERENCE: f64 = 1.0e-3;
-/// Steps at most.
+/// Most steps.
 const STEPS: usize = 40;
-/// Steps that each of several starts is given before the best goes on alone.
+/// Steps of each of several starts before only the best continues.
 const FIRST_STEPS: usize = 6;
-/// A fit has settled when two steps in a row win less than this share of the sum of squares.
+/// Share of the sum of squares below which the gain of two steps in a row ends a fit.
 const SETTLED: f64 = 1.0e-4;
-/// Damping beyond which no step is left.
+/// Damping above which a fit ends.
 const STIFFEST: f64 = 1.0e8;
 
-/// What a fit works on.
+/// Inputs of a fit.
 pub(super) struct Problem<'a> {
     pub plant: &'a Plant,
     pub logs: &'a [Log],
-    /// Number of a log, and which rows of it.
+    /// Index of a log, and its rows.
     pub segments: Vec<(usize, Segment)>,
     pub effects: &'a [Kind],
-    /// Parameters that are fitted.
+    /// Fitted parameters.
     pub free: &'a [usize],
-    /// Of all parameters.
+    /// Bounds of all parameters.
     pub bounds: &'a [[f64; 2]],
 }
 
-/// Segments of the logs that `which` picks, in windows of `length` seconds.
+/// Returns the segments of the logs in `which`, in windows of `length` seconds.
 pub(super) fn segments(
     logs: &[Log],
     which: impl Fn(usize) -> bool,
@@ -50,10 +50,10 @@ pub(super) fn segments(
 }
 
 impl Problem<'_> {
-    /// Simulated minus recorded position, row by row.
+    /// Returns simulated minus recorded position, row by row.
     ///
     /// # Errors
-    /// [`Halt`] where the simulation is not possible.
+    /// [`Halt`] if the simulation is not possible.
     pub(super) fn residual(&self, theta: &[f64]) -> Result<Vec<f64>, Halt> {
         let rows = self.segments.iter().map(|(_, s)| s.to - s.from).sum();
         let mut out = Vec::with_capacity(rows);
@@ -68,20 +68,20 @@ impl Problem<'_> {
         Ok(out)
     }
 
-    /// RMS of [`Self::residual`]; infinite where there is none.
+    /// Returns the RMS of [`Self::residual`]; infinite if it fails.
     pub(super) fn rms(&self, theta: &[f64]) -> f64 {
         self.residual(theta).map_or(f64::INFINITY, |r| {
             (square(&r) / r.len().max(1) as f64).sqrt()
         })
     }
 
-    /// Slopes of the residual by the free parameters, one column each.
+    /// Returns the slopes of the residual by the free parameters, one column each.
     fn slopes(&self, theta: &[f64], residual: &[f64], typical: &[f64]) -> Option<DMatrix<f64>> {
         let mut slopes = DMatrix::zeros(residual.len(), self.free.len());
         for (column, &p) in self.free.iter().enumerate() {
             let step = DIFFERENCE * theta[p].abs().max(typical[p]);
             let mut moved = theta.to_vec();
-            // Inwards from the upper bound, and where the other side cannot be simulated.
+            // Inwards from the upper bound, or where the other side cannot be simulated.
             let mut found = None;
             for side in [step, -step] {
                 moved[p] = theta[p] + side;
@@ -100,7 +100,7 @@ impl Problem<'_> {
         Some(slopes)
     }
 
-    /// Parameters of the least sum of squares near the best of `starts`; that start itself where nothing better is found.
+    /// Returns the parameters of least squares near the best of `starts`; that start itself if nothing is better.
     pub(super) fn fit(&self, starts: &[&[f64]]) -> Vec<f64> {
         if let [start] = starts {
             return self.descend(Descent::from(self, start), STEPS).theta;
@@ -113,7 +113,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Goes on with a fit by at most `steps` steps.
+    /// Continues a fit by at most `steps` steps.
     fn descend(&self, mut at: Descent, steps: usize) -> Descent {
         for _ in 0..steps {
             if at.settled {
@@ -145,7 +145,7 @@ impl Problem<'_> {
         at
     }
 
-    /// One damped step; parameters at a bound that they press against stay there.
+    /// Returns the parameters after one damped step; those pressed against a bound stay there.
     fn step(
         &self,
         theta: &[f64],
@@ -177,14 +177,14 @@ impl Problem<'_> {
         Some(self.within(&next))
     }
 
-    /// Each parameter within its bounds.
+    /// Limits each parameter to its bounds.
     fn within(&self, theta: &[f64]) -> Vec<f64> {
         (theta.iter().zip(self.bounds))
             .map(|(x, [low, high])| x.clamp(*low, *high))
             .collect()
     }
 
-    /// Standard deviations of the free parameters, blocks of whole segments taken as independent (sandwich, White 1982).
+    /// Returns the free parameters' standard deviations, with segments as independent blocks (sandwich, White 1982).
     pub(super) fn deviations(&self, theta: &[f64]) -> Option<Vec<f64>> {
         let residual = self.residual(theta).ok()?;
         let typical: Vec<f64> = theta.iter().map(|x| x.abs().max(1.0e-9)).collect();
@@ -206,16 +206,16 @@ impl Problem<'_> {
     }
 }
 
-/// A fit on its way.
+/// State of a fit.
 struct Descent {
     theta: Vec<f64>,
     /// Scale of each parameter.
     typical: Vec<f64>,
     residual: Vec<f64>,
-    /// Sum of squares; infinite where the start cannot be simulated.
+    /// Sum of squares; infinite if the start cannot be simulated.
     cost: f64,
     damping: f64,
-    /// Steps in a row that won next to nothing.
+    /// Steps in a row with negligible gain.
     quiet: usize,
     settled: bool,
 }

@@ -1,36 +1,36 @@
-//! What became of the free runs of a model.
+//! Results of free runs.
 
 use serde::Serialize;
 
 use super::halt::Cause;
 use super::log::Log;
 
-/// What became of the free runs of a model over recordings, each from the recorded start without a look at the measured motion.
+/// Result of a model's free runs over recordings, each from the recorded start without using the measured motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 pub enum FreeRun {
-    /// No simulated position was further from the recorded one than the joint travels in the recordings.
+    /// No position error exceeded the joint's travel in the recordings.
     Followed {
-        /// RMS of simulated less recorded position, rad or m.
+        /// RMS of simulated minus recorded position, rad or m.
         rms: f64,
         /// Mean of its absolute value, rad or m.
         mean_absolute: f64,
         /// Largest absolute value, rad or m.
         max: f64,
     },
-    /// A free run left the recorded motion or could not go on; its errors say nothing of the model.
+    /// A free run left the recorded motion or could not continue; its errors do not judge the model.
     Diverged {
         /// The recording.
         recording: String,
-        /// From which time of the recording, s.
+        /// Start of the divergence in the recording, s.
         time: f64,
-        /// Why, a clause.
+        /// Reason, a clause.
         why: String,
     },
 }
 
 impl FreeRun {
-    /// Of simulated less recorded positions.
+    /// Builds the result from simulated minus recorded positions.
     pub(super) fn followed(errors: &[f64]) -> Self {
         let rows = errors.len().max(1) as f64;
         Self::Followed {
@@ -40,7 +40,7 @@ impl FreeRun {
         }
     }
 
-    /// Of a run over `recording` that ends at `time`, s.
+    /// Builds the result of a run over `recording` that ends at `time`, s.
     pub(super) fn diverged(recording: &str, time: f64, cause: Cause) -> Self {
         Self::Diverged {
             recording: recording.to_owned(),
@@ -49,7 +49,7 @@ impl FreeRun {
         }
     }
 
-    /// RMS of the position error, rad or m; none where a run diverged.
+    /// Returns the RMS of the position error, rad or m; `None` if a run diverged.
     pub fn rms(&self) -> Option<f64> {
         match self {
             Self::Followed { rms, .. } => Some(*rms),
@@ -57,12 +57,12 @@ impl FreeRun {
         }
     }
 
-    /// The same as a number for a table, which has no place for words: NaN where a run diverged.
+    /// Returns the same as a number for a table: NaN if a run diverged.
     pub(super) fn number(&self) -> f64 {
         self.rms().unwrap_or(f64::NAN)
     }
 
-    /// Returns true if the error is at most 1 + `share` times that of `other`; a run that diverged is worse than any other.
+    /// Returns true if the error is at most 1 + `share` times that of `other`; a diverged run is worse than any other.
     pub(super) fn is_within(&self, share: f64, other: &Self) -> bool {
         match (self.rms(), other.rms()) {
             (Some(own), Some(other)) => own <= (1.0 + share) * other,
@@ -72,7 +72,7 @@ impl FreeRun {
     }
 }
 
-/// Largest distance between two positions of one recording, rad or m.
+/// Returns the largest travel in one recording, rad or m.
 pub(super) fn travel(logs: &[Log]) -> f64 {
     let of = |log: &Log| {
         let fold = |pick: fn(f64, f64) -> f64, from| log.q.iter().copied().fold(from, pick);

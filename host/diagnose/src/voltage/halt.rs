@@ -1,18 +1,18 @@
-//! Why a simulation under voltage cannot go on.
+//! Reasons why a simulation under voltage ends.
 
 /// The end of a simulation before the end of its rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Halt {
     /// Time of the recording, s.
     pub(crate) time: f64,
-    /// Why.
+    /// Reason.
     pub(crate) cause: Cause,
 }
 
-/// Why a free run cannot be compared with its recording.
+/// Reasons why a free run cannot be compared with its recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cause {
-    /// The simulated position is further from the recorded one than the joint travels in the recordings.
+    /// The position error exceeds the joint's travel in the recordings.
     LeftTravel,
     /// Position or velocity grows without bounds.
     Unbounded,
@@ -21,7 +21,7 @@ pub(crate) enum Cause {
 }
 
 impl Cause {
-    /// The cause as a clause.
+    /// Returns the cause as a clause.
     pub(super) fn clause(self) -> &'static str {
         match self {
             Self::LeftTravel => {
@@ -42,7 +42,7 @@ impl Halt {
         }
     }
 
-    /// A motion without bounds at `time`, s.
+    /// An unbounded motion at `time`, s.
     pub(super) fn unbounded(time: f64) -> Self {
         Self {
             time,

@@ -1,12 +1,13 @@
-//! The controller behind a voltage, read off the recording.
+//! The controller behind a voltage, from the recording.
 //!
-//! A servo whose voltage follows its reference simulates as it moved: in the closed loop, where the model meets the
-//! same reference. What the recorded voltage alone lets drift, the controller holds.
+//! A servo whose voltage follows its reference is simulated in the closed loop, with the same reference. The controller
+//! holds what drifts under the recorded voltage alone.
 //!
-//! The share of the supply is linear in the gains of a PID controller with feed-forward while it is off its limit: least squares
-//! over those rows. Which terms the controller has is decided by rows that were left out of the fit (Stone 1974).
+//! Off its limit, the share of the supply is linear in the gains of a PID controller with feed-forward (least squares).
+//! Rows left out of the fit decide on the controller's terms (Stone 1974).
 //!
-//! Leaves out: filters and delays of the controller, cascades with an integral of the velocity, back-calculation of the integral.
+//! Leaves out: filters and delays of the controller, cascades with an integral of the velocity, back-calculation of the
+//! integral.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,34 +15,34 @@ use super::log::Log;
 use super::search::{LEAST_GAIN, LEVEL, signed_rank};
 use rig_model::robot::{AntiWindup, VoltageController};
 
-/// Share of the voltage's power that a law has to explain.
+/// Least share of the voltage's power that a law explains.
 const EXPLAINED: f64 = 0.995;
-/// Rows at least that it is judged by.
+/// Fewest rows for a law.
 const FEWEST: usize = 100;
-/// Share of the largest share of the supply from which on the bridge may be at its limit.
+/// Share of the largest supply share above which the bridge may be at its limit.
 const LIMIT: f64 = 0.995;
-/// Rows at the limit from which on there is one.
+/// Fewest rows at a limit.
 const AT_LIMIT: usize = 10;
-/// Pieces that a recording is cut into to judge its terms by.
+/// Pieces of a recording for the choice of terms.
 const PIECES: usize = 16;
-/// Pieces are left out of a fit every so many.
+/// Folds of the pieces that are left out in turn.
 const FOLDS: usize = 8;
-/// Sample periods by which columns of one row may be apart: each is read within its period, and the controller has one of its own.
+/// Largest time between columns of a row, in sample periods: each is read within one, and the controller has its own.
 const APART: f64 = 2.0;
 
-/// Columns: error, damping, velocity and acceleration of the reference, constant, integral of the error with and without clamping.
+/// Columns: error, damping, reference velocity and acceleration, constant, error integral with and without clamping.
 const COLUMNS: usize = 7;
-/// Columns that a term beside the proportional one brings in.
+/// Columns of each term beside the proportional one.
 const TERMS: [&[usize]; 6] = [&[1], &[2], &[3], &[4], &[4, 5], &[4, 6]];
-/// Place of the integral that stands still at the limit.
+/// Index of the integral that stops at the limit.
 const CLAMPED: usize = 6;
 
-/// A controller as a recording shows it.
+/// A controller by a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Law {
     /// The controller.
     pub controller: VoltageController,
-    /// Integral of the position error at each row, rad·s or m·s; empty where the controller has none.
+    /// Integral of the position error at each row, rad·s or m·s; empty without an integral.
     pub integral: Vec<f64>,
 }
 
@@ -81,7 +82,7 @@ impl Normal {
         })
     }
 
-    /// Gains of the columns `used`, 0 for the others; none where they are collinear.
+    /// Returns the gains of the columns `used`, 0 for the others; `None` if they are collinear.
     fn solve(&self, used: &[usize]) -> Option<DVector<f64>> {
         let scale: Vec<f64> = used.iter().map(|c| self.matrix[(*c, *c)].sqrt()).collect();
         if scale.iter().any(|s| !(*s > 0.0)) {
@@ -100,17 +101,17 @@ impl Normal {
         Some(gains)
     }
 
-    /// Sum of squares that gains leave.
+    /// Returns the squared residual with these gains.
     fn left(&self, gains: &DVector<f64>) -> f64 {
         (self.power - 2.0 * gains.dot(&self.right) + gains.dot(&(&self.matrix * gains))).max(0.0)
     }
 }
 
-/// What a recording resolves.
+/// Resolution of a recording.
 struct Resolution {
     /// Time between rows, s.
     period: f64,
-    /// Of the recording, s.
+    /// Duration of the recording, s.
     duration: f64,
     /// Smallest step of the share of the supply.
     step: f64,
@@ -123,14 +124,14 @@ impl Resolution {
         Self {
             period: log.duration() / log.t.len() as f64,
             duration: log.duration(),
-            // Less than that is rounding of a quotient.
+            // Smaller steps are rounding of a quotient.
             step: (steps.filter(|step| *step > 1.0e-6 * largest)).fold(f64::INFINITY, f64::min),
         }
     }
 
-    /// Gain of each column at which it is told from what the recording's own limits make of a proportional controller: columns
-    /// that are read at different instants look like gains on velocities and accelerations, rounding like a constant, a drift like
-    /// an integral whose time is longer than the recording.
+    /// Returns the least identifiable gain of each column beside a proportional controller. Columns read at different
+    /// instants look like gains on velocities and accelerations. Rounding looks like a constant, a drift like an
+    /// integral with a time longer than the recording.
     fn least(&self, proportional: f64) -> [f64; COLUMNS] {
         let apart = APART * self.period * proportional;
         let slow = proportional / self.duration;
@@ -138,8 +139,8 @@ impl Resolution {
         [0.0, apart, apart, bent, self.step, slow, slow]
     }
 
-    /// Returns true if these are the gains of a controller: all that the recording resolves, none with the wrong sign. Gains on the
-    /// velocities of joint and reference may be small, of either sign, and then are those instants.
+    /// Returns true if these are gains of a controller: all identifiable, none with the wrong sign. Gains on the
+    /// velocities of joint and reference may be small with either sign: they come from different instants.
     fn allows(&self, gains: &DVector<f64>) -> bool {
         let least = self.least(gains[0]);
         let has_integral = gains[5] + gains[CLAMPED] > 0.0;
@@ -149,7 +150,7 @@ impl Resolution {
                 _ if gain == 0.0 => true,
                 0 | 3 | 5 | CLAMPED => gain > least[column],
                 1 | 2 => gain > -least[column],
-                // The constant beside an integral is where that began.
+                // Beside an integral, the constant is its initial value.
                 _ => gain.abs() > least[column] || has_integral,
             }
         };
@@ -157,7 +158,7 @@ impl Resolution {
     }
 }
 
-/// Columns of a controller, and what each piece leaves where it is left out of the fit.
+/// Columns of a controller, and the squared residual of each piece when it is left out of the fit.
 struct Terms {
     used: Vec<usize>,
     unseen: Vec<f64>,
@@ -181,7 +182,7 @@ impl Terms {
         self.unseen.iter().sum()
     }
 
-    /// Returns true if the rows left out of the fit are better explained than by `other`, and not by chance.
+    /// Returns true if left-out rows are explained better than by `other`, and significantly.
     fn beats(&self, other: &Self) -> bool {
         let gains: Vec<f64> = (other.unseen.iter().zip(&self.unseen))
             .map(|(before, after)| (before / after).ln())
@@ -191,7 +192,7 @@ impl Terms {
     }
 }
 
-/// The fewest columns that no larger set beats; none where not even the proportional term explains anything.
+/// Returns the fewest columns that no larger set beats; `None` if even the proportional term explains nothing.
 fn chosen(pieces: &[Normal], resolution: &Resolution) -> Option<Vec<usize>> {
     let whole = Normal::sum(pieces.iter());
     let mut all: Vec<Terms> = (0..1_usize << TERMS.len())
@@ -220,7 +221,7 @@ fn chosen(pieces: &[Normal], resolution: &Resolution) -> Option<Vec<usize>> {
     all.into_iter().nth(best).map(|terms| terms.used)
 }
 
-/// Shares of the supply and which of them may be limited.
+/// Shares of the supply, and which may be limited.
 struct Shares {
     share: Vec<f64>,
     /// Rows with the drive on.
@@ -244,7 +245,7 @@ impl Shares {
         self.share[k].abs() >= LIMIT * self.largest
     }
 
-    /// Integral of the error at each row; it stands still where `clamped` and the share is at its limit.
+    /// Returns the integral of the error at each row; with `clamped` it stops while the share is at its limit.
     fn integral(&self, log: &Log, clamped: bool) -> Vec<f64> {
         let error = |k: usize| log.reference[k] - log.q[k];
         let mut sum = 0.0;
@@ -260,7 +261,7 @@ impl Shares {
     }
 }
 
-/// A recording with everything that a controller may answer.
+/// A recording with all inputs of a controller.
 struct Rows<'a> {
     log: &'a Log,
     shares: Shares,
@@ -279,7 +280,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The columns at row `k`.
+    /// Returns the columns at row `k`.
     fn columns(&self, k: usize) -> [f64; COLUMNS] {
         let log = self.log;
         let (error, velocity) = (log.reference[k] - log.q[k], log.slope(k)[0]);
@@ -288,8 +289,8 @@ impl<'a> Rows<'a> {
         [error, -velocity, speed, acceleration, 1.0, free, clamped]
     }
 
-    /// The largest share where it is a limit: the gains ask there for more by more than they are off elsewhere, `scatter`. The
-    /// whole supply where it is none and the supply is known, because a bridge gives no more; none where it is not.
+    /// Returns the largest share if it is a limit: the gains demand more there, by more than their `scatter` elsewhere.
+    /// Else returns the whole supply if that is known, because a bridge gives no more, or `None`.
     fn limit(&self, gains: &DVector<f64>, scatter: f64) -> Option<f64> {
         let Shares { share, on, largest } = &self.shares;
         let limited: Vec<usize> = (on.iter().copied())
@@ -312,7 +313,7 @@ impl<'a> Rows<'a> {
 }
 
 impl Law {
-    /// What the rows of a recording with the drive on and off its limit follow; none where they follow no such law.
+    /// Fits the rows with the drive on and off its limit; `None` if they follow no such law.
     pub(super) fn of(log: &Log) -> Option<Self> {
         let rows = log.t.len();
         if log.reference.len() != rows || log.u.len() != rows {
@@ -359,7 +360,7 @@ impl Law {
                     true => AntiWindup::Clamping,
                     false => AntiWindup::None,
                 },
-                // Until the recordings together have shown theirs.
+                // Until all recordings together determine it.
                 supply: [1.0, 0.0],
             },
             integral: match (columns.contains(&5), clamped) {
@@ -371,18 +372,17 @@ impl Law {
     }
 }
 
-/// A supply by its readings: a line over the share asked of it, because a switching bridge makes a reading jump with the phase that it
-/// is caught at.
+/// A supply by its readings: a line over the demanded share. A switching bridge makes a reading depend on its phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Supply {
-    /// Voltage without load, V, and what a share of one changes it by, V.
+    /// Voltage without load, V, and its change per share, V.
     line: [f64; 2],
     /// RMS of the readings about the line, V.
     scatter: f64,
 }
 
 impl Supply {
-    /// The supply of recordings: one line for all, because small shares alone do not show it.
+    /// Fits the supply of recordings: one line for all, because small shares alone do not determine it.
     pub(super) fn of(logs: &[Log]) -> Self {
         let all = || logs.iter().flat_map(readings);
         let (mut sums, mut right) = (nalgebra::Matrix2::zeros(), nalgebra::Vector2::zeros());
@@ -402,13 +402,13 @@ impl Supply {
         }
     }
 
-    /// A supply that is known by its line; the scatter stays.
+    /// Returns the supply with a known line; the scatter stays.
     pub(super) fn with_line(self, line: [f64; 2]) -> Self {
         Self { line, ..self }
     }
 
-    /// Gives the controllers of `logs` this supply. A recording whose readings lie off the line by more in the mean than readings
-    /// scatter about it has its own voltage without load.
+    /// Gives this supply to the controllers of `logs`. A recording has its own voltage without load if its readings
+    /// differ from the line by more than their scatter in the mean.
     pub(super) fn give(&self, logs: &mut [Log]) {
         for log in logs {
             let [off, rows] = readings(log)
@@ -428,7 +428,7 @@ impl Supply {
     }
 }
 
-/// Share of the supply and its reading, V, of the rows with the drive on.
+/// Returns share and reading of the supply, V, for rows with the drive on.
 fn readings(log: &Log) -> Vec<[f64; 2]> {
     let shares = Shares::of(log);
     let reading = |k: &usize| [shares.share[*k].abs(), log.supply[*k]];

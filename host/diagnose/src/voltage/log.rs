@@ -1,17 +1,17 @@
-//! Recordings as a voltage-driven simulation takes them: rows as they were written, no filter, no even grid.
+//! Recordings for a voltage-driven simulation: rows as written, without filter or even grid.
 
 use super::law::Law;
 use crate::DiagnoseError;
 use rig_data::prepare::Recording;
 use rig_model::robot::VoltageController;
 
-/// Rows on each side that the velocity at a row is taken from: a parabola through eleven rows.
+/// Rows on each side for the velocity at a row: a parabola through eleven rows.
 const SIDE: usize = 5;
-/// The same for a reference, which has no noise: a parabola through five rows.
+/// The same for a reference without noise: a parabola through five rows.
 const REFERENCE_SIDE: usize = 2;
-/// A voltage is known well enough between rows this many periods apart; farther apart there is a gap.
+/// Row distance, in periods, above which there is a gap; a closer voltage is known well enough.
 const GAP: f64 = 5.0;
-/// Column that says whether the drive is on.
+/// Column that shows whether the drive is on.
 const ENABLE: &str = "torque_enable";
 /// Column of the supply's voltage.
 const SUPPLY: &str = "supply";
@@ -19,7 +19,7 @@ const SUPPLY: &str = "supply";
 /// A stretch of a recording without a gap.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Log {
-    /// Of which recording.
+    /// Name of the recording.
     pub label: String,
     /// s
     pub t: Vec<f64>,
@@ -27,24 +27,24 @@ pub(super) struct Log {
     pub q: Vec<f64>,
     /// V
     pub u: Vec<f64>,
-    /// Reference position, rad or m; empty where none was recorded.
+    /// Reference position, rad or m; empty if not recorded.
     pub reference: Vec<f64>,
-    /// V; 1 where it was not recorded.
+    /// V; 1 if not recorded.
     pub supply: Vec<f64>,
-    /// Velocity of the reference, rad/s or m/s; empty where none was recorded.
+    /// Velocity of the reference, rad/s or m/s; empty if not recorded.
     pub reference_velocity: Vec<f64>,
-    /// Acceleration of the reference, rad/s² or m/s²; empty where none was recorded.
+    /// Acceleration of the reference, rad/s² or m/s²; empty if not recorded.
     pub reference_acceleration: Vec<f64>,
-    /// The controller that closes the loop; none where the recorded voltage drives.
+    /// The controller that closes the loop; `None` if the recorded voltage drives.
     pub law: Option<VoltageController>,
-    /// Integral of the position error as its controller had it at each row, rad·s or m·s; empty where that has none.
+    /// The controller's integral of the position error at each row, rad·s or m·s; empty if it has none.
     pub integral: Vec<f64>,
-    /// Whether the drive is on; an idle bridge lets no current flow, so that nothing brakes.
+    /// True if the drive is on; an idle bridge passes no current, so nothing brakes.
     pub on: Vec<bool>,
 }
 
 impl Log {
-    /// s
+    /// Returns the duration, s.
     pub(super) fn duration(&self) -> f64 {
         self.t
             .last()
@@ -52,12 +52,12 @@ impl Log {
             .map_or(0.0, |(b, a)| b - a)
     }
 
-    /// Velocity and acceleration at a row by a parabola through its neighbours.
+    /// Returns velocity and acceleration at a row by a parabola through its neighbours.
     pub(super) fn slope(&self, row: usize) -> [f64; 2] {
         slope(&self.t, &self.q, row, SIDE)
     }
 
-    /// Takes the slopes of the reference from its rows.
+    /// Computes the derivatives of the reference from its rows.
     pub(super) fn read_slopes(&mut self) {
         if self.reference.len() == self.t.len() {
             let slopes =
@@ -67,7 +67,7 @@ impl Log {
         }
     }
 
-    /// Takes the controller from the rows.
+    /// Identifies the controller from the rows.
     pub(super) fn read_controller(&mut self) {
         self.read_slopes();
         if let Some(law) = Law::of(self) {
@@ -75,14 +75,14 @@ impl Log {
         }
     }
 
-    /// Pieces of about `length` seconds; the whole where it is infinite.
+    /// Returns pieces of about `length` seconds; the whole for infinity.
     pub(super) fn windows(&self, length: f64) -> Vec<Segment> {
         let mut list = Vec::new();
         let (mut from, last) = (0, self.t.len().saturating_sub(1));
         while from < last {
             let end = self.t[from] + length;
             let mut to = (from..=last).find(|k| self.t[*k] > end).unwrap_or(last + 1);
-            // A short rest joins the piece before it.
+            // A short remainder joins the piece before it.
             if self.t[last] - self.t[to.min(last)] < 0.5 * length {
                 to = last + 1;
             }
@@ -97,7 +97,7 @@ impl Log {
     }
 }
 
-/// First and second derivative of a column at a row by a parabola through `side` rows on each side.
+/// Returns first and second derivative of a column at a row by a parabola through `side` rows on each side.
 fn slope(t: &[f64], column: &[f64], row: usize, side: usize) -> [f64; 2] {
     let last = t.len().saturating_sub(1);
     let (low, high) = (row.saturating_sub(side), (row + side).min(last));
@@ -120,21 +120,21 @@ fn slope(t: &[f64], column: &[f64], row: usize, side: usize) -> [f64; 2] {
         .map_or([0.0; 2], |c| [c[1], 2.0 * c[2]])
 }
 
-/// Rows of a log that are simulated from the recorded state of the first.
+/// Rows of a log in one simulation from the recorded state of the first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment {
     /// First row.
     pub from: usize,
     /// One past the last.
     pub to: usize,
-    /// At the first row, rad/s or m/s.
+    /// Velocity at the first row, rad/s or m/s.
     pub velocity: f64,
 }
 
 /// Reads the first joint of `recordings`.
 ///
 /// # Errors
-/// What reading gives; a recording without a voltage.
+/// Errors of reading; a recording without a voltage.
 pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseError> {
     let mut list: Vec<Log> = Vec::new();
     for source in recordings {
@@ -177,12 +177,12 @@ pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseEr
             return Err(DiagnoseError::NoVoltage(source.label()));
         }
     }
-    // Shorter than two parabolas there is nothing to simulate.
+    // A log shorter than two parabolas is not simulated.
     list.retain(|log| log.t.len() > 4 * SIDE);
     for log in &mut list {
         log.read_controller();
     }
-    // What is found must not hang on the order of the files, and folds dealt in this order have weak and strong motions each.
+    // The result must not depend on the order of the files. In this order, folds have weak and strong motions each.
     let strength = |log: &Log| log.u.iter().map(|u| u * u).sum::<f64>() / log.u.len() as f64;
     list.sort_by(|a, b| (strength(a).total_cmp(&strength(b))).then_with(|| a.label.cmp(&b.label)));
     Ok(list)

@@ -1,21 +1,21 @@
-//! The gap workflow for one joint that is driven by a known voltage, where neither torque nor current was measured.
+//! The gap workflow for one joint driven by a known voltage, without measured torque or current.
 //!
-//! There is no torque to compare: the model runs freely from the recorded start of each recording with the recorded
-//! voltage, and the gap is that of the position, in rad (or m). Identifiable are the torque per volt and the back-EMF,
-//! the drive's inertia and friction, against the link's inertia and weight, which the description must state. Effects come
-//! in one at a time, by the motion of recordings that they were not fitted to (Stone 1974), as `search` says; all
-//! numbers of the result in `train_rms`, `holdout_rms`, waterfall and floor are of the position: each recording is
-//! simulated from its first row to its last (`LONGEST` at most, after which it starts anew), without a look at the
-//! measured motion in between.
+//! Without torque, the model runs freely from the recorded start of each recording with the recorded voltage. The gap
+//! is that of the position, in rad (or m). Identifiable are torque per volt, back-EMF, the drive's inertia and
+//! friction, relative to the link's inertia and weight, which must be described. `search` adds one effect at a time by
+//! the motion of left-out recordings (Stone 1974). `train_rms`, `holdout_rms`, waterfall and floor refer to the
+//! position. Each recording is simulated from its first row to its last without using the measured motion in between
+//! (`LONGEST` at most, then it restarts).
 //!
-//! Where the recording's references and voltage show the controller, the loop is closed (`law`) and no recorded voltage drives.
-//! Held-back recordings have a say: an effect that makes their motion worse does not stand.
+//! If references and voltage show the controller, the loop is closed (`law`) and no recorded voltage drives. An effect
+//! that makes the hold-out motion worse is rejected.
 //!
-//! A fit begins with the equation of motion on short pieces (`start`), goes on with windows of one second and ends with whole
-//! recordings. A free run that leaves the recorded motion has diverged ([`FreeRun`]), and its errors are no residual.
+//! A fit starts with the equation of motion on short pieces (`start`), continues with windows of one second and ends
+//! with whole recordings. A free run that leaves the recorded motion has diverged ([`FreeRun`]); its errors are no
+//! residual.
 //!
-//! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; filters and delays of
-//! the controller.
+//! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; filters
+//! and delays of the controller.
 
 #[cfg(test)]
 mod closed_loop_tests;
@@ -59,15 +59,15 @@ use super::{DiagnoseError, Options};
 use rig_data::prepare::Recording;
 use rig_model::robot::{JointKind, Robot};
 
-/// Longest stretch that is simulated in one, s: a joint without weight drifts from its start without bounds.
+/// Longest stretch of one simulation, s: a joint without weight drifts without bounds.
 const LONGEST: f64 = 10.0;
-/// An effect that makes the motion of recordings held back worse by more than this share of its RMS does not stand.
+/// Relative increase of the hold-out RMS above which an effect is rejected.
 const WORSE: f64 = 0.02;
-/// Most recordings that are drawn.
+/// Most recordings in the pictures.
 const DRAWN: usize = 4;
 
-/// Finds what the model of a voltage-driven joint lacks. The second result is the description with the effects and the
-/// parameters identified anew.
+/// Finds the missing effects of a voltage-driven joint. The second result is the description with the effects and the
+/// newly identified parameters.
 ///
 /// # Errors
 /// [`DiagnoseError`]: no recording, no voltage, more than one joint, a link without inertia, a motion that excites
@@ -137,7 +137,7 @@ pub fn diagnose_voltage(
     Ok(result)
 }
 
-/// The model of the description's structure, fitted, with the description's effects.
+/// Fits the model of the description's structure, with the description's effects.
 fn nominal(bench: &Search<'_>, stated: &mut Stated) -> Result<Model, DiagnoseError> {
     let parts = stated.driven(&bench.library);
     let nominal = bench.nominal().ok_or_else(|| {
@@ -153,7 +153,7 @@ fn nominal(bench: &Search<'_>, stated: &mut Stated) -> Result<Model, DiagnoseErr
     })
 }
 
-/// Takes back the effects that spoil the motion of the hold-out, and says so of the one that was taken first.
+/// Removes effects that make the hold-out motion worse, and records it for the first one.
 fn keep_standing(
     models: &mut Vec<Model>,
     holdout: &mut Vec<FreeRun>,
@@ -173,8 +173,8 @@ fn keep_standing(
     }
 }
 
-/// The last of the models, each with one effect more, that does not spoil a motion it was not fitted to: an effect may make
-/// that worse where the next one mends it. `holdout` has what became of the free runs of each.
+/// Returns the last model that does not make the hold-out motion worse; each has one effect more. An effect may make it
+/// worse if the next one corrects that. `holdout` has the free runs of each model.
 fn standing(holdout: &[FreeRun]) -> usize {
     let mut least: Option<&FreeRun> = None;
     let mut last = 0;
@@ -189,7 +189,7 @@ fn standing(holdout: &[FreeRun]) -> usize {
     last
 }
 
-/// Motion of the recordings in which the effects change the simulation most, without effects and with all of them.
+/// Returns the motion of the recordings that effects change most, without effects and with all.
 fn curves(joint: &str, search: &Search<'_>, models: &[Model]) -> Vec<Curves> {
     let (Some(first), Some(last)) = (models.first(), models.last()) else {
         return Vec::new();
@@ -222,7 +222,7 @@ fn curves(joint: &str, search: &Search<'_>, models: &[Model]) -> Vec<Curves> {
     list.into_iter().map(|(_, curves)| curves).collect()
 }
 
-/// Which voltage drives the model, in words.
+/// Returns the voltage that drives the model, in words.
 fn driven(train: &[Log], sealed: &[Log]) -> String {
     let all = train.len() + sealed.len();
     let closed = train
@@ -238,7 +238,7 @@ fn driven(train: &[Log], sealed: &[Log]) -> String {
     }
 }
 
-/// What the description knows of the joint.
+/// Returns the described values of the joint.
 fn plant(robot: &Robot) -> Result<Plant, DiagnoseError> {
     let [joint] = robot.joints.as_slice() else {
         return Err(DiagnoseError::Model(format!(
@@ -285,13 +285,13 @@ fn plant(robot: &Robot) -> Result<Plant, DiagnoseError> {
     })
 }
 
-/// What the encoder's steps leave of any position: the smallest over √12.
+/// Returns the noise floor from the encoder's steps: the smallest step over √12.
 fn floor(logs: &[Log]) -> f64 {
     let steps = logs.iter().flat_map(|log| log.q.windows(2));
     let largest = (logs.iter().flat_map(|log| &log.q)).fold(0.0_f64, |m, q| m.max(q.abs()));
     let least = steps
         .map(|pair| (pair[1] - pair[0]).abs())
-        // Less than that is rounding of the file.
+        // Smaller steps are rounding of the file.
         .filter(|step| *step > 1.0e-6 * largest)
         .fold(f64::INFINITY, f64::min);
     if least.is_finite() {

@@ -1,12 +1,12 @@
-//! One joint that a voltage drives, simulated freely from a recorded start.
+//! Free simulation of a voltage-driven joint from a recorded start.
 //!
-//! J·q̈ + g(q) + viscous·q̇ + friction + offset = gain·(u − emf·q̇), current without delay (L neglected), none where the
-//! drive is off. The voltage is the recorded one, or
-//! in the closed loop that of the recording's own controller. Steps after Moreau (1988), as in [`rig_model::simulate`]: dry friction is whatever value within its bounds
-//! brings the joint to rest, so it really sticks. What is proportional to the velocity is taken as its mean over the step, and
-//! voltages at the velocity in the middle of the step, so that the error falls with the square of the step between reversals.
+//! J·q̈ + g(q) + viscous·q̇ + friction + offset = gain·(u − emf·q̇). The current has no delay (L neglected) and is zero
+//! with the drive off. The voltage is the recorded one, or in the closed loop that of the recording's controller. Steps
+//! after Moreau (1988), as in [`rig_model::simulate`]: within its bounds, dry friction takes the value that stops the
+//! joint, so it really sticks. Terms proportional to the velocity use its mean over the step, voltages the velocity in
+//! the middle. So the error falls with the square of the step between reversals.
 //!
-//! Leaves out: inductance, sag of the supply between rows, heating, play and elasticity of the gear.
+//! Leaves out: inductance, sag of the supply between rows, heating, backlash and elasticity of the gear.
 
 use rig_shared::effects::Kind;
 
@@ -15,8 +15,9 @@ use super::log::{Log, Segment};
 use super::stepper::{State, Stepper};
 use rig_model::robot::Robot;
 
-/// Longest step to begin with, s; halved until the steps no longer matter beside the residual. At 6 ms the positions of the XL330
-/// recordings are off by 0.4 mrad (with friction under load by 2.7 mrad) of residuals of 85 mrad (35 mrad), November 2026.
+/// Longest initial step, s; halved until steps do not matter beside the residual. At 6 ms the XL330 recordings'
+/// positions are off by 0.4 mrad (with friction under load by 2.7 mrad). Their residuals are 85 mrad (35 mrad),
+/// November 2026.
 const STEP: f64 = 6.0e-3;
 /// Longest step as an angle of the closed loop's own oscillation, rad: explicit steps are stable up to 2.
 const ANGLE: f64 = 0.2;
@@ -34,10 +35,10 @@ pub(super) const NAMES: [(&str, &str); NOMINAL] = [
     ("off1", "N*m"),
 ];
 
-/// What is known of the joint.
+/// Known values of the joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Plant {
-    /// Of the link, kg·m² or kg.
+    /// Inertia of the link, kg·m² or kg.
     pub inertia: f64,
     /// Torque against gravity: with cos q, with sin q, constant, N·m or N.
     pub gravity: [f64; 3],
@@ -45,12 +46,12 @@ pub(super) struct Plant {
     pub per_moment: [f64; 3],
     /// Motor turns per joint turn.
     pub ratio: f64,
-    /// Times that the longest step is halved.
+    /// Number of halvings of the longest step.
     pub halvings: i32,
 }
 
 impl Plant {
-    /// The nominal parameters of a description, where it states all of them.
+    /// Returns the nominal parameters of a description; `None` if any is missing.
     pub(super) fn described(&self, robot: &Robot) -> Option<[f64; NOMINAL]> {
         let joint = robot.joints.first()?;
         let (drive, friction) = (joint.drive.as_ref()?, joint.friction.as_ref()?);
@@ -66,13 +67,13 @@ impl Plant {
         ])
     }
 
-    /// Torque against gravity, N·m or N.
+    /// Returns the torque against gravity, N·m or N.
     pub(super) fn weight(&self, q: f64) -> f64 {
         let (sin, cos) = q.sin_cos();
         self.gravity[0] * cos + self.gravity[1] * sin + self.gravity[2]
     }
 
-    /// The same with steps half as long.
+    /// Returns the same plant with half the step.
     pub(super) fn finer(&self) -> Self {
         Self {
             halvings: self.halvings + 1,
@@ -83,7 +84,7 @@ impl Plant {
     /// Appends the simulated positions at the rows of `segment` to `out`.
     ///
     /// # Errors
-    /// [`Halt`]: friction that would drive the joint, or a motion without bounds, and when.
+    /// [`Halt`]: friction that would drive the joint, or an unbounded motion, and its time.
     pub(super) fn simulate(
         &self,
         effects: &[Kind],
@@ -97,7 +98,7 @@ impl Plant {
         })
     }
 
-    /// Simulates the rows of `segment` and hands the state at each row to `visit`.
+    /// Simulates the rows of `segment` and passes the state at each row to `visit`.
     ///
     /// # Errors
     /// As [`Self::simulate`].

@@ -1,4 +1,4 @@
-//! A trajectory followed by a joint that its voltage drives, as a recording would show it.
+//! A trajectory followed by a voltage-driven joint, as a recording.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use rig_data::{Column, EffortNeed, RecordingWriter, Source};
 use rig_excite::{ExciteError, Noise, SETTLING, drawn, load_reference};
 use rig_model::robot::Robot;
 
-/// Why a trajectory cannot be followed under voltage.
+/// Reasons why a trajectory cannot be followed under voltage.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The description has no model under voltage, or its simulation ends early.
@@ -26,31 +26,31 @@ pub enum ReplayError {
     Data(#[from] DataError),
 }
 
-/// What the simulated joint did.
+/// Motion of the simulated joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VoltageReplay {
     /// s
     pub t: Vec<f64>,
     /// Reference position, rad or m.
     pub reference: Vec<f64>,
-    /// Position as measured, noise included, rad or m.
+    /// Measured position with noise, rad or m.
     pub position: Vec<f64>,
-    /// Velocity as measured, noise included, rad/s or m/s.
+    /// Measured velocity with noise, rad/s or m/s.
     pub velocity: Vec<f64>,
     /// Voltage at the motor, V.
     pub voltage: Vec<f64>,
     /// Supply, V.
     pub supply: Vec<f64>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Simulates the one joint of a description that its voltage drives, following the trajectory of a file with the controller and the
-/// supply of the description. A recording is followed at its own instants and from its own first state; a trajectory that
-/// `rig excite` designed begins when the model has stood at its first reference for one second.
+/// Simulates a description's only joint under voltage along the trajectory of a file, with the described controller and
+/// supply. A recording is followed at its own instants, from its own first state. A trajectory of `rig excite` starts
+/// after the model has stood at its first reference for one second.
 ///
 /// # Errors
-/// [`ReplayError`]: a file that has no reference, a description without a controller or without what a voltage makes of the joint.
+/// [`ReplayError`]: a file without a reference, a description without a controller or voltage parameters.
 pub fn replay_voltage(
     robot: &Robot,
     path: &Path,
@@ -82,7 +82,7 @@ pub fn replay_voltage(
     Ok(done)
 }
 
-/// The reference of a file, and how many rows of it are the settling before it.
+/// Returns the reference of a file, and its number of settling rows.
 fn reference(robot: &Robot, path: &Path, rate: f64) -> Result<(Reference, usize), ReplayError> {
     let designed = path
         .extension()
@@ -109,7 +109,7 @@ fn reference(robot: &Robot, path: &Path, rate: f64) -> Result<(Reference, usize)
 }
 
 impl VoltageReplay {
-    /// Writes the recording: t, q1, qd1, u1, supply and ref1. The file appears whole or not at all.
+    /// Writes the recording: t, q1, qd1, u1, supply and ref1. The file appears complete or not at all.
     ///
     /// # Errors
     /// [`ReplayError::Data`].

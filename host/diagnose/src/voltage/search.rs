@@ -1,5 +1,4 @@
-//! Which effects a voltage-driven joint lacks: one at a time, by what the free-running motion of recordings not fitted to
-//! gains.
+//! Search for the effects of a voltage-driven joint: one at a time, by the free-running motion of left-out recordings.
 
 use rig_shared::effects::{Channel, Effect, Kind, Parameter, Scale};
 
@@ -13,29 +12,29 @@ use super::start::start;
 use rig_data::prepare::each_of;
 use rig_model::robot::Robot;
 
-/// Folds of the cross-validation at most: up to so many recordings each is left out once.
+/// Most folds of the cross-validation; each recording is left out once if there are at most as many.
 const FOLDS: usize = 8;
-/// Blocks at least: fewer recordings are cut into pieces, so that a test over them can say something.
+/// Least blocks for a significance test; fewer recordings are cut into pieces.
 const BLOCKS: usize = 8;
 /// Length of the pieces whose errors are compared, s.
 const PIECE: f64 = 2.0;
-/// Share of the error on recordings not fitted to that an effect has to take away.
+/// Least relative error reduction by an effect on left-out recordings.
 pub(super) const LEAST_GAIN: f64 = 0.03;
 /// Level of the signed-rank test over the pieces.
 pub(super) const LEVEL: f64 = 0.05;
-/// Candidates within this share of the best on recordings not fitted to are as good.
+/// Relative difference of left-out errors within which candidates are equal.
 pub(super) const EQUAL: f64 = 0.03;
-/// Candidates of a round that go to the cross-validation, the best by training error first.
+/// Candidates per round in the cross-validation, those of least training error.
 const SHORT_LIST: usize = 3;
-/// Times at most that a model that came in is fitted again.
+/// Most refits of an accepted model.
 const POLISHES: usize = 5;
-/// Share of the RMS that another fit has to win to be followed by one more.
+/// Relative RMS reduction above which another refit follows.
 const POLISHED: f64 = 1.0e-5;
-/// Share of the RMS residual by which steps half as long may change the positions.
+/// Largest change of positions by halving the steps, as a share of the RMS residual.
 const STEP_SHARE: f64 = 0.1;
-/// Times at most that steps are halved.
+/// Most halvings of the steps.
 const HALVINGS: usize = 5;
-/// Effects at most.
+/// Most effects.
 const MOST: usize = 5;
 
 /// A model and its parameters: the nominal ones, then gains and shapes of each effect.
@@ -47,23 +46,23 @@ pub(super) struct Model {
     pub free: Vec<usize>,
 }
 
-/// One that was tried.
+/// A tried effect.
 #[derive(Clone, Debug)]
 pub(super) struct Trial {
     pub kind: Kind,
-    /// Fitted to all recordings; none where it could not be simulated.
+    /// Fit to all recordings; `None` if it could not be simulated.
     pub model: Option<Model>,
     /// RMS on them.
     pub train: f64,
-    /// RMS on blocks not fitted to; none where it did not come so far.
+    /// RMS on left-out blocks; `None` if it was not cross-validated.
     pub unseen: Option<f64>,
-    /// Signed-rank test; candidates are tested in a fixed sequence, which needs no correction for their number.
+    /// Signed-rank test; the fixed test sequence needs no correction for the number of candidates.
     pub p_value: f64,
-    /// Why it was not taken; empty for the one that was.
+    /// Reason for rejection; empty if accepted.
     pub refused: String,
 }
 
-/// What the search works on.
+/// Inputs of the search.
 pub(super) struct Search<'a> {
     pub plant: &'a Plant,
     pub logs: &'a [Log],
@@ -71,7 +70,7 @@ pub(super) struct Search<'a> {
     pub threads: usize,
 }
 
-/// Effects whose laws the simulation of one voltage-driven joint has; in the closed loop no recorded voltage can be late.
+/// Returns the effects in the simulation of a voltage-driven joint; a closed loop has no late recorded voltage.
 pub(super) fn library(without: &[Kind], closed: bool) -> Vec<Kind> {
     [
         Kind::Stribeck,
@@ -102,7 +101,7 @@ impl Search<'_> {
         }
     }
 
-    /// Whole recordings, or pieces where they are few.
+    /// Returns whole recordings, or pieces if there are few.
     pub(super) fn blocks(&self) -> Vec<(usize, Segment)> {
         let whole = segments(self.logs, |_| true, f64::INFINITY);
         if whole.len() >= BLOCKS || whole.is_empty() {
@@ -112,13 +111,13 @@ impl Search<'_> {
         segments(self.logs, |_| true, all / (BLOCKS + whole.len()) as f64)
     }
 
-    /// RMS of the free-running position over the blocks.
+    /// Returns the RMS of the free-running position over the blocks.
     pub(super) fn rms(&self, model: &Model) -> f64 {
         self.problem(model, self.blocks()).rms(&model.theta)
     }
 
-    /// The plant with steps so fine that halving them changes the positions of the nominal model by less than a tenth of their
-    /// residual: where the residual is near the encoder's steps, those of the simulation must not look like an effect.
+    /// Returns the plant with steps so fine that halving changes the nominal model's positions by less than a tenth of
+    /// their residual. Near the encoder's resolution, the simulation's steps must not look like an effect.
     pub(super) fn in_fine_steps(&self) -> Plant {
         match self.nominal() {
             Some(model) => in_fine_steps(self.plant, self.logs, &model.effects, &model.theta),
@@ -126,7 +125,7 @@ impl Search<'_> {
         }
     }
 
-    /// What becomes of the free runs over whole recordings.
+    /// Runs the model freely over whole recordings.
     pub(super) fn freely(&self, model: &Model) -> FreeRun {
         let travel = travel(self.logs);
         let mut errors = Vec::new();
@@ -148,7 +147,7 @@ impl Search<'_> {
         FreeRun::followed(&errors)
     }
 
-    /// Simulated positions of one recording; empty where it cannot be simulated.
+    /// Returns the simulated positions of one recording; empty if it cannot be simulated.
     pub(super) fn simulated(&self, model: &Model, log: usize) -> Vec<f64> {
         let whole = segments(self.logs, |k| k == log, LONGEST);
         let error = self.problem(model, whole).residual(&model.theta);
@@ -156,12 +155,12 @@ impl Search<'_> {
         pairs.map(|(error, q)| q + error).collect()
     }
 
-    /// Standard deviations in the order of the free parameters.
+    /// Returns standard deviations in the order of the free parameters.
     pub(super) fn deviations(&self, model: &Model) -> Option<Vec<f64>> {
         self.problem(model, self.blocks()).deviations(&model.theta)
     }
 
-    /// `starts`, which differ in their parameters alone, fitted to pieces of the recordings from the best of them.
+    /// Fits to pieces of the recordings from the best of `starts`, which differ only in their parameters.
     fn fitted(&self, starts: &[&Model], list: Vec<(usize, Segment)>) -> Model {
         let thetas: Vec<&[f64]> = starts.iter().map(|model| model.theta.as_slice()).collect();
         let theta = self.problem(starts[0], list).fit(&thetas);
@@ -171,8 +170,8 @@ impl Search<'_> {
         }
     }
 
-    /// A model fitted to whole recordings from several starts. Whole recordings alone end in the nearest of many valleys, windows
-    /// alone weigh what windows show: each start is taken as it is and fitted to windows.
+    /// Fits a model to whole recordings from several starts. Whole recordings have many local minima, and windows alone
+    /// have other weights. So each start is used as it is and after a fit to windows.
     fn settled(&self, starts: &[Model]) -> Model {
         let windows = || segments(self.logs, |_| true, WINDOW);
         let near: Vec<Model> = starts
@@ -183,7 +182,7 @@ impl Search<'_> {
         self.fitted(&all, self.blocks())
     }
 
-    /// A model fitted again from where its fit ended, until that wins nothing: a fit ends early where joints stick.
+    /// Refits a model until that improves nothing: a fit may end early where joints stick.
     fn polished(&self, mut model: Model) -> Model {
         for _ in 0..POLISHES {
             let before = self.rms(&model);
@@ -195,7 +194,7 @@ impl Search<'_> {
         model
     }
 
-    /// The nominal model, from several starts; none where the motion does not excite it.
+    /// Fits the nominal model from several starts; `None` if the motion does not excite it.
     pub(super) fn nominal(&self) -> Option<Model> {
         let viscous = (self.logs.iter()).any(|log| log.on.iter().any(|on| !on));
         let theta = start(self.plant, self.logs, viscous)?;
@@ -211,7 +210,7 @@ impl Search<'_> {
                 [0.0, infinity],
                 [-infinity, infinity],
             ],
-            // With the drive always on, viscous friction and back-EMF are one.
+            // With the drive always on, viscous friction and back-EMF are collinear.
             free: (0..NOMINAL).filter(|p| viscous || *p != 4).collect(),
         };
         let starts = [1.0, 0.5, 2.0].map(|factor| {
@@ -222,7 +221,7 @@ impl Search<'_> {
         Some(self.polished(self.settled(&starts)))
     }
 
-    /// `nominal` with the effects of a description, those that are marked fitted again; none where that cannot be simulated.
+    /// Adds a description's effects to `nominal` and refits those that are marked; `None` if it cannot be simulated.
     pub(super) fn with_described(
         &self,
         nominal: Model,
@@ -246,13 +245,13 @@ impl Search<'_> {
                 let held = !fitted || effect.kind.optional().contains(&shape.name);
                 model.free.extend((!held).then_some(model.theta.len()));
                 model.theta.push(value);
-                // What is described stands, however far from what rigs have.
+                // A described value is allowed, however unusual.
                 model
                     .bounds
                     .push([value.min(0.1 * low), value.max(10.0 * high)]);
             }
         }
-        // The nominal values may have been bent by what was not in the model: those of the description are tried as well.
+        // Missing effects may have biased the nominal values: the described ones are a second start.
         let mut starts = vec![model.clone()];
         if let Some(own) = self.plant.described(robot) {
             model.theta[..NOMINAL].copy_from_slice(&own);
@@ -261,8 +260,8 @@ impl Search<'_> {
         Some(self.settled(&starts)).filter(|model| self.rms(model).is_finite())
     }
 
-    /// Of each model the sum of squares and number of rows of every piece of the recordings, of the model fitted to other blocks;
-    /// infinite where that cannot be simulated.
+    /// Returns, for each model, sum of squares and number of rows of every piece of the recordings, fitted to other
+    /// blocks. The sums are infinite if it cannot be simulated.
     fn unseen(&self, models: &[&Model]) -> Vec<Vec<[f64; 2]>> {
         let blocks = self.blocks();
         let folds = FOLDS.min(blocks.len()).max(1);
@@ -281,8 +280,7 @@ impl Search<'_> {
         all.into_iter().map(|pieces| pieces.concat()).collect()
     }
 
-    /// The pieces of the blocks of one fold, for a model fitted to the blocks of the others: the number of each block with the
-    /// sums of its pieces.
+    /// Fits a model to all blocks except one fold. Returns that fold's block numbers, each with the sums of its pieces.
     fn left_out(
         &self,
         model: &Model,
@@ -312,7 +310,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// `model` with one more effect, fitted to all recordings from several starts.
+    /// Fits `model` with one more effect to all recordings, from several starts.
     fn with(&self, model: &Model, kind: Kind) -> Option<Model> {
         let mut starts = Vec::new();
         for share in [0.25, 0.75] {
@@ -327,7 +325,7 @@ impl Search<'_> {
             let mut shaped = false;
             for shape in about.shapes {
                 let [low, high] = shape.range;
-                // How friction parts between the sides of a gear is more than such a motion tells.
+                // Such a motion does not determine how a gear divides friction between its sides.
                 if kind.optional().contains(&shape.name) {
                     more.theta.push(0.0);
                     more.bounds.push(shape.bounds);
@@ -339,7 +337,7 @@ impl Search<'_> {
                     Scale::Linear | Scale::Whole => low + share * (high - low),
                     Scale::Logarithmic => low * (high / low).powf(share),
                 });
-                // What is far outside of what rigs have is another effect.
+                // A value far outside the range of rigs is another effect.
                 more.bounds.push([0.1 * low, 10.0 * high]);
             }
             starts.push(more);
@@ -350,7 +348,7 @@ impl Search<'_> {
         Some(self.settled(&starts)).filter(|found| self.rms(found).is_finite())
     }
 
-    /// A small size for this joint, by the unit.
+    /// Returns a small gain for this joint, by its unit.
     fn first_gain(&self, gain: &Parameter, model: &Model) -> f64 {
         let weight = self.plant.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let torque = weight.max(model.theta[3]);
@@ -369,8 +367,8 @@ impl Search<'_> {
         (self.logs.iter().flat_map(|log| &log.u)).fold(0.0, |m, u| m.max(u.abs()))
     }
 
-    /// Adds effects while they are worth it. `report` is told of every round: its number, the error on recordings left out of
-    /// the fit before it, and all trials.
+    /// Adds effects while they improve the model. `report` receives each round's number, the error on left-out
+    /// recordings before it, and all trials.
     pub(super) fn run(
         &self,
         nominal: &Model,
@@ -400,7 +398,7 @@ impl Search<'_> {
         models
     }
 
-    /// Every effect that `model` does not have, fitted to all recordings, the best first.
+    /// Fits every effect that `model` lacks to all recordings; the best comes first.
     fn trials(&self, model: &Model) -> Vec<Trial> {
         let has = |kind: &Kind| {
             let same = |e: &Kind| e.about().name == kind.about().name;
@@ -428,7 +426,7 @@ impl Search<'_> {
         trials
     }
 
-    /// Judges the trials that fit best by recordings left out of the fit, and gives the error of `model` on those.
+    /// Judges the best-fitting trials by left-out recordings; returns the error of `model` on those.
     fn judge(&self, model: &Model, trials: &mut [Trial]) -> f64 {
         let short: Vec<usize> = (0..SHORT_LIST.min(trials.len()))
             .filter(|k| trials[*k].model.is_some())
@@ -461,7 +459,7 @@ impl Search<'_> {
     }
 }
 
-/// A plant with steps so fine that halving them changes the positions of a model by less than [`STEP_SHARE`] of their residual.
+/// Returns a plant whose positions change by less than [`STEP_SHARE`] of their residual when its steps are halved.
 pub(super) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta: &[f64]) -> Plant {
     let run = |plant: &Plant| {
         let problem = Problem {
@@ -491,9 +489,9 @@ pub(super) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta
     plant
 }
 
-/// Each candidate is tested at the full level as long as all before it, which fit better, have passed: so the chance of any
-/// false one stays at that level (fixed sequence; Maurer, Hothorn and Lehmacher 1995). The order is that of the training error,
-/// of which the pieces not fitted to know little.
+/// Tests each candidate at the full level while all better-fitting ones before it pass. The probability of any false
+/// one then stays at that level (fixed sequence; Maurer, Hothorn and Lehmacher 1995). The order is that of the training
+/// error, which hardly depends on the left-out pieces.
 pub(super) fn in_sequence(trials: &mut [Trial]) {
     let chance = trials.iter().position(|trial| trial.p_value > LEVEL);
     for trial in trials.iter_mut().skip(chance.map_or(usize::MAX, |k| k + 1)) {
@@ -503,7 +501,7 @@ pub(super) fn in_sequence(trials: &mut [Trial]) {
     }
 }
 
-/// Which of the candidates that passed comes in: of those about as good on what they were not fitted to, the one that fits best.
+/// Returns the accepted candidate: the best fit among those that are about equal on left-out data.
 pub(super) fn taken(trials: &[Trial]) -> Option<usize> {
     let passed = || (trials.iter().enumerate()).filter(|(_, t)| t.refused.is_empty());
     let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
@@ -513,19 +511,19 @@ pub(super) fn taken(trials: &[Trial]) -> Option<usize> {
         .map(|(k, _)| k)
 }
 
-/// RMS over pieces.
+/// Returns the RMS over pieces.
 fn pooled(pieces: &[[f64; 2]]) -> f64 {
     let [sum, rows] = (pieces.iter()).fold([0.0; 2], |a, p| [a[0] + p[0], a[1] + p[1]]);
     (sum / f64::max(rows, 1.0)).sqrt()
 }
 
-/// Chance of such gains where each is as likely to be a loss of its size: Wilcoxon's signed-rank test (1945), one-sided, its
-/// distribution exact. `gains` are logarithms of error before over after; those of zero, or of no number, say nothing.
+/// Returns the probability of such gains if losses are equally likely: Wilcoxon's signed-rank test (1945), one-sided,
+/// exact. `gains` are logarithms of error before over after; zeros and NaN do not count.
 pub(super) fn signed_rank(gains: &[f64]) -> f64 {
     let mut gains: Vec<f64> = gains.iter().copied().filter(|g| g.abs() > 0.0).collect();
     gains.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     let largest = gains.len() * (gains.len() + 1) / 2;
-    // Chance of each sum of the ranks of gains.
+    // Probability of each sum of the ranks of gains.
     let mut chance = vec![0.0; largest + 1];
     chance[0] = 1.0;
     for rank in 1..=gains.len() {
@@ -539,7 +537,7 @@ pub(super) fn signed_rank(gains: &[f64]) -> f64 {
     chance[observed..].iter().sum::<f64>().min(1.0)
 }
 
-/// Whether the effect acts on the voltage.
+/// Returns true if the effect acts on the voltage.
 pub(super) fn on_the_voltage(kind: Kind) -> bool {
     kind.about().channel == Channel::Voltage || kind == Kind::MeasurementDelay
 }

@@ -1,10 +1,10 @@
-//! A servo with a pendulum for tests: its own physics and its own discrete controller, no step of the simulation under test.
+//! A servo with a pendulum for tests: its own physics and discrete controller, independent of the tested simulation.
 #![allow(clippy::unwrap_used)]
 
 use rig_data::prepare::InMemory;
 use rig_data::{Block, JointColumns};
 
-/// A pendulum on a motor under a controller whose output is a share of the supply.
+/// A pendulum on a motor; its controller's output is a share of the supply.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Servo {
     /// Link and drive, kg·m².
@@ -52,7 +52,7 @@ const PERIOD: f64 = 5.0e-3;
 /// Length of a recording, s.
 const LENGTH: f64 = 6.0;
 
-/// Reference position, velocity and acceleration: two sinusoids that begin at rest.
+/// Returns reference position, velocity and acceleration: two sinusoids that start at rest.
 fn reference(number: usize, t: f64) -> [f64; 3] {
     let pace = 1.0 + 0.4 * number as f64;
     let wave = |amplitude: f64, omega: f64| {
@@ -70,7 +70,7 @@ impl Servo {
         (q / count).round() * count
     }
 
-    /// A recording of the `number`-th motion, about `offset`, rad: positions as the encoder reads them, voltage, supply, reference.
+    /// Returns the `number`-th recorded motion, about `offset`, rad: encoder positions, voltage, supply, reference.
     pub(super) fn recorded(&self, number: usize, offset: f64) -> InMemory {
         let [kp, ki, kd, kv, ka] = self.gains;
         let (mut q, mut v, mut share, mut integral) = (offset, 0.0_f64, 0.0_f64, 0.0);
@@ -83,13 +83,13 @@ impl Servo {
             let wanted = wanted + offset;
             if step % control == 0 {
                 let measured = self.read(q);
-                // A filter of 10 ms on the difference of the encoder.
+                // A filter of 10 ms on the encoder's difference.
                 speed += 0.1 * ((measured - before) / CONTROL - speed);
                 before = measured;
                 let error = wanted - measured;
                 let wish = kp * error + ki * integral - kd * speed + kv * wanted_v + ka * wanted_a;
                 share = wish.clamp(-self.limit, self.limit);
-                // The integral stands still while it drives further into the limit.
+                // The integral stops while it drives further into the limit.
                 if wish == share || wish * error < 0.0 {
                     integral += CONTROL * error;
                 }

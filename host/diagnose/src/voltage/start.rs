@@ -1,8 +1,8 @@
 //! Nominal parameters of a voltage-driven joint without a simulation: the start of a fit.
 //!
-//! The equation of motion is linear in them. Multiplied by a bump that vanishes with its slope at both ends of a short piece, and
-//! integrated by parts, it needs no derivative of the measured position (weak form; Shinbrot 1954, Preisig and Rippin 1993), so that
-//! the steps of the encoder do not bias the inertia, and no simulation can diverge.
+//! The equation of motion is linear in them. It is multiplied by a bump that vanishes with its slope at both ends of a
+//! short piece, and integrated by parts (weak form; Shinbrot 1954, Preisig and Rippin 1993). This needs no derivative
+//! of the measured position, so encoder steps do not bias the inertia and no simulation can diverge.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,15 +10,15 @@ use super::log::Log;
 use super::plant::{NOMINAL, Plant};
 use crate::sanity::nnls::nnls;
 
-/// Length of a piece, s: a few steps of a coarse encoder, short beside a swing.
+/// Length of a piece, s: a few steps of a coarse encoder, short beside an oscillation.
 const PIECE: f64 = 0.3;
-/// Rows of a piece at least.
+/// Fewest rows of a piece.
 const FEWEST: usize = 12;
 /// Share of the RMS velocity below which dry friction may hold the joint.
 const SLOW: f64 = 0.1;
-/// Share of slow rows above which a piece says nothing of Coulomb friction.
+/// Share of slow rows above which a piece does not show Coulomb friction.
 const MOSTLY_SLOW: f64 = 0.25;
-/// Rounds of the least squares at most, many times what five bounded unknowns need.
+/// Most rounds of the least squares, many times the need of five bounded unknowns.
 const ROUNDS: usize = 100;
 
 /// Columns of a joint under gravity: inertia, back-EMF, dry friction, a constant, and gravity's two.
@@ -26,11 +26,11 @@ const OF_GRAVITY: usize = 6;
 /// Singular values below this are rounding.
 const TINY: f64 = 1e-12;
 
-/// Drive inertia, torque per volt, its product with the back-EMF, Coulomb and viscous friction: none is negative. The offset may be.
+/// Non-negative: drive inertia, torque per volt, its product with the back-EMF, Coulomb and viscous friction.
 const NOT_NEGATIVE: usize = 5;
 
-/// Nominal parameters by least squares, none of them negative; none where the voltage does not drive the joint. Viscous friction is
-/// told from the back-EMF only where `viscous`, by rows with the drive off.
+/// Returns non-negative nominal parameters by least squares; `None` if the voltage does not drive the joint. `viscous`
+/// separates viscous friction from the back-EMF, by rows with the drive off.
 pub(super) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f64>> {
     let velocities: Vec<Vec<f64>> = (logs.iter())
         .map(|log| (0..log.t.len()).map(|k| log.slope(k)[0]).collect())
@@ -77,9 +77,9 @@ pub(super) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f6
     ])
 }
 
-/// Share of the voltage's squares that a joint under gravity leaves, its position `factor` times what was recorded: of the factors
-/// the one whose gravity has the right period leaves least. Inertia, friction, back-EMF and gravity are fitted, whatever the
-/// description says of them.
+/// Returns the residual share of the voltage's squares for a joint under gravity whose position is `factor` times the
+/// recorded. The factor with gravity's right period gives the least. Inertia, friction, back-EMF and gravity are fitted
+/// without the description.
 pub(super) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
     let (mut rows, mut right) = (Vec::new(), Vec::new());
     for log in logs {
@@ -116,7 +116,7 @@ pub(super) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
     (squares > 0.0).then(|| (y - x * fit).norm_squared() / squares)
 }
 
-/// x³(1 − x)³ at a share of a piece, and its derivatives by time, of a piece of that length, s.
+/// Returns x³(1 − x)³ at a share of a piece of `length`, s, and its time derivatives.
 fn bump(x: f64, length: f64) -> [f64; 3] {
     let rest = 1.0 - x;
     [
@@ -126,7 +126,7 @@ fn bump(x: f64, length: f64) -> [f64; 3] {
     ]
 }
 
-/// Rows of overlapping pieces, the last one past the end.
+/// Returns the rows of overlapping pieces; the last index is one past the end.
 fn pieces(log: &Log) -> Vec<[usize; 2]> {
     let mut list = Vec::new();
     let mut from = 0;
@@ -139,7 +139,7 @@ fn pieces(log: &Log) -> Vec<[usize; 2]> {
     list
 }
 
-/// Coefficients of the nominal parameters in one piece, and what the description knows of it.
+/// Returns the coefficients of the nominal parameters in one piece, and its described part.
 fn equation(
     plant: &Plant,
     log: &Log,

@@ -1,4 +1,4 @@
-//! One step of a joint that a voltage drives.
+//! One step of a voltage-driven joint.
 
 use rig_shared::effects::{Channel, Direction, Effect, Instant, Kind, Memory};
 use rig_shared::scalar::Real as _;
@@ -18,20 +18,20 @@ pub(crate) struct State {
     pub(crate) velocity: f64,
     /// Voltage at the motor, V.
     pub(crate) voltage: f64,
-    /// Supply at that voltage, V; 1 where the recorded voltage drives.
+    /// Supply at that voltage, V; 1 if the recorded voltage drives.
     pub(crate) supply: f64,
 }
 
-/// Where an effect enters a step.
+/// Place of an effect in a step.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
-    /// Takes off the voltage.
+    /// Reduces the voltage.
     Voltage,
-    /// A torque whatever the direction of motion is.
+    /// A torque for any direction of motion.
     Torque,
     /// Dry friction.
     Dry,
-    /// Dry friction through the contact of presliding, where there is one.
+    /// Dry friction through the contact of presliding, if any.
     Contact,
 }
 
@@ -40,11 +40,11 @@ struct Part {
     effect: Effect<f64>,
     memory: Memory<f64>,
     role: Role,
-    /// Whether its hidden state has to be carried on.
+    /// True if its hidden state must be advanced.
     remembers: bool,
 }
 
-/// Effects with their parameters, after the nominal ones in the list of a fit.
+/// Returns effects with their parameters, which follow the nominal ones in a fit's list.
 fn parts(effects: &[Kind], theta: &[f64]) -> Vec<Part> {
     let mut at = NOMINAL;
     let mut take = move |count: usize| {
@@ -76,7 +76,7 @@ impl Part {
         self.effect.torque(&mut self.memory.clone(), at)
     }
 
-    /// How far the contact is bent by then, of presliding.
+    /// Returns the deflection of the presliding contact.
     fn bent(&self, at: &Instant<f64>) -> f64 {
         let mut memory = self.memory;
         self.effect.torque(&mut memory, at);
@@ -84,11 +84,11 @@ impl Part {
     }
 }
 
-/// Torques of one step without the back-EMF and the viscous friction.
+/// Torques of one step without back-EMF and viscous friction.
 struct Torques {
-    /// Of drive, gravity and effects, N·m.
+    /// Torque of drive, gravity and effects, N·m.
     torque: f64,
-    /// Dry friction at rest lies between these, N·m.
+    /// Bounds of dry friction at rest, N·m.
     dry: [f64; 2],
 }
 
@@ -101,10 +101,10 @@ pub(super) struct Stepper<'a> {
     coulomb: f64,
     viscous: f64,
     offset: f64,
-    /// How long after its row a voltage acts, s.
+    /// Delay of a voltage after its row, s.
     late: f64,
     parts: Vec<Part>,
-    /// The place of presliding.
+    /// Index of the presliding effect, if any.
     contact: Option<usize>,
     q: f64,
     v: f64,
@@ -112,12 +112,12 @@ pub(super) struct Stepper<'a> {
     drive_torque: f64,
     /// Integral of the position error, rad·s or m·s.
     integral: f64,
-    /// Row of the recording that the time was last in.
+    /// Recording row of the last lookup.
     row: usize,
 }
 
 impl<'a> Stepper<'a> {
-    /// Of nominal parameters and those of the effects; none where parameters are missing.
+    /// Builds a stepper with nominal parameters and those of the effects; `None` if parameters are missing.
     pub(super) fn new(plant: &'a Plant, effects: &[Kind], theta: &[f64]) -> Option<Self> {
         let &[armature, gain, emf, coulomb, viscous, offset, ..] = theta else {
             return None;
@@ -148,15 +148,15 @@ impl<'a> Stepper<'a> {
         })
     }
 
-    /// Begins at the first row of a segment.
+    /// Starts at the first row of a segment.
     pub(super) fn start(&mut self, log: &Log, segment: &Segment) {
         self.row = segment.from;
         (self.q, self.v) = (log.q[segment.from], segment.velocity);
         self.integral = log.integral.get(segment.from).copied().unwrap_or(0.0);
     }
 
-    /// Angular frequency of the closed loop without friction, or the rate of its damping where that is faster, 1/s; 0 where the
-    /// recorded voltage drives.
+    /// Returns the angular frequency of the closed loop without friction, or its damping rate if that is faster, 1/s; 0
+    /// if the recorded voltage drives.
     pub(super) fn fastest(&self, log: &Log) -> f64 {
         let Some(law) = &log.law else { return 0.0 };
         let per_share = self.gain * law.supply[0].abs() / (self.plant.inertia + self.armature);
@@ -169,7 +169,7 @@ impl<'a> Stepper<'a> {
         self.q.abs() < most && self.v.abs() < most
     }
 
-    /// State at row `k`.
+    /// Returns the state at row `k`.
     pub(super) fn state(&mut self, log: &Log, k: usize) -> State {
         let voltage = match log.on[k] {
             true => self.voltage(log, log.t[k], [self.q, self.v], 0.0),
@@ -183,7 +183,7 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// Voltage that the controller gives at a state, or the recorded one; integrates the position error over `dt`.
+    /// Returns the controller's voltage at a state, or the recorded one; integrates the position error over `dt`.
     fn voltage(&mut self, log: &Log, now: f64, [q, v]: [f64; 2], dt: f64) -> f64 {
         let Some(law) = &log.law else {
             let (k, share) = self.place(log, now + self.late);
@@ -206,8 +206,8 @@ impl<'a> Stepper<'a> {
         law.voltage(wish)
     }
 
-    /// The row before a time and the share of the interval that has gone by then: on a line between two rows of one state
-    /// of the drive, held where that changes.
+    /// Returns the row before a time and the elapsed share of its interval: linear between rows with one drive state,
+    /// held at a change.
     fn place(&mut self, log: &Log, time: f64) -> (usize, f64) {
         while self.row + 1 < log.t.len() && log.t[self.row + 1] <= time {
             self.row += 1;
@@ -223,16 +223,16 @@ impl<'a> Stepper<'a> {
         (k, share.clamp(0.0, 1.0))
     }
 
-    /// Velocity in the middle of a step of `dt`: never beyond a reversal.
+    /// Returns the velocity in the middle of a step of `dt`, never beyond a reversal.
     fn middle_velocity(&self, dt: f64) -> f64 {
         let middle = self.v + 0.5 * dt * self.acceleration;
         if middle * self.v > 0.0 { middle } else { 0.0 }
     }
 
-    /// One step of `dt` after row `row`, its middle at `now`.
+    /// Takes one step of `dt` after row `row`, its middle at `now`.
     ///
     /// # Errors
-    /// [`Halt`] where friction would drive the joint.
+    /// [`Halt`] if friction would drive the joint.
     pub(super) fn step(&mut self, log: &Log, row: usize, now: f64, dt: f64) -> Result<(), Halt> {
         let on = log.on[row];
         let middle = self.q + 0.5 * dt * self.v;
@@ -285,12 +285,12 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Coulomb and viscous friction at a velocity, N·m.
+    /// Returns Coulomb and viscous friction at a velocity, N·m.
     fn sliding(&self, v: f64) -> f64 {
         self.viscous * v + self.coulomb * v.sgn()
     }
 
-    /// Torque of the voltage without the back-EMF; sets the drive torque, N·m.
+    /// Returns the torque of the voltage without the back-EMF; sets the drive torque, N·m.
     fn drive(&self, voltage: f64, at: &mut Instant<f64>) -> f64 {
         let back = self.emf * at.velocity;
         let net = voltage - back;
@@ -299,13 +299,13 @@ impl<'a> Stepper<'a> {
             .filter(|part| part.role == Role::Voltage)
             .map(|part| part.torque(at))
             .sum();
-        // What is lost stops the current; it does not turn it round.
+        // The loss stops the current but does not reverse it.
         let effective = voltage - lost.abs().min(net.abs()) * net.signum();
         at.drive_torque = self.gain * (effective - back);
         self.gain * effective
     }
 
-    /// Adds what the effects do to a torque, and to the Coulomb friction.
+    /// Adds the effects to a torque and to the Coulomb friction.
     fn torques(&self, mut torque: f64, at: &mut Instant<f64>) -> Torques {
         let [mut low, mut high] = [-self.coulomb, self.coulomb];
         let bent = self.contact.map_or(0.0, |k| self.parts[k].bent(at));
@@ -337,7 +337,7 @@ impl<'a> Stepper<'a> {
     }
 }
 
-/// A column between row `k` and the next, by the share of the interval.
+/// Interpolates a column between row `k` and the next.
 fn between(column: &[f64], k: usize, share: f64) -> f64 {
     let now = column[k];
     match column.get(k + 1) {

@@ -22,7 +22,7 @@ pub(super) fn found(train: &[&dyn Recording], sealed: &[&dyn Recording]) -> (Dia
     diagnose_voltage(&robot, train, sealed, &Options::default(), &mut |_| ()).unwrap()
 }
 
-/// A pendulum under voltage by small semi-implicit Euler steps: its own physics, no step of the simulation under test.
+/// A pendulum under voltage by small semi-implicit Euler steps: its own physics, independent of the tested simulation.
 fn pendulum(number: usize, load_friction: f64) -> InMemory {
     let (inertia, weight, gain, emf) = (0.0065, 0.4805, 0.1, 0.35);
     let (mut q, mut v, mut acceleration) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -153,7 +153,7 @@ fn an_effect_may_spoil_what_the_next_one_mends() {
 
 #[test]
 fn candidates_pass_until_the_first_that_may_be_chance_and_the_best_fitting_of_equals_comes_in() {
-    // RMS on the fit and off it, p-value: in the order of the fit, as the search has them.
+    // RMS on the fit and on left-out data, p-value: in the order of the fit, as in the search.
     let trials = |list: &[[f64; 3]]| -> Vec<search::Trial> {
         let one = |[train, unseen, p_value]: &[f64; 3]| search::Trial {
             kind: Kind::Stribeck,
@@ -183,7 +183,7 @@ fn candidates_pass_until_the_first_that_may_be_chance_and_the_best_fitting_of_eq
 
 #[test]
 fn signed_ranks_have_their_exact_chances() {
-    // Every gain: one of 2^5 patterns. All but the smallest: two of them. None: all.
+    // All gains: one of 2^5 patterns. All except the smallest: two of them. None: all.
     let p = |gains: &[f64]| search::signed_rank(gains);
     assert!((p(&[1.0, 2.0, 3.0, 4.0, 5.0]) - 1.0 / 32.0).abs() < 1e-15);
     assert!((p(&[-1.0, 2.0, 3.0, 4.0, 5.0]) - 2.0 / 32.0).abs() < 1e-15);
@@ -232,7 +232,7 @@ fn a_servo_law_is_read_off_its_voltage() {
     assert_eq!(law::Law::of(&log), None);
 }
 
-/// A fit may ask for values whose torque is beyond all numbers.
+/// A fit may try values with an infinite torque.
 #[test]
 fn a_joint_whose_friction_is_no_number_is_no_motion() {
     let rows = 400;
@@ -287,7 +287,7 @@ fn a_voltage_against_the_motion_is_a_fault_of_the_data() {
     assert_eq!(kinds, ["sign"], "{found:?}");
 }
 
-/// What is said to be wrong with a pendulum whose columns were changed.
+/// Returns the reported fault of a pendulum with changed columns.
 fn fault_of(change: impl Fn(&mut JointColumns)) -> String {
     let mut runs: Vec<InMemory> = (0..4).map(|k| pendulum(k, 0.0)).collect();
     for run in &mut runs {

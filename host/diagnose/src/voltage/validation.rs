@@ -1,8 +1,8 @@
-//! Validation of a joint that is known by its motor voltage, where neither torque nor current was measured.
+//! Validation of a joint by its motor voltage, without measured torque or current.
 //!
-//! The model runs freely from the first state of each recording (10 s at most, then anew): in the closed loop of the controller that
-//! the recording shows, with the supply of the description, or under the recorded voltage where it shows none. Its position is
-//! compared with the recorded one.
+//! The model runs freely from the first state of each recording (10 s at most, then it restarts). The loop is closed by
+//! the recording's controller with the described supply; without one, the recorded voltage drives. The simulated
+//! position is compared with the recorded one.
 
 use serde::Serialize;
 
@@ -10,11 +10,11 @@ use crate::voltage::{DrivenError, Followed, FreeRun, VoltageModel};
 use rig_data::prepare::Recording;
 use rig_model::robot::{Robot, VoltageController};
 
-/// What drives the model.
+/// Drive of the model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum DrivenBy {
-    /// The controller that the recording shows, in the closed loop.
+    /// The recording's controller, in the closed loop.
     Controller {
         /// The controller.
         controller: VoltageController,
@@ -30,9 +30,9 @@ pub struct VoltageChecked {
     pub recording: String,
     /// Rows.
     pub rows: usize,
-    /// What drives the model.
+    /// Drive of the model.
     pub driven: DrivenBy,
-    /// What became of the free run, and its position errors.
+    /// Result of the free run, and its position errors.
     pub motion: FreeRun,
     /// s
     #[serde(skip)]
@@ -40,7 +40,7 @@ pub struct VoltageChecked {
     /// rad or m
     #[serde(skip)]
     pub measured: Vec<f64>,
-    /// rad or m; shorter where the run could not go on.
+    /// rad or m; shorter if the run could not continue.
     #[serde(skip)]
     pub simulated: Vec<f64>,
 }
@@ -58,7 +58,7 @@ pub struct VoltageValidation {
     pub position_unit: String,
     /// All recordings together.
     pub motion: FreeRun,
-    /// One a recording.
+    /// One per recording.
     pub recordings: Vec<VoltageChecked>,
     /// Sentences.
     pub warnings: Vec<String>,
@@ -84,7 +84,7 @@ impl From<Followed> for VoltageChecked {
 /// Checks the motion that `robot` predicts for recordings of a joint under voltage. Nothing is refitted.
 ///
 /// # Errors
-/// [`DrivenError`]: a description that does not state what a voltage makes of the joint, recordings without a voltage.
+/// [`DrivenError`]: a description without the parameters of a voltage model, recordings without a voltage.
 pub fn validate_voltage(
     robot: &Robot,
     recordings: &[&dyn Recording],
@@ -106,7 +106,7 @@ pub fn validate_voltage(
     })
 }
 
-/// Says where and why the run over a recording diverged, where it did.
+/// Returns a sentence on where and why a run diverged, if it did.
 fn diverged(checked: &VoltageChecked) -> Option<String> {
     let FreeRun::Diverged {
         recording,

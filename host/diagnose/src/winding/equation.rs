@@ -8,51 +8,51 @@ use rig_data::prepare::central_difference;
 use rig_data::runs::Run;
 use rig_model::robot::Robot;
 
-/// Places of the nominal columns: resistance,
+/// Index of the resistance among the nominal columns.
 pub(super) const CURRENT: usize = 0;
-/// inductance,
+/// Index of the inductance.
 pub(super) const CHANGE: usize = 1;
-/// back-EMF,
+/// Index of the back-EMF.
 pub(super) const SPEED: usize = 2;
-/// what sampling apart does to it,
+/// Index of the different sampling instants.
 pub(super) const ACCELERATION: usize = 3;
-/// the current sensor's zero,
+/// Index of the current sensor's zero.
 pub(super) const CONSTANT: usize = 4;
-/// and the back-EMF that iron loses as it saturates, to first order in the current's square.
+/// Index of the back-EMF's loss by iron saturation, to first order in the squared current.
 const SATURATION: usize = 5;
 const COLUMNS: usize = 6;
-/// Place of the current among the coordinates.
+/// Index of the current among the coordinates.
 pub(super) const ACROSS: usize = 0;
 
-/// Currents below which a dead zone fades, because ripple crosses zero within the pulse, A: from none to half an ampere, as
-/// switching and inductance have it.
+/// Currents below which a dead zone fades, A, because ripple crosses zero within the pulse: up to half an ampere,
+/// depending on switching and inductance.
 pub(super) const FADES: [f64; 11] = [
     0.0, 0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.17, 0.25, 0.5,
 ];
 
-/// Share by which clocks of one rate may differ.
+/// Largest relative difference between clocks of one rate.
 const SAME_RATE: f64 = 1e-3;
-/// Share of a row's neighbourhood in which the drive may be off, as the low-pass has it: a volt less is a volt in the row.
+/// Largest share of drive-off time in a row after the low-pass: a volt less is a volt in the row.
 const COASTS: f64 = 1e-3;
 
 /// Rows of one joint's voltage with the columns of its winding.
 pub(super) struct Equation {
-    /// The voltage stands for the torque, V.
+    /// The voltage takes the torque's place, V.
     pub(super) rows: Rows,
     /// Voltage lost per volt of a dead zone, for each of [`FADES`].
     pub(super) dead_zones: Vec<Column>,
-    /// Of the joint, by the description, N·m/A or N/A.
+    /// Torque per current at the joint, by the description, N·m/A or N/A.
     pub(super) torque_per_ampere: f64,
     current: Vec<f64>,
     speed: Vec<f64>,
 }
 
 impl Equation {
-    /// Of a joint, over runs in motion and others of it clamped; none where its voltage was not recorded throughout or its torque
-    /// stands for no current.
+    /// Builds the rows of a joint from runs in motion and clamped ones. `None` without a complete voltage record, or if
+    /// the torque does not represent a current.
     ///
     /// # Errors
-    /// [`DiagnoseError::Clamped`] at another rate.
+    /// [`DiagnoseError::Clamped`] if the rates differ.
     pub(super) fn of(
         robot: &Robot,
         joint: usize,
@@ -106,7 +106,7 @@ impl Equation {
             thinning.push(&omega, &mut columns[SPEED]);
             thinning.push(&scaled(&joint.qdd), &mut columns[ACCELERATION]);
             thinning.push(&vec![1.0; i.len()], &mut columns[CONSTANT]);
-            // The sign of what the current is without its noise.
+            // Sign of the current without its noise.
             let smooth = thinning.smooth(&i);
             let saturated: Vec<f64> = (smooth.iter().zip(&omega))
                 .map(|(i, omega)| i * i * omega)
@@ -148,7 +148,7 @@ impl Equation {
         }))
     }
 
-    /// What more fading would change, so that its being unknown widens the interval of the rest; nothing at the grid's ends.
+    /// Returns the change by more fading: the unknown fading increases other uncertainties. Empty at the grid's ends.
     pub(super) fn fading(&self, k: usize) -> Vec<Column> {
         let around = k
             .checked_sub(1)
@@ -158,7 +158,7 @@ impl Equation {
             .collect()
     }
 
-    /// What the voltage may depend on; the current stands at [`ACROSS`].
+    /// Returns the coordinates that the voltage may depend on; the current is at [`ACROSS`].
     pub(super) fn coordinates(&self) -> Vec<Coordinate> {
         let of = |name: &str, unit, values: &[f64]| Coordinate {
             name: name.to_owned(),
@@ -171,7 +171,7 @@ impl Equation {
         ]
     }
 
-    /// RMS of what coefficients leave, V: those of the nominal columns, then that of a dead zone.
+    /// Returns the RMS residual, V, with coefficients of the nominal columns, then of a dead zone.
     pub(super) fn rms(&self, values: &[f64], dead_zone: Option<usize>) -> f64 {
         let effect = dead_zone.and_then(|k| self.dead_zones.get(k));
         let columns: Vec<&Column> = self.rows.nominal.iter().chain(effect).collect();
@@ -189,7 +189,7 @@ impl Equation {
     }
 }
 
-/// What an inverter loses at a current per volt of its dead zone.
+/// Returns the voltage that an inverter loses at a current, per volt of its dead zone.
 fn lost(current: f64, fade: f64) -> f64 {
     if current == 0.0 {
         0.0

@@ -1,32 +1,32 @@
-//! What nothing explains of a motor's voltage.
+//! Unexplained remainder of a motor's voltage.
 
 use crate::judge::BEYOND_FLOOR;
 use crate::outcome::{Place, Remainder};
 use rig_output::format_significant;
 
-/// Share of what is left of the voltage that a coordinate must explain to be more than an inverter's own unrest …
+/// Least share of the residual that a coordinate must explain; an inverter's own noise explains less …
 const LEFT: f64 = 0.2;
-/// … or times the floor that is left, whatever it goes with.
+/// … or least ratio of the residual to its floor, without a coordinate.
 const FAR_BEYOND_FLOOR: f64 = 3.0;
-/// Least of it, as a share of the voltage: a dead band of the sensor and a dead zone too small for a name left 0.2 and 0.5 %.
+/// Least residual as a share of the voltage: a sensor's dead band and an unnamed small dead zone left 0.2 and 0.5 %.
 const LEAST: f64 = 0.01;
-/// Share of the squares that a dead zone takes away which it may leave: no inverter fades just so.
+/// Share of a dead zone's squares that it may leave: no inverter fades exactly like the law.
 const SHADOW: f64 = 0.02;
 
-/// What a winding's equation leaves of the voltage of a joint.
+/// Residual of a winding's equation on the voltage of a joint.
 pub(super) struct Rest<'a> {
     /// Name of the joint.
     pub(super) joint: &'a str,
     /// RMS of the voltage, V.
     pub(super) voltage: f64,
-    /// Left without a dead zone and with the one found, V.
+    /// Residual RMS without a dead zone and with the one found, V.
     pub(super) rms: [f64; 2],
-    /// Of the voltage's noise, V, where a motion was repeated.
+    /// Noise floor of the voltage, V, if a motion was repeated.
     pub(super) floor: Option<f64>,
 }
 
 impl Rest<'_> {
-    /// What of it is no noise; none where that is nothing to speak of. `place` is what the rest goes with most.
+    /// Returns the remainder above the noise, unless negligible. `place` is the residual's strongest dependence.
     pub(super) fn remainder(self, place: impl FnOnce() -> Option<Place>) -> Option<Remainder> {
         let [before, rms] = self.rms;
         if rms <= LEAST * self.voltage {
@@ -64,7 +64,7 @@ impl Rest<'_> {
     }
 }
 
-/// A place that says of what it is.
+/// Adds to a place that it concerns the voltage.
 pub(super) fn of_the_voltage(place: Place) -> Place {
     Place {
         text: format!("Of the motor's voltage: {}", place.text),
@@ -99,14 +99,14 @@ mod tests {
     fn what_is_small_or_goes_with_nothing_is_no_remainder() {
         let found = left([0.1, 0.1], Some(0.05), 0.5);
         assert!(found.is_some_and(|left| (left.ratio - 2.0).abs() < 1e-12));
-        // Under a hundredth of the voltage.
+        // Less than a hundredth of the voltage.
         assert!(left([0.03, 0.03], Some(0.01), 0.5).is_none());
-        // Neither with the current nor far beyond the floor …
+        // Neither related to the current nor far above the floor …
         assert!(left([0.1, 0.1], Some(0.05), 0.1).is_none());
-        // … and far beyond it.
+        // … and far above it.
         assert!(left([0.2, 0.2], Some(0.05), 0.1).is_some());
         assert!(left([0.2, 0.2], None, 0.1).is_none());
-        // What a dead zone of half a volt fades by.
+        // The fading of a dead zone of half a volt.
         assert!(left([0.5, 0.07], Some(0.05), 0.5).is_none());
     }
 }

@@ -1,13 +1,13 @@
-//! What the recorded voltage of a motor says of its winding, its inverter and its current sensor.
+//! Winding, inverter and current sensor, from the recorded voltage of a motor.
 //!
-//! u = R·(i − i₀) + L·di/dt + k·ω·(1 − b·i²) + c·dω/dt + volts · sgn(i), with i the current that the torque stands for by the
-//! description's torque constant, ω the motor's speed, i₀ what the sensor reads without a current (Krause, Wasynczuk &
-//! Sudhoff 2002, ch. 2; the last term, which fades at low current: Holtz 1992). L and c take up, to first order, that voltage, current and position are
-//! sampled at different instants. No torque is in it: friction, load and gear do not bend it, and what it says of the
-//! current's zero tells a sensor from a torque.
+//! u = R·(i − i₀) + L·di/dt + k·ω·(1 − b·i²) + c·dω/dt + volts · sgn(i). i is the current, from the torque and the
+//! described torque constant. ω is the motor's speed and i₀ the sensor's reading without a current (Krause, Wasynczuk &
+//! Sudhoff 2002, ch. 2; the last term, which fades at low current: Holtz 1992). L and c include, to first order,
+//! different sampling instants of voltage, current and position. The equation has no torque: friction, load and gear do
+//! not affect it. So its current zero separates a sensor error from a torque.
 //!
-//! Leaves out: a resistance that rises with temperature; ripple within a pulse; drives that move several joints; that the
-//! drop of brushes is a dead zone by its look.
+//! Leaves out: a resistance that rises with temperature; ripple within a pulse; drives that move several joints; the
+//! voltage drop of brushes, which looks like a dead zone.
 
 mod equation;
 mod left;
@@ -39,24 +39,24 @@ use rig_output::{format_significant, format_value};
 
 pub(super) use self::settle::{settled, zeros};
 
-/// A winding that leaves more than this share of the voltage's squares is not the one that was recorded.
+/// Share of the voltage's squares in the residual above which the winding's equation does not fit.
 const EXPLAINED: f64 = 0.1;
-/// Least share of what is left of the voltage that a dead zone takes away.
+/// Least RMS reduction of the voltage residual by a dead zone.
 const LEAST_SHARE: f64 = 0.1;
-/// Relative difference of back-EMF and torque constant that is said: magnets and load change them by less.
+/// Relative difference of back-EMF and torque constant that is reported: magnets and load change them by less.
 const CONSTANT_OFF: f64 = 0.05;
-/// … and of the resistance: copper gains 0.39 % a kelvin.
+/// … and that of the resistance: copper gains 0.39 % a kelvin.
 const RESISTANCE_OFF: f64 = 0.25;
 /// … in standard deviations.
 const SURE: f64 = 5.0;
 
-/// What the voltage of one joint's motor says.
+/// Results from the voltage of one joint's motor.
 pub(super) struct Winding {
     /// From 0.
     joint: usize,
-    /// What the sensor reads without a current, as a torque at the joint, and its standard deviation, N·m or N.
+    /// Sensor reading without a current, as a torque at the joint, and its standard deviation, N·m or N.
     offset: [f64; 2],
-    /// Whether the back-EMF contradicts the torque constant, in words.
+    /// A sentence if the back-EMF contradicts the torque constant.
     constant: Option<String>,
     remarks: Vec<String>,
     tried: Tried,
@@ -66,7 +66,7 @@ pub(super) struct Winding {
 }
 
 struct DeadZone {
-    /// Whether the description states it.
+    /// True if the description states it.
     described: bool,
     volts: f64,
     step: Step,
@@ -75,7 +75,7 @@ struct DeadZone {
     map: Map,
 }
 
-/// What the voltages say, joint by joint where they were recorded; sentences about those that say nothing.
+/// Analyses the recorded voltages, joint by joint. Also returns sentences on those without a result.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -228,7 +228,7 @@ fn winding(
         );
         places.into_iter().filter(|p| p.p_value < SIGNIFICANT)
     };
-    // A dead zone that is too small for a name explains what it explains.
+    // A dead zone too small for a name still explains its part.
     let mut known = last.clone();
     if !stands && !left_out {
         known.push(&training.dead_zones[fade]);
@@ -287,12 +287,12 @@ fn winding(
     let scale = training.torque_per_ampere / after.values[CURRENT];
     Ok(Winding {
         joint,
-        // u holds −R·i₀.
+        // The constant in u is −R·i₀.
         offset: [
             -scale * after.values[CONSTANT],
             scale.abs() * after.std(CONSTANT),
         ],
-        // An equation that does not hold bends what it is fitted by.
+        // If the equation does not hold, its coefficients are wrong.
         constant: constant_off(robot, joint, &after).filter(|_| left.is_none()),
         remarks: (resistance_off(robot, joint, &after).filter(|_| left.is_none()))
             .into_iter()
@@ -304,13 +304,13 @@ fn winding(
     })
 }
 
-/// What the voltages leave that nothing explains.
+/// Returns the unexplained remainder of the voltages.
 pub(super) fn left_of_voltage(windings: &[Winding]) -> Option<Remainder> {
     let left = windings.iter().filter_map(|w| w.left.clone());
     left.max_by(|a, b| a.ratio.total_cmp(&b.ratio))
 }
 
-/// Why a voltage that stands is none of an inverter's: what else the equation lacks bends it by as much.
+/// Returns the reason why a small voltage step is not an inverter's: other errors of the equation are as large.
 fn too_small(profile: &Profile) -> Option<String> {
     let volts = profile.evidence.gains[0];
     let least = Kind::DriveDeadzone.about().gains[0].range[0];
@@ -334,7 +334,7 @@ fn value(solution: &Solution, k: usize, volts: &Parameter) -> Value {
     }
 }
 
-/// What a dead zone had done to resistance and back-EMF.
+/// Returns the changes of resistance and back-EMF by a dead zone.
 fn absorbed(joint: &str, before: &Solution, after: &Solution) -> Vec<Absorbed> {
     let moved = |(place, name, unit): (usize, &str, &str)| Absorbed {
         parameter: format!("{name} of the motor of {joint}"),
@@ -352,7 +352,7 @@ fn absorbed(joint: &str, before: &Solution, after: &Solution) -> Vec<Absorbed> {
     .into()
 }
 
-/// Why to believe a dead zone, one sentence.
+/// Returns the reason to believe a dead zone, one sentence.
 fn why(before: &Solution, after: &Solution, fade: f64, floor: f64) -> String {
     format!(
         "The voltage follows R·i + L·di/dt + k·ω but for a step where the current changes its sign{}, down to a floor of {} V; without the step the resistance had come out as {} Ω instead of {}.",
@@ -366,8 +366,8 @@ fn why(before: &Solution, after: &Solution, fade: f64, floor: f64) -> String {
     )
 }
 
-/// Back-EMF and torque constant are one number in SI units where the motor is brushed; with phases it depends on what is
-/// called voltage and current.
+/// In SI units, back-EMF and torque constant of a brushed motor are equal. With phases this depends on the definitions
+/// of voltage and current.
 fn constant_off(robot: &Robot, joint: usize, after: &Solution) -> Option<String> {
     let own = &robot.joints[joint];
     let drive = own.drive.as_ref().filter(|d| d.pole_pairs == Some(0))?;
@@ -403,18 +403,18 @@ fn differs(seen: f64, std: f64, stated: f64, least: f64) -> bool {
     off > least * stated.abs() && off > SURE * std
 }
 
-/// Whether the voltages name something that the description does not state.
+/// Returns true if any named dead zone is not in the description.
 pub(super) fn name_something(windings: &[Winding]) -> bool {
     let found = |w: &Winding| w.dead_zone.as_ref().is_some_and(|dead| !dead.described);
     windings.iter().any(found)
 }
 
-/// Whether they contradict the description's values.
+/// Returns true if the voltages contradict the description's values.
 pub(super) fn contradict(windings: &[Winding]) -> bool {
     windings.iter().any(|w| w.constant.is_some())
 }
 
-/// Adds what the voltages say to a result and to its description.
+/// Adds the results of the voltages to a result and to its description.
 pub(super) fn tell(windings: Vec<Winding>, diagnosis: &mut Diagnosis, model: &mut Robot) {
     for winding in windings {
         diagnosis.tried.push(winding.tried);
@@ -437,7 +437,7 @@ pub(super) fn tell(windings: Vec<Winding>, diagnosis: &mut Diagnosis, model: &mu
                 format_significant(after, 3)
             ));
             let name = &model.joints[winding.joint].name;
-            // What the description states of it is not held any more.
+            // The description's own value is no longer held.
             let placed = model.placed_effects();
             let mut stated = placed
                 .iter()
@@ -476,7 +476,7 @@ pub(super) fn tell(windings: Vec<Winding>, diagnosis: &mut Diagnosis, model: &mu
                 diagnosis.steps.push(dead.step);
             }
         }
-        // The one that is most beyond its floor, or a torque's, is the remainder already.
+        // The remainder already is the one farthest above its floor, or a torque's.
         let other = winding
             .left
             .filter(|left| diagnosis.remainder.as_ref() != Some(left));

@@ -1,4 +1,4 @@
-//! A constant torque or a constant error of its sensor: the voltage tells, or what the sensor reads with the drive off.
+//! Decision between a constant torque and a sensor offset, by the voltage or by sensor readings with the drive off.
 
 use rig_shared::effects::Kind;
 
@@ -11,26 +11,26 @@ use crate::outcome::Step;
 use crate::profile::Profile;
 use crate::search::{Search, is_constant, with};
 
-/// Constants that are a torque. They are one function, too, unless a recording is without all that pulls on the joint.
+/// Constant torques. Only a recording without external loads separates them.
 const TORQUES: [Kind; 2] = [Kind::TorqueOffset, Kind::AsymmetricCoulomb];
-/// What the sensor reads without a current counts as the torque's constant, or as nothing, within so many standard deviations …
+/// Standard deviations within which the sensor's zero equals the torque's constant, or zero …
 const WITHIN: f64 = 3.0;
-/// … and this share of the constant.
+/// … and additional share of the constant.
 const SHARE: f64 = 0.2;
 
-/// What is said of a constant.
+/// Decision on a constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Word {
     /// The sensor reads it without a current.
     Sensor,
-    /// The sensor reads nothing without a current.
+    /// The sensor reads zero without a current.
     Torque,
-    /// Neither, or both.
+    /// Undecided: neither, or both.
     Open,
 }
 
-/// What the sensors read without a current and its standard deviation, joint by joint, N·m or N: as recorded with the drive
-/// off (`given`), else as the voltage says where its equation holds.
+/// Returns the sensors' readings without a current and their standard deviations, joint by joint, N·m or N. They come
+/// from a recording with the drive off (`given`), else from a valid voltage equation.
 pub(crate) fn zeros(
     given: &[[f64; 2]],
     windings: &[Winding],
@@ -54,8 +54,8 @@ impl Word {
     }
 }
 
-/// For each effect what is said of it; a constant that is the sensor's gets that name, and one that is not loses it. So does
-/// what a constant would explain as well.
+/// Decides on each effect. A constant of the sensor gets that name and one that is not loses it. The same holds for
+/// effects that a constant explains as well.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -114,7 +114,7 @@ pub(crate) fn settled(
     Ok(words)
 }
 
-/// The constant torque of an effect that is one, on average, and its standard deviation.
+/// Returns the mean torque of a constant effect and its standard deviation.
 fn constant(profile: &Profile) -> Option<[f64; 2]> {
     let column = profile.columns.first()?[profile.candidate.joint].as_ref()?;
     let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
@@ -124,7 +124,7 @@ fn constant(profile: &Profile) -> Option<[f64; 2]> {
 }
 
 impl Word {
-    /// Takes the names that are excluded out of a step.
+    /// Removes excluded names from a step.
     pub(crate) fn applied(self, step: &mut Step) {
         let sensor = Kind::CurrentOffset.about().name;
         match self {

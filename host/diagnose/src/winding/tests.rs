@@ -1,5 +1,5 @@
-//! The emulated rig's own winding, inverter and current sensor: volts that fade at low current, ripple, delays and noise that
-//! the equation does not have.
+//! Winding, inverter and current sensor of the emulated rig: a voltage step that fades at low current, ripple, delays
+//! and noise that the equation lacks.
 
 #![allow(clippy::unwrap_used)]
 
@@ -31,7 +31,7 @@ fn a_dead_zone_shows_in_the_voltage_alone() {
     assert_eq!(found.verdict, Verdict::Explained);
     let step = &found.steps[0];
     let volts = &step.parameters["volts"];
-    // The rig's falls off in a straight line below 0.1 A.
+    // The rig's step falls linearly below 0.1 A.
     assert!((volts.value - 0.6).abs() < 0.05 * 0.6, "{volts:?}");
     assert!(step.gap_closed > 0.9, "{}", step.gap_closed);
     assert_eq!(found.gap_closed, Some(step.gap_closed));
@@ -45,7 +45,7 @@ fn a_dead_zone_shows_in_the_voltage_alone() {
     );
 }
 
-/// What its law would explain is there whether the library holds the law or not.
+/// The voltage is a remainder even if the library lacks its law.
 #[test]
 fn what_no_law_explains_of_a_voltage_is_a_remainder() {
     let made = made(Some(Effect::DriveDeadzone { voltage: 0.6 }), 5);
@@ -59,7 +59,7 @@ fn what_no_law_explains_of_a_voltage_is_a_remainder() {
     let left = found.remainder.unwrap();
     println!("{}", left.text);
     assert_eq!(left.unit, "V");
-    // Resistance and back-EMF have bent to some of it.
+    // Resistance and back-EMF have compensated some of it.
     assert!(
         (0.1..0.6).contains(&left.rms) && left.ratio > 3.0,
         "{left:?}"
@@ -105,7 +105,7 @@ fn a_constant_of_the_sensor_is_told_from_one_of_the_torque() {
     assert!(set.iter().all(|n| n != "current_offset"), "{set:?}");
 }
 
-/// An amplifier that clips bends what the voltage says of the sensor's zero: a torque's constant had become the sensor's by it.
+/// A clipping amplifier biases the voltage's sensor zero: a torque's constant was once taken for the sensor's.
 #[test]
 fn a_voltage_that_follows_no_winding_owns_no_constant() {
     let mut made = made(Some(Effect::TorqueOffset { torque: 0.3 }), 8);
@@ -132,7 +132,7 @@ fn a_voltage_that_follows_no_winding_owns_no_constant() {
     assert!(!clipped.words.iter().any(|w| w.contains('Ω')));
 }
 
-/// Without the voltage the three constants stand together, until the drive has been recorded off.
+/// Without the voltage, the three constants are collinear until the drive is recorded off.
 #[test]
 fn with_the_drive_off_a_sensor_s_constant_is_told_from_a_torque() {
     for (hidden, seed, sensor) in [
@@ -220,8 +220,8 @@ fn a_column_that_is_no_motor_voltage_says_nothing() {
     assert!(found.words.iter().any(said), "{:?}", found.words);
 }
 
-/// With the drive off the motor's voltage is its back-EMF and not the inverter's, and no current flows: a joint that coasts
-/// bends nothing that is said of the winding, and what is in the friction shows in it as well.
+/// With the drive off, the motor's voltage is its back-EMF, not the inverter's, and no current flows. A coasting joint
+/// biases no result on the winding, and its friction shows as well.
 #[test]
 fn a_recording_in_which_the_drive_is_switched_off_is_one_to_learn_from() {
     let dead = Hidden {
@@ -260,7 +260,7 @@ fn a_recording_in_which_the_drive_is_switched_off_is_one_to_learn_from() {
     let joint = &block.joints[0];
     let speed = (joint.q[off] - joint.q[off - 10]) / (block.t[off] - block.t[off - 10]);
     assert!((speed - 2.0).abs() < 0.3, "{speed}");
-    // It goes on, without a current.
+    // It moves on without a current.
     assert!(joint.q[off + 50] > joint.q[off] + 0.03);
     let largest = joint.tau[off + 20..]
         .iter()
@@ -277,7 +277,7 @@ fn a_recording_in_which_the_drive_is_switched_off_is_one_to_learn_from() {
     let after = volts(&made);
     println!("{before:.4} V, {after:.4} V with it");
     assert!((after / before - 1.0).abs() < 0.01, "{before} {after}");
-    // Unsaid, it is a voltage that no winding has.
+    // Without its mode, it is a voltage that no winding has.
     made.further[0].blocks[0].extra.clear();
     let (deaf, _) = made.diagnosed(&made.robot, &Options::default());
     let told = deaf
@@ -287,7 +287,7 @@ fn a_recording_in_which_the_drive_is_switched_off_is_one_to_learn_from() {
     println!("{told:.4} V where the mode is not said");
 }
 
-/// A clamped shaft has no friction and no back-EMF: the staircase of its torque is between voltage and current alone.
+/// A clamped shaft has no friction and no back-EMF: the torque staircase concerns voltage and current alone.
 #[test]
 fn a_clamped_shaft_shows_a_dead_zone() {
     let dead = Hidden {
@@ -338,7 +338,7 @@ fn a_clamped_shaft_shows_a_dead_zone() {
     options.clamped = crate::clamped(&clamped).unwrap();
     let after = sure(&options);
     assert_ne!(after, before);
-    // It counts: of another drive, with four times the dead zone, it adds to what the rest shows.
+    // It counts: of another drive with four times the dead zone, it adds to the others' result.
     let other = Scenario {
         hidden: vec![Hidden {
             joint: 0,

@@ -1,9 +1,9 @@
-//! Ratios that are wrong by less than a unit is, and changes of the robot that are no ratio.
+//! Ratio errors smaller than those of units, and changes of the robot that are no ratio.
 
 use super::*;
 use rig_scenario::{Effect, Scenario};
 
-/// The training motion of a rig on which that is hidden, over a part of a turn.
+/// Returns the training motion of a rig with these hidden effects, over a part of a turn.
 fn runs(effects: Vec<Effect>) -> (Robot, Vec<Run>) {
     let made = Scenario::short(effects, 3).make().unwrap();
     let low_pass = LowPass::butterworth(4, 20.0, 1000.0).unwrap();
@@ -18,7 +18,7 @@ fn a_ratio_is_told_from_a_payload_and_from_friction() {
     for factor in [0.5, 2.0] {
         only(&robot, &q(&sound, 0, factor), "ratio", 0, "gear ratio");
         only(&robot, &tau(&sound, 0, factor), "ratio", 0, "alike");
-        // Where the description's ratio is wrong its reflected rotor is, too.
+        // A wrong described ratio also makes its reflected rotor wrong.
         let mut other = robot.clone();
         other.joints[0].drive.as_mut().unwrap().gear_ratio *= factor;
         let given = tau(&sound, 0, factor);
@@ -52,7 +52,7 @@ fn a_ratio_is_told_from_a_payload_and_from_friction() {
     assert_eq!(faults(&robot, &pulled).unwrap(), []);
 }
 
-/// What links and friction are need not be described for it.
+/// Links and friction need not be described for this.
 #[test]
 fn a_rotor_that_outweighs_the_joint_is_a_wrong_ratio() {
     let (mut robot, sound) = runs(Vec::new());
@@ -76,7 +76,7 @@ fn a_start_and_then_rest_is_no_motion_to_learn_from() {
     let fault = too_short_to_learn(&stopped).unwrap();
     println!("{}", fault.text);
     assert_eq!(fault.kind, "not-moving");
-    // Beside long recordings a short one with everything taken off tells nothing of what is gone.
+    // Beside long recordings, a short one without external loads does not show their torque.
     let mut both = sound.clone();
     let mut free = sound[0].clone();
     free.t.truncate(2000);

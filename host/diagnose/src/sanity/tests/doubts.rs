@@ -1,4 +1,4 @@
-//! What looks like a fault and is none, and faults that look like others.
+//! Sound data that look faulty, and faults that look like others.
 
 use rig_shared::trajectory::SlowReversals;
 
@@ -6,7 +6,7 @@ use super::windows::changed_wrist;
 use super::*;
 use rig_plant::effect::cogging::Cogging;
 
-/// A mass at a place of the last link that the description knows nothing of.
+/// Adds an undescribed mass at a place of the last link.
 fn loaded(robot: &mut Robot, mass: f64, [x, y, z]: [f64; 3]) {
     let last = robot.joints.last_mut().unwrap();
     let inertial = last.inertial.as_mut().unwrap();
@@ -69,7 +69,7 @@ fn a_recording_cut_in_two_is_no_fault() {
     assert_eq!(faults(&robot, &both).unwrap(), []);
 }
 
-/// Rows at steps of 8 to 16 ms were not judged at all.
+/// Rows at steps of 8 to 16 ms were once not judged at all.
 #[test]
 fn uneven_rows_are_judged_like_even_ones() {
     let (robot, runs) = emulated();
@@ -99,7 +99,7 @@ fn uneven_rows_are_judged_like_even_ones() {
     }
 }
 
-/// It was called a reversed sense, a delay and a wrong scale.
+/// It was once called a reversed sense, a delay and a wrong scale.
 #[test]
 fn a_torque_that_lost_its_sign_is_named_as_that() {
     let folder = tempfile::tempdir().unwrap();
@@ -118,7 +118,7 @@ fn a_torque_that_lost_its_sign_is_named_as_that() {
     only(&robot, &lost, "magnitude", 0, "never negative");
 }
 
-/// Cogging that the description does not have waves in torque and acceleration, and a shift lets the one stand in for the other.
+/// Cogging that is not described makes waves in torque and acceleration, and a shift can imitate it.
 #[test]
 fn hidden_cogging_at_slow_reversals_is_no_late_torque() {
     let robot = text("one-link.toml", template("one-link").unwrap());

@@ -1,16 +1,16 @@
-//! Arms that hang or stand otherwise than described.
+//! Arms with another mounting than described.
 
 use super::windows::sound_arms;
 use super::*;
 
-/// The description as if the arm stood on a ground along which gravity points so.
+/// Returns the description with another direction of gravity.
 fn described(robot: &Robot, gravity: [f64; 3]) -> Robot {
     let mut robot = robot.clone();
     robot.gravity = gravity;
     robot
 }
 
-/// The one fault that is found is of gravity and says so.
+/// Asserts that the only fault is one of gravity, with these words.
 fn gravity_alone(robot: &Robot, runs: &[Run], words: [&str; 2]) {
     let found = faults(robot, runs).unwrap();
     assert_eq!(found.len(), 1, "{found:?}");
@@ -34,7 +34,7 @@ fn an_arm_that_hangs_or_is_mounted_on_a_wall_is_said_once() {
         for wall in [[g, 0.0, 0.0], [0.0, -g, 0.0]] {
             gravity_alone(&described(robot, wall), runs, ["elsewhere", "on a wall"]);
         }
-        // A base that is not level is for the search behind.
+        // A tilted base is left to the search.
         let leaning = described(robot, [0.3 * g, 0.0, -0.95 * g]);
         let found = faults(&leaning, runs).unwrap();
         assert!(found.iter().all(|f| f.kind != "gravity"), "{found:?}");

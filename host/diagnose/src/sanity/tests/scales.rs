@@ -7,7 +7,7 @@ use super::*;
 fn torques_that_are_all_a_thousand_times_too_large_or_small_are_refused_at_once() {
     let folder = tempfile::tempdir().unwrap();
     for (mut robot, runs) in sound_arms(folder.path()) {
-        // A limit or friction would say it before.
+        // A limit or friction would show it earlier.
         for joint in &mut robot.joints {
             joint.limits = None;
             joint.friction = None;

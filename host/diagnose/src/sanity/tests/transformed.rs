@@ -1,4 +1,4 @@
-//! Columns of arms in another order, from another zero, by another factor, about an axis that points the other way.
+//! Arm columns in another order, from another zero, by another factor, or about a reversed axis.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
@@ -6,7 +6,7 @@ use super::windows::sound_arms;
 use super::*;
 use crate::planar_tests;
 
-/// The one fault that is certain: its kind and its text.
+/// Returns kind and text of the only certain fault.
 fn certain(robot: &Robot, runs: &[Run]) -> (String, String) {
     let found = faults(robot, runs).unwrap();
     let mut certain = found.into_iter().filter(|fault| fault.certain);
@@ -18,7 +18,7 @@ fn certain(robot: &Robot, runs: &[Run]) -> (String, String) {
     (fault.kind, fault.text)
 }
 
-/// Columns of the first three joints rotated: the positions, the torques, or both.
+/// Rotates columns of the first three joints: positions, torques, or both.
 fn rotated(runs: &[Run], positions: bool, torques: bool) -> Vec<Run> {
     injured(runs, |run| {
         let sound = run.joints.clone();
@@ -53,7 +53,7 @@ fn joints_in_cyclic_order_are_put_in_order() {
     }
 }
 
-/// An arm of two joints by closed equations of motion, and what its URDF says.
+/// An arm of two joints by closed equations of motion, with its URDF.
 fn planar() -> (Robot, Vec<Run>) {
     let robot = planar_tests::urdf(None);
     let made = planar_tests::recorded(3, 1, [0.05, 1e-5]);
@@ -72,7 +72,7 @@ fn the_zero_of_a_joint_is_found_where_gravity_shows_it() {
                 run.joints[j].q_raw.iter_mut().for_each(|q| *q += angle);
             });
             let (kind, text) = certain(&robot, &turned);
-            // Of the first joint it may be the base as well, which is said.
+            // For the first joint it may be the base too, which the text says.
             assert!(kind == "zero" || j == 0 && kind == "gravity", "{text}");
             let back = (-angle).to_degrees().round();
             let near = [back - 1.0, back, back + 1.0];

@@ -1,9 +1,9 @@
-//! Sound recordings that are short, or of drives that move several joints: none is accused.
+//! Sound recordings that are short, or of drives that move several joints: none has a certain fault.
 
 use super::*;
 use rig_excite::SampledReference;
 
-/// Recordings with nothing wrong of whole arms: one simulated, and a real one where it is at hand.
+/// Returns sound recordings of whole arms: one simulated, and a real one if available.
 pub(super) fn sound_arms(folder: &Path) -> Vec<(Robot, Vec<Run>)> {
     let mut arms = vec![simulated_wrist(folder, 20.0, 1)];
     if let Some((robot, mut runs)) = one("kuka") {
@@ -13,12 +13,12 @@ pub(super) fn sound_arms(folder: &Path) -> Vec<(Robot, Vec<Run>)> {
     arms
 }
 
-/// The TX40 with friction of its own in every motor, its coupled sixth too, on a motion of `seconds`.
+/// The TX40 with friction in every motor, the coupled sixth included, on a motion of `seconds`.
 fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) {
     changed_wrist(folder, seconds, seed, |_| ())
 }
 
-/// The same of another arm than the one described.
+/// The same for another arm than the described one.
 pub(super) fn changed_wrist(
     folder: &Path,
     seconds: f64,
@@ -69,7 +69,7 @@ fn a_coupled_wrist_with_friction_of_its_own_raises_nothing() {
         if seconds < 20.0 {
             continue;
         }
-        // Where the columns are wrong it is still told.
+        // Wrong columns are still found.
         for j in [4, 5] {
             for wrong in [tau(&runs, j, -1.0), q(&runs, j, -1.0)] {
                 let found = faults(&robot, &wrong).unwrap();
@@ -80,7 +80,7 @@ fn a_coupled_wrist_with_friction_of_its_own_raises_nothing() {
     }
 }
 
-/// A stretch of a run.
+/// Returns a stretch of a run.
 fn part(run: &Run, start: f64, seconds: f64) -> Run {
     let mut run = run.clone();
     let from = ((start * run.rate) as usize).min(run.len());
@@ -96,7 +96,7 @@ fn part(run: &Run, start: f64, seconds: f64) -> Run {
     injured(&[run], |_| ()).swap_remove(0)
 }
 
-/// A few seconds of a motion leave much open; no sound recording is accused for that.
+/// A few seconds of motion leave much undecided; no sound recording gets a certain fault for that.
 #[test]
 fn no_window_of_a_real_recording_is_accused() {
     let mut accused = Vec::new();
@@ -112,7 +112,7 @@ fn no_window_of_a_real_recording_is_accused() {
                     let window = part(run, start, seconds);
                     count += 1;
                     for fault in faults(&set.robot, &[window]).unwrap() {
-                        // A window in which nothing moves holds nothing.
+                        // A window without motion holds no information.
                         if fault.certain && fault.kind != "not-moving" {
                             accused.push(format!(
                                 "{} {start} {seconds}: {} {}",
