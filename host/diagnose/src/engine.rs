@@ -229,7 +229,6 @@ fn attempt(
         refit: &refit,
         fitting: &fitting,
         replay: &learnt,
-        sealed: sealed.as_ref(),
     };
     let Survivors {
         mut judged,

@@ -218,8 +218,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Returns the first found effect that makes its joint's motion worse: when it was added and, if that can be
-    /// simulated, in the full model. An RMS increase by more than the share `most` is worse even if it is not
-    /// significant.
+    /// simulated, in the full model.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -227,16 +226,13 @@ impl<'a> Replay<'a> {
         &self,
         chosen: &[Profile],
         described: usize,
-        most: f64,
     ) -> Result<Option<usize>, DiagnoseError> {
         let mut before = self.errors(&chosen[..described])?;
         for k in described..chosen.len() {
             let after = self.errors(&chosen[..=k])?;
             let joint = chosen[k].candidate.joint;
             let worse = |[a, b]: [&Option<Errors>; 2]| match (a, b) {
-                (Some(a), Some(b)) => {
-                    Some(a.worse_than(b, joint) || a.rms(joint) > (1.0 + most) * b.rms(joint))
-                }
+                (Some(a), Some(b)) => Some(a.worse_than(b, joint)),
                 _ => None,
             };
             if worse([&after, &before]) == Some(true) {

@@ -453,6 +453,13 @@ pub struct Tried {
 }
 
 impl Step {
+    /// Returns true if the effect does not reduce the residual of the hold-out: the RMS rises by more than 1 %, half the least
+    /// gain of an effect on the training data.
+    pub fn is_contradicted(&self) -> bool {
+        const RISE: f64 = 1.01;
+        (self.holdout_rms).is_some_and(|[before, after]| after > RISE * before)
+    }
+
     /// Returns the RMS before and after, on the hold-out, else on the training data.
     pub fn judged(&self) -> [f64; 2] {
         self.holdout_rms.unwrap_or(self.train_rms)
@@ -595,12 +602,13 @@ pub struct Diagnosis {
 
 impl Diagnosis {
     /// Returns true if a step's name is certain. Its set has no other name, its posterior probability is at least 95 %,
-    /// and its joint has no residual for another name.
+    /// its joint has no residual for another name, and the hold-out does not contradict it.
     pub fn is_certain(&self, step: &Step) -> bool {
         let own = self.left.iter().find(|left| left.joint == step.joint);
         let left =
             (self.remainder.as_ref()).is_some_and(|r| r.joint == step.joint && r.unit != "V");
         step.set.len() < 2
+            && !step.is_contradicted()
             && (step.name_probability.is_nan() || step.name_probability >= CERTAIN)
             && own.is_none_or(|own| own.explained)
             && !left

@@ -340,13 +340,17 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     let (unit, floor) = (effort(&found.robot.joints[j]), found.known[j]);
     let unseen = step.holdout_rms.map_or(String::new(), |[before, after]| {
         format!(
-            "On the hold-out, which took no part in the fit, the residual of joint {} goes from {} to {} {unit} RMS{}. ",
+            "On the hold-out, which took no part in the fit, the residual of joint {} goes from {} to {} {unit} RMS{}.{} ",
             step.joint,
             number(before),
             number(after),
             match floor.is_nan() {
                 true => String::new(),
                 false => format!(", with a noise floor of {} {unit}", number(floor)),
+            },
+            match step.is_contradicted() {
+                true => " The effect does not reduce it there: the hold-out contradicts the name.",
+                false => "",
             }
         )
     });

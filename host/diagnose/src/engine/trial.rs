@@ -1,9 +1,8 @@
-//! Acceptance of the effects found: tests by simulated motion, joint fit and hold-out.
+//! Acceptance of the effects found: tests by simulated motion and joint fit, on training data alone.
 
 use super::steps::{refuse, refuse_guesses};
-use super::unbelieved::{CarriedOver, carried_over, ordered, unbelieved};
+use super::unbelieved::unbelieved;
 use crate::DiagnoseError;
-use crate::bench::Loaded;
 use crate::bodies::Fitting;
 use crate::described::by_description;
 use crate::judge::{Judge, Judged};
@@ -11,10 +10,6 @@ use crate::motion::Replay;
 use crate::outcome::Tried;
 use crate::profile::Profile;
 use crate::refit::Refit;
-
-/// Relative rise of the hold-out's simulated error that drops an effect without a significance test. The hold-out is
-/// often too short for one.
-const MUCH_WORSE: f64 = 0.1;
 
 /// Data for the acceptance tests.
 pub(super) struct Trial<'a, 'r> {
@@ -26,8 +21,6 @@ pub(super) struct Trial<'a, 'r> {
     pub(super) fitting: &'a Fitting<'a, 'r>,
     /// Simulation of the training motion.
     pub(super) replay: &'a Replay<'a>,
-    /// The hold-out.
-    pub(super) sealed: Option<&'a Loaded>,
 }
 
 /// Result of the acceptance tests.
@@ -60,43 +53,24 @@ impl Trial<'_, '_> {
         };
         // An effect that increases the simulated error replaces another one.
         let why = "explains torque, but the simulated motion gets worse with it";
-        left = self.unspoilt(left, (self.replay, f64::INFINITY), why, tried)?;
+        left = self.unspoilt(left, why, tried)?;
         while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
             left = self.without(left, k, why, tried)?;
-        }
-        // The hold-out selects no effect, but removes those that it contradicts.
-        if let Some(sealed) = self.sealed {
-            let why = "explains the training data, and leaves more of the recordings held back than there is without it";
-            loop {
-                match carried_over(self.fitting, search, &left.judged.chosen, sealed)? {
-                    CarriedOver::Yes => break,
-                    CarriedOver::InAnotherOrder => {
-                        let found = std::mem::take(&mut left.judged.chosen);
-                        left.judged.chosen = ordered(self.fitting, search, found, sealed)?;
-                        break;
-                    }
-                    CarriedOver::Not(k) => left = self.without(left, k, why, tried)?,
-                }
-            }
-            let held = Replay::of(self.fitting, sealed)?;
-            let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
-            left = self.unspoilt(left, (&held, MUCH_WORSE), why, tried)?;
         }
         Ok(left)
     }
 
-    /// Drops effects that degrade a simulation. `most` is the relative rise that suffices without significance.
+    /// Drops effects that degrade the simulated training motion.
     fn unspoilt(
         &self,
         mut left: Survivors,
-        (replay, most): (&Replay, f64),
         why: &str,
         tried: &mut [Tried],
     ) -> Result<Survivors, DiagnoseError> {
         let given = |chosen: &[Profile]| self.judge.search.count_given(chosen);
         while let Some(k) = {
             let chosen = &left.judged.chosen;
-            replay.spoiling(chosen, given(chosen), most)?
+            self.replay.spoiling(chosen, given(chosen))?
         } {
             left = self.without(left, k, why, tried)?;
         }

@@ -1,4 +1,4 @@
-//! Effects that fail the joint fit of all effects, or the hold-out.
+//! Effects that fail the joint fit of all effects.
 
 use std::f64::consts::TAU;
 
@@ -6,8 +6,6 @@ use rig_shared::effects::{GAINS, Kind};
 
 use super::plausible::Asked;
 use crate::DiagnoseError;
-use crate::bench::Loaded;
-use crate::bodies::Fitting;
 use crate::judge::Judge;
 use crate::profile::{Profile, SIGNIFICANT};
 use crate::refit::Refit;
@@ -23,9 +21,6 @@ const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
 /// Largest amplitude of a joint encoder error, rad. 1.5 times the largest catalogue value (0.6 mm off centre on a ring
 /// of 20 mm radius). A larger one belongs to another wave, such as friction under load.
 const MOST_OF_AN_ENCODER: f64 = 0.03;
-/// Largest RMS ratio on the hold-out, with an effect over without it. The rise is half the least gain of an effect.
-const WORSE: f64 = 1.01;
-
 /// Returns the least credible effect beside the others, with the reason; None if all are credible.
 ///
 /// # Errors
@@ -92,112 +87,6 @@ pub(super) fn unbelieved(
         }
     }
     Ok(None)
-}
-
-/// Verdict of the hold-out on the effects found.
-pub(super) enum CarriedOver {
-    /// Each effect reduces the hold-out RMS in the given order.
-    Yes,
-    /// All together do, but not one by one in the order of the search.
-    InAnotherOrder,
-    /// This effect does not.
-    Not(usize),
-}
-
-/// Compares the effects found with the hold-out. An effect fails if it increases the RMS after its predecessors and
-/// does not reduce it beside all others. Joints with a gear are skipped: the observer estimates their link only after
-/// acceptance.
-///
-/// # Errors
-/// [`DiagnoseError::Model`].
-pub(super) fn carried_over(
-    fitting: &Fitting,
-    search: &Search,
-    chosen: &[Profile],
-    sealed: &Loaded,
-) -> Result<CarriedOver, DiagnoseError> {
-    let mut rising = rising(fitting, search, chosen, sealed)?;
-    if rising.is_empty() {
-        return Ok(CarriedOver::Yes);
-    }
-    rising.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let whole = fitting.unseen(chosen, sealed)?;
-    for (k, _) in rising {
-        let joint = chosen[k].candidate.joint;
-        let without = fitting.unseen(&but(chosen, k), sealed)?;
-        if WORSE * whole[joint] > without[joint] {
-            return Ok(CarriedOver::Not(k));
-        }
-    }
-    Ok(CarriedOver::InAnotherOrder)
-}
-
-/// Sorts the effects found by their use on the hold-out, the least useful last. For example, position-dependent
-/// friction may reduce the RMS only after warm-up is in the model.
-///
-/// # Errors
-/// [`DiagnoseError::Model`].
-pub(super) fn ordered(
-    fitting: &Fitting,
-    search: &Search,
-    mut front: Vec<Profile>,
-    sealed: &Loaded,
-) -> Result<Vec<Profile>, DiagnoseError> {
-    let given = search.count_given(&front);
-    let mut behind = Vec::new();
-    while front.len() > given + 1 {
-        let whole = fitting.unseen(&front, sealed)?;
-        let mut least: Option<(usize, f64)> = None;
-        for k in given..front.len() {
-            let joint = front[k].candidate.joint;
-            let missed = fitting.unseen(&but(&front, k), sealed)?[joint] / whole[joint];
-            if least.is_none_or(|(_, least)| missed < least) {
-                least = Some((k, missed));
-            }
-        }
-        let Some((k, _)) = least else { break };
-        behind.push(front.remove(k));
-    }
-    front.extend(behind.into_iter().rev());
-    Ok(front)
-}
-
-/// Returns the effects that increase the hold-out RMS after their predecessors, with the ratio.
-fn rising(
-    fitting: &Fitting,
-    search: &Search,
-    chosen: &[Profile],
-    sealed: &Loaded,
-) -> Result<Vec<(usize, f64)>, DiagnoseError> {
-    let geared = |joint: usize| {
-        (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind))
-    };
-    let mut rising = Vec::new();
-    let mut last: Option<(usize, Vec<f64>)> = None;
-    for k in search.count_given(chosen)..chosen.len() {
-        let joint = chosen[k].candidate.joint;
-        if geared(joint) {
-            continue;
-        }
-        let left = |count| fitting.unseen(&chosen[..count], sealed);
-        let before = match last.take() {
-            Some((count, known)) if count == k => known,
-            _ => left(k)?,
-        };
-        let after = left(k + 1)?;
-        let rise = after[joint] / before[joint];
-        last = Some((k + 1, after));
-        if rise > WORSE {
-            rising.push((k, rise));
-        }
-    }
-    Ok(rising)
-}
-
-/// Returns all effects except the `k`-th.
-fn but(chosen: &[Profile], k: usize) -> Vec<Profile> {
-    let others = (chosen.iter().enumerate()).filter(|(i, _)| *i != k);
-    others.map(|(_, profile)| profile.clone()).collect()
 }
 
 /// Returns the resonance of the link on its gear with the motor locked, Hz.

@@ -61,15 +61,6 @@ impl FreeRun {
     pub(super) fn number(&self) -> f64 {
         self.rms().unwrap_or(f64::NAN)
     }
-
-    /// Returns true if the error is at most 1 + `share` times that of `other`; a diverged run is worse than any other.
-    pub(super) fn is_within(&self, share: f64, other: &Self) -> bool {
-        match (self.rms(), other.rms()) {
-            (Some(own), Some(other)) => own <= (1.0 + share) * other,
-            (None, Some(_)) => false,
-            (_, None) => true,
-        }
-    }
 }
 
 /// Returns the largest travel in one recording, rad or m.

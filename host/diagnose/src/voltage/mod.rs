@@ -61,8 +61,6 @@ use rig_model::robot::{JointKind, Robot};
 
 /// Longest stretch of one simulation, s: a joint without weight drifts without bounds.
 const LONGEST: f64 = 10.0;
-/// Relative increase of the hold-out RMS above which an effect is rejected.
-const WORSE: f64 = 0.02;
 /// Most recordings in the pictures.
 const DRAWN: usize = 4;
 
@@ -105,18 +103,17 @@ pub fn diagnose_voltage(
     progress(0.2);
     let mut rounds = Vec::new();
     let mut unseen = Vec::new();
-    let mut models = bench.run(&nominal, &mut |round, before, trials| {
+    let models = bench.run(&nominal, &mut |round, before, trials| {
         unseen.push(before);
         rounds.push(trials.to_vec());
         progress(0.2 + 0.7 * (1.0 - 0.6_f64.powi(round as i32 + 1)));
     });
     let judge = search(&plant, &sealed);
-    let mut holdout: Vec<FreeRun> = if sealed.is_empty() {
+    let holdout: Vec<FreeRun> = if sealed.is_empty() {
         Vec::new()
     } else {
         models.iter().map(|m| judge.freely(m)).collect()
     };
-    keep_standing(&mut models, &mut holdout, &mut rounds);
     let drawn = if sealed.is_empty() { &bench } else { &judge };
     let found = Told {
         curves: curves(&robot.joints[0].name, drawn, &models),
@@ -151,42 +148,6 @@ fn nominal(bench: &Search<'_>, stated: &mut Stated) -> Result<Model, DiagnoseErr
             "with its effects the description cannot be simulated under these voltages; look at the values of its [[effect]] tables.".into(),
         )
     })
-}
-
-/// Removes effects that make the hold-out motion worse, and records it for the first one.
-fn keep_standing(
-    models: &mut Vec<Model>,
-    holdout: &mut Vec<FreeRun>,
-    rounds: &mut Vec<Vec<search::Trial>>,
-) {
-    let standing = standing(holdout);
-    if standing + 1 >= holdout.len() {
-        return;
-    }
-    holdout.truncate(standing + 1);
-    let taken = (models.drain(standing + 1..).next()).and_then(|m| m.effects.last().copied());
-    rounds.truncate(standing + 1);
-    for trial in rounds.iter_mut().flatten() {
-        if trial.refused.is_empty() && Some(trial.kind) == taken {
-            trial.refused = "makes the motion of the recordings held back worse".into();
-        }
-    }
-}
-
-/// Returns the last model that does not make the hold-out motion worse; each has one effect more. An effect may make it
-/// worse if the next one corrects that. `holdout` has the free runs of each model.
-fn standing(holdout: &[FreeRun]) -> usize {
-    let mut least: Option<&FreeRun> = None;
-    let mut last = 0;
-    for (k, run) in holdout.iter().enumerate() {
-        if least.is_none_or(|least| run.is_within(WORSE, least)) {
-            last = k;
-        }
-        if least.is_none_or(|least| run.is_within(0.0, least)) {
-            least = Some(run);
-        }
-    }
-    last
 }
 
 /// Returns the motion of the recordings that effects change most, without effects and with all.

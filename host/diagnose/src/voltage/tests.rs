@@ -133,25 +133,6 @@ fn recordings_stand_in_one_order_whatever_order_they_are_given_in() {
 }
 
 #[test]
-fn an_effect_may_spoil_what_the_next_one_mends() {
-    let standing = |list: &[f64]| {
-        let run = |rms: &f64| match rms.is_finite() {
-            true => FreeRun::followed(&[*rms]),
-            false => FreeRun::diverged("a", 0.0, halt::Cause::LeftTravel),
-        };
-        super::standing(&list.iter().map(run).collect::<Vec<_>>())
-    };
-    let away = f64::INFINITY;
-    assert_eq!(standing(&[1.0, 0.5, 0.6]), 1);
-    assert_eq!(standing(&[1.0, 1.5, 0.4]), 2);
-    assert_eq!(standing(&[1.0, 1.5, 1.2]), 0);
-    assert_eq!(standing(&[1.0, 1.01]), 1);
-    assert_eq!(standing(&[1.0, away]), 0);
-    assert_eq!(standing(&[away, 1.0]), 1);
-    assert_eq!(standing(&[]), 0);
-}
-
-#[test]
 fn candidates_pass_until_the_first_that_may_be_chance_and_the_best_fitting_of_equals_comes_in() {
     // RMS on the fit and on left-out data, p-value: in the order of the fit, as in the search.
     let trials = |list: &[[f64; 3]]| -> Vec<search::Trial> {
