@@ -1,5 +1,5 @@
-//! The `rig` program as a library: [`commands`] are its verbs, [`pages`] what its reports show, [`demo`] the main job
-//! without hardware.
+//! The `rig` program as a library: [`commands`] runs the commands, [`pages`] composes the reports, and [`demo`] is the
+//! demonstration without hardware.
 
 pub mod commands;
 pub mod demo;
