@@ -201,7 +201,7 @@ pub(crate) struct Args {
     /// Use the recorded qd<k> (and qdd<k>) instead of deriving them from the filtered position
     #[arg(long)]
     measured_derivatives: bool,
-    /// Seed of the random states from which the base parameters are found
+    /// Seed of the random states from which the base parameters are computed
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Fit although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); prints the faults

@@ -175,8 +175,8 @@ fn emulated_at(
     let hangs = plant.initial_position;
     let home = home.map_or(hangs, f64::from);
     if (home - hangs).abs() > HANGS {
-        // `home` counts straight down as −90°, but the link hangs beside that by an offset; the same offset applies
-        // here.
+        // The user takes the hanging position for −90°. The true one differs by hangs + 90°, and the rig has one zero:
+        // the same offset applies to `home`.
         let stands = home + (hangs + FRAC_PI_2);
         (plant.initial_position, plant.sensors.encoder.zero) = (stands, stands);
         plant.held = true;
