@@ -260,7 +260,7 @@ fn design_options(seed: u64, home: f64) -> rig_excite::Options {
     }
 }
 
-/// The friction sweep, at each speed in both directions.
+/// The friction sweep: at each speed at least 0.4 rad in both directions.
 fn sweep() -> Result<Trajectory<f64>, DemoError> {
     FrictionSweep::new(&SPEEDS, 0.4, 0.1, 0.3, 1.0)
         .map(Trajectory::FrictionSweep)
