@@ -155,8 +155,7 @@ pub fn exact_class(name: &str) -> BTreeSet<&str> {
 }
 
 /// Returns true if one of two effects with other parameters equals both together, in recordings of torque, motor
-/// position and voltage: two names of one function, or a spring and a constant torque (a spring with another rest
-/// position).
+/// position and voltage: two names of one function, or a spring and a constant torque (another rest position).
 pub(super) fn one_holds_both(a: &str, b: &str) -> bool {
     let springs = [Kind::Spring.about().name, Kind::TorqueOffset.about().name];
     let [spring, constants] = [springs[0], springs[1]].map(same_by_voltage);

@@ -33,8 +33,7 @@ pub struct ArmOutcome {
     pub hidden: Option<(&'static str, String)>,
     /// The fault and its values as text.
     pub fault: String,
-    /// Residual of the fault after a refit of the description, relative to the noise floor of its joint; none without a
-    /// fit.
+    /// Residual of the fault after a refit of the description, over the noise floor of its joint; none without a fit.
     pub size: Option<f64>,
     /// Effect and joint of each step.
     pub named: Vec<(String, String)>,

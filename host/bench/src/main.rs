@@ -56,8 +56,8 @@ struct Args {
     /// Hide each effect once more, with its name removed from the library
     #[arg(long)]
     leave_out: bool,
-    /// Run the negative controls: wrong description, random residual, faint effect, poor excitation, disturbance in one
-    /// run, finer integration step
+    /// Run the negative controls: wrong description, random residual, faint effect, poor motion, one disturbance, finer
+    /// step
     #[arg(long)]
     controls: bool,
     /// If several names remain possible, record the proposed experiment on the same rig and diagnose again with it
@@ -84,8 +84,7 @@ struct Args {
     /// Folder for benchmark.json, benchmark.md and, with --keep, the recordings
     #[arg(long, default_value = "benchmark")]
     out: PathBuf,
-    /// Write recordings, descriptions and hidden effects (truth.json), one folder for each case, and truth.md for all
-    /// cases; judge no method
+    /// Write recordings, descriptions and truth.json, one folder for each case, and truth.md; judge no method
     #[arg(long)]
     keep: bool,
     /// Replace results that the folder already holds

@@ -1,5 +1,4 @@
-//! True values of the library's parameters, for laws of the emulated rig that have the same form or a counterpart in
-//! the library.
+//! True values of the library's parameters, for laws of the emulated rig with a counterpart there.
 
 use nalgebra::Vector3;
 use rig_shared::multibody::column;

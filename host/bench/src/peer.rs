@@ -5,8 +5,7 @@
 //! with every sample counted as independent). Both fit the residual torque of the nominal model with columns projected
 //! onto its orthogonal complement, in a band of 40 Hz at 100 Hz. `dictionary` uses a small grid of shape parameters.
 //!
-//! Not covered: backlash and dead time (no column is linear in them), LuGre (three shape parameters), more than one
-//! joint.
+//! Not covered: backlash and dead time (no column is linear in them), LuGre (three shapes), more than one joint.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::Kind;
@@ -83,8 +82,7 @@ impl Problem {
         let basis = orthonormal(&train.nominal);
         let off = |column: &DVector<f64>| {
             let mut column = column.clone();
-            // Twice, because one projection leaves rounding errors as large as the subtracted part (Giraud et al.
-            // 2005).
+            // Twice: one projection leaves rounding errors as large as the subtracted part (Giraud et al. 2005).
             for _ in 0..2 {
                 for q in &basis {
                     column.axpy(-q.dot(&column), q, 1.0);

@@ -60,8 +60,7 @@ impl Outcome {
         self.hidden.iter().map(|h| h.effect.name()).collect()
     }
 
-    /// Names in the answer. A change of values counts as the name of a payload if a payload is hidden; otherwise it is
-    /// no name.
+    /// Names in the answer. A change of values is the name of a payload if one is hidden, otherwise no name.
     fn names(&self) -> Vec<&str> {
         let Some(answer) = &self.answer else {
             return Vec::new();
@@ -154,8 +153,7 @@ impl Outcome {
         Some((after.named.first()).is_some_and(|first| first.set == [truth]))
     }
 
-    /// For one hidden effect with indistinguishable partners: returns true if the first set holds all of them. None for
-    /// other cases.
+    /// For one hidden effect with indistinguishable partners: true if the first set holds them all; else none.
     fn whole_set(&self) -> Option<bool> {
         let [truth] = self.truth()[..] else {
             return None;
@@ -197,8 +195,7 @@ pub struct Score {
     pub remainder_flagged: Proportion,
     /// Effect of an exactly confounded set: the answer has the whole set.
     pub set_returned: Proportion,
-    /// The first set holds the hidden effect and an experiment is proposed: the rig can run it, unchanged or without
-    /// external loads.
+    /// The rig can run the experiment proposed for a first set with the hidden effect, with or without external loads.
     pub experiment_runs: Proportion,
     /// Share of these experiments after which only the hidden effect is in the set.
     pub set_separated: Proportion,

@@ -5,8 +5,7 @@ use std::fmt::Write as _;
 use super::score::Score;
 use super::wilson::Proportion;
 
-/// Returns Markdown: the criteria and their aims with one column for each method, then a table of effects for each
-/// method.
+/// Returns Markdown: criteria and aims with one column for each method, then a table of effects for each method.
 pub fn markdown(scores: &[Score]) -> String {
     let methods: Vec<(&str, &Score)> = scores.iter().map(|s| (s.method.as_str(), s)).collect();
     let mut rows = Rows::new("criterion", &methods);

@@ -1,5 +1,4 @@
-//! The `rig` program as a library: [`commands`] runs the commands, [`pages`] composes the reports, and [`demo`] is the
-//! demonstration without hardware.
+//! The `rig` program as a library: its [`commands`], the [`pages`] of its reports, and the [`demo`] without hardware.
 
 pub mod commands;
 pub mod demo;

@@ -1,8 +1,8 @@
 //! Recordings of an arm with several joints, one of them faulty.
 //!
 //! The mechanics of the arm are the rigid-body mechanics of the library with four steps per control period. The hidden
-//! faults have their own equations. Controller, current loop, sensors and disturbances are in this file. Equal arms
-//! give equal recordings.
+//! faults have their own equations. This file has controller, current loop, sensors and disturbances. Equal arms give
+//! equal recordings.
 //!
 //! Not modelled: elasticity and backlash of the gears, sampling jitter.
 
@@ -32,8 +32,7 @@ const CURRENT_LOOP: f64 = 4e-4;
 const COUNTS: [f64; 2] = [8192.0, 1_048_576.0];
 /// Coulomb friction, viscous friction per rad/s and drive inertia, each divided by the torque limit.
 pub(super) const OF_LIMIT: [f64; 3] = [0.03, 0.015, 3e-3];
-/// RMS white noise of the torque reading, its quantisation step, and the disturbance torque RMS, each divided by the
-/// torque limit.
+/// Noise RMS and step of the torque reading, and disturbance torque RMS, each divided by the torque limit.
 const NOISE: [f64; 3] = [3e-3, 5e-4, 1.5e-3];
 /// Correlation time of the disturbance torque, s.
 const SURROUNDINGS: f64 = 0.05;

@@ -4,8 +4,7 @@ use super::dice::Dice;
 use super::hidden::Effect;
 use super::rig::TICK_RATE;
 
-/// Names with the smallest and largest size, in the unit of the first parameter. For an elastic gear the size is its
-/// compliance, mrad/(N·m).
+/// Smallest and largest size in the unit of the first parameter; for an elastic gear compliance, mrad/(N·m).
 const SIZES: [(&str, [f64; 2]); 21] = [
     ("stribeck", [0.1, 1.0]),
     ("asymmetric_coulomb", [0.05, 0.3]),

@@ -11,8 +11,7 @@ use rig_plant::stream;
 pub(super) struct Dice(Pcg64Mcg);
 
 impl Dice {
-    /// Creates the stream of a seed and purpose. Equal arguments give equal draws; other purposes give independent
-    /// draws.
+    /// Creates the stream of a seed and purpose; other purposes give independent draws.
     pub(super) fn new(seed: u64, purpose: u64) -> Self {
         Self(stream(seed, purpose))
     }

@@ -1,7 +1,6 @@
 //! Arms with a fault drawn by a seed.
 //!
-//! Sizes are log-uniform over ranges seen in laboratories, relative to the friction or the drive inertia of the faulty
-//! joint.
+//! Sizes are log-uniform over ranges seen in laboratories, relative to friction or drive inertia of the joint.
 
 use super::arm::{Arm, ArmScenario, OF_LIMIT, limits_of};
 use super::dice::Dice;

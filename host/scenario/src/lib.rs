@@ -1,5 +1,4 @@
-//! Recordings with a known gap: an emulated rig with hidden effects, and the description of a user who does not know
-//! them.
+//! Recordings with a known gap: an emulated rig with hidden effects and a description without them.
 //!
 //! The rig ([`rig_plant`]) shares no equation with the library of effects: velocity weakening is rational instead of
 //! Gaussian, presliding has four elements, heat drives the warm-up, and so on. The recordings also contain the
@@ -316,8 +315,7 @@ pub struct Size {
     pub parameter_change: bool,
 }
 
-/// Residual of an effect after a refit, as a ratio to the noise floor, from which on a diagnosis should find the
-/// effect.
+/// Ratio of an effect's residual after a refit to the noise floor from which on a diagnosis should find it.
 pub const ABOVE_FLOOR: f64 = 0.5;
 
 impl Size {
@@ -359,8 +357,7 @@ pub struct Made {
 }
 
 impl Scenario {
-    /// Returns a short scenario: 30 s of training recorded twice and 20 s of hold-out recorded once, with `effects` in
-    /// joint 0.
+    /// Returns a short scenario: 30 s of training (twice) and 20 s of hold-out (once), with `effects` in joint 0.
     pub fn short(effects: impl IntoIterator<Item = Effect>, seed: u64) -> Self {
         let hidden = effects
             .into_iter()

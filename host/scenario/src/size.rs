@@ -2,8 +2,7 @@
 //!
 //! Both are residual RMS values after a refit of the nominal model J·q̈ + m·g·l·sin q + fv·q̇ + fc·sgn q̇ to the
 //! torque. Model and torque pass the same zero-phase filter of 40 Hz. Only rows in motion count, because sgn q̇ is
-//! undefined at rest. The excess comes from two recordings of the same reference without noise, with and without the
-//! effect.
+//! undefined at rest. The excess comes from two recordings without noise, with and without the effect.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -64,8 +64,7 @@ impl Signals {
 }
 
 impl Dictionary {
-    /// Returns the filtered torque, including rows at rest, so that two runs of one reference can be compared sample by
-    /// sample.
+    /// Returns the filtered torque, with rows at rest, so that two runs can be compared sample by sample.
     pub(super) fn torque_of(recording: &InMemory) -> Result<Vec<f64>, BenchError> {
         let signals = Signals::of(recording)?;
         let joint = signals.run.joints.into_iter().next();

@@ -78,8 +78,7 @@ enum Action {
     Clear,
     /// Switches the bridge off at once
     Disarm,
-    /// Sends limits, model, friction and effects of a description to the board, switches precompensation on and stores
-    /// all
+    /// Sends limits, model, friction and effects of a description, switches precompensation on and stores all
     Upload {
         /// Robot description, such as the model.toml of a diagnosis
         #[arg(long)]

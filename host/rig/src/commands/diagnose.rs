@@ -62,8 +62,7 @@ pub(crate) struct Args {
     /// Hold-out recording of another motion, not used in any fit; one or more
     #[arg(long, num_args = 1..)]
     holdout: Vec<PathBuf>,
-    /// Recording made with the drive off, if torque is measured by the motor current: the reading there is the sensor's
-    /// offset
+    /// Recording made with the drive off, if torque comes from the motor current: it shows the sensor's offset
     #[arg(long)]
     drive_off: Option<PathBuf>,
     /// Training recording made after all external loads (hoses, cables, springs) were removed from the rig: an effect

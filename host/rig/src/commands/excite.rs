@@ -224,7 +224,7 @@ impl Args {
                 "--joint {joint} names the one joint that moves, but --kind fourier moves all of them; give --kind chirp, staircase, reversals or sweep, or leave --joint out."
             ))),
             (Some(kind), _, Some((option, _))) => Err(CommandError::Sentence(format!(
-                "{option} belongs to --kind fourier; the size of a {} follows from the limits and its own options, so leave {option} out or give --kind fourier.",
+                "{option} belongs to --kind fourier; the size of a {} follows from the limits and its own options, so leave the option out or give --kind fourier.",
                 kind.name()
             ))),
             _ => Ok(()),

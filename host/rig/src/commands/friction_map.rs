@@ -33,8 +33,7 @@ pub(crate) struct Args {
     /// Joint, by name or counted from 1
     #[arg(long, default_value = "1")]
     joint: String,
-    /// Draw the map although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); prints the
-    /// faults
+    /// Draw the map although columns look wrong (sign, unit, ratio, clock, swapped); prints the faults
     #[arg(long)]
     even_if_wrong: bool,
     /// Folder for the results

@@ -62,8 +62,7 @@ pub(crate) enum Fit {
     Ml,
     /// Ridge regression towards the description's values
     Ridge,
-    /// Weighted and physically consistent: each link is a possible rigid body; friction and drive inertia are not
-    /// negative
+    /// Weighted and physically consistent: each link is a possible body, friction and drive inertia are not negative
     Consistent,
 }
 
@@ -131,7 +130,7 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
 fn speed(text: &str) -> Result<Choice<f64>, String> {
     match auto::<f64>(text)? {
         Choice::Fixed(speed) if !(speed >= 0.0 && speed.is_finite()) => Err(format!(
-            "{text} is not a valid speed; 0 keeps all rows, and a number above 0 leaves out slower rows"
+            "{text} is not a valid speed; 0 keeps all rows, and a number above it leaves out slower rows"
         )),
         choice => Ok(choice),
     }
@@ -188,8 +187,7 @@ pub(crate) struct Args {
     /// Keep every n-th row after the parallel low-pass, or "auto"
     #[arg(long, default_value = "auto", value_parser = auto::<usize>)]
     decimation: Choice<usize>,
-    /// Leave out rows slower than this, rad/s or m/s, because the sign of friction is uncertain there; 0 keeps all, or
-    /// "auto"
+    /// Leave out rows slower than this, rad/s or m/s, where the sign of friction is uncertain; 0 keeps all, or "auto"
     #[arg(long, default_value = "auto", value_parser = speed, allow_negative_numbers = true)]
     min_speed: Choice<f64>,
     /// Length of the windows of the integral model, s [default: chosen from the motion]
@@ -411,7 +409,7 @@ fn chosen(robot: &Robot, found: &Identification) -> Vec<String> {
 /// refuse the result, then those that are only warnings.
 ///
 /// A base parameter that is a sum of masses, moments of inertia and friction with positive factors cannot be negative.
-/// In an arm, inertias compensate each other: a negative one may be a model error that the others cancel, so it is a
+/// In an arm, inertias compensate each other: a negative one may be a model error that others cancel, so it is a
 /// warning.
 fn impossible(robot: &Robot, found: &Identification) -> (Vec<String>, Vec<String>) {
     let details = &found.details;

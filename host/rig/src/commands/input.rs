@@ -282,8 +282,8 @@ impl Inputs {
         Ok(strange)
     }
 
-    /// Returns one sentence for each recording whose references do not fit its positions: they have another unit, sign,
-    /// zero, clock or joint.
+    /// Returns one sentence for each recording whose references have another unit, sign, zero, clock or joint than its
+    /// positions.
     ///
     /// # Errors
     /// Names the error in a file and its line.
@@ -314,8 +314,7 @@ impl Inputs {
         })
     }
 
-    /// Warnings about the rows that were read: for each recording and kind one line, with the worst row and the number
-    /// of further ones.
+    /// Warnings about the rows: for each recording and kind one line, with the worst row and the number of others.
     pub(crate) fn heard(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, heard) in self.sources.iter().zip(&self.heard) {
@@ -337,8 +336,7 @@ impl Inputs {
         all
     }
 
-    /// Positions beyond `[joint.limits]` in the rows that were read: first the recording and joint with the largest
-    /// excess.
+    /// Positions beyond `[joint.limits]` in the rows, first the recording and joint with the largest excess.
     pub(crate) fn outside(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, outside) in self.sources.iter().zip(&self.outside) {
@@ -503,8 +501,7 @@ pub(crate) fn refuse_faults(
     }
 }
 
-/// Resolves a path, so that two names of one file compare equal. A missing file keeps its path; reading it gives the
-/// error.
+/// Resolves a path, so that two names of one file compare equal. A missing file keeps its path.
 pub(crate) fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }

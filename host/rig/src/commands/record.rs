@@ -163,8 +163,7 @@ fn described_or_template(robot: Option<Robot>) -> Result<Robot, CommandError> {
     }
 }
 
-/// As [`emulated`], for recording number `run` (from 1). If `home` differs from the hanging position, the link is held
-/// there.
+/// As [`emulated`], for recording `run` (from 1). A link with `home` away from the hanging position is held.
 fn emulated_at(
     described: &Robot,
     [seed, run]: [u64; 2],
@@ -189,8 +188,7 @@ fn emulated_at(
     })
 }
 
-/// Prints a remark if the described link differs from the emulated one, or if the described motor is too weak for the
-/// motion.
+/// Prints remarks if the described link differs from the emulated one or the motor is too weak for the motion.
 ///
 /// # Errors
 /// Values that the description lacks.

@@ -14,8 +14,7 @@ use rig_report::{
 const CARDS: usize = 6;
 /// Largest number of confidence ellipses.
 const ELLIPSES: usize = 4;
-/// Correlation below which no ellipse is drawn: its axes are nearly parallel to the parameters, so it adds nothing to
-/// the table.
+/// Correlation below which no ellipse is drawn: it would be nearly upright and add nothing to the table.
 const CORRELATED: f64 = 0.3;
 
 /// Composes the page of an identification.

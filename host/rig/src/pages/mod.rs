@@ -1,7 +1,7 @@
 //! Reports: the figures, tables and sentences that show a result.
 //!
-//! This module only composes each page as a [`Document`](rig_report::Document). It computes no new results, and uses no
-//! files and no clock.
+//! This module only composes each page as a [`Document`](rig_report::Document). It computes no new results and uses no
+//! files or clock.
 
 mod demo;
 mod diagnosis;

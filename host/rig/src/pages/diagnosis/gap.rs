@@ -10,8 +10,7 @@ use rig_report::{self, Axis, Block, Column, Marker, Plot, Role, Section, Series,
 const ROOM: usize = 48;
 /// Smallest share of the gap that is printed as a sentence.
 const LEAST_SHARE: f64 = 0.005;
-/// Ratio of the highest residual to the noise floor from which on the axis is logarithmic: bars would hide the last
-/// steps.
+/// Ratio of highest residual to noise floor from which on the axis is logarithmic, to show the last steps.
 const TALL: f64 = 20.0;
 
 /// Residual from the description to the final model.
@@ -284,8 +283,7 @@ pub(super) fn maps(map: &Map) -> Vec<Plot> {
     std::iter::once(whole).chain(close).collect()
 }
 
-/// Returns the bins near zero if they are crowded there. This happens for travel and time since reversal, which are
-/// mostly short.
+/// Returns the bins near zero if they are crowded there. Travel and time since reversal are mostly short.
 fn closer(map: &Map) -> Option<Map> {
     let mut far: Vec<f64> = map.at.iter().map(|x| x.abs()).collect();
     far.sort_by(f64::total_cmp);
