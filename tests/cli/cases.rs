@@ -342,7 +342,7 @@ fn voltages_that_are_none_are_faults_of_the_data() {
             "u1 looks like mV",
             "it looks like turns; give it in rad",
         ],
-        &["gravity_tilt", "Something is left", "cannot be built"],
+        &["gravity_tilt", "Unexplained residual", "cannot be built"],
     );
 }
 

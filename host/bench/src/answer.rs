@@ -1,4 +1,4 @@
-//! What a method says of a recording, reduced to what is scored.
+//! Answer of a method to a recording, reduced to the scored parts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,50 +15,50 @@ use rig_scenario::Made;
 pub struct Named {
     /// Best name.
     pub effect: String,
-    /// All names that it holds possible, the best among them.
+    /// All names that the method considers possible, including the best.
     pub set: Vec<String>,
-    /// Of the best name.
+    /// Parameters of the best name.
     pub parameters: BTreeMap<String, Value>,
 }
 
-/// What a method says.
+/// Answer of a method.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Answer {
-    /// In the order found.
+    /// Named effects, in the order found.
     pub named: Vec<Named>,
-    /// Whether it names no effect and says that values of the description have changed.
+    /// True if the answer has no effect but says that values of the description have changed.
     pub changed: bool,
-    /// Whether it says that something is left that it cannot name.
+    /// True if the answer has an unexplained remainder.
     pub remainder: bool,
-    /// Share of the hold-out's gap that it closes; none where it names nothing.
+    /// Share of the gap on the hold-out that the effects close; none without effects.
     pub gap_closed: Option<f64>,
-    /// Effects that it says the recording cannot show.
+    /// Effects that the recording cannot show, by the answer.
     pub not_testable: Vec<String>,
-    /// What it would record next.
+    /// Proposed experiment.
     pub next: Option<Proposed>,
 }
 
 /// An experiment that a method proposes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Proposed {
-    /// Which.
+    /// Kind of experiment.
     pub kind: String,
-    /// Names that it is to separate.
+    /// Names that the experiment should separate.
     pub separates: Vec<String>,
-    /// The motion, where the rig can run it as it is, or with what pulls on it taken off; a [`rig_excite::TrajectoryFile`].
+    /// Motion as a [`rig_excite::TrajectoryFile`], if the rig can run it unchanged or without external loads.
     #[serde(skip)]
     pub trajectory: Option<String>,
 }
 
 /// A method to be judged.
 pub trait Method: Sync {
-    /// In words.
+    /// Name of the method.
     fn name(&self) -> &'static str;
 
-    /// What it says, with these effects left out of its library.
+    /// Answers to recordings, with the effects `without` removed from the library.
     ///
     /// # Errors
-    /// Where it cannot work at all.
+    /// The method cannot process the recordings.
     fn answer(&self, made: &Made, without: &[Kind]) -> Result<Answer, BenchError>;
 }
 
@@ -95,7 +95,7 @@ impl Method for Diagnose {
 }
 
 impl Answer {
-    /// As a result has it.
+    /// Converts the result of a diagnosis.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let named: Vec<Named> = (diagnosis.steps.iter())
             .map(|step| Named {
@@ -124,7 +124,7 @@ impl Answer {
     }
 }
 
-/// A name and those that a recording of torque, motor position and voltage, as the benchmark's are, cannot tell from it.
+/// Returns a name and all names that recordings of torque, motor position and voltage cannot distinguish from it.
 pub(super) fn same_by_voltage(name: &str) -> BTreeSet<&str> {
     let told = |a: &str, b: &str| {
         (Kind::ALL.iter().map(|kind| kind.about()))
@@ -137,7 +137,7 @@ pub(super) fn same_by_voltage(name: &str) -> BTreeSet<&str> {
     class
 }
 
-/// A name and those that no recording of torque and motor position can tell from it, itself among them.
+/// Returns a name and all names that recordings of torque and motor position cannot distinguish from it.
 pub fn exact_class(name: &str) -> BTreeSet<&str> {
     let mut class = BTreeSet::from([name]);
     for kind in Kind::ALL {
@@ -154,8 +154,8 @@ pub fn exact_class(name: &str) -> BTreeSet<&str> {
     class
 }
 
-/// Whether two effects together are one of them with other parameters, as far as a recording of torque, motor position and voltage
-/// goes: partners of one function, or a spring and a constant torque, which another rest of the spring holds as well.
+/// Returns true if one of two effects with other parameters equals both together, in recordings of torque, motor
+/// position and voltage: two names of one function, or a spring and a constant torque (another rest position).
 pub(super) fn one_holds_both(a: &str, b: &str) -> bool {
     let springs = [Kind::Spring.about().name, Kind::TorqueOffset.about().name];
     let [spring, constants] = [springs[0], springs[1]].map(same_by_voltage);
@@ -163,7 +163,7 @@ pub(super) fn one_holds_both(a: &str, b: &str) -> bool {
     exact_class(a).contains(b) || held(a, b) || held(b, a)
 }
 
-/// Whether `named` is `truth` but for exact partners.
+/// Returns true if `named` is `truth` or indistinguishable from it.
 pub fn is_right(named: &str, truth: &str) -> bool {
     exact_class(truth).contains(named)
 }

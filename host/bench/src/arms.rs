@@ -1,4 +1,4 @@
-//! Arms of several joints with one joint at fault.
+//! Benchmark of arms with one faulty joint.
 
 use serde::Serialize;
 
@@ -13,43 +13,43 @@ use rig_diagnose::outcome::{Diagnosis, Verdict};
 use rig_diagnose::{Options, diagnose};
 use rig_scenario::{ABOVE_FLOOR, Arm, ArmScenario, CallsFor, Fault};
 
-/// One arm.
+/// One case with an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmCase {
-    /// Its name.
+    /// Name of the arm.
     pub arm: &'static str,
-    /// What is recorded.
+    /// Scenario that is recorded.
     pub scenario: ArmScenario,
 }
 
-/// What is said of it.
+/// Answer of the diagnosis for a case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmOutcome {
-    /// Which arm.
+    /// Name of the arm.
     pub arm: &'static str,
-    /// Of motion, noise and fault.
+    /// Seed of motion, noise and fault.
     pub seed: u64,
-    /// Name of the fault and of its joint; none where nothing is wrong.
+    /// Names of the fault and of its joint; none without a fault.
     pub hidden: Option<(&'static str, String)>,
-    /// The fault itself, in words.
+    /// The fault and its values as text.
     pub fault: String,
-    /// What a refit of the description leaves of it, over the noise floor of its joint; none where it was not fitted.
+    /// Residual of the fault after a refit of the description, over the noise floor of its joint; none without a fit.
     pub size: Option<f64>,
-    /// Effect and joint of each name.
+    /// Effect and joint of each step.
     pub named: Vec<(String, String)>,
-    /// The verdict; none where the diagnosis failed.
+    /// Verdict; none if the diagnosis failed.
     pub verdict: Option<Verdict>,
-    /// Share of the hold-out's gap that the first name closes at its joint.
+    /// Share of the gap on the hold-out that the first effect closes at its joint.
     pub gap_closed: Option<f64>,
-    /// Error of the simulated motion of the first name's joint after and before it, as a ratio.
+    /// Error of the simulated motion at the joint of the first effect: ratio of after to before.
     pub motion: Option<f64>,
-    /// Why the diagnosis failed.
+    /// Reason of a failure.
     pub failure: Option<String>,
     #[serde(skip)]
     calls_for: Option<CallsFor>,
 }
 
-/// Each arm with nothing wrong and with each of its faults, once a seed.
+/// Returns the cases: each arm without a fault and with each of its faults, once for each seed.
 ///
 /// # Errors
 /// [`BenchError::Scenario`].
@@ -69,10 +69,10 @@ pub fn arm_cases(first_seed: u64, seeds: u64) -> Result<Vec<ArmCase>, BenchError
     Ok(cases)
 }
 
-/// Diagnoses every case, `threads` at a time; `progress` hears how many of how many are done.
+/// Diagnoses every case in `threads` threads. Calls `progress` with the number of finished cases and their total.
 ///
 /// # Errors
-/// A scenario that cannot be made. A diagnosis that fails is an outcome.
+/// A scenario cannot be made. A failed diagnosis is an outcome.
 pub fn run_arms(
     cases: &[ArmCase],
     threads: usize,
@@ -130,14 +130,14 @@ impl ArmOutcome {
         self.motion = first.map(|[before, after]| after / before);
         self.size = fault.and_then(|(joint, fault)| {
             let w = said.waterfall.get(joint)?;
-            // A refit takes up what values of the description it is: that is then its size.
+            // A refit removes a change of values, so the residual of the description is its size.
             let refitted = usize::from(fault.calls_for() != CallsFor::ParameterChange);
             let before = w.train.get(refitted)?;
             Some((before * before - w.floor * w.floor).max(0.0).sqrt() / w.floor)
         });
     }
 
-    /// Whether the fault is large enough to be seen; where nothing was fitted that is not known, and held against the diagnosis.
+    /// Returns true if the fault is above the floor. If nothing was fitted its size is unknown, and it counts as above.
     fn above(&self) -> bool {
         self.size.is_none_or(|size| size >= ABOVE_FLOOR)
     }
@@ -146,7 +146,7 @@ impl ArmOutcome {
         self.calls_for == Some(what) && self.above()
     }
 
-    /// Whether a name is that of the fault, on its joint. A tilt is one of the base.
+    /// Returns true if effect and joint are right. A tilt of the base counts at any joint.
     fn is_right(&self, (effect, joint): &(String, String)) -> bool {
         let right = |(fault, place): &(&str, String)| {
             is_right(effect, fault) && (joint == place || *fault == "gravity_tilt")
@@ -162,12 +162,12 @@ impl ArmOutcome {
         self.named.len() == 1 && self.right_first()
     }
 
-    /// Whether it names something, or finds values changed, although nothing is wrong.
+    /// Returns true if the diagnosis has a name or says that values have changed (a false alarm without a fault).
     fn alarmed(&self) -> bool {
         !self.named.is_empty() || self.verdict == Some(Verdict::ParameterChange)
     }
 
-    /// Whether it says that values of the description have changed, and nothing else.
+    /// Returns true if the diagnosis only says that values of the description have changed.
     fn changed(&self) -> bool {
         let other = |(effect, _): &(String, String)| effect != "payload";
         self.verdict == Some(Verdict::ParameterChange) && !self.named.iter().any(other)
@@ -178,7 +178,7 @@ impl ArmOutcome {
     }
 }
 
-/// The figures as Markdown, one column an arm.
+/// Returns the figures as Markdown, one column for each arm.
 pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
     let arms: Vec<(&str, Vec<&ArmOutcome>)> = (Arm::ALL.iter())
         .map(|(name, _)| (*name, outcomes.iter().filter(|o| o.arm == *name).collect()))

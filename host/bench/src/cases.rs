@@ -1,4 +1,4 @@
-//! What the benchmark asks: scenarios in groups.
+//! Cases of the benchmark: scenarios in groups.
 
 use rig_shared::effects::Kind;
 use serde::Serialize;
@@ -7,34 +7,34 @@ use super::answer::{exact_class, one_holds_both};
 use crate::BenchError;
 use rig_scenario::{Effect, Excitation, Hidden, Intrusion, Made, Noise, Scenario, Size, Truth};
 
-/// Why a scenario is there.
+/// Purpose of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Group {
-    /// Nothing is hidden.
+    /// No hidden effect.
     Nothing,
-    /// One effect.
+    /// One hidden effect.
     Single,
-    /// Two effects or more.
+    /// Two or more hidden effects.
     Combination,
-    /// One effect that is not in the library.
+    /// One hidden effect that is not in the library.
     LeftOut,
-    /// Nothing is hidden, and the description is wrong by a fifth in every parameter but the torque constant.
+    /// No hidden effect; all parameters of the description except the torque constant are wrong by a fifth.
     WrongDescription,
-    /// The residual is noise of the right spectrum.
+    /// Noise with the same spectrum replaces the residual.
     PhaseRandomised,
-    /// One effect, a tenth of the least that rigs have.
+    /// One hidden effect, scaled to a tenth.
     Faint,
-    /// One effect, and a motion of one slow sine.
+    /// One hidden effect; the motion is one slow sine.
     PoorExcitation,
-    /// Nothing is hidden; a torque from outside comes in one of two runs.
+    /// No hidden effect; a disturbance torque acts in one of two runs.
     OneRunOnly,
-    /// Nothing is hidden; the emulated rig is integrated five times as finely.
+    /// No hidden effect; the integration step of the emulated rig is five times finer.
     FineStep,
 }
 
 impl Group {
-    /// Groups where any name is an invention.
+    /// Returns true for groups in which any name is wrong.
     pub fn is_null(self) -> bool {
         matches!(
             self,
@@ -47,23 +47,23 @@ impl Group {
     }
 }
 
-/// One question.
+/// One case of the benchmark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// Why it is asked.
+    /// Group of the case.
     pub group: Group,
-    /// Of which level of noise.
+    /// Noise level.
     pub level: &'static str,
-    /// What is recorded.
+    /// Scenario that is recorded.
     pub scenario: Scenario,
-    /// What the library lacks.
+    /// Effects removed from the library.
     pub without: Vec<Kind>,
-    /// Whether an experiment that is proposed for an open set of names is recorded and all is asked again.
+    /// True if the experiment proposed for an open set of names is recorded and the method asked again.
     pub follow: bool,
 }
 
 impl Case {
-    /// Records it.
+    /// Makes the recordings.
     ///
     /// # Errors
     /// [`BenchError::Scenario`].
@@ -85,40 +85,40 @@ impl Case {
     }
 }
 
-/// What to ask.
+/// Settings of the benchmark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Effects that are hidden, by name.
+    /// Names of the hidden effects.
     pub effects: Vec<String>,
-    /// Seeds of each.
+    /// Number of seeds for each effect.
     pub seeds: u64,
-    /// The first of them.
+    /// First seed.
     pub first_seed: u64,
-    /// Runs with nothing hidden at each level; the false-alarm rate needs more than an effect does.
+    /// Cases without hidden effects at each noise level. The false-alarm rate needs more cases than an effect.
     pub nothing: u64,
-    /// Levels of noise by name.
+    /// Noise levels with their names.
     pub levels: Vec<(&'static str, Noise)>,
-    /// Sizes of the combinations.
+    /// Numbers of combined effects.
     pub combinations: Vec<usize>,
-    /// Combinations of each size.
+    /// Combinations for each number.
     pub combined: u64,
-    /// Whether each effect is also hidden with its name left out of the library.
+    /// True if each effect is also hidden with its name removed from the library.
     pub leave_out: bool,
-    /// Whether the negative controls are run.
+    /// True if the negative controls are run.
     pub controls: bool,
-    /// Whether experiments that are proposed for an open set of names are recorded, for a second answer.
+    /// True if experiments proposed for an open set of names are recorded for a second answer.
     pub follow: bool,
     /// Length of training and hold-out, s.
     pub seconds: [f64; 2],
-    /// Whether the rig has a second encoder, on the link.
+    /// True if the rig has a second encoder, on the link.
     pub second_encoder: bool,
 }
 
 impl Plan {
-    /// The questions, in an order that does not depend on how they are worked off.
+    /// Returns the cases, in an order that does not depend on the threads.
     ///
     /// # Errors
-    /// [`BenchError::Scenario`] naming an effect that does not exist.
+    /// [`BenchError::Option`] that names an unknown effect.
     pub fn cases(&self) -> Result<Vec<Case>, BenchError> {
         let mut cases = Vec::new();
         let seeds = self.first_seed..self.first_seed + self.seeds;
@@ -169,12 +169,12 @@ impl Plan {
         Ok(cases)
     }
 
-    /// Different effects that do not describe the same function, nor one that another of them holds already, turning through the list
-    /// with the seed; none where the list is too short.
+    /// Chooses different effects by the seed, none of which describes the same function as another or is contained in
+    /// it. None if the list is too short.
     fn combination(&self, count: usize, seed: u64) -> Result<Option<Scenario>, BenchError> {
         let n = self.effects.len();
         let mut chosen: Vec<&String> = Vec::new();
-        // Strides that change with every turn through the list, so that pairs differ.
+        // The stride changes with each pass through the list, so that pairs differ.
         let (start, stride) = (seed as usize % n.max(1), 1 + seed as usize / n.max(1));
         for k in 0..n * 2 {
             let name = &self.effects[(start + k * stride + k / n.max(1)) % n];

@@ -1,4 +1,4 @@
-//! The experiment that is proposed for an open set of names, run on the same rig, and what is said with it.
+//! Runs the experiment that a method proposes for an open set of names, and asks the method again.
 
 use std::path::Path;
 
@@ -12,17 +12,17 @@ use rig_excite::TrajectoryFile;
 use rig_scenario::Made;
 use rig_scenario::ScenarioError;
 
-/// What came of a proposed experiment.
+/// Result of a proposed experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Followed {
-    /// What is said with its recording beside the others; none where it asks for more than to take off what pulls on the rig, or
-    /// has failed.
+    /// Answer with the additional recording; none if the method failed, or if the experiment needs other manual work
+    /// than the removal of external loads.
     pub answer: Option<Answer>,
-    /// Why it has failed.
+    /// Reason of a failure.
     pub failure: Option<String>,
 }
 
-/// Follows what is proposed where the first name is open; none where it is not, or nothing is proposed for it.
+/// Runs the proposed experiment if the first name is open; none if it is not open or no experiment is proposed for it.
 pub(super) fn follow(
     case: &Case,
     made: &Made,
@@ -55,14 +55,14 @@ pub(super) fn follow(
     Some(followed)
 }
 
-/// The recordings with that of the proposed motion.
+/// Adds a recording of the proposed motion.
 fn moved(case: &Case, made: &Made, trajectory: &str) -> Result<Made, BenchError> {
     let mut more = made.clone();
     (more.further).push(case.scenario.proposed(made, &file(trajectory)?)?);
     Ok(more)
 }
 
-/// The recordings with that of the rig whose shaft is clamped.
+/// Adds a recording with the shaft clamped.
 fn clamped(case: &Case, made: &Made, trajectory: &str) -> Result<Made, BenchError> {
     Ok(Made {
         clamped: Some(case.scenario.clamped(made, &file(trajectory)?)?),
@@ -70,7 +70,7 @@ fn clamped(case: &Case, made: &Made, trajectory: &str) -> Result<Made, BenchErro
     })
 }
 
-/// The recordings with that of the proposed motion of the rig with what pulls on it taken off.
+/// Adds a recording of the proposed motion without external loads.
 fn unburdened(case: &Case, made: &Made, trajectory: &str) -> Result<Made, BenchError> {
     let mut more = made.clone();
     let scenario = case.scenario.unburdened();
@@ -83,7 +83,7 @@ fn file(trajectory: &str) -> Result<TrajectoryFile, BenchError> {
         .map_err(|error| BenchError::Scenario(ScenarioError(error.to_string())))
 }
 
-/// The recordings with that of the drive off.
+/// Adds a recording with the drive off.
 fn at_rest(case: &Case, made: &Made) -> Result<Made, BenchError> {
     Ok(Made {
         drive_off: Some(case.scenario.drive_off(made)?),

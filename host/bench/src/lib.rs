@@ -1,7 +1,8 @@
-//! How often a method finds what was hidden in recordings of the emulated rig, and how often it finds what is not there.
+//! A benchmark for developers: how often a method finds the hidden effects in recordings of the emulated rig, and how
+//! often it names effects that are not there.
 //!
-//! Every figure is over scenarios of [`rig_scenario`]; proportions come with Wilson intervals. It is a tool for developers:
-//! `cargo run --release -p rig-bench -- --help`.
+//! All figures are over scenarios of [`rig_scenario`]; proportions have Wilson intervals. Run
+//! `cargo run --release -p rig-bench -- --help` for the options.
 
 mod answer;
 mod arms;
@@ -32,33 +33,33 @@ pub use score::{EffectScore, Outcome, Score};
 pub use table::markdown;
 pub use wilson::Proportion;
 
-/// Why the bench cannot go on.
+/// Reason why the benchmark stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// A scenario that cannot be made.
+    /// A scenario cannot be made.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// A method that cannot work at all.
+    /// A method cannot process a recording.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
-    /// A file that cannot be written.
+    /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A folder that holds results.
+    /// The output folder holds results already.
     #[error(
         "{0} holds results of an earlier run; name another folder with --out, or replace them with --force."
     )]
     Results(PathBuf),
-    /// An option out of its range, a sentence.
+    /// An option is out of its range; a sentence.
     #[error("{0}")]
     Option(String),
 }
 
-/// Puts every case to every method, `threads` at a time; `progress` hears how many of how many are done. The result has
-/// one list a method, in the order of the cases.
+/// Runs every method on every case in `threads` threads. Calls `progress` with the number of finished cases and their
+/// total. Returns one list of outcomes for each method, in the order of the cases.
 ///
 /// # Errors
-/// A scenario that cannot be made. A method that fails is an outcome, not an error.
+/// A scenario cannot be made. A failed method is an outcome, not an error.
 pub fn run(
     cases: &[Case],
     methods: &[&dyn Method],
@@ -74,7 +75,7 @@ pub fn run(
     Ok(lists)
 }
 
-/// What comes of each case, in their order, `threads` at a time.
+/// Processes the cases in `threads` threads and returns the results in the order of the cases.
 fn counted<C: Sync, O: Send>(
     cases: &[C],
     threads: usize,

@@ -1,4 +1,4 @@
-//! The developer's bench: how often the diagnosis finds what was hidden.
+//! Benchmark for developers: how often the diagnosis finds hidden effects.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use rig_output::{folder, write_whole};
 use rig_output::{format_short, format_significant};
 use rig_scenario::{Effect, Noise, Size, Truth};
 
-/// Which method is judged.
+/// Method that is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Judged {
     /// The project's own diagnosis.
@@ -41,32 +41,32 @@ struct Args {
     /// The first seed
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// Recordings at each noise level with nothing hidden
+    /// Recordings without hidden effects at each noise level
     #[arg(long, default_value_t = 20)]
     nothing: u64,
     /// Noise levels: low, medium, high
     #[arg(long, value_delimiter = ',', default_value = "medium")]
     noise: Vec<String>,
-    /// How many effects are hidden together, for instance 2,3
+    /// Numbers of effects that are hidden together, for example 2,3
     #[arg(long, value_delimiter = ',')]
     combinations: Vec<usize>,
-    /// Seeds of each size of combination
+    /// Seeds for each number of combined effects
     #[arg(long, default_value_t = 20)]
     combined: u64,
-    /// Hide each effect once more with its name kept out of the library
+    /// Hide each effect once more, with its name removed from the library
     #[arg(long)]
     leave_out: bool,
-    /// Run the negative controls: wrong description, meaningless residual, faint effect, poor motion, an intrusion, another
-    /// integration step
+    /// Run the negative controls: wrong description, random residual, faint effect, poor motion, one disturbance, finer
+    /// step
     #[arg(long)]
     controls: bool,
-    /// Record the experiment that is proposed for an open set of names on the same rig, and ask again with it
+    /// If several names remain possible, record the proposed experiment on the same rig and diagnose again with it
     #[arg(long)]
     follow: bool,
-    /// Record an encoder on the link beside the motor's
+    /// Record an encoder on the link, too
     #[arg(long)]
     second_encoder: bool,
-    /// Seeds of arms of two and of six joints with one joint at fault; judged by the project's own diagnosis alone
+    /// Seeds of arms with two and six joints, one of them faulty; only the project's own diagnosis is judged on them
     #[arg(long, default_value_t = 0)]
     arms: u64,
     /// Methods to judge
@@ -78,24 +78,23 @@ struct Args {
     /// Length of the hold-out recording, s
     #[arg(long, default_value_t = 60.0)]
     holdout: f64,
-    /// Threads [default: as many as the machine has]
+    /// Threads [default: all of the machine]
     #[arg(long, default_value_t = 0)]
     threads: usize,
     /// Folder for benchmark.json, benchmark.md and, with --keep, the recordings
     #[arg(long, default_value = "benchmark")]
     out: PathBuf,
-    /// Write the recordings and descriptions, one folder a case, with what is hidden in each (truth.json there, truth.md of all),
-    /// and judge nothing
+    /// Write recordings, descriptions and truth.json, one folder for each case, and truth.md; judge no method
     #[arg(long)]
     keep: bool,
-    /// Replace results that the folder holds
+    /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
 }
 
 /// Results of a run.
 const RESULTS: [&str; 2] = ["benchmark.json", "benchmark.md"];
-/// What is hidden in which folder.
+/// Table of the hidden effects in each folder.
 const TRUTHS: &str = "truth.md";
 
 fn truth_head() -> String {
@@ -103,7 +102,7 @@ fn truth_head() -> String {
         .to_owned()
 }
 
-/// A line of the table, of a rig of one joint.
+/// Table row of a case with one joint.
 fn truth_row(folder: &str, case: &Case, truth: &Truth, sizes: &[Size]) -> String {
     let names = match truth.names() {
         none if none.is_empty() => "nothing".to_owned(),
@@ -121,7 +120,7 @@ fn truth_row(folder: &str, case: &Case, truth: &Truth, sizes: &[Size]) -> String
     )
 }
 
-/// Recordings, descriptions and what is hidden, one folder a case.
+/// Writes recordings, descriptions and hidden effects, one folder for each case.
 fn keep(out: &Path, cases: &[Case], arms: &[ArmCase]) -> Result<(), BenchError> {
     let count = cases.len() + arms.len();
     let progress = bar("recording", count);
@@ -191,7 +190,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A progress bar on standard error; invisible where that is no terminal.
+/// A progress bar on standard error; hidden without a terminal.
 fn bar(what: &'static str, total: usize) -> ProgressBar {
     let bar = ProgressBar::new(total as u64).with_message(what);
     let style = ProgressStyle::with_template("{msg:>20} [{bar:40}] {percent:>3} % {eta} left");

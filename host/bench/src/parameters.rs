@@ -1,5 +1,4 @@
-//! What the library's parameters ought to come out as, where the emulated rig's law is of the same form or has a
-//! counterpart in it.
+//! True values of the library's parameters, for laws of the emulated rig with a counterpart there.
 
 use nalgebra::Vector3;
 use rig_shared::multibody::column;
@@ -9,36 +8,36 @@ use super::answer::Named;
 use rig_model::robot::Robot;
 use rig_scenario::{Effect, Truth, payload};
 
-/// An estimate beside what is true.
+/// An estimate and its true value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Compared {
-    /// Key in a description.
+    /// Name of the parameter in a description.
     pub parameter: &'static str,
-    /// Magnitude that is true.
+    /// True magnitude.
     pub truth: f64,
-    /// Magnitude found.
+    /// Estimated magnitude.
     pub found: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the estimate.
     pub std: f64,
-    /// Whether both laws have one form, so that the interval must cover the truth.
+    /// True if both laws have the same form, so the interval must cover the truth.
     pub same_form: bool,
 }
 
 impl Compared {
-    /// Relative error.
+    /// Relative error of the estimate.
     pub fn error(&self) -> f64 {
         (self.found - self.truth).abs() / self.truth.abs()
     }
 
-    /// Whether the 95 % interval holds the truth; one without an end holds nothing.
+    /// Returns true if the 95 % interval is finite and holds the truth.
     pub fn covered(&self) -> bool {
         self.std.is_finite() && (self.found - self.truth).abs() <= 1.96 * self.std
     }
 }
 
-/// Magnitudes of what was found under the right name beside the truth as it shows against `robot`, the description: torques
-/// are what its torque constant makes of the currents, and a payload is what inertia and gravity have grown by beyond its
-/// values; all of these are written to three digits.
+/// Compares the parameters of a rightly named effect with the truth relative to the description `robot`. Torques are
+/// currents times its torque constant, and a payload is the increase of inertia and gravity over its values. The
+/// description has three digits.
 pub fn compare(effect: &Effect, truth: &Truth, named: &Named, robot: &Robot) -> Vec<Compared> {
     let Some(drive) = robot.joints.first().and_then(|j| j.drive.as_ref()) else {
         return Vec::new();
@@ -58,7 +57,7 @@ pub fn compare(effect: &Effect, truth: &Truth, named: &Named, robot: &Robot) -> 
             same_form,
         })
     };
-    // Cosine and sine as one amplitude; their errors are taken as uncorrelated.
+    // Amplitude of cosine and sine; their errors are assumed to be uncorrelated.
     let amplitude = |value: f64| {
         let (c, s) = (
             named.parameters.get("cosine")?,
@@ -77,7 +76,7 @@ pub fn compare(effect: &Effect, truth: &Truth, named: &Named, robot: &Robot) -> 
     let list = match *effect {
         Effect::Stribeck { ratio, velocity } => vec![
             plain("breakaway", coulomb * (ratio - 1.0), false),
-            // Half of the excess is gone where exp(−(v/velocity)²) is ½.
+            // The excess has fallen to half where exp(−(v/velocity)²) is ½.
             plain("velocity", velocity / 2f64.ln().sqrt(), false),
         ],
         Effect::AsymmetricCoulomb { difference } => {
@@ -99,7 +98,7 @@ pub fn compare(effect: &Effect, truth: &Truth, named: &Named, robot: &Robot) -> 
         }
         Effect::CurrentOffset { current } => vec![plain("offset", current * constant, true)],
         Effect::TorqueSaturation { loss } => {
-            // 1/(1 + (i/knee)²) begins as 1 − (i/knee)².
+            // 1/(1 + (i/knee)²) is 1 − (i/knee)² for small currents.
             let at_peak = loss / (1.0 - loss) / (Effect::PEAK_CURRENT * constant).powi(2);
             vec![plain("coefficient", at_peak, false)]
         }
@@ -112,13 +111,13 @@ pub fn compare(effect: &Effect, truth: &Truth, named: &Named, robot: &Robot) -> 
         Effect::Spring { stiffness, .. } => vec![plain("stiffness", scale * stiffness, true)],
         Effect::DriveDeadzone { voltage } => vec![plain("volts", voltage, true)],
         Effect::TorqueOffset { torque } => vec![plain("offset", scale * torque, true)],
-        // Four elements against one, heat against time: no number of one is a number of the other.
+        // The laws differ (four elements and one, heat and time), so their parameters cannot be compared.
         Effect::Presliding { .. } | Effect::ViscousWarmup { .. } => Vec::new(),
     };
     list.into_iter().flatten().collect()
 }
 
-/// The mass at one place that inertia and first moment have grown by beyond what `robot` states.
+/// Point mass that explains the increase of inertia and first moment over the values of `robot`.
 fn grown(robot: &Robot, scale: f64, truth: &Truth, mass: f64, distance: f64) -> f64 {
     let true_of = |name: &str| truth.nominal.get(name).copied().unwrap_or(f64::NAN);
     let body = payload(mass, distance);

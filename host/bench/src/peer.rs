@@ -1,11 +1,11 @@
-//! Sparse regression over the same candidates, as peers in the table.
+//! Sparse regression methods with the same candidates, for comparison.
 //!
-//! Sequentially thresholded least squares (STLSQ: Brunton, Proctor, Kutz 2016, PNAS 113:3932, threshold by the hold-out) and
-//! forward regression with orthogonal least squares (FROLS: Billings 2013, ch. 3, number of terms by BIC with every
-//! sample counted as independent). Both work on the torque that a refit of the nominal model leaves, with columns
-//! projected on its complement, 40 Hz band, 100 Hz; `dictionary` is over a small grid of shapes.
+//! Sequentially thresholded least squares (STLSQ: Brunton, Proctor, Kutz 2016, PNAS 113:3932, threshold by the
+//! hold-out) and forward regression with orthogonal least squares (FROLS: Billings 2013, ch. 3, number of terms by BIC
+//! with every sample counted as independent). Both fit the residual torque of the nominal model with columns projected
+//! onto its orthogonal complement, in a band of 40 Hz at 100 Hz. `dictionary` uses a small grid of shape parameters.
 //!
-//! Leaves out: backlash and dead time (no column is linear in them), LuGre (three shapes), more than one joint.
+//! Not covered: backlash and dead time (no column is linear in them), LuGre (three shapes), more than one joint.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::Kind;
@@ -18,11 +18,11 @@ mod dictionary;
 
 use dictionary::Dictionary;
 
-/// Most terms that forward regression tries.
+/// Largest number of terms in forward regression.
 const MOST: usize = 20;
-/// Thresholds that are tried, of the standard deviation of the target.
+/// Thresholds that are tried, as shares of the target's norm.
 const THRESHOLDS: [f64; 8] = [0.02, 0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5];
-/// Rounds of thresholding.
+/// Largest number of thresholding rounds.
 const ROUNDS: usize = 20;
 
 /// Sequentially thresholded least squares.
@@ -70,7 +70,7 @@ struct Problem {
     holdout: Dictionary,
     /// Columns orthogonal to the nominal model, of unit length.
     projected: Vec<DVector<f64>>,
-    /// What the nominal model leaves.
+    /// Residual of the nominal model.
     target: DVector<f64>,
     floor: f64,
 }
@@ -82,7 +82,7 @@ impl Problem {
         let basis = orthonormal(&train.nominal);
         let off = |column: &DVector<f64>| {
             let mut column = column.clone();
-            // Twice: once leaves rounding of the size of what is taken away (Giraud et al. 2005).
+            // Twice: one projection leaves rounding errors as large as the subtracted part (Giraud et al. 2005).
             for _ in 0..2 {
                 for q in &basis {
                     column.axpy(-q.dot(&column), q, 1.0);
@@ -94,7 +94,7 @@ impl Problem {
         let projected = train.terms.iter().map(|term| {
             let mut left = off(&term.column);
             let length = left.norm();
-            // What the nominal model says as well is no candidate.
+            // A column that the nominal model can represent is no candidate.
             let scale = if length > 1e-6 * term.column.norm() {
                 length.recip()
             } else {
@@ -122,7 +122,7 @@ impl Problem {
         })
     }
 
-    /// RMS on the hold-out of nominal model and chosen terms fitted together on the training data.
+    /// Residual RMS on the hold-out after a joint fit of nominal model and chosen terms to the training data.
     fn unseen(&self, chosen: &[usize]) -> f64 {
         let matrix = |of: &Dictionary| {
             let terms = chosen.iter().map(|k| &of.terms[*k].column);
@@ -159,7 +159,7 @@ impl Problem {
     }
 }
 
-/// The columns made orthonormal; those that follow from others are dropped.
+/// Orthonormalises the columns and drops linearly dependent ones.
 fn orthonormal(columns: &[DVector<f64>]) -> Vec<DVector<f64>> {
     let mut basis: Vec<DVector<f64>> = Vec::new();
     for column in columns {
@@ -177,7 +177,7 @@ fn orthonormal(columns: &[DVector<f64>]) -> Vec<DVector<f64>> {
     basis
 }
 
-/// Indices that stay, largest coefficient first.
+/// Indices of the remaining terms, largest coefficient first.
 fn thresholded(problem: &Problem, threshold: f64) -> Vec<usize> {
     let limit = threshold * problem.target.norm();
     let mut active: Vec<usize> = (0..problem.projected.len())
@@ -193,7 +193,7 @@ fn thresholded(problem: &Problem, threshold: f64) -> Vec<usize> {
             .collect();
         let matrix = DMatrix::from_columns(&columns);
         let mut normal = matrix.tr_mul(&matrix);
-        // The customary small ridge of the method; columns have unit length.
+        // The usual small ridge term of the method; columns have unit length.
         for k in 0..active.len() {
             normal[(k, k)] += 0.05;
         }
@@ -217,7 +217,7 @@ fn thresholded(problem: &Problem, threshold: f64) -> Vec<usize> {
     active
 }
 
-/// Indices in the order of their error reduction ratios, as many as BIC wants.
+/// Indices in the order of their error reduction ratios; BIC decides their number.
 fn forward(columns: &[DVector<f64>], target: &DVector<f64>) -> Vec<usize> {
     let n = target.len() as f64;
     let mut left: Vec<DVector<f64>> = columns.to_vec();
@@ -230,7 +230,7 @@ fn forward(columns: &[DVector<f64>], target: &DVector<f64>) -> Vec<usize> {
     for _ in 0..MOST.min(columns.len()) {
         let gain = |column: &DVector<f64>| {
             let length = column.norm_squared();
-            // A column that those chosen span has nothing left but rounding.
+            // A column in the span of the chosen ones is only rounding error.
             if length < 1e-8 {
                 0.0
             } else {
@@ -267,7 +267,7 @@ mod tests {
     fn forward_regression_takes_the_true_columns_in_the_order_of_what_they_explain() {
         let wave = |w: f64| DVector::from_fn(2000, |k, _| (w * k as f64).sin());
         let columns: Vec<DVector<f64>> = [0.011, 0.017, 0.031, 0.047].map(wave).to_vec();
-        // A hash as noise: reproducible and far from every column.
+        // A hash as noise: reproducible and nearly uncorrelated with the columns.
         let noise = DVector::from_fn(2000, |k, _| {
             ((k * 7919 % 1009) as f64 / 1009.0 - 0.5) * 0.02
         });

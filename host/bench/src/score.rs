@@ -1,7 +1,7 @@
-//! From answers to figures.
+//! Computes figures from the answers of a method.
 //!
-//! An effect counts as *above the floor* where what a refit of the nominal model leaves because of it is at least half of
-//! the noise floor ([`Size::above_floor`]). Names that describe exactly the same function of the recording count as one.
+//! An effect is *above the floor* if its residual after a refit of the nominal model is at least half of the noise
+//! floor ([`Size::above_floor`]). Names that describe exactly the same function of the recording count as one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,33 +14,33 @@ use super::parameters::Compared;
 use super::wilson::Proportion;
 use rig_scenario::{Hidden, Size};
 
-/// One question with its answer.
+/// One case and the answer of a method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
-    /// Why it was asked.
+    /// Group of the case.
     pub group: Group,
     /// Level of noise.
     pub level: &'static str,
-    /// Of the scenario.
+    /// Seed of the scenario.
     pub seed: u64,
-    /// What was hidden.
+    /// Hidden effects.
     pub hidden: Vec<Hidden>,
-    /// How large that was, in the order of `hidden`.
+    /// Sizes of the hidden effects, in the order of `hidden`.
     pub sizes: Vec<Size>,
-    /// What was said; none where the method failed.
+    /// Answer; none if the method failed.
     pub answer: Option<Answer>,
-    /// Why it failed.
+    /// Reason of a failure.
     pub failure: Option<String>,
-    /// What came of the experiment proposed for an open first name, where it was to be followed.
+    /// Result of the proposed experiment, if the first name was open and the experiment was to be followed.
     pub followed: Option<Followed>,
-    /// Parameters under right names.
+    /// Parameters of rightly named effects.
     pub parameters: Vec<Compared>,
 }
 
-/// The one hidden effect that is a change of the description's values.
+/// The hidden effect that is a change of values in the description.
 const PAYLOAD: &str = "payload";
 
-/// Whether every one of `truth` is in a set of its own, and no set is left over.
+/// Returns true if each name of `truth` is in a separate set and all sets are used.
 pub(super) fn one_each(truth: &[&str], sets: &[BTreeSet<String>]) -> bool {
     match truth {
         [] => sets.is_empty(),
@@ -53,14 +53,14 @@ pub(super) fn one_each(truth: &[&str], sets: &[BTreeSet<String>]) -> bool {
 
 impl Outcome {
     fn truth(&self) -> Vec<&'static str> {
-        // What was hidden before the phases were drawn anew is no longer in the recording.
+        // Random phases removed the hidden effect from the recording.
         if self.group.is_null() {
             return Vec::new();
         }
         self.hidden.iter().map(|h| h.effect.name()).collect()
     }
 
-    /// Changed values of the description are the name of a payload where one is hidden, and elsewhere no name.
+    /// Names in the answer. A change of values is the name of a payload if one is hidden, otherwise no name.
     fn names(&self) -> Vec<&str> {
         let Some(answer) = &self.answer else {
             return Vec::new();
@@ -71,18 +71,18 @@ impl Outcome {
         answer.named.iter().map(|n| n.effect.as_str()).collect()
     }
 
-    /// Whether it says that values of the description have changed which have not.
+    /// Returns true if the answer wrongly says that values of the description have changed.
     fn changed_wrongly(&self) -> bool {
         let is_so = self.group == Group::WrongDescription || self.truth().contains(&PAYLOAD);
         !is_so && self.answer.as_ref().is_some_and(|a| a.changed)
     }
 
-    /// Whether every hidden effect is above the floor.
+    /// Returns true if every hidden effect is above the floor.
     pub fn above(&self) -> bool {
         self.sizes.iter().all(Size::above_floor)
     }
 
-    /// Whether the first name is one of the hidden effects.
+    /// Returns true if the first name is one of the hidden effects.
     pub fn right_first(&self) -> bool {
         let names = self.names();
         names
@@ -90,17 +90,17 @@ impl Outcome {
             .is_some_and(|first| self.truth().iter().any(|truth| is_right(first, truth)))
     }
 
-    /// Whether the names are those of the hidden effects, all and no other.
+    /// Returns true if the names are exactly those of the hidden effects.
     pub fn exact(&self) -> bool {
         let classes = |names: &[&str]| -> BTreeSet<String> {
             let first = |name: &&str| exact_class(name).into_iter().next().unwrap_or(name).into();
             names.iter().map(first).collect()
         };
-        // A method that failed has named nothing, and is wrong where something was to be named.
+        // A failed method has no names, which is wrong if an effect is hidden.
         classes(&self.names()) == classes(&self.truth())
     }
 
-    /// Whether each hidden effect is one of the names that the data leave to a name of its own, and no name is over.
+    /// Returns true if each hidden effect is in the set of possible names of a separate step, and no step is left over.
     pub fn exact_as_sets(&self) -> bool {
         let named = |answer: &Answer| -> Vec<BTreeSet<String>> {
             let set = |n: &Named| n.set.iter().cloned().chain([n.effect.clone()]).collect();
@@ -110,12 +110,12 @@ impl Outcome {
         self.exact() || one_each(&self.truth(), &sets)
     }
 
-    /// Whether it names anything, or finds values changed that have not.
+    /// Returns true if the answer has a name or wrongly says that values have changed.
     pub fn alarmed(&self) -> bool {
         !self.names().is_empty() || self.changed_wrongly()
     }
 
-    /// Whether it names anything that is not there, or finds values changed that have not.
+    /// Returns true if the answer has a wrong name or wrongly says that values have changed.
     pub fn invented(&self) -> bool {
         self.wrong() > 0 || self.changed_wrongly()
     }
@@ -127,7 +127,7 @@ impl Outcome {
         names.iter().filter(unknown).count()
     }
 
-    /// Share of the names that are wrong; 0 where none is given.
+    /// Share of wrong names; 0 if the answer has no names.
     pub fn false_discoveries(&self) -> f64 {
         self.wrong() as f64 / self.names().len().max(1) as f64
     }
@@ -136,7 +136,7 @@ impl Outcome {
         self.answer.as_ref().is_some_and(|a| a.remainder)
     }
 
-    /// The experiment followed for a first set that holds the one hidden effect.
+    /// The followed experiment, if the first set holds the only hidden effect.
     fn experiment(&self) -> Option<&Followed> {
         let [truth] = self.truth()[..] else {
             return None;
@@ -146,15 +146,14 @@ impl Outcome {
         self.followed.as_ref().filter(|_| held)
     }
 
-    /// Whether the experiment has left the hidden effect alone in the first set.
+    /// Returns true if only the hidden effect is in the first set after the experiment.
     fn separated(&self) -> Option<bool> {
         let truth = self.truth().first().copied()?;
         let after = self.experiment()?.answer.as_ref()?;
         Some((after.named.first()).is_some_and(|first| first.set == [truth]))
     }
 
-    /// Whether it is one effect with partners that its recording cannot tell from it, and all of them were returned as the
-    /// first set.
+    /// For one hidden effect with indistinguishable partners: true if the first set holds them all; else none.
     fn whole_set(&self) -> Option<bool> {
         let [truth] = self.truth()[..] else {
             return None;
@@ -170,67 +169,66 @@ impl Outcome {
 /// Figures of one method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Score {
-    /// Its name.
+    /// Name of the method.
     pub method: String,
-    /// Right name first; one effect above the floor.
+    /// The first name is right; one hidden effect above the floor.
     pub right_first: Proportion,
-    /// The same with those below the floor.
+    /// As `right_first`, including effects below the floor.
     pub right_first_any_size: Proportion,
-    /// Names something although nothing is hidden.
+    /// The answer has a name although no effect is hidden.
     pub false_alarm: Proportion,
-    /// Mean share of wrong names, something hidden.
+    /// Mean share of wrong names in cases with hidden effects.
     pub false_discovery: Option<f64>,
-    /// Names exactly what is hidden: one effect above the floor.
+    /// The names are exactly the hidden ones; one effect above the floor.
     pub exact_single: Proportion,
-    /// The same of two or more, each above the floor.
+    /// The names are exactly the hidden ones; two or more effects, each above the floor.
     pub exact_combination: Proportion,
-    /// The same where an open name counts as right whose set holds the hidden effect.
+    /// As `exact_combination`, but an open name counts as right if its set holds the hidden effect.
     pub exact_combination_as_sets: Proportion,
-    /// Median share of the hold-out's gap that is closed under a right first name, by class of effect.
+    /// Median share of the gap on the hold-out that is closed if the first name is right, by class of effect.
     pub gap_closed: BTreeMap<&'static str, f64>,
-    /// Says that something is left although nothing is hidden or exactly what is hidden, one effect, is named.
+    /// The answer has a remainder although no effect is hidden, or although the only hidden effect was named exactly.
     pub left_wrongly: Proportion,
-    /// Effect not in the library: gives a name and does not say that something is left.
+    /// Effect not in the library: the answer has a name and no remainder.
     pub invented_silently: Proportion,
-    /// Effect not in the library: says that something is left.
+    /// Effect not in the library: the answer has a remainder.
     pub remainder_flagged: Proportion,
-    /// One of an exactly confounded set: the whole set is returned.
+    /// Effect of an exactly confounded set: the answer has the whole set.
     pub set_returned: Proportion,
-    /// A first set with the hidden effect in it, an experiment proposed: the rig runs it as it is, or with what pulls on it taken
-    /// off.
+    /// The rig can run the experiment proposed for a first set with the hidden effect, with or without external loads.
     pub experiment_runs: Proportion,
-    /// Of these: the hidden effect is left alone with its recording.
+    /// Share of these experiments after which only the hidden effect is in the set.
     pub set_separated: Proportion,
-    /// Median relative error of the parameters under right names.
+    /// Median relative error of the parameters of rightly named effects.
     pub parameter_error: Option<f64>,
-    /// 95 % intervals that hold the truth, laws of one form only.
+    /// 95 % intervals that hold the true value, only for laws of the same form.
     pub coverage: Proportion,
-    /// Names something that is not there, by negative control.
+    /// Wrong names, by negative control.
     pub controls: BTreeMap<Group, Proportion>,
-    /// Right name first and wrong names by effect, one effect above the floor.
+    /// Figures for each effect, from cases with one hidden effect.
     pub effects: BTreeMap<&'static str, EffectScore>,
-    /// Where the method failed altogether.
+    /// Number of cases in which the method failed.
     pub failed: usize,
 }
 
 /// Figures of one effect.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct EffectScore {
-    /// Above the floor.
+    /// The first name is right; effects above the floor.
     pub right_first: Proportion,
-    /// Above the floor.
+    /// The names are exact; effects above the floor.
     pub exact: Proportion,
-    /// Below the floor: names something wrong.
+    /// The answer has a wrong name; effects below the floor.
     pub invented_below: Proportion,
-    /// Median of the hold-out's gap closed, above the floor, right first name.
+    /// Median share of the gap closed on the hold-out; effects above the floor with a right first name.
     pub gap_closed: Option<f64>,
-    /// Median relative error of its parameters.
+    /// Median relative error of the parameters.
     pub parameter_error: Option<f64>,
-    /// First names that were wrong, above the floor, and how often.
+    /// Wrong first names and their counts; effects above the floor.
     pub taken_for: BTreeMap<String, usize>,
 }
 
-/// Classes by which the gap closed is reported.
+/// Class of an effect for the figure of the gap closed.
 fn class_of(effect: &str) -> &'static str {
     match effect {
         "presliding" => "presliding",
@@ -249,7 +247,7 @@ pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 impl Score {
-    /// Counts what a method has said.
+    /// Computes the figures of a method.
     pub fn of(method: &str, outcomes: &[Outcome]) -> Self {
         let group = |group: Group| outcomes.iter().filter(move |o| o.group == group);
         let single = || group(Group::Single).filter(|o| o.above());
@@ -272,7 +270,7 @@ impl Score {
             .map(Outcome::false_discoveries)
             .collect();
         let compared = || single().flat_map(|o| &o.parameters);
-        // A value of the description that is wrong is missing in no library: that it has changed is the right verdict.
+        // A wrong value of the description does not belong to the library: "changed" is then the right verdict.
         let only_values = |o: &&Outcome| o.sizes.iter().all(|size| size.parameter_change);
         let left_out = || {
             let all = group(Group::LeftOut).filter(|o| o.above());

@@ -1,11 +1,11 @@
-//! The figures as a table.
+//! Writes the figures as a table.
 
 use std::fmt::Write as _;
 
 use super::score::Score;
 use super::wilson::Proportion;
 
-/// Markdown: the criteria with what is aimed at, one column a method, then one table of effects for each method.
+/// Returns Markdown: criteria and aims with one column for each method, then a table of effects for each method.
 pub fn markdown(scores: &[Score]) -> String {
     let methods: Vec<(&str, &Score)> = scores.iter().map(|s| (s.method.as_str(), s)).collect();
     let mut rows = Rows::new("criterion", &methods);
@@ -137,14 +137,14 @@ pub fn markdown(scores: &[Score]) -> String {
     text
 }
 
-/// Figures with what is aimed at, as Markdown, one column each of those that they are of.
+/// A Markdown table of figures and aims, one column for each method or arm.
 pub(super) struct Rows<'o, O> {
     columns: &'o [(&'o str, O)],
     pub(super) text: String,
 }
 
 impl<'o, O> Rows<'o, O> {
-    /// The head; `of` names what the rows are.
+    /// Creates the table head; `of` is the title of the first column.
     pub(super) fn new(of: &str, columns: &'o [(&'o str, O)]) -> Self {
         let mut text = format!("| {of} | aim |");
         for (name, _) in columns {
@@ -156,7 +156,7 @@ impl<'o, O> Rows<'o, O> {
         Self { columns, text }
     }
 
-    /// One figure.
+    /// Adds a row.
     pub(super) fn row(&mut self, name: &str, aim: &str, of: &dyn Fn(&O) -> String) {
         let _ = write!(self.text, "| {name} | {aim} |");
         for (_, column) in self.columns {

@@ -1,4 +1,4 @@
-//! That answers are counted as they should.
+//! Tests of the counting of answers.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,7 +10,7 @@ use super::score::one_each;
 use super::*;
 use rig_scenario::{Effect, Hidden, Made, Noise, Scenario};
 
-/// Says what it was told to, whatever the recording: names, and whether values of the description have changed.
+/// A method with a fixed answer: names, and whether values of the description have changed.
 struct Parrot(Vec<&'static str>, bool);
 
 impl Method for Parrot {
@@ -68,12 +68,12 @@ fn answers_are_counted_by_what_was_hidden() {
     );
     assert_eq!(tilt.false_discovery, Some(2.0 / 6.0));
     assert_eq!(tilt.exact_combination.hits, 0);
-    // Left out of the library and named all the same, without a word of a remainder.
+    // Named although it was removed from the library, without a remainder.
     assert!(tilt.invented_silently.of > 0);
     assert_eq!(tilt.invented_silently.hits, tilt.invented_silently.of);
     assert_eq!(tilt.remainder_flagged.hits, 0);
     assert_eq!(tilt.controls[&Group::OneRunOnly].hits, 2);
-    // A change of the description is no name, but wrong wherever it is not what was hidden.
+    // A change of the description is no name, but it is wrong if no such change was hidden.
     assert_eq!((changed.false_alarm.hits, changed.false_alarm.of), (3, 3));
     assert_eq!(changed.false_discovery, Some(0.0));
     assert_eq!(changed.right_first_any_size.hits, 0);
@@ -88,7 +88,7 @@ fn exact_partners_count_as_one_name() {
     assert!(is_right("current_offset", "torque_offset"));
     assert!(is_right("asymmetric_coulomb", "current_offset"));
     assert!(!is_right("gravity_tilt", "torque_offset"));
-    // The voltage tells a sensor from a torque.
+    // The voltage separates an offset of the current sensor from a torque.
     let left = |name| same_by_voltage(name).into_iter().collect::<Vec<_>>();
     assert_eq!(left("current_offset"), ["current_offset"]);
     assert_eq!(
@@ -96,7 +96,7 @@ fn exact_partners_count_as_one_name() {
         ["asymmetric_coulomb", "torque_offset"]
     );
     assert!(!is_right("stribeck", "presliding"));
-    // k·(q − rest) + c has one rest; a current that is read wrong shows beside the voltage.
+    // k·(q − rest) + c is a spring with another rest; the voltage shows an error of the current reading.
     assert!(one_holds_both("spring", "asymmetric_coulomb"));
     assert!(one_holds_both("torque_offset", "spring"));
     assert!(!one_holds_both("spring", "current_offset"));
@@ -115,7 +115,7 @@ fn an_open_name_is_right_once_where_its_set_holds_the_hidden_effect() {
         &hidden,
         &sets(&[&["payload"], &["torque_offset", "spring"]])
     ));
-    // The first set could be either, and only one way leaves each a set of its own.
+    // The first set fits both effects, but only one assignment gives each effect a separate set.
     assert!(one_each(
         &hidden,
         &sets(&[&["spring", "payload"], &["spring"]])
@@ -196,6 +196,6 @@ fn a_constant_that_the_library_lacks_is_not_passed_off_as_a_tilt() {
         .collect();
     let unknown = Diagnose.answer(&made, &without).unwrap();
     assert!(unknown.remainder, "{unknown:?}");
-    // A spring that pushes, or none but its preload, is no spring.
+    // A spring with negative stiffness, or with a preload only, is no spring.
     assert!(unknown.named.iter().all(|named| named.effect != "spring"));
 }

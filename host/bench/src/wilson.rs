@@ -1,23 +1,23 @@
-//! Intervals of proportions.
+//! Confidence intervals of proportions.
 
 use serde::Serialize;
 
 /// Normal quantile of a two-sided 95 % interval.
 const QUANTILE: f64 = 1.959_963_984_540_054;
 
-/// So many of so many, with its 95 % interval.
+/// A proportion with its 95 % interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Proportion {
-    /// How many.
+    /// Number of hits.
     pub hits: usize,
-    /// Of how many.
+    /// Number of trials.
     pub of: usize,
-    /// Score interval without continuity correction (Wilson 1927, JASA 22:209); 0 to 1 where there was no trial.
+    /// Score interval without continuity correction (Wilson 1927, JASA 22:209); 0 to 1 without trials.
     pub interval: [f64; 2],
 }
 
 impl Proportion {
-    /// Counts `true`.
+    /// Counts the hits (`true`) and the trials.
     pub fn of(outcomes: impl IntoIterator<Item = bool>) -> Self {
         let (mut hits, mut of) = (0, 0);
         for outcome in outcomes {
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn intervals_solve_the_score_equation() {
-        // Both ends are where |p − x| = z·√(x(1 − x)/n); none of none says nothing.
+        // Both ends satisfy |p − x| = z·√(x(1 − x)/n). Without trials the interval is 0 to 1.
         for (hits, of) in [(0, 20), (1, 20), (13, 20), (20, 20), (484, 500)] {
             let p = hits as f64 / of as f64;
             for x in wilson(hits, of) {

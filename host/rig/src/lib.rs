@@ -1,5 +1,4 @@
-//! The `rig` program as a library: [`commands`] are its verbs, [`pages`] what its reports show, [`demo`] the main job
-//! without hardware.
+//! The `rig` program as a library: its [`commands`], the [`pages`] of its reports, and the [`demo`] without hardware.
 
 pub mod commands;
 pub mod demo;

@@ -1,9 +1,10 @@
-//! Recordings of an arm of several joints with one joint at fault.
+//! Recordings of an arm with several joints, one of them faulty.
 //!
-//! The arm is the library's rigid-body mechanics, stepped four times a control period; what is hidden in it has equations of
-//! its own, and its controller, current loop, sensors and surroundings are this file's. Equal arms give equal recordings.
+//! The mechanics of the arm are the rigid-body mechanics of the library with four steps per control period. The hidden
+//! faults have their own equations. This file has controller, current loop, sensors and disturbances. Equal arms give
+//! equal recordings.
 //!
-//! Leaves out: twist and play of the gears, sampling that jitters.
+//! Not modelled: elasticity and backlash of the gears, sampling jitter.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -17,28 +18,28 @@ use rig_data::{Block, JointColumns};
 use rig_model::robot::{Drive, EDDA_TEMPLATE, JointFriction, Robot, TX40};
 use rig_model::simulate::{Model, SimulateError, Stepper};
 
-/// Control periods a second; every second one is recorded.
+/// Control rate, Hz; every second control period is recorded.
 const RATE: f64 = 1000.0;
-/// Steps of the mechanics a control period.
+/// Integration steps per control period.
 const STEPS: usize = 4;
 /// Natural frequency of the position loops, Hz, and their damping ratio.
 const LOOP: [f64; 2] = [6.0, 0.9];
-/// First-order filter on the differentiated reading, Hz.
+/// Cut-off of the first-order filter on the differentiated encoder reading, Hz.
 const SPEED_FILTER: f64 = 80.0;
 /// Time constant of the current loop, s.
 const CURRENT_LOOP: f64 = 4e-4;
 /// Counts of the encoder per motor turn, behind a gear and on a direct drive.
 const COUNTS: [f64; 2] = [8192.0, 1_048_576.0];
-/// Coulomb friction, viscous friction per rad/s and inertia of the drive over the torque limit.
+/// Coulomb friction, viscous friction per rad/s and drive inertia, each divided by the torque limit.
 pub(super) const OF_LIMIT: [f64; 3] = [0.03, 0.015, 3e-3];
-/// White noise of the torque's reading, its step, and the RMS of the surroundings' torque over the torque limit.
+/// Noise RMS and step of the torque reading, and disturbance torque RMS, each divided by the torque limit.
 const NOISE: [f64; 3] = [3e-3, 5e-4, 1.5e-3];
-/// Memory of the surroundings' torque, s.
+/// Correlation time of the disturbance torque, s.
 const SURROUNDINGS: f64 = 0.05;
-/// Share of a recording that is run at full speed; the rest at a sixth of it.
+/// Share of a recording at full speed; the rest is at a sixth of that speed.
 const FAST: f64 = 0.6;
 
-/// Which arm.
+/// Kind of arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arm {
     /// Two direct drives in a horizontal plane.
@@ -49,14 +50,14 @@ pub enum Arm {
     Six,
 }
 
-/// What is to be recorded.
+/// Settings of the recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmScenario {
-    /// On which arm.
+    /// Kind of arm.
     pub arm: Arm,
-    /// What is wrong, and with which joint, from 0.
+    /// Faulty joint, counted from 0, and its fault.
     pub fault: Option<(usize, Fault)>,
-    /// Of motion and noise.
+    /// Seed of motion and noise.
     pub seed: u64,
     /// Length of the training and of the hold-out recording, s.
     pub seconds: [f64; 2],
@@ -65,11 +66,11 @@ pub struct ArmScenario {
 /// An arm's recordings.
 #[derive(Clone, Debug)]
 pub struct ArmRecordings {
-    /// What the user knows.
+    /// Description that the user has.
     pub robot: Robot,
-    /// To learn from, and the same motion again.
+    /// Training recording and its repeat.
     pub train: [InMemory; 2],
-    /// Another motion.
+    /// Hold-out recording of another motion.
     pub holdout: InMemory,
 }
 
@@ -77,7 +78,7 @@ impl ArmRecordings {
     /// Writes `robot.toml`, `train.csv`, `repeat.csv` and `holdout.csv` into a folder that exists.
     ///
     /// # Errors
-    /// What the system says.
+    /// A file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), ScenarioError> {
         let [train, repeat] = &self.train;
         let recordings = [
@@ -89,7 +90,7 @@ impl ArmRecordings {
     }
 }
 
-/// The arm's description without any fault.
+/// Description of the arm without a fault.
 fn described(arm: Arm) -> Result<Robot, ScenarioError> {
     let text = match arm {
         Arm::Planar | Arm::Upright => EDDA_TEMPLATE,
@@ -136,7 +137,7 @@ pub(super) fn limits_of(arm: Arm) -> Result<Vec<f64>, ScenarioError> {
 }
 
 impl ArmScenario {
-    /// 60 s of training run twice and 40 s of hold-out.
+    /// Returns the standard scenario: 60 s of training recorded twice and 40 s of hold-out.
     pub fn new(arm: Arm, fault: Option<(usize, Fault)>, seed: u64) -> Self {
         Self {
             arm,
@@ -149,7 +150,7 @@ impl ArmScenario {
     /// Runs the arm.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the fault names a joint that the arm has not, or the loop is unstable.
+    /// [`ScenarioError`] if the arm does not have the faulty joint, or if the control loop is unstable.
     pub fn make(&self) -> Result<ArmRecordings, ScenarioError> {
         let robot = described(self.arm)?;
         let joints = robot.joints.len();
@@ -180,7 +181,7 @@ impl ArmScenario {
         })
     }
 
-    /// The mechanics with what is wrong in it.
+    /// Mechanics of the arm with its fault.
     fn mechanics(&self, robot: &Robot) -> Result<Model, SimulateError> {
         let mut robot = robot.clone();
         if let Some((_, Fault::GravityTilt([x, y]))) = self.fault {
@@ -299,7 +300,8 @@ impl ArmScenario {
     }
 }
 
-/// Sums of five sines, fast and then slow, at rest where they begin and end: one value a control period.
+/// Returns the reference for each joint: a sum of five sines, first fast, then slow, with rest at both ends of each
+/// part. One value per control period.
 fn reference(robot: &Robot, seconds: f64, seed: u64, motion: u64) -> Vec<Vec<f64>> {
     let mut dice = Dice::new(seed, motion);
     let samples = (seconds * RATE) as usize;
@@ -324,7 +326,7 @@ fn reference(robot: &Robot, seconds: f64, seed: u64, motion: u64) -> Vec<Vec<f64
                 .map(|k| {
                     let t = k as f64 / RATE;
                     let split = FAST * seconds;
-                    // Each part fades in and out over a second and a half.
+                    // Each part fades in and out within 1.5 s.
                     let (from, to, pace) = if t < split {
                         (0.0, split, 1.0)
                     } else {

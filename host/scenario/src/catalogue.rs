@@ -1,11 +1,10 @@
-//! Effects at random, their sizes drawn log-uniformly over what such rigs have.
+//! Random effects, with sizes drawn log-uniformly over the range of comparable rigs.
 
 use super::dice::Dice;
 use super::hidden::Effect;
 use super::rig::TICK_RATE;
 
-/// Names and what sizes are drawn from: least and largest, in the unit of the first parameter. For an elastic gear
-/// the size is its compliance, mrad/(N·m).
+/// Smallest and largest size in the unit of the first parameter; for an elastic gear compliance, mrad/(N·m).
 const SIZES: [(&str, [f64; 2]); 21] = [
     ("stribeck", [0.1, 1.0]),
     ("asymmetric_coulomb", [0.05, 0.3]),
@@ -31,13 +30,13 @@ const SIZES: [(&str, [f64; 2]); 21] = [
 ];
 
 impl Effect {
-    /// All names, as the contract has them.
+    /// Names of all effects.
     pub fn names() -> impl Iterator<Item = &'static str> {
         SIZES.iter().map(|(name, _)| *name)
     }
 
-    /// An effect of that name at random; its size is drawn over the catalogue's range and multiplied by `strength`.
-    /// None where there is no such name.
+    /// Draws an effect of the given name. Its size is drawn from the range of the catalogue and multiplied by
+    /// `strength`. None if there is no such name.
     pub fn draw(name: &str, strength: f64, seed: u64) -> Option<Self> {
         let (at, (_, range)) = SIZES
             .iter()
@@ -73,7 +72,7 @@ impl Effect {
             },
             "torque_ripple" => Self::TorqueRipple {
                 amplitude: size,
-                // Six times the pole pairs, and what unequal gains of the phase currents give.
+                // Six times the pole pairs (42), twice them (14: unequal gains of the phase currents), and 84.
                 order: [42.0, 14.0, 84.0][dice.index(3)],
                 phase,
             },
@@ -88,7 +87,7 @@ impl Effect {
                 let stiffness = 1000.0 / size;
                 Self::JointElasticity {
                     stiffness,
-                    // 1 to 6 % of critical for rotor against link.
+                    // 1 to 6 % of the critical damping of rotor against link.
                     damping: dice.log_uniform([0.02, 0.12]) * (stiffness * 0.0375).sqrt(),
                 }
             }

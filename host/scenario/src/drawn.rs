@@ -1,6 +1,6 @@
-//! Arms whose fault a seed draws.
+//! Arms with a fault drawn by a seed.
 //!
-//! Sizes are log-uniform over what laboratories see, each by the friction or the drive's inertia of the joint that has it.
+//! Sizes are log-uniform over ranges seen in laboratories, relative to friction or drive inertia of the joint.
 
 use super::arm::{Arm, ArmScenario, OF_LIMIT, limits_of};
 use super::dice::Dice;
@@ -9,7 +9,7 @@ use crate::ScenarioError;
 
 /// Purpose of the draws of the first fault; others follow.
 const DRAW: u64 = 50;
-/// Payload in kg that belongs to a torque limit of 1 N·m at the last joint: the Stäubli TX40 carries 2 kg at its flange.
+/// Payload per torque limit of the last joint, kg/(N·m): the Stäubli TX40 carries 2 kg at its flange.
 const CARRIES: f64 = 2.0 / 30.7;
 
 /// Faults that a seed draws, by name.
@@ -26,19 +26,19 @@ const FAULTS: [&str; 9] = [
 ];
 
 impl Arm {
-    /// All of them, by name.
+    /// All arms with their names.
     pub const ALL: [(&'static str, Self); 3] = [
         ("planar", Self::Planar),
         ("upright", Self::Upright),
         ("six", Self::Six),
     ];
 
-    /// Faults that its recordings show, by name.
+    /// Names of the faults that the recordings of the arm show.
     pub fn faults(self) -> Vec<&'static str> {
         let hidden: &[&str] = match self {
-            // No gear, and no gravity along its way.
+            // The arm has no gear, and gravity does not act in its plane.
             Self::Planar => &["gear_eccentricity", "load_friction", "joint_offset"],
-            // A base turned about a horizontal axis changes its torque in second order alone.
+            // A tilt of the base about a horizontal axis changes the torque only in second order.
             Self::Upright => &["gravity_tilt"],
             Self::Six => &[],
         };
@@ -48,10 +48,10 @@ impl Arm {
 }
 
 impl ArmScenario {
-    /// An arm with a fault of [`Arm::faults`] drawn by the seed, or with none.
+    /// Draws an arm with the named fault of [`Arm::faults`], or without a fault.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the arm shows no fault of that name.
+    /// [`ScenarioError`] if the arm shows no fault of that name.
     pub fn drawn(arm: Arm, fault: Option<&str>, seed: u64) -> Result<Self, ScenarioError> {
         let Some(name) = fault else {
             return Ok(Self::new(arm, None, seed));
@@ -68,7 +68,7 @@ impl ArmScenario {
         let limits = limits_of(arm)?;
         let n = limits.len();
         let any = dice.index(n);
-        // Of a joint before it.
+        // A joint that has a preceding joint.
         let behind = 1 + dice.index(n - 1);
         let [coulomb, viscous, inertia] = OF_LIMIT;
         let coulomb = coulomb * limits[any];

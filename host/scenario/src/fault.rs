@@ -1,38 +1,38 @@
-//! What is wrong with one joint of an arm, and the torque that it costs.
+//! Faults of one joint of an arm and their torques.
 
 use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column, inertia_matrix};
 
 use rig_model::robot::Robot;
 use rig_model::simulate::{Model, SimulateError};
 
-/// Speed over which dry friction of a fault turns, rad/s.
+/// Speed scale of the smooth reversal of a fault's dry friction, rad/s.
 const TURN: f64 = 5e-3;
 
-/// What is wrong with one joint. Torques are those that the drive has to give.
+/// A fault of one joint. Torques are additional drive torques.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// Friction that falls with the speed: torque, N·m, and speed at which half of it is left, rad/s.
+    /// Friction that falls with speed: torque, N·m, and speed at which half of it remains, rad/s.
     Stribeck([f64; 2]),
     /// More friction forwards than backwards, N·m.
     AsymmetricCoulomb(f64),
-    /// A wave once a motor turn, with a second harmonic of a tenth: amplitude, N·m, and phase, rad.
+    /// A sine once per motor turn, with a second harmonic of a tenth of its amplitude: amplitude, N·m, and phase, rad.
     GearEccentricity([f64; 2]),
-    /// Friction per torque that the gear transmits.
+    /// Friction per transmitted torque of the gear.
     LoadFriction(f64),
-    /// Torque per acceleration of the joint before, kg·m².
+    /// Torque per acceleration of the preceding joint, kg·m².
     InertiaCoupling(f64),
-    /// Torque per velocity of the joint before, N·m·s/rad: friction that it shares, and no inertia.
+    /// Torque per velocity of the preceding joint, N·m·s/rad: shared friction without inertia.
     ViscousCoupling(f64),
-    /// The base turned about x and y, rad.
+    /// Tilt of the base about x and y, rad.
     GravityTilt([f64; 2]),
     /// A point mass, kg, at a place in the link's frame, m.
     Payload([f64; 4]),
-    /// The reading is this much more than the position, rad.
+    /// Position reading minus true position, rad.
     JointOffset(f64),
 }
 
 impl Fault {
-    /// Name in results: the library's where it has one.
+    /// Name in results: that of the library's effect if there is one.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Stribeck(_) => "stribeck",
@@ -47,7 +47,7 @@ impl Fault {
         }
     }
 
-    /// What is to be said of it.
+    /// Diagnosis that is expected for the fault.
     pub fn calls_for(&self) -> CallsFor {
         match self {
             Self::ViscousCoupling(_) => CallsFor::Remainder,
@@ -57,14 +57,14 @@ impl Fault {
     }
 }
 
-/// What is to be said of a fault.
+/// Expected diagnosis of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CallsFor {
-    /// Its name, and the joint.
+    /// Name and joint of the fault.
     Name,
-    /// That values of the description have changed.
+    /// A change of values in the description.
     ParameterChange,
-    /// That something is left: the library has no such effect.
+    /// A remainder: the library has no such effect.
     Remainder,
 }
 
@@ -73,14 +73,14 @@ pub(super) struct Hidden {
     fault: Option<(usize, Fault)>,
     ratio: f64,
     chain: Chain<f64>,
-    /// Without friction, offset and the drive's inertia.
+    /// Parameters of the links without friction, offset and drive inertia.
     link: Vec<[f64; COLUMNS]>,
     before: Vec<f64>,
     acceleration: Vec<f64>,
 }
 
 impl Hidden {
-    /// Of a fault on the arm `model`.
+    /// Creates the torque model of a fault on the arm `model`.
     pub(super) fn new(fault: Option<(usize, Fault)>, robot: &Robot, model: &Model) -> Self {
         let joint = fault.map_or(0, |f| f.0);
         let mut link = model.parameters.clone();
@@ -98,10 +98,10 @@ impl Hidden {
         }
     }
 
-    /// Takes the fault's torque off what the drives apply.
+    /// Subtracts the fault's torque from the applied torques.
     ///
     /// # Errors
-    /// [`SimulateError`] where the arm has no dynamics there.
+    /// [`SimulateError`] if the dynamics of the arm cannot be computed there.
     pub(super) fn take(
         &self,
         q: &[f64],
@@ -113,7 +113,7 @@ impl Hidden {
         };
         let turned = (v[j] / TURN).tanh();
         applied[j] -= match fault {
-            // Rational, not Gaussian.
+            // Rational instead of Gaussian, unlike the library's effect.
             Fault::Stribeck([more, speed]) => more * turned / (1.0 + (v[j] / speed).powi(2)),
             Fault::AsymmetricCoulomb(half) => half * turned.abs(),
             Fault::GearEccentricity([amplitude, phase]) => {
@@ -137,12 +137,12 @@ impl Hidden {
         Ok(())
     }
 
-    /// Told of the velocities before a step.
+    /// Stores the velocities before a step.
     pub(super) fn before(&mut self, v: &[f64]) {
         self.before.copy_from_slice(v);
     }
 
-    /// Told of the velocities after it.
+    /// Computes the accelerations from the velocities after the step.
     pub(super) fn after(&mut self, v: &[f64], dt: f64) {
         for ((a, now), before) in self.acceleration.iter_mut().zip(v).zip(&self.before) {
             *a = (now - before) / dt;

@@ -1,4 +1,4 @@
-//! What is hidden in a recording: an effect of the emulated rig with its parameters.
+//! Hidden effects of the emulated rig and their parameters.
 
 use serde::Serialize;
 
@@ -18,14 +18,14 @@ use rig_plant::effect::torque_saturation::TorqueSaturation;
 use rig_plant::effect::transmission::{Backlash, Elasticity};
 use rig_plant::{Body, PlantConfig, VelocityWeakening};
 
-/// Power that friction takes on average in the scenarios' motion, W: 0.8 N·m and 0.25 N·m·s/rad at some 0.7 rad/s.
+/// Mean friction power in the motions of the scenarios, W: 0.8 N·m and 0.25 N·m·s/rad at about 0.7 rad/s.
 const FRICTION_POWER: f64 = 0.7;
-/// Rise of the gear's temperature at that power, K. Only its product with the rate of the friction shows.
+/// Temperature rise of the gear at that power, K. Only its product with the temperature rate of the friction matters.
 const WARMING: f64 = 10.0;
-/// Stiffness of closed teeth, N·m/rad, and their damping, N·m·s/rad.
+/// Contact stiffness of backlash, N·m/rad, and its damping, N·m·s/rad.
 const TEETH: [f64; 2] = [3000.0, 2.0];
 
-/// An effect with the parameters that are drawn, as the emulated rig means them.
+/// An effect with its drawn parameters, by the equations of the emulated rig.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Effect {
@@ -41,17 +41,17 @@ pub enum Effect {
         /// (F₊ − F₋)/F
         difference: f64,
     },
-    /// Torque with the square of speed.
+    /// Torque proportional to the square of speed.
     QuadraticDrag {
         /// N·m·s²/rad²
         coefficient: f64,
     },
-    /// Friction with the torque transmitted.
+    /// Friction proportional to the transmitted torque.
     LoadFriction {
         /// N·m per N·m
         ratio: f64,
     },
-    /// Tight spots of the joint.
+    /// Friction that varies with the joint position.
     PositionFriction {
         /// Relative.
         amplitude: f64,
@@ -60,14 +60,14 @@ pub enum Effect {
         /// rad
         phase: f64,
     },
-    /// Contact that yields before it slides (four Maxwell-slip elements).
+    /// Presliding: contacts deform before they slide (four Maxwell-slip elements).
     Presliding {
-        /// From rest to sliding, rad.
+        /// Travel from rest to sliding, rad.
         stroke: f64,
     },
-    /// Viscous friction falling as friction heats the gear.
+    /// Viscous friction that decreases as friction heats the gear.
     ViscousWarmup {
-        /// Share that is gone in the end.
+        /// Final relative decrease.
         fall: f64,
         /// s
         time_constant: f64,
@@ -81,7 +81,7 @@ pub enum Effect {
         /// rad
         phase: f64,
     },
-    /// Torque constant over the motor's angle.
+    /// Ripple of the torque constant over the motor angle.
     TorqueRipple {
         /// Relative.
         amplitude: f64,
@@ -97,7 +97,7 @@ pub enum Effect {
         /// rad
         phase: f64,
     },
-    /// Play between rotor and link.
+    /// Backlash between rotor and link.
     Backlash {
         /// Whole gap, rad.
         gap: f64,
@@ -109,45 +109,45 @@ pub enum Effect {
         /// N·m·s/rad
         damping: f64,
     },
-    /// Encoder off its axis.
+    /// Eccentric encoder disc.
     EncoderEccentricity {
         /// rad of the motor
         amplitude: f64,
         /// rad
         phase: f64,
     },
-    /// Error of the current sensor.
+    /// Offset of the current sensor.
     CurrentOffset {
         /// A
         current: f64,
     },
-    /// Torque constant over the current, 1/(1 + (i/knee)²).
+    /// Torque constant that falls with the current as 1/(1 + (i/knee)²).
     TorqueSaturation {
         /// Share lost at the current of the torque limit.
         loss: f64,
     },
-    /// Current reading that comes late.
+    /// Delay of the current measurement.
     MeasurementDelay {
         /// s, whole tenths of a millisecond
         delay: f64,
     },
-    /// Base not level.
+    /// Tilted base.
     GravityTilt {
         /// rad
         angle: f64,
     },
-    /// A body on the link that nobody wrote down.
+    /// A body on the link that the description does not have.
     Payload {
         /// kg
         mass: f64,
         /// From the joint's axis, m.
         distance: f64,
     },
-    /// Cable.
+    /// Spring torque, for example of a cable.
     Spring {
         /// N·m/rad
         stiffness: f64,
-        /// Angle from hanging at which it pulls nothing, rad.
+        /// Angle from the hanging position at which the spring torque is zero, rad.
         rest: f64,
     },
     /// Dead time of the bridge.
@@ -162,7 +162,7 @@ pub enum Effect {
     },
 }
 
-/// A compact body of steel, a few centimetres large, on the link.
+/// Returns a compact steel body of a few centimetres on the link.
 pub fn payload(mass: f64, distance: f64) -> Body {
     Body {
         mass,
@@ -177,7 +177,7 @@ pub fn payload(mass: f64, distance: f64) -> Body {
 pub struct Hidden {
     /// Index of the joint.
     pub joint: usize,
-    /// What.
+    /// Effect.
     pub effect: Effect,
 }
 
@@ -185,7 +185,7 @@ impl Effect {
     /// Current at the rig's torque limit of 8 N·m, A.
     pub const PEAK_CURRENT: f64 = 3.2;
 
-    /// Name as the contract has it.
+    /// Name in results and descriptions.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Stribeck { .. } => "stribeck",
@@ -212,7 +212,7 @@ impl Effect {
         }
     }
 
-    /// Puts it into the rig.
+    /// Adds the effect to the rig.
     pub(super) fn hide(&self, config: &mut PlantConfig) {
         let ratio = config.mechanism.ratio;
         let motor = &mut config.motor;

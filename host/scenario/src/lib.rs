@@ -1,9 +1,8 @@
-//! Recordings with a known gap: the emulated rig with effects hidden in it, and the description of a user who does not
-//! know of them.
+//! Recordings with a known gap: an emulated rig with hidden effects and a description without them.
 //!
-//! The rig ([`rig_plant`]) shares no equation with the library of effects: weakening is rational, not Gaussian,
-//! presliding has four elements, warming is driven by heat, and so on; step, controller and sensors lie between the truth
-//! and what is recorded. Equal scenarios give equal bytes.
+//! The rig ([`rig_plant`]) shares no equation with the library of effects: velocity weakening is rational instead of
+//! Gaussian, presliding has four elements, heat drives the warm-up, and so on. The recordings also contain the
+//! influence of integration step, controller and sensors. Equal scenarios give equal bytes.
 //!
 //! ```no_run
 //! use rig_scenario::Scenario;
@@ -49,15 +48,15 @@ use rig_plant::PlantConfig;
 use size::{Equation, Problem, beyond};
 use written::write_all;
 
-/// Run of the hold-out's repeat, beside those of training (0, 1), hold-out (2) and experiments.
+/// Number of the run that repeats the hold-out. Training has 0 and 1, hold-out 2; experiments use the numbers between.
 const HELD_AGAIN: u64 = 6;
 
-/// Why a scenario cannot be made.
+/// Reason why a scenario cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[error("The scenario cannot be made: {0}")]
 pub struct ScenarioError(pub String);
 
-/// Which rig is recorded.
+/// Kind of rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rig {
     /// A geared link in a vertical plane.
@@ -65,37 +64,37 @@ pub enum Rig {
     OneLink,
 }
 
-/// What is to be recorded.
+/// Settings of the recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
-    /// On what.
+    /// Kind of rig.
     pub rig: Rig,
-    /// What is hidden; nothing where empty.
+    /// Hidden effects; empty for a rig without hidden effects.
     pub hidden: Vec<Hidden>,
-    /// Of sensors and surroundings.
+    /// Noise of sensors and disturbance torque.
     pub noise: Noise,
-    /// Of rig, motion and noise.
+    /// Seed of rig, motion and noise.
     pub seed: u64,
-    /// How much the motion shows.
+    /// Kind of excitation.
     pub excitation: Excitation,
     /// Length of the training and of the hold-out recording, s.
     pub seconds: [f64; 2],
-    /// Whether the training reference is run twice.
+    /// True if the training motion is recorded twice.
     pub repeated: bool,
-    /// Whether the reference held back is run twice.
+    /// True if the hold-out motion is recorded twice.
     pub held_twice: bool,
     /// Relative error of the parameters in the description.
     pub description_error: f64,
-    /// A torque from outside that comes in the first run only.
+    /// Disturbance torque in the first run only.
     pub intrusion: Option<Intrusion>,
-    /// Substeps of the rig per 0.1 ms; none for what suffices.
+    /// Integration substeps of the rig per 0.1 ms; none for the default.
     pub substeps: Option<u32>,
-    /// Whether an encoder on the link is recorded beside the motor's.
+    /// True if an encoder on the link is recorded beside that of the motor.
     pub second_encoder: bool,
 }
 
 impl Scenario {
-    /// 90 s of training and 60 s of hold-out, each run twice, at the middle noise level.
+    /// Returns the standard scenario: 90 s of training and 60 s of hold-out, both recorded twice, with medium noise.
     pub fn new(hidden: Vec<Hidden>, seed: u64) -> Self {
         Self {
             rig: Rig::OneLink,
@@ -113,7 +112,7 @@ impl Scenario {
         }
     }
 
-    /// The named effects in joint 0, drawn by the seed; none where a name is unknown.
+    /// Draws the named effects with the seed and hides them in joint 0; none if a name is unknown.
     pub fn of(names: &[&str], seed: u64) -> Option<Self> {
         let hidden = names
             .iter()
@@ -124,7 +123,7 @@ impl Scenario {
     /// Runs the rig.
     ///
     /// # Errors
-    /// [`ScenarioError`] where a hidden effect names a joint that the rig has not.
+    /// [`ScenarioError`] if a hidden effect names a joint that the rig does not have.
     pub fn make(&self) -> Result<Made, ScenarioError> {
         let Rig::OneLink = self.rig;
         if let Some(beyond) = self.hidden.iter().find(|h| h.joint > 0) {
@@ -172,11 +171,11 @@ impl Scenario {
         })
     }
 
-    /// How large each hidden effect is by itself against the noise floor, in the order of `hidden`. Takes two more runs of
-    /// the training reference and one for each effect.
+    /// Measures each hidden effect alone against the noise floor, in the order of `hidden`. Simulates the training
+    /// motion twice and once more for each effect.
     ///
     /// # Errors
-    /// A motion that does not excite the nominal model.
+    /// The motion does not excite the nominal model.
     pub fn sizes(&self) -> Result<Vec<Size>, ScenarioError> {
         let healthy = rig::healthy(self.seed, &self.noise);
         let robot = rig::description(&healthy, 0.0, self.seed)?;
@@ -222,7 +221,7 @@ impl Scenario {
         run: u64,
         manner: Manner,
     ) -> Result<Block, ScenarioError> {
-        // The controller is tuned to the rig as it was before anything was hidden in it.
+        // The controller is tuned to the rig without hidden effects.
         let equivalent = healthy.equivalent();
         let config = self.hiding(healthy);
         let nominal = Nominal {
@@ -242,7 +241,7 @@ impl Scenario {
         ))
     }
 
-    /// The rig with all that is hidden in it.
+    /// Returns the rig with its hidden effects.
     fn hiding(&self, healthy: &PlantConfig) -> PlantConfig {
         let mut config = healthy.clone();
         if let Some(substeps) = self.substeps {
@@ -255,7 +254,7 @@ impl Scenario {
         config
     }
 
-    /// Seeds of runs far apart from those of the rigs.
+    /// Seed of a run.
     fn seed_of(&self, run: u64) -> u64 {
         self.seed.wrapping_mul(8).wrapping_add(run)
     }
@@ -266,7 +265,7 @@ fn drive_of(robot: &Robot) -> Result<&Drive, ScenarioError> {
     drive.ok_or_else(|| ScenarioError("the description has no drive".into()))
 }
 
-/// J, m·g·l, fv and fc of the rig before anything was hidden in it, and its joint-side torque constant.
+/// J, m·g·l, fv and fc of the rig without hidden effects, and its joint-side torque constant.
 fn nominal_parameters(config: &PlantConfig) -> BTreeMap<&'static str, f64> {
     let e = config.equivalent();
     BTreeMap::from([
@@ -281,47 +280,47 @@ fn nominal_parameters(config: &PlantConfig) -> BTreeMap<&'static str, f64> {
     ])
 }
 
-/// What is true of a scenario's recordings.
+/// Ground truth of a scenario's recordings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Truth {
-    /// What is hidden.
+    /// Hidden effects.
     pub hidden: Vec<Hidden>,
-    /// The rig's nominal parameters, SI, joint-side.
+    /// Nominal parameters of the rig, SI units, joint side.
     pub nominal: BTreeMap<&'static str, f64>,
-    /// Of the scenario.
+    /// Seed of the scenario.
     pub seed: u64,
 }
 
 impl Truth {
-    /// Names of what is hidden.
+    /// Names of the hidden effects.
     pub fn names(&self) -> Vec<&'static str> {
         self.hidden.iter().map(|h| h.effect.name()).collect()
     }
 }
 
-/// How large a hidden effect is.
+/// Size of a hidden effect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Size {
-    /// RMS that a refit of the nominal model leaves because of it.
+    /// RMS of the part of the residual that the effect causes after a refit of the nominal model.
     pub excess_rms: f64,
-    /// The same with the nominal parameters as they were before.
+    /// As `excess_rms`, with the nominal parameters from before instead of a refit.
     pub frozen_rms: f64,
-    /// RMS that a refit leaves of a recording with noise and nothing hidden.
+    /// Noise floor: residual RMS after a refit, with noise and without the hidden effect.
     pub floor_rms: f64,
-    /// The same without noise: what filtering and reversals leave.
+    /// As `floor_rms`, but without noise: the residual from filtering and reversals.
     pub base_rms: f64,
-    /// ASCII; volts for what shows in the voltage alone.
+    /// Unit of the RMS values, ASCII; V for an effect that shows only in the voltage.
     pub unit: &'static str,
-    /// Whether what is hidden is a change of parameters, which a refit takes up.
+    /// True if the effect is a change of parameters, which a refit removes.
     pub parameter_change: bool,
 }
 
-/// What an effect has to leave after a refit, in noise floors, for it to be expected to be found.
+/// Ratio of an effect's residual after a refit to the noise floor from which on a diagnosis should find it.
 pub const ABOVE_FLOOR: f64 = 0.5;
 
 impl Size {
-    /// Whether the effect can be expected to be found: what it leaves is at least [`ABOVE_FLOOR`] of the noise floor. A change
-    /// of parameters is judged with the parameters as they were.
+    /// Returns true if a diagnosis should find the effect: its residual is at least [`ABOVE_FLOOR`] times the noise
+    /// floor. For a change of parameters this is the residual without a refit.
     pub fn above_floor(&self) -> bool {
         let rms = if self.parameter_change {
             self.frozen_rms
@@ -335,30 +334,30 @@ impl Size {
 /// A scenario's recordings.
 #[derive(Clone, Debug)]
 pub struct Made {
-    /// What the user knows.
+    /// Description that the user has.
     pub robot: Robot,
-    /// To learn from.
+    /// Training recording.
     pub train: InMemory,
-    /// The same reference again.
+    /// Second recording of the training motion.
     pub repeat: Option<InMemory>,
-    /// To learn from besides: what was recorded since.
+    /// Further training recordings, made later.
     pub further: Vec<InMemory>,
-    /// … with everything taken off that pulls on the rig from outside.
+    /// Training recordings made after all external loads were removed.
     pub unburdened: Vec<InMemory>,
-    /// The rig with its drive off; none unless asked for.
+    /// Recording with the drive off; none unless requested.
     pub drive_off: Option<InMemory>,
-    /// … and with the motor's shaft clamped.
+    /// Recording with the motor's shaft clamped; none unless requested.
     pub clamped: Option<InMemory>,
-    /// Another reference.
+    /// Hold-out recording of another motion.
     pub holdout: InMemory,
-    /// The same other reference again, by which the noise of what is held back is known.
+    /// Second recording of the hold-out motion, which gives its noise floor.
     pub held_again: Option<InMemory>,
-    /// What is true.
+    /// Ground truth.
     pub truth: Truth,
 }
 
 impl Scenario {
-    /// 30 s of training run twice and 20 s of hold-out once, with these effects in joint 0.
+    /// Returns a short scenario: 30 s of training (twice) and 20 s of hold-out (once), with `effects` in joint 0.
     pub fn short(effects: impl IntoIterator<Item = Effect>, seed: u64) -> Self {
         let hidden = effects
             .into_iter()
@@ -372,8 +371,7 @@ impl Scenario {
 }
 
 impl Made {
-    /// Gives `take` the recordings to learn from and those held out, with the repeats where there are any and what was recorded
-    /// since.
+    /// Calls `take` with the training and the hold-out recordings, including repeats and later recordings.
     pub fn with_recordings<T>(
         &self,
         take: impl FnOnce(&[&dyn Recording], &[&dyn Recording]) -> T,
@@ -395,7 +393,7 @@ impl Made {
     /// Writes `robot.toml`, `train.csv`, `repeat.csv`, `holdout.csv` and `holdout-again.csv` into a folder that exists.
     ///
     /// # Errors
-    /// What the system says.
+    /// A file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), ScenarioError> {
         let recordings = [
             ("train.csv", Some(&self.train)),

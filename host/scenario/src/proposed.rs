@@ -1,4 +1,4 @@
-//! A proposed motion on the rig of a scenario.
+//! Recordings of proposed experiments on the rig of a scenario.
 
 use rig_shared::effects::Kind;
 
@@ -9,30 +9,30 @@ use crate::ScenarioError;
 use rig_data::prepare::InMemory;
 use rig_excite::{COASTING, JointTrajectory, TrajectoryFile};
 
-/// Time to come from rest where the link hangs to where the motion begins, and back, s.
+/// Time of the approach from rest at the hanging position to the start of the motion, and of the return, s.
 const APPROACH: f64 = 2.0;
-/// Number of the run; the scenario's own come before it.
+/// Number of the run; 0 to 2 belong to training and hold-out.
 const RUN: u64 = 3;
-/// … and of the log with the drive off, which lasts so long, s.
+/// Number of the recording with the drive off, and its length, s.
 const OFF: (u64, f64) = (4, 2.0);
 
-/// The one joint of a proposed motion.
+/// Returns the only joint of a proposed motion.
 fn joint_of(file: &TrajectoryFile) -> Result<&JointTrajectory, ScenarioError> {
     (file.joints.first()).ok_or_else(|| ScenarioError("the proposed motion has no joint".into()))
 }
 
-/// Its references from `start` on, for so long (s).
+/// Samples the references of a joint from the position `start` on for `duration` seconds.
 fn sampled(own: &JointTrajectory, start: f64, duration: f64) -> impl Iterator<Item = f64> {
     let samples = (duration * RATE).ceil() as usize;
     (0..samples).map(move |k| start + own.trajectory.at(k as f64 / RATE).position)
 }
 
 impl Scenario {
-    /// Records a motion on the rig that `made` was recorded on, from rest where it hangs and back; of one in which the drive is
-    /// switched off until it has come to rest.
+    /// Records a motion on the rig of `made`, with approach from the hanging position and return to it. If the motion
+    /// switches the drive off, the recording ends when the rig has come to rest.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the file has no joint.
+    /// [`ScenarioError`] if the file has no joint.
     pub fn proposed(&self, made: &Made, file: &TrajectoryFile) -> Result<InMemory, ScenarioError> {
         let own = joint_of(file)?;
         let approach = (APPROACH * RATE) as usize;
@@ -53,10 +53,10 @@ impl Scenario {
         self.recorded(made, &reference, Manner::CoastingFrom(from))
     }
 
-    /// Records a motion with the motor's shaft clamped where the link hangs.
+    /// Records a motion with the motor shaft clamped at the hanging position.
     ///
     /// # Errors
-    /// Those of [`proposed`](Self::proposed).
+    /// As [`proposed`](Self::proposed).
     pub fn clamped(&self, made: &Made, file: &TrajectoryFile) -> Result<InMemory, ScenarioError> {
         let own = joint_of(file)?;
         let reference: Vec<f64> = sampled(own, 0.0, own.trajectory.duration()).collect();
@@ -76,7 +76,7 @@ impl Scenario {
         })
     }
 
-    /// The same rig with everything taken off that pulls on it from outside.
+    /// Returns the same rig without external loads.
     pub fn unburdened(&self) -> Self {
         let outside =
             |effect: &Effect| Kind::named(effect.name(), None).is_some_and(Kind::is_external);
@@ -88,10 +88,10 @@ impl Scenario {
         }
     }
 
-    /// Records the rig that `made` was recorded on with its drive off.
+    /// Records the rig of `made` with its drive off.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the description has no drive.
+    /// [`ScenarioError`] if the description has no drive.
     pub fn drive_off(&self, made: &Made) -> Result<InMemory, ScenarioError> {
         let (run, seconds) = OFF;
         let config = self.hiding(&rig::healthy(self.seed, &self.noise));

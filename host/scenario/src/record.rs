@@ -1,9 +1,9 @@
-//! The rig under a position loop, recorded.
+//! Recordings of the rig under a position loop.
 //!
-//! Proportional and derivative action on the encoder's reading, with the nominal weight and inertia fed forward; the
-//! torque becomes a voltage over the nominal resistance and back-EMF. There is no current loop, so that noise of
-//! the current sensor does not come back as torque. The supply alone limits: with a limit on the wanted torque, dead
-//! time would leave nothing of it.
+//! The controller is a PD controller on the encoder reading with feed-forward of nominal gravity and inertia. It
+//! converts torque to voltage with the nominal resistance and back-EMF. It has no current loop, so noise of the current
+//! sensor does not act on the torque. Only the supply limits the voltage: with a limit on the commanded torque, dead
+//! time would consume the whole command.
 
 use core::f64::consts::TAU;
 
@@ -19,26 +19,26 @@ use rig_plant::{Plant, PlantConfig};
 
 /// Natural frequency of the position loop, Hz.
 const BANDWIDTH: f64 = 8.0;
-/// Damping ratio of it.
+/// Damping ratio of the position loop.
 const DAMPING: f64 = 0.9;
-/// First-order filter on the differentiated reading, Hz.
+/// Cut-off of the first-order filter on the differentiated encoder reading, Hz.
 const SPEED_FILTER: f64 = 120.0;
 
-/// What the controller is made from: nominal values.
+/// Nominal values for the design of the controller.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nominal {
-    /// kg·m², rotor included.
+    /// Inertia including the rotor, kg·m².
     pub(super) inertia: f64,
     /// Gravity torque at 90° from hanging, N·m.
     pub(super) gravity: f64,
 }
 
-/// A torque that comes and goes during one recording, on the link.
+/// Disturbance torque on the link during a part of one recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrusion {
     /// Highest torque, N·m.
     pub torque: f64,
-    /// When it begins and ends, s.
+    /// Start and end, s.
     pub interval: [f64; 2],
 }
 
@@ -48,24 +48,24 @@ impl Intrusion {
         if t <= from || t >= to {
             return 0.0;
         }
-        // Shakes by hand: a few swings under a window.
+        // A hand shakes the link: a few swings with smooth start and end.
         let place = (t - from) / (to - from);
         self.torque * (0.5 * TAU * place).sin() * (9.0 * TAU * place).sin().powi(2)
     }
 }
 
-/// How a recording is made.
+/// Condition of the drive during a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Manner {
-    /// Under the controller from the first sample to the last.
+    /// Controlled from the first sample to the last.
     Driven,
-    /// From this sample on with the drive off, which the rig's mode says.
+    /// Drive off from this sample on; the recorded mode shows it.
     CoastingFrom(usize),
-    /// With the motor's shaft in a clamp.
+    /// Motor shaft clamped.
     Clamped,
 }
 
-/// Inertia that a shaft in a clamp has as good as, kg·m².
+/// Rotor inertia that represents a clamped shaft, kg·m².
 const CLAMP: f64 = 1e6;
 
 struct Loop {
@@ -96,7 +96,7 @@ impl Loop {
         )
     }
 
-    /// Duty for a reference position, velocity and acceleration.
+    /// Computes the duty for a reference position, velocity and acceleration.
     fn duty(&self, q: f64, [reference, velocity, acceleration]: [f64; 3]) -> f64 {
         let natural = TAU * BANDWIDTH;
         let nominal = &self.nominal;
@@ -112,8 +112,8 @@ impl Loop {
     }
 }
 
-/// Runs the rig along `reference` and records t, q, torque by the nominal constant, reference, voltage in force
-/// (that of the control period before the sample) and what an encoder on the link reads, where there is one.
+/// Runs the rig along `reference` and records t, q, torque (current times the nominal torque constant), reference and
+/// applied voltage (of the control period before the sample). Records the encoder on the link, too, if there is one.
 pub(super) fn record(
     mut config: PlantConfig,
     drive: &Drive,
@@ -165,7 +165,7 @@ pub(super) fn record(
         joint.q.push(q);
         joint.tau.push(constant * current);
         links.extend(plant.link_angle());
-        // A rig that does not drive asks for where it is.
+        // With the drive off, the reference is the position.
         references.push(if command.bridge { position } else { q });
         voltages.push(f64::from(command.duty.0) * control.supply);
 
@@ -198,7 +198,7 @@ pub(super) fn record(
     block
 }
 
-/// The rig hanging with its drive off, recorded for so many samples: no reference, no voltage.
+/// Records `samples` samples of the hanging rig with its drive off, without reference and voltage.
 pub(super) fn drive_off(config: PlantConfig, drive: &Drive, samples: usize, seed: u64) -> Block {
     let scaling = config.sensors.scaling;
     let ticks = (TICK_RATE / RATE).round() as usize;
@@ -217,7 +217,7 @@ pub(super) fn drive_off(config: PlantConfig, drive: &Drive, samples: usize, seed
         }
         let code = f64::from(sample.current.0) - f64::from(scaling.current_zero);
         block.t.push(k as f64 / RATE);
-        // It hangs where it was switched on.
+        // The rig hangs at the position where it was switched on.
         joint.q.push(0.0);
         joint
             .tau

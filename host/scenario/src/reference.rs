@@ -1,4 +1,4 @@
-//! What the rig is asked to do: sums of sines, slow ramps with reversals and chirps, at random.
+//! Reference motions of the rig, drawn at random: sums of sines, slow ramps with reversals, and chirps.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,27 +6,27 @@ use super::dice::Dice;
 
 /// Reference samples and control steps per second.
 pub(super) const RATE: f64 = 1000.0;
-/// Largest angle from where the link hangs, rad.
+/// Largest angle from the hanging position, rad.
 const REACH: f64 = 1.5;
 /// Largest speed, rad/s, and acceleration, rad/s².
 const SPEED: f64 = 5.0;
 const ACCELERATION: f64 = 18.0;
 /// Acceleration between two speeds of a ramp, rad/s².
 const RAMP_ACCELERATION: f64 = 4.0;
-/// Time to come from anywhere to rest at the middle, s.
+/// Time of the return from any position to rest at the middle, s.
 const RETURN: f64 = 1.5;
 
-/// How much the motion shows.
+/// Kind of excitation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Excitation {
-    /// Half of the time sums of sines, 30 % ramps at 0.02 to 1 rad/s, 20 % chirps from 0.3 to 3 Hz.
+    /// 50 % of the time sums of sines, 30 % ramps at 0.02 to 1 rad/s, 20 % chirps from 0.3 to 3 Hz.
     #[default]
     Full,
     /// One slow sine of a third of a radian: no slow ramps, no high speed, little change of load.
     Poor,
 }
 
-/// Reference position over time, sampled at [`RATE`], from and to rest at 0.
+/// Returns the reference position, sampled at [`RATE`], which starts and ends at rest at 0.
 pub(super) fn reference(excitation: Excitation, seconds: f64, seed: u64, purpose: u64) -> Vec<f64> {
     let mut dice = Dice::new(seed, purpose);
     let samples = (seconds * RATE).round() as usize;
@@ -38,7 +38,7 @@ pub(super) fn reference(excitation: Excitation, seconds: f64, seed: u64, purpose
             q.extend(part);
         }
         Excitation::Full => {
-            // Two of each of the longer kinds, in any order, so that warming up meets all of them.
+            // Two parts of each longer kind, in random order, so that all kinds occur both cold and warm.
             let mut parts = [0, 0, 1, 1, 2];
             for k in (1..parts.len()).rev() {
                 parts.swap(k, dice.index(k + 1));
@@ -56,7 +56,7 @@ pub(super) fn reference(excitation: Excitation, seconds: f64, seed: u64, purpose
     q
 }
 
-/// `law` over `seconds`, faded in and out over one second.
+/// Samples `law` over `seconds` and fades it in and out within one second.
 fn tapered(seconds: f64, law: impl Fn(f64) -> f64) -> Vec<f64> {
     let samples = (seconds * RATE).round() as usize;
     (0..samples)
@@ -68,7 +68,7 @@ fn tapered(seconds: f64, law: impl Fn(f64) -> f64) -> Vec<f64> {
         .collect()
 }
 
-/// Brings a curve within reach, speed and acceleration.
+/// Scales a curve to the limits of reach, speed and acceleration.
 fn within(mut q: Vec<f64>, reach: f64) -> Vec<f64> {
     let peak = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m: f64, x| m.max(x.abs()));
     let position = peak(&mut q.iter().copied());
@@ -103,7 +103,7 @@ fn multisine(dice: &mut Dice, seconds: f64) -> Vec<f64> {
     within(tapered(seconds, sum), reach)
 }
 
-/// Constant speeds in both directions, then back to the middle.
+/// Constant speeds in both directions, then a return to the middle.
 fn ramps(dice: &mut Dice, seconds: f64) -> Vec<f64> {
     let samples = ((seconds - RETURN) * RATE).round().max(0.0) as usize;
     let mut q = Vec::with_capacity(samples + (RETURN * RATE) as usize);
@@ -116,7 +116,7 @@ fn ramps(dice: &mut Dice, seconds: f64) -> Vec<f64> {
             target = direction * dice.log_uniform([0.02, 1.0]);
             left = (dice.uniform(0.5, 2.5) * RATE) as usize;
         }
-        // Turn before the end of the range.
+        // Reverse before the end of the range.
         let stopping = 0.5 * speed * speed / RAMP_ACCELERATION;
         if (position + stopping * speed.signum()).abs() > REACH - 0.1 && position * target > 0.0 {
             direction = -direction;
@@ -128,7 +128,7 @@ fn ramps(dice: &mut Dice, seconds: f64) -> Vec<f64> {
         left -= 1;
         q.push(position);
     }
-    // Quintic to rest at the middle, from the position and speed reached.
+    // Quintic polynomial from the present position and speed to rest at the middle.
     let [p, v] = [position, speed * RETURN];
     for k in 1..=(RETURN * RATE) as usize {
         let s = k as f64 / (RETURN * RATE);
@@ -140,7 +140,7 @@ fn ramps(dice: &mut Dice, seconds: f64) -> Vec<f64> {
     q
 }
 
-/// Exponential sweep about a random angle, as wide as the acceleration allows.
+/// Exponential sweep about a random angle; the acceleration limit bounds its amplitude.
 fn chirp(dice: &mut Dice, seconds: f64) -> Vec<f64> {
     let (low, high) = (0.3_f64, 3.0_f64);
     let growth = (high / low).ln() / seconds;
@@ -176,7 +176,7 @@ mod tests {
                 "{highest} {jump}"
             );
             assert!(q[0].abs() < 1e-4 && q[q.len() - 1].abs() < 1e-4);
-            // Slow motion at constant speed, and reversals, are there to be seen.
+            // The motion must contain slow constant speeds and reversals.
             let slow = speed.iter().filter(|v| (0.02..0.3).contains(&v.abs()));
             assert!(slow.count() > 5_000, "seed {seed}");
             let turns = speed.windows(2).filter(|w| w[0] * w[1] < 0.0).count();

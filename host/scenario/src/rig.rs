@@ -1,6 +1,6 @@
-//! The rig that the scenarios are recorded on, and what its owner would have written down about it.
+//! The rig of the scenarios and the description that its owner has.
 //!
-//! A 24 V geared arm of the size of the catalogue's reference rig: ratio 50, reflected rotor 0.05 kg·m², link
+//! A 24 V geared arm, as large as the reference rig of the catalogue: ratio 50, reflected rotor 0.05 kg·m², link
 //! 0.15 kg·m², gravity 3.4 N·m, viscous 0.25 N·m·s/rad and Coulomb friction 0.8 N·m, three quarters of both before the gear.
 
 use std::f64::consts::FRAC_PI_2;
@@ -11,20 +11,20 @@ use rig_model::robot::{JointFriction, ONE_LINK_TEMPLATE, Robot};
 use rig_plant::effect::disturbance::Disturbance;
 use rig_plant::{Body, Friction, LinkEncoder, PlantConfig, Presliding};
 
-/// Ticks of the rig per second: also the resolution of a delay.
+/// Ticks of the rig per second, Hz. One tick is also the resolution of a delay.
 pub(super) const TICK_RATE: f64 = 10_000.0;
-/// Substeps per tick. The tests compare with ten.
+/// Integration substeps per tick. A test compares the results with those of ten substeps.
 pub(super) const SUBSTEPS: u32 = 2;
-/// Travel of the contact on the rig without presliding, rad: below one count of the encoder.
+/// Presliding stroke of a rig without the presliding effect, rad: below one count of the encoder.
 const STROKE: f64 = 2.0e-5;
 /// Share of friction that acts before the gear.
 const BEFORE_GEAR: f64 = 0.75;
-/// Where the link hangs, in the angle of the plant, rad.
+/// Hanging position of the link in the plant's angle, rad.
 const HANGING: f64 = -FRAC_PI_2;
-/// Largest relative departure of a rig from the reference.
+/// Largest relative deviation of a rig's parameters from the reference.
 const SPREAD: f64 = 0.1;
 
-/// The encoder on the link where there is one: absolute, of 17 bits, with half a count of noise; nobody has set its zero.
+/// The optional encoder on the link: absolute, 17 bits, half a count of noise, with an arbitrary zero.
 pub(super) const LINK_ENCODER: LinkEncoder = LinkEncoder {
     counts_per_turn: 131_072.0,
     zero: HANGING + 0.2,
@@ -32,38 +32,38 @@ pub(super) const LINK_ENCODER: LinkEncoder = LinkEncoder {
     eccentricity: None,
 };
 
-/// How much the sensors and the surroundings disturb.
+/// Noise of the sensors and disturbance torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Of one current sample, A rms.
+    /// Noise of one current sample, A rms.
     pub current: f64,
-    /// Coloured torque on the joint, N·m rms.
+    /// Coloured disturbance torque on the joint, N·m rms.
     pub disturbance: f64,
-    /// Its correlation time, s.
+    /// Correlation time of the disturbance, s.
     pub correlation: f64,
     /// Encoder counts per motor turn.
     pub counts: f64,
 }
 
 impl Noise {
-    /// A tenth of a newton metre in the torque: 0.05 A per sample at 2.5 N·m/A.
+    /// Medium noise: 0.05 A per sample, about 0.1 N·m at 2.5 N·m/A.
     pub const MEDIUM: Self = Self {
         current: 0.05,
         disturbance: 0.03,
         correlation: 0.05,
         counts: 4096.0,
     };
-    /// A good current sensor.
+    /// Low noise: a good current sensor.
     pub const LOW: Self = Self {
         current: 0.02,
         ..Self::MEDIUM
     };
-    /// A poor one.
+    /// High noise: a poor current sensor.
     pub const HIGH: Self = Self {
         current: 0.2,
         ..Self::MEDIUM
     };
-    /// Sixteen times finer counts and nothing random: what the effect alone leaves.
+    /// No noise and 16 times finer counts, to measure the residual of an effect alone.
     pub(super) const NONE: Self = Self {
         current: 0.0,
         disturbance: 0.0,
@@ -78,7 +78,7 @@ impl Noise {
     ];
 }
 
-/// A rig near the reference, nothing hidden in it.
+/// Returns a rig near the reference without hidden effects.
 pub(super) fn healthy(seed: u64, noise: &Noise) -> PlantConfig {
     let mut dice = Dice::new(seed, 0);
     let mut near = |value: f64| value * dice.uniform(1.0 - SPREAD, 1.0 + SPREAD);
@@ -143,8 +143,8 @@ pub(super) fn healthy(seed: u64, noise: &Noise) -> PlantConfig {
     config
 }
 
-/// What the owner of the rig knows: its parameters to three digits, its angle from where it hangs. `error` is the
-/// relative standard deviation of what was written down wrongly.
+/// Returns the description that the owner of the rig has: parameters with three digits, angle from the hanging
+/// position. `error` is the relative standard deviation of the errors in its values.
 ///
 /// # Errors
 /// The template cannot be read.
@@ -189,7 +189,7 @@ pub(super) fn description(
     if let Some(drive) = &mut joint.drive {
         drive.gear_ratio = ratio;
         drive.rotor_inertia = written(rotor);
-        // Torques are what this constant makes of the currents; an error would rescale every parameter alike.
+        // Exact, because an error of the torque constant would scale all torques and parameters by one factor.
         drive.torque_constant = three_digits(config.motor.torque_constant);
         drive.resistance = Some(three_digits(config.motor.resistance));
         drive.inductance = Some(three_digits(config.motor.inductance));
@@ -203,7 +203,7 @@ fn three_digits(value: f64) -> f64 {
         return 0.0;
     }
     let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
-    // Divided by the inverse where that is whole: 0.799 and not 0.7990000000000001.
+    // Dividing by the whole inverse gives 0.799 instead of 0.7990000000000001.
     if unit < 1.0 {
         let inverse = (1.0 / unit).round();
         (value * inverse).round() / inverse

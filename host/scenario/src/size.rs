@@ -1,8 +1,8 @@
-//! How large a hidden effect is against the noise floor.
+//! Size of a hidden effect relative to the noise floor.
 //!
-//! Both are RMS values of what a refit of the nominal model J·q̈ + m·g·l·sin q + fv·q̇ + fc·sgn q̇ leaves of the torque,
-//! model and torque below 40 Hz by the same zero-phase filter, while the joint moves: at rest sgn q̇ says nothing. The excess is taken from recordings without noise,
-//! with the effect and without it, of the same reference.
+//! Both are residual RMS values after a refit of the nominal model J·q̈ + m·g·l·sin q + fv·q̇ + fc·sgn q̇ to the
+//! torque. Model and torque pass the same zero-phase filter of 40 Hz. Only rows in motion count, because sgn q̇ is
+//! undefined at rest. The excess comes from two recordings without noise, with and without the effect.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,24 +12,24 @@ use rig_data::prepare::{LowPass, central_difference, second_difference};
 
 use super::reference::RATE;
 
-/// Band that residuals are compared in, Hz.
+/// Cut-off of the filter for residuals, Hz.
 const BAND: f64 = 40.0;
-/// Every so many samples are used: twice the band and more.
+/// Every tenth sample is used, so the sample rate stays above twice the band.
 const STRIDE: usize = 10;
 
-/// Speed from which the joint moves, rad/s.
+/// Speed above which the joint counts as moving, rad/s.
 const MOVING: f64 = 0.01;
 
-/// Which equation is refitted.
+/// Equation that is refitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Equation {
-    /// Of the mechanics, N·m.
+    /// Equation of motion, N·m.
     Torque,
-    /// Of the winding, V: u = R·i + L·di/dt + k·q̇.
+    /// Voltage equation of the winding, V: u = R·i + L·di/dt + k·q̇.
     Voltage,
 }
 
-/// A linear model of one recording: its columns, and what they are to explain.
+/// A linear model of one recording: regressor columns and target.
 pub(super) struct Problem {
     columns: DMatrix<f64>,
     target: DVector<f64>,
@@ -54,7 +54,7 @@ impl Problem {
         })
     }
 
-    /// What the refitted model says at every sample.
+    /// Returns the prediction of the refitted model at every sample.
     pub(super) fn explained(&self, block: &Block) -> Result<Vec<f64>, ScenarioError> {
         let parameters = self.refit()?;
         let signals = Signals::of(block, self.equation)?;
@@ -65,7 +65,7 @@ impl Problem {
         Ok((0..signals.target.len()).map(at).collect())
     }
 
-    /// Least squares.
+    /// Refits the parameters by least squares.
     pub(super) fn refit(&self) -> Result<DVector<f64>, ScenarioError> {
         let normal = self.columns.transpose() * &self.columns;
         let right = self.columns.transpose() * &self.target;
@@ -75,7 +75,7 @@ impl Problem {
             .ok_or_else(|| ScenarioError("the motion does not excite the model".into()))
     }
 
-    /// Of what `parameters` leave.
+    /// Residual RMS with these parameters.
     pub(super) fn rms(&self, parameters: &DVector<f64>) -> f64 {
         let left = &self.target - &self.columns * parameters;
         (left.norm_squared() / left.len() as f64).sqrt()
@@ -134,7 +134,7 @@ impl Signals {
     }
 }
 
-/// What `with` has beyond `without`, of uncorrelated origin.
+/// RMS of the part of `with` that is not in `without`, assuming both parts are uncorrelated.
 pub(super) fn beyond(with: f64, without: f64) -> f64 {
     (with * with - without * without).max(0.0).sqrt()
 }

@@ -1,4 +1,4 @@
-//! Recordings whose residual has the right spectrum and no meaning.
+//! Surrogate recordings: noise with the spectrum of the residual replaces the residual.
 
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
@@ -10,11 +10,11 @@ use crate::ScenarioError;
 use rig_data::prepare::InMemory;
 
 impl Made {
-    /// The same recordings with what the nominal model leaves of the torque replaced by noise of the same spectrum
-    /// (Theiler et al. 1992, phases drawn anew for each recording): nothing in it follows from the motion any more.
+    /// Replaces the residual of the nominal model by noise with the same spectrum (Theiler et al. 1992, new phases for
+    /// each recording). The new residual does not depend on the motion.
     ///
     /// # Errors
-    /// A motion that does not excite the nominal model.
+    /// The motion does not excite the nominal model.
     pub fn phase_randomised(mut self, seed: u64) -> Result<Self, ScenarioError> {
         randomise(&mut self.train, seed, 6)?;
         if let Some(repeat) = &mut self.repeat {
@@ -36,7 +36,7 @@ fn randomise(recording: &mut InMemory, seed: u64, purpose: u64) -> Result<(), Sc
         let Some(joint) = block.joints.first_mut() else {
             continue;
         };
-        // The link does not move as that torque would have it.
+        // The reading of the link encoder does not fit the new torque.
         joint.link = None;
         let mut left: Vec<f64> = joint.tau.iter().zip(&model).map(|(t, m)| t - m).collect();
         let length = left.len() as f64;
@@ -46,7 +46,7 @@ fn randomise(recording: &mut InMemory, seed: u64, purpose: u64) -> Result<(), Sc
         let mut spectrum = forward.make_output_vec();
         let failed = |error: realfft::FftError| ScenarioError(format!("no spectrum: {error}"));
         forward.process(&mut left, &mut spectrum).map_err(failed)?;
-        // The mean and the highest frequency have no phase.
+        // The mean and the highest frequency are real and have no free phase.
         let last = spectrum.len().saturating_sub(1);
         for line in spectrum.iter_mut().take(last).skip(1) {
             *line = Complex::from_polar(line.norm(), dice.phase());

@@ -1,4 +1,4 @@
-//! What the recordings hold.
+//! Tests of the recordings.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
@@ -56,7 +56,7 @@ fn the_loop_follows_and_the_description_explains_a_healthy_rig() {
         let off = joint.q.iter().zip(reference).map(|(q, r)| (q - r).powi(2));
         let rms = (off.sum::<f64>() / joint.q.len() as f64).sqrt();
         assert!(rms < 0.01, "seed {seed}: {rms} rad");
-        // A refit of the nominal model gives the rig's parameters back.
+        // A refit of the nominal model must recover the rig's parameters.
         let found = Problem::of(&made.train.blocks[0], Equation::Torque)
             .unwrap()
             .refit()
@@ -75,7 +75,7 @@ fn the_loop_follows_and_the_description_explains_a_healthy_rig() {
 
 #[test]
 fn every_effect_leaves_its_mark_and_two_substeps_suffice() {
-    // Strong ones, so that each stands out: nothing may be hidden that is not in the recording.
+    // Strong effects, so that each one must be visible in the recording.
     for name in Effect::names() {
         let effect = Effect::draw(name, 2.0, 9).unwrap();
         let with = |substeps| Scenario {
@@ -88,7 +88,7 @@ fn every_effect_leaves_its_mark_and_two_substeps_suffice() {
         let [coarse, fine] = [2, 10].map(|s| with(s).sizes().unwrap()[0]);
         let mark = |size: &Size| size.excess_rms.max(size.frozen_rms);
         assert!(mark(&coarse) > 0.003, "{name}: {coarse:?}");
-        // Impacts are not reproducible to the step, but as large.
+        // Impacts differ between step sizes, but their size agrees.
         let allowed = 0.05 * mark(&fine) + 0.1 * fine.floor_rms;
         assert!(
             (mark(&coarse) - mark(&fine)).abs() < allowed,
@@ -166,7 +166,7 @@ fn a_second_encoder_changes_nothing_but_what_is_recorded() {
     let own = seen.train.blocks[0].joints[0].link.take().unwrap();
     assert_eq!(blocks[0].joints[0].link.as_ref(), Some(&own));
     assert_eq!(plain.train.blocks, seen.train.blocks);
-    // Counts of 17 bits from a zero of its own; the shaft twists by milliradians.
+    // 17-bit counts with another zero; the shaft twists by some milliradians.
     let count = core::f64::consts::TAU / 131_072.0;
     let off = (own.iter()).fold(0.0f64, |m, x| {
         m.max(

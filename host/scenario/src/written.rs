@@ -1,4 +1,4 @@
-//! A scenario's description and recordings as files, for whoever wants to ask another program.
+//! Writes a scenario's description and recordings as files for other programs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,10 +9,10 @@ use rig_data::{Block, Column, DataError, JointColumns, RecordingWriter};
 use rig_model::robot::Robot;
 use rig_output::write_whole;
 
-/// Writes `robot.toml` and the recordings that there are, by name, into a folder that exists.
+/// Writes `robot.toml` and the given recordings, by name, into a folder that exists.
 ///
 /// # Errors
-/// What the system says.
+/// A file cannot be written.
 pub(super) fn write_all(
     folder: &Path,
     robot: &Robot,

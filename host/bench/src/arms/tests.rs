@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 use super::*;
 
-/// Of each seed an arm is the same once more, and other seeds have other faults.
+/// Equal seeds give equal cases; other seeds give other faults.
 #[test]
 fn cases_are_of_their_seed() {
     let [once, again, other] =

@@ -1,4 +1,4 @@
-//! Candidates' columns over one recording of one joint.
+//! Columns of the candidates for one recording of one joint.
 
 use nalgebra::DVector;
 use rig_shared::effects::{Channel, Instant, Kind, MEMORY, SHAPES, Scale};
@@ -9,17 +9,17 @@ use rig_data::runs::{Run, runs_of};
 use rig_diagnose::DiagnoseError;
 use rig_model::robot::Robot;
 
-/// Hz, of the recordings.
+/// Sample rate of the recordings, Hz.
 const RATE: f64 = 1000.0;
-/// Hz
+/// Cut-off of the filter, Hz.
 const BAND: f64 = 40.0;
-/// Every so many samples are used.
+/// Every tenth sample is used.
 const STRIDE: usize = 10;
-/// Speed below which sgn q̇ says nothing, rad/s.
+/// Speed below which the sign of q̇ is not reliable, rad/s.
 const MOVING: f64 = 0.01;
-/// Orders that are tried: of gears, slots, poles and their multiples.
+/// Orders that are tried: those of gears, slots and poles, and their multiples.
 const ORDERS: [f64; 11] = [1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 14.0, 24.0, 36.0, 42.0, 84.0];
-/// Points of the grid over a range of any numbers.
+/// Grid points over a continuous range.
 const POINTS: usize = 6;
 
 /// One column of the dictionary.
@@ -28,7 +28,7 @@ pub(super) struct Term {
     pub(super) column: DVector<f64>,
 }
 
-/// Everything that is regressed over one recording.
+/// All columns of one recording.
 pub(super) struct Dictionary {
     pub(super) nominal: Vec<DVector<f64>>,
     pub(super) terms: Vec<Term>,
@@ -64,7 +64,7 @@ impl Signals {
 }
 
 impl Dictionary {
-    /// Torque in the band, at rest too, so that two runs of one reference compare sample by sample.
+    /// Returns the filtered torque, with rows at rest, so that two runs can be compared sample by sample.
     pub(super) fn torque_of(recording: &InMemory) -> Result<Vec<f64>, BenchError> {
         let signals = Signals::of(recording)?;
         let joint = signals.run.joints.into_iter().next();
@@ -92,7 +92,7 @@ impl Dictionary {
         let drive = described.drive.as_ref();
         let ratio = drive.map_or(1.0, |d| d.gear_ratio);
         let rotor = drive.map_or(0.0, |d| d.rotor_inertia * ratio * ratio);
-        // The joint lies horizontally: gravity acts along the link's angle to the horizon.
+        // The joint axis is horizontal: gravity depends on the link's angle to the horizontal.
         let weight = -moment * robot.gravity[2];
         let gravity: Vec<f64> = joint
             .q
@@ -129,7 +129,7 @@ impl Dictionary {
             };
             match kind {
                 Kind::MeasurementDelay => push(&central_difference(&torque, 1.0 / RATE)),
-                // Motor-side: what the spring bends by moves the rotor's inertia.
+                // Motor side: the deflection of the spring accelerates the rotor.
                 Kind::JointElasticity => {
                     let bend = second_difference(&load, 1.0 / RATE);
                     push(&bend.iter().map(|b| rotor * b).collect::<Vec<_>>());
@@ -152,7 +152,7 @@ impl Dictionary {
                         }
                         for column in columns {
                             if about.channel == Channel::Position {
-                                // An error of the reading is seen through the inertia.
+                                // An error of the position reading acts through the inertia.
                                 let column = second_difference(&column, 1.0 / RATE);
                                 push(
                                     &column
@@ -176,12 +176,12 @@ impl Dictionary {
     }
 }
 
-/// The one shape of an effect at a few places, or nothing to choose.
+/// Grid over the only shape parameter of an effect, or a single point if it has none.
 fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
     let Some(shape) = kind.about().shapes.first() else {
         return vec![[0.0; SHAPES]];
     };
-    // A regression knows of no friction that a gear might carry.
+    // An optional shape parameter stays at zero.
     if kind.optional().contains(&shape.name) {
         return vec![[0.0; SHAPES]];
     }

@@ -8,18 +8,18 @@ use super::input::RobotArg;
 use super::ui::Ui;
 use rig_identify::{Base, agree, grouped};
 
-/// Lists the canonical (base) parameters: the combinations that motion and torque can tell apart.
+/// Lists the canonical (base) parameters: the combinations of parameters that motion and torque can identify.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// Which equations they are for
+    /// Equations that the parameters belong to
     #[arg(long, value_enum, default_value = "differential")]
     model: Model,
-    /// As JSON
+    /// Print as JSON
     #[arg(long)]
     json: bool,
-    /// Seed of the random states from which they are found
+    /// Seed of the random states from which the parameters are computed
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -27,7 +27,7 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// The description, or a model whose base parameters cannot be decided.
+/// The description is wrong, or the base parameters of the model cannot be decided.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load(ui)?;
     let base = Base::structural(&robot, args.model.into(), args.seed)?;

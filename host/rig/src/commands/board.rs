@@ -1,4 +1,4 @@
-//! `rig board`: how the board is, what it keeps, its faults, and its control ticks one by one.
+//! `rig board`: health, stored settings, faults and single control ticks of the board.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -20,12 +20,12 @@ use rig_link::{
     EmulatedPort, LinkError, Port, SerialLine, Session, SessionSettings, describe_fault,
 };
 
-/// Health comes once a second.
+/// Longest wait for a health report, which the board sends once a second.
 const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
-/// Longest silence between two parts of a capture, beyond the ticks that are still to be captured.
+/// Longest wait for all parts of a capture, in addition to the time of the ticks that are still to be captured.
 const PART_PATIENCE: Duration = Duration::from_secs(2);
 
-/// Talks to the rig's board: its health, its faults, its stored settings, its single control ticks.
+/// Reads health, faults and single control ticks from the rig's board, and changes its stored settings.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     /// Serial port of the rig, such as /dev/ttyACM0 or COM3
@@ -34,7 +34,7 @@ pub(crate) struct Args {
     /// The board's debug probe instead of its serial port
     #[arg(long, global = true, conflicts_with = "emulated")]
     probe: bool,
-    /// The emulated rig instead of hardware; it keeps nothing and has no health of its own
+    /// The emulated rig instead of hardware; it stores nothing and sends no health report
     #[arg(long, global = true)]
     emulated: bool,
     /// Speed of the serial port, baud
@@ -49,13 +49,13 @@ pub(crate) struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Says how the board is: why it started, with which settings, what its control tick takes
+    /// Prints the board's health: reason of the last start, settings, time that the control tick takes
     Health,
-    /// Keeps the settings that are in force for the next power on
+    /// Stores the present settings for the next power-on
     Store,
     /// Fetches a burst of single control ticks (10 kHz) as CSV
     Capture {
-        /// Ticks between now and the end of the burst; the burst itself is as long as the board keeps
+        /// Ticks between now and the end of the burst; the board's memory fixes the length of the burst
         #[arg(long, default_value_t = 1000)]
         after: u16,
         /// Replace the file if it exists
@@ -74,19 +74,19 @@ enum Action {
         #[arg(long)]
         out: Option<PathBuf>,
     },
-    /// Forgets the latched fault, once its cause has gone
+    /// Clears the latched fault after its cause has gone
     Clear,
-    /// Switches the bridge off, at once
+    /// Switches the bridge off at once
     Disarm,
-    /// Sends limits, model, friction and effects of a description, precompensation on, and stores them
+    /// Sends limits, model, friction and effects of a description, switches precompensation on and stores all
     Upload {
         /// Robot description, such as the model.toml of a diagnosis
         #[arg(long)]
         model: PathBuf,
-        /// Send the rest where the description has effects that nothing can be done about
+        /// If the description has effects that cannot be compensated, leave them out and send the rest
         #[arg(long)]
         leave_out: bool,
-        /// Do not store: the next power on forgets them
+        /// Do not store: the settings are lost at the next power-on
         #[arg(long)]
         unstored: bool,
     },
@@ -95,15 +95,15 @@ enum Action {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence: the port, the rig's refusal, the file.
+/// A sentence about the port, a request that the rig refused, or the file.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    // What can be wrong with the arguments is said before the rig is disturbed.
-    // Options before and after the action are not seen to exclude each other while they are read.
+    // Check the arguments before contacting the rig. clap does not notice that an option before the action
+    // conflicts with one after it.
     let places =
         usize::from(args.port.is_some()) + usize::from(args.probe) + usize::from(args.emulated);
     if places != 1 {
         return Err(CommandError::Sentence(
-            "Say where the rig is, by one of --port DEV (such as /dev/ttyACM0), --probe and --emulated."
+            "Name the connection to the rig with exactly one of --port DEV (such as /dev/ttyACM0), --probe and --emulated."
                 .to_owned(),
         ));
     }
@@ -143,7 +143,9 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
         }
         Action::Store => {
             when_calibrated(&mut session, RequestBody::Store)?;
-            ui.say("The settings in force are stored; the next power on begins with them.");
+            ui.say(
+                "The present settings are stored; the rig starts with them at the next power-on.",
+            );
         }
         Action::Capture { after, out, .. } => {
             session.request(RequestBody::Capture(*after))?;
@@ -172,7 +174,7 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
                 return Ok(());
             };
             ui.say(&format!(
-                "{} docs/firmware.md says more of each fault; `rig board clear` forgets it.",
+                "{} docs/firmware.md describes each fault; `rig board clear` clears it.",
                 describe_fault(&record, f64::from(session.greeting().control_rate_hz)),
             ));
             if let Some(out) = out {
@@ -186,7 +188,7 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
         }
         Action::Clear => {
             session.request(RequestBody::ClearFault)?;
-            ui.say("No fault is latched. After one of the encoder, tell the rig where the link stands (--home).");
+            ui.say("No fault is latched. After a fault of the encoder, tell the rig the position of the link (--home).");
         }
         Action::Disarm => {
             session.request(RequestBody::Disarm)?;
@@ -200,7 +202,7 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
                 when_calibrated(&mut session, body)?;
             }
             let kept = if *unstored {
-                "until the next power on"
+                "until the next power-on"
             } else {
                 match when_calibrated(&mut session, RequestBody::Store) {
                     Err(LinkError::Refused {
@@ -208,7 +210,7 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
                         ..
                     }) => {
                         return Err(CommandError::Sentence(format!(
-                            "{} was sent to the rig, which has no memory to store it in; with --unstored it is not asked to.",
+                            "{} was sent to the rig but not stored, because the rig has no memory for it; give --unstored to send without storing.",
                             model.display()
                         )));
                     }
@@ -231,7 +233,7 @@ fn health<P: Port>(session: &mut Session<P>) -> Result<Health, CommandError> {
             Some(_) => {}
             None => {
                 return Err(CommandError::Sentence(format!(
-                    "The rig has not told its health in {} s; only a board tells it, the emulated rig has none.",
+                    "No health report came in {} s; only a board sends one, the emulated rig has none.",
                     HEALTH_PATIENCE.as_secs()
                 )));
             }
@@ -241,14 +243,14 @@ fn health<P: Port>(session: &mut Session<P>) -> Result<Health, CommandError> {
 
 fn describe(greeting: &Greeting, health: &Health) -> String {
     let settings = match health.settings {
-        SettingsOrigin::Defaults => "the firmware's own; none were ever stored",
+        SettingsOrigin::Defaults => "the firmware's defaults; none were ever stored",
         SettingsOrigin::Stored => "as stored",
         SettingsOrigin::OlderCopy => {
-            "one of two stored copies; the other is damaged, another firmware's, or cannot be used"
+            "one of two stored copies; the other is damaged, belongs to another firmware or cannot be used"
         }
-        SettingsOrigin::Damaged => "the firmware's own; what is stored is damaged",
+        SettingsOrigin::Damaged => "the firmware's defaults; the stored settings are damaged",
         SettingsOrigin::Unusable => {
-            "the firmware's own; what is stored is another firmware's, or cannot be used"
+            "the firmware's defaults; the stored settings belong to another firmware or cannot be used"
         }
     };
     let period = f64::from(health.clock_hz) / f64::from(greeting.control_rate_hz);
@@ -269,7 +271,7 @@ fn describe(greeting: &Greeting, health: &Health) -> String {
         if health.crystal {
             "from the crystal"
         } else {
-            "from the chip's own oscillator: times may be wrong by 1 %"
+            "from the chip's internal oscillator: times may be wrong by 1 %"
         },
         share(health.tick_cycles_mean),
         share(health.tick_cycles_max),
@@ -279,14 +281,14 @@ fn describe(greeting: &Greeting, health: &Health) -> String {
     )
 }
 
-/// Control ticks that the rig has kept, and the fault that they are about.
+/// Control ticks stored by the rig, and the fault that they belong to.
 #[derive(Default)]
 struct Kept {
     ticks: Vec<SnapshotSample>,
     fault: Option<FaultRecord>,
 }
 
-/// Fetches what has been asked for, part by part.
+/// Fetches the requested control ticks, part by part.
 fn fetch<P: Port>(
     session: &mut Session<P>,
     patience: Duration,
@@ -303,7 +305,7 @@ fn fetch<P: Port>(
         let got = kept.ticks.len();
         let Some(report) = report else {
             return Err(CommandError::Sentence(format!(
-                "The rig has sent {got} of the ticks that it keeps and no more; ask again."
+                "The rig stopped sending after {got} of its stored control ticks; run the command again."
             )));
         };
         let Some(part) = part_of(&report) else {
@@ -311,7 +313,7 @@ fn fetch<P: Port>(
         };
         if usize::from(part.first) != got {
             return Err(CommandError::Sentence(format!(
-                "A part of the ticks that the rig keeps, after tick {got}, was lost on the line; ask again."
+                "A part of the stored control ticks, after tick {got}, was lost on the line; run the command again."
             )));
         }
         total = usize::from(part.total);

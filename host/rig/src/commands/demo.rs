@@ -1,4 +1,4 @@
-//! `rig demo`: the main job with no hardware.
+//! `rig demo`: the demonstration without hardware.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -13,19 +13,19 @@ use super::ui::Ui;
 use crate::demo;
 use rig_output::write_whole;
 
-/// Where the demonstration goes.
+/// Default folder of the demonstration.
 const FOLDER: &str = "rig-demo";
 
-/// Shows the whole way without hardware: excite, record, identify, compensate, report.
+/// Runs the whole procedure without hardware: excite, record, identify, diagnose, compensate, report.
 #[derive(Clone, Debug, ClapArgs)]
 pub(crate) struct Args {
-    /// Folder for recordings, results and the report [default: rig-demo, or rig-demo-2 and so on where that holds results]
+    /// Folder for recordings, results and the report [default: rig-demo; rig-demo-2 and so on if that holds results]
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Replace results that the folder holds
+    /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
-    /// Seed: which rig is emulated, and its noise
+    /// Seed that selects the emulated rig and its noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -43,7 +43,7 @@ impl Default for Args {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence naming what went wrong.
+/// A sentence that names the fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let begin = Instant::now();
     let out = match &args.out {

@@ -1,4 +1,4 @@
-//! `rig diagnose`: what the model lacks.
+//! `rig diagnose`: finds the effects that the model lacks.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -27,27 +27,27 @@ use rig_model::robot::Robot;
 use rig_output::format_significant;
 use rig_output::{can_take, folder, write_whole};
 
-/// The description with what was found.
+/// File with the description and the effects that were found.
 const MODEL: &str = "model.toml";
-/// The result for programs.
+/// File with the result for programs.
 const DIAGNOSIS: &str = "diagnosis.json";
-/// The result for people.
+/// File with the result for people.
 const REPORT: &str = "report.html";
 
-/// Says what the model lacks: where prediction and recording disagree, which physical effect is missing, what it takes
-/// away on data held back, and when there is nothing left to find.
+/// Finds the physical effects that a model lacks: where prediction and recording disagree, which effect explains it,
+/// how much that effect reduces the residual on the hold-out, and when only noise remains.
 ///
-/// Record every motion twice: what differs between the two runs is noise, and no model needs to explain it. Hold one other
-/// motion back with --holdout: an effect that is really there improves that one, too. Slow motion and reversals show
-/// friction; several speeds, positions and loads show the rest. What the recordings cannot show is listed, with the
-/// experiment that would show it.
+/// Record every motion twice: the difference between the two runs is noise, which no model needs to explain. Give
+/// another motion with --holdout: a real effect reduces the residual there, too. Slow motion and reversals show
+/// friction; several speeds, positions and loads show the other effects. The report lists the effects that these
+/// recordings cannot show, and the experiment that would show each of them.
 ///
-/// Where one joint's motor voltage was recorded (u1, or duty1 with supply) and neither torque nor current, the model runs
-/// freely under that voltage and its position is compared instead. Where the recording has ref1 and shows its controller (PID with
-/// feed-forward, within the supply), the loop is closed; model.toml has the controller and the supply.
+/// If the motor voltage of a single joint was recorded (u1, or duty1 with supply) but no torque and no current, the
+/// model runs freely under that voltage and its position is compared instead. If the recording also has ref1 and shows
+/// its controller (PID with feed-forward, limited by the supply), the loop is closed; model.toml then holds the
+/// controller and the supply.
 ///
-/// The description should be what is believed of the robot: its values are fitted again, and are compared with what they
-/// were.
+/// Give the best known values in the description: the diagnosis refits them and compares them with the values before.
 ///
 /// Writes model.toml (the description with the effects found and the parameters fitted again, for --robot), diagnosis.json
 /// and report.html into the folder given with --out, the figures of what was found as pictures of their own (gap-1.svg,
@@ -56,37 +56,37 @@ const REPORT: &str = "report.html";
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// Recording to learn from, CSV or MCAP; one or more
+    /// Training recording, CSV or MCAP; one or more
     #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// Recording to judge by, of another motion, not used in any fit; one or more
+    /// Hold-out recording of another motion, not used in any fit; one or more
     #[arg(long, num_args = 1..)]
     holdout: Vec<PathBuf>,
-    /// Recording made with the drive off, where torque is measured by the motor's current: what the sensor reads there is its own
+    /// Recording made with the drive off, if torque comes from the motor current: it shows the sensor's offset
     #[arg(long)]
     drive_off: Option<PathBuf>,
-    /// Recording to learn from of the rig with everything taken off that could pull on its joints (hoses, cables, springs): what
-    /// is gone there comes from outside; may be given several times
+    /// Training recording made after all external loads (hoses, cables, springs) were removed from the rig: an effect
+    /// that is absent there is an external load; may be given several times
     #[arg(long)]
     pulls_off: Vec<PathBuf>,
-    /// Recording with the joints clamped, motor voltage beside current or torque: a dead zone of the drive shows there without friction
-    /// and back-EMF; may be given several times
+    /// Recording made with the joints clamped, with motor voltage and current or torque: it shows a dead zone of the
+    /// drive without friction and back-EMF; may be given several times
     #[arg(long)]
     clamped: Vec<PathBuf>,
-    /// Effect to leave out of the library, as one that the rig cannot have; may be given several times. What it explained is then
-    /// left, or another name stands in for it
+    /// Effect that the rig cannot have, to be left out of the library; may be given several times. The residual that it
+    /// explained then remains, or another effect takes its place
     #[arg(long, value_parser = known)]
     without: Vec<String>,
-    /// Fit although recordings look wrong (sign, unit, ratio, clock, swapped columns); what looks wrong is said first
+    /// Fit although recordings look wrong (sign, unit, ratio, clock, swapped columns); the faults are printed first
     #[arg(long)]
     even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Replace results that the folder holds
+    /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
-    /// Seed of whatever is drawn at random; the same seed gives the same files
+    /// Seed of the random numbers; the same seed gives the same files
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -94,7 +94,7 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence naming the file, line or value at fault.
+/// A sentence that names the wrong file, line or value.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &[MODEL, DIAGNOSIS, REPORT, FILE])?;
     refuse_folder(&args.out, &[], args.force)?;
@@ -111,14 +111,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for path in &args.clamped {
         refuse_as_rest(["--clamped", "the joints clamped"], path, &moved)?;
     }
-    // Units that look wrong are no reason to stop here: they are a verdict.
+    // Wrong units do not stop the command: they give a verdict.
     let (training, holdout, workflow) = read(&robot, args)?;
     let special = (args.drive_off.iter().map(|path| ("--drive-off", path)))
         .chain(args.pulls_off.iter().map(|path| ("--pulls-off", path)))
         .chain(args.clamped.iter().map(|path| ("--clamped", path)));
     if let (Some((option, path)), false) = (special.into_iter().next(), training.any_effort()) {
         return Err(CommandError::Sentence(format!(
-            "{option} {} says nothing where a joint goes by its voltage alone; leave it out, or record tau1 or i1 in motion too.",
+            "{option} {} cannot be used if only the motor voltage of the joint was recorded; leave it out, or also record tau1 or i1 during the motion.",
             path.display()
         )));
     }
@@ -131,7 +131,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for inputs in [&training, &holdout] {
         for sentence in inputs.strange_references(&robot)? {
             ui.remark(&format!(
-                "{sentence} References tell which recordings repeat one motion, and under voltage what the controller did."
+                "{sentence} References are used to find recordings that repeat one motion and, under voltage, to identify the controller."
             ));
         }
     }
@@ -197,7 +197,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// The name of an effect.
+/// Parses the name of an effect.
 fn known(name: &str) -> Result<String, String> {
     let names: BTreeSet<&str> = Kind::ALL.iter().map(|kind| kind.about().name).collect();
     if names.contains(name) {
@@ -205,12 +205,12 @@ fn known(name: &str) -> Result<String, String> {
     }
     let names: Vec<&str> = names.into_iter().collect();
     Err(format!(
-        "no effect has that name; there are {}",
+        "no effect has that name; the names are {}",
         names.join(", ")
     ))
 }
 
-/// One of the two ways from recordings to a verdict.
+/// A diagnosis by torque or by voltage.
 type Workflow = fn(
     &Robot,
     &[&dyn Recording],
@@ -219,7 +219,7 @@ type Workflow = fn(
     &mut dyn FnMut(f64),
 ) -> Result<(Diagnosis, Robot), DiagnoseError>;
 
-/// The recordings, and how they are diagnosed: one joint without torque or current goes by its voltage.
+/// Opens the recordings and selects the workflow: a single joint without torque or current is diagnosed by its voltage.
 fn read(robot: &Robot, args: &Args) -> Result<(Inputs, Inputs, Workflow), CommandError> {
     if robot.joints.len() == 1 {
         let all = |paths| Inputs::read_with(robot, paths, EffortNeed::Optional);
@@ -233,7 +233,7 @@ fn read(robot: &Robot, args: &Args) -> Result<(Inputs, Inputs, Workflow), Comman
     Ok((training, holdout, diagnose))
 }
 
-/// What the sensors read with the drive off, where that was recorded.
+/// Sensor readings with the drive off, if such a recording was given.
 fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandError> {
     let Some(path) = &args.drive_off else {
         return Ok(Vec::new());
@@ -249,7 +249,7 @@ fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandEr
     Ok(zeros)
 }
 
-/// What was recorded with the joints clamped.
+/// Recordings made with the joints clamped.
 fn clamps(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<Run>, CommandError> {
     let logs = Inputs::read(robot, &args.clamped)?;
     let runs = (recordings(&logs.listened()).into_iter())
@@ -262,7 +262,7 @@ fn clamps(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<Run>, CommandError>
     Ok(runs)
 }
 
-/// The result at a glance.
+/// Prints the result in short.
 fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
     let lines = summary(found);
     for fault in &found.data_faults {
@@ -276,17 +276,17 @@ fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
     }
     if found.verdict == Verdict::DataFault {
         let way_on = match found.data_faults.iter().all(DataFault::leaves_rows) {
-            true => " --even-if-wrong fits all the same.",
+            true => " Give --even-if-wrong to fit in spite of this.",
             false => "",
         };
         ui.remark(&format!(
-            "nothing was fitted; model.toml is the description as it was given.{way_on}"
+            "nothing was fitted; model.toml is the unchanged description.{way_on}"
         ));
     }
     ui.say(&format!("report: {}", out.join(REPORT).display()));
 }
 
-/// First what was asked for, then everything else that the diagnosis has to say.
+/// Lines of the short result: verdict and effects first, further sentences of the diagnosis last.
 fn summary(found: &Diagnosis) -> Vec<String> {
     let mut lines = vec![format!("verdict: {}", pages::verdict(found.verdict))];
     let (first, besides) = found.words.split_at(found.words.len().min(1));
@@ -306,11 +306,11 @@ fn summary(found: &Diagnosis) -> Vec<String> {
         let on = if found.steps.iter().any(|step| step.holdout_rms.is_some()) {
             "on the hold-out"
         } else {
-            "on the training data; none were held back"
+            "on the training data (no hold-out was given)"
         };
         let refit = (found.closed_by_effects()).map_or(String::new(), |own| {
             format!(
-                ", from the description as it stands; of what fitting it again leaves, the effects close {} %",
+                ", counted from the given description; the effects close {} % of the gap that remains after the refit",
                 format_significant(100.0 * own, 3)
             )
         });
@@ -320,25 +320,25 @@ fn summary(found: &Diagnosis) -> Vec<String> {
         ));
     }
     if let Some(remainder) = &found.remainder {
-        lines.push(format!("left: {}", remainder.text));
+        lines.push(format!("remainder: {}", remainder.text));
     }
     if let Some(next) = &found.next_experiment {
         lines.push(match (next.separates.as_slice(), &next.file) {
-            // Nothing is open for it: whoever wants to know has the report.
+            // The text of an experiment for one effect is long; the report holds it.
             ([one], Some(file)) => {
-                format!("next: {file} would make {one} testable; the report says how")
+                format!("next experiment: {file} would make {one} testable; the report says how")
             }
-            _ => format!("next: {}", next.text),
+            _ => format!("next experiment: {}", next.text),
         });
     }
     if !besides.is_empty() {
-        lines.push("besides:".into());
+        lines.push("also:".into());
         lines.extend(besides.iter().map(|sentence| format!("  - {sentence}")));
     }
     lines
 }
 
-/// `of_joint` where there are several joints, each with a gap of its own.
+/// Describes one step in a line. `of_joint`: the robot has several joints, each with its own gap.
 fn effect(number: usize, step: &Step, of_joint: bool) -> String {
     let law = step
         .law
@@ -353,7 +353,7 @@ fn effect(number: usize, step: &Step, of_joint: bool) -> String {
     let open = if rivals.is_empty() {
         String::new()
     } else {
-        format!("; these data support as well: {}", rivals.join(", "))
+        format!("; these data support equally: {}", rivals.join(", "))
     };
     format!(
         "{number}. {}{law} at joint {}, {}{open}",
@@ -361,11 +361,11 @@ fn effect(number: usize, step: &Step, of_joint: bool) -> String {
         step.joint,
         match (0.0..=1.0).contains(&step.gap_closed) {
             true => format!(
-                "{} of the gap {}before it",
+                "closes {} of the remaining gap{}",
                 step.fall(),
-                if of_joint { "of that joint " } else { "" }
+                if of_joint { " of that joint" } else { "" }
             ),
-            false => format!("residual {} RMS", step.fall()),
+            false => format!("residual RMS {}", step.fall()),
         },
     )
 }

@@ -1,4 +1,4 @@
-//! What went wrong, as one sentence.
+//! Errors of the commands, each one sentence.
 
 use std::path::PathBuf;
 
@@ -13,21 +13,21 @@ use rig_output::WriteError;
 use rig_plant::emulated::NameplateError;
 use rig_report::ReportError;
 
-/// Why a command did not do its work. Every text is a sentence for the person at the terminal.
+/// Reason why a command failed. Every text is a sentence for the user.
 #[derive(Debug, Error)]
 pub enum CommandError {
-    /// A file stands in the way.
+    /// The output file exists already.
     #[error("{} exists already; choose another name with --out, or give --force to replace it.", path.display())]
     Exists {
         /// The file.
         path: PathBuf,
     },
-    /// A folder that holds results.
+    /// The output folder holds results already.
     #[error("{} holds {file} of an earlier run; choose another folder with --out, or give --force to replace what is there.", folder.display())]
     Results {
         /// The folder.
         folder: PathBuf,
-        /// The first of them.
+        /// The first result found in it.
         file: &'static str,
     },
     /// The robot description.
@@ -54,7 +54,7 @@ pub enum CommandError {
     /// An output file.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// Data that contradict the description.
+    /// Data or results that contradict the description or physics.
     #[error("{0}")]
     Implausible(String),
     /// Trajectory design.
@@ -69,13 +69,13 @@ pub enum CommandError {
     /// The gap workflow.
     #[error(transparent)]
     Diagnose(#[from] rig_diagnose::DiagnoseError),
-    /// Simulation under voltage.
+    /// Simulation of a joint under motor voltage.
     #[error(transparent)]
     Replay(#[from] rig_diagnose::voltage::ReplayError),
-    /// A joint that its voltage drives.
+    /// A joint that is known by its motor voltage.
     #[error(transparent)]
     Voltage(#[from] rig_diagnose::voltage::DrivenError),
-    /// Anything else that has its whole sentence.
+    /// Any other error, as a whole sentence.
     #[error("{0}")]
     Sentence(String),
 }

@@ -1,4 +1,4 @@
-//! `rig excite`: a motion that tells the robot's parameters apart, within its limits.
+//! `rig excite`: designs a motion within the robot's limits that makes its parameters identifiable.
 
 use std::path::PathBuf;
 
@@ -13,32 +13,32 @@ use rig_excite::{
 };
 use rig_model::robot::Robot;
 
-/// What is optimised.
+/// Optimality criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CriterionArg {
     /// Condition number: errors spread evenly over the parameters
     Cond,
-    /// Smallest singular value: the worst combination known as well as possible
+    /// Smallest singular value: the least certain combination becomes as certain as possible
     MinSingular,
     /// Determinant of the information: the smallest confidence ellipsoid
     DOptimal,
 }
 
-/// Which parameters count.
+/// Parameters that the criterion includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ParametersArg {
     /// All that `rig identify` finds: links, drive inertias, friction, offsets
     All,
-    /// Inertial parameters of the links alone
+    /// Only the inertial parameters of the links
     Links,
 }
 
-/// By what the columns of the regressor are divided.
+/// Scaling of the regressor's columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ScalingArg {
-    /// By what the limits would let any motion do for the column alone
+    /// Each column by the largest size that the limits allow it in any motion
     Sizes,
-    /// By nothing: SI units as they are
+    /// No scaling: SI units
     None,
 }
 
@@ -61,7 +61,7 @@ impl KindArg {
     /// The motions of one joint.
     const STAGED: [Self; 4] = [Self::Chirp, Self::Staircase, Self::Reversals, Self::Sweep];
 
-    /// The motion of one joint that it is; none for the optimal one of all joints.
+    /// Returns the kind of a motion of one joint; none for the optimal motion of all joints.
     fn staged(self) -> Option<StagedKind> {
         match self {
             Self::Fourier => None,
@@ -81,17 +81,17 @@ impl KindArg {
 /// ω₀ of 2 Hz (12.6 rad/s) this is 1.2 % of the amplitude for the fundamental and 6 % for the fifth harmonic. The 5 % of the
 /// range at each end are 10 % of the amplitude.
 const MARGIN: f64 = 0.1;
-/// Share of the velocity limit that an optimal motion uses, and its square of the acceleration limit: a loop with damping 0.7
-/// overshoots a sinusoid by less than 5 %, and noise of the measured velocity comes on top.
+/// Share of the velocity limit that an optimal motion uses; it uses the square of this share of the acceleration limit.
+/// A loop with damping 0.7 overshoots a sinusoid by less than 5 %; noise of the measured velocity adds to that.
 const SPEED_SHARE: f64 = 0.9;
-/// Condition number from which on a motion is called a poor one. Schröer 1993 asks for 100; at ten times that, noise of 1 % of
-/// the torque is 10 times the part of it that the worst combination has.
+/// Condition number from which on a motion is reported as poor. Schröer 1993 asks for 100. At 1000, noise of 1 % of the
+/// torque is 10 times the torque of the worst combination.
 const POOR_CONDITION: f64 = 1e3;
 
-/// Designs a motion within the robot's limits that tells its parameters apart.
+/// Designs a motion within the robot's limits that makes its parameters identifiable.
 ///
-/// The limits stand in the robot description under [joint.limits], and [[workspace]] for points of the links. The
-/// torque limit is kept by the inertia and friction written there, where they are. The same seed gives the same file.
+/// The limits are in the robot description under [joint.limits], and under [[workspace]] for points of the links. If
+/// the description has inertia and friction, the motion also keeps the torque limit. The same seed gives the same file.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Robot description (.toml or .urdf)
@@ -103,17 +103,17 @@ pub(crate) struct Args {
     /// Kind of motion; all but fourier move one joint
     #[arg(long, value_enum, default_value_t = KindArg::Fourier)]
     pub(crate) kind: KindArg,
-    /// What is optimised [default: cond] (fourier)
+    /// Criterion that is optimised [default: cond] (fourier)
     #[arg(long, value_enum)]
     pub(crate) criterion: Option<CriterionArg>,
-    /// Which parameters the motion is to tell apart [default: all] (fourier)
+    /// Parameters that the motion should make identifiable [default: all] (fourier)
     #[arg(long, value_enum)]
     pub(crate) parameters: Option<ParametersArg>,
-    /// By what the columns of the regressor are divided before it is judged [default: sizes] (fourier)
+    /// Scaling of the regressor's columns before the criterion is computed [default: sizes] (fourier)
     #[arg(long, value_enum)]
     pub(crate) scaling: Option<ScalingArg>,
-    /// Standard deviation of each joint's torque, comma between them, N*m or N [default: taken as a share of its
-    /// torque limit that is the same for all joints] (fourier)
+    /// Standard deviation of each joint's torque noise, separated by commas, N*m or N [default: the same share of the
+    /// torque limit for all joints] (fourier)
     #[arg(long, value_delimiter = ',')]
     pub(crate) torque_noise: Option<Vec<f64>>,
     /// Harmonics per joint, 1 to 8 [default: 5] (fourier)
@@ -122,49 +122,49 @@ pub(crate) struct Args {
     /// Period of the slowest harmonic, s [default: from the limits, 1 s at least] (fourier)
     #[arg(long)]
     pub(crate) period: Option<f64>,
-    /// Rise from rest to full amplitude and fall back to rest, each, s [default: one period] (fourier)
+    /// Time from rest to full amplitude, and from there back to rest, s [default: one period] (fourier)
     #[arg(long)]
     pub(crate) ramp: Option<f64>,
     /// Whole periods at full amplitude [default: 5] (fourier)
     #[arg(long)]
     pub(crate) periods: Option<u16>,
-    /// Joint positions at the beginning, comma between them, rad or m [default: free for fourier, else mid-range]
+    /// Joint positions at the start, separated by commas, rad or m [default: free for fourier, else mid-range]
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) start: Option<Vec<f64>>,
     /// The joint that moves [default: the first] (all but fourier)
     #[arg(long)]
     pub(crate) joint: Option<String>,
-    /// Share of each position range that is kept free, half of it at each end, for what the controller is off by
-    /// [default: 0.1 for fourier; else the motion uses 80 % of the way from its start to the nearer limit]
+    /// Share of each position range that is kept free for the tracking error of the controller, half of it at each end
+    /// [default: 0.1 for fourier; else the motion uses 80 % of the distance from its start to the nearer limit]
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) margin: Option<f64>,
-    /// Share of the velocity limits that is used, and its square of the acceleration limits [default: 0.9 for fourier;
-    /// else 0.8 of both]. Begin with a small one on a robot that this motion is new to
+    /// Share of the velocity limits that is used; of the acceleration limits its square is used [default: 0.9 for
+    /// fourier; else 0.8 of both]. Begin with a small share if the motion is new to the robot
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) speed_share: Option<f64>,
-    /// Distance to either side of the start, rad or m [default: from the limits] (all but fourier)
+    /// Amplitude to either side of the start, rad or m [default: from the limits] (all but fourier)
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) amplitude: Option<f64>,
-    /// Speed of reversals, or slowest and fastest of a sweep with a comma between them, rad/s or m/s [default: 0.8 % of the
-    /// limit; 0.4 to 80 %]
+    /// Speed of reversals, or slowest and fastest speed of a sweep separated by a comma, rad/s or m/s [default: 0.8 %
+    /// of the limit; 0.4 to 80 %]
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) speed: Option<Vec<f64>>,
     /// Number of speeds, 2 to 16 [default: 12] (sweep)
     #[arg(long)]
     pub(crate) speeds: Option<usize>,
-    /// First and last frequency with a comma between them, Hz [default: from the limits] (chirp)
+    /// First and last frequency separated by a comma, Hz [default: from the limits] (chirp)
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) band: Option<Vec<f64>>,
     /// Triangles, two reversals each, at each of three amplitudes [default: 2] (reversals)
     #[arg(long)]
     pub(crate) cycles: Option<u16>,
-    /// Random starts of the optimiser: more find better motions and take longer [default: 24] (fourier)
+    /// Random starts of the optimiser: more starts find better motions but take longer [default: 24] (fourier)
     #[arg(long)]
     pub(crate) starts: Option<u32>,
     /// Seed of the random starts [default: 1] (fourier)
     #[arg(long)]
     pub(crate) seed: Option<u64>,
-    /// Samples a second in a .csv, Hz
+    /// Sample rate of a .csv, Hz
     #[arg(long, default_value_t = 1000.0)]
     pub(crate) rate: f64,
     /// Replace the file if it exists
@@ -176,7 +176,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Refuses what this kind of motion would leave unused.
+    /// Refuses options that this kind of motion does not use.
     fn refuse_unused(&self) -> Result<(), CommandError> {
         let of_fourier = [
             ("--criterion", self.criterion.is_some()),
@@ -224,24 +224,24 @@ impl Args {
                 "--joint {joint} names the one joint that moves, but --kind fourier moves all of them; give --kind chirp, staircase, reversals or sweep, or leave --joint out."
             ))),
             (Some(kind), _, Some((option, _))) => Err(CommandError::Sentence(format!(
-                "{option} belongs to --kind fourier, but a {} is sized by the limits and its own options; leave it out, or give --kind fourier.",
+                "{option} belongs to --kind fourier; the size of a {} follows from the limits and its own options, so leave the option out or give --kind fourier.",
                 kind.name()
             ))),
             _ => Ok(()),
         }
     }
 
-    /// What is asked of a motion of one joint.
+    /// Options of a motion of one joint.
     ///
     /// # Errors
-    /// A band that is no pair.
+    /// `--band` has not exactly two numbers.
     fn staged_options(&self) -> Result<StagedOptions, CommandError> {
         let band = match self.band.as_deref() {
             None => None,
             Some(&[low, high]) => Some([low, high]),
             Some(other) => {
                 return Err(CommandError::Sentence(format!(
-                    "--band has {} numbers; give two, the first and the last frequency in Hz, as 0.5,20.",
+                    "--band has {} numbers; give two, the first and the last frequency in Hz, such as 0.5,20.",
                     other.len()
                 )));
             }
@@ -260,26 +260,26 @@ impl Args {
     }
 }
 
-/// Condition number beyond which a combination of parameters is lost in the rounding of single precision, in which the rig and
-/// many loggers hold torques: 1/2⁻²³.
+/// Condition number beyond which the worst combination of parameters is smaller than the rounding of single precision:
+/// 1/2⁻²³. The rig and many loggers store torques in single precision.
 const TELLS_NOTHING: f64 = 1.0 / f32::EPSILON as f64;
-/// What mends that.
+/// Advice against a large condition number.
 const MORE_MOTION: &str = "give a longer --period, more range or more --harmonics";
 
-/// What a motion is not checked against; printed with each.
-const NOT_LOOKED_AT: &str = "Not looked at: self-collision, table and other objects, cables. The limits hold for the reference alone; a controller goes beyond it (--margin and --speed-share leave it room). Watch a first run at low speed, as with --speed-share 0.2, and keep the emergency stop at hand.";
+/// Note about checks that were not made; printed with each motion.
+const NOT_LOOKED_AT: &str = "Not checked: self-collision, collisions with the table and other objects, cables. The limits hold for the reference only; the robot may go beyond it (--margin and --speed-share leave room for that). Watch a first run at low speed, for example with --speed-share 0.2, and keep the emergency stop at hand.";
 
 /// Runs the command.
 ///
 /// # Errors
-/// A description or options that do not serve, no motion within the limits, a file that cannot be written.
+/// An unsuitable description or option, no motion within the limits, or a file that cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     args.refuse_unused()?;
     refuse_file(&args.out, args.force)?;
     let robot = described(&args.robot, ui)?.robot;
     if !args.even_if_wrong && !robot.limits_in_degrees().is_empty() {
         return Err(CommandError::Implausible(
-            "A motion sized by limits that look like degrees may break the robot, so none was designed; correct the limits, or give --even-if-wrong where they are right.".to_owned(),
+            "A motion sized by limits that look like degrees may break the robot, so none was designed; correct the limits, or give --even-if-wrong if they are right.".to_owned(),
         ));
     }
     let Some(kind) = args.kind.staged() else {
@@ -340,7 +340,7 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     let condition = found.values.condition_number;
     if condition > TELLS_NOTHING {
         return Err(CommandError::Sentence(format!(
-            "This motion identifies nothing: its condition number is {}, so that some combination of parameters moves the torque that many times less than the others. Nothing was written; {MORE_MOTION}.",
+            "This motion identifies nothing: its condition number is {}, so one combination of parameters changes the torque that many times less than the others. Nothing was written; {MORE_MOTION}.",
             number(condition)
         )));
     }
@@ -359,7 +359,7 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// A condition number with the digits that mean something.
+/// Formats a condition number with its significant digits.
 fn number(condition: f64) -> String {
     if condition < 1e6 {
         format!("{condition:.3}")
@@ -368,7 +368,7 @@ fn number(condition: f64) -> String {
     }
 }
 
-/// What the condition number means.
+/// Rates a condition number in words.
 fn verdict(condition: f64) -> String {
     if condition < 100.0 {
         "good (below 100)".into()
@@ -376,12 +376,12 @@ fn verdict(condition: f64) -> String {
         "usable (100 to 1000)".into()
     } else {
         format!(
-            "poor: some combination of parameters moves the torque {condition:.0e} times less than the others and will not be identified; {MORE_MOTION}"
+            "poor: one combination of parameters changes the torque {condition:.0e} times less than the others and will not be identified; {MORE_MOTION}"
         )
     }
 }
 
-/// What the design achieves, line by line.
+/// Describes the designed motion, line by line.
 fn summary(found: &Design, robot: &Robot) -> Vec<String> {
     let values = &found.values;
     let mut lines = vec![
@@ -391,7 +391,7 @@ fn summary(found: &Design, robot: &Robot) -> Vec<String> {
             found.base_parameters.join(", ")
         ),
         format!(
-            "condition number {} with columns scaled by their sizes ({} in SI units), {}; smallest singular value {:.3}, mean {:.3}.",
+            "condition number {} with columns scaled to their largest sizes ({} in SI units), {}; smallest singular value {:.3}, mean {:.3}.",
             number(values.condition_number),
             number(values.si_condition_number),
             verdict(values.condition_number),

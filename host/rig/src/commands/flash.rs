@@ -1,4 +1,4 @@
-//! `rig flash`: the image onto the board.
+//! `rig flash`: writes the firmware image to the board.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -11,9 +11,9 @@ use super::ui::Ui;
 
 /// The chip, as probe-rs calls it.
 pub(crate) const CHIP: &str = "STM32G474RETx";
-/// Where `firmware/build` puts the image, from the project's folder.
+/// Image that `firmware/build` makes, relative to the project's folder.
 const IMAGE: &str = "target/thumbv7em-none-eabihf/chip/rig-firmware";
-/// The tool that talks to the debug probe.
+/// Program that controls the debug probe.
 const TOOL: &str = "probe-rs";
 /// Machine number of Arm in an ELF header (`EM_ARM`).
 const ARM: [u8; 2] = [40, 0];
@@ -24,7 +24,7 @@ const ARM: [u8; 2] = [40, 0];
 /// stays off while flashing and afterwards, until the rig is armed.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
-    /// The image; without it the one that firmware/build has made
+    /// Firmware image [default: the image made by firmware/build]
     #[arg(long)]
     elf: Option<PathBuf>,
 }
@@ -32,18 +32,21 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence: no image, no tool, no board.
+/// A sentence about a missing image, a missing tool or a missing board.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let elf = args.elf.clone().unwrap_or_else(|| PathBuf::from(IMAGE));
     check(&elf)?;
     call(&["download", "--chip", CHIP, "--verify"], Some(&elf))?;
-    // The chip stands still after a download.
+    // The chip is halted after a download.
     call(&["reset", "--chip", CHIP], None)?;
-    ui.say(&format!("{} is on the board and runs.", elf.display()));
+    ui.say(&format!(
+        "{} was flashed to the board and runs.",
+        elf.display()
+    ));
     Ok(())
 }
 
-/// Whether a file can be an image for the chip.
+/// Checks that a file can be an image for the chip.
 fn check(elf: &Path) -> Result<(), CommandError> {
     let sentence = |text: String| Err(CommandError::Sentence(text));
     let mut head = [0; 20];
@@ -51,7 +54,7 @@ fn check(elf: &Path) -> Result<(), CommandError> {
         Ok(()) => {}
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             return sentence(format!(
-                "There is no image {}; build it with firmware/build, or name another with --elf.",
+                "The image {} does not exist; build it with firmware/build, or name another one with --elf.",
                 elf.display()
             ));
         }
@@ -72,23 +75,23 @@ fn check(elf: &Path) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Calls the tool, which tells its own progress.
+/// Runs the tool, which prints its own progress.
 fn call(arguments: &[&str], elf: Option<&Path>) -> Result<(), CommandError> {
     let mut command = Command::new(TOOL);
     command.args(arguments).args(elf);
     let status = command.status().map_err(|error| {
         CommandError::Sentence(match error.kind() {
             io::ErrorKind::NotFound => format!(
-                "The tool {TOOL}, which talks to the board, is not installed; install it with `cargo install probe-rs-tools --locked`, or see https://probe.rs."
+                "The tool {TOOL}, which connects to the board, is not installed; install it with `cargo install probe-rs-tools --locked`, or see https://probe.rs."
             ),
-            _ => format!("The tool {TOOL} cannot be started: {error}; install it anew."),
+            _ => format!("The tool {TOOL} cannot be started: {error}; install it again."),
         })
     })?;
     if status.success() {
         return Ok(());
     }
     Err(CommandError::Sentence(format!(
-        "`{TOOL} {}` has failed ({status}); its own words stand above: check that the board is plugged in at its ST-LINK socket and that no other program uses it.",
+        "`{TOOL} {}` failed ({status}), its messages are above: check that the board is plugged in at its ST-LINK socket and that no other program uses it.",
         arguments.join(" ")
     )))
 }

@@ -1,4 +1,4 @@
-//! `rig friction-map`: friction over speed, from a sweep of constant speeds.
+//! `rig friction-map`: friction as a function of speed, from a sweep of constant speeds.
 
 use std::path::{Path, PathBuf};
 
@@ -17,9 +17,9 @@ use rig_output::{can_take, folder, write_whole};
 
 /// Draws friction over speed from a recording of a friction sweep.
 ///
-/// Gravity and inertia are taken from an identification on the recordings given with --data; the sweep's
-/// stretches of constant speed give one point each. They come from the recorded reference (ref<k>), without one from the
-/// position. The sweep may have another sample rate. Stretches that give no point are listed with the reason.
+/// Gravity and inertia are identified from the recordings given with --data. Each stretch of constant speed in the
+/// sweep gives one point. The stretches are found in the recorded reference (ref<k>) or, without one, in the position.
+/// The sweep may have another sample rate. Stretches that give no point are listed with the reason.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -33,18 +33,18 @@ pub(crate) struct Args {
     /// Joint, by name or counted from 1
     #[arg(long, default_value = "1")]
     joint: String,
-    /// Draw the map although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); says what looks wrong
+    /// Draw the map although columns look wrong (sign, unit, ratio, clock, swapped); prints the faults
     #[arg(long)]
     even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Replace results that the folder holds
+    /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
 }
 
-/// The joint of that name or number.
+/// Finds a joint by its name or number.
 fn joint_of(robot: &Robot, given: &str) -> Result<usize, CommandError> {
     let by_number = || {
         let number = given.parse::<usize>().ok()?.checked_sub(1)?;
@@ -64,7 +64,7 @@ fn joint_of(robot: &Robot, given: &str) -> Result<usize, CommandError> {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence naming the file, line or value at fault.
+/// A sentence that names the wrong file, line or value.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &["friction-map.json", "report.html"])?;
     refuse_folder(&args.out, &[], args.force)?;
@@ -97,13 +97,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             FrictionMapOptions::default(),
         );
         if drawn.is_err() {
-            // Rows that are missing may be why.
+            // Missing rows may be the reason.
             sweep.heard().iter().for_each(|warning| ui.remark(warning));
         }
         let map = drawn?;
         if !map.doubts.is_empty() && !args.even_if_wrong {
             return Err(CommandError::Implausible(format!(
-                "{} Nothing was written; --even-if-wrong draws the map all the same.",
+                "{} Nothing was written; give --even-if-wrong to draw the map in spite of this.",
                 map.doubts.join(" ")
             )));
         }
@@ -129,7 +129,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 /// Writes the map as JSON and as a page into a folder.
 ///
 /// # Errors
-/// What the system says of a file.
+/// A file cannot be written.
 fn write(
     out: &Path,
     robot: &Robot,
@@ -153,7 +153,7 @@ fn write(
     Ok(())
 }
 
-/// What is printed: which stretches gave points, which not and why, the law, the decision.
+/// Printed lines: stretches that gave points, rejected stretches with the reason, the friction law, the decision.
 fn lines(map: &FrictionMap, kind: JointKind) -> Vec<String> {
     let (velocity, torque, viscous) = match kind {
         JointKind::Revolute => ("rad/s", "N·m", "N·m·s/rad"),

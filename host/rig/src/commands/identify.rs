@@ -1,4 +1,4 @@
-//! `rig identify`: recordings and a description in, parameters with their uncertainty out.
+//! `rig identify`: estimates parameters and their uncertainty from recordings and a description.
 
 mod printed;
 
@@ -24,13 +24,13 @@ use rig_model::robot::{MOST_LEAD, Robot};
 use rig_output::{can_take, folder, write_whole};
 use rig_output::{format_significant, format_unit, listed};
 
-/// Which equations are fitted.
+/// Equations that are fitted.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Model {
-    /// Torque against acceleration, velocity and position
+    /// Torque as a function of acceleration, velocity and position
     Differential,
-    /// Over windows, without acceleration: of one joint work against change of energy, of several impulse against change of
-    /// momentum, one equation a joint
+    /// Integrals over windows of time, without acceleration. For one joint: work equals the change of energy; for
+    /// several joints: impulse equals the change of momentum, one equation a joint
     Integral,
 }
 
@@ -43,26 +43,26 @@ impl From<Model> for ModelKind {
     }
 }
 
-/// How they are fitted.
+/// Estimators.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Fit {
     /// Ordinary least squares
     Ols,
-    /// Each joint's rows weighted by its noise
+    /// Least squares with each joint's rows weighted by its noise
     Weighted,
-    /// Weighted, and outliers count less (Huber)
+    /// Weighted least squares in which outliers count less (Huber)
     Robust,
     /// Instrumental variables from the simulated closed loop (IDIM-IV): unbiased by noise in the motion
     Iv,
-    /// Torque of the simulated closed loop against the measured one (DIDIM); needs [joint.controller] and ref<k>
+    /// Fits the torque of the simulated closed loop to the measured torque (DIDIM); needs [joint.controller] and ref<k>
     OutputError,
-    /// Total least squares: noise in the motion, measured by its spectrum, and in the torque
+    /// Total least squares: allows for noise in the torque and in the motion (estimated from its spectrum)
     Tls,
-    /// Maximum likelihood: residuals autoregressive in time and correlated between joints
+    /// Maximum likelihood: residuals are autoregressive in time and correlated between joints
     Ml,
     /// Ridge regression towards the description's values
     Ridge,
-    /// Weighted, every link a body that can exist, friction and drive inertia not negative
+    /// Weighted and physically consistent: each link is a possible body, friction and drive inertia are not negative
     Consistent,
 }
 
@@ -82,25 +82,26 @@ impl From<Fit> for Estimator {
     }
 }
 
-/// Whether estimators are compared.
+/// Estimators to compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Compare {
-    /// weighted, iv and consistent, where the recordings are small enough for a second or two
+    /// weighted, iv and consistent, if the recordings are small (32 MiB at most)
     Auto,
-    /// All that recordings and description allow
+    /// All estimators that the recordings and the description allow
     All,
-    /// None
+    /// No comparison
     None,
 }
 
-/// Bytes of recordings up to which a comparison takes a few seconds.
+/// Largest size of recordings that are compared by default, bytes: up to this size a comparison takes a few seconds.
 const COMPARED_BYTES: u64 = 32 << 20;
-/// Half-widths of a 95 % interval by which friction has to lie below zero: five standard deviations. A few seconds of a motion
-/// leave friction and the rest of a joint hard to tell apart, and of many joints one may then come out below zero by chance.
+/// Half-widths of a 95 % interval (2.5: five standard deviations) by which a value must lie below zero to count as
+/// impossible. In a recording of a few seconds friction and other parameters are nearly collinear. With many joints,
+/// one friction value may then be below zero by chance.
 const CLEARLY: f64 = 2.5;
-/// Standard deviations of half a 95 % interval, about.
+/// Half-width of a 95 % interval in standard deviations, about.
 const WIDTH: f64 = 2.0;
-/// Coefficients of a base parameter below this are rounding.
+/// Coefficients of a base parameter below this are rounding errors.
 const ROUNDING: f64 = 1e-9;
 
 impl Compare {
@@ -115,7 +116,7 @@ impl Compare {
     }
 }
 
-/// A setting that is `auto` (chosen from the data) or a number.
+/// Parses a setting: `auto` (chosen from the data) or a number.
 fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
     if text == "auto" {
         return Ok(Choice::Auto);
@@ -125,58 +126,59 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
         .map_err(|_| format!("\"{text}\" is neither a number nor \"auto\""))
 }
 
-/// A least speed: `auto` or a number that can be one.
+/// Parses a speed threshold: `auto`, or a finite number of 0 or more.
 fn speed(text: &str) -> Result<Choice<f64>, String> {
     match auto::<f64>(text)? {
         Choice::Fixed(speed) if !(speed >= 0.0 && speed.is_finite()) => Err(format!(
-            "{text} is no least speed; 0 keeps all rows, and a number above it leaves out slower ones"
+            "{text} is not a valid speed; 0 keeps all rows, and a number above it leaves out slower rows"
         )),
         choice => Ok(choice),
     }
 }
 
-/// A lead that a description may have too.
+/// Parses a torque lead, within the limits of a robot description.
 fn lead(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(lead) if lead.abs() <= MOST_LEAD => Ok(lead),
         _ => Err(format!(
-            "\"{text}\" is no lead; it must lie between -{MOST_LEAD} and {MOST_LEAD} s"
+            "\"{text}\" is not a valid lead; it must lie between -{MOST_LEAD} and {MOST_LEAD} s"
         )),
     }
 }
 
 /// Identifies the parameters of a robot from recordings.
 ///
-/// Writes identified.toml (the description with the identified values), identification.json and report.html
-/// into the folder given with --out, and identified.urdf where a full set of parameters was found: of a URDF the same file
-/// with other values, of a TOML description a new one.
+/// Writes identified.toml (the description with the identified values), identification.json and report.html into the
+/// folder given with --out. Writes identified.urdf, too, if a full set of parameters was found: a copy of the given
+/// URDF with new values, or a new file for a TOML description.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// Recording to learn from, CSV or MCAP; one or more
+    /// Training recording, CSV or MCAP; one or more
     #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// Recording to judge by, not used in the fit; one or more
+    /// Hold-out recording, not used in the fit; one or more
     #[arg(long, num_args = 1..)]
     holdout: Vec<PathBuf>,
-    /// Which equations are fitted
+    /// Equations that are fitted
     #[arg(long, value_enum, default_value = "differential")]
     model: Model,
-    /// How they are fitted [default: weighted; for several joints consistent]
+    /// Estimator [default: weighted; for several joints consistent]
     #[arg(long, value_enum)]
     estimator: Option<Fit>,
-    /// Compare estimators on stretches of time left out of the fit, and say which to trust
+    /// Estimators to compare by cross-validation (each predicts stretches of time left out of its fit); recommends one
     #[arg(long, value_enum, default_value = "auto")]
     compare: Compare,
-    /// How often each --data counts, in their order; 1 where not given
+    /// Weight of each --data, in the order of the recordings; 1 if not given
     #[arg(long, allow_negative_numbers = true)]
     weight: Vec<f64>,
-    /// Relative uncertainty of the description's inertial values (0.1 = 10 %), for iv, output-error, ridge and consistent,
-    /// and of several joints for the bodies that are written [default: ridge: what makes the data most likely; else 2]
+    /// Relative uncertainty of the description's inertial values (0.1 = 10 %). It is used by iv, output-error, ridge
+    /// and consistent, and for the links in the written files if there are several joints [default: ridge: the value
+    /// that makes the data most likely; else 2]
     #[arg(long, allow_negative_numbers = true)]
     prior_uncertainty: Option<f64>,
-    /// Take the description as it is: do not look for springs, ripple or a base that is not level
+    /// Fit the description only: do not look for springs, torque ripple or a tilted base
     #[arg(long)]
     as_described: bool,
     /// Cut-off of the zero-phase low-pass on the position, Hz, or "auto": chosen from the data
@@ -185,28 +187,28 @@ pub(crate) struct Args {
     /// Keep every n-th row after the parallel low-pass, or "auto"
     #[arg(long, default_value = "auto", value_parser = auto::<usize>)]
     decimation: Choice<usize>,
-    /// Leave out rows slower than this, rad/s or m/s, where friction has no sign yet; 0 keeps all, or "auto"
+    /// Leave out rows slower than this, rad/s or m/s, where the sign of friction is uncertain; 0 keeps all, or "auto"
     #[arg(long, default_value = "auto", value_parser = speed, allow_negative_numbers = true)]
     min_speed: Choice<f64>,
-    /// Length of the windows, s [default: chosen from the motion] (integral)
+    /// Length of the windows of the integral model, s [default: chosen from the motion]
     #[arg(long, allow_negative_numbers = true)]
     window: Option<f64>,
-    /// How much later a recorded torque acts, s (half a sample for a command held until the next one)
+    /// Torque lead: time by which a recorded torque acts later, s (half a sample for a command held until the next one)
     #[arg(long, default_value_t = 0.0, value_parser = lead, allow_negative_numbers = true)]
     torque_lead: f64,
     /// Use the recorded qd<k> (and qdd<k>) instead of deriving them from the filtered position
     #[arg(long)]
     measured_derivatives: bool,
-    /// Seed of the random states from which the base parameters are found
+    /// Seed of the random states from which the base parameters are computed
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Fit although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); says what looks wrong
+    /// Fit although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); prints the faults
     #[arg(long)]
     even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Replace results that the folder holds
+    /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
 }
@@ -240,7 +242,7 @@ impl Args {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence naming the file, line or value at fault.
+/// A sentence that names the wrong file, line or value.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let names = [
         "identified.toml",
@@ -260,11 +262,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_shared(&args.data, &args.holdout)?;
     refuse_twice(
         &args.data,
-        "give it once, with --weight where it is to count more",
+        "give it once, and use --weight if it should count more",
     )?;
     if args.weight.len() > args.data.len() {
         return Err(CommandError::Sentence(format!(
-            "--weight is given {} times and --data {} times; each weight belongs to the recording of its place.",
+            "--weight is given {} times but --data {} times; give one weight at most for each recording, in the same order.",
             args.weight.len(),
             args.data.len()
         )));
@@ -276,7 +278,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     } else {
         for sentence in strange {
             ui.remark(&format!(
-                "{sentence} They are not used: --estimator iv and the comparison take the smoothed position instead, and only output-error needs them."
+                "{sentence} They are not used: --estimator iv and the comparison use the smoothed position instead; only output-error needs references."
             ));
         }
     }
@@ -309,7 +311,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let (refused, doubtful) = impossible(&robot, &identification);
     if !args.even_if_wrong && !refused.is_empty() {
         return Err(CommandError::Implausible(format!(
-            "{} Nothing was written; --even-if-wrong writes all the same.",
+            "{} Nothing was written; give --even-if-wrong to write the files in spite of this.",
             refused.join(" ")
         )));
     }
@@ -317,7 +319,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     folder(&args.out)?;
     let (identified, mut remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
-    // A full set of parameters is a body each; combinations alone would not be.
+    // URDF needs a full set of parameters for each link; base parameters do not give one.
     let (mut urdf, mut said) = (None, Vec::new());
     if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
         let found = match &description.urdf {
@@ -360,7 +362,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     printed::print(ui, &identification);
     if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
         ui.say(&format!(
-            "No estimators were compared, so none is recommended: the recordings have {:.0} MiB, and beyond {} MiB that takes long; --compare all does it.",
+            "No estimators were compared, so none is recommended: the recordings have {:.0} MiB, and a comparison takes long beyond {} MiB. Give --compare all to run it.",
             training.bytes() as f64 / f64::from(1 << 20),
             COMPARED_BYTES >> 20
         ));
@@ -375,7 +377,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Drive inertias and constant torques that stand in the files and were identified in a sum only.
+/// Sentences about drive inertias and constant torques that were identified only in sums with other parameters.
 fn chosen(robot: &Robot, found: &Identification) -> Vec<String> {
     let in_a_sum = |place: usize| -> Option<String> {
         let set = found.standard_parameters.as_ref()?;
@@ -396,18 +398,19 @@ fn chosen(robot: &Robot, found: &Identification) -> Vec<String> {
     let one = |(place, what, with)| {
         in_a_sum(place).map(|names| {
             format!(
-                "The {what} of {names} are a choice: only their sums with {with} are identified, and the split nearest to the description was taken. Use them with the links of this file only."
+                "The {what} of {names} are not identified on their own, only their sums with {with}; the file holds the split nearest to the description. Use these values together with the links of this file only."
             )
         })
     };
     kinds.into_iter().filter_map(one).collect()
 }
 
-/// One sentence for each friction or inertia that lies below zero by many of its standard deviations, which no robot has: those
-/// that no result can stand beside, and those that may be said.
+/// Returns sentences about friction and inertia that lie below zero by many standard deviations: first those that
+/// refuse the result, then those that are only warnings.
 ///
-/// A base parameter that is a sum of masses, moments of inertia and friction with positive factors cannot lie below zero. Inertias of
-/// an arm make up for each other: one below zero may be an error of the model that the others take back.
+/// A base parameter that is a sum of masses, moments of inertia and friction with positive factors cannot be negative.
+/// In an arm, inertias compensate each other: a negative one may be a model error that others cancel, so it is a
+/// warning.
 fn impossible(robot: &Robot, found: &Identification) -> (Vec<String>, Vec<String>) {
     let details = &found.details;
     let below_zero = |row: usize| {
@@ -444,7 +447,7 @@ fn impossible(robot: &Robot, found: &Identification) -> (Vec<String>, Vec<String
     let driven: Vec<String> = (driving.iter())
         .map(|&j| {
             format!(
-                "viscous and Coulomb friction of joint \"{}\" both come out below zero, so that friction would drive the motion: the sign of tau{n} or i{n}, of q{n}, or of gear_ratio is wrong.",
+                "viscous and Coulomb friction of joint \"{}\" are both below zero, so friction would drive the motion: the sign of tau{n} or i{n}, of q{n}, or of gear_ratio is wrong.",
                 robot.joints[j].name,
                 n = j + 1
             )
@@ -466,7 +469,7 @@ fn impossible(robot: &Robot, found: &Identification) -> (Vec<String>, Vec<String
             false => &mut doubtful,
         };
         list.push(format!(
-            "{} of joint \"{}\" at {} {}, by {} of its standard deviations",
+            "{} of joint \"{}\" is {} {}, below zero by {} of its standard deviations",
             own.expression,
             robot.joints[column / COLUMNS].name,
             format_significant(value, 3),
@@ -477,7 +480,7 @@ fn impossible(robot: &Robot, found: &Identification) -> (Vec<String>, Vec<String
     let said = |list: Vec<String>| match list.is_empty() {
         true => Vec::new(),
         false => vec![format!(
-            "Below zero, which no robot has, come out: {}. Look at the columns (unit, sign, time, single rows), at the description and at the cut-off.",
+            "No robot can have these values: {}. Check the columns (unit, sign, time, single rows), the description and the cut-off.",
             listed(&list)
         )],
     };

@@ -1,4 +1,4 @@
-//! `rig init`: a commented robot description to start from.
+//! `rig init`: writes a commented robot description to start from.
 
 use std::path::PathBuf;
 
@@ -10,12 +10,12 @@ use super::ui::Ui;
 use rig_model::robot;
 use rig_output::write_whole;
 
-/// Robots that there is a description of.
+/// Robots with a prepared description.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Kind {
     /// The one-link geared rig.
     OneLink,
-    /// The planar direct-drive arm of the book; its figures are representative.
+    /// The planar direct-drive arm of the book, with representative values.
     Edda,
     /// The five-axis IRp-6 of the book, with its ball screws, absolute drives and coupled wrist.
     Irp6,
@@ -46,7 +46,7 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// Where the file exists already or cannot be written.
+/// The file exists already or cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let (name, text) = match args.kind {
         Kind::OneLink => ("one-link.toml", robot::ONE_LINK_TEMPLATE),
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_file(&path, args.force)?;
     write_whole(&path, text.as_bytes())?;
     ui.say(&format!(
-        "{}: change what is not true of your rig, then give it to the other commands as --robot.",
+        "{}: change the values that differ on your rig, then give the file to the other commands with --robot.",
         path.display()
     ));
     Ok(())

@@ -1,4 +1,4 @@
-//! What several commands take: a robot description and recordings, checked before any work begins.
+//! Inputs that several commands share: a robot description and recordings, checked before any work begins.
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -25,27 +25,27 @@ pub(crate) struct RobotArg {
 }
 
 impl RobotArg {
-    /// Where a URDF was given and a description of what it has no place for stands beside it: a word of that.
+    /// Returns a remark if the robot is a URDF file and a TOML description of the same name exists beside it.
     pub(crate) fn fuller(&self) -> Option<String> {
         let urdf = self.path.extension().is_some_and(|end| end == "urdf");
         let beside = self.path.with_extension("toml");
         (urdf && beside.is_file()).then(|| {
             format!(
-                "A URDF has no place for inertia of drives, constant torques and effects, which are missing in this prediction; {} has them.",
+                "A URDF cannot hold drive inertias, constant torques or effects, so this prediction lacks them; {} has them.",
                 beside.display()
             )
         })
     }
 
-    /// Loads it.
+    /// Loads the robot.
     ///
     /// # Errors
-    /// What is wrong with the file, by line.
+    /// Names the error in the file and its line.
     pub(crate) fn load(&self, ui: &Ui) -> Result<Robot, CommandError> {
         Ok(self.describe(ui)?.robot)
     }
 
-    /// Loads it with the file that it was read from.
+    /// Loads the robot together with the file that it was read from.
     ///
     /// # Errors
     /// As [`Self::load`].
@@ -54,10 +54,10 @@ impl RobotArg {
     }
 }
 
-/// Loads a description and says what is strange about it.
+/// Loads a description and prints its remarks.
 ///
 /// # Errors
-/// What is wrong with the file, by line.
+/// Names the error in the file and its line.
 pub(crate) fn described(path: &Path, ui: &Ui) -> Result<Description, CommandError> {
     let description = Description::load(path)?;
     for remark in &description.remarks {
@@ -66,26 +66,26 @@ pub(crate) fn described(path: &Path, ui: &Ui) -> Result<Description, CommandErro
     Ok(description)
 }
 
-/// What columns of recordings look like, one sentence each.
+/// Faults found in the columns of recordings, one sentence each.
 pub(crate) struct Faults {
-    /// What they cannot be.
+    /// Certain faults: the columns cannot be right.
     pub(crate) wrong: Vec<String>,
-    /// What they may be, or the description is far off, or the motion is too short to say.
+    /// Possible faults: the description may be wrong instead, or the motion is too short to decide.
     pub(crate) doubtful: Vec<String>,
 }
 
 /// Recordings that fit the robot.
 pub(crate) struct Inputs {
     sources: Vec<Source>,
-    /// What the rows of each were worth saying, in the pass that came furthest.
+    /// Warnings about the rows of each recording, from the pass that read the most.
     heard: Vec<RefCell<Vec<Warning>>>,
     /// Position limits of each joint.
     ranges: Vec<Range>,
-    /// What the pass that came furthest saw beyond them, for each recording.
+    /// For each recording: positions beyond these limits, from the pass that read the most rows.
     outside: Vec<RefCell<Outside>>,
 }
 
-/// Name of a joint, its position limits where it has any, and its unit.
+/// Name of a joint, its finite position limits (if any) and its unit.
 struct Range {
     joint: String,
     limits: Option<[f64; 2]>,
@@ -110,11 +110,11 @@ impl Range {
 #[derive(Clone, Debug, Default)]
 struct Outside {
     rows: u64,
-    /// Per joint: rows beyond, and by how much at most.
+    /// For each joint: number of rows beyond the limits, and the largest excess.
     joints: Vec<(u64, f64)>,
 }
 
-/// Share of a range by which a position is beyond it through rounding alone.
+/// Share of the position range by which rounding alone can put a position beyond its limit.
 const ROUNDING: f64 = 1e-6;
 
 impl Outside {
@@ -137,7 +137,7 @@ impl Outside {
     }
 }
 
-/// What the first rows of a recording show of its columns.
+/// Applies the check `look` to the first rows of a recording.
 fn at_start<T>(
     source: &Source,
     robot: &Robot,
@@ -149,7 +149,7 @@ fn at_start<T>(
     }
 }
 
-/// What is wrong with a recording in one sentence.
+/// Puts all faults of a recording into one sentence.
 fn sentence(source: &Source, wrong: &[Implausible]) -> String {
     let all: Vec<String> = wrong.iter().map(ToString::to_string).collect();
     let text = source.in_its_names(&all.join("; "));
@@ -160,12 +160,12 @@ impl Inputs {
     /// Opens recordings and checks their columns.
     ///
     /// # Errors
-    /// What is wrong, by file and line.
+    /// Names the error, its file and its line.
     pub(crate) fn read(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
         Self::read_with(robot, paths, EffortNeed::Required)
     }
 
-    /// As [`Self::read`], saying whether the torque may be missing.
+    /// As [`Self::read`]; `need` tells whether the torque may be missing.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -191,15 +191,15 @@ impl Inputs {
     /// Opens recordings and checks their columns and units.
     ///
     /// # Errors
-    /// What is wrong, by file and line; all units that look wrong in one sentence.
+    /// Names the error, its file and its line. One sentence lists all units that look wrong.
     pub(crate) fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
         Self::open_with(robot, paths, EffortNeed::Required)
     }
 
-    /// As [`Self::open`], saying whether the torque may be missing.
+    /// As [`Self::open`]; `need` tells whether the torque may be missing.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Self::open`].
     pub(crate) fn open_with(
         robot: &Robot,
         paths: &[PathBuf],
@@ -217,11 +217,11 @@ impl Inputs {
         Ok(inputs)
     }
 
-    /// One sentence for each recording whose columns cannot be what they say: units, and where those are right signs, ratios,
-    /// clocks and columns in each other's place, of which the motion tells.
+    /// Returns one sentence for each recording whose columns look wrong. Units are checked first. If they are right,
+    /// the motion is checked for wrong signs, ratios, clocks and swapped columns.
     ///
     /// # Errors
-    /// What is wrong with a file, by line.
+    /// Names the error in a file and its line.
     pub(crate) fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
         let mut faults = Faults {
             wrong: Vec::new(),
@@ -234,7 +234,7 @@ impl Inputs {
             if !doubts.is_empty() {
                 faults.doubtful.push(sentence(source, &doubts));
             }
-            // The model tells more closely what a unit is, where there is something that it can be held against.
+            // A comparison with the model names a wrong unit more precisely, if the columns allow the comparison.
             let judged = match wrong.iter().any(Implausible::spoils) {
                 true => Vec::new(),
                 false => faults_at_start(robot, source, JUDGED_ROWS)?,
@@ -258,7 +258,7 @@ impl Inputs {
         Ok(faults)
     }
 
-    /// Gives a message about the recording of that name the file's own names of the columns; another one stays.
+    /// Replaces column names in a message about `recording` by the names that its file uses.
     pub(crate) fn in_its_names(&self, recording: &str, text: &mut String) {
         let of = |source: &&Source| source.label() == recording;
         if let Some(source) = self.sources.iter().find(of) {
@@ -266,10 +266,11 @@ impl Inputs {
         }
     }
 
-    /// One sentence for each recording whose measured velocities or accelerations are none, which concerns who uses them.
+    /// Returns one sentence for each recording whose velocity or acceleration columns do not match its motion.
+    /// Only commands that use these columns need it.
     ///
     /// # Errors
-    /// What is wrong with a file, by line.
+    /// Names the error in a file and its line.
     pub(crate) fn strange_rates(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut strange = Vec::new();
         for source in &self.sources {
@@ -281,10 +282,11 @@ impl Inputs {
         Ok(strange)
     }
 
-    /// One sentence for each recording whose references cannot be those of its positions: another unit, sense, zero, clock or joint.
+    /// Returns one sentence for each recording whose references have another unit, sign, zero, clock or joint than its
+    /// positions.
     ///
     /// # Errors
-    /// What is wrong with a file, by line.
+    /// Names the error in a file and its line.
     pub(crate) fn strange_references(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut strange = Vec::new();
         for source in &self.sources {
@@ -302,7 +304,7 @@ impl Inputs {
         Ok(strange)
     }
 
-    /// What their headers make worth saying.
+    /// Warnings from the headers of the recordings.
     pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.sources.iter().flat_map(|source| {
             source
@@ -312,8 +314,7 @@ impl Inputs {
         })
     }
 
-    /// What their rows made worth saying, once they were read: of each recording one line a kind, that of the worst row, and how
-    /// many more there are of it.
+    /// Warnings about the rows: for each recording and kind one line, with the worst row and the number of others.
     pub(crate) fn heard(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, heard) in self.sources.iter().zip(&self.heard) {
@@ -335,7 +336,7 @@ impl Inputs {
         all
     }
 
-    /// Where their positions left `[joint.limits]`, once they were read: the recording and joint that went farthest, and the others.
+    /// Positions beyond `[joint.limits]` in the rows, first the recording and joint with the largest excess.
     pub(crate) fn outside(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, outside) in self.sources.iter().zip(&self.outside) {
@@ -350,7 +351,7 @@ impl Inputs {
                     kind: "outside",
                     size: *most,
                     sentence: format!(
-                        "{path}: q{n} is beyond the position limits of joint \"{}\" ({low} to {high} {unit}) in {rows} of {} rows, by up to {beyond}. If the joint touched a stop there, its torque is in those rows and biases friction and gravity: record with more margin to the limits, or correct [joint.limits].",
+                        "{path}: q{n} is beyond the position limits of joint \"{}\" ({low} to {high} {unit}) in {rows} of {} rows, by up to {beyond}. If the joint touched a stop there, the stop's torque is in those rows and biases friction and gravity: record with more margin to the limits, or correct [joint.limits].",
                         range.joint, outside.rows,
                     ),
                     short: format!("q{n} of {path} ({rows} rows, {beyond})"),
@@ -360,32 +361,32 @@ impl Inputs {
         one_a_kind(all)
     }
 
-    /// Whether any of them has a torque or a current.
+    /// Returns true if any recording has a torque or a current.
     pub(crate) fn any_effort(&self) -> bool {
         self.sources.iter().any(Source::has_effort)
     }
 
-    /// Whether every recording has torque or current.
+    /// Returns true if every recording has a torque or a current.
     pub(crate) fn all_effort(&self) -> bool {
         self.sources.iter().all(Source::has_effort)
     }
 
-    /// Whether any recording has a motor voltage.
+    /// Returns true if any recording has a motor voltage.
     pub(crate) fn any_voltage(&self) -> bool {
         self.sources.iter().any(Source::has_voltage)
     }
 
-    /// Bytes in all files.
+    /// Size of all files, bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.sources.iter().map(Source::bytes).sum()
     }
 
-    /// The recordings, each reporting what its rows make worth saying.
+    /// The recordings; reading one collects the warnings about its rows.
     pub(crate) fn listened(&self) -> Vec<Watched<'_>> {
         self.with_progress(None)
     }
 
-    /// The same, each reporting to `progress` what was read.
+    /// As [`Self::listened`]; reading a recording also advances `progress`.
     pub(crate) fn watched<'a>(&'a self, progress: &'a RefCell<Progress>) -> Vec<Watched<'a>> {
         self.with_progress(Some(progress))
     }
@@ -403,7 +404,7 @@ impl Inputs {
     }
 }
 
-/// A recording that is listened to while it is read, and may move a progress bar.
+/// A recording that collects warnings while it is read and may advance a progress bar.
 pub(crate) struct Watched<'a> {
     source: &'a Source,
     heard: &'a RefCell<Vec<Warning>>,
@@ -441,7 +442,7 @@ impl Recording for Watched<'_> {
             self.advance(read - before);
             before = read;
         }
-        // Every pass hears the same, as far as it goes.
+        // Every pass gives the same warnings, up to the row where it ends.
         let mut heard = self.heard.borrow_mut();
         if blocks.warnings().len() > heard.len() {
             *heard = blocks.warnings().to_vec();
@@ -458,7 +459,7 @@ impl Recording for Watched<'_> {
     }
 }
 
-/// The list that the library takes.
+/// Converts recordings to the list type that the library takes.
 pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
     watched
         .iter()
@@ -466,12 +467,11 @@ pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recordin
         .collect()
 }
 
-/// Judges the columns of recordings as every command that fits something does: signs, units, ratios, clocks and columns in
-/// each other's place. What is doubtful is said; what is wrong is refused, with `more` sentences of the caller, or said where
-/// the user wants the fit all the same.
+/// Checks the columns of recordings before a fit: signs, units, ratios, clocks and swapped columns. Prints possible
+/// faults. Refuses certain faults and the sentences in `more`; with `even_if_wrong` it prints them instead.
 ///
 /// # Errors
-/// What is wrong with a file, by line; all that looks wrong in one sentence each.
+/// Names the error in a file and its line; gives one sentence for each fault.
 pub(crate) fn refuse_faults(
     robot: &Robot,
     inputs: &[&Inputs],
@@ -495,35 +495,35 @@ pub(crate) fn refuse_faults(
         Ok(())
     } else {
         Err(CommandError::Implausible(format!(
-            "{} Nothing was fitted; --even-if-wrong fits all the same.",
+            "{} Nothing was fitted; give --even-if-wrong to fit in spite of this.",
             wrong.join(" ")
         )))
     }
 }
 
-/// The same of two names of one file; a file that is not there is told of by whoever reads it.
+/// Resolves a path, so that two names of one file compare equal. A missing file keeps its path.
 pub(crate) fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// A recording that was learnt from says nothing as a judge.
+/// Refuses a recording that is given both as training data and as hold-out.
 ///
 /// # Errors
-/// A sentence naming a recording that is given as both.
+/// A sentence that names the recording.
 pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
     match holdout
         .iter()
         .find(|held| data.iter().any(|path| real(path) == real(held)))
     {
         Some(path) => Err(CommandError::Sentence(format!(
-            "{} is given to learn from and as --holdout; judge by a recording that was not learnt from.",
+            "{} is given both as training data and as --holdout; give a hold-out that is not used in the fit.",
             path.display()
         ))),
         None => Ok(()),
     }
 }
 
-/// A motion under torque says nothing of what a sensor reads without one, or a motor at rest.
+/// Refuses a recording that is given both for `option` (drive off, or joints clamped) and as a motion.
 pub(crate) fn refuse_as_rest(
     [option, with]: [&str; 2],
     log: &Path,
@@ -531,19 +531,19 @@ pub(crate) fn refuse_as_rest(
 ) -> Result<(), CommandError> {
     if moved.iter().any(|path| real(path) == real(log)) {
         return Err(CommandError::Sentence(format!(
-            "{} is given as {option} and as a recording of motion; {option} takes one made with {with}.",
+            "{} is given both as {option} and as a recording of motion; {option} takes a recording made with {with}.",
             log.display()
         )));
     }
     Ok(())
 }
 
-/// A recording that is learnt from twice makes every interval too narrow.
+/// Refuses a training recording that is given twice: it would make every interval too narrow.
 pub(crate) fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError> {
     for (k, path) in data.iter().enumerate() {
         if data[..k].iter().any(|before| real(before) == real(path)) {
             return Err(CommandError::Sentence(format!(
-                "{} is given twice to learn from, which would count its noise as two recordings'; {instead}.",
+                "{} is given twice as training data, which would count its noise twice; {instead}.",
                 path.display()
             )));
         }
@@ -551,7 +551,7 @@ pub(crate) fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), Comman
     Ok(())
 }
 
-/// The command line as typed, for the report's "how to repeat this".
+/// The command line as typed, for the section "How to repeat this" of a report.
 pub(crate) fn command_line() -> String {
     let mut words = vec!["rig".to_string()];
     words.extend(std::env::args().skip(1).map(|word| {
@@ -574,7 +574,7 @@ mod tests {
     use super::*;
     use rig_model::robot::ONE_LINK_TEMPLATE;
 
-    /// What is wrong with rows is known only once they were read; every later pass hears the same again.
+    /// Warnings about rows exist only after the rows were read; a later pass must not repeat them.
     #[test]
     fn gaps_are_heard_once_however_often_a_recording_is_read() {
         let folder = tempfile::tempdir().unwrap();
@@ -596,7 +596,7 @@ mod tests {
             let [gap] = &heard[..] else {
                 panic!("one line a kind: {heard:?}")
             };
-            // The longest of them, and the others.
+            // The longest gap, and the number of the others.
             assert!(
                 gap.contains("line 102") && gap.contains("0.050000 s are missing"),
                 "{gap}"

@@ -1,4 +1,4 @@
-//! Ctrl-C, and the signals that end a program, while the rig is recorded.
+//! Ctrl-C and the signals that end a program, during a recording.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,19 +6,19 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use super::error::CommandError;
 
-/// Whether the program has been asked to end since the recording began.
+/// True if the program has been asked to end since the recording began.
 static ASKED: AtomicBool = AtomicBool::new(false);
 /// The file that is being written under a hidden name.
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// Listens to Ctrl-C, SIGTERM and SIGHUP from now on: the link is then brought to rest before the program ends, and what was
-/// recorded is kept. At the second request the program ends at once: it removes `unfinished`, and the rig stops by itself when
-/// it no longer hears anything.
+/// Handles Ctrl-C, SIGTERM and SIGHUP from now on. After the first request the link comes to rest, the recorded samples
+/// are kept and the program ends. After the second request the program removes `unfinished` and ends at once; the rig
+/// then stops by itself because the communication has ended.
 ///
 /// # Errors
-/// [`CommandError::Sentence`] where the system does not allow it.
+/// [`CommandError::Sentence`] if the system does not allow a handler.
 pub(super) fn listen(unfinished: &Path) -> Result<(), CommandError> {
-    // A process has one handler; the program as a library records more than once.
+    // A process has one handler, but a process that uses this library may record more than once.
     static LISTENING: OnceLock<Result<(), String>> = OnceLock::new();
     *UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner) = Some(unfinished.to_path_buf());
     ASKED.store(false, Ordering::Relaxed);
@@ -27,10 +27,10 @@ pub(super) fn listen(unfinished: &Path) -> Result<(), CommandError> {
             if ASKED.swap(true, Ordering::Relaxed) {
                 let unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
                 if let Some(path) = unfinished.as_ref() {
-                    // It has its own name and is not hidden once it is whole: then there is nothing to remove.
+                    // A complete file has been renamed: then there is no file of this name to remove.
                     let _ = std::fs::remove_file(path);
                 }
-                // As a shell says that SIGINT ended it.
+                // The exit status that a shell gives for a program ended by SIGINT.
                 std::process::exit(130);
             }
         })

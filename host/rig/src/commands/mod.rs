@@ -1,4 +1,4 @@
-//! The program's verbs, one file each: arguments in, library called, results named.
+//! The commands of the program, one file each: read the arguments, call the library, report the results.
 
 mod base;
 mod board;
@@ -27,7 +27,7 @@ use ui::Ui;
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
 ///
-/// Without a command: the demonstration, which needs no hardware.
+/// Without a command it runs the demonstration (`rig demo`), which needs no hardware.
 #[derive(Debug, Parser)]
 #[command(name = "rig", version)]
 pub struct Cli {
@@ -53,10 +53,10 @@ enum Command {
 }
 
 impl Cli {
-    /// Does what was asked.
+    /// Runs the command.
     ///
     /// # Errors
-    /// The sentence for the person at the terminal.
+    /// A sentence for the user.
     pub fn run(self) -> Result<(), CommandError> {
         let ui = Ui::new();
         match self.command {

@@ -1,13 +1,13 @@
-//! One rule for all commands: nothing is overwritten without `--force`.
+//! The rule of all commands: nothing is overwritten without `--force`.
 
 use std::path::{Path, PathBuf};
 
 use super::error::CommandError;
 
-/// Whatever commands write into a folder of results under a fixed name.
+/// Files with fixed names that commands write into a folder of results.
 ///
-/// A folder that holds any of them is refused by all commands: results of two commands side by side share the name
-/// report.html, and a file that a later run does not write again would be taken for one of its own.
+/// All commands refuse a folder that holds any of these files. Two commands would both write report.html, and a user
+/// could take a file of an earlier run for a result of the later one.
 const RESULTS: [&str; 10] = [
     "report.html",
     "identified.toml",
@@ -21,7 +21,7 @@ const RESULTS: [&str; 10] = [
     "friction-map.json",
 ];
 
-/// What the demonstration writes besides. Other commands leave such files alone, which may be the user's own recordings.
+/// Further files that the demonstration writes. Other commands ignore them: they may be the user's own recordings.
 pub(crate) const DEMONSTRATION: [&str; 7] = [
     "train.csv",
     "train-again.csv",
@@ -37,14 +37,14 @@ pub(crate) const DEMONSTRATION: [&str; 7] = [
 /// # Errors
 /// [`CommandError::Exists`].
 pub(crate) fn refuse_file(path: &Path, force: bool) -> Result<(), CommandError> {
-    // A link to nothing is there, too.
+    // A symbolic link without a target exists, too.
     if path.symlink_metadata().is_ok() && !force {
         return Err(CommandError::Exists { path: path.into() });
     }
     Ok(())
 }
 
-/// Refuses a folder that holds results of any command, or a file of the names in `besides`.
+/// Refuses a folder that holds results of any command or a file named in `besides`.
 ///
 /// # Errors
 /// [`CommandError::Results`].
@@ -62,13 +62,13 @@ pub(crate) fn refuse_folder(
     }
 }
 
-/// The first result that a folder holds.
+/// Returns the first result that a folder holds.
 fn held(folder: &Path, besides: &[&'static str]) -> Option<&'static str> {
     (RESULTS.iter().chain(besides).copied())
         .find(|name| folder.join(name).symlink_metadata().is_ok())
 }
 
-/// `name`, or where that holds results or files of the names in `besides` `name-2`, `name-3` and so on.
+/// Returns the first of `name`, `name-2`, `name-3` … that holds no results and no file named in `besides`.
 pub(crate) fn free_folder(name: &str, besides: &[&'static str]) -> PathBuf {
     let numbered = (2u32..).map(|k| PathBuf::from(format!("{name}-{k}")));
     std::iter::once(PathBuf::from(name))
@@ -99,7 +99,7 @@ mod tests {
             assert!(refuse_folder(path, &[], true).is_ok());
             std::fs::remove_file(path.join(name)).unwrap();
         }
-        // A user's own recording is in the way of the demonstration alone, which would write it.
+        // Only the demonstration refuses a user's own train.csv, because it would write that file.
         std::fs::write(path.join("train.csv"), "mine").unwrap();
         assert!(refuse_folder(path, &[], false).is_ok());
         assert!(refuse_folder(path, &DEMONSTRATION, false).is_err());

@@ -1,4 +1,4 @@
-//! The figures of a diagnosis as files of their own.
+//! Writes the figures of a diagnosis as separate files.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use crate::pages::PICTURE_NAMES;
 use rig_diagnose::outcome::Diagnosis;
 use rig_report::{self, ReportError};
 
-/// More figures of one kind than any diagnosis has.
+/// Upper bound on the number of figures of one kind.
 const MOST: usize = 64;
 
-/// Writes the figures, and takes those of an earlier result away.
+/// Writes the figures and removes those of an earlier result.
 ///
 /// # Errors
 /// A figure that cannot be drawn, a file that cannot be written or removed.
@@ -24,7 +24,7 @@ pub(super) fn write(out: &Path, found: &Diagnosis) -> Result<(), CommandError> {
     }
     for (name, plot) in &pages::pictures(found) {
         match rig_report::write_svg(&out.join(name), plot) {
-            // The report says so in its place.
+            // The report shows a sentence in its place.
             Err(ReportError::NothingToDraw { .. }) => {}
             written => written?,
         }
@@ -32,7 +32,7 @@ pub(super) fn write(out: &Path, found: &Diagnosis) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Takes a file of an earlier result away, which nobody is to take for one of this.
+/// Removes a file of an earlier result, so that nobody takes it for a part of the new one.
 ///
 /// # Errors
 /// A file that cannot be removed.

@@ -1,4 +1,4 @@
-//! `rig record`: a trajectory run on the rig, or the rig at rest, recorded.
+//! `rig record`: records the rig at rest or while it runs a trajectory.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -42,25 +42,25 @@ pub(crate) struct Args {
     /// Speed of the serial port, baud
     #[arg(long, default_value_t = DEFAULT_BAUD)]
     baud: u32,
-    /// Robot description whose model, friction and limits are sent to the rig first
+    /// Robot description; its model, friction and limits are sent to the rig first
     #[arg(long)]
     robot: Option<PathBuf>,
     /// Trajectory to run (`rig excite` writes one); without it the rig stays disarmed
     #[arg(long)]
     trajectory: Option<PathBuf>,
-    /// How long to record after the trajectory or its drive_off, or in all without one, s
+    /// Recording time after the trajectory (and its drive_off), or in total without a trajectory, s
     #[arg(long, default_value_t = 1.0)]
     seconds: f64,
-    /// Where the link stands at the start, rad: an incremental encoder cannot know
+    /// Position of the link at the start, rad; an incremental encoder cannot measure it
     #[arg(long, allow_negative_numbers = true)]
     home: Option<f32>,
-    /// Compensate friction and effects by the description
+    /// Compensate friction and effects with the values of the description
     #[arg(long, requires = "robot")]
     precompensation: bool,
     /// Seed of the emulated rig
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Which recording of the emulated rig this is: another one of the same motion differs by noise
+    /// Number of the recording of the emulated rig: another number gives the same motion with other noise
     #[arg(long, default_value_t = 1)]
     run: u32,
     /// Replace the recording if it exists
@@ -74,11 +74,11 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence: the port, the rig's refusal, the file.
+/// A sentence about the port, a request that the rig refused, or the file.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     if !(args.seconds >= 0.0 && args.seconds.is_finite()) {
         return Err(CommandError::Sentence(format!(
-            "--seconds {} is no time; give 0 or more.",
+            "--seconds {} is not a valid time; give 0 or more.",
             args.seconds
         )));
     }
@@ -135,7 +135,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// What a description asks the rig to be told, effects included; what is left out of it is said.
+/// Returns the requests that send a description to the rig, effects included. Prints the effects that were left out.
 pub(crate) fn uploaded(
     robot: &Robot,
     leave_out: bool,
@@ -148,7 +148,7 @@ pub(crate) fn uploaded(
     Ok(upload.requests)
 }
 
-/// The emulated rig: a laboratory's, with drive, encoder and nameplate of this description or of the template.
+/// Creates an emulated laboratory rig with the drive, encoder and nameplate of this description or of the template.
 pub(crate) fn emulated(robot: Option<Robot>, seed: u64) -> Result<EmulatedRig, CommandError> {
     emulated_at(&described_or_template(robot)?, [seed, 1], None)
 }
@@ -163,7 +163,7 @@ fn described_or_template(robot: Option<Robot>) -> Result<Robot, CommandError> {
     }
 }
 
-/// The same in one of its recordings (counted from 1), its link held where it is said to stand, if that is not where it hangs.
+/// As [`emulated`], for recording `run` (from 1). A link with `home` away from the hanging position is held.
 fn emulated_at(
     described: &Robot,
     [seed, run]: [u64; 2],
@@ -174,7 +174,8 @@ fn emulated_at(
     let hangs = plant.initial_position;
     let home = home.map_or(hangs, f64::from);
     if (home - hangs).abs() > HANGS {
-        // Who says straight down of where it hangs is off by as much wherever else he brings it: the rig has one zero.
+        // The user takes the hanging position for −90°. The true one differs by hangs + 90°, and the rig has one zero:
+        // the same offset applies to `home`.
         let stands = home + (hangs + FRAC_PI_2);
         (plant.initial_position, plant.sensors.encoder.zero) = (stands, stands);
         plant.held = true;
@@ -187,10 +188,10 @@ fn emulated_at(
     })
 }
 
-/// Says where the description's link cannot be the emulated one, and where its motor is too weak for the motion of that.
+/// Prints remarks if the described link differs from the emulated one or the motor is too weak for the motion.
 ///
 /// # Errors
-/// What is missing in the description.
+/// Values that the description lacks.
 fn doubt(
     rig: &EmulatedRig,
     robot: &Robot,
@@ -213,13 +214,13 @@ fn doubt(
     Ok(())
 }
 
-/// The rig behind the debug probe.
+/// Opens the connection to the rig through the debug probe.
 #[cfg(feature = "probe")]
 pub(crate) fn open_probe() -> Result<rig_link::ProbeLine, CommandError> {
     Ok(rig_link::ProbeLine::open()?)
 }
 
-/// A program without this ability says so.
+/// Reports that the program was built without the debug probe.
 #[cfg(not(feature = "probe"))]
 pub(crate) fn open_probe() -> Result<Box<dyn Port>, CommandError> {
     Err(CommandError::Sentence(
@@ -227,7 +228,7 @@ pub(crate) fn open_probe() -> Result<Box<dyn Port>, CommandError> {
     ))
 }
 
-/// The motion of the rig's one joint, if it starts where the link stands.
+/// Returns the motion of the rig's only joint, after a check that it starts at the position of the link.
 fn single<'a>(
     file: &'a TrajectoryFile,
     path: &Path,
@@ -235,7 +236,7 @@ fn single<'a>(
 ) -> Result<&'a JointTrajectory, CommandError> {
     let [joint] = file.joints.as_slice() else {
         return Err(CommandError::Sentence(format!(
-            "{} moves {} joints, but the rig has one; design it with `rig excite` from the rig's description.",
+            "{} moves {} joints, but the rig has one; design the motion with `rig excite` from the rig's description.",
             path.display(),
             file.joints.len()
         )));
@@ -243,7 +244,7 @@ fn single<'a>(
     let stands = f64::from(home.unwrap_or(0.0));
     if (joint.start - stands).abs() > START_TOLERANCE {
         return Err(CommandError::Sentence(format!(
-            "{} starts at {:.4} rad, but the link stands at {stands:.4} rad (--home); bring the link there, or design the motion with `rig excite --start {stands:.4}`.",
+            "{} starts at {:.4} rad, but the link is at {stands:.4} rad (--home); move the link to the start, or design the motion with `rig excite --start {stands:.4}`.",
             path.display(),
             joint.start
         )));
@@ -251,18 +252,18 @@ fn single<'a>(
     Ok(joint)
 }
 
-/// A link that is said to stand within this of where it hangs does hang, rad.
+/// Largest distance from the hanging position at which a `home` still means that the link hangs, rad.
 const HANGS: f64 = 0.2;
 
-/// How far from its start a motion may begin, rad: about what a spirit level leaves. The rig checks its
-/// limits from where the link really stands.
+/// Largest distance between the link and the start of a motion, rad: about the accuracy of a spirit level. The rig
+/// checks its limits from the true position of the link.
 const START_TOLERANCE: f64 = 0.02;
 
-/// What a board tells of a fault after the recording; the emulated rig is gone with it.
+/// Advice about a fault on a board. The emulated rig ends with the recording and gets no such advice.
 const ON_BOARD: &str =
-    " `rig board fault` fetches the ticks around it, `rig board clear` forgets it.";
+    " `rig board fault` fetches the control ticks around it; `rig board clear` clears it.";
 
-/// What is written beside the rows: firmware, modes and limits by number.
+/// Metadata of a recording: firmware, and the numbers of modes and limits.
 fn metadata(firmware: &str) -> BTreeMap<String, String> {
     let modes = names(&[
         Mode::Calibrating,
@@ -340,7 +341,7 @@ fn record<P: Port>(
         Err(error) => {
             writer.finish()?;
             return Err(CommandError::Sentence(format!(
-                "{error} {} holds the {} samples that came before; how many were lost is not known.",
+                "{error} {} holds the {} samples received before that; the number of lost samples is not known.",
                 out.display(),
                 ending.done
             )));
@@ -355,7 +356,7 @@ fn record<P: Port>(
 struct Ending {
     fault: Option<FaultRecord>,
     mode: Mode,
-    /// Samples that came.
+    /// Number of samples received.
     done: u64,
 }
 
@@ -371,23 +372,23 @@ impl Default for Ending {
 
 impl Ending {
     /// # Errors
-    /// A sentence where a fault or the user ended the recording.
+    /// A sentence if a fault or the user ended the recording.
     fn judge(&self, out: &Path, more: &str, control_rate: f64) -> Result<(), CommandError> {
         let out = out.display();
         if let Some(record) = &self.fault {
             return Err(CommandError::Sentence(format!(
-                "The rig has stopped. {} {out} holds what was recorded until the end.{more}",
+                "The rig has stopped. {} {out} holds the samples recorded until then.{more}",
                 describe_fault(record, control_rate)
             )));
         }
         if self.mode == Mode::Fault {
             return Err(CommandError::Sentence(format!(
-                "The rig has a fault latched that was not announced while {out} was recorded: `rig board fault` says which, `rig board clear` forgets it."
+                "The rig has a latched fault, but sent no report of it while {out} was recorded: `rig board fault` names the fault, `rig board clear` clears it."
             )));
         }
         if interrupts::asked() {
             return Err(CommandError::Sentence(format!(
-                "Broken off: the motion was stopped and the bridge switched off; {out} holds the {} samples until then.",
+                "Interrupted: the motion was stopped and the bridge switched off; {out} holds the {} samples recorded until then.",
                 self.done
             )));
         }

@@ -1,4 +1,4 @@
-//! `rig simulate`: what the model would do on a trajectory, as a recording.
+//! `rig simulate`: simulates the robot on a trajectory and writes a recording.
 
 use std::path::PathBuf;
 
@@ -12,24 +12,25 @@ use rig_model::robot::Robot;
 
 /// Simulates the robot following a trajectory, with its own friction, drives and controller.
 ///
-/// Where the description has one joint with a [joint.voltage_controller], as `rig diagnose` writes it for recordings of a motor
-/// voltage, that controller closes the loop, and the recording has the columns t, q1, qd1, u1, supply and ref1.
+/// Writes a recording with the column t and the columns q, qd, tau and ref for each joint. The other commands read it
+/// like a recording of the real robot. The same seed gives the same file. The controllers act at every step of the
+/// simulation, 0.25 ms at most, independently of the rate of the recording.
 ///
-/// Writes a recording with the columns t, q, qd, tau and ref per joint, which the other commands read like one of the
-/// real robot. The same seed gives the same file. The controllers answer at every step of the simulation, 0.25 ms at most, whatever
-/// the rate of the recording.
+/// If the description has a single joint with a [joint.voltage_controller], as `rig diagnose` writes it for recordings
+/// of a motor voltage, that controller closes the loop. The recording then has the columns t, q1, qd1, u1, supply and
+/// ref1.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Robot description (.toml or .urdf) with inertia and friction
     #[arg(long)]
     pub(crate) robot: PathBuf,
-    /// Trajectory that `rig excite` wrote (.toml or .csv), or a recording whose reference is run again
+    /// Trajectory written by `rig excite` (.toml or .csv), or a recording whose reference is repeated
     #[arg(long)]
     pub(crate) trajectory: PathBuf,
     /// Recording to write (.csv or .mcap)
     #[arg(long)]
     pub(crate) out: PathBuf,
-    /// Samples a second for a .toml trajectory, Hz; a .csv has its own
+    /// Sample rate for a .toml trajectory, Hz; a .csv has its own rate
     #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
     pub(crate) rate: f64,
     /// Standard deviation of the noise on positions, rad or m
@@ -52,7 +53,7 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// Files that cannot be read or written, a model that cannot be simulated.
+/// A file cannot be read or written, or the model cannot be simulated.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = described(&args.robot, ui)?.robot;
     if real(&args.out) == real(&args.trajectory) {
@@ -68,7 +69,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     ] {
         if !(deviation >= 0.0 && deviation.is_finite()) {
             return Err(CommandError::Sentence(format!(
-                "--noise-{option} {deviation} is no standard deviation; it must be 0 or a number above it."
+                "--noise-{option} {deviation} is not a standard deviation; it must be 0 or a number above it."
             )));
         }
     }
@@ -103,11 +104,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Simulates a joint that its voltage drives.
+/// Simulates a joint under motor voltage.
 fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError> {
     if args.noise_torque > 0.0 {
         return Err(CommandError::Sentence(format!(
-            "--noise-torque {} says nothing of joint {}, which is simulated under voltage and has no torque column; leave it out.",
+            "--noise-torque {} has no effect on joint {}, which is simulated under voltage and has no torque column; leave it out.",
             args.noise_torque, robot.joints[0].name
         )));
     }

@@ -1,28 +1,28 @@
-//! What a person sees while a command works: progress on a terminal, sentences everywhere.
+//! Output for the user while a command works: a progress bar on a terminal, and sentences.
 
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Speaks to the person at the terminal. Results go to standard output, everything else to standard error.
+/// Prints messages for the user. Results go to standard output, everything else to standard error.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ui {
     terminal: bool,
 }
 
 impl Ui {
-    /// Progress bars only where standard error is a terminal.
+    /// Creates the output. It shows progress bars only if standard error is a terminal.
     pub(crate) fn new() -> Self {
         Self {
             terminal: std::io::stderr().is_terminal(),
         }
     }
 
-    /// A result: one line on standard output.
+    /// Prints a result: one line on standard output.
     pub(crate) fn say(&self, text: &str) {
         if let Err(error) = writeln!(std::io::stdout(), "{text}") {
-            // A reader that has seen enough (`rig … | head`) is no failure; a full disk is.
+            // A closed pipe (`rig … | head`) is no failure; a full disk is one.
             if error.kind() == std::io::ErrorKind::BrokenPipe {
                 std::process::exit(0);
             }
@@ -31,12 +31,12 @@ impl Ui {
         }
     }
 
-    /// A remark that is no result: one line on standard error.
+    /// Prints a remark: one line on standard error.
     pub(crate) fn remark(&self, text: &str) {
         eprintln!("rig: {text}");
     }
 
-    /// A bar for work of `total` steps; invisible off a terminal, and there for the first second.
+    /// Creates a bar for work of `total` steps. It is hidden without a terminal and during the first second.
     pub(crate) fn progress(&self, what: &'static str, total: u64) -> Progress {
         if !self.terminal {
             return Progress {
@@ -68,7 +68,7 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// So many steps are done.
+    /// Sets the number of steps that are done.
     pub(crate) fn at(&mut self, done: u64) {
         if self
             .started
@@ -86,12 +86,12 @@ impl Progress {
         self.bar.set_position(done);
     }
 
-    /// So many steps more are done.
+    /// Adds to the number of steps that are done.
     pub(crate) fn advance(&mut self, steps: u64) {
         self.at(self.bar.position() + steps);
     }
 
-    /// So many of so many steps are done.
+    /// Sets the number of steps that are done and their total.
     pub(crate) fn at_of(&mut self, done: u64, total: u64) {
         self.bar.set_length(total);
         self.at(done);

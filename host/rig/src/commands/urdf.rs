@@ -1,4 +1,4 @@
-//! `rig urdf`: a description as URDF.
+//! `rig urdf`: writes a description as URDF.
 
 use std::path::PathBuf;
 
@@ -10,15 +10,15 @@ use super::overwrite::refuse_file;
 use super::ui::Ui;
 use rig_output::write_whole;
 
-/// Writes a robot description as URDF, for simulators and other libraries, and says what URDF has no place for.
+/// Writes a robot description as URDF for simulators and other libraries, and names the values that URDF cannot hold.
 ///
-/// A TOML description becomes a file of bare links. With --into its values are put into a URDF of the same robot instead,
-/// whose names, frames, meshes and comments stay as they are.
+/// A TOML description becomes a file of links without meshes. With --into its values are written into a copy of another
+/// URDF of the same robot; names, frames, meshes and comments of that file stay unchanged.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// URDF file of the same robot into which the values are put
+    /// URDF file of the same robot whose copy gets the values
     #[arg(long, value_name = "FILE")]
     into: Option<PathBuf>,
     /// File to write (.urdf)
@@ -32,7 +32,7 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// The description, a link without inertial parameters, or the file.
+/// The description is wrong, a link has no inertial parameters, or the file cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_file(&args.out, args.force)?;
     let description = args.robot.describe(ui)?;
@@ -45,7 +45,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let original = match (&args.into, into) {
         (Some(path), Some(into)) => Some(into.urdf.ok_or_else(|| {
             CommandError::Sentence(format!(
-                "{} is no URDF file, but --into names one whose values are replaced.",
+                "{} is not a URDF file; --into takes a URDF file whose values are replaced in the copy.",
                 path.display()
             ))
         })?),
@@ -60,9 +60,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(remark);
     }
     let what = match (&original, &args.into) {
-        (Some(_), None) => "the URDF file as it was",
+        (Some(_), None) => "the unchanged URDF file",
         (Some(_), Some(_)) => "the URDF file with the description's values",
-        (None, _) => "link frames are the description's",
+        (None, _) => "the link frames are those of the description",
     };
     ui.say(&format!(
         "{}: {} joints; {what}.",

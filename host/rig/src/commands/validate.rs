@@ -1,4 +1,4 @@
-//! `rig validate`: a description against data that it was not made from.
+//! `rig validate`: compares a description with recordings that were not used to make it.
 
 use std::path::{Path, PathBuf};
 
@@ -21,26 +21,26 @@ use rig_validate::{Motion, Options, Validation, validate};
 
 /// Predicts torque and simulates motion on data not used before.
 ///
-/// Where the description has a [joint.controller] for every joint, the motion is that of the closed loop that follows the
-/// recorded references; else the recorded torque drives the model, and a controller answers what it departs from the recorded
-/// motion by, as in `rig diagnose`.
+/// If the description has a [joint.controller] for every joint, the simulated closed loop follows the recorded
+/// references. Otherwise the recorded torque drives the model, and a controller corrects the deviation from the
+/// recorded motion, as in `rig diagnose`.
 ///
-/// Where one joint's motor voltage was recorded (u1, or duty1 with supply) and neither torque nor current, the model runs freely
-/// under voltage instead: in the closed loop of the controller that the recording shows, with the supply of the description, or
-/// under the recorded voltage. RMS and mean absolute error of the position are printed.
+/// If the motor voltage of a single joint was recorded (u1, or duty1 with supply) but no torque and no current, the
+/// model runs freely under voltage instead: in the closed loop of the controller that the recording shows, with the
+/// supply of the description, or under the recorded voltage. RMS and mean absolute error of the position are printed.
 ///
 /// Writes validation.json and report.html into the folder given with --out.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// Recording to judge by, CSV or MCAP; one or more
+    /// Recording to compare with, CSV or MCAP; one or more
     #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Replace results that the folder holds
+    /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
 }
@@ -48,7 +48,7 @@ pub(crate) struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// A sentence naming the file, line or value at fault.
+/// A sentence that names the wrong file, line or value.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &["validation.json", "report.html"])?;
     refuse_folder(&args.out, &[], args.force)?;
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     if voltage {
         for sentence in inputs.strange_references(&robot)? {
             ui.remark(&format!(
-                "{sentence} The controller that moved the joint was looked for with these references."
+                "{sentence} These references were used to identify the controller that moved the joint."
             ));
         }
         return under_voltage(args, ui, &robot, &inputs);
@@ -93,7 +93,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// The recordings, and whether the voltage is all that they know of what drives the joint: of a robot of one joint alone.
+/// Opens the recordings. Returns true with them if the robot has one joint and only its motor voltage was recorded.
 fn opened(robot: &Robot, paths: &[PathBuf]) -> Result<(Inputs, bool), CommandError> {
     if robot.joints.len() != 1 {
         return Ok((Inputs::open(robot, paths)?, false));
@@ -104,12 +104,12 @@ fn opened(robot: &Robot, paths: &[PathBuf]) -> Result<(Inputs, bool), CommandErr
     }
     match !inputs.any_effort() && inputs.any_voltage() {
         true => Ok((inputs, true)),
-        // It says what is missing, and where.
+        // This call fails with an error that names the missing column and the file.
         false => Ok((Inputs::open(robot, paths)?, false)),
     }
 }
 
-/// The answer, the warnings and where the report is.
+/// Prints the answer, the warnings and the path of the report.
 fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
     for line in answer {
         ui.say(line);
@@ -134,7 +134,7 @@ fn write<T: Serialize>(out: &Path, found: &T, page: &Document) -> Result<(), Com
     Ok(())
 }
 
-/// Validates a joint that is known by its voltage.
+/// Validates a joint whose motor voltage was recorded without torque or current.
 fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result<(), CommandError> {
     let mut found = validate_voltage(robot, &recordings(&inputs.listened()))?;
     found.warnings.extend(inputs.heard());
@@ -159,7 +159,7 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result
     Ok(())
 }
 
-/// What became of a free run, with what drove it.
+/// Describes the error of a free run and its input.
 fn moved(run: &FreeRun, driven: Option<&DrivenBy>, unit: &str) -> String {
     let how = match driven {
         Some(DrivenBy::Controller { controller }) => format!(
@@ -173,17 +173,17 @@ fn moved(run: &FreeRun, driven: Option<&DrivenBy>, unit: &str) -> String {
         FreeRun::Followed {
             rms, mean_absolute, ..
         } => format!(
-            "position simulated{how} off by {} {unit} rms, {} {unit} mean absolute",
+            "simulated position{how}: error {} {unit} rms, {} {unit} mean absolute",
             format_significant(*rms, 4),
             format_significant(*mean_absolute, 4)
         ),
         FreeRun::Diverged { time, .. } => {
-            format!("the position simulated{how} diverges at {time:.2} s; a remark says why")
+            format!("simulated position{how}: diverges at {time:.2} s; a remark says why")
         }
     }
 }
 
-/// The result at a glance: one line a joint and recording for the torque, one for the motion.
+/// Short result: for each joint and recording one line on the torque and one on the motion.
 fn summary(validation: &Validation) -> Vec<String> {
     let mut lines = Vec::new();
     for checked in &validation.recordings {
@@ -193,7 +193,7 @@ fn summary(validation: &Validation) -> Vec<String> {
                 continue;
             }
             lines.push(format!(
-                "{}, {}: torque off by {} {} rms, {:.2} % of the torque",
+                "{}, {}: torque error {} {} rms, {:.2} % of the torque",
                 checked.recording,
                 torque.joint,
                 format_significant(torque.residual.rms, 4),
@@ -210,7 +210,7 @@ fn summary(validation: &Validation) -> Vec<String> {
                 ..
             } => lines.extend(joints.iter().map(|joint| {
                 format!(
-                    "{}, {}: position simulated {} off by {} {} rms, {:.2} % of the tracking error of {} {}; torque by {} {} rms",
+                    "{}, {}: position simulated {}: error {} {} rms, {:.2} % of the tracking error of {} {}; torque error {} {} rms",
                     checked.recording,
                     joint.joint,
                     if uncontrolled.is_empty() {

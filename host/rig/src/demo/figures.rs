@@ -1,4 +1,4 @@
-//! What the demonstration shows: its results as the page and the terminal want them.
+//! Results of the demonstration, prepared for the page and the terminal.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -26,8 +26,8 @@ const MEANINGS: [(&str, &str); PARAMETER_COUNT] = [
     ("constant torque", "N·m"),
 ];
 
-/// Standard columns behind the six, in the same order; the second and third are first moments, turned into
-/// gravity torques by [`gravity_factors`].
+/// Standard parameter columns of the six parameters, in the same order. [`gravity_factors`] converts the second and
+/// third, first moments, to gravity torques.
 const STANDARD: [usize; PARAMETER_COUNT] = [
     column::INERTIA + 5,
     column::FIRST_MOMENT,
@@ -37,7 +37,7 @@ const STANDARD: [usize; PARAMETER_COUNT] = [
     column::OFFSET,
 ];
 
-/// Joint torque at q = 0 of a unit first moment along x, and at q = π/2 of one along y, m/s².
+/// Joint torque of a unit first moment along x at q = 0, and of one along y at q = π/2, m/s².
 fn gravity_factors(demo: &Demo) -> Result<[f64; 2], DemoError> {
     let model = Model::from_robot(&demo.robot)?;
     let mut factors = [0.0; 2];
@@ -52,7 +52,7 @@ fn gravity_factors(demo: &Demo) -> Result<[f64; 2], DemoError> {
     Ok(factors)
 }
 
-/// The six one-link parameters as an identification found them.
+/// Returns the six one-link parameters of an identification.
 fn found(
     result: &Identification,
     factors: [f64; 2],
@@ -74,7 +74,7 @@ fn found(
             .and_then(|row| result.base_parameters.get(row))
             .ok_or_else(|| {
                 DemoError::Sentence(format!(
-                    "The demonstration's motion did not identify {}.",
+                    "The motion of the demonstration did not identify {}.",
                     PARAMETER_NAMES[k]
                 ))
             })?;
@@ -90,18 +90,18 @@ fn found(
 }
 
 impl Demo {
-    /// The page.
+    /// Composes the page of the demonstration.
     ///
     /// # Errors
-    /// Where a parameter was not identified.
+    /// A parameter was not identified.
     pub fn page(&self, command: &str) -> Result<Document, DemoError> {
         Ok(pages::demo(&self.figures(command)?))
     }
 
-    /// The page of the diagnosis.
+    /// Composes the page of the diagnosis.
     ///
     /// # Errors
-    /// A description that cannot be written.
+    /// The description cannot be written.
     pub fn diagnosis_page(&self, command: &str) -> Result<Document, DemoError> {
         let context = Context {
             command: command.to_owned(),
@@ -112,7 +112,7 @@ impl Demo {
         Ok(pages::diagnosis(&self.diagnosis, &context))
     }
 
-    /// The tracking error with and without precompensation, as a picture of its own.
+    /// Draws the tracking error with and without precompensation.
     pub fn picture(&self) -> Plot {
         pages::tracking_plot(&tracking(&self.without, &self.with))
     }
@@ -128,7 +128,7 @@ impl Demo {
             .estimates
             .last()
             .map(|(_, estimate)| *estimate)
-            .ok_or_else(|| DemoError::Sentence("The rig has sent no on-line estimate.".into()))?;
+            .ok_or_else(|| DemoError::Sentence("The rig sent no on-line estimate.".into()))?;
         let truth = self.truth.to_array();
         Ok((0..PARAMETER_COUNT)
             .map(|k| {
@@ -182,7 +182,7 @@ impl Demo {
                 received,
                 lost,
                 text: format!(
-                    "Over {} runs the rig took {} samples; {received} arrived and {lost} are known to be missing.",
+                    "In {} runs the rig took {} samples; {received} arrived and {lost} were lost.",
                     self.losses.len(),
                     self.losses.iter().map(|l| l.taken).sum::<u64>(),
                 ),
@@ -202,10 +202,10 @@ impl Demo {
         })
     }
 
-    /// The result at a glance, for the terminal.
+    /// Short result for the terminal.
     ///
     /// # Errors
-    /// Where a parameter was not identified.
+    /// A parameter was not identified.
     pub fn summary(&self) -> Result<Vec<String>, DemoError> {
         let mut lines = vec![format!(
             "{:4} {:>10}  {:>20}  {:>20}  {:>20}",
@@ -225,7 +225,7 @@ impl Demo {
         }
         let (without, with) = (self.without.tracking_rms(), self.with.tracking_rms());
         lines.push(format!(
-            "slow reversals: {:.3} mrad rms without precompensation, {:.3} mrad with it, {:.1} times less",
+            "slow reversals: {:.3} mrad rms without precompensation, {:.3} mrad with it, {:.1} times smaller",
             1e3 * without,
             1e3 * with,
             without / with,
@@ -240,33 +240,33 @@ impl Demo {
     }
 }
 
-/// Movement at rest that is no hunting, rad: three counts of 8192 a turn behind a gear of 50; a count of flicker
-/// at a quantisation step is no motion.
+/// Movement at rest that does not count as a limit cycle, rad: three counts of an encoder with 8192 counts a turn
+/// behind a gear of 50. Flicker at a quantisation step is no motion.
 const FLICKER: f64 = 3.0 * core::f64::consts::TAU / (8192.0 * 50.0);
 
-/// What the emulated rig does that the six parameters cannot express.
+/// Effects of the emulated rig that the six parameters cannot represent.
 const BEYOND_MODEL: [&str; 6] = [
-    "friction with memory: presliding by elastic asperities that stick and slip (generalised Maxwell slip), on rotor and link",
-    "friction that weakens with speed, by another law than the one fitted",
-    "a winding with inductance, driven through a bridge that is one period late",
-    "converters of 12 bits with noise and an offset, an encoder that counts in steps",
-    "a random torque on the joint, correlated over 50 ms",
+    "friction with memory: presliding of elastic asperities that stick and slip (generalised Maxwell slip), at rotor and link",
+    "friction that decreases with speed, by another law than the fitted one",
+    "a motor winding with inductance, driven by a bridge with a delay of one period",
+    "12-bit converters with noise and an offset, an encoder that counts in steps",
+    "a random torque at the joint, correlated over 50 ms",
     "masses and centres of mass that differ from the description by up to 30 %",
 ];
 
 const FILES: [(&str, &str); 11] = [
     (
         "train.csv",
-        "the excitation that the parameters were identified from",
+        "the excitation from which the parameters were identified",
     ),
     (
         "train-again.csv",
-        "the same motion again: what differs is noise",
+        "the same motion again: the difference is noise",
     ),
-    ("holdout.csv", "another excitation, used only to judge them"),
+    ("holdout.csv", "another excitation, used only as hold-out"),
     ("sweep.csv", "constant speeds, for the friction map"),
     ("slow-without.csv", "slow reversals without precompensation"),
-    ("slow-with.csv", "the same with it"),
+    ("slow-with.csv", "slow reversals with precompensation"),
     (
         "tracking.svg",
         "the tracking error with and without precompensation",
@@ -277,16 +277,13 @@ const FILES: [(&str, &str); 11] = [
     ),
     (
         "model.toml",
-        "that description with the effects that it lacked",
+        "the identified description with the effects that were found",
     ),
-    (
-        "diagnosis.html",
-        "where and why the identified model misses",
-    ),
-    ("diagnosis.json", "the same for programs"),
+    ("diagnosis.html", "the diagnosis of the identified model"),
+    ("diagnosis.json", "the diagnosis for programs"),
 ];
 
-/// Tracking errors of two runs of the same motion, side by side.
+/// Tracking errors of two runs of the same motion.
 fn tracking(without: &RecordedRun, with: &RecordedRun) -> Tracking {
     let begin = without.rows.first().map_or(0.0, |row| row.t);
     let error = |run: &RecordedRun| {
@@ -312,8 +309,8 @@ fn tracking(without: &RecordedRun, with: &RecordedRun) -> Tracking {
     }
 }
 
-/// What the rest shows. The random torque on the joint moves the link within its presliding range in either case;
-/// a limit cycle would move it much further than it moves without precompensation.
+/// Describes the motion during the rest. The random torque on the joint moves the link within its presliding range in
+/// both runs. A limit cycle would move it much further than the run without precompensation does.
 fn rest_note(without: f64, with: f64) -> String {
     let verdict = if with <= 2.0 * without + FLICKER {
         "no limit cycle"
@@ -321,7 +318,7 @@ fn rest_note(without: f64, with: f64) -> String {
         "a limit cycle"
     };
     format!(
-        "During the second half of the rest the link moves by {:.3} mrad in all with precompensation and {:.3} mrad without: {verdict}.",
+        "During the second half of the rest the link moves by {:.3} mrad in all with precompensation and by {:.3} mrad without it: {verdict}.",
         1e3 * with,
         1e3 * without
     )

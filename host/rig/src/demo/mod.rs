@@ -1,5 +1,5 @@
-//! The main job without hardware: a rig that differs from its description is excited, recorded over the
-//! real wire, identified off-line and on-line, and compensated; everything lands in one report.
+//! The demonstration without hardware: a rig that differs from its description is excited, recorded over the real wire
+//! protocol, identified off-line and on-line, diagnosed and compensated. One report shows all results.
 
 mod figures;
 
@@ -27,9 +27,9 @@ use rig_output::{WriteError, folder, write_whole};
 use rig_plant::emulated::{EmulatedRig, Nameplate, NameplateError, link_parameters};
 use rig_plant::{Equivalent, PlantConfig};
 
-/// Speed of the slow reversals that the precompensation is judged by, rad/s.
+/// Speed of the slow reversals that test the precompensation, rad/s.
 const SLOW: f64 = 0.05;
-/// Rest after the slow reversals, in which a limit cycle would show, s.
+/// Rest after the slow reversals, which would show a limit cycle, s.
 const REST: f64 = 5.0;
 /// Speeds of the friction sweep, rad/s: below, at and well above the Stribeck velocity of a servo gear
 /// (0.01 to 0.3 rad/s; Armstrong-Hélouvry, Dupont & Canudas de Wit 1994).
@@ -37,13 +37,13 @@ const SPEEDS: [f64; 12] = [
     0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6, 1.0, 1.5, 2.0,
 ];
 
-/// Why the demonstration could not be run.
+/// Reason why the demonstration failed.
 #[derive(Debug, Error)]
 pub enum DemoError {
     /// The description.
     #[error(transparent)]
     Robot(#[from] RobotError),
-    /// What the firmware is told.
+    /// The nameplate that is sent to the firmware.
     #[error(transparent)]
     Nameplate(#[from] NameplateError),
     /// Trajectory design.
@@ -64,7 +64,7 @@ pub enum DemoError {
     /// Diagnosis.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
-    /// The model behind a figure.
+    /// The model for a figure.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
     /// Files.
@@ -75,21 +75,21 @@ pub enum DemoError {
     Sentence(String),
 }
 
-/// Everything that the demonstration found.
+/// Results of the demonstration.
 pub struct Demo {
-    /// What the firmware and the host were told.
+    /// Description that firmware and host were given.
     pub robot: Robot,
-    /// What is true, about the joint's own angle.
+    /// True parameters of the emulated rig, with the link's true angle as coordinate.
     pub truth: Equivalent,
-    /// By the differential model.
+    /// Identification with the differential model.
     pub differential: Identification,
-    /// By the integral model.
+    /// Identification with the integral model.
     pub integral: Identification,
-    /// Friction over speed.
+    /// Friction as a function of speed.
     pub friction_map: FrictionMap,
-    /// What the identified description lacks.
+    /// Diagnosis of the identified description.
     pub diagnosis: Diagnosis,
-    /// That description with what was found.
+    /// Identified description with the effects that were found.
     pub model: Robot,
     /// The training run, with its on-line estimates.
     pub training: RecordedRun,
@@ -97,19 +97,19 @@ pub struct Demo {
     pub holdout: RecordedRun,
     /// Slow reversals without precompensation.
     pub without: RecordedRun,
-    /// The same with it.
+    /// Slow reversals with precompensation.
     pub with: RecordedRun,
-    /// What the wire lost in all runs.
+    /// Lost samples of each run.
     pub losses: Vec<LossReport>,
-    /// Telemetry samples a second.
+    /// Sample rate of the telemetry, Hz.
     pub sample_rate: f64,
 }
 
-/// Runs the demonstration; recordings and the identified description are written into `out`. `progress` is
-/// told how much of the work is done, 0 to 1.
+/// Runs the demonstration and writes recordings and the identified description into `out`. Calls `progress` with the
+/// share of the work that is done, 0 to 1.
 ///
 /// # Errors
-/// [`DemoError`]; what it says is a sentence.
+/// [`DemoError`], whose text is a sentence.
 pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo, DemoError> {
     folder(out)?;
     let plant = PlantConfig::laboratory(seed);
@@ -124,7 +124,7 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     })?;
     let mut session = Session::open(EmulatedPort::new(rig), SessionSettings::default())?;
     let at_home = vec![RequestBody::SetPosition(home as f32)];
-    // Two motions in a row can be more than the motor stands for good.
+    // Two motions without a pause can overheat the motor.
     let cooling = f64::from(nameplate.config.monitor.thermal_time);
     let mut losses = Vec::new();
     let mut record = |session: &mut Session<_>,
@@ -233,11 +233,11 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     })
 }
 
-/// The shipped description with what a motor's nameplate says of this motor; masses, inertia and friction stay
-/// the description's guess.
+/// Returns the shipped description with the torque constant, resistance and inductance of this motor's nameplate.
+/// Masses, inertia and friction keep the guesses of the description.
 ///
-/// A wrong torque constant scales every torque alike and cannot be seen in torque and motion, so the
-/// demonstration does not pretend to find it.
+/// A wrong torque constant scales every torque by the same factor and is not identifiable from torque and motion, so
+/// the demonstration takes it from the nameplate.
 fn nameplate_of(plant: &PlantConfig) -> Result<Robot, DemoError> {
     let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml"))?;
     for drive in robot
@@ -260,7 +260,7 @@ fn design_options(seed: u64, home: f64) -> rig_excite::Options {
     }
 }
 
-/// The friction sweep: a tenth of a turn at each speed, both ways.
+/// The friction sweep: at each speed at least 0.4 rad in both directions.
 fn sweep() -> Result<Trajectory<f64>, DemoError> {
     FrictionSweep::new(&SPEEDS, 0.4, 0.1, 0.3, 1.0)
         .map(Trajectory::FrictionSweep)
@@ -277,7 +277,7 @@ fn reversals() -> Result<Trajectory<f64>, DemoError> {
         })
 }
 
-/// The identified model and friction law as requests to the rig, precompensation switched on.
+/// Returns the requests that send the identified model and friction law to the rig and switch precompensation on.
 fn compensation(identified: &Robot, map: &FrictionMap) -> Result<Vec<RequestBody>, DemoError> {
     let model = link_parameters(identified)?;
     let mut settings = Nameplate::from_robot(identified)?.settings.precompensation;

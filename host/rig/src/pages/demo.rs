@@ -1,4 +1,4 @@
-//! The page of the demonstration: the emulated rig, identified by its own firmware and host.
+//! The page of the demonstration: the emulated rig, identified by firmware and host.
 
 mod missing;
 
@@ -42,22 +42,22 @@ pub struct DemoParameter {
     pub unit: String,
     /// Value in the emulated rig.
     pub truth: f64,
-    /// Torque against acceleration, velocity and position, off-line.
+    /// Off-line estimate by the differential model (torque).
     pub differential: Interval,
-    /// Work against change of energy, off-line.
+    /// Off-line estimate by the integral model (energy).
     pub integral: Interval,
     /// The firmware's estimate at the end of the motion.
     pub online: Interval,
 }
 
-/// The firmware's estimates while the rig moved.
+/// Estimates of the firmware during the motion.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OnlineEstimates {
     /// s
     pub t: Vec<f64>,
-    /// Per parameter (order of [`DemoFigures::parameters`]), one value an instant.
+    /// One series for each parameter, in the order of [`DemoFigures::parameters`].
     pub values: Vec<Vec<f64>>,
-    /// Their standard deviations, same shape.
+    /// Standard deviations of `values`.
     pub std: Vec<Vec<f64>>,
 }
 
@@ -72,19 +72,19 @@ pub struct Tracking {
     pub t: Vec<f64>,
     /// Reference position.
     pub reference: Vec<f64>,
-    /// Reference less position, feedback alone; not a number where there is none.
+    /// Reference less position with feedback alone; NaN where there is no sample.
     pub error_without: Vec<f64>,
-    /// The same with friction and dynamics precompensated.
+    /// Reference less position with friction and dynamics precompensated.
     pub error_with: Vec<f64>,
     /// RMS over all samples of the run.
     pub rms_without: f64,
     /// RMS over all samples of the run.
     pub rms_with: f64,
-    /// One line on the runs.
+    /// A remark about the runs.
     pub note: String,
 }
 
-/// What the wire carried.
+/// Samples on the wire.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wire {
     /// Samples received.
@@ -100,11 +100,11 @@ pub struct Wire {
 pub struct DemoFigures {
     /// The description that was identified.
     pub robot: Robot,
-    /// The command line that repeats it.
+    /// The command line that repeats the demonstration.
     pub command: String,
-    /// Length of the recording that was identified, s.
+    /// Length of all recordings together, s.
     pub seconds: f64,
-    /// Six for one link.
+    /// The six parameters of one link.
     pub parameters: Vec<DemoParameter>,
     /// On-line estimates over time.
     pub online: OnlineEstimates,
@@ -112,19 +112,19 @@ pub struct DemoFigures {
     pub tracking: Vec<Tracking>,
     /// Friction map.
     pub friction: Option<FrictionMap>,
-    /// Why there is no map, where there is none.
+    /// The reason if there is no map.
     pub friction_text: String,
     /// The wire.
     pub wire: Wire,
-    /// Residuals on data held back, one a joint.
+    /// Residuals on the hold-out, one for each joint.
     pub holdout: Vec<ResidualReport>,
-    /// What the identified model lacks.
+    /// Diagnosis of the identified model.
     pub diagnosis: Option<Diagnosis>,
-    /// What the emulated rig contains and the model does not.
+    /// Effects of the emulated rig that the model does not have.
     pub beyond_model: Vec<String>,
     /// Sentences for the top of the page.
     pub warnings: Vec<String>,
-    /// Files written beside the page, and what each holds.
+    /// Files in the folder of the page, with the content of each.
     pub files: Vec<(String, String)>,
 }
 
@@ -158,7 +158,7 @@ pub fn demo(figures: &DemoFigures) -> Document {
     Document {
         title: "One geared link, identified and precompensated".into(),
         subtitle: format!(
-            "No hardware took part. The firmware's own logic drove an emulated rig, {}; its telemetry passed the wire protocol, and from {} s of it this program estimated what moves the link. The rig holds effects that the model does not, so the estimates are tested against a truth that is richer than they are.",
+            "No hardware was used. The logic of the firmware drove an emulated rig, {}. Its telemetry, {} s in all, passed through the real wire protocol, and from it this program estimated the dynamics of the link. The rig has effects that the model lacks, so the estimates are tested against a more complex truth.",
             figures.robot.name,
             format_significant(figures.seconds, 3)
         ),
@@ -190,7 +190,7 @@ fn summary(figures: &DemoFigures) -> Vec<Fact> {
             format!("{covered} of {total}"),
         )
         .note("off-line, differential model")
-        // One of twenty intervals is expected to miss; more than one of six is not chance.
+        // One interval of twenty is expected to miss. More than one miss of six is unlikely to be chance.
         .tone(if covered + 1 >= total {
             Tone::Good
         } else {
@@ -218,7 +218,7 @@ fn summary(figures: &DemoFigures) -> Vec<Fact> {
     for report in &figures.holdout {
         facts.push(
             Fact::new(
-                "Torque left on data held back",
+                "Torque residual on the hold-out",
                 parts::percent(report.relative_error),
             )
             .unit("%")
@@ -240,12 +240,12 @@ fn summary(figures: &DemoFigures) -> Vec<Fact> {
     facts
 }
 
-/// By what factor precompensation reduces the tracking error.
+/// Factor by which precompensation reduces the tracking error.
 fn gain(t: &Tracking) -> Option<f64> {
     (t.rms_with > 0.0 && t.rms_without.is_finite()).then(|| t.rms_without / t.rms_with)
 }
 
-/// A factor of improvement in words, also where it is none.
+/// Describes a reduction or an increase of the error in words.
 fn times(factor: f64) -> String {
     if factor >= 1.0 {
         format!("{} times smaller", format_significant(factor, 2))
@@ -301,11 +301,11 @@ fn parameters(figures: &DemoFigures) -> Section {
     }
     plot = plot
         .mark(Marker::horizontal(0.0, "truth"))
-        .note("Bars are 95 % intervals: one that does not reach the line misses the truth.");
+        .note("Bars are 95 % intervals; a bar that does not reach the line misses the truth.");
     Section::new(
         "parameters",
         "Truth and estimates",
-        "The same motion identified three ways: off-line from the torque balance, off-line from the energy balance, and by the firmware while it moved. The torque constant is taken from the nameplate as true: an error in it would scale every parameter alike and is not in the intervals.",
+        "Three estimates from the same motion: off-line from the torque balance, off-line from the energy balance, and by the firmware during the motion. The torque constant of the nameplate is assumed to be exact: an error in it would scale all parameters by the same factor and is not included in the intervals.",
     )
     .with(Block::Table(Table {
         caption: "Parameters of the link, ± half the 95 % interval".into(),
@@ -323,7 +323,7 @@ fn parameters(figures: &DemoFigures) -> Section {
     .with(Block::Plot(plot))
 }
 
-/// Factor and unit in which a tracking error reads best.
+/// Scale and unit for printing a tracking error.
 fn shown(t: &Tracking) -> (f64, String) {
     let unit = parts::unit(&t.unit);
     if t.rms_without.abs() < 0.1 {
@@ -333,7 +333,7 @@ fn shown(t: &Tracking) -> (f64, String) {
     }
 }
 
-/// The tracking error with and without precompensation; also worth a picture of its own.
+/// Draws the tracking error with and without precompensation.
 pub fn tracking_plot(t: &Tracking) -> Plot {
     let (scale, shown) = shown(t);
     let scaled = |v: &[f64]| v.iter().map(|e| scale * e).collect::<Vec<_>>();
@@ -371,8 +371,8 @@ pub fn tracking_plot(t: &Tracking) -> Plot {
 fn tracking(figures: &DemoFigures) -> Section {
     let mut section = Section::new(
         "tracking",
-        "What the model is good for",
-        "The same motion twice: with feedback alone, and with the torque that the identified model predicts added before the feedback has to ask for it.",
+        "Tracking with the identified model",
+        "The same motion twice: with feedback alone, and with the torque predicted by the identified model added as feed-forward (precompensation).",
     );
     for t in &figures.tracking {
         let mut reference = Plot::new(
@@ -403,8 +403,8 @@ fn tracking(figures: &DemoFigures) -> Section {
 fn online(figures: &DemoFigures) -> Section {
     let mut section = Section::new(
         "online",
-        "Learning while moving",
-        "The firmware's recursive estimate, sample by sample. The band is ±1.96 of its own standard deviations.",
+        "On-line estimation",
+        "Recursive estimate of the firmware, sample by sample. The band is ±1.96 of its standard deviations.",
     );
     let o = &figures.online;
     for (k, p) in figures.parameters.iter().enumerate() {
@@ -423,7 +423,7 @@ fn online(figures: &DemoFigures) -> Section {
                 .map(|(v, s)| v + f * s)
                 .collect::<Vec<_>>()
         };
-        // Before anything is learnt the band spans all there is: it would flatten the rest of the figure.
+        // At the start the band is very wide and would flatten the rest of the figure, so it is cut off.
         let wide = 5.0
             * std
                 .last()
@@ -479,7 +479,7 @@ fn online(figures: &DemoFigures) -> Section {
             format_value(p.online.value, p.online.std),
             if first > 0 {
                 format!(
-                    " Drawn from {} s on, when something was known.",
+                    " Drawn from {} s on, when the band had become narrow.",
                     format_significant(t.first().copied().unwrap_or(0.0), 2)
                 )
             } else {
@@ -495,16 +495,16 @@ fn online(figures: &DemoFigures) -> Section {
 fn holdout(figures: &DemoFigures) -> Section {
     let mut section = Section::new(
         "holdout",
-        "A motion that was held back",
-        "Torque of a motion that took no part in the fit, predicted with the identified parameters.",
+        "Prediction of the hold-out",
+        "Torque of a motion not used in the fit, predicted with the identified parameters.",
     );
     for (joint, report) in figures.robot.joints.iter().zip(&figures.holdout) {
         section
             .blocks
-            .extend(parts::torque_plots(joint, report, "data held back"));
+            .extend(parts::torque_plots(joint, report, "hold-out"));
     }
     if figures.holdout.is_empty() {
-        section = section.with(parts::warning("No data were held back."));
+        section = section.with(parts::warning("There is no hold-out."));
     }
     section
 }
@@ -513,7 +513,7 @@ fn friction(figures: &DemoFigures) -> Section {
     let section = Section::new(
         "friction",
         "Friction over velocity",
-        "Stretches of constant speed, gravity and inertia taken off.",
+        "Friction on stretches of constant speed; gravity and inertia are subtracted.",
     );
     match &figures.friction {
         Some(map) => {
@@ -537,7 +537,7 @@ fn wire(figures: &DemoFigures) -> Section {
     } else {
         NoteKind::Warning
     };
-    Section::new("wire", "Between firmware and host", "").with(Block::Note {
+    Section::new("wire", "Communication between firmware and host", "").with(Block::Note {
         kind,
         text: figures.wire.text.clone(),
     })
@@ -546,12 +546,12 @@ fn wire(figures: &DemoFigures) -> Section {
 fn beyond(figures: &DemoFigures) -> Section {
     let section = Section::new(
         "beyond",
-        "What the emulated rig contains and the model does not",
-        "These effects make the test honest: the rig shares no equation with the model that is fitted to it.",
+        "Effects of the emulated rig that the model lacks",
+        "These effects make the test realistic: the rig shares no equation with the fitted model.",
     );
     if figures.beyond_model.is_empty() {
         return section.with(parts::info(
-            "Nothing beyond the model was switched on for this run.",
+            "No effect beyond the model was switched on in this run.",
         ));
     }
     section.with(Block::List(figures.beyond_model.clone()))

@@ -1,4 +1,4 @@
-//! What an identification says beyond its estimate: other estimators, essential and full parameters.
+//! Further sections of an identification: comparison of estimators, essential and full parameters.
 
 use super::parts;
 use rig_identify::{Comparison, EssentialSet, Identification, StandardSet};
@@ -6,12 +6,12 @@ use rig_model::robot::Robot;
 use rig_output::format_significant;
 use rig_report::{Block, Column, NoteKind, Section, Table};
 
-/// The sections that `found` gives reason for.
+/// Composes the sections that `found` has results for.
 pub(super) fn sections(robot: &Robot, found: &Identification) -> Vec<Section> {
     let mut all = Vec::new();
     all.extend(found.comparison.as_ref().map(|c| compared(robot, found, c)));
     if !found.procedure.is_empty() {
-        let mut section = Section::new("procedure", "How the estimator went", "");
+        let mut section = Section::new("procedure", "Progress of the estimator", "");
         for sentence in &found.procedure {
             section = section.with(Block::Text(sentence.clone()));
         }
@@ -45,14 +45,14 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
         .any(|row| row.holdout_relative_error.is_some());
     let mut columns = vec![
         Column::text("Estimator"),
-        Column::number("Left, cross-validated", "%"),
+        Column::number("Residual, cross-validated", "%"),
     ];
     if held {
-        columns.push(Column::number("Left, held back", "%"));
+        columns.push(Column::number("Residual, hold-out", "%"));
     }
     columns.extend([
-        Column::text("Bodies that can exist"),
-        Column::number("Distance to such", "std"),
+        Column::text("Physically consistent"),
+        Column::number("Distance to consistent", "std"),
         Column::number("Largest shift", "std"),
     ]);
     let mut notes: Vec<Block> = Vec::new();
@@ -89,8 +89,8 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
         .collect();
     let mut section = Section::new(
         "estimators",
-        "Which result to trust",
-        "Every estimator predicts the torque of stretches of time that it was not fitted to.",
+        "Comparison of estimators",
+        "Every estimator predicts the torque on stretches of time that were left out of its fit.",
     )
     .with(Block::Note {
         kind: if comparison.recommended == found.estimator {
@@ -101,18 +101,18 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
         text: comparison.recommendation.clone(),
     })
     .with(Block::Table(Table {
-        caption: "Estimators side by side".into(),
+        caption: "Estimators".into(),
         columns,
         rows,
         note: format!(
-            "Left: residual RMS over torque RMS, joint by joint ({}), of {} stretches each predicted from the others. Distance: from the nearest parameters that bodies can have, all parameters together. Shift: largest difference from the weighted fit.",
+            "Residual: residual RMS over torque RMS for each joint ({}), on {} stretches, each predicted from a fit to the others. Distance: from all parameters together to the nearest physically consistent set. Shift: largest difference from the weighted fit.",
             joints.join(", "),
             comparison.folds
         ),
     }));
     if !comparison.repeated_holdout.is_empty() {
         section = section.with(Block::Text(format!(
-            "Held back, but a repetition of a motion learnt from: {}. That is no evidence of how another motion is predicted.",
+            "These hold-outs repeat a training motion: {}. They do not show how well another motion is predicted.",
             comparison.repeated_holdout.join(", ")
         )));
     }
@@ -121,7 +121,7 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
     }
     if !notes.is_empty() {
         section = section.with(Block::Details {
-            summary: "How each of them went".into(),
+            summary: "Progress of each estimator".into(),
             blocks: notes,
         });
     }
@@ -129,7 +129,7 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
 }
 
 fn essential(set: &EssentialSet) -> Section {
-    let intro = "The few parameters that the torque needs, from the estimate given here: the least certain one is taken as zero and the rest fitted anew, as long as that costs nothing that chance would not.";
+    let intro = "The smallest set of parameters that explains the torque. The least certain parameter is set to zero and the others are refitted, as long as the residual does not grow significantly.";
     let section = Section::new("essential", "Essential parameters", intro);
     if set.left_out.is_empty() {
         return section.with(parts::info(format!(
@@ -200,11 +200,11 @@ fn standard(robot: &Robot, found: &Identification, set: &StandardSet) -> Section
     };
     let mut section = Section::new(
         "standard",
-        "Full parameters of bodies that can exist",
-        "One parameter set of the many that give the identified combinations or lie nearest to them: every link has positive mass and a pseudo-inertia that is positive definite, friction and drive inertia are not negative. It is what the written description holds.",
+        "Full physically consistent parameters",
+        "Many parameter sets give the identified combinations. This one is physically consistent and gives them, or lies nearest to them: every link has positive mass and a positive definite pseudo-inertia; friction and drive inertia are not negative. The written description holds this set.",
     )
     .with(parts::info(format!(
-        "Against the weighted fit, which is free to give links that cannot exist, the residual's RMS on the training data changes by: {}.",
+        "Change of the residual's RMS on the training data from the weighted fit, which has no such constraints: {}.",
         increases.join(", ")
     )));
     for sentence in &set.prior {

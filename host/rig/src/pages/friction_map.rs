@@ -59,7 +59,7 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
     let mut section = Section::new(
         "map",
         "Friction over velocity",
-        "From stretches of constant speed, gravity, inertia and offset taken off as identified.",
+        "Friction on stretches of constant speed; the identified gravity, inertia and offset are subtracted.",
     );
     section.blocks = parts::friction(kind, map);
     sections.push(section);
@@ -101,7 +101,7 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
     }
 }
 
-/// The stretches that gave no point, with the reason; none where there are none.
+/// Stretches that gave no point, with the reason.
 fn dropped(map: &FrictionMap, velocity: &'static str) -> Option<Section> {
     if map.dropped.is_empty() {
         return None;
@@ -120,7 +120,7 @@ fn dropped(map: &FrictionMap, velocity: &'static str) -> Option<Section> {
             Column::number("Start", "s"),
             Column::number("Duration", "s"),
             Column::number("Velocity", velocity),
-            Column::text("Why"),
+            Column::text("Reason"),
         ],
         rows: rows.collect(),
         note: String::new(),
@@ -128,7 +128,7 @@ fn dropped(map: &FrictionMap, velocity: &'static str) -> Option<Section> {
     Some(Section::new("dropped", "Left out", "").with(Block::Table(table)))
 }
 
-/// The law that the points warrant.
+/// The friction law that the points support.
 fn chosen(map: &FrictionMap) -> &rig_identify::FrictionFit {
     match &map.stribeck {
         Some(fit) if map.warranted => fit,

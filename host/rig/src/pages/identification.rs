@@ -10,11 +10,11 @@ use rig_report::{
     Axis, Block, Column, Document, Fact, NoteKind, Plot, Role, Section, Series, Style, Table, Tone,
 };
 
-/// Up to so many parameters get a card each; more are summed up in one.
+/// Largest number of parameters that get a card each; more share one card.
 const CARDS: usize = 6;
-/// Ellipses that are drawn.
+/// Largest number of confidence ellipses.
 const ELLIPSES: usize = 4;
-/// Below this correlation an ellipse is upright and tells no more than the table.
+/// Correlation below which no ellipse is drawn: it would be nearly upright and add nothing to the table.
 const CORRELATED: f64 = 0.3;
 
 /// Composes the page of an identification.
@@ -30,8 +30,8 @@ pub fn identification(robot: &Robot, found: &Identification, context: &Context) 
     sections.push(residuals(robot, found));
     sections.push(parts::repeat(context));
     let model = match found.model {
-        ModelKind::Differential => "torque against acceleration, velocity and position",
-        ModelKind::Integral => "work against change of energy over windows",
+        ModelKind::Differential => "torque as a function of acceleration, velocity and position",
+        ModelKind::Integral => "work equal to the change of energy over windows",
     };
     let estimator = found.estimator.words();
     Document {
@@ -56,7 +56,7 @@ fn summary(found: &Identification, context: &Context) -> Vec<Fact> {
     let mut facts = Vec::new();
     match worst(&|j| j.holdout_relative_error) {
         Some(held) => facts.push(
-            Fact::new("Left on data held back", parts::percent(held))
+            Fact::new("Residual on the hold-out", parts::percent(held))
                 .unit("%")
                 .note(format!(
                     "residual RMS over torque RMS{several}; on the training data {} %",
@@ -70,12 +70,12 @@ fn summary(found: &Identification, context: &Context) -> Vec<Fact> {
         ),
         None => facts.push(
             Fact::new(
-                "Left on the training data",
+                "Residual on the training data",
                 train.map_or("–".into(), parts::percent),
             )
             .unit("%")
             .note(format!(
-                "residual RMS over torque RMS{several}; no data were held back"
+                "residual RMS over torque RMS{several}; no hold-out was given"
             ))
             .tone(Tone::Warning),
         ),
@@ -85,7 +85,7 @@ fn summary(found: &Identification, context: &Context) -> Vec<Fact> {
         Fact::new("Warnings", "none").tone(Tone::Good)
     } else {
         Fact::new("Warnings", warnings.to_string())
-            .note("on top of the page")
+            .note("at the top of the page")
             .tone(Tone::Warning)
     });
     facts.push(
@@ -127,7 +127,7 @@ fn summary(found: &Identification, context: &Context) -> Vec<Fact> {
     if !found.not_excited.is_empty() {
         facts.push(
             Fact::new("Not excited", found.not_excited.len().to_string())
-                .note("combinations that these data say nothing about on their own")
+                .note("combinations that these data alone do not determine")
                 .tone(Tone::Warning),
         );
     }
@@ -144,7 +144,7 @@ fn parameters(found: &Identification) -> Section {
         .iter()
         .map(|b| {
             let decimals = |v: f64| {
-                // Ends of the interval with the digits of the value beside them.
+                // The ends of the interval get as many decimals as the value.
                 format_value(v, b.std)
                     .split(" ± ")
                     .next()
@@ -174,7 +174,7 @@ fn parameters(found: &Identification) -> Section {
     Section::new(
         "parameters",
         "Parameters",
-        "The combinations of parameters that the torque depends on. Standard deviations allow for the correlation of the residual in time; the classical ones, as the literature prints them, take it as white and are too small where it is not.",
+        "Combinations of parameters that the torque depends on. The standard deviations allow for the correlation of the residual in time. The classical ones, common in the literature, assume a white residual and are too small otherwise.",
     )
     .with(Block::Table(Table {
         caption: "Base parameters".into(),
@@ -188,7 +188,7 @@ fn parameters(found: &Identification) -> Section {
         ],
         rows,
         note: format!(
-            "Std: standard deviation. {} rows; the residual remembers {} of them, so they count as {}. Intervals by Student's t with {} degrees of freedom.",
+            "Std: standard deviation. {} rows; the residual is correlated over {} of them, so they count as {} independent rows. Intervals by Student's t with {} degrees of freedom.",
             parts::count(e.rows),
             format_significant(e.memory_rows, 2),
             parts::count(e.effective_rows as u64),
@@ -199,22 +199,24 @@ fn parameters(found: &Identification) -> Section {
 
 fn not_excited(found: &Identification) -> Section {
     if found.not_excited.is_empty() {
-        return Section::new("not-excited", "What was not excited", "").with(Block::Note {
-            kind: NoteKind::Good,
-            text: "The motion tells every base parameter of the model apart.".into(),
-        });
+        return Section::new("not-excited", "Parameters that were not excited", "").with(
+            Block::Note {
+                kind: NoteKind::Good,
+                text: "The motion makes every base parameter of the model identifiable.".into(),
+            },
+        );
     }
     Section::new(
         "not-excited",
-        "What was not excited",
-        "These data do not tell the following combinations apart from others, or say less of them than is known without data. A value given for one of the latter is noise with least squares, and mostly the description's with ridge and consistent.",
+        "Parameters that were not excited",
+        "These data do not separate the following combinations from others, or determine them less well than prior knowledge does. In the second case a value from least squares is noise, and a value from ridge or consistent is mostly that of the description.",
     )
     .with(Block::Table(Table {
-        caption: "Combinations that the motion does not show".into(),
+        caption: "Combinations that the motion does not excite".into(),
         columns: vec![
             Column::text("Combination"),
-            Column::text("Why"),
-            Column::text("A motion that would change that"),
+            Column::text("Reason"),
+            Column::text("Motion that would excite it"),
         ],
         rows: found
             .not_excited
@@ -229,7 +231,7 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
     let mut section = Section::new(
         "fit",
         "How well the model fits",
-        "Torque measured and predicted with the identified parameters, after the same filters. Data held back took no part in the fit.",
+        "Measured torque, and torque predicted with the identified parameters, behind the same filters. The hold-out was not used in the fit.",
     );
     if found.joints.len() > 1 {
         let optional = |v: Option<f64>, f: &dyn Fn(f64) -> String| v.map_or("–".into(), f);
@@ -239,13 +241,13 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
                 Column::text("Joint"),
                 Column::text("Unit"),
                 Column::number("Residual RMS, training", ""),
-                Column::number("Residual RMS, held back", ""),
-                Column::number("Left, training", "%"),
-                Column::number("Left, held back", "%"),
+                Column::number("Residual RMS, hold-out", ""),
+                Column::number("Residual, training", "%"),
+                Column::number("Residual, hold-out", "%"),
                 Column::number("Rows used, training", "%"),
-                Column::number("Left on all rows, training", "%"),
-                Column::number("Rows used, held back", "%"),
-                Column::number("Left on all rows, held back", "%"),
+                Column::number("Residual on all rows, training", "%"),
+                Column::number("Rows used, hold-out", "%"),
+                Column::number("Residual on all rows, hold-out", "%"),
             ],
             rows: found
                 .joints
@@ -266,7 +268,7 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
                     ]
                 })
                 .collect(),
-            note: "Left: residual RMS over torque RMS. Rows used: those that the fit and these figures count, without slow ones and ones at the torque limit.".into(),
+            note: "Residual in %: residual RMS over torque RMS. Rows used: share of the rows in the fit and in these figures, without slow rows and rows at the torque limit.".into(),
         }));
     }
     for (j, joint) in robot.joints.iter().enumerate() {
@@ -278,7 +280,7 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
         {
             section
                 .blocks
-                .extend(parts::torque_plots(joint, report, "data held back"));
+                .extend(parts::torque_plots(joint, report, "hold-out"));
         }
         if let Some(report) = found.details.train.get(j) {
             section
@@ -287,7 +289,7 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
         }
     }
     section.with(parts::info(
-        "Drag over a plot to zoom, double-click to see all of it again.",
+        "Drag over a plot to zoom; double-click to reset.",
     ))
 }
 
@@ -307,8 +309,8 @@ fn confidence(found: &Identification) -> Section {
     });
     let mut section = Section::new(
         "confidence",
-        "Which parameters are confused with which",
-        "Parameters that are strongly correlated trade against each other: only their combination is well known.",
+        "Correlation of the parameters",
+        "Strongly correlated parameters can compensate each other: only their combination is well determined.",
     );
     let strong: Vec<_> = pairs
         .iter()
@@ -355,7 +357,7 @@ fn confidence(found: &Identification) -> Section {
             vec![e.values[b]],
         ))
         .note(format!(
-            "Correlation in time allowed for; {} rows that count as {}.",
+            "Allows for correlation in time; {} rows count as {} independent rows.",
             parts::count(e.rows),
             parts::count(e.effective_rows as u64)
         ));
@@ -363,7 +365,7 @@ fn confidence(found: &Identification) -> Section {
         section = section.with(Block::Plot(plot));
     }
     if n > 12 {
-        // A wide matrix reads badly; the pairs that matter do not.
+        // A wide matrix is hard to read, so only the strongest pairs are listed.
         section = section.with(Block::Table(Table {
             caption: "The twenty strongest correlations".into(),
             columns: vec![
@@ -429,20 +431,19 @@ fn data(robot: &Robot, found: &Identification) -> Section {
             .collect::<Vec<_>>()
     };
     let mut rows = surveys(&d.training, "training");
-    rows.extend(surveys(&d.holdout, "held back"));
-    let mut section =
-        Section::new("data", "What was done to the data", "").with(Block::Table(Table {
-            caption: "Recordings".into(),
-            columns: vec![
-                Column::text("Recording"),
-                Column::text("Used for"),
-                Column::number("Rows", ""),
-                Column::number("Rate", "Hz"),
-                Column::number("Duration", "s"),
-            ],
-            rows,
-            note: String::new(),
-        }));
+    rows.extend(surveys(&d.holdout, "hold-out"));
+    let mut section = Section::new("data", "Treatment of the data", "").with(Block::Table(Table {
+        caption: "Recordings".into(),
+        columns: vec![
+            Column::text("Recording"),
+            Column::text("Used for"),
+            Column::number("Rows", ""),
+            Column::number("Rate", "Hz"),
+            Column::number("Duration", "s"),
+        ],
+        rows,
+        note: String::new(),
+    }));
     section
         .blocks
         .extend(parts::treatment(&robot.joints, &d.treatment));
@@ -479,8 +480,8 @@ fn residuals(robot: &Robot, found: &Identification) -> Section {
     let d = &found.details;
     let mut section = Section::new(
         "residuals",
-        "What is left",
-        "A residual that depends on something shows what the model leaves out. Tests are on the training data.",
+        "Residual",
+        "A residual that depends on one of these quantities shows that the model lacks an effect. The tests use the training data.",
     );
     let period = 1.0 / d.treatment.kept_rate();
     for (joint, report) in robot.joints.iter().zip(&d.train) {

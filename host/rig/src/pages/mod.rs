@@ -1,7 +1,7 @@
-//! Reports: which figures, tables and sentences a result is shown with.
+//! Reports: the figures, tables and sentences that show a result.
 //!
-//! Every page is a [`Document`](rig_report::Document) composed here and nothing else: no computation that
-//! a result does not already hold, no file, no clock.
+//! This module only composes each page as a [`Document`](rig_report::Document). It computes no new results and uses no
+//! files or clock.
 
 mod demo;
 mod diagnosis;
@@ -23,15 +23,15 @@ pub use identification::identification;
 pub use validation::validation;
 pub use validation_voltage::validation_voltage;
 
-/// What a page says beside its result.
+/// Information on a page beside the result.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Context {
     /// The command line that repeats the result.
     pub command: String,
-    /// Name and text of the description that was written beside the page.
+    /// Name and text of the description that was written into the same folder.
     pub identified: Option<(String, String)>,
-    /// What had to be decided to write that description.
+    /// Remarks about choices made to write that description.
     pub remarks: Vec<String>,
-    /// What reading the recordings gave reason to say.
+    /// Warnings from reading the recordings.
     pub warnings: Vec<String>,
 }

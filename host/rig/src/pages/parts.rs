@@ -1,4 +1,4 @@
-//! Pieces that several pages share.
+//! Parts that several pages share.
 
 pub(super) use rig_output::format_unit as unit;
 
@@ -10,7 +10,7 @@ use rig_report::{
     Axis, Block, Column, Marker, NoteKind, Plot, Role, Section, Series, Style, Table,
 };
 
-/// Torque or force.
+/// Returns "torque" or "force".
 pub(super) fn effort(kind: JointKind) -> &'static str {
     match kind {
         JointKind::Revolute => "torque",
@@ -26,7 +26,7 @@ pub(super) fn units(kind: JointKind) -> [&'static str; 3] {
     }
 }
 
-/// A whole number with thin spaces between thousands.
+/// Formats a whole number with thin spaces between thousands.
 pub(super) fn count(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::new();
@@ -39,13 +39,13 @@ pub(super) fn count(n: u64) -> String {
     text
 }
 
-/// A share as a percentage with as many digits as a reader needs.
+/// Formats a share in per cent, with two digits below 10 % and three above.
 pub(super) fn percent(share: f64) -> String {
     let value = 100.0 * share;
     format_significant(value, if value.abs() < 10.0 { 2 } else { 3 })
 }
 
-/// A small length or angle in the unit that reads best.
+/// Formats a small length or angle with a suitable unit prefix.
 pub(super) fn length(value: f64, unit: &str) -> String {
     let (scale, prefix) = if value < 1e-6 {
         (1e9, "n")
@@ -73,7 +73,7 @@ pub(super) fn info(text: impl Into<String>) -> Block {
     }
 }
 
-/// All warnings on top of a page, or nothing.
+/// Returns the section of all warnings; none if there are no warnings.
 pub(super) fn warnings(groups: &[&[String]]) -> Option<Section> {
     let blocks: Vec<Block> = groups.iter().copied().flatten().map(warning).collect();
     (!blocks.is_empty()).then(|| Section {
@@ -84,7 +84,7 @@ pub(super) fn warnings(groups: &[&[String]]) -> Option<Section> {
     })
 }
 
-/// How to repeat it, and the description that came of it.
+/// The command that repeats the result, and the description that was written.
 pub(super) fn repeat(context: &super::Context) -> Section {
     let mut section =
         Section::new("repeat", "How to repeat this", "").with(Block::Code(context.command.clone()));
@@ -100,7 +100,7 @@ pub(super) fn repeat(context: &super::Context) -> Section {
     section
 }
 
-/// Curves with a gap wherever time jumps, so that no line joins two recordings.
+/// Inserts a gap at each jump of time, so that no line joins two recordings.
 fn with_gaps(curves: &Curves) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let steps: Vec<f64> = curves.t.windows(2).map(|w| w[1] - w[0]).collect();
     let mut sorted = steps.clone();
@@ -121,7 +121,7 @@ fn with_gaps(curves: &Curves) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     (t, a, b)
 }
 
-/// Measured and predicted torque, and what is left, over time.
+/// Draws measured and predicted torque and the residual over time.
 pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> Vec<Block> {
     let (what, torque) = (effort(joint.kind), units(joint.kind)[2]);
     let (t, measured, predicted) = with_gaps(&report.series);
@@ -131,7 +131,7 @@ pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> 
         .map(|(a, b)| a - b)
         .collect();
     let note = format!(
-        "{} rows, residual RMS {} {torque}, {what} RMS {} {torque}: {} % are left.",
+        "{} rows, residual RMS {} {torque}, {what} RMS {} {torque}: the residual is {} % of it.",
         count(report.rows),
         format_significant(report.rms, 3),
         format_significant(report.torque_rms, 3),
@@ -162,7 +162,7 @@ pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> 
     .with(Series::line("residual", Role::Residual, t, residual))
     .mark(Marker::horizontal(0.0, ""))
     .note(format!(
-        "{} rows, RMS {} {torque}. Rows that were masked are drawn but not counted.",
+        "{} rows, RMS {} {torque}. Masked rows are drawn but not counted.",
         count(report.rows),
         format_significant(report.rms, 3)
     ));
@@ -170,7 +170,7 @@ pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> 
     vec![Block::Plot(first), Block::Plot(second)]
 }
 
-/// What was tested on the residuals of one joint: sentence first, figure after.
+/// Tests of the residual of one joint: sentences first, then figures.
 pub(super) fn residual_tests(joint: &Joint, report: &ResidualReport, period: f64) -> Vec<Block> {
     let [_, _, torque] = units(joint.kind);
     let n = report.autocorrelation.len();
@@ -248,7 +248,7 @@ fn dependence(joint: &Joint, d: &Dependence, report: &ResidualReport) -> Plot {
     plot
 }
 
-/// What is left of the torque with each cut-off that was tried.
+/// Draws the torque residual over the cut-offs that were tried.
 fn over_cutoff(joints: &[Joint], treatment: &Treatment) -> Plot {
     let mut plot = Plot::new(
         "Torque residual over the cut-off".to_owned(),
@@ -275,11 +275,11 @@ fn over_cutoff(joints: &[Joint], treatment: &Treatment) -> Plot {
     }
     plot.height = 280;
     plot.note(
-        "A fit for each cut-off, to the same torque in the same band. A cut-off that is too low bends the motion; one that is too high lets noise into it.",
+        "One fit for each cut-off, to the same torque in the same band. A cut-off that is too low distorts the motion; one that is too high lets noise through.",
     )
 }
 
-/// What was done to the data: sentences and the spectrum that they rest on.
+/// Treatment of the data: sentences, and the spectra behind them.
 pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
     let rate = treatment.sample_rate;
     let mut items = vec![
@@ -292,14 +292,14 @@ pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
         format!("Decimation: {}", treatment.decimation_reason),
         format!("Speed thresholds: {}", treatment.speed_reason),
         format!(
-            "Trimmed: {} rows ({} s) at both ends of every stretch, which the filters have not settled in.",
+            "Trimmed: {} rows ({} s) at both ends of every stretch, because the filters have not settled there.",
             count(treatment.trimmed as u64),
             format_significant(treatment.trimmed as f64 / rate, 3)
         ),
     ];
     if treatment.torque_lead != 0.0 {
         items.push(format!(
-            "The torque recorded at an instant is taken to act {} ms later.",
+            "Torque lead: a recorded torque is assumed to act {} ms later.",
             format_significant(1e3 * treatment.torque_lead, 3)
         ));
     }
@@ -363,7 +363,7 @@ fn law(fit: &FrictionFit, v: f64) -> f64 {
     v.signum() * (fit.coulomb + dip) + fit.viscous * v + fit.offset
 }
 
-/// Points with error bars, the laws that they warrant, the profile of the Stribeck velocity, the decision.
+/// Friction points with error bars, the fitted laws, the profile over the Stribeck velocity and the decision.
 pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
     let [_, velocity, torque] = units(kind);
     let what = effort(kind);
@@ -373,7 +373,7 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
         .iter()
         .fold(fastest, |m, p| m.min(p.speed.abs()))
         .max(fastest * 1e-4);
-    // Two branches with a gap at rest, where the laws jump; closer together where they bend.
+    // Two branches with a gap at rest, where the laws jump. Samples are denser at low speed, where the curves bend.
     let curve = |fit: &FrictionFit| -> (Vec<f64>, Vec<f64>) {
         let branch: Vec<f64> = (0..=120)
             .map(|k| 0.2 * slowest * (5.0 * fastest / slowest).powf(f64::from(k) / 120.0))
@@ -410,9 +410,9 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
             map.points.iter().map(|p| p.friction).collect(),
         ))
         .note(format!(
-            "n = {} stretches of constant speed, {}. RMS error on points left out: {} {torque} without a Stribeck term{}.",
+            "n = {} stretches of constant speed, {}. Leave-one-out RMS error: {} {torque} without a Stribeck term{}.",
             map.points.len(),
-            if map.from_reference { "as the reference has them" } else { "as the position shows them" },
+            if map.from_reference { "found in the reference" } else { "found in the position" },
             format_significant(map.simple.leave_one_out_rms, 2),
             map.stribeck_left_out_rms
                 .map_or(String::new(), |rms| format!(", {} {torque} with it", format_significant(rms, 2))),
@@ -457,7 +457,7 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
             ],
             rows,
             note: format!(
-                "fc·sgn v + fv·v + constant{}. Constant torque beyond the identified one: {} {torque}. Standard deviation from pass to pass beyond the noise within a pass: {} {torque}.",
+                "fc·sgn v + fv·v + constant{}. Constant torque in addition to the identified one: {} {torque}. Standard deviation between passes in addition to the noise within a pass: {} {torque}.",
                 if map.stribeck.is_some() {
                     ", and the same with Δ·exp(−(v/vs)²)·sgn v"
                 } else {
@@ -470,7 +470,7 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
     ];
     if map.stribeck.is_some() && map.profile.len() > 1 {
         let mut profile = Plot::new(
-            "What the choice of the Stribeck velocity rests on",
+            "Sum of squares over the Stribeck velocity",
             Axis::log("Stribeck velocity", velocity),
             Axis::new("weighted sum of squares", ""),
         )

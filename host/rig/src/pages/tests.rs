@@ -23,7 +23,7 @@ fn robot() -> Robot {
     robot
 }
 
-/// Thirty seconds of its own closed loop, the torque with a ripple that no model has.
+/// Thirty seconds of its closed loop; the torque has a ripple that no model has.
 fn recording(robot: &Robot) -> InMemory {
     let reference: Vec<f64> = (0..30_000)
         .map(|k| f64::from(k) * 1e-3)
@@ -174,7 +174,7 @@ fn a_friction_map_shows_its_decision_and_both_laws() {
     ] {
         assert!(page.contains(text), "{text}");
     }
-    // A law that the points do not warrant stands nowhere.
+    // The page does not show a law that the points do not support.
     let plain = FrictionMap {
         stribeck: None,
         warranted: false,
@@ -259,7 +259,7 @@ fn the_demonstration_shows_what_it_was_given() {
         "10 times smaller",
         "6 of 6",
         "6.200 ± 0.040 *",
-        "No data were held back.",
+        "There is no hold-out.",
     ] {
         let plain = text.replace("&#39;", "'");
         assert!(page.contains(text) || page.contains(&plain), "{text}");

@@ -18,8 +18,8 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
     }
     let mut data = Section::new(
         "data",
-        "What was done to the data for the torque",
-        "The motion is compared as recorded, without any filter. Slow rows are counted here that an identification may leave out because friction below their speed is not what its model says; its hold-out figure can therefore be smaller.",
+        "Treatment of the data for the torque",
+        "The motion is compared without any filter. Slow rows count here, too. An identification may leave them out because its friction model does not hold at low speed; its figure for the hold-out can therefore be smaller.",
     );
     data.blocks.push(Block::List(
         found
@@ -41,8 +41,8 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
     sections.push(data);
     let mut tests = Section::new(
         "residuals",
-        "What is left of the torque",
-        "A residual that depends on something shows what the model leaves out.",
+        "Torque residual",
+        "A residual that depends on one of these quantities shows that the model lacks an effect.",
     );
     let period = 1.0 / found.treatment.kept_rate();
     for (checked, name) in found.recordings.iter().zip(&names) {
@@ -57,7 +57,7 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
     sections.push(parts::repeat(context));
     Document {
         title: format!("{}: validation", found.robot),
-        subtitle: "What the description predicts for these recordings; no parameter was changed."
+        subtitle: "Predictions of the description for these recordings; no parameter was changed."
             .into(),
         summary: summary(found, context),
         sections,
@@ -88,22 +88,19 @@ fn summary(found: &Validation, context: &Context) -> Vec<Fact> {
         .filter(|r| simulated(r).is_empty())
         .count();
     let mut facts = vec![
-        Fact::new(
-            "Torque left unexplained",
-            torque.map_or("–".into(), parts::percent),
-        )
-        .unit("%")
-        .note("residual RMS over torque RMS, worst case")
-        .tone(if torque.is_some_and(|t| t > 0.3) {
-            Tone::Warning
-        } else {
-            Tone::Plain
-        }),
+        Fact::new("Torque residual", torque.map_or("–".into(), parts::percent))
+            .unit("%")
+            .note("residual RMS over torque RMS, worst case")
+            .tone(if torque.is_some_and(|t| t > 0.3) {
+                Tone::Warning
+            } else {
+                Tone::Plain
+            }),
     ];
     if moved.is_empty() {
         facts.push(
             Fact::new("Motion", "not simulated")
-                .note("the section on motion says why")
+                .note("the section on motion gives the reason")
                 .tone(Tone::Warning),
         );
     } else {
@@ -137,7 +134,7 @@ fn summary(found: &Validation, context: &Context) -> Vec<Fact> {
         Fact::new("Warnings", "none").tone(Tone::Good)
     } else {
         Fact::new("Warnings", warnings.to_string())
-            .note("on top of the page")
+            .note("at the top of the page")
             .tone(Tone::Warning)
     });
     facts
@@ -171,13 +168,13 @@ fn overview(found: &Validation) -> Section {
         "overview",
         "All figures",
         if replayed {
-            "Torque: predicted for the measured motion. Simulation: the recorded torque drives the model, and a controller answers what it departs from the recorded motion by; the error of the simulated torque is that answer."
+            "Torque: predicted for the measured motion. Simulation: the recorded torque drives the model, and a controller corrects the deviation from the recorded motion; the error of the simulated torque is the torque of this controller."
         } else {
             "Torque: predicted for the measured motion. Simulation: model and controller follow the recorded reference on their own."
         },
     )
     .with(Block::Table(Table {
-        caption: "Prediction against measurement".into(),
+        caption: "Prediction and measurement".into(),
         columns: vec![
             Column::text("Recording"),
             Column::text("Joint"),
@@ -202,7 +199,7 @@ fn torque(robot: &Robot, checked: &Checked, name: &str, k: usize) -> Section {
     section
 }
 
-/// The recordings' file names, or their whole paths where the names do not tell them apart.
+/// File names of the recordings, or whole paths if two names are equal.
 fn names(found: &Validation) -> Vec<String> {
     let labels = || found.recordings.iter().map(|r| r.recording.as_str());
     let short: Vec<&str> = labels()
@@ -241,7 +238,7 @@ fn motion(robot: &Robot, checked: &Checked, name: &str, k: usize) -> Section {
 
 fn steps(joints: &[MotionCheck]) -> Block {
     Block::Table(Table {
-        caption: "Simulation against measurement".into(),
+        caption: "Simulation and measurement".into(),
         columns: vec![
             Column::text("Joint"),
             Column::number("Position RMS", ""),
@@ -268,7 +265,7 @@ fn steps(joints: &[MotionCheck]) -> Block {
                 ]
             })
             .collect(),
-        note: "Errors of the simulation. Half step: RMS change of the simulation when its step is halved. At limit: samples at which the torque limit cut the controller's wish.".into(),
+        note: "Errors of the simulation. Half step: RMS change of the simulation when its step is halved. At limit: samples at which the torque limit cut the controller's command.".into(),
     })
 }
 
@@ -327,7 +324,7 @@ fn motion_plots(joint: &Joint, m: &MotionCheck, samples: u64) -> Vec<Block> {
         less(&s.reference, &s.simulated),
     ))
     .note(format!(
-        "n = {n}, measured RMS {}; the simulation leaves {} % of it.",
+        "n = {n}, measured RMS {}; the error of the simulation is {} % of it.",
         parts::length(m.tracking_rms, position),
         parts::percent(m.tracking_relative_error)
     ));

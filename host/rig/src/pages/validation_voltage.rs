@@ -5,7 +5,7 @@ use rig_diagnose::voltage::FreeRun;
 use rig_diagnose::voltage::{DrivenBy, VoltageChecked, VoltageValidation};
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
 
-/// The page.
+/// Composes the page of a validation under voltage.
 pub fn validation_voltage(found: &VoltageValidation, context: &Context) -> Document {
     let mut sections: Vec<Section> = parts::warnings(&[&context.warnings, &found.warnings])
         .into_iter()
@@ -17,14 +17,14 @@ pub fn validation_voltage(found: &VoltageValidation, context: &Context) -> Docum
     sections.push(parts::repeat(context));
     Document {
         title: format!("{}: validation", found.robot),
-        subtitle: "The motion that the description predicts under voltage for these recordings; no parameter was changed.".into(),
+        subtitle: "Motion predicted by the description under voltage for these recordings; no parameter was changed.".into(),
         summary: summary(found),
         sections,
         footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
     }
 }
 
-/// RMS, mean absolute and largest error of a run as printed; dashes where it diverged.
+/// Formats RMS, mean absolute and largest error of a run; dashes if it diverged.
 fn errors(run: &FreeRun, unit: &str) -> [String; 3] {
     match run {
         FreeRun::Followed {
@@ -57,7 +57,7 @@ fn summary(found: &VoltageValidation) -> Vec<Fact> {
         .count();
     let all = found.recordings.len();
     let loops = Fact::new("Closed loop", format!("{closed} of {all}"))
-        .note("recordings that show their controller; the recorded voltage drives the others");
+        .note("recordings whose controller was identified; the recorded voltage drives the others");
     fact.into_iter().chain([loops]).collect()
 }
 
@@ -75,7 +75,7 @@ fn overview(found: &VoltageValidation) -> Section {
     Section::new(
         "overview",
         "All figures",
-        "Each recording is simulated from its first state, 10 s at most, without a look at the measured motion. In the closed loop the controller that the recording shows meets the recorded reference.",
+        "Each recording is simulated from its first state for 10 s at most, without using the measured motion. In the closed loop, the controller identified from the recording follows the recorded reference.",
     )
     .with(Block::Table(Table {
         caption: "Simulated less measured position".into(),

@@ -33,12 +33,12 @@ fn a_step_is_one_line_that_names_what_the_data_leave_open() {
     };
     assert_eq!(
         effect(1, &step, false),
-        "1. cogging at joint link, 50.0 % of the gap before it"
+        "1. cogging at joint link, closes 50.0 % of the remaining gap"
     );
     assert_eq!(
         effect(1, &step, true),
-        "1. cogging at joint link, 50.0 % of the gap of that joint before it"
+        "1. cogging at joint link, closes 50.0 % of the remaining gap of that joint"
     );
     step.set.push("torque_ripple".into());
-    assert!(effect(2, &step, true).ends_with("; these data support as well: torque_ripple"));
+    assert!(effect(2, &step, true).ends_with("; these data support equally: torque_ripple"));
 }

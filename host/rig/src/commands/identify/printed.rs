@@ -1,13 +1,13 @@
-//! What `rig identify` says on the terminal.
+//! Terminal output of `rig identify`.
 
 use super::super::ui::Ui;
 use rig_identify::{Estimator, Identification, NotExcited, StandardSet};
 use rig_output::{format_interval, format_value};
 
-/// Share of rows from which on a figure is over as good as all of them.
+/// Share of used rows from which on the figure over all rows is not printed, because it is nearly the same.
 const ALL_BUT_A_FEW: f64 = 0.985;
 
-/// The result at a glance.
+/// Prints the result in short.
 pub(super) fn print(ui: &Ui, result: &Identification) {
     let width = result
         .base_parameters
@@ -31,9 +31,7 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
             joint.holdout_relative_error_all_rows,
         );
         let holdout = match held {
-            (Some(error), ..) if error.is_nan() => {
-                ", no row of the hold-out left to judge by".to_owned()
-            }
+            (Some(error), ..) if error.is_nan() => ", no usable row in the hold-out".to_owned(),
             (Some(error), Some(share), Some(all)) => {
                 format!(", on the hold-out {}", left(error, share, all))
             }
@@ -41,7 +39,7 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
         };
         if joint.train_residual_rms.is_nan() {
             ui.say(&format!(
-                "{}: none of its torque was used{holdout}",
+                "{}: no row of its torque was used{holdout}",
                 joint.name
             ));
             continue;
@@ -76,11 +74,11 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
     }
 }
 
-/// How much of the torque is left, over how many of the rows, and over all of them.
+/// Residual in per cent of the torque, over the used rows and over all rows.
 fn left(error: f64, share: f64, all: f64) -> String {
     let error = format!("{:.2} % of the torque", 100.0 * error);
     match share {
-        // A few rows at reversals change nothing that is worth a word.
+        // The few rows at reversals do not change the figure.
         ALL_BUT_A_FEW.. => error,
         _ => format!(
             "{error} on {:.0} % of the rows, {:.2} % on all",
@@ -90,7 +88,7 @@ fn left(error: f64, share: f64, all: f64) -> String {
     }
 }
 
-/// What the set that is written leaves, where that is not what was fitted.
+/// Residual of the parameter set in the written files, which differs from the fitted parameters.
 fn of_the_files(set: &StandardSet) -> String {
     let percent = |errors: &[f64]| {
         let list: Vec<String> = errors.iter().map(|e| format!("{:.1}", 100.0 * e)).collect();
@@ -101,12 +99,12 @@ fn of_the_files(set: &StandardSet) -> String {
         format!(", on the hold-out {} %", percent(errors))
     });
     format!(
-        "identified.toml and identified.urdf hold the nearest set that bodies can have (--estimator consistent fits it): it leaves {} % of the torque{held}.",
+        "identified.toml and identified.urdf hold the nearest physically consistent parameters (--estimator consistent fits them); their residual is {} % of the torque{held}.",
         percent(&set.train_relative_error)
     )
 }
 
-/// One line for each motion that would show more, with all that it would show.
+/// One line for each recommended motion, with all combinations that it would excite.
 fn not_excited(list: &[NotExcited]) -> Vec<String> {
     let mut by_motion: Vec<(&str, Vec<&NotExcited>)> = Vec::new();
     for missing in list {
@@ -130,7 +128,7 @@ fn not_excited(list: &[NotExcited]) -> Vec<String> {
     });
     let mut lines: Vec<String> = lines.collect();
     if by_motion.iter().any(|(_, own)| own.len() > 1) {
-        lines.push("How well these data alone know each of them stands in the report.".into());
+        lines.push("The report says how well these data alone determine each combination.".into());
     }
     lines
 }

@@ -1,16 +1,16 @@
-//! What the identified model lacks, in short.
+//! Short diagnosis of the identified model.
 
 use super::super::verdict;
 use rig_diagnose::outcome::Diagnosis;
 use rig_output::format_p_value;
 use rig_report::{Block, Column, Section, Table};
 
-/// The diagnosis on the page of the demonstration.
+/// Composes the diagnosis on the page of the demonstration.
 pub(super) fn section(found: &Diagnosis) -> Section {
     let mut section = Section::new(
         "missing",
-        "What the identified model lacks",
-        "The same recordings with the excitation run a second time: what does not repeat is noise, and what repeats without being predicted is missing in the model. diagnosis.html has the whole of it.",
+        "Diagnosis of the identified model",
+        "The diagnosis uses the same recordings and a second run of the excitation. The difference between the runs is noise; a repeatable residual shows that the model lacks an effect. diagnosis.html has all details.",
     )
     .with(Block::List(
         std::iter::once(format!("Verdict: {}.", verdict(found.verdict)))
@@ -22,7 +22,7 @@ pub(super) fn section(found: &Diagnosis) -> Section {
             caption: "Effects that were found".into(),
             columns: vec![
                 Column::text("Effect"),
-                Column::text("Names that fit as well"),
+                Column::text("Names that fit equally well"),
                 Column::text("Gap closed"),
                 Column::number("p", ""),
             ],

@@ -1,4 +1,4 @@
-//! Measured curves and what the models say to them.
+//! Measured curves and the predictions of the models.
 
 use super::{parts, words};
 use rig_diagnose::outcome::{Curves, Diagnosis};
@@ -13,7 +13,7 @@ pub(super) fn section(found: &Diagnosis) -> Option<Section> {
     let mut section = Section::new(
         "curves",
         "Measured and predicted, over time",
-        "A stretch of a recording, with the model refitted but without the effects, and with them. First the curves themselves, then what each model misses: the smaller the lower curve, the better.",
+        "A stretch of a recording, predicted by the refitted model without the effects and with them. First the curves themselves, then the error of each model.",
     );
     if !found.motion_how.is_empty() {
         section = section.with(Block::Text(found.motion_how.clone()));
@@ -39,15 +39,15 @@ pub(super) fn section(found: &Diagnosis) -> Option<Section> {
 const NAMES: [(&str, Role); 3] = [
     ("measured", Role::Measured),
     ("without the effects", Role::Before),
-    ("with them", Role::After),
+    ("with the effects", Role::After),
 ];
 
-/// The three curves, and the two differences from what was measured times `scale`.
+/// Draws the three curves, and the errors of both models (measured less predicted) times `scale`.
 fn pair(curves: &Curves, of: &[Vec<f64>; 3], plots: [Plot; 2], scale: f64) -> [Plot; 2] {
     let [mut whole, mut missed] = plots;
     for (values, (name, role)) in of.iter().zip(NAMES).filter(|(v, _)| !v.is_empty()) {
         let line = Series::line(name, role, curves.t.clone(), values.clone());
-        // Broken where it lies on the measured curve, so that both are seen.
+        // Dashed, so that the measured curve stays visible below it.
         whole = whole.with(if role == Role::After {
             line.dashed()
         } else {
@@ -85,7 +85,7 @@ fn torque(curves: &Curves, unit: &str) -> [Plot; 2] {
                 Axis::new(what, &unit),
             ),
             Plot::new(
-                format!("Joint {}: {what} that each model misses", curves.joint),
+                format!("Joint {}: {what} error of each model", curves.joint),
                 time(),
                 Axis::new("measured less predicted", &unit),
             ),
@@ -106,7 +106,7 @@ fn motion(curves: &Curves, unit: &str) -> [Plot; 2] {
                 Axis::new("position", unit),
             ),
             Plot::new(
-                format!("Joint {}: motion that each simulation misses", curves.joint),
+                format!("Joint {}: position error of each simulation", curves.joint),
                 time(),
                 Axis::new("measured less simulated", &format!("m{unit}")),
             ),

@@ -1,4 +1,4 @@
-//! How large the gap is and where it sits.
+//! Size of the gap and its dependence on the motion.
 
 use super::{parts, words};
 use rig_diagnose::outcome::{Diagnosis, Map, Place, Residual, Waterfall};
@@ -6,27 +6,27 @@ use rig_diagnose::what_falls;
 use rig_output::{format_p_value, format_significant};
 use rig_report::{self, Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table};
 
-/// Letters for which there is room below the axis on a narrow window; longer names lose their laws or give way to numbers.
+/// Number of letters that fit below the axis in a narrow window. Longer names are shortened or replaced by numbers.
 const ROOM: usize = 48;
-/// A smaller share is none.
+/// Smallest share of the gap that is printed as a sentence.
 const LEAST_SHARE: f64 = 0.005;
-/// From this ratio of highest to floor on, bars from zero would hide the last steps.
+/// Ratio of highest residual to noise floor from which on the axis is logarithmic, to show the last steps.
 const TALL: f64 = 20.0;
 
-/// From the description down to the noise floor.
+/// Residual from the description to the final model.
 pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
     if found.waterfall.is_empty() {
         return None;
     }
     let mut section = Section::new(
         "gap",
-        "From the description down to the noise",
+        "Residual from the description to the final model",
         match found.residual {
             Residual::Torque => {
-                "How much torque each model leaves unexplained: first the description as it was given (its own values), then the same equations with all their parameters fitted to the training data, then each effect added in turn. Where that reaches the noise floor, nothing but noise is left."
+                "Torque that each model leaves unexplained: first the description with its given values, then the same equations with all parameters refitted to the training data, then each effect added in turn. At the noise floor only noise remains."
             }
             Residual::Position => {
-                "How far the position of each model runs away from the recorded one when it is driven by the motor voltage, from the first row of a recording to its last: first with the parameters fitted again, then with each effect added in turn. The line is the encoder's step, which no simulation can pass."
+                "Deviation of each model's position from the recorded one when the motor voltage drives the model from the first row of a recording to its last: first with refitted parameters, then with each effect added in turn. The line is the encoder's step; no simulation can come below it."
             }
         },
     );
@@ -58,8 +58,8 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
     Some(section.with(figures(found)))
 }
 
-/// The residual of a joint from model to model. Where the models' names need more than `room` letters they go without the effects' laws,
-/// and where that is not enough the models are numbered.
+/// Draws the residual of a joint for each model. If the names of the models need more than `room` letters, the laws of
+/// the effects are left out; if that is not enough, the models are numbered.
 pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
     let n = w.models.len();
     let short: Vec<String> = w
@@ -67,7 +67,7 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
         .iter()
         .map(|model| match model.as_str() {
             "frozen description" => "as given".into(),
-            "refitted" => "fitted again".into(),
+            "refitted" => "refitted".into(),
             effect => format!("+ {}", words::name(effect)),
         })
         .collect();
@@ -89,7 +89,7 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
         .iter()
         .chain(&w.holdout)
         .fold(0.0f64, |m, v| m.max(*v));
-    // A free-running position stays far above the encoder's step; there is no fall to a floor to show.
+    // The position of a free run stays far above the encoder's step, so the axis stays linear.
     let tall = found.residual == Residual::Torque && w.floor > 0.0 && highest > TALL * w.floor;
     let (y, style) = if tall {
         (Axis::log("residual RMS", unit), Style::Line)
@@ -97,7 +97,7 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
         (Axis::new("residual RMS", unit), Style::Bars)
     };
     let mut plot = Plot::new(
-        format!("Joint {}: residual from model to model", w.joint),
+        format!("Joint {}: residual of each model", w.joint),
         Axis::categories("", names),
         y,
     )
@@ -110,7 +110,7 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
     ));
     if !w.holdout.is_empty() {
         plot = plot.with(Series::new(
-            "held back",
+            "hold-out",
             Role::After,
             style,
             places,
@@ -119,10 +119,10 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
     }
     let mut note = String::new();
     if numbered {
-        note.push_str("The table below has the models' names. ");
+        note.push_str("The table below lists the names of the models. ");
     }
     if tall {
-        note.push_str("Logarithmic: the first model leaves far more than the last. ");
+        note.push_str("Logarithmic axis: the first residual is far larger than the last. ");
     }
     if w.floor.is_nan() {
         note.push_str("No noise floor is known.");
@@ -145,9 +145,9 @@ fn figures(found: &Diagnosis) -> Block {
         Column::number("Training", ""),
     ];
     if held {
-        columns.push(Column::number("Held back", ""));
+        columns.push(Column::number("Hold-out", ""));
     }
-    columns.extend([Column::text("Unit"), Column::number("Over the floor", "")]);
+    columns.extend([Column::text("Unit"), Column::number("Ratio to floor", "")]);
     let value = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::NAN);
     let rows = found
         .waterfall
@@ -178,39 +178,32 @@ fn figures(found: &Diagnosis) -> Block {
         })
         .collect();
     Block::Table(Table {
-        caption: format!(
-            "RMS of the {}, model by model",
-            words::shown(found, "").what
-        ),
+        caption: format!("RMS of the {} for each model", words::shown(found, "").what),
         columns,
         rows,
         note: format!(
-            "Over the floor: {} over the noise floor; 1 is nothing but noise.{}",
-            if held {
-                "RMS on the data held back"
-            } else {
-                "RMS"
-            },
+            "Ratio to floor: {} divided by the noise floor; 1 means noise only.{}",
+            if held { "RMS on the hold-out" } else { "RMS" },
             what_falls(found).map_or(String::new(), |meaning| format!(" {meaning}"))
         ),
     })
 }
 
-/// Where the gap sits.
+/// Dependence of the gap on position, velocity and other coordinates.
 pub(super) fn places(found: &Diagnosis) -> Option<Section> {
-    // Of a position that runs freely nothing is located, nor of recordings at fault.
+    // The gap is located neither for free runs under voltage nor for faulty recordings.
     if found.residual != Residual::Torque || found.waterfall.is_empty() {
         return None;
     }
     let texts: Vec<String> = texts(&found.places, found.waterfall.len() > 1);
     let mut section = Section::new(
         "where",
-        "Where the gap sits",
-        "Before any effect is added: what the residual of the refitted model depends on. Noise depends on nothing; whatever does is something that the model lacks.",
+        "Where the gap is",
+        "Quantities that the residual of the refitted model depends on, before any effect is added. Noise depends on none of them; a dependence shows that the model lacks an effect.",
     );
     if found.places.is_empty() {
         return Some(section.with(Block::Text(
-            "No coordinate alone explains it: the residual goes with none of them more than chance would have it (p < 0.05)."
+            "No coordinate alone explains it: the residual does not depend significantly (p < 0.05) on any of them."
                 .to_owned(),
         )));
     }
@@ -218,12 +211,12 @@ pub(super) fn places(found: &Diagnosis) -> Option<Section> {
         section = section.with(Block::List(texts));
     }
     Some(section.with(table(
-        "What the gap depends on, most of it first",
+        "Quantities that the gap depends on, largest share first",
         &found.places,
     )))
 }
 
-/// What goes with something, in words; of which joint, where there are several.
+/// Sentences about dependences of the residual; with the name of the joint if there are several.
 pub(super) fn texts(places: &[Place], several: bool) -> Vec<String> {
     places
         .iter()
@@ -241,7 +234,7 @@ pub(super) fn table(caption: &str, places: &[Place]) -> Block {
         columns: vec![
             Column::text("Joint"),
             Column::text("Depends on"),
-            Column::number("Most of it between", ""),
+            Column::number("Mainly between", ""),
             Column::text("Unit"),
             Column::number("Share", "%"),
             Column::number("p", ""),
@@ -263,17 +256,17 @@ pub(super) fn table(caption: &str, places: &[Place]) -> Block {
                 ]
             })
             .collect(),
-        note: "Share: how much of the gap this one quantity accounts for; quantities that move together account for the same part, so shares do not add up. p is corrected for the number of quantities looked at; those that are 0.05 or more, as chance makes them, are left out.".into(),
+        note: "Share: part of the gap that this quantity alone explains. Correlated quantities explain the same part, so the shares do not add up. p is corrected for the number of quantities tested; quantities with p of 0.05 or more are left out.".into(),
     })
 }
 
-/// Middle of the distances of bins from zero, as a share of the farthest, up to which they are crowded.
+/// Median distance of the bins from zero, as a share of the largest distance, up to which the bins count as crowded.
 const CROWDED: f64 = 0.2;
-/// Fewest bins of a figure of them.
+/// Smallest number of bins in a figure of the middle range.
 const FEWEST: usize = 8;
 
-/// The mean residual over one coordinate, before and after, and the law that was fitted to it; its middle once more where bins crowd
-/// there.
+/// Draws the mean residual over one coordinate, before and after the step, with the fitted law. If the bins are crowded
+/// near zero, a second figure shows the middle range.
 pub(super) fn maps(map: &Map) -> Vec<Plot> {
     let whole = drawn(map);
     let nearer = |m: &Map| closer(m).filter(|m| m.at.len() >= FEWEST);
@@ -282,7 +275,7 @@ pub(super) fn maps(map: &Map) -> Vec<Plot> {
         let mut plot = drawn(&close);
         plot.title = format!("{}, its middle", plot.title);
         plot.note = format!(
-            "The {} bins of the figure before that are crowded in its middle.",
+            "The {} bins that are crowded in the middle of the figure before.",
             close.at.len()
         );
         plot
@@ -290,8 +283,7 @@ pub(super) fn maps(map: &Map) -> Vec<Plot> {
     std::iter::once(whole).chain(close).collect()
 }
 
-/// The bins in the middle, where they are too close to be told apart: those of the way or the time since a reversal, most of which are
-/// short.
+/// Returns the bins near zero if they are crowded there. Travel and time since reversal are mostly short.
 fn closer(map: &Map) -> Option<Map> {
     let mut far: Vec<f64> = map.at.iter().map(|x| x.abs()).collect();
     far.sort_by(f64::total_cmp);
@@ -341,7 +333,7 @@ fn drawn(map: &Map) -> Plot {
         let name = if map.step.is_some() {
             "before"
         } else {
-            "first of all"
+            "at the start"
         };
         plot = plot.with(bars(name, Role::Before, &map.before));
     }
@@ -355,7 +347,7 @@ fn drawn(map: &Map) -> Plot {
     }
     if !map.law.is_empty() {
         plot = plot.with(Series::line(
-            "the fitted law",
+            "fitted law",
             Role::Model,
             map.at.clone(),
             map.law.clone(),
@@ -367,7 +359,7 @@ fn drawn(map: &Map) -> Plot {
         if map.law.is_empty() {
             ""
         } else {
-            " The law is drawn without the part that mass, inertia and friction of the standard model can take over."
+            " The law is drawn without the part that mass, inertia and friction of the standard model can represent."
         }
     ))
 }

@@ -1,14 +1,14 @@
-//! What the missing effects had done to the parameters, and what is left without a name.
+//! Bias of the parameters by the missing effects, and the unexplained residual.
 
 use super::{gap, parts, words};
 use rig_diagnose::outcome::{Absorbed, Before, Diagnosis, FloorFrom, Remainder};
 use rig_output::{format_significant, format_value};
 use rig_report::{Block, Column, Section, Table};
 
-/// From so many standard deviations on a parameter counts as having been wrong.
+/// Change in standard deviations from which on a parameter counts as biased.
 const LYING: f64 = 3.0;
 
-/// Nominal parameters that had been lying.
+/// Nominal parameters that the missing effects had biased.
 pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
     if found.absorbed.is_empty() {
         return None;
@@ -20,22 +20,22 @@ pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
     let ([title, intro], moved, heads) = match found.absorbed_before {
         Before::WithoutEffects => (
             [
-                "Parameters that had been lying",
-                "What a model lacks does not all stay in the residual: part of it bends the parameters that are there, because the fit uses them to make up for it. These are the parameters of the standard model, fitted without the effects and with them.",
+                "Parameters biased by the missing effects",
+                "A missing effect does not only leave a residual: the fit also changes the other parameters to compensate for it. The table gives the parameters of the standard model, fitted without the effects and with them.",
             ],
             format!(
-                "{lying} of {} {has} moved by more than {LYING:.0} standard deviations; their old values stood in for what was missing. The new ones belong to the model with the effects, and are no values of a model without them.",
+                "{lying} of {} {has} changed by more than {LYING:.0} standard deviations, because the old values compensated for the missing effects. The new values are valid only in the model with the effects.",
                 list.len()
             ),
             ["Without the effects", "With them ± std"],
         ),
         Before::Described => (
             [
-                "The description's values and those of the data",
-                "No effect was found that could have bent them: these are the parameters of the standard model, as the description states them and as the training data have them.",
+                "Values of the description and of the data",
+                "No effect was found that could have biased the parameters. The table gives the parameters of the standard model, as described and as identified from the training data.",
             ],
             format!(
-                "{lying} of {} {has} moved by more than {LYING:.0} standard deviations from the description.",
+                "{lying} of {} {has} changed by more than {LYING:.0} standard deviations from the description.",
                 list.len()
             ),
             ["As described", "Identified ± std"],
@@ -44,18 +44,18 @@ pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
     Some(
         Section::new("absorbed", title, intro)
             .with(Block::Text(if lying == 0 {
-                format!("None has moved by more than {LYING:.0} standard deviations.")
+                format!("None has changed by more than {LYING:.0} standard deviations.")
             } else {
                 moved
             }))
             .with(Block::Table(Table {
-                caption: "Before and after, the largest change first".into(),
+                caption: "Before and after, largest change first".into(),
                 columns: vec![
                     Column::text("Parameter"),
                     Column::number(heads[0], ""),
                     Column::number(heads[1], ""),
                     Column::text("Unit"),
-                    Column::number("Moved by", "std"),
+                    Column::number("Change", "std"),
                 ],
                 rows: list
                     .iter()
@@ -75,7 +75,7 @@ pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
     )
 }
 
-/// What the written model leaves of each joint's torque.
+/// Residual of the written model for each joint.
 pub(super) fn sizes(found: &Diagnosis) -> Option<Section> {
     let first = found.left.first()?;
     let number = |x: f64| match x.is_nan() {
@@ -85,13 +85,13 @@ pub(super) fn sizes(found: &Diagnosis) -> Option<Section> {
     Some(
         Section::new(
             "sizes",
-            "What the written model leaves",
-            "RMS of the torque residual of model.toml, beside the recorded torque and a noise floor that no model made. A joint is explained where its residual is noise, or where the effects close nearly all of the gap above the floor.",
+            "Residual of the written model",
+            "RMS of the torque residual of model.toml, compared with the recorded torque and with a noise floor that does not depend on a model. A joint is explained if its residual is noise, or if the effects close nearly all of the gap above the floor.",
         )
         .with(Block::Table(Table {
             caption: match first.on_holdout {
                 true => "On the hold-out".into(),
-                false => "On blocks of the training data, left out of the fit in turn".into(),
+                false => "On blocks of the training data, each left out of the fit in turn".into(),
             },
             columns: vec![
                 Column::text("Joint"),
@@ -101,7 +101,7 @@ pub(super) fn sizes(found: &Diagnosis) -> Option<Section> {
                 Column::text("Unit"),
                 Column::text("Floor from"),
                 Column::number("Torque RMS", ""),
-                Column::number("Residual of torque", "%"),
+                Column::number("Residual / torque", "%"),
                 Column::text("Explained?"),
             ],
             rows: (found.left.iter())
@@ -129,24 +129,24 @@ pub(super) fn sizes(found: &Diagnosis) -> Option<Section> {
     )
 }
 
-/// The parameters by torque and by simulated motion.
+/// The parameters estimated from the torque and from the simulated motion.
 pub(super) fn by_motion(found: &Diagnosis) -> Option<Section> {
     let by_motion = found.by_motion.as_ref()?;
     Some(
         Section::new(
             "by-motion",
-            "The same parameters, fitted to the motion",
-            "Two ways to the same numbers: the torque that the measured motion asks for, and the motion that the measured torque makes in a simulation. Noise of the position spoils the one and not the other. Where the model is right both agree within a few of their deviations.",
+            "The same parameters, estimated from the motion",
+            "The parameters are estimated in two ways: from the torque that the measured motion requires, and from the motion that the measured torque causes in a simulation. Noise of the position affects only the first. If the model is right, both agree within a few standard deviations.",
         )
         .with(Block::Text(by_motion.text.clone()))
         .with(Block::Table(Table {
-            caption: "By torque and by simulated motion".into(),
+            caption: "Estimates from torque and from simulated motion".into(),
             columns: vec![
                 Column::text("Parameter"),
-                Column::number("By the torque ± std", ""),
-                Column::number("By the motion ± std", ""),
+                Column::number("From the torque ± std", ""),
+                Column::number("From the motion ± std", ""),
                 Column::text("Unit"),
-                Column::number("Apart by", "std"),
+                Column::number("Difference", "std"),
             ],
             rows: by_motion
                 .parameters
@@ -166,7 +166,7 @@ pub(super) fn by_motion(found: &Diagnosis) -> Option<Section> {
     )
 }
 
-/// What no known effect explains; without it, what the residual looks like at the end.
+/// The unexplained residual; without one, the mean residual of the final model.
 pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     let maps: Vec<Block> = found
         .maps
@@ -180,16 +180,16 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
             blocks: maps,
             ..Section::new(
                 "left",
-                "What is left",
-                "The mean residual at the end. Dots that lie on zero within their bars hide nothing; dots that do not would be something that the model still lacks.",
+                "Remaining residual",
+                "Mean residual of the final model. Points whose bars include zero show only noise; other points show that the model still lacks an effect.",
             )
         });
     };
     let shown = words::shown(found, &remainder.unit);
     let mut section = Section::new(
         "left",
-        "What is left without a name",
-        "No effect that is known here explains this part of the gap. It is described instead of being given the name that fits least badly.",
+        "Unexplained residual",
+        "No effect of the catalogue explains this part of the gap. It is described and gets no name, because even the best-fitting name would be wrong.",
     )
     .with(parts::warning(remainder.text.clone()));
     // A free run that diverged has no residual.
@@ -202,7 +202,7 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     }
     if !remainder.places.is_empty() {
         section = section.with(gap::table(
-            "What the remainder depends on",
+            "Quantities that the remainder depends on",
             &remainder.places,
         ));
     }
@@ -210,18 +210,18 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     Some(section)
 }
 
-/// The remainder of a joint in numbers.
+/// Describes the remainder of a joint in numbers.
 fn unnamed(remainder: &Remainder, shown: &words::Shown) -> String {
     format!(
-        "Joint {}: {} RMS without a name{}.",
+        "Joint {}: {} RMS unexplained{}.",
         remainder.joint,
         shown.value(remainder.rms),
         match remainder.ratio.is_nan() {
             true => "; no noise floor is known".into(),
             false => format!(
-                "; with noise, {} is {} times the noise floor",
+                "; including noise, {} is {} times the noise floor",
                 match remainder.of_a_voltage() {
-                    true => "what is left of the voltage",
+                    true => "the voltage residual",
                     false => "the whole residual",
                 },
                 format_significant(remainder.ratio, 3)

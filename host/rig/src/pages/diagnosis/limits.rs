@@ -1,14 +1,14 @@
-//! What these data could not say, what was tried, and what to do next.
+//! Limits of the data, effects that were tried, and the next experiment.
 
 use super::{parts, words};
 use rig_diagnose::outcome::{Diagnosis, NotTestable, Residual, Tried};
 use rig_output::{format_p_value, format_significant};
 use rig_report::{self, Block, Column, Section, Table};
 
-/// A longer table is folded.
+/// Number of rows above which a table is folded.
 const LONG: usize = 12;
 
-/// What to do next.
+/// The next experiment.
 pub(super) fn next(found: &Diagnosis) -> Option<Section> {
     let next = found.next_experiment.as_ref()?;
     let names: Vec<String> = next
@@ -24,7 +24,7 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
     }
     if let Some(separation) = next.separation {
         items.push(format!(
-            "The rivals' predictions would lie {} standard deviations of the noise apart.",
+            "The predictions of the rival effects would differ by {} standard deviations of the noise.",
             format_significant(separation, 2)
         ));
     }
@@ -33,8 +33,8 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
     }
     let mut section = Section::new(
         "next",
-        "What to do next",
-        "The experiment that would tell the most beyond what these data can.",
+        "Next experiment",
+        "The experiment that adds the most information to these data.",
     )
     .with(parts::info(format!(
         "{}. {}",
@@ -45,16 +45,16 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
         section = section.with(Block::List(items));
     }
     Some(match &next.file {
-        Some(file) => section.with(Block::Text(format!("{file} lies beside this page."))),
-        // What only has to be recorded says how by itself.
+        Some(file) => section.with(Block::Text(format!("{file} is in the folder of this page."))),
+        // The text of the experiment says how to record it.
         None if names.len() < 2 => section,
         None => section.with(Block::Text(
-            "This one needs hands: no motion that the rig could run by itself would do.".into(),
+            "This experiment must be done by hand: no motion that the rig can run by itself replaces it.".into(),
         )),
     })
 }
 
-/// An effect that cannot be tested, with every joint for which that holds for the same reason.
+/// Groups effects that cannot be tested: one entry for all joints with the same reason.
 pub(super) fn grouped(list: &[NotTestable]) -> Vec<(&NotTestable, Vec<String>)> {
     let mut groups: Vec<(&NotTestable, Vec<String>)> = Vec::new();
     for item in list {
@@ -70,7 +70,7 @@ pub(super) fn grouped(list: &[NotTestable]) -> Vec<(&NotTestable, Vec<String>)> 
     groups
 }
 
-/// What these data could not have shown.
+/// Effects that these data cannot show.
 pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
     if found.not_testable.is_empty() && found.detectable.is_empty() {
         return None;
@@ -78,7 +78,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
     let mut section = Section::new(
         "limits",
         "What these data cannot show",
-        "Not found is not the same as not there. Some effects these data cannot show, or only where they are large; others would have shown from some size on.",
+        "An effect that was not found may still be present. These data cannot show some effects at all, and show others only above a certain size.",
     );
     if !found.not_testable.is_empty() {
         section = section.with(Block::Table(Table {
@@ -87,7 +87,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
                 Column::text("Effect"),
                 Column::text("Joint"),
                 Column::text("What the data lack"),
-                Column::text("What would show it"),
+                Column::text("Experiment that would show it"),
             ],
             rows: grouped(&found.not_testable)
                 .into_iter()
@@ -113,7 +113,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
             Column::text("Joint"),
             Column::text("Size of"),
             Column::number("Smallest", ""),
-            Column::number("At its worst", ""),
+            Column::number("Worst case", ""),
             Column::text("Unit"),
         ],
         rows: found
@@ -130,7 +130,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
                 ]
             })
             .collect(),
-        note: "A smaller one may be there and would have passed unseen. Of a law with a speed, a period or a time of its own the size is the median over these, and the worst is where this motion shows it least.".into(),
+        note: "A smaller effect may be present without being found. If a law has a speed, a period or a time as parameter, the smallest size is the median over its values, and the worst case is the value that this motion shows least.".into(),
     };
     Some(section.with(folded(
         "The smallest sizes that would have been found",
@@ -138,7 +138,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
     )))
 }
 
-/// A long table behind a line that unfolds it.
+/// Folds a long table behind a summary line.
 fn folded(summary: &str, table: Table) -> Block {
     if table.rows.len() <= LONG {
         return Block::Table(table);
@@ -149,15 +149,15 @@ fn folded(summary: &str, table: Table) -> Block {
     }
 }
 
-/// Everything that was tried and why it was not taken.
+/// All effects that were tried, with the reason why they were refused.
 pub(super) fn tried(found: &Diagnosis) -> Option<Section> {
     if found.tried.is_empty() {
         return None;
     }
     let mut section = Section::new(
         "tried",
-        "What was tried",
-        "In every round each effect of the catalogue was added to the model in turn, fitted to most of the training data and judged on the rest. The best is taken if chance cannot explain it; the others are refused, and this is why.",
+        "Effects that were tried",
+        "In every round each effect of the catalogue was added to the model in turn, fitted to most of the training data and judged on the rest. The best effect is accepted if chance cannot explain its gain. The tables give the reason why the others were refused.",
     );
     let rounds = found.tried.iter().map(|t| t.step).max().unwrap_or(0);
     for round in 0..=rounds {
@@ -167,12 +167,12 @@ pub(super) fn tried(found: &Diagnosis) -> Option<Section> {
         }
         list.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let taken = list.iter().any(|t| t.refused.is_empty());
-        // Positions are compared piece by piece of recordings, by a test that has no such figure.
+        // The test for positions compares pieces of recordings and gives no such figure.
         let sigmas = found.residual == Residual::Torque;
         let mut columns = vec![
             Column::text("Effect"),
             Column::text("Joint"),
-            Column::number("Takes away", "%"),
+            Column::number("Reduction", "%"),
         ];
         if sigmas {
             columns.push(Column::number("Gain over its std", ""));
@@ -189,7 +189,7 @@ pub(super) fn tried(found: &Diagnosis) -> Option<Section> {
             }
             row.push(format_p_value(t.p_value));
             row.push(if t.refused.is_empty() {
-                "taken".into()
+                "accepted".into()
             } else {
                 format!("refused: {}", t.refused)
             });
@@ -197,13 +197,13 @@ pub(super) fn tried(found: &Diagnosis) -> Option<Section> {
         };
         let table = Table {
             caption: format!(
-                "Round {}{}, the largest gain first",
+                "Round {}{}, largest reduction first",
                 round + 1,
-                if taken { "" } else { ": nothing was taken" }
+                if taken { "" } else { ": no effect was accepted" }
             ),
             columns,
             rows: list.iter().map(row).collect(),
-            note: "Takes away: share of the residual's RMS on stretches that the effect was not fitted to; below zero it makes things worse there.".into(),
+            note: "Reduction: share by which the effect reduces the residual's RMS on stretches that it was not fitted to; a negative value means a larger residual.".into(),
         };
         section
             .blocks

@@ -1,4 +1,4 @@
-//! The page of a diagnosis: the verdict first, then what it rests on.
+//! The page of a diagnosis: the verdict first, then its evidence.
 
 mod curves;
 mod gap;
@@ -39,7 +39,7 @@ pub fn diagnosis(found: &Diagnosis, context: &Context) -> Document {
     sections.extend(treated::section(found));
     sections.push(parts::repeat(context));
     Document {
-        title: format!("{}: what the model lacks", found.robot),
+        title: format!("{}: diagnosis of the model", found.robot),
         subtitle: words::meaning(found.verdict).into(),
         summary: summary(found),
         sections,
@@ -47,12 +47,12 @@ pub fn diagnosis(found: &Diagnosis, context: &Context) -> Document {
     }
 }
 
-/// Whether figures on a hold-out stand beside those on the training recordings.
+/// Returns true if there are figures for a hold-out beside those for the training recordings.
 fn held_out(found: &Diagnosis) -> bool {
     found.waterfall.iter().any(|w| !w.holdout.is_empty())
 }
 
-/// RMS of the last model over the noise floor, worst joint; on the hold-out where there is one.
+/// Ratio of the last model's residual RMS to the noise floor, worst joint; on the hold-out if there is one.
 fn left_over(found: &Diagnosis) -> Option<f64> {
     found
         .waterfall
@@ -67,16 +67,16 @@ fn left_over(found: &Diagnosis) -> Option<f64> {
 
 fn summary(found: &Diagnosis) -> Vec<Fact> {
     let judged = if held_out(found) {
-        "on data held back"
+        "on the hold-out"
     } else {
-        "on the training data; no data were held back"
+        "on the training data; no hold-out was given"
     };
     let mut facts =
         vec![Fact::new("Verdict", words::verdict(found.verdict)).tone(words::tone(found.verdict))];
     if found.verdict == Verdict::DataFault {
         facts.push(
             Fact::new("Faults in the data", found.data_faults.len().to_string())
-                .note("mend them and run the diagnosis again")
+                .note("correct them and run the diagnosis again")
                 .tone(Tone::Fault),
         );
         return facts;
@@ -99,7 +99,7 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
     if let Some(share) = found.gap_closed {
         let refit = (found.closed_by_effects()).map_or(String::new(), |own| {
             format!(
-                "; counted from the description as it stands, the effects close {} % of what fitting it again leaves",
+                "; counted from the given description; the effects close {} % of the gap that remains after the refit",
                 parts::percent(own)
             )
         });
@@ -113,20 +113,20 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
     }
     if let Some(ratio) = left_over(found) {
         facts.push(
-            Fact::new("Left at the end", format_significant(ratio, 3))
+            Fact::new("Final residual", format_significant(ratio, 3))
                 .unit("× noise floor")
-                .note(format!("worst joint, {judged}; 1 is nothing but noise")),
+                .note(format!("worst joint, {judged}; 1 means noise only")),
         );
     }
     if let ([floor], [joint]) = (found.noise_floor_rms.as_slice(), found.waterfall.as_slice()) {
         let shown = words::shown(found, &joint.unit);
         facts.push(match floor.is_nan() {
             true => Fact::new("Noise floor", "not known")
-                .note("record one motion twice to have it")
+                .note("record one motion twice to measure it")
                 .tone(Tone::Warning),
             false => Fact::new("Noise floor", shown.number(*floor))
                 .unit(shown.unit)
-                .note("RMS of what no model can predict"),
+                .note("RMS of the part that no model can predict"),
         });
     }
     if !found.not_testable.is_empty() {
@@ -135,7 +135,7 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
                 "Not testable",
                 words::several(limits::grouped(&found.not_testable).len(), "effect"),
             )
-            .note("these data cannot exclude them"),
+            .note("these data can neither show nor exclude them"),
         );
     }
     facts
@@ -157,13 +157,13 @@ fn opening(found: &Diagnosis) -> Section {
         return section;
     }
     section.with(Block::Table(Table {
-        caption: "What was found, in this order".into(),
+        caption: "Effects in the order in which they were found".into(),
         columns: vec![
             Column::text("Effect"),
             Column::text("Joint"),
             Column::text("Gap closed"),
             Column::number("p", ""),
-            Column::text("Certain of the name?"),
+            Column::text("Is the name certain?"),
         ],
         rows: found
             .steps
@@ -175,25 +175,25 @@ fn opening(found: &Diagnosis) -> Section {
                     step.fall(),
                     format_p_value(step.p_value),
                     match words::rivals(step).len() {
-                        0 if doubted(found, &step.joint) => "see what is left".into(),
+                        0 if doubted(found, &step.joint) => "see the unexplained residual".into(),
                         0 if values_alike(found, step).is_some() => {
-                            "no: values of the description as good".into()
+                            "no: other values in the description explain it as well".into()
                         }
                         0 if found.is_certain(step) => "yes".into(),
                         0 if step.name_probability.is_finite() && found.left.iter().all(|l| l.joint != step.joint || l.explained) => {
                             format!("no: probability {}", format_significant(step.name_probability, 2))
                         }
-                        0 => "see what is left".into(),
-                        n => format!("no: {} as good", words::several(n, "other name")),
+                        0 => "see the unexplained residual".into(),
+                        n => format!("no: {} equally good", words::several(n, "other name")),
                     },
                 ]
             })
             .collect(),
-        note: "Gap: what the residual's RMS lies above the noise floor; where no floor is known, the RMS before and after. p: how often chance alone would look like this, corrected for all that was tried.".into(),
+        note: "Gap: difference between the residual's RMS and the noise floor. If no floor is known, the column gives the RMS before and after. p: probability that chance alone gives such a reduction, corrected for all tests.".into(),
     }))
 }
 
-/// Whether what is left of a joint leaves it open that one of its names stands in for something else.
+/// Returns true if the unexplained residual of a joint makes the name of its effects doubtful.
 fn doubted(found: &Diagnosis, joint: &str) -> bool {
     let speaks = |left: &Remainder| left.joint == joint && left.doubt && !left.of_a_voltage();
     found.remainder.as_ref().is_some_and(speaks)
@@ -206,13 +206,13 @@ fn faults(found: &Diagnosis) -> Option<Section> {
     Some(
         Section::new(
             "faults",
-            "What is wrong with the data",
+            "Faults in the data",
             if found.verdict == Verdict::DataFault {
-                "A certain fault cannot come from any robot that the description fits. A fit of such data would only bend parameters: mend the recording first. An open fault has another explanation that predicts the data as well."
+                "No robot that matches the description can cause a certain fault. A fit of such data gives wrong parameters: correct the recording first. An open fault has another explanation that predicts the data equally well."
             } else if found.data_faults.iter().any(|fault| fault.certain) {
-                "A certain fault cannot come from any robot that the description fits. The recordings were fitted all the same, as asked for: any number on this page may be bent by it. An open fault has another explanation that predicts the data as well."
+                "No robot that matches the description can cause a certain fault. The recordings were fitted in spite of it, as requested: any number on this page may be wrong. An open fault has another explanation that predicts the data equally well."
             } else {
-                "Each of these has another explanation that predicts the data as well, so the recordings were fitted as they are. Check them: a fault would bend the numbers on this page."
+                "Each of these faults has another explanation that predicts the data equally well, so the recordings were fitted unchanged. Check them: a real fault makes the numbers on this page wrong."
             },
         )
         .with(Block::Table(Table {
@@ -222,7 +222,7 @@ fn faults(found: &Diagnosis) -> Option<Section> {
                 Column::text("Recording"),
                 Column::text("Joint"),
                 Column::text("Certain"),
-                Column::text("What is wrong, and what would be right"),
+                Column::text("Fault and correction"),
             ],
             rows: found
                 .data_faults

@@ -1,17 +1,18 @@
-//! The figures of a diagnosis that a text of one's own wants, each with the name of its file.
+//! Figures of a diagnosis for use in other texts, each with the name of its file.
 
 use super::gap;
 use rig_diagnose::outcome::Diagnosis;
 use rig_report::Plot;
 
-/// What the names of the files begin with, in the order in which [`pictures`] gives them; a number from 1 and `.svg` follow.
+/// First parts of the file names, in the order of [`pictures`]; a number from 1 and `.svg` follow.
 pub const NAMES: [&str; 3] = ["gap", "effect", "left"];
 
-/// Letters for which there is room below the axis of a picture of its own.
+/// Number of letters that fit below the axis of a separate picture.
 const ROOM: usize = 92;
 
-/// The fall of the gap at each joint in which something was found or left (at all where nothing was), the residual map of each effect
-/// that has one, and that of what is left, each map's middle where its bins crowd there.
+/// Returns the residual of each model at each joint with an effect or a remainder (at all joints if there is none), the
+/// residual map of each effect that has one, and the maps of the remainder. Of a map with crowded bins it returns the
+/// middle range.
 pub fn pictures(found: &Diagnosis) -> Vec<(String, Plot)> {
     let [gap, effect, left] = NAMES;
     let named = |kind: &str, k: usize| format!("{kind}-{}.svg", k + 1);

@@ -1,4 +1,4 @@
-//! One effect that was found: what gave it away, what it is worth, why to believe it.
+//! The section of one effect: signature, parameters, reduction of the residual, evidence.
 
 use super::{gap, parts, words};
 use rig_diagnose::outcome::{Diagnosis, Residual, Step};
@@ -6,14 +6,14 @@ use rig_diagnose::values_alike;
 use rig_output::format_p_value;
 use rig_report::{self, Block, Column, NoteKind, Section, Table};
 
-/// What the figure of a step shows.
-const PICTURE: &str = "The figure shows the mean residual before this step and after it. Where the dots before lie off zero by more than their bars, the model lacked something. The line is the effect's law, fitted to the data. The dots after should lie on zero.";
+/// Explanation of the figure of a step.
+const PICTURE: &str = "The figure shows the mean residual before this step and after it. Where the points before the step differ from zero by more than their bars, the model lacks an effect. The line is the law of the effect, fitted to the data. The points after the step should lie on zero.";
 
-/// The parameter of a gear that no description holds.
+/// A parameter of a gear that is not written into descriptions.
 const SHARE: &str = "share";
-const SHARE_MEANS: &str = "times the torque that the twist gives with the description's inertia and load; 1 where these are right; not in model.toml";
+const SHARE_MEANS: &str = "factor of the torque that follows from the gear's twist with the described inertia and load; 1 if these are right; not in model.toml";
 
-/// The section of step `k`, from 0.
+/// Composes the section of step `k`, counted from 0.
 pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
     let step = &found.steps[k];
     let law = step.law.as_deref();
@@ -30,12 +30,14 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
     );
     if let Some(about) = words::about(&step.effect, law) {
         section = section.with(Block::Text(format!(
-            "How it shows: {}. Its equation: {}. After {}.\n\nIn descriptions and results it is called {}{}.",
+            "Signature: {}. Equation: {}. Source: {}.\n\nName in descriptions and results: {}{}.",
             about.signature,
             about.equation,
             about.source,
             about.name,
-            about.law.map_or(String::new(), |law| format!(", law {law}"))
+            about
+                .law
+                .map_or(String::new(), |law| format!(", law {law}"))
         )));
     }
     section
@@ -52,7 +54,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
                 false => NoteKind::Good,
             },
             text: format!(
-                "Why to believe it. {} The probability that chance alone looks like this, corrected for all that was tried: {}.",
+                "Evidence. {} Probability that chance alone gives such a reduction, corrected for all tests: {}.",
                 step.why,
                 format_p_value(step.p_value)
             ),
@@ -113,8 +115,8 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
     let residual =
         |on: &str, rms: [f64; 2]| row(&format!("{what}, {on}"), rms.map(|v| shown.value(v)));
     let mut rows = vec![residual("training", step.train_rms)];
-    rows.extend(step.holdout_rms.map(|rms| residual("held back", rms)));
-    // Where the residual is the motion's, that has been said.
+    rows.extend(step.holdout_rms.map(|rms| residual("hold-out", rms)));
+    // If the residual is one of the position, its row is there already.
     let motion = (step.motion_rms).filter(|_| found.residual == Residual::Torque);
     rows.extend(motion.map(|rms| {
         let unit = words::position_unit(&torque);
@@ -124,49 +126,49 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
         )
     }));
     Block::Table(Table {
-        caption: "What the step is worth (RMS)".into(),
+        caption: "Residual before and after the step (RMS)".into(),
         columns: vec![
-            Column::text("Of what"),
+            Column::text("Quantity"),
             Column::number("Before", ""),
             Column::number("After", ""),
         ],
         rows,
         note: format!(
-            "The step closes its gap to the noise floor by {}, {}.",
+            "Gap to the noise floor closed by the step: {}, {}.",
             step.fall(),
             if step.holdout_rms.is_some() {
-                "on data that took no part in the fit"
+                "on data not used in the fit"
             } else {
-                "on the training data; no data were held back"
+                "on the training data; no hold-out was given"
             }
         ),
     })
 }
 
-/// How sure the name is.
+/// States how certain the name is.
 fn name(found: &Diagnosis, step: &Step) -> Block {
     let runner_up = match (&step.runner_up, step.runner_up_gap_closed) {
         (Some(name), Some(share)) => format!(
-            " The next best name, {}, would have closed {} % of this step's gap.",
+            " The second-best name, {}, would close {} % of this step's gap.",
             words::name(name),
             parts::percent(share)
         ),
-        (Some(name), None) => format!(" The next best name was {}.", words::name(name)),
+        (Some(name), None) => format!(" The second-best name is {}.", words::name(name)),
         (None, _) => String::new(),
     };
     let rivals = words::rivals(step);
     if let Some(values) = values_alike(found, step).filter(|_| rivals.is_empty()) {
         return parts::warning(format!(
-            "No other effect that is known here explains these data as well, but {values} would.{runner_up}"
+            "No other effect of the catalogue explains these data as well, but {values} would.{runner_up}"
         ));
     }
     if rivals.is_empty() {
         return Block::Text(format!(
-            "No other effect that is known here explains these data as well.{runner_up}"
+            "No other effect of the catalogue explains these data as well.{runner_up}"
         ));
     }
     parts::warning(format!(
-        "These data do not settle the name: {} explain{} them as well as {}. The {} is the same either way, so the model can be used; the name cannot be relied on before an experiment separates them.{runner_up}",
+        "These data do not decide the name: {} explain{} them as well as {}. The predicted {} is the same, so the model can be used; do not rely on the name until an experiment separates them.{runner_up}",
         rig_output::listed(&rivals),
         if rivals.len() == 1 { "s" } else { "" },
         words::name(&step.effect),

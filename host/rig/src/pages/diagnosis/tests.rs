@@ -150,14 +150,14 @@ fn pictures_have_the_fall_each_effect_and_what_is_left() {
     assert_eq!(effects.len(), found.steps.len(), "{effects:?}");
     let left = names(&made_up::remainder());
     assert!(left.contains(&"left-1.svg".to_owned()), "{left:?}");
-    // Where nothing was found, how little there was to find.
+    // If nothing was found, the figure shows the small gap.
     let mut nothing = found;
     nothing.steps.clear();
     assert_eq!(names(&nothing)[0], "gap-1.svg");
     assert!(names(&made_up::data_fault()).is_empty());
 }
 
-/// A name beside which a free function still takes something off may stand for another.
+/// A name is doubtful if a free function still reduces the residual.
 #[test]
 fn a_doubted_name_is_not_confirmed() {
     let mut found = made_up::explained();
@@ -167,7 +167,7 @@ fn a_doubted_name_is_not_confirmed() {
     left.doubt = true;
     found.remainder = Some(left);
     let text = page(&found);
-    assert!(text.contains("see what is left") && !text.contains("<td>yes</td>"));
+    assert!(text.contains("see the unexplained residual") && !text.contains("<td>yes</td>"));
 }
 
 #[test]
@@ -191,7 +191,7 @@ fn values_against_the_description_are_no_lies_of_a_fit() {
     let mut found = made_up::explained();
     found.absorbed_before = outcome::Before::Described;
     let text = page(&found);
-    assert!(text.contains("As described") && !text.contains("had been lying"));
+    assert!(text.contains("As described") && !text.contains("biased by the missing effects"));
 }
 
 #[test]
@@ -202,8 +202,8 @@ fn without_a_holdout_every_figure_says_so() {
         step.holdout_rms = None;
     }
     let text = page(&found);
-    assert!(text.contains("no data were held back"));
-    assert!(!text.contains("Held back") && !text.contains("on data held back;"));
+    assert!(text.contains("no hold-out was given"));
+    assert!(!text.contains("Hold-out") && !text.contains("on the hold-out;"));
 }
 
 #[test]

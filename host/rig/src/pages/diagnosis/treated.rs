@@ -1,17 +1,17 @@
-//! Filters, band and rows that everything on the page rests on.
+//! Filters, band and rows behind all results on the page.
 
 use rig_diagnose::outcome::{Diagnosis, Treated};
 use rig_output::{format_significant, format_unit};
 use rig_report::{Block, Column, Section, Table};
 
-/// What was done to the recordings.
+/// Treatment of the recordings.
 pub(super) fn section(found: &Diagnosis) -> Option<Section> {
     let treated = found.treatment.as_ref()?;
     Some(
         Section::new(
             "rows",
             "Filter and rows",
-            "Torque and model are compared on rows behind filters, each of which both pass. What is faster than the band shows nowhere on this page, and rows that were left out took no part in a fit or a figure.",
+            "Torque and model pass the same filters and are then compared row by row. Nothing on this page shows frequencies above the band, and rows that were left out were used in no fit and no figure.",
         )
         .with(Block::Text(filters(treated)))
         .with(Block::Table(rows(treated))),
@@ -22,12 +22,12 @@ fn filters(treated: &Treated) -> String {
     let hertz = |value: f64| format!("{} Hz", format_significant(value, 3));
     let links = treated.links_cutoff.map_or(String::new(), |cutoff| {
         format!(
-            " Inertia and gravity are formed of the position up to {} and filtered like the torque afterwards.",
+            " Inertia and gravity torques are computed from the position up to {} and then filtered like the torque.",
             hertz(cutoff)
         )
     });
     format!(
-        "Recorded at {}; the motion reaches {}. Low-pass of the position: {}{links} Rows: up to {}, {} a second.",
+        "Sample rate: {}; highest frequency of the motion: {}. Low-pass of the position: {}{links} Rows: band up to {}, {} rows a second.",
         hertz(treated.sample_rate),
         hertz(treated.motion_frequency),
         treated.position_cutoff_why,
@@ -45,7 +45,7 @@ fn rows(treated: &Treated) -> Table {
         caption: "Rows that are used".into(),
         columns: vec![
             Column::text("Joint"),
-            Column::number("Slower is left out", ""),
+            Column::number("Least speed", ""),
             Column::number("Training", ""),
             Column::number("Hold-out", ""),
         ],
@@ -63,6 +63,6 @@ fn rows(treated: &Treated) -> Table {
                 ]
             })
             .collect(),
-        note: "Left out are rows near rests and reversals, where friction may be anything between both directions', rows at a torque limit and what was touched.".into(),
+        note: "Rows left out: slower than the least speed, near rests and reversals, where friction can have any value between those of both directions; at a torque limit; and during a disturbance.".into(),
     }
 }

@@ -1,4 +1,4 @@
-//! Names and sentences for a reader.
+//! Names and sentences for the page of a diagnosis.
 
 use rig_shared::effects::{About, Kind};
 
@@ -7,33 +7,35 @@ use rig_diagnose::outcome::{Diagnosis, Residual, Step, Verdict};
 use rig_output::format_significant;
 use rig_report::{NoteKind, Tone};
 
-/// A verdict in a word or two.
+/// A verdict in a few words.
 pub fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::NothingMissing => "Nothing missing",
         Verdict::Explained => "Explained",
         Verdict::ParameterChange => "A parameter has changed",
-        Verdict::Remainder => "Something is left",
+        Verdict::Remainder => "Unexplained residual",
         Verdict::DataFault => "The data are at fault",
     }
 }
 
-/// What the verdict means.
+/// The meaning of the verdict.
 pub(super) fn meaning(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::NothingMissing => {
-            "These data show nothing that the model as it is lacks. No effect had to be added."
+            "These data show no effect that the model lacks. No effect was added."
         }
         Verdict::Explained => {
-            "The model lacked something, and the effects named here explain it: on data that took no part in the fit the residual is noise, or nearly all of the gap above the noise floor is closed."
+            "The model lacked effects, and the effects named here explain the residual: on data not used in the fit the residual is noise, or nearly all of the gap above the noise floor is closed."
         }
         Verdict::ParameterChange => {
-            "The equations hold; a value in the description does not, or does no longer."
+            "The equations are right, but a value in the description is wrong or has changed."
         }
         Verdict::Remainder => {
-            "Something stays open: no effect that is known here explains it, so it is described and not named."
+            "No effect of the catalogue explains a part of the residual, so this part is described without a name."
         }
-        Verdict::DataFault => "A recording cannot be what it says it is. Nothing was fitted to it.",
+        Verdict::DataFault => {
+            "A recording contradicts the description of its columns or of the robot. Nothing was fitted to it."
+        }
     }
 }
 
@@ -49,19 +51,19 @@ pub(super) fn tone(verdict: Verdict) -> Tone {
 pub(super) fn note(verdict: Verdict) -> NoteKind {
     match verdict {
         Verdict::Explained => NoteKind::Good,
-        // That nothing was seen confirms nothing.
+        // An effect that was not seen may still be present.
         Verdict::NothingMissing | Verdict::ParameterChange => NoteKind::Info,
         Verdict::Remainder => NoteKind::Warning,
         Verdict::DataFault => NoteKind::Fault,
     }
 }
 
-/// What is known of an effect; none where the name is no effect of the catalogue.
+/// Entry of an effect in the catalogue; none if the catalogue has no such name.
 pub(super) fn about(effect: &str, law: Option<&str>) -> Option<&'static About> {
     Kind::named(effect, law).map(Kind::about)
 }
 
-/// An effect as a heading has it: its title, or its name without underscores.
+/// An effect for a heading: its title, or its name without underscores.
 pub(super) fn title(effect: &str, law: Option<&str>) -> String {
     capital(&about(effect, law).map_or_else(|| name(effect), |about| about.title.into()))
 }
@@ -74,12 +76,12 @@ pub(super) fn capital(text: &str) -> String {
     })
 }
 
-/// An effect's name as print has it; its law does not matter.
+/// An effect's name without underscores.
 pub(super) fn name(effect: &str) -> String {
     effect.replace('_', " ")
 }
 
-/// Names that these data support as well as the step's own.
+/// Names that these data support equally well, except the step's own name.
 pub(super) fn rivals(step: &Step) -> Vec<String> {
     step.set
         .iter()
@@ -99,7 +101,7 @@ pub(super) fn or_dash(text: &str) -> String {
     if text.is_empty() { "–" } else { text }.into()
 }
 
-/// Unit of the position that belongs to a unit of a residual.
+/// Unit of the position for a residual of the given unit.
 pub(super) fn position_unit(torque: &str) -> &'static str {
     match torque {
         "N" | "m" => "m",
@@ -107,34 +109,34 @@ pub(super) fn position_unit(torque: &str) -> &'static str {
     }
 }
 
-/// How residuals are printed: torques as they are, positions in thousandths.
+/// Format of residuals: torques in their unit, positions in thousandths of it.
 pub(super) struct Shown {
-    /// Of a printed number to the number itself.
+    /// Factor from the value to the printed number.
     scale: f64,
-    /// As printed.
+    /// Printed unit.
     pub(super) unit: String,
-    /// What the residual is of, for captions.
+    /// Quantity of the residual, for captions.
     pub(super) what: &'static str,
 }
 
 impl Shown {
-    /// A value, three digits.
+    /// Formats a value with three digits.
     pub(super) fn number(&self, value: f64) -> String {
         format_significant(self.scale * value, 3)
     }
 
-    /// A value with its unit.
+    /// Formats a value with its unit.
     pub(super) fn value(&self, value: f64) -> String {
         format!("{} {}", self.number(value), self.unit)
     }
 
-    /// Values for a plot.
+    /// Scales values for a plot.
     pub(super) fn scaled(&self, values: &[f64]) -> Vec<f64> {
         values.iter().map(|v| self.scale * v).collect()
     }
 }
 
-/// How residuals in `unit` are printed.
+/// Returns the format of residuals in `unit`.
 pub(super) fn shown(found: &Diagnosis, unit: &str) -> Shown {
     match found.residual {
         Residual::Torque => Shown {
@@ -145,7 +147,7 @@ pub(super) fn shown(found: &Diagnosis, unit: &str) -> Shown {
         Residual::Position => Shown {
             scale: 1e3,
             unit: format!("m{}", parts::unit(unit)),
-            what: "simulated position's error",
+            what: "error of the simulated position",
         },
     }
 }
