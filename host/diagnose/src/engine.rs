@@ -1,51 +1,46 @@
 //! The workflow from recordings to a verdict.
 
-mod even;
 mod follow;
-mod intake;
 mod pass;
-mod plausible;
-mod remarks;
-mod steps;
-mod trial;
-mod unbelieved;
 
 use rig_shared::effects::Kind;
 
-use self::even::{Uneven, of_error};
-pub(super) use self::follow::Follower;
-use self::intake::{Intake, Material, intake, without};
-use self::pass::Pass;
-use self::remarks::{remarks, weight_of_a_spring};
-use self::steps::{change_step, reconcile, steps};
-use self::trial::{Survivors, Trial};
-use super::across::{across, names_something, refutes, tell as tell_across};
-use super::bodies::Fitting;
-use super::by_motion::by_motion;
-use super::change::change;
-use super::descent::Descent;
-use super::fault::{faulty, of_preparing};
-use super::finish::{Drawn, Found, finish};
-use super::floor;
-use super::judge::{
+use crate::acceptance::judge::{
     Judge, Judged, besides, left_of_held, not_carried_over, taken_by_none, too_short_for_names,
 };
-use super::lead::{differ, leads, moved};
-use super::locate::coordinates;
-use super::motion::Replay;
-use super::outcome::{Before, Diagnosis, Residual, Verdict};
-use super::position_reading::PositionReading;
-use super::profile::Profile;
-use super::proof::{Proof, unexplained};
-use super::refit::Refit;
-use super::sanity::spoilt_columns;
-use super::search::{is_friction, with};
-use super::stated::{Now, Stated};
-use super::treated::treated;
-use super::waves::is_of_the_motor;
-use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
-use super::zeros::{another_zero, another_zero_held};
-use super::{DiagnoseError, Options};
+use crate::acceptance::model_check::{Proof, unexplained};
+use crate::acceptance::residual_dependence::coordinates;
+use crate::acceptance::trial::{Survivors, Trial};
+use crate::columns::waves::is_of_the_motor;
+use crate::description::described_effects::{Now, Stated};
+pub(crate) use crate::engine::follow::Follower;
+use crate::engine::pass::Pass;
+use crate::faults::refusal::{faulty, of_preparing};
+use crate::faults::spoilt_columns;
+use crate::fit::refit::Refit;
+use crate::link_encoder::{across, names_something, refutes, tell as tell_across};
+use crate::models::bodies::Fitting;
+use crate::models::output_error::by_motion;
+use crate::models::parameter_change::change;
+use crate::models::rms_path::Descent;
+use crate::models::simulated_motion::Replay;
+use crate::motor_voltage::{
+    contradict, left_of_voltage, name_something, settled, tell, windings, zeros,
+};
+use crate::outcome::{Before, Diagnosis, Residual, Verdict};
+use crate::recordings::encoder_zero::{another_zero, another_zero_held};
+use crate::recordings::intake::{Intake, Material, intake, without};
+use crate::recordings::noise_floor;
+use crate::recordings::position_reading::PositionReading;
+use crate::recordings::resampling::{Uneven, of_error};
+use crate::recordings::torque_lead::{differ, leads, moved};
+use crate::result::finish::{Drawn, Found, finish};
+use crate::result::remarks::{remarks, weight_of_a_spring};
+use crate::result::steps::{change_step, reconcile, steps};
+use crate::result::treatment::treated;
+use crate::search::fitted_candidate::Profile;
+use crate::search::stepwise::{is_friction, with};
+use crate::{DiagnoseError, Options};
 use rig_data::prepare::{Recording, as_recordings};
 use rig_model::robot::Robot;
 
@@ -211,7 +206,7 @@ fn attempt(
         search: &search,
         rows: &loaded.rows,
         coordinates: &coordinates,
-        pairs: floor::repeats(&loaded.runs),
+        pairs: noise_floor::repeats(&loaded.runs),
         position_reading: PositionReading::of(
             &search.source,
             &loaded.rows,

@@ -11,12 +11,12 @@ use std::sync::Arc;
 use rig_shared::effects::{Kind, SHAPES};
 
 use crate::DiagnoseError;
-use crate::bench::{Bench, Loaded};
-use crate::columns::{Candidate, Source};
-use crate::floor;
-use crate::profile::{Followed, Profile};
-use crate::refit::Refit;
-use crate::search::{Search, with};
+use crate::columns::effect_columns::{Candidate, Source};
+use crate::fit::refit::Refit;
+use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::noise_floor;
+use crate::search::fitted_candidate::{Followed, Profile};
+use crate::search::stepwise::{Search, with};
 
 /// Rounds in which the gear shapes and all other parameters are fitted alternately.
 const ROUNDS: usize = 2;
@@ -45,7 +45,7 @@ type Driven = (Candidate, [f64; SHAPES]);
 
 impl<'a, 'r> Follower<'a, 'r> {
     /// Creates a follower for these recordings.
-    pub(super) fn new(
+    pub(crate) fn new(
         bench: &'a Bench<'a>,
         loaded: &'a Loaded,
         refit: &'a Refit<'r>,
@@ -106,7 +106,7 @@ impl<'a, 'r> Follower<'a, 'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn hears(&self, found: &[Profile], play: Profile) -> Result<bool, DiagnoseError> {
+    pub(crate) fn hears(&self, found: &[Profile], play: Profile) -> Result<bool, DiagnoseError> {
         let joint = play.candidate.joint;
         let of = |chosen: &[Profile]| with(self.refit.even(), chosen, None);
         let before = of(found);
@@ -130,7 +130,7 @@ impl<'a, 'r> Follower<'a, 'r> {
         let rms = |chosen: &[Profile]| with(refit.even(), chosen, None).rms(joint);
         let driven = chosen[k].clone();
         let before = rms(chosen);
-        let reading = floor::of_reading(&loaded.runs, joint, loaded.rows.period);
+        let reading = noise_floor::of_reading(&loaded.runs, joint, loaded.rows.period);
         let own = &mut chosen[k];
         own.followed = Some(Followed {
             noise: reading.unwrap_or(noise[joint]),
@@ -165,7 +165,7 @@ impl<'a, 'r> Follower<'a, 'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn source(&self, chosen: &[Profile]) -> Result<Source<'a>, DiagnoseError> {
+    pub(crate) fn source(&self, chosen: &[Profile]) -> Result<Source<'a>, DiagnoseError> {
         let solution = self.refit.solution(chosen)?;
         let (nominal, gains) = solution.values.split_at(self.refit.free.len());
         self.bench

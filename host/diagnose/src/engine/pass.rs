@@ -1,14 +1,14 @@
 //! One search for effects on the training data, repeated with new row weights if it finds gears.
 
-use super::follow::Follower;
-use crate::across::{Across, across, gears, refutes};
-use crate::bench::{Bench, Loaded, library};
-use crate::columns::Candidate;
+use crate::columns::effect_columns::Candidate;
+use crate::description::described_effects::candidate;
+use crate::engine::follow::Follower;
+use crate::fit::refit::Refit;
+use crate::link_encoder::{Across, across, gears, refutes};
 use crate::outcome::Tried;
-use crate::profile::Profile;
-use crate::refit::Refit;
-use crate::search::{Search, is_constant, same};
-use crate::stated::candidate;
+use crate::recordings::context::{Bench, Loaded, library};
+use crate::search::fitted_candidate::Profile;
+use crate::search::stepwise::{Search, is_constant, same};
 use crate::{DiagnoseError, Options};
 use rig_model::robot::title_of;
 
@@ -16,17 +16,17 @@ use rig_model::robot::title_of;
 const BESIDE_GEARS: usize = 2;
 
 /// Result of a search.
-pub(super) struct Pass<'a> {
+pub(crate) struct Pass<'a> {
     /// The nominal model, with row weights if a gear was found.
-    pub(super) refit: Refit<'a>,
+    pub(crate) refit: Refit<'a>,
     /// The library, with the predictions of the last model.
-    pub(super) search: Search<'a>,
+    pub(crate) search: Search<'a>,
     /// The effects.
-    pub(super) found: Vec<Profile>,
+    pub(crate) found: Vec<Profile>,
     /// All trials.
-    pub(super) tried: Vec<Tried>,
+    pub(crate) tried: Vec<Tried>,
     /// Results of the link encoders.
-    pub(super) across: Vec<Across>,
+    pub(crate) across: Vec<Across>,
 }
 
 /// Trials so far, and number of sweeps.
@@ -38,7 +38,7 @@ struct Heard {
 
 impl<'a> Pass<'a> {
     /// Searches recordings whose torque lead is already compensated.
-    pub(super) fn over(
+    pub(crate) fn over(
         bench: &'a Bench,
         loaded: &'a Loaded,
         options: &Options,

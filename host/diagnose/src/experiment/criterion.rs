@@ -6,8 +6,8 @@
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::{Channel, Effect, GAINS, Instant, Kind, MEMORY, SHAPES, Scale};
 
-use super::place::{Nominal, Place};
-use super::primitives::Primitive;
+use crate::experiment::place::{Nominal, Place};
+use crate::experiment::primitives::Primitive;
 
 /// Independent torque values per second of a noise floor, as after a low-pass at 40 to 50 Hz.
 pub const FLOOR_RATE: f64 = 100.0;
@@ -26,17 +26,17 @@ pub struct Held {
 }
 
 /// A motion as instants, pass after pass.
-pub(super) struct Course {
+pub(crate) struct Course {
     instants: Vec<Vec<Instant<f64>>>,
     /// Independent values per row.
     weight: f64,
-    pub(super) held: Held,
+    pub(crate) held: Held,
     /// Described gravity torque with cos q and with sin q, of length 1.
     gravity: [f64; 2],
 }
 
 /// Returns true if an effect's torque along a given motion can be computed.
-pub(super) fn predictable(kind: Kind) -> bool {
+pub(crate) fn predictable(kind: Kind) -> bool {
     !matches!(
         kind.about().channel,
         Channel::Transmission | Channel::Voltage
@@ -44,7 +44,7 @@ pub(super) fn predictable(kind: Kind) -> bool {
 }
 
 impl Course {
-    pub(super) fn of(place: &Place, primitive: &Primitive) -> Self {
+    pub(crate) fn of(place: &Place, primitive: &Primitive) -> Self {
         let [_, cosine, sine, ..] = place.nominal;
         let length = cosine.hypot(sine);
         let duration = primitive.duration();
@@ -143,7 +143,7 @@ impl Course {
     }
 
     /// Returns the torque per unit of each gain.
-    pub(super) fn columns(
+    pub(crate) fn columns(
         &self,
         kind: Kind,
         shapes: &[f64; SHAPES],
@@ -173,7 +173,7 @@ impl Course {
     }
 
     /// Returns the squared distance, in units of the noise, between the truth and the best rival of that kind.
-    pub(super) fn separation(
+    pub(crate) fn separation(
         &self,
         truth: &(Effect<f64>, Nominal),
         rival: &Effect<f64>,
@@ -282,13 +282,13 @@ fn shapes_of(rival: &Effect<f64>) -> Vec<[f64; SHAPES]> {
 }
 
 #[cfg(test)]
-pub(super) mod access {
+pub(crate) mod access {
     //! Access for tests with simulated noise.
 
     use super::*;
 
     /// Returns the rows of the standard model and of an effect along a motion.
-    pub(in super::super) fn rows(
+    pub(in crate::experiment) fn rows(
         course: &Course,
         effect: &Effect<f64>,
         nominal: &Nominal,
@@ -302,7 +302,7 @@ pub(super) mod access {
     }
 
     /// Returns the squared residual of `y` with the standard model and the best rival.
-    pub(in super::super) fn best(
+    pub(in crate::experiment) fn best(
         course: &Course,
         rival: &Effect<f64>,
         nominal: &Nominal,

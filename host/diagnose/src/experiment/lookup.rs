@@ -2,19 +2,19 @@
 
 use rig_shared::effects::{Confusion, Kind};
 
-use super::primitives::Family;
+use crate::experiment::primitives::Family;
 
 /// The remedy for a pair.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Split {
+pub(crate) struct Split {
     /// Name in results.
-    pub(super) kind: &'static str,
+    pub(crate) kind: &'static str,
     /// Sentences: what to do, to record and to expect; `{k}` is the joint's number.
-    pub(super) text: String,
+    pub(crate) text: String,
     /// Motion to run, if any.
-    pub(super) motion: Option<Family>,
+    pub(crate) motion: Option<Family>,
     /// True if it needs more than the rig alone: a load, a turned base, another sensor.
-    pub(super) hands: bool,
+    pub(crate) hands: bool,
 }
 
 /// Name in results of the log with the drive off …
@@ -38,7 +38,7 @@ const SPEEDS: &str = "Run the constant speeds; record t, q{k} and tau{k}. What d
 const LOAD_OR_SPEED: &str = "Run the constant speeds; record t, q{k} and tau{k}. At constant speed no acceleration asks for torque, so that what is left belongs to the speed; what belongs to load or current shows where gravity is lifted slowly.";
 
 /// Returns the registry's entry on the pair.
-pub(super) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
+pub(crate) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
     let of = |x: Kind, y: Kind| {
         let mut all = x.about().confused.iter();
         all.find(|c| c.with == y.about().name)
@@ -47,7 +47,7 @@ pub(super) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
 }
 
 /// Returns the remedy for the pair, by names of the registry.
-pub(super) fn split([a, b]: [Kind; 2]) -> Split {
+pub(crate) fn split([a, b]: [Kind; 2]) -> Split {
     let [a_name, b_name] = [a.about().name, b.about().name];
     let is = |x: &str, y: &str| (a_name == x && b_name == y) || (a_name == y && b_name == x);
     let has = |x: &str| a_name == x || b_name == x;

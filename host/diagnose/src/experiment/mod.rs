@@ -12,6 +12,7 @@ mod criterion;
 mod lookup;
 mod place;
 mod primitives;
+pub mod testable;
 
 #[cfg(test)]
 mod tests;
@@ -24,8 +25,8 @@ pub use lookup::{OFF_LOG, PULLS_OFF};
 pub use place::Nominal;
 pub use primitives::{Family, Hands};
 
-use super::DiagnoseError;
-use super::outcome::NextExperiment;
+use crate::DiagnoseError;
+use crate::outcome::NextExperiment;
 use rig_excite::{COASTING, JointTrajectory, TrajectoryFile};
 use rig_model::robot::Robot;
 use rig_output::format_unit;
@@ -174,7 +175,7 @@ fn pairs(count: usize) -> impl Iterator<Item = Pair> {
 }
 
 /// Returns true if the registry has both as the same function of torque and motion.
-pub(super) fn exact(pair: [Kind; 2]) -> bool {
+pub(crate) fn exact(pair: [Kind; 2]) -> bool {
     confused(pair).is_some_and(|c| c.exact)
 }
 

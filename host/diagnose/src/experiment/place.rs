@@ -3,9 +3,9 @@
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::trajectory::Trajectory;
 
-use super::super::DiagnoseError;
-use super::criterion::Held;
-use super::primitives::{Hands, Primitive};
+use crate::DiagnoseError;
+use crate::experiment::criterion::Held;
+use crate::experiment::primitives::{Hands, Primitive};
 use rig_excite::COASTING;
 use rig_identify::chain_of;
 use rig_model::batch::ModelBatch;
@@ -29,37 +29,37 @@ const LOOKS: usize = 2000;
 
 /// One joint, with the others standing.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
-    pub(super) low: f64,
-    pub(super) high: f64,
-    pub(super) velocity: f64,
-    pub(super) acceleration: f64,
-    pub(super) torque: Option<f64>,
+pub(crate) struct Place {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    pub(crate) velocity: f64,
+    pub(crate) acceleration: f64,
+    pub(crate) torque: Option<f64>,
     /// Torque per position error of the rig's controller, if known; N·m/rad or N/m.
-    pub(super) stiffness: Option<f64>,
+    pub(crate) stiffness: Option<f64>,
     /// True if the robot has no other joint.
-    pub(super) alone: bool,
+    pub(crate) alone: bool,
     /// Positions of all standing joints.
-    pub(super) stand: Vec<f64>,
+    pub(crate) stand: Vec<f64>,
     /// Middle of the range.
-    pub(super) middle: f64,
+    pub(crate) middle: f64,
     /// Position of the strongest gravity, with room on both sides.
-    pub(super) heavy: f64,
-    pub(super) revolute: bool,
+    pub(crate) heavy: f64,
+    pub(crate) revolute: bool,
     /// Motor turns per joint turn; 0 if not described.
-    pub(super) ratio: f64,
+    pub(crate) ratio: f64,
     /// Inertia of the drive at the joint.
-    pub(super) drive_inertia: f64,
+    pub(crate) drive_inertia: f64,
     /// Torque of gravity per first moment along x: with cos q, with sin q, constant; m/s².
-    pub(super) pull: [f64; 3],
-    pub(super) nominal: Nominal,
+    pub(crate) pull: [f64; 3],
+    pub(crate) nominal: Nominal,
     /// Nominal parameters that a refit keeps as described.
-    pub(super) held: Held,
+    pub(crate) held: Held,
 }
 
 impl Place {
     /// Returns the setup of a joint (from 0); `None` without limits, or for a prismatic joint without finite ones.
-    pub(super) fn of(
+    pub(crate) fn of(
         robot: &Robot,
         joint: usize,
         nominal: Nominal,
@@ -141,17 +141,17 @@ impl Place {
         Ok([zero - constant, up - constant, constant])
     }
 
-    pub(super) fn unit(&self) -> &'static str {
+    pub(crate) fn unit(&self) -> &'static str {
         if self.revolute { "rad" } else { "m" }
     }
 
-    pub(super) fn effort_unit(&self) -> &'static str {
+    pub(crate) fn effort_unit(&self) -> &'static str {
         if self.revolute { "N*m" } else { "N" }
     }
 
     /// Returns position, velocity and acceleration of the coasting joint in the middle of each of `count` periods (s).
     /// A share of its dry and viscous friction acts. It stops where friction holds its weight.
-    pub(super) fn coast(
+    pub(crate) fn coast(
         &self,
         [mut position, mut velocity]: [f64; 2],
         friction: f64,
@@ -189,7 +189,7 @@ impl Place {
     }
 
     /// Returns true if a joint with its drive off stays within its range with half its friction.
-    pub(super) fn stops(&self, primitive: &Primitive) -> bool {
+    pub(crate) fn stops(&self, primitive: &Primitive) -> bool {
         let Some(off) = primitive.drive_off else {
             return true;
         };
@@ -201,13 +201,13 @@ impl Place {
     }
 
     /// Returns the torque of gravity per first moment along x.
-    pub(super) fn pull_at(&self, q: f64) -> f64 {
+    pub(crate) fn pull_at(&self, q: f64) -> f64 {
         let (sine, cosine) = q.sin_cos();
         self.pull[0] * cosine + self.pull[1] * sine + self.pull[2]
     }
 
     /// Returns the nominal torque of gravity.
-    pub(super) fn weight(&self, q: f64) -> f64 {
+    pub(crate) fn weight(&self, q: f64) -> f64 {
         let (sine, cosine) = q.sin_cos();
         if self.revolute {
             self.nominal[1] * cosine + self.nominal[2] * sine
@@ -217,7 +217,7 @@ impl Place {
     }
 
     /// Returns true if the torque limit allows the motion in every pass, with full Coulomb friction.
-    pub(super) fn bears(&self, motion: &Trajectory<f64>, start: f64, hands: Hands) -> bool {
+    pub(crate) fn bears(&self, motion: &Trajectory<f64>, start: f64, hands: Hands) -> bool {
         let Some(limit) = self.torque else {
             return true;
         };

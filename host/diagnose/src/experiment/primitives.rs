@@ -8,7 +8,7 @@ use rig_shared::trajectory::{
     Chirp, Fourier, FrictionSweep, Reference, SlowReversals, Staircase, Sweep, Trajectory,
 };
 
-use super::place::Place;
+use crate::experiment::place::Place;
 
 /// Used share of each limit.
 const SHARE: f64 = 0.8;
@@ -96,7 +96,7 @@ pub enum Hands {
 
 impl Hands {
     /// Returns the factors on inertia and gravity of the link in each pass.
-    pub(super) fn passes(self) -> &'static [[f64; 2]] {
+    pub(crate) fn passes(self) -> &'static [[f64; 2]] {
         match self {
             Self::None => &[[1.0, 1.0]],
             // A payload of half the link's mass stays well within the reserve of the limits.
@@ -106,7 +106,7 @@ impl Hands {
     }
 
     /// Returns sentences: the work, and how to use the recordings.
-    pub(super) fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         match self {
             Self::None => "Give what it records with --data beside the others.",
             Self::Payload => {
@@ -121,27 +121,27 @@ impl Hands {
 
 /// A motion of one joint.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Primitive {
-    pub(super) family: Family,
-    pub(super) hands: Hands,
+pub(crate) struct Primitive {
+    pub(crate) family: Family,
+    pub(crate) hands: Hands,
     /// Start position, rad or m.
-    pub(super) start: f64,
-    pub(super) trajectory: Trajectory<f64>,
+    pub(crate) start: f64,
+    pub(crate) trajectory: Trajectory<f64>,
     /// Time at which the drive is switched off, s after the start.
-    pub(super) drive_off: Option<f64>,
+    pub(crate) drive_off: Option<f64>,
     /// Figures in words.
-    pub(super) figures: String,
+    pub(crate) figures: String,
 }
 
 impl Primitive {
     /// Returns the recorded duration of one pass, s.
-    pub(super) fn duration(&self) -> f64 {
+    pub(crate) fn duration(&self) -> f64 {
         (self.drive_off).map_or_else(|| self.trajectory.duration(), |off| off + COASTING)
     }
 
     /// Returns position, velocity and acceleration from the start in the middle of each of `rows` pieces of a pass. The
     /// flag is true if the drive is on.
-    pub(super) fn way(&self, place: &Place, rows: usize) -> Vec<(Reference<f64>, bool)> {
+    pub(crate) fn way(&self, place: &Place, rows: usize) -> Vec<(Reference<f64>, bool)> {
         let period = self.duration() / rows as f64;
         let time = |k: usize| (k as f64 + 0.5) * period;
         let off = self.drive_off.unwrap_or(f64::INFINITY);
@@ -317,7 +317,7 @@ fn half_way(trajectory: &Trajectory<f64>) -> Option<f64> {
 }
 
 /// Returns the staircase of a clamped joint; `None` without a known controller gain or torque limit.
-pub(super) fn clamped(place: &Place) -> Option<Primitive> {
+pub(crate) fn clamped(place: &Place) -> Option<Primitive> {
     let highest = CLAMPED * place.torque?;
     let levels = LEVELS.map(|share| share * highest / place.stiffness.unwrap_or(0.0));
     if !levels.iter().all(|level| level.is_finite()) {
@@ -343,7 +343,7 @@ pub(super) fn clamped(place: &Place) -> Option<Primitive> {
 }
 
 /// Returns all motions of a family at a place, over amplitudes and speeds.
-pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Primitive> {
+pub(crate) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Primitive> {
     let heavy = family == Family::ReversalsUnderLoad;
     let start = if heavy { place.heavy } else { place.middle };
     let room = SHARE * (place.high - start).min(start - place.low);

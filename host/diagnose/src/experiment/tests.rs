@@ -7,8 +7,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rig_shared::safety::Limits;
 
-use super::criterion::access;
-use super::*;
+use crate::experiment::criterion::access;
+use crate::experiment::*;
 use rig_model::robot::{EMPS, ONE_LINK_TEMPLATE, template};
 
 fn robot() -> Robot {

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use super::servo::Servo;
-use super::tests::{found, list, robot};
-use super::validation::validate_voltage;
-use super::*;
+use crate::voltage::servo::Servo;
+use crate::voltage::tests::{found, list, robot};
+use crate::voltage::validation::validate_voltage;
+use crate::voltage::*;
 use rig_data::prepare::InMemory;
 use rig_model::robot::{AntiWindup, VoltageController};
 

@@ -1,6 +1,6 @@
 //! Controllers in recordings of a voltage-driven joint.
 
-use super::log::Log;
+use crate::voltage::log::Log;
 use rig_model::robot::{AntiWindup, VoltageController};
 use rig_output::format_significant;
 
@@ -10,7 +10,7 @@ const ONE: f64 = 0.1;
 
 /// One controller and its number of recordings.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Shown {
+pub(crate) struct Shown {
     /// Mean of the gains.
     pub controller: VoltageController,
     /// Number of recordings.
@@ -18,7 +18,7 @@ pub(super) struct Shown {
 }
 
 /// Returns the controllers of recordings, by number of recordings; among equals the stiffer first.
-pub(super) fn shown(logs: &[Log]) -> Vec<Shown> {
+pub(crate) fn shown(logs: &[Log]) -> Vec<Shown> {
     let mut groups: Vec<Vec<VoltageController>> = Vec::new();
     for law in logs.iter().filter_map(|log| log.law) {
         let near = |group: &&mut Vec<VoltageController>| {
@@ -102,7 +102,7 @@ pub fn terms(c: &VoltageController, unit: &str) -> String {
 }
 
 /// Returns sentences on the recordings' controllers and supply; empty if they show none.
-pub(super) fn sentences(list: &[Shown], unit: &str) -> Vec<String> {
+pub(crate) fn sentences(list: &[Shown], unit: &str) -> Vec<String> {
     let Some(first) = list.first() else {
         return Vec::new();
     };

@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use super::controllers::{self, Shown};
-use super::free_run::FreeRun;
-use super::plant::{NAMES, NOMINAL, Plant};
-use super::search::{EQUAL, Model, Trial, on_the_voltage};
-use crate::judge::closed;
+use crate::acceptance::judge::closed;
+use crate::description::described_effects::{Now, Stated};
 use crate::outcome::{
     Absorbed, Before, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value,
     Verdict, Waterfall,
 };
-use crate::stated::{Now, Stated};
+use crate::voltage::controllers;
+use crate::voltage::controllers::Shown;
+use crate::voltage::free_run::FreeRun;
+use crate::voltage::plant::{NAMES, NOMINAL, Plant};
+use crate::voltage::search::{EQUAL, Model, Trial, on_the_voltage};
 use rig_model::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
 use rig_output::format_significant;
 use rig_shared::effects::Effect;
@@ -20,7 +21,7 @@ use rig_shared::effects::Effect;
 const LEFT: f64 = 1.2;
 
 /// All results.
-pub(super) struct Told<'a> {
+pub(crate) struct Told<'a> {
     /// The description, and the fate of its effects.
     pub stated: &'a Stated,
     /// Curves to draw.
@@ -92,7 +93,7 @@ impl Told<'_> {
     }
 
     /// Returns the content of `diagnosis.json`.
-    pub(super) fn diagnosis(&self) -> Diagnosis {
+    pub(crate) fn diagnosis(&self) -> Diagnosis {
         let judged = self.judged();
         let (first, last) = (&judged[0], &judged[judged.len() - 1]);
         let steps: Vec<Step> = (1..self.models.len()).map(|k| self.step(k)).collect();
@@ -364,7 +365,7 @@ impl Told<'_> {
     }
 
     /// Returns the description with the found values.
-    pub(super) fn robot(&self, plant: &Plant) -> Robot {
+    pub(crate) fn robot(&self, plant: &Plant) -> Robot {
         let mut robot = self.stated.robot.clone();
         robot.effects = self.stated.undriven();
         // The identification record describes the old values.

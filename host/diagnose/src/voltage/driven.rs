@@ -1,15 +1,15 @@
 //! Simulation of a voltage-driven joint by its description.
 
-use super::free_run::{FreeRun, travel};
-use super::halt::{Cause, Halt};
-use super::law::Supply;
-use super::log::{Log, Segment, logs};
-use super::plant::Plant;
-use super::search::{in_fine_steps, library};
-use super::stepper::State;
-use super::{LONGEST, plant};
 use crate::DiagnoseError;
-use crate::stated::Stated;
+use crate::description::described_effects::Stated;
+use crate::voltage::free_run::{FreeRun, travel};
+use crate::voltage::halt::{Cause, Halt};
+use crate::voltage::law::Supply;
+use crate::voltage::log::{Log, Segment, logs};
+use crate::voltage::plant::Plant;
+use crate::voltage::search::{in_fine_steps, library};
+use crate::voltage::stepper::State;
+use crate::voltage::{LONGEST, plant};
 use rig_data::prepare::Recording;
 use rig_model::robot::{Robot, VoltageController};
 use rig_shared::effects::Kind;

@@ -1,13 +1,13 @@
 //! Faulty recordings of a voltage-driven joint.
 
-use super::fit::WINDOW;
-use super::free_run::travel;
-use super::log::Log;
-use super::plant::Plant;
-use super::start::{left_of_voltage, start};
-use super::{DiagnoseError, floor};
+use crate::faults::names;
 use crate::outcome::{About, DataFault};
-use crate::sanity::names;
+use crate::voltage::fit::WINDOW;
+use crate::voltage::free_run::travel;
+use crate::voltage::log::Log;
+use crate::voltage::plant::Plant;
+use crate::voltage::start::{left_of_voltage, start};
+use crate::voltage::{DiagnoseError, floor};
 use rig_data::prepare::{Recording, first_block};
 use rig_data::{Implausible, JUDGED_ROWS, plausibility};
 use rig_model::robot::{Joint, JointKind, Robot};
@@ -31,7 +31,7 @@ const THOUSAND: f64 = 5.0;
 ///
 /// # Errors
 /// Errors of reading.
-pub(super) fn faults(
+pub(crate) fn faults(
     robot: &Robot,
     plant: &Plant,
     given: &[&[&dyn Recording]; 2],

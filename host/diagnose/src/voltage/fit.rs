@@ -7,12 +7,12 @@
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::Kind;
 
-use super::halt::Halt;
-use super::log::{Log, Segment};
-use super::plant::Plant;
+use crate::voltage::halt::Halt;
+use crate::voltage::log::{Log, Segment};
+use crate::voltage::plant::Plant;
 
 /// Length of the windows that a fit begins with, s.
-pub(super) const WINDOW: f64 = 1.0;
+pub(crate) const WINDOW: f64 = 1.0;
 /// Relative step of the differences: far above rounding, smaller than the width of any law.
 const DIFFERENCE: f64 = 1.0e-3;
 /// Most steps.
@@ -25,7 +25,7 @@ const SETTLED: f64 = 1.0e-4;
 const STIFFEST: f64 = 1.0e8;
 
 /// Inputs of a fit.
-pub(super) struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     pub plant: &'a Plant,
     pub logs: &'a [Log],
     /// Index of a log, and its rows.
@@ -38,7 +38,7 @@ pub(super) struct Problem<'a> {
 }
 
 /// Returns the segments of the logs in `which`, in windows of `length` seconds.
-pub(super) fn segments(
+pub(crate) fn segments(
     logs: &[Log],
     which: impl Fn(usize) -> bool,
     length: f64,
@@ -54,7 +54,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// [`Halt`] if the simulation is not possible.
-    pub(super) fn residual(&self, theta: &[f64]) -> Result<Vec<f64>, Halt> {
+    pub(crate) fn residual(&self, theta: &[f64]) -> Result<Vec<f64>, Halt> {
         let rows = self.segments.iter().map(|(_, s)| s.to - s.from).sum();
         let mut out = Vec::with_capacity(rows);
         for (k, segment) in &self.segments {
@@ -69,7 +69,7 @@ impl Problem<'_> {
     }
 
     /// Returns the RMS of [`Self::residual`]; infinite if it fails.
-    pub(super) fn rms(&self, theta: &[f64]) -> f64 {
+    pub(crate) fn rms(&self, theta: &[f64]) -> f64 {
         self.residual(theta).map_or(f64::INFINITY, |r| {
             (square(&r) / r.len().max(1) as f64).sqrt()
         })
@@ -101,7 +101,7 @@ impl Problem<'_> {
     }
 
     /// Returns the parameters of least squares near the best of `starts`; that start itself if nothing is better.
-    pub(super) fn fit(&self, starts: &[&[f64]]) -> Vec<f64> {
+    pub(crate) fn fit(&self, starts: &[&[f64]]) -> Vec<f64> {
         if let [start] = starts {
             return self.descend(Descent::from(self, start), STEPS).theta;
         }
@@ -185,7 +185,7 @@ impl Problem<'_> {
     }
 
     /// Returns the free parameters' standard deviations, with segments as independent blocks (sandwich, White 1982).
-    pub(super) fn deviations(&self, theta: &[f64]) -> Option<Vec<f64>> {
+    pub(crate) fn deviations(&self, theta: &[f64]) -> Option<Vec<f64>> {
         let residual = self.residual(theta).ok()?;
         let typical: Vec<f64> = theta.iter().map(|x| x.abs().max(1.0e-9)).collect();
         let slopes = self.slopes(theta, &residual, &typical)?;

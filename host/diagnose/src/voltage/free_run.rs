@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::halt::Cause;
-use super::log::Log;
+use crate::voltage::halt::Cause;
+use crate::voltage::log::Log;
 
 /// Result of a model's free runs over recordings, each from the recorded start without using the measured motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,7 +31,7 @@ pub enum FreeRun {
 
 impl FreeRun {
     /// Builds the result from simulated minus recorded positions.
-    pub(super) fn followed(errors: &[f64]) -> Self {
+    pub(crate) fn followed(errors: &[f64]) -> Self {
         let rows = errors.len().max(1) as f64;
         Self::Followed {
             rms: (errors.iter().map(|e| e * e).sum::<f64>() / rows).sqrt(),
@@ -41,7 +41,7 @@ impl FreeRun {
     }
 
     /// Builds the result of a run over `recording` that ends at `time`, s.
-    pub(super) fn diverged(recording: &str, time: f64, cause: Cause) -> Self {
+    pub(crate) fn diverged(recording: &str, time: f64, cause: Cause) -> Self {
         Self::Diverged {
             recording: recording.to_owned(),
             time,
@@ -58,13 +58,13 @@ impl FreeRun {
     }
 
     /// Returns the same as a number for a table: NaN if a run diverged.
-    pub(super) fn number(&self) -> f64 {
+    pub(crate) fn number(&self) -> f64 {
         self.rms().unwrap_or(f64::NAN)
     }
 }
 
 /// Returns the largest travel in one recording, rad or m.
-pub(super) fn travel(logs: &[Log]) -> f64 {
+pub(crate) fn travel(logs: &[Log]) -> f64 {
     let of = |log: &Log| {
         let fold = |pick: fn(f64, f64) -> f64, from| log.q.iter().copied().fold(from, pick);
         fold(f64::max, f64::NEG_INFINITY) - fold(f64::min, f64::INFINITY)

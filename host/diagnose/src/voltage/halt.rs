@@ -22,7 +22,7 @@ pub(crate) enum Cause {
 
 impl Cause {
     /// Returns the cause as a clause.
-    pub(super) fn clause(self) -> &'static str {
+    pub(crate) fn clause(self) -> &'static str {
         match self {
             Self::LeftTravel => {
                 "the simulated position is further from the recorded one than the joint travels in the recordings"
@@ -35,7 +35,7 @@ impl Cause {
 
 impl Halt {
     /// Friction that would drive the joint at `time`, s.
-    pub(super) fn driving(time: f64) -> Self {
+    pub(crate) fn driving(time: f64) -> Self {
         Self {
             time,
             cause: Cause::DrivingFriction,
@@ -43,7 +43,7 @@ impl Halt {
     }
 
     /// An unbounded motion at `time`, s.
-    pub(super) fn unbounded(time: f64) -> Self {
+    pub(crate) fn unbounded(time: f64) -> Self {
         Self {
             time,
             cause: Cause::Unbounded,

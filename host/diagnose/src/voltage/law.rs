@@ -11,8 +11,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::log::Log;
-use super::search::{LEAST_GAIN, LEVEL, signed_rank};
+use crate::voltage::log::Log;
+use crate::voltage::search::{LEAST_GAIN, LEVEL, signed_rank};
 use rig_model::robot::{AntiWindup, VoltageController};
 
 /// Least share of the voltage's power that a law explains.
@@ -39,7 +39,7 @@ const CLAMPED: usize = 6;
 
 /// A controller by a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Law {
+pub(crate) struct Law {
     /// The controller.
     pub controller: VoltageController,
     /// Integral of the position error at each row, rad·s or m·s; empty without an integral.
@@ -314,7 +314,7 @@ impl<'a> Rows<'a> {
 
 impl Law {
     /// Fits the rows with the drive on and off its limit; `None` if they follow no such law.
-    pub(super) fn of(log: &Log) -> Option<Self> {
+    pub(crate) fn of(log: &Log) -> Option<Self> {
         let rows = log.t.len();
         if log.reference.len() != rows || log.u.len() != rows {
             return None;
@@ -374,7 +374,7 @@ impl Law {
 
 /// A supply by its readings: a line over the demanded share. A switching bridge makes a reading depend on its phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Supply {
+pub(crate) struct Supply {
     /// Voltage without load, V, and its change per share, V.
     line: [f64; 2],
     /// RMS of the readings about the line, V.
@@ -383,7 +383,7 @@ pub(super) struct Supply {
 
 impl Supply {
     /// Fits the supply of recordings: one line for all, because small shares alone do not determine it.
-    pub(super) fn of(logs: &[Log]) -> Self {
+    pub(crate) fn of(logs: &[Log]) -> Self {
         let all = || logs.iter().flat_map(readings);
         let (mut sums, mut right) = (nalgebra::Matrix2::zeros(), nalgebra::Vector2::zeros());
         for [share, volts] in all() {
@@ -403,13 +403,13 @@ impl Supply {
     }
 
     /// Returns the supply with a known line; the scatter stays.
-    pub(super) fn with_line(self, line: [f64; 2]) -> Self {
+    pub(crate) fn with_line(self, line: [f64; 2]) -> Self {
         Self { line, ..self }
     }
 
     /// Gives this supply to the controllers of `logs`. A recording has its own voltage without load if its readings
     /// differ from the line by more than their scatter in the mean.
-    pub(super) fn give(&self, logs: &mut [Log]) {
+    pub(crate) fn give(&self, logs: &mut [Log]) {
         for log in logs {
             let [off, rows] = readings(log)
                 .into_iter()

@@ -1,7 +1,7 @@
 //! Recordings for a voltage-driven simulation: rows as written, without filter or even grid.
 
-use super::law::Law;
 use crate::DiagnoseError;
+use crate::voltage::law::Law;
 use rig_data::prepare::Recording;
 use rig_model::robot::VoltageController;
 
@@ -18,7 +18,7 @@ const SUPPLY: &str = "supply";
 
 /// A stretch of a recording without a gap.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Log {
+pub(crate) struct Log {
     /// Name of the recording.
     pub label: String,
     /// s
@@ -45,7 +45,7 @@ pub(super) struct Log {
 
 impl Log {
     /// Returns the duration, s.
-    pub(super) fn duration(&self) -> f64 {
+    pub(crate) fn duration(&self) -> f64 {
         self.t
             .last()
             .zip(self.t.first())
@@ -53,12 +53,12 @@ impl Log {
     }
 
     /// Returns velocity and acceleration at a row by a parabola through its neighbours.
-    pub(super) fn slope(&self, row: usize) -> [f64; 2] {
+    pub(crate) fn slope(&self, row: usize) -> [f64; 2] {
         slope(&self.t, &self.q, row, SIDE)
     }
 
     /// Computes the derivatives of the reference from its rows.
-    pub(super) fn read_slopes(&mut self) {
+    pub(crate) fn read_slopes(&mut self) {
         if self.reference.len() == self.t.len() {
             let slopes =
                 (0..self.t.len()).map(|k| slope(&self.t, &self.reference, k, REFERENCE_SIDE));
@@ -68,7 +68,7 @@ impl Log {
     }
 
     /// Identifies the controller from the rows.
-    pub(super) fn read_controller(&mut self) {
+    pub(crate) fn read_controller(&mut self) {
         self.read_slopes();
         if let Some(law) = Law::of(self) {
             (self.law, self.integral) = (Some(law.controller), law.integral);
@@ -76,7 +76,7 @@ impl Log {
     }
 
     /// Returns pieces of about `length` seconds; the whole for infinity.
-    pub(super) fn windows(&self, length: f64) -> Vec<Segment> {
+    pub(crate) fn windows(&self, length: f64) -> Vec<Segment> {
         let mut list = Vec::new();
         let (mut from, last) = (0, self.t.len().saturating_sub(1));
         while from < last {
@@ -122,7 +122,7 @@ fn slope(t: &[f64], column: &[f64], row: usize, side: usize) -> [f64; 2] {
 
 /// Rows of a log in one simulation from the recorded state of the first.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Segment {
+pub(crate) struct Segment {
     /// First row.
     pub from: usize,
     /// One past the last.
@@ -135,7 +135,7 @@ pub(super) struct Segment {
 ///
 /// # Errors
 /// Errors of reading; a recording without a voltage.
-pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseError> {
+pub(crate) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseError> {
     let mut list: Vec<Log> = Vec::new();
     for source in recordings {
         let first = list.len();

@@ -41,21 +41,23 @@ mod validation;
 
 use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector};
 
-pub use self::controllers::terms as controller_terms;
-use self::describe::Told;
-pub use self::driven::DrivenError;
-use self::driven::{Followed, Reference, VoltageModel, reference_of};
-pub use self::free_run::FreeRun;
-use self::law::Supply;
-use self::log::{Log, logs};
-use self::plant::Plant;
-pub use self::replay::{ReplayError, VoltageReplay, replay_voltage};
-use self::search::{Model, Search, library};
-pub use self::validation::{DrivenBy, VoltageChecked, VoltageValidation, validate_voltage};
-use super::fault::faulty;
-use super::outcome::{Curves, Diagnosis};
-use super::stated::Stated;
-use super::{DiagnoseError, Options};
+use crate::description::described_effects::Stated;
+use crate::faults::refusal::faulty;
+use crate::outcome::{Curves, Diagnosis};
+pub use crate::voltage::controllers::terms as controller_terms;
+use crate::voltage::describe::Told;
+pub use crate::voltage::driven::DrivenError;
+use crate::voltage::driven::{Followed, Reference, VoltageModel, reference_of};
+pub use crate::voltage::free_run::FreeRun;
+use crate::voltage::law::Supply;
+use crate::voltage::log::{Log, logs};
+use crate::voltage::plant::Plant;
+pub use crate::voltage::replay::{ReplayError, VoltageReplay, replay_voltage};
+use crate::voltage::search::{Model, Search, library};
+pub use crate::voltage::validation::{
+    DrivenBy, VoltageChecked, VoltageValidation, validate_voltage,
+};
+use crate::{DiagnoseError, Options};
 use rig_data::prepare::Recording;
 use rig_model::robot::{JointKind, Robot};
 

@@ -10,9 +10,9 @@
 
 use rig_shared::effects::Kind;
 
-use super::halt::Halt;
-use super::log::{Log, Segment};
-use super::stepper::{State, Stepper};
+use crate::voltage::halt::Halt;
+use crate::voltage::log::{Log, Segment};
+use crate::voltage::stepper::{State, Stepper};
 use rig_model::robot::Robot;
 
 /// Longest initial step, s; halved until steps do not matter beside the residual. At 6 ms the XL330 recordings'
@@ -24,9 +24,9 @@ const ANGLE: f64 = 0.2;
 /// Position and velocity beyond which a simulation has no bounds, rad and rad/s (m and m/s).
 const UNBOUNDED: f64 = 1.0e6;
 /// Nominal parameters, in the order of [`NAMES`].
-pub(super) const NOMINAL: usize = 6;
+pub(crate) const NOMINAL: usize = 6;
 /// Drive inertia seen at the joint; torque per volt; back-EMF; Coulomb and viscous friction; constant torque.
-pub(super) const NAMES: [(&str, &str); NOMINAL] = [
+pub(crate) const NAMES: [(&str, &str); NOMINAL] = [
     ("Ia1", "kg*m^2"),
     ("torque per volt", "N*m/V"),
     ("back-EMF", "V*s/rad"),
@@ -37,7 +37,7 @@ pub(super) const NAMES: [(&str, &str); NOMINAL] = [
 
 /// Known values of the joint.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Plant {
+pub(crate) struct Plant {
     /// Inertia of the link, kg·m² or kg.
     pub inertia: f64,
     /// Torque against gravity: with cos q, with sin q, constant, N·m or N.
@@ -52,7 +52,7 @@ pub(super) struct Plant {
 
 impl Plant {
     /// Returns the nominal parameters of a description; `None` if any is missing.
-    pub(super) fn described(&self, robot: &Robot) -> Option<[f64; NOMINAL]> {
+    pub(crate) fn described(&self, robot: &Robot) -> Option<[f64; NOMINAL]> {
         let joint = robot.joints.first()?;
         let (drive, friction) = (joint.drive.as_ref()?, joint.friction.as_ref()?);
         let emf = drive.torque_constant * self.ratio.abs();
@@ -68,13 +68,13 @@ impl Plant {
     }
 
     /// Returns the torque against gravity, N·m or N.
-    pub(super) fn weight(&self, q: f64) -> f64 {
+    pub(crate) fn weight(&self, q: f64) -> f64 {
         let (sin, cos) = q.sin_cos();
         self.gravity[0] * cos + self.gravity[1] * sin + self.gravity[2]
     }
 
     /// Returns the same plant with half the step.
-    pub(super) fn finer(&self) -> Self {
+    pub(crate) fn finer(&self) -> Self {
         Self {
             halvings: self.halvings + 1,
             ..*self
@@ -85,7 +85,7 @@ impl Plant {
     ///
     /// # Errors
     /// [`Halt`]: friction that would drive the joint, or an unbounded motion, and its time.
-    pub(super) fn simulate(
+    pub(crate) fn simulate(
         &self,
         effects: &[Kind],
         theta: &[f64],
@@ -102,7 +102,7 @@ impl Plant {
     ///
     /// # Errors
     /// As [`Self::simulate`].
-    pub(super) fn run(
+    pub(crate) fn run(
         &self,
         effects: &[Kind],
         theta: &[f64],

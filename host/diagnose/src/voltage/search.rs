@@ -2,13 +2,13 @@
 
 use rig_shared::effects::{Channel, Effect, Kind, Parameter, Scale};
 
-use super::LONGEST;
-use super::fit::{Problem, WINDOW, segments};
-use super::free_run::{FreeRun, travel};
-use super::halt::Cause;
-use super::log::{Log, Segment};
-use super::plant::{NOMINAL, Plant};
-use super::start::start;
+use crate::voltage::LONGEST;
+use crate::voltage::fit::{Problem, WINDOW, segments};
+use crate::voltage::free_run::{FreeRun, travel};
+use crate::voltage::halt::Cause;
+use crate::voltage::log::{Log, Segment};
+use crate::voltage::plant::{NOMINAL, Plant};
+use crate::voltage::start::start;
 use rig_data::prepare::each_of;
 use rig_model::robot::Robot;
 
@@ -19,11 +19,11 @@ const BLOCKS: usize = 8;
 /// Length of the pieces whose errors are compared, s.
 const PIECE: f64 = 2.0;
 /// Least relative error reduction by an effect on left-out recordings.
-pub(super) const LEAST_GAIN: f64 = 0.03;
+pub(crate) const LEAST_GAIN: f64 = 0.03;
 /// Level of the signed-rank test over the pieces.
-pub(super) const LEVEL: f64 = 0.05;
+pub(crate) const LEVEL: f64 = 0.05;
 /// Relative difference of left-out errors within which candidates are equal.
-pub(super) const EQUAL: f64 = 0.03;
+pub(crate) const EQUAL: f64 = 0.03;
 /// Candidates per round in the cross-validation, those of least training error.
 const SHORT_LIST: usize = 3;
 /// Most refits of an accepted model.
@@ -39,7 +39,7 @@ const MOST: usize = 5;
 
 /// A model and its parameters: the nominal ones, then gains and shapes of each effect.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Model {
+pub(crate) struct Model {
     pub effects: Vec<Kind>,
     pub theta: Vec<f64>,
     pub bounds: Vec<[f64; 2]>,
@@ -48,7 +48,7 @@ pub(super) struct Model {
 
 /// A tried effect.
 #[derive(Clone, Debug)]
-pub(super) struct Trial {
+pub(crate) struct Trial {
     pub kind: Kind,
     /// Fit to all recordings; `None` if it could not be simulated.
     pub model: Option<Model>,
@@ -63,7 +63,7 @@ pub(super) struct Trial {
 }
 
 /// Inputs of the search.
-pub(super) struct Search<'a> {
+pub(crate) struct Search<'a> {
     pub plant: &'a Plant,
     pub logs: &'a [Log],
     pub library: Vec<Kind>,
@@ -71,7 +71,7 @@ pub(super) struct Search<'a> {
 }
 
 /// Returns the effects in the simulation of a voltage-driven joint; a closed loop has no late recorded voltage.
-pub(super) fn library(without: &[Kind], closed: bool) -> Vec<Kind> {
+pub(crate) fn library(without: &[Kind], closed: bool) -> Vec<Kind> {
     [
         Kind::Stribeck,
         Kind::AsymmetricCoulomb,
@@ -102,7 +102,7 @@ impl Search<'_> {
     }
 
     /// Returns whole recordings, or pieces if there are few.
-    pub(super) fn blocks(&self) -> Vec<(usize, Segment)> {
+    pub(crate) fn blocks(&self) -> Vec<(usize, Segment)> {
         let whole = segments(self.logs, |_| true, f64::INFINITY);
         if whole.len() >= BLOCKS || whole.is_empty() {
             return whole;
@@ -112,13 +112,13 @@ impl Search<'_> {
     }
 
     /// Returns the RMS of the free-running position over the blocks.
-    pub(super) fn rms(&self, model: &Model) -> f64 {
+    pub(crate) fn rms(&self, model: &Model) -> f64 {
         self.problem(model, self.blocks()).rms(&model.theta)
     }
 
     /// Returns the plant with steps so fine that halving changes the nominal model's positions by less than a tenth of
     /// their residual. Near the encoder's resolution, the simulation's steps must not look like an effect.
-    pub(super) fn in_fine_steps(&self) -> Plant {
+    pub(crate) fn in_fine_steps(&self) -> Plant {
         match self.nominal() {
             Some(model) => in_fine_steps(self.plant, self.logs, &model.effects, &model.theta),
             None => *self.plant,
@@ -126,7 +126,7 @@ impl Search<'_> {
     }
 
     /// Runs the model freely over whole recordings.
-    pub(super) fn freely(&self, model: &Model) -> FreeRun {
+    pub(crate) fn freely(&self, model: &Model) -> FreeRun {
         let travel = travel(self.logs);
         let mut errors = Vec::new();
         for (k, segment) in segments(self.logs, |_| true, LONGEST) {
@@ -148,7 +148,7 @@ impl Search<'_> {
     }
 
     /// Returns the simulated positions of one recording; empty if it cannot be simulated.
-    pub(super) fn simulated(&self, model: &Model, log: usize) -> Vec<f64> {
+    pub(crate) fn simulated(&self, model: &Model, log: usize) -> Vec<f64> {
         let whole = segments(self.logs, |k| k == log, LONGEST);
         let error = self.problem(model, whole).residual(&model.theta);
         let pairs = error.iter().flatten().zip(&self.logs[log].q);
@@ -156,7 +156,7 @@ impl Search<'_> {
     }
 
     /// Returns standard deviations in the order of the free parameters.
-    pub(super) fn deviations(&self, model: &Model) -> Option<Vec<f64>> {
+    pub(crate) fn deviations(&self, model: &Model) -> Option<Vec<f64>> {
         self.problem(model, self.blocks()).deviations(&model.theta)
     }
 
@@ -195,7 +195,7 @@ impl Search<'_> {
     }
 
     /// Fits the nominal model from several starts; `None` if the motion does not excite it.
-    pub(super) fn nominal(&self) -> Option<Model> {
+    pub(crate) fn nominal(&self) -> Option<Model> {
         let viscous = (self.logs.iter()).any(|log| log.on.iter().any(|on| !on));
         let theta = start(self.plant, self.logs, viscous)?;
         let infinity = f64::INFINITY;
@@ -222,7 +222,7 @@ impl Search<'_> {
     }
 
     /// Adds a description's effects to `nominal` and refits those that are marked; `None` if it cannot be simulated.
-    pub(super) fn with_described(
+    pub(crate) fn with_described(
         &self,
         nominal: Model,
         parts: &[(Effect<f64>, bool)],
@@ -369,7 +369,7 @@ impl Search<'_> {
 
     /// Adds effects while they improve the model. `report` receives each round's number, the error on left-out
     /// recordings before it, and all trials.
-    pub(super) fn run(
+    pub(crate) fn run(
         &self,
         nominal: &Model,
         report: &mut dyn FnMut(usize, f64, &[Trial]),
@@ -460,7 +460,7 @@ impl Search<'_> {
 }
 
 /// Returns a plant whose positions change by less than [`STEP_SHARE`] of their residual when its steps are halved.
-pub(super) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta: &[f64]) -> Plant {
+pub(crate) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta: &[f64]) -> Plant {
     let run = |plant: &Plant| {
         let problem = Problem {
             plant,
@@ -492,7 +492,7 @@ pub(super) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta
 /// Tests each candidate at the full level while all better-fitting ones before it pass. The probability of any false
 /// one then stays at that level (fixed sequence; Maurer, Hothorn and Lehmacher 1995). The order is that of the training
 /// error, which hardly depends on the left-out pieces.
-pub(super) fn in_sequence(trials: &mut [Trial]) {
+pub(crate) fn in_sequence(trials: &mut [Trial]) {
     let chance = trials.iter().position(|trial| trial.p_value > LEVEL);
     for trial in trials.iter_mut().skip(chance.map_or(usize::MAX, |k| k + 1)) {
         if trial.refused.is_empty() {
@@ -502,7 +502,7 @@ pub(super) fn in_sequence(trials: &mut [Trial]) {
 }
 
 /// Returns the accepted candidate: the best fit among those that are about equal on left-out data.
-pub(super) fn taken(trials: &[Trial]) -> Option<usize> {
+pub(crate) fn taken(trials: &[Trial]) -> Option<usize> {
     let passed = || (trials.iter().enumerate()).filter(|(_, t)| t.refused.is_empty());
     let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
     let least = passed().map(|(_, t)| of(t)).fold(f64::INFINITY, f64::min);
@@ -519,7 +519,7 @@ fn pooled(pieces: &[[f64; 2]]) -> f64 {
 
 /// Returns the probability of such gains if losses are equally likely: Wilcoxon's signed-rank test (1945), one-sided,
 /// exact. `gains` are logarithms of error before over after; zeros and NaN do not count.
-pub(super) fn signed_rank(gains: &[f64]) -> f64 {
+pub(crate) fn signed_rank(gains: &[f64]) -> f64 {
     let mut gains: Vec<f64> = gains.iter().copied().filter(|g| g.abs() > 0.0).collect();
     gains.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     let largest = gains.len() * (gains.len() + 1) / 2;
@@ -538,6 +538,6 @@ pub(super) fn signed_rank(gains: &[f64]) -> f64 {
 }
 
 /// Returns true if the effect acts on the voltage.
-pub(super) fn on_the_voltage(kind: Kind) -> bool {
+pub(crate) fn on_the_voltage(kind: Kind) -> bool {
     kind.about().channel == Channel::Voltage || kind == Kind::MeasurementDelay
 }

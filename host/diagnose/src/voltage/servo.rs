@@ -6,7 +6,7 @@ use rig_data::{Block, JointColumns};
 
 /// A pendulum on a motor; its controller's output is a share of the supply.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Servo {
+pub(crate) struct Servo {
     /// Link and drive, kg·m².
     pub inertia: f64,
     /// N·m
@@ -71,7 +71,7 @@ impl Servo {
     }
 
     /// Returns the `number`-th recorded motion, about `offset`, rad: encoder positions, voltage, supply, reference.
-    pub(super) fn recorded(&self, number: usize, offset: f64) -> InMemory {
+    pub(crate) fn recorded(&self, number: usize, offset: f64) -> InMemory {
         let [kp, ki, kd, kv, ka] = self.gains;
         let (mut q, mut v, mut share, mut integral) = (offset, 0.0_f64, 0.0_f64, 0.0);
         let (mut before, mut speed) = (offset, 0.0);

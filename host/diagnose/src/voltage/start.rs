@@ -6,9 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::log::Log;
-use super::plant::{NOMINAL, Plant};
-use crate::sanity::nnls::nnls;
+use crate::faults::nnls::nnls;
+use crate::voltage::log::Log;
+use crate::voltage::plant::{NOMINAL, Plant};
 
 /// Length of a piece, s: a few steps of a coarse encoder, short beside an oscillation.
 const PIECE: f64 = 0.3;
@@ -31,7 +31,7 @@ const NOT_NEGATIVE: usize = 5;
 
 /// Returns non-negative nominal parameters by least squares; `None` if the voltage does not drive the joint. `viscous`
 /// separates viscous friction from the back-EMF, by rows with the drive off.
-pub(super) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f64>> {
+pub(crate) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f64>> {
     let velocities: Vec<Vec<f64>> = (logs.iter())
         .map(|log| (0..log.t.len()).map(|k| log.slope(k)[0]).collect())
         .collect();
@@ -80,7 +80,7 @@ pub(super) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f6
 /// Returns the residual share of the voltage's squares for a joint under gravity whose position is `factor` times the
 /// recorded. The factor with gravity's right period gives the least. Inertia, friction, back-EMF and gravity are fitted
 /// without the description.
-pub(super) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
+pub(crate) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
     let (mut rows, mut right) = (Vec::new(), Vec::new());
     for log in logs {
         for [from, to] in pieces(log) {

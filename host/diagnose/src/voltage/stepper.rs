@@ -3,9 +3,9 @@
 use rig_shared::effects::{Channel, Direction, Effect, Instant, Kind, Memory};
 use rig_shared::scalar::Real as _;
 
-use super::halt::Halt;
-use super::log::{Log, Segment};
-use super::plant::{NOMINAL, Plant};
+use crate::voltage::halt::Halt;
+use crate::voltage::log::{Log, Segment};
+use crate::voltage::plant::{NOMINAL, Plant};
 use rig_model::effects::over_coulomb;
 use rig_model::robot::Demand;
 
@@ -93,7 +93,7 @@ struct Torques {
 }
 
 /// A joint in motion.
-pub(super) struct Stepper<'a> {
+pub(crate) struct Stepper<'a> {
     plant: &'a Plant,
     armature: f64,
     gain: f64,
@@ -118,7 +118,7 @@ pub(super) struct Stepper<'a> {
 
 impl<'a> Stepper<'a> {
     /// Builds a stepper with nominal parameters and those of the effects; `None` if parameters are missing.
-    pub(super) fn new(plant: &'a Plant, effects: &[Kind], theta: &[f64]) -> Option<Self> {
+    pub(crate) fn new(plant: &'a Plant, effects: &[Kind], theta: &[f64]) -> Option<Self> {
         let &[armature, gain, emf, coulomb, viscous, offset, ..] = theta else {
             return None;
         };
@@ -149,7 +149,7 @@ impl<'a> Stepper<'a> {
     }
 
     /// Starts at the first row of a segment.
-    pub(super) fn start(&mut self, log: &Log, segment: &Segment) {
+    pub(crate) fn start(&mut self, log: &Log, segment: &Segment) {
         self.row = segment.from;
         (self.q, self.v) = (log.q[segment.from], segment.velocity);
         self.integral = log.integral.get(segment.from).copied().unwrap_or(0.0);
@@ -157,7 +157,7 @@ impl<'a> Stepper<'a> {
 
     /// Returns the angular frequency of the closed loop without friction, or its damping rate if that is faster, 1/s; 0
     /// if the recorded voltage drives.
-    pub(super) fn fastest(&self, log: &Log) -> f64 {
+    pub(crate) fn fastest(&self, log: &Log) -> f64 {
         let Some(law) = &log.law else { return 0.0 };
         let per_share = self.gain * law.supply[0].abs() / (self.plant.inertia + self.armature);
         let stiffness = per_share * law.proportional;
@@ -165,12 +165,12 @@ impl<'a> Stepper<'a> {
     }
 
     /// Returns true if position and velocity are within ± `most`.
-    pub(super) fn is_within(&self, most: f64) -> bool {
+    pub(crate) fn is_within(&self, most: f64) -> bool {
         self.q.abs() < most && self.v.abs() < most
     }
 
     /// Returns the state at row `k`.
-    pub(super) fn state(&mut self, log: &Log, k: usize) -> State {
+    pub(crate) fn state(&mut self, log: &Log, k: usize) -> State {
         let voltage = match log.on[k] {
             true => self.voltage(log, log.t[k], [self.q, self.v], 0.0),
             false => 0.0,
@@ -233,7 +233,7 @@ impl<'a> Stepper<'a> {
     ///
     /// # Errors
     /// [`Halt`] if friction would drive the joint.
-    pub(super) fn step(&mut self, log: &Log, row: usize, now: f64, dt: f64) -> Result<(), Halt> {
+    pub(crate) fn step(&mut self, log: &Log, row: usize, now: f64, dt: f64) -> Result<(), Halt> {
         let on = log.on[row];
         let middle = self.q + 0.5 * dt * self.v;
         let speed = self.middle_velocity(dt);

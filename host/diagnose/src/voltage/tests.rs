@@ -3,21 +3,21 @@ use std::path::Path;
 
 use rig_shared::effects::Kind;
 
-use super::*;
 use crate::outcome::Fate;
+use crate::voltage::*;
 use rig_data::prepare::InMemory;
 use rig_data::{Block, JointColumns};
 use rig_model::robot::XL330;
 
-pub(super) fn robot() -> Robot {
+pub(crate) fn robot() -> Robot {
     Robot::from_toml(XL330, Path::new("xl330.toml")).unwrap()
 }
 
-pub(super) fn list<R: Recording>(sources: &[R]) -> Vec<&dyn Recording> {
+pub(crate) fn list<R: Recording>(sources: &[R]) -> Vec<&dyn Recording> {
     sources.iter().map(|s| s as &dyn Recording).collect()
 }
 
-pub(super) fn found(train: &[&dyn Recording], sealed: &[&dyn Recording]) -> (Diagnosis, Robot) {
+pub(crate) fn found(train: &[&dyn Recording], sealed: &[&dyn Recording]) -> (Diagnosis, Robot) {
     let robot = robot();
     diagnose_voltage(&robot, train, sealed, &Options::default(), &mut |_| ()).unwrap()
 }

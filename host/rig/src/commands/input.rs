@@ -12,7 +12,7 @@ use rig_data::{
     Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Source, StrangeReference, Warning,
     plausibility, strange_rates, strange_references,
 };
-use rig_diagnose::sanity::faults_at_start;
+use rig_diagnose::faults::faults_at_start;
 use rig_model::robot::{Description, Joint, JointKind, Robot};
 use rig_output::{Finding, format_significant, one_a_kind, worst_first};
 

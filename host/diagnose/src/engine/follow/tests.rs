@@ -2,14 +2,14 @@
 
 #![allow(clippy::unwrap_used)]
 
-use super::*;
 use crate::Options;
-use crate::bench::library;
-use crate::columns::Candidate;
-use crate::fit::Evidence;
+use crate::columns::effect_columns::Candidate;
+use crate::description::described_effects::Stated;
+use crate::engine::follow::*;
+use crate::fit::least_squares::Evidence;
 use crate::outcome::Verdict;
-use crate::stated::Stated;
-use crate::test_made::Diagnosed as _;
+use crate::recordings::context::library;
+use crate::tests::made::Diagnosed as _;
 use rig_data::prepare::Recording;
 use rig_scenario::{Effect, Scenario};
 

@@ -1,0 +1,101 @@
+//! Effects that fail the joint fit of all effects.
+
+use std::f64::consts::TAU;
+
+use rig_shared::effects::{GAINS, Kind};
+
+use crate::DiagnoseError;
+use crate::acceptance::judge::Judge;
+use crate::acceptance::plausibility::Asked;
+use crate::fit::refit::Refit;
+use crate::search::fitted_candidate::{Profile, SIGNIFICANT};
+use crate::search::stepwise::{Search, is_gear};
+
+/// p-value above which an effect is dropped: its 95 % interval contains zero.
+const NOTHING: f64 = 0.05;
+/// Number of inertia gains of a coupling. They come first; the last gain is friction.
+const OF_INERTIA: usize = 2;
+/// Largest share of the twist torque that an accepted gear may have. Mass and load of the link give 1 at most; real
+/// gears of the emulated rig give 0.7 to 1.1.
+const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
+/// Largest amplitude of a joint encoder error, rad. 1.5 times the largest catalogue value (0.6 mm off centre on a ring
+/// of 20 mm radius). A larger one belongs to another wave, such as friction under load.
+const MOST_OF_AN_ENCODER: f64 = 0.03;
+/// Returns the least credible effect beside the others, with the reason; None if all are credible.
+///
+/// # Errors
+/// [`DiagnoseError`] of the fit.
+pub(crate) fn unbelieved(
+    refit: &Refit,
+    search: &Search,
+    judge: &Judge,
+    chosen: &[Profile],
+) -> Result<Option<(usize, &'static str)>, DiagnoseError> {
+    let found = search.count_given(chosen)..chosen.len();
+    if found.is_empty() {
+        return Ok(None);
+    }
+    let joint = refit.joint(&search.source, chosen, &judge.pairs, judge.coordinates)?;
+    let free = refit.free.len();
+    let asked = Asked {
+        search,
+        joint: &joint,
+        free,
+        chosen,
+    };
+    if let Some(implausible) = asked.implausible(found.clone()) {
+        return Ok(Some(implausible));
+    }
+    let nothing = (found.clone())
+        .filter(|k| !is_gear(chosen[*k].candidate.kind))
+        .map(|k| (k, joint.of_nothing(chosen, free, k, GAINS)))
+        .filter(|(_, p)| *p > NOTHING)
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, _)) = nothing {
+        return Ok(Some((
+            k,
+            "by its own deviation it could as well be nothing",
+        )));
+    }
+    let couples = |k: &usize| chosen[*k].candidate.kind == Kind::InertiaCoupling;
+    for k in found.clone().filter(couples) {
+        if joint.of_nothing(chosen, free, k, OF_INERTIA) > SIGNIFICANT {
+            let why = "what it takes away goes with the other joint's speed alone, and no inertia is shown";
+            return Ok(Some((k, why)));
+        }
+    }
+    let reads = |k: &usize| chosen[*k].candidate.kind == Kind::EncoderEccentricityJoint;
+    for k in found.clone().filter(reads) {
+        let amplitude = joint
+            .gains(chosen, free, k)
+            .iter()
+            .fold(0.0, |a: f64, g| a.hypot(*g));
+        if amplitude > MOST_OF_AN_ENCODER {
+            let why = "its encoder would have to be farther off its centre than any is";
+            return Ok(Some((k, why)));
+        }
+    }
+    for k in found.filter(|k| is_gear(chosen[*k].candidate.kind)) {
+        let shares = joint.gains(chosen, free, k);
+        if shares.iter().any(|share| *share > MOST_OF_A_TWIST) {
+            let why = "it would change more torque than mass and load of the link have";
+            return Ok(Some((k, why)));
+        }
+        if resonance(search, &chosen[k])? > 0.5 / judge.rows.period {
+            let why = "it would resonate beyond the band of the data, where other laws of fast motion look alike";
+            return Ok(Some((k, why)));
+        }
+    }
+    Ok(None)
+}
+
+/// Returns the resonance of the link on its gear with the motor locked, Hz.
+fn resonance(search: &Search, gear: &Profile) -> Result<f64, DiagnoseError> {
+    let shapes = gear.candidate.kind.about().shapes;
+    let stiffness = (shapes.iter().zip(&gear.shapes)).find(|(shape, _)| shape.name == "stiffness");
+    let mass = search.source.mass(gear.candidate.joint, 0)?;
+    Ok(stiffness.map_or(0.0, |(_, stiffness)| (stiffness / mass).sqrt() / TAU))
+}
+
+#[cfg(test)]
+mod tests;

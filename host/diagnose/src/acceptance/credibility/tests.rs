@@ -1,0 +1,247 @@
+//! False gears.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::tests::made::Diagnosed as _;
+use std::sync::Arc;
+
+use crate::Options;
+use crate::acceptance::credibility::*;
+use crate::columns::effect_columns::Candidate;
+use crate::description::described_effects::Stated;
+use crate::engine::Follower;
+use crate::fit::least_squares::Evidence;
+use crate::outcome::{Tried, Verdict};
+use crate::recordings::context::{Bench, Loaded, library};
+use crate::recordings::position_reading::PositionReading;
+use rig_data::prepare::Recording;
+use rig_scenario::{Arm, ArmScenario, Effect, Scenario};
+use rig_shared::effects::{Kind, SHAPES};
+
+const SPRING: Effect = Effect::JointElasticity {
+    stiffness: 700.0,
+    damping: 0.3,
+};
+const GEAR: Candidate = Candidate::on(Kind::JointElasticity, 0);
+
+/// Returns the result of `ask` for the library on a rig with this hidden effect.
+fn on<T>(
+    effect: Option<Effect>,
+    seed: u64,
+    ask: impl FnOnce(&Bench, &Loaded, &Refit, &Search) -> T,
+) -> T {
+    let made = Scenario::short(effect, seed).make().unwrap();
+    let stated = Stated::of(&made.robot);
+    let training: [&dyn Recording; 1] = [&made.train];
+    let bench = Bench::of(&stated, &training).unwrap();
+    let loaded = bench.load(&training).unwrap();
+    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let values = bench.anchor.values(&refit.before.values);
+    let search = Search::new(
+        bench.source(&loaded, &values).unwrap(),
+        library(&made.robot, &loaded.runs, &[]),
+        Vec::new(),
+        2,
+    );
+    ask(&bench, &loaded, &refit, &search)
+}
+
+/// Stiffness, damping and friction share as shapes.
+fn shapes(of: [f64; 3]) -> [f64; SHAPES] {
+    let mut shapes = [0.0; SHAPES];
+    shapes[..3].copy_from_slice(&of);
+    shapes
+}
+
+/// Returns the reason against an elastic gear (rig: 700 N·m/rad) of this stiffness; its torque is scaled by `times`.
+fn said(stiffness: f64, times: f64) -> Option<&'static str> {
+    on(Some(SPRING), 5, |bench, loaded, refit, search| {
+        let shapes = shapes([stiffness, 0.3, 0.25]);
+        let follower = Follower::new(bench, loaded, refit, search);
+        let judge = Judge {
+            robot: bench.robot,
+            search,
+            follower: &follower,
+            rows: &loaded.rows,
+            coordinates: &[Vec::new()],
+            pairs: Vec::new(),
+            position_reading: PositionReading::of_noise(vec![0.0]),
+            base: &refit.base,
+            seed: 1,
+        };
+        let mut columns = search.source.columns(&GEAR, &shapes).unwrap();
+        for value in columns.iter_mut().flatten().flatten().flatten() {
+            *value *= times;
+        }
+        let gear = Profile {
+            candidate: GEAR,
+            shapes,
+            columns: Arc::new(columns),
+            evidence: Evidence::default(),
+            vanished: None,
+            followed: None,
+            otherwise: None,
+            heard: false,
+            doubled: false,
+        };
+        let fallen = unbelieved(refit, search, &judge, &[gear]).unwrap();
+        fallen.map(|(_, why)| why)
+    })
+}
+
+#[test]
+fn a_gear_stands_that_is_as_stiff_as_the_rig_and_not_one_that_is_too_stiff_or_moves_too_much() {
+    assert_eq!(said(700.0, 1.0), None);
+    // A quarter of its torque needs a factor of four.
+    assert!(said(700.0, 0.25).unwrap().contains("mass and load"));
+    // 0.15 kg·m² at 1e5 N·m/rad resonate at 130 Hz, above rows of less than 100 Hz.
+    assert!(said(1e5, 1.0).unwrap().contains("band"));
+}
+
+/// With creep, the friction of the rig lags a little. A link with all friction behind a spring of five times critical
+/// damping would remove a tenth of that residual (6 % without rows near standstill).
+#[test]
+fn a_gear_that_does_not_swing_is_none() {
+    let made = Scenario::short([], 900).make().unwrap();
+    let (diagnosis, _) = made.diagnosed(&made.robot, &Options::default());
+    assert_eq!(
+        diagnosis.verdict,
+        Verdict::NothingMissing,
+        "{:?}",
+        diagnosis.words
+    );
+    let gear = |t: &&Tried| t.effect.contains("elasticity");
+    let why = ["swing", "less than 10 %"];
+    for tried in diagnosis.tried.iter().filter(gear) {
+        assert!(
+            why.iter().any(|why| tried.refused.contains(why)),
+            "{tried:?}"
+        );
+    }
+}
+
+/// Returns the elastic gear from a search that starts at these shapes.
+fn profiled(effect: Option<Effect>, seed: u64, begun: [f64; 3]) -> Profile {
+    on(effect, seed, |_, _, refit, search| {
+        let place = search.library.iter().position(|c| *c == GEAR).unwrap();
+        let profile = search.profile(&refit.base, place, Some(shapes(begun)));
+        profile.unwrap().unwrap()
+    })
+}
+
+/// On the creeping rig the best gear above critical damping stays there; a true one swings.
+#[test]
+fn a_gear_beyond_critical_damping_is_refused_for_that_alone() {
+    let lag = profiled(None, 900, [3000.0, 190.0, 0.25]);
+    assert!(lag.refused(300).unwrap().contains("swing"), "{lag:?}");
+    let gear = profiled(Some(SPRING), 5, [700.0, 0.3, 0.25]);
+    assert_eq!(gear.refused(300), None);
+}
+
+/// Returns the reason against an effect with `count` columns on joint 2 of an upright two-link arm without effects.
+fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'static str> {
+    let made = ArmScenario {
+        seconds: [20.0, 15.0],
+        ..ArmScenario::new(Arm::Upright, None, 11)
+    }
+    .make()
+    .unwrap();
+    let stated = Stated::of(&made.robot);
+    let training: [&dyn Recording; 1] = [&made.train[0]];
+    let bench = Bench::of(&stated, &training).unwrap();
+    let loaded = bench.load(&training).unwrap();
+    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let values = bench.anchor.values(&refit.before.values);
+    let search = Search::new(
+        bench.source(&loaded, &values).unwrap(),
+        library(&made.robot, &loaded.runs, &[]),
+        Vec::new(),
+        2,
+    );
+    let candidate = Candidate::on(kind, 1);
+    let follower = Follower::new(&bench, &loaded, &refit, &search);
+    let judge = Judge {
+        robot: bench.robot,
+        search: &search,
+        follower: &follower,
+        rows: &loaded.rows,
+        coordinates: &[Vec::new(), Vec::new()],
+        pairs: Vec::new(),
+        position_reading: PositionReading::of_noise(vec![0.0; 2]),
+        base: &refit.base,
+        seed: 1,
+    };
+    let mut own = search.source.columns(&candidate, &shapes).unwrap();
+    own.truncate(columns);
+    let profile = Profile {
+        candidate,
+        shapes,
+        columns: Arc::new(own),
+        evidence: Evidence::default(),
+        vanished: None,
+        followed: None,
+        otherwise: None,
+        heard: false,
+        doubled: false,
+    };
+    // A gear too soft to simulate has no column.
+    let fallen = unbelieved(&refit, &search, &judge, &[profile]).ok()?;
+    fallen.map(|(_, why)| why)
+}
+
+/// The second link of the arm loads its joint with some N·m.
+#[test]
+fn an_arm_does_not_stand_on_a_soft_joint() {
+    let of = |stiffness: f64| said_on_arm(Kind::JointElasticity, shapes([stiffness, 1.0, 0.25]), 1);
+    let soft = [30.0, 50.0, 80.0, 120.0].map(of);
+    assert!(
+        soft.iter().flatten().any(|why| why.contains("sag")),
+        "{soft:?}"
+    );
+    let stiff = of(2e4);
+    assert!(stiff.is_none_or(|why| !why.contains("sag")), "{stiff:?}");
+}
+
+#[test]
+fn one_joint_of_a_recorder_has_no_clock_of_its_own() {
+    let said = said_on_arm(Kind::MeasurementDelay, [0.0; SHAPES], 1);
+    assert!(said.unwrap().contains("one clock"), "{said:?}");
+}
+
+/// Backlash of a thousandth of a degree on a rig without any.
+#[test]
+fn a_gap_that_may_be_none_is_none() {
+    on(None, 6, |bench, loaded, refit, search| {
+        let candidate = Candidate {
+            kind: Kind::Backlash,
+            ..GEAR
+        };
+        let shapes = [2e-5, 1500.0, 15.0, 0.25];
+        let follower = Follower::new(bench, loaded, refit, search);
+        let judge = Judge {
+            robot: bench.robot,
+            search,
+            follower: &follower,
+            rows: &loaded.rows,
+            coordinates: &[Vec::new()],
+            pairs: Vec::new(),
+            position_reading: PositionReading::of_noise(vec![0.0]),
+            base: &refit.base,
+            seed: 1,
+        };
+        let play = Profile {
+            candidate,
+            shapes,
+            columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
+            evidence: Evidence::default(),
+            vanished: None,
+            followed: None,
+            otherwise: None,
+            heard: false,
+            doubled: false,
+        };
+        let fallen = unbelieved(refit, search, &judge, &[play]).unwrap();
+        let why = fallen.map(|(_, why)| why);
+        assert!(why.unwrap().contains("its gap"), "{why:?}");
+    });
+}

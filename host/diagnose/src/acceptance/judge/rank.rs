@@ -1,0 +1,106 @@
+//! Alternative names of a step.
+
+use std::collections::BTreeMap;
+
+use rig_shared::effects::Kind;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::experiment::testable;
+use crate::outcome::Step;
+use crate::search::fitted_candidate::Profile;
+use rig_data::runs::Run;
+
+/// Share of a step's gain from which on an alternative is equal, if the blocks show no difference.
+const AS_GOOD: f64 = 0.9;
+/// Largest RMS ratio of an equal alternative to the step. A larger one means a missing effect.
+const LEAVES: f64 = 1.2;
+/// Standard deviations by which a stiffness may exceed its estimate.
+const SURELY: f64 = 2.0;
+/// Largest distance of a spring's rest position from the middle of the motion, in spans of the motion.
+const SPANS_TO_REST: f64 = 2.0;
+/// Standard deviations of a paired block difference below which alternatives are equal.
+const NO_DIFFERENCE: f64 = 2.5;
+
+/// Fills the set and the runner-up of a step. `rivals` would replace it, best first. A rival on another joint is no
+/// runner-up. Kinds that it `is_not` are excluded.
+pub(crate) fn rank(
+    step: &mut Step,
+    own: &Profile,
+    rivals: &[Profile],
+    runs: &[Run],
+    is_not: &dyn Fn(Kind) -> bool,
+) {
+    let mut names = vec![step.effect.clone()];
+    let mut exact = |kind: Kind| {
+        for confusion in testable::confounded(kind, own.candidate.joint, runs) {
+            if Kind::named(confusion.with, None).is_some_and(is_not) {
+                continue;
+            }
+            if !names.iter().any(|n| n == confusion.with) {
+                names.push(confusion.with.to_owned());
+            }
+        }
+    };
+    exact(own.candidate.kind);
+    let possible = |rival: &&Profile| may_stand(rival, runs) && !is_not(rival.candidate.kind);
+    for rival in rivals.iter().filter(possible) {
+        let name = rival.candidate.kind.about().name;
+        if names.iter().any(|n| n == name) {
+            continue;
+        }
+        if equal(own, rival) {
+            names.push(name.to_owned());
+        } else if step.runner_up.is_none() && rival.candidate.joint == own.candidate.joint {
+            step.runner_up = Some(name.to_owned());
+            step.runner_up_gap_closed =
+                Some(step.gap_closed * (rival.evidence.gain / own.evidence.gain).clamp(0.0, 1.0));
+        }
+    }
+    step.set = names;
+    let others = rivals.iter().filter(possible).filter(|rival| {
+        let kind = rival.candidate.kind;
+        rival.candidate.joint == own.candidate.joint && kind.about().name != step.effect
+    });
+    step.name_probability = posterior(own, others);
+}
+
+/// Returns the posterior probability of a name among its rivals, with equal priors. The odds of each rival come from
+/// mean and spread of the paired differences on blocks outside both fits (pseudo-BMA with the uncertainty of a sum over
+/// blocks, Yao et al. 2018, Bayesian Analysis 13(3)).
+fn posterior<'p>(own: &Profile, rivals: impl Iterator<Item = &'p Profile>) -> f64 {
+    let normal = Normal::standard();
+    let mut best: BTreeMap<&str, f64> = BTreeMap::new();
+    for rival in rivals {
+        let ahead = own.evidence.ahead_of(&rival.evidence);
+        let odds = normal.sf(ahead) / normal.cdf(ahead).max(f64::MIN_POSITIVE);
+        let most = best.entry(rival.candidate.kind.about().name).or_default();
+        *most = most.max(odds);
+    }
+    1.0 / (1.0 + best.values().sum::<f64>())
+}
+
+/// Returns true if a rival is not at a bound. A spring may also be too soft to tell, if a slightly stiffer one would
+/// rest not far from the motion.
+pub(crate) fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
+    let (gains, stds) = (&rival.evidence.gains, &rival.evidence.stds);
+    let (&[stiffness, preload], &[std, _]) = (&gains[..], &stds[..]) else {
+        return rival.vanished.is_none();
+    };
+    if rival.vanished.is_none() || rival.candidate.kind != Kind::Spring {
+        return rival.vanished.is_none();
+    }
+    let places = (runs.iter()).flat_map(|run| &run.joints[rival.candidate.joint].q);
+    let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+        [low.min(*q), high.max(*q)]
+    });
+    let pull = stiffness * 0.5 * (low + high) + preload;
+    pull.abs() <= (stiffness + SURELY * std) * SPANS_TO_REST * (high - low)
+}
+
+/// Returns true if the data support a rival equally well.
+pub(crate) fn equal(own: &Profile, rival: &Profile) -> bool {
+    rival.candidate.joint == own.candidate.joint
+        && rival.evidence.gain >= AS_GOOD * own.evidence.gain
+        && 1.0 - rival.evidence.gain <= LEAVES * (1.0 - own.evidence.gain)
+        && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE
+}

@@ -1,0 +1,9 @@
+//! Tests that an effect must pass, and what stays unexplained.
+
+pub(crate) mod credibility;
+pub(crate) mod judge;
+pub(crate) mod lack_of_fit;
+pub(crate) mod model_check;
+pub(crate) mod plausibility;
+pub(crate) mod residual_dependence;
+pub(crate) mod trial;

@@ -1,0 +1,535 @@
+//! Dependence of the residual on each coordinate of the motion: tests and sentences.
+//!
+//! Per coordinate, the cumulated residual (a marked empirical process: Stute 1997, Ann. Statist. 25) is compared with
+//! its wild block bootstrap (random signs per block: Cameron, Gelbach & Miller 2008). The p-values are corrected for
+//! the number of coordinates under any dependence (Benjamini & Yekutieli 2001).
+
+mod frequency;
+mod refitted;
+
+use rand::{RngExt, SeedableRng};
+
+use crate::acceptance::residual_dependence::frequency::{frequency, is_frequency};
+pub(crate) use crate::acceptance::residual_dependence::refitted::Refitted;
+use crate::outcome::Place;
+use crate::rows::nominal_torque::Predicted;
+use crate::rows::regression::Rows;
+use crate::search::fitted_candidate::SIGNIFICANT;
+use rig_data::prepare::central_difference;
+use rig_data::runs::Run;
+use rig_model::robot::{JointKind, Robot};
+use rig_output::{format_significant, format_unit};
+
+/// Number of bins with equal row counts.
+pub(crate) const BINS: usize = 24;
+/// Bootstrap draws …
+const DRAWS: usize = 999;
+/// … and those of a coordinate that no draw reaches, if the correction for the number of coordinates needs more. One
+/// alone among fifteen must reach 0.0002.
+const MOST_DRAWS: usize = 19_999;
+/// Coordinates of most laws.
+const OF_LAWS: [&str; 4] = [VELOCITY, POSITION, ACCELERATION, DRIVE];
+const VELOCITY: &str = "velocity";
+const POSITION: &str = "position";
+const ACCELERATION: &str = "acceleration";
+const DRIVE: &str = "torque of the drive";
+/// The coordinate of friction drift.
+pub(crate) const SINCE_START: &str = "time since the start, by direction";
+/// p-value from which on a dependence counts as chance.
+const BY_CHANCE: f64 = 0.05;
+/// Share of the explained squares within the reported interval.
+const MOST_OF_IT: f64 = 0.75;
+
+/// A coordinate of one joint on the kept rows.
+#[derive(Clone)]
+pub(crate) struct Coordinate {
+    /// Its name in words.
+    pub(crate) name: String,
+    /// Unit, ASCII.
+    pub(crate) unit: &'static str,
+    /// One value per row.
+    pub(crate) values: Vec<f64>,
+}
+
+impl Coordinate {
+    /// Returns true if laws of the library depend on it, so that a mismatch of a law follows it.
+    pub(crate) fn is_of_a_law(&self) -> bool {
+        OF_LAWS.contains(&self.name.as_str())
+    }
+}
+
+/// Returns all coordinates of a joint. `waves` are the orders per motor turn of its effects: bins of a turn would
+/// average a high order out.
+pub(crate) fn coordinates(
+    rows: &Rows,
+    runs: &[Run],
+    predicted: &[Predicted],
+    robot: &Robot,
+    joint: usize,
+    waves: &[f64],
+) -> Vec<Coordinate> {
+    let ratio = robot.joints[joint].gear_ratio();
+    let mut list: Vec<Coordinate> = Vec::new();
+    let mut add = |name: &str, unit: &'static str, of: &dyn Fn(usize, &Run) -> Vec<f64>| {
+        let mut values = Vec::with_capacity(rows.count);
+        for (r, run) in runs.iter().enumerate() {
+            rows.thinning.pick(&of(r, run), &mut values);
+        }
+        list.push(Coordinate {
+            name: name.to_owned(),
+            unit,
+            values,
+        });
+    };
+    let (p, f) = robot.joints[joint].kind.units();
+    let (v, a, rate) = match robot.joints[joint].kind {
+        JointKind::Revolute => ("rad/s", "rad/s^2", "N*m/s"),
+        JointKind::Prismatic => ("m/s", "m/s^2", "N/s"),
+    };
+    add(VELOCITY, v, &|_, run| run.joints[joint].qd.clone());
+    add(POSITION, p, &|_, run| run.joints[joint].q.clone());
+    add(ACCELERATION, a, &|_, run| run.joints[joint].qdd.clone());
+    let angle = |order: f64| {
+        let within = std::f64::consts::TAU;
+        move |_: usize, run: &Run| -> Vec<f64> {
+            (run.joints[joint].q.iter())
+                .map(|q| (order * ratio * q).rem_euclid(within))
+                .collect()
+        }
+    };
+    if ratio.abs() > 1.0 {
+        add("motor angle within a turn", "rad", &angle(1.0));
+    }
+    for order in waves {
+        let name = format!(
+            "motor angle within one wave, {} to a turn",
+            format_significant(*order, 3)
+        );
+        add(&name, "rad", &angle(*order));
+    }
+    add("torque on the gear along the motion", f, &|r, run| {
+        (predicted[r].load[joint].iter().zip(&run.joints[joint].qd))
+            .map(|(l, v)| l * v.signum())
+            .collect()
+    });
+    add(DRIVE, f, &|r, _| predicted[r].torque[joint].clone());
+    // Friction drift has zero mean over both directions.
+    add(SINCE_START, "s", &|_, run| {
+        (run.t.iter().zip(&run.joints[joint].qd))
+            .map(|(t, v)| v.signum() * (t - run.began))
+            .collect()
+    });
+    add("way since the last reversal, by direction", p, &|_, run| {
+        since_reversal(run, joint).0
+    });
+    add(
+        "time since the last reversal, by direction",
+        "s",
+        &|_, run| since_reversal(run, joint).1,
+    );
+    add("change of the drive's torque", rate, &|r, run| {
+        central_difference(&predicted[r].torque[joint], 1.0 / run.rate)
+    });
+    if runs.iter().all(|r| r.joints[joint].temperature.is_some()) {
+        add("temperature", "degC", &|_, run| {
+            run.joints[joint].temperature.clone().unwrap_or_default()
+        });
+    }
+    for other in 0..robot.joints.len() {
+        if other != joint {
+            list.push(Coordinate {
+                name: velocity_of(&robot.joints[other].name),
+                unit: match robot.joints[other].kind {
+                    JointKind::Revolute => "rad/s",
+                    JointKind::Prismatic => "m/s",
+                },
+                values: runs.iter().fold(Vec::new(), |mut values, run| {
+                    rows.thinning.pick(&run.joints[other].qd, &mut values);
+                    values
+                }),
+            });
+        }
+    }
+    list
+}
+
+/// Returns the name of another joint's velocity as a coordinate.
+pub(crate) fn velocity_of(joint: &str) -> String {
+    format!("velocity of joint {joint}")
+}
+
+/// Returns travel and time since reversal, with the sign of the direction.
+fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
+    let j = &run.joints[joint];
+    let (mut from, mut at, mut sign) = (0.0, 0.0, 0.0);
+    let mut lists = (Vec::with_capacity(run.len()), Vec::with_capacity(run.len()));
+    for k in 0..run.len() {
+        if j.qd[k].signum() != sign {
+            (from, at, sign) = (j.q[k], run.t[k], j.qd[k].signum());
+        }
+        lists.0.push(j.q[k] - from);
+        lists.1.push(sign * (run.t[k] - at));
+    }
+    lists
+}
+
+/// Sorts used rows into bins with equal counts. Returns the bin of each row (None if unused) and the edges.
+pub(crate) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<usize>>, Vec<f64>) {
+    let mut sorted: Vec<f64> = (values.iter().zip(keep))
+        .filter(|(_, k)| **k)
+        .map(|(v, _)| *v)
+        .collect();
+    sorted.sort_by(f64::total_cmp);
+    if sorted.is_empty() {
+        return (vec![None; values.len()], vec![0.0, 0.0]);
+    }
+    let edges: Vec<f64> = (0..=bins)
+        .map(|b| sorted[(b * (sorted.len() - 1)) / bins])
+        .collect();
+    let inner = &edges[1..bins];
+    let place = values
+        .iter()
+        .zip(keep)
+        .map(|(v, k)| k.then(|| inner.partition_point(|e| e < v)))
+        .collect();
+    (place, edges)
+}
+
+/// Additional knowledge about a residual.
+pub(crate) struct Known<'a> {
+    /// Components that a previous refit removed.
+    pub(crate) refitted: Refitted,
+    /// Runs that repeat each other.
+    pub(crate) pairs: &'a [(usize, usize)],
+}
+
+/// Returns the coordinates on which a joint's residual depends, the largest share of the excess over `floor` first.
+/// Empty if no dependence is beyond chance. `block` is the block of each row. With `known`, each draw of the bootstrap
+/// is refitted like the residual.
+pub(crate) fn locate(
+    rows: &Rows,
+    coordinates: &[Coordinate],
+    residual: &[f64],
+    known: Option<&Known>,
+    block: &[usize],
+    joint: usize,
+    joint_name: &str,
+    floor: f64,
+    seed: u64,
+) -> Vec<Place> {
+    let keep = &rows.keep[joint];
+    let used = rows.used(joint).max(1) as f64;
+    let none = Refitted::none();
+    let refitted = known.map_or(&none, |known| &known.refitted);
+    let residual = &refitted.rest(residual);
+    let squares: f64 = residual.iter().map(|r| r * r).sum();
+    let excess = (squares - used * floor * floor).max(0.0);
+    let blocks = block.iter().max().map_or(0, |b| b + 1);
+    let mut places: Vec<Place> = Vec::new();
+    let mut processes = Vec::new();
+    for coordinate in coordinates {
+        let (place, edges) = bins(&coordinate.values, keep, BINS);
+        let mut count = [0.0; BINS];
+        let mut sums = vec![[0.0; BINS]; blocks];
+        for ((b, r), blk) in place.iter().zip(residual).zip(block) {
+            if let Some(b) = b {
+                count[*b] += 1.0;
+                sums[*blk][*b] += r;
+            }
+        }
+        let total: [f64; BINS] = std::array::from_fn(|b| sums.iter().map(|s| s[b]).sum());
+        // Squares explained by the bin means, minus the noise part from the spread of the blocks.
+        let explained: [f64; BINS] = std::array::from_fn(|b| {
+            let noise: f64 = sums.iter().map(|s| s[b] * s[b]).sum();
+            if count[b] > 0.0 {
+                ((total[b] * total[b] - noise) / count[b]).max(0.0)
+            } else {
+                0.0
+            }
+        });
+        let all: f64 = explained.iter().sum();
+        let share = if excess > 0.0 {
+            (all / excess).min(1.0)
+        } else {
+            0.0
+        };
+        let (low, high) = narrowest(&explained, all);
+        let mean: [f64; BINS] = std::array::from_fn(|b| {
+            if count[b] > 0.0 {
+                total[b] / count[b]
+            } else {
+                0.0
+            }
+        });
+        places.push(Place {
+            joint: joint_name.to_owned(),
+            coordinate: coordinate.name.clone(),
+            interval: [edges[low], edges[high + 1]],
+            unit: coordinate.unit.to_owned(),
+            share,
+            p_value: 1.0,
+            text: sentence(coordinate, share, &edges, low, high, &mean, &count),
+        });
+        processes.push(Process {
+            taken: refitted.in_bins(&place),
+            sums,
+        });
+    }
+    let pairs = known.map_or(&[][..], |known| known.pairs);
+    if let Some((place, process)) = frequency(rows, residual, pairs, joint_name) {
+        places.push(place);
+        processes.push(process);
+    }
+    let along = refitted.along(residual, block, blocks);
+    for (place, p) in places
+        .iter_mut()
+        .zip(probabilities(&processes, &along, seed))
+    {
+        place.p_value = p;
+    }
+    places.retain(|place| place.p_value < BY_CHANCE);
+    places
+        .sort_by(|a, b| (is_frequency(a).cmp(&is_frequency(b))).then(b.share.total_cmp(&a.share)));
+    places
+}
+
+/// Sums of one coordinate, bin by bin.
+struct Process {
+    /// Of the residual, block by block.
+    sums: Vec<[f64; BINS]>,
+    /// Of the components that a refit removes, direction by direction.
+    taken: Vec<[f64; BINS]>,
+}
+
+/// Returns the p-value of each process, corrected for their number. If the correction makes significance impossible
+/// with `DRAWS`, processes that no draw reaches get more draws.
+fn probabilities(processes: &[Process], along: &[Vec<f64>], seed: u64) -> Vec<f64> {
+    let mut list: Vec<f64> = (processes.iter())
+        .map(|process| process_p(process, along, DRAWS, seed))
+        .collect();
+    if corrected(&list).iter().all(|p| *p >= SIGNIFICANT) {
+        for (p, process) in list.iter_mut().zip(processes) {
+            if *p <= 1.0 / (DRAWS + 1) as f64 {
+                *p = process_p(process, along, MOST_DRAWS, seed);
+            }
+        }
+    }
+    corrected(&list)
+}
+
+/// Corrects p-values for their number under any dependence (Benjamini & Yekutieli 2001).
+fn corrected(list: &[f64]) -> Vec<f64> {
+    let m = list.len();
+    let harmonic: f64 = (1..=m).map(|k| 1.0 / k as f64).sum();
+    let mut order: Vec<usize> = (0..m).collect();
+    order.sort_by(|a, b| list[*a].total_cmp(&list[*b]));
+    let mut result = vec![1.0; m];
+    let mut least = 1.0_f64;
+    for (rank, &k) in order.iter().enumerate().rev() {
+        least = least.min(list[k] * harmonic * m as f64 / (rank + 1) as f64);
+        result[k] = least;
+    }
+    result
+}
+
+/// Returns the p-value of the largest excursion of the cumulated residual, by the wild block bootstrap. `along` is the
+/// residual along each direction of the refit, block by block.
+fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> f64 {
+    let excursion = |sign: &mut dyn FnMut() -> f64| {
+        let mut total = [0.0; BINS];
+        let mut fitted = vec![0.0; process.taken.len()];
+        for (k, s) in process.sums.iter().enumerate() {
+            let w = sign();
+            for (t, x) in total.iter_mut().zip(s) {
+                *t += w * x;
+            }
+            // Without a refit, nothing is removed.
+            let own = along.get(k).map_or(&[][..], Vec::as_slice);
+            for (f, x) in fitted.iter_mut().zip(own) {
+                *f += w * x;
+            }
+        }
+        for (f, taken) in fitted.iter().zip(&process.taken) {
+            for (t, x) in total.iter_mut().zip(taken) {
+                *t -= f * x;
+            }
+        }
+        let (mut sum, mut most) = (0.0, 0.0_f64);
+        for t in total {
+            sum += t;
+            most = most.max(f64::abs(sum));
+        }
+        most
+    };
+    let found = excursion(&mut || 1.0);
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+    let beyond = (0..draws)
+        .filter(|_| excursion(&mut || if rng.random::<bool>() { 1.0 } else { -1.0 }) >= found)
+        .count();
+    (beyond + 1) as f64 / (draws + 1) as f64
+}
+
+/// Returns the shortest range of bins with most of the explained squares.
+fn narrowest(explained: &[f64; BINS], all: f64) -> (usize, usize) {
+    let mut best = (0, BINS - 1);
+    for low in 0..BINS {
+        let mut sum = 0.0;
+        for (high, e) in explained.iter().enumerate().skip(low) {
+            sum += e;
+            if sum >= MOST_OF_IT * all {
+                if high - low < best.1 - best.0 {
+                    best = (low, high);
+                }
+                break;
+            }
+        }
+    }
+    best
+}
+
+fn sentence(
+    coordinate: &Coordinate,
+    share: f64,
+    edges: &[f64],
+    low: usize,
+    high: usize,
+    mean: &[f64; BINS],
+    count: &[f64; BINS],
+) -> String {
+    let digits = format_significant;
+    let unit = format_unit(coordinate.unit);
+    let whole = low == 0 && high == BINS - 1;
+    let place = if whole {
+        "over its whole range".to_owned()
+    } else {
+        format!(
+            "mostly between {} and {} {unit}",
+            digits(edges[low], 3),
+            digits(edges[high + 1], 3)
+        )
+    };
+    let signed =
+        coordinate.values.iter().any(|v| *v < 0.0) && coordinate.values.iter().any(|v| *v > 0.0);
+    let parity = if signed {
+        // Bins of equal count are symmetric if the motion is.
+        let (mut odd, mut even) = (0.0, 0.0);
+        for b in 0..BINS / 2 {
+            let (x, y) = (mean[b], mean[BINS - 1 - b]);
+            let weight = count[b].min(count[BINS - 1 - b]);
+            odd += weight * (y - x) * (y - x);
+            even += weight * (y + x) * (y + x);
+        }
+        if odd > 4.0 * even {
+            ", odd in it"
+        } else if even > 4.0 * odd {
+            ", even in it"
+        } else {
+            ""
+        }
+    } else {
+        ""
+    };
+    format!(
+        "{:.0} % of the excess goes with the {}, {place}{parity}.",
+        100.0 * share,
+        coordinate.name
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fourteen coordinates without dependence, and one with a dependence in every block.
+    fn processes(found: f64) -> Vec<Process> {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+        let mut noise = || rng.random::<f64>() - 0.5;
+        (0..15)
+            .map(|c| {
+                let one = |_| -> [f64; BINS] {
+                    let place = |b: usize| if b < BINS / 2 { found } else { -found };
+                    std::array::from_fn(|b| noise() + if c == 3 { place(b) } else { 0.0 })
+                };
+                Process {
+                    sums: (0..60).map(one).collect(),
+                    taken: Vec::new(),
+                }
+            })
+            .collect()
+    }
+
+    fn no_refit() -> Vec<Vec<f64>> {
+        vec![Vec::new(); 60]
+    }
+
+    /// A residual refitted with x and a constant contains a cubic in x of a tenth of its noise. A refitted bootstrap
+    /// detects it, and has no more false alarms than its level without it.
+    #[test]
+    fn chance_is_refitted_where_the_residual_was() {
+        const ROWS: usize = 4000;
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(11);
+        let x: Vec<f64> = (0..ROWS).map(|k| (0.013 * k as f64).sin()).collect();
+        let columns = [x.clone(), vec![1.0; ROWS]];
+        let rows = Rows::of_columns(columns.map(|c| vec![Some(c)]).to_vec(), ROWS);
+        let known = Known {
+            refitted: Refitted::of(&rows, None, 0),
+            pairs: &[],
+        };
+        let block: Vec<usize> = (0..ROWS).map(|k| k / 40).collect();
+        let coordinate = Coordinate {
+            name: "x".into(),
+            unit: "",
+            values: x.clone(),
+        };
+        let mut found = |size: f64, seed: u64, as_it_was: bool| {
+            let residual: Vec<f64> = (x.iter())
+                .map(|x| size * x.powi(3) + 2.0 * (rng.random::<f64>() - 0.5))
+                .collect();
+            let residual = known.refitted.rest(&residual);
+            let chance = as_it_was.then_some(&known);
+            let coordinates = std::slice::from_ref(&coordinate);
+            let list = locate(
+                &rows,
+                coordinates,
+                &residual,
+                chance,
+                &block,
+                0,
+                "",
+                0.0,
+                seed,
+            );
+            usize::from(!list.is_empty())
+        };
+        let mut of = |size, as_it_was| (0..40).map(|k| found(size, k, as_it_was)).sum::<usize>();
+        let counts = [of(0.5, true), of(0.5, false), of(0.0, true)];
+        println!("{counts:?} of 40");
+        assert!(
+            counts[0] > 30 && counts[1] < 10 && counts[2] < 7,
+            "{counts:?}"
+        );
+    }
+
+    #[test]
+    fn a_gap_along_one_coordinate_alone_reaches_the_level() {
+        let list = probabilities(&processes(0.2), &no_refit(), 1);
+        assert!(list[3] < SIGNIFICANT, "{list:?}");
+        assert!(
+            list.iter().enumerate().all(|(c, p)| c == 3 || *p > 0.05),
+            "{list:?}"
+        );
+        let none = probabilities(&processes(0.0), &no_refit(), 1);
+        assert!(none.iter().all(|p| *p > SIGNIFICANT), "{none:?}");
+    }
+
+    #[test]
+    fn the_correction_is_that_of_benjamini_and_yekutieli() {
+        // 1 + 1/2 + 1/3 + 1/4 = 25/12; each times 4 over its rank, at most the next one.
+        let got = corrected(&[0.04, 0.001, 0.03, 0.5]);
+        let wanted = [1.0 / 9.0, 1.0 / 120.0, 1.0 / 9.0, 1.0];
+        assert!(
+            got.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12),
+            "{got:?}"
+        );
+    }
+}

@@ -1,0 +1,99 @@
+//! Acceptance of the effects found: tests by simulated motion and joint fit, on training data alone.
+
+use crate::DiagnoseError;
+use crate::acceptance::credibility::unbelieved;
+use crate::acceptance::judge::{Judge, Judged};
+use crate::description::preferred_values::by_description;
+use crate::fit::refit::Refit;
+use crate::models::bodies::Fitting;
+use crate::models::simulated_motion::Replay;
+use crate::outcome::Tried;
+use crate::result::steps::{refuse, refuse_guesses};
+use crate::search::fitted_candidate::Profile;
+
+/// Data for the acceptance tests.
+pub(crate) struct Trial<'a, 'r> {
+    /// The training data.
+    pub(crate) judge: &'a Judge<'a, 'r>,
+    /// The nominal model on them.
+    pub(crate) refit: &'a Refit<'r>,
+    /// Models with effects.
+    pub(crate) fitting: &'a Fitting<'a, 'r>,
+    /// Simulation of the training motion.
+    pub(crate) replay: &'a Replay<'a>,
+}
+
+/// Result of the acceptance tests.
+pub(crate) struct Survivors {
+    /// Accepted effects.
+    pub(crate) judged: Judged,
+    /// Dropped effects with a large gain.
+    pub(crate) fallen: Vec<Profile>,
+}
+
+impl Trial<'_, '_> {
+    /// Drops effects that fail a test, one at a time, and writes the reason to `tried`.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn stand(
+        &self,
+        found: Vec<Profile>,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let Self { judge, refit, .. } = self;
+        let (robot, search) = (judge.robot, judge.search);
+        let judged = judge.judged(found)?;
+        refuse_guesses(robot, tried, &judged);
+        let judged = by_description(judge, refit, self.fitting.bench, judged)?;
+        refuse_guesses(robot, tried, &judged);
+        let mut left = Survivors {
+            judged,
+            fallen: Vec::new(),
+        };
+        // An effect that increases the simulated error replaces another one.
+        let why = "explains torque, but the simulated motion gets worse with it";
+        left = self.unspoilt(left, why, tried)?;
+        while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
+            left = self.without(left, k, why, tried)?;
+        }
+        Ok(left)
+    }
+
+    /// Drops effects that degrade the simulated training motion.
+    fn unspoilt(
+        &self,
+        mut left: Survivors,
+        why: &str,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let given = |chosen: &[Profile]| self.judge.search.count_given(chosen);
+        while let Some(k) = {
+            let chosen = &left.judged.chosen;
+            self.replay.spoiling(chosen, given(chosen))?
+        } {
+            left = self.without(left, k, why, tried)?;
+        }
+        Ok(left)
+    }
+
+    fn without(
+        &self,
+        Survivors { judged, mut fallen }: Survivors,
+        k: usize,
+        why: &str,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let (robot, search) = (self.judge.robot, self.judge.search);
+        let mut stand = judged.chosen;
+        let gone = stand.remove(k);
+        refuse(robot, tried, &gone, why);
+        if gone.takes_much(search.trials()) {
+            fallen.push(gone);
+        }
+        let stand = search.possible(&self.refit.base, stand)?;
+        let judged = self.judge.judged(stand)?;
+        refuse_guesses(robot, tried, &judged);
+        Ok(Survivors { judged, fallen })
+    }
+}

@@ -1,0 +1,7 @@
+//! Torque of each effect along the measured motion.
+
+pub(crate) mod effect_columns;
+pub(crate) mod slopes;
+pub(crate) mod transmission;
+pub(crate) mod wave_orders;
+pub(crate) mod waves;

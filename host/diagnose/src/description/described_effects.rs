@@ -1,0 +1,457 @@
+//! Described effects beyond the standard model, and their treatment.
+//!
+//! A described effect starts the search with its parameters, and is refitted with everything else. If the recordings
+//! neither show nor contradict it, it is held as described, and its torque subtracted. So is one without columns in the
+//! search. A tilt is held until the recordings show another one, which then replaces it. A payload is a mass of its
+//! link.
+//!
+//! Limit: held effects between motor and link cannot be subtracted from the torque of a given motion.
+
+use std::collections::BTreeMap;
+
+use rig_shared::effects::{Channel, Effect, Kind};
+use rig_shared::multibody::Chain;
+
+use crate::DiagnoseError;
+use crate::columns::effect_columns::{Candidate, Source};
+use crate::fit::least_squares::Fit;
+use crate::outcome::{Described, Fate, Value};
+use crate::search::fitted_candidate::Profile;
+use crate::search::stepwise::{is_gear, with};
+use rig_model::effects::{Effects, is_torque};
+use rig_model::robot::{JointKind, Placed, Robot, RobotEffect, title_of, unit_of};
+use rig_output::{format_significant, format_unit};
+
+/// Standard deviations within which a fitted gain agrees with the described one.
+const AGREES: f64 = 3.0;
+/// Relative difference above which a value has changed …
+const CHANGED: f64 = 0.1;
+/// … and the standard deviations that it must also exceed.
+const SURE: f64 = 5.0;
+
+/// Treatment of a described effect.
+#[derive(Clone, Debug, PartialEq)]
+enum Way {
+    /// Part of the link.
+    Link,
+    /// Fitted: the search begins with it.
+    Free,
+    /// Held as described, with the reason, and whether its torque is subtracted.
+    Held { why: String, taken_off: bool },
+    /// Removed: the recordings show another effect of its kind.
+    GivenUp,
+}
+
+impl Way {
+    /// Returns the treatment of an effect held in a search by torque.
+    fn held(kind: Kind, why: &str) -> Self {
+        let seen = !matches!(
+            kind.about().channel,
+            Channel::Voltage | Channel::Transmission
+        );
+        Self::Held {
+            why: why.to_owned(),
+            taken_off: seen && kind != Kind::ViscousWarmupTemperature,
+        }
+    }
+}
+
+/// The effects of a description.
+#[derive(Clone, Debug)]
+pub(crate) struct Stated {
+    /// The description without its effects; payloads are part of their links.
+    pub(crate) robot: Robot,
+    /// True if the format of the description has no constant torque.
+    pub(crate) no_offsets: bool,
+    /// True if the recordings tell which part of a described constant torque is external.
+    pub(crate) pulls_told: bool,
+    /// Sentences about ignored torque limits.
+    pub(crate) lifted: Vec<String>,
+    effects: Vec<(RobotEffect, Placed, Way)>,
+}
+
+impl Stated {
+    /// Reads the effects of a description.
+    pub(crate) fn of(robot: &Robot) -> Self {
+        let mut plain = robot.clone();
+        plain.effects.clear();
+        let placed = robot.placed_effects();
+        let effects = (robot.effects.iter().cloned().zip(placed))
+            .map(|(effect, placed)| {
+                let way = match placed.effect.kind {
+                    Kind::Payload => {
+                        carried(&mut plain, &placed);
+                        Way::Link
+                    }
+                    kind @ Kind::GravityTilt => Way::held(kind, "what is fitted of a tilt is the direction of gravity, which the description states beside it"),
+                    kind if kind.about().channel == Channel::Voltage => {
+                        Way::held(kind, "it shows in the motor's voltage alone")
+                    }
+                    _ => Way::Free,
+                };
+                (effect, placed, way)
+            })
+            .collect();
+        Self {
+            robot: plain,
+            no_offsets: false,
+            pulls_told: false,
+            lifted: Vec::new(),
+            effects,
+        }
+    }
+
+    /// Returns the effects that are refitted, in the order of the description.
+    pub(crate) fn free(&self) -> Vec<Placed> {
+        let of = |(_, placed, way): &(_, Placed, Way)| (*way == Way::Free).then_some(*placed);
+        self.effects.iter().filter_map(of).collect()
+    }
+
+    /// Returns the tables of the held effects.
+    pub(crate) fn held(&self) -> impl Iterator<Item = &RobotEffect> {
+        let held = |(_, _, way): &&(RobotEffect, Placed, Way)| matches!(way, Way::Held { .. });
+        self.effects.iter().filter(held).map(|(effect, ..)| effect)
+    }
+
+    /// Returns the removed effects.
+    pub(crate) fn given_up(&self) -> impl Iterator<Item = &Placed> {
+        let out = |(_, _, way): &&(_, Placed, Way)| *way == Way::GivenUp;
+        self.effects.iter().filter(out).map(|(_, placed, _)| placed)
+    }
+
+    /// Removes held tilts if a tilt was found beside them. A wrong described tilt would otherwise appear as a
+    /// difference. Returns true if any was removed.
+    pub(crate) fn give_up_tilts(&mut self, found: &[Profile]) -> bool {
+        let tilted = |kind: Kind| kind == Kind::GravityTilt;
+        let another = found.iter().any(|p| tilted(p.candidate.kind));
+        let mut changed = false;
+        for (_, placed, way) in &mut self.effects {
+            if another && tilted(placed.effect.kind) && *way != Way::GivenUp {
+                *way = Way::GivenUp;
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Returns true if an effect of the kind is held on a joint.
+    pub(crate) fn holds(&self, kind: Kind, joint: usize) -> bool {
+        let of = |(_, placed, way): &(_, Placed, Way)| {
+            placed.effect.kind == kind && placed.joint == joint && matches!(way, Way::Held { .. })
+        };
+        self.effects.iter().any(of)
+    }
+
+    /// Returns true if the description has the effect, with any treatment.
+    pub(crate) fn states(&self, effect: &Candidate) -> bool {
+        self.effects
+            .iter()
+            .any(|(_, placed, _)| is_one(placed, effect))
+    }
+
+    /// Returns the held effects to subtract from recordings, without external loads if `unburdened`; None if nothing is
+    /// held.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] if the description makes no chain.
+    pub(crate) fn taken_off(
+        &self,
+        unburdened: bool,
+    ) -> Result<Option<(Effects, Chain<f64>)>, DiagnoseError> {
+        let mut robot = self.robot.clone();
+        let there = |e: &&RobotEffect| !(unburdened && e.effect.kind.is_external());
+        robot.effects = self.held().filter(there).cloned().collect();
+        if robot.effects.is_empty() {
+            return Ok(None);
+        }
+        let failed = |e: &dyn std::fmt::Display| DiagnoseError::Model(e.to_string());
+        let effects = Effects::of(&robot).map_err(|e| failed(&e))?;
+        let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| failed(&e))?;
+        Ok(Some((effects, chain)))
+    }
+
+    /// Returns the description to simulate and compare with recordings without the torque of held effects.
+    pub(crate) fn moving(&self) -> Robot {
+        let free = self.effects.iter().filter(|(.., way)| *way == Way::Free);
+        Robot {
+            effects: free.map(|(effect, ..)| effect.clone()).collect(),
+            ..self.robot.clone()
+        }
+    }
+
+    /// Holds fitted effects that are not in the library. Returns true if there was one.
+    pub(crate) fn hold_what_is_not_in(&mut self, library: &[Candidate]) -> bool {
+        let mut changed = false;
+        for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
+            if !library.contains(&candidate(placed).sort()) {
+                let why = match placed.effect.kind {
+                    Kind::ViscousWarmupTemperature => "the temperature was not recorded throughout",
+                    _ => "it was left out of the search",
+                };
+                *way = Way::held(placed.effect.kind, why);
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Holds delays of up to `slack`, s: without a description they would count as sampling. Returns true if there was
+    /// one.
+    pub(crate) fn hold_delays(&mut self, slack: f64) -> bool {
+        let mut changed = false;
+        for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
+            let kind = placed.effect.kind;
+            if kind == Kind::MeasurementDelay && placed.effect.gains[0] <= slack {
+                let why = "it is no longer than what the instants of sampling may make of it";
+                *way = Way::held(kind, why);
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Returns true if the fit changed the described effects: one is gone, or a value differs by more than noise and
+    /// rounding.
+    pub(crate) fn changed(&self, told: &[Described]) -> bool {
+        (self.effects.iter().zip(told)).any(|((effect, ..), now)| match now.fate {
+            Fate::Dropped => true,
+            Fate::FittedAgain => effect.values().any(|(p, stated)| {
+                (now.parameters.get(p.name)).is_some_and(|value| is_another(value, stated))
+            }),
+            Fate::Held | Fate::InTheLink => false,
+        })
+    }
+
+    /// Holds fitted effects that were not found, unless the recordings contradict them. Link encoders contradict those
+    /// that are `refuted`. Returns true if any was held.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn hold_what_is_not_refuted(
+        &mut self,
+        source: &Source,
+        base: &Fit,
+        found: &[Profile],
+        refuted: &dyn Fn(&Candidate) -> bool,
+    ) -> Result<bool, DiagnoseError> {
+        let stays = self.matched(found);
+        let fit = with(base, found, None);
+        let mut changed = false;
+        for ((_, placed, way), stays) in self.effects.iter_mut().zip(stays) {
+            // If another gear was found on the joint, it replaces this one.
+            let replaced = is_gear(placed.effect.kind)
+                && (found.iter())
+                    .any(|p| p.candidate.joint == placed.joint && is_gear(p.candidate.kind));
+            if *way != Way::Free || stays.is_some() || replaced || refuted(&candidate(placed)) {
+                continue;
+            }
+            let columns = source.columns(&candidate(placed), &placed.effect.shapes)?;
+            let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; columns.len()];
+            let shown = (fit.distinct(&columns)).and_then(|own| fit.evidence(&own, &open));
+            let why = match shown {
+                None => {
+                    "along this motion its torque is a combination of what other parameters give"
+                }
+                Some(e)
+                    if (gains(placed).iter().zip(e.gains.iter().zip(&e.stds)))
+                        .all(|(stated, (gain, std))| (gain - stated).abs() <= AGREES * std) =>
+                {
+                    "these recordings neither show nor contradict it"
+                }
+                Some(_) => continue,
+            };
+            *way = Way::held(placed.effect.kind, why);
+            changed = true;
+        }
+        Ok(changed)
+    }
+
+    /// Returns the index of each described effect among those found; with several orders, the nearest one.
+    pub(crate) fn matched(&self, found: &[Profile]) -> Vec<Option<usize>> {
+        let mut taken = vec![false; found.len()];
+        (self.effects.iter())
+            .map(|(_, placed, way)| {
+                let off = |k: &usize| (found[*k].shapes[0] - placed.effect.shapes[0]).abs();
+                let place = (0..found.len())
+                    .filter(|k| *way == Way::Free && !taken[*k])
+                    .filter(|k| is_one(placed, &found[*k].candidate))
+                    .min_by(|a, b| off(a).total_cmp(&off(b)))?;
+                taken[place] = true;
+                Some(place)
+            })
+            .collect()
+    }
+
+    /// Returns the fate of each described effect, in order. `now` are law and parameters of those in the model.
+    pub(crate) fn told(&self, now: Vec<Option<Now>>) -> Vec<Described> {
+        (self.effects.iter().zip(now))
+            .map(|((effect, placed, way), now)| {
+                let kind = now.as_ref().map_or(placed.effect.kind, |now| now.kind);
+                let joint = &self.robot.joints[placed.joint];
+                let what = format!("{} of joint {}", title_of(kind), joint.name);
+                let (fate, text) = match (way, &now) {
+                    (Way::Link, _) => (
+                        Fate::InTheLink,
+                        format!("The description's payload on joint {} counts as part of its link, where model.toml has it.", joint.name),
+                    ),
+                    (Way::Held { why, taken_off }, _) => (
+                        Fate::Held,
+                        format!(
+                            "The description's {what} is held as stated{}: {why}.",
+                            if *taken_off { ", and was taken off the recordings" } else { "" }
+                        ),
+                    ),
+                    (Way::Free, Some(now)) => (
+                        Fate::FittedAgain,
+                        format!(
+                            "The description's {what} stays, fitted again together with everything else.{}",
+                            what_changed(effect, now, joint.kind)
+                        ),
+                    ),
+                    (Way::Free | Way::GivenUp, _) => {
+                        let values = effect.values().map(|(p, value)| {
+                            let unit = unit_of(p, joint.kind);
+                            format!("{} {} {unit}", p.name, format_significant(value, 3))
+                        });
+                        let values: Vec<String> = values.collect();
+                        (
+                            Fate::Dropped,
+                            format!(
+                                "The description's {what} ({}) is not in model.toml: beside everything else that these recordings show it does not stand as stated.{}",
+                                values.join(", "),
+                                match way {
+                                    Way::GivenUp => " What they show of a tilt is in the direction of gravity.",
+                                    _ => "",
+                                }
+                            ),
+                        )
+                    }
+                };
+                Described {
+                    effect: kind.about().name.to_owned(),
+                    law: kind.about().law.map(str::to_owned),
+                    joint: joint.name.clone(),
+                    fate,
+                    parameters: now.map(|now| now.parameters).unwrap_or_default(),
+                    text,
+                }
+            })
+            .collect()
+    }
+
+    /// Sets the treatment for a model with a voltage input. Effects of its `library` are refitted, other torques take
+    /// part unchanged, the rest is ignored. Returns those that take part, and whether each is fitted.
+    pub(crate) fn driven(&mut self, library: &[Kind]) -> Vec<(Effect<f64>, bool)> {
+        let mut parts = Vec::new();
+        for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w != Way::Link) {
+            let kind = placed.effect.kind;
+            let fitted = library.contains(&kind);
+            let torque = is_torque(kind) && kind != Kind::ViscousWarmupTemperature;
+            if fitted || torque {
+                parts.push((placed.effect, fitted));
+            }
+            *way = if fitted {
+                Way::Free
+            } else {
+                let why = if torque {
+                    "it takes part in the simulation, and is not fitted to a voltage"
+                } else {
+                    "the simulation of a joint that its voltage drives does not have it"
+                };
+                Way::Held {
+                    why: why.into(),
+                    taken_off: false,
+                }
+            };
+        }
+        parts
+    }
+
+    /// Returns the tables of effects that take no part in a model with a voltage input; after [`Self::driven`].
+    pub(crate) fn undriven(&self) -> Vec<RobotEffect> {
+        (self.held())
+            .filter(|e| {
+                !is_torque(e.effect.kind) || e.effect.kind == Kind::ViscousWarmupTemperature
+            })
+            .cloned()
+            .collect()
+    }
+
+    /// Returns the kinds of the refitted effects; None for the others, in the order of the description.
+    pub(crate) fn fitted(&self) -> impl Iterator<Item = Option<Kind>> {
+        let of =
+            |(_, placed, way): &(_, Placed, Way)| (*way == Way::Free).then_some(placed.effect.kind);
+        self.effects.iter().map(of)
+    }
+}
+
+/// A described effect in the last model.
+pub(crate) struct Now {
+    /// Its law.
+    pub(crate) kind: Kind,
+    /// Its fitted values.
+    pub(crate) parameters: BTreeMap<String, Value>,
+}
+
+/// Returns true if a fitted value differs from the described one by more than noise and rounding.
+fn is_another(value: &Value, stated: f64) -> bool {
+    let off = (value.value - stated).abs();
+    off > CHANGED * stated.abs() && off > SURE * value.std
+}
+
+/// Returns a sentence on the changed values of a described effect; empty if none changed.
+fn what_changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
+    let changed: Vec<String> = (effect.values())
+        .filter_map(|(p, stated)| {
+            let value = now.parameters.get(p.name)?;
+            let unit = match unit_of(p, kind) {
+                unit if unit == "1" => String::new(),
+                unit => format!(" {}", format_unit(&unit)),
+            };
+            let [from, to] = [stated, value.value].map(|x| format_significant(x, 4));
+            is_another(value, stated).then(|| format!("{} from {from} to {to}{unit}", p.name))
+        })
+        .collect();
+    match changed.as_slice() {
+        [] => String::new(),
+        list => format!(" Changed: {}.", list.join(", ")),
+    }
+}
+
+/// Returns the candidate of a described effect.
+pub(crate) fn candidate(placed: &Placed) -> Candidate {
+    Candidate::on(placed.effect.kind, placed.joint)
+        .naming(placed.other)
+        .shaped(&placed.effect.shapes)
+}
+
+/// Returns the described gains of the columns. The twist of a gear has gain 1.
+pub(crate) fn gains(placed: &Placed) -> Vec<f64> {
+    if is_gear(placed.effect.kind) {
+        return vec![1.0];
+    }
+    placed.effect.gains[..placed.effect.kind.about().gains.len()].to_vec()
+}
+
+/// Returns true if an effect is the described one, with any law. A wave of another order is another effect.
+pub(crate) fn is_one(placed: &Placed, effect: &Candidate) -> bool {
+    placed.effect.kind.about().name == effect.kind.about().name
+        && placed.joint == effect.joint
+        && placed.other == effect.other
+        && !candidate(placed).is_another_order(effect)
+}
+
+/// Adds a payload to its link, if the description gives the link's mass.
+fn carried(robot: &mut Robot, placed: &Placed) {
+    let (mass, arm) = (placed.effect.gains[0], placed.effect.shapes[0]);
+    if let Some(link) = robot.joints[placed.joint].inertial.as_mut() {
+        link.mass += mass;
+        link.first_moment[0] += mass * arm;
+        // Iyy and Izz of a point on x.
+        link.inertia[3] += mass * arm * arm;
+        link.inertia[5] += mass * arm * arm;
+    }
+}
+
+#[cfg(test)]
+mod tests;

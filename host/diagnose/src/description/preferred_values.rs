@@ -1,0 +1,83 @@
+//! Choice among equal names by the described values.
+//!
+//! A wrong name can fit as well if nominal parameters compensate: a constant replaces a spring if gravity absorbs its
+//! stiffness. With the right name, the described values hold.
+
+use rig_shared::effects::Kind;
+
+use crate::DiagnoseError;
+use crate::acceptance::judge::{BEYOND_FLOOR, Judge, Judged, equal};
+use crate::fit::refit::Refit;
+use crate::models::parameter_change::is_loaded;
+use crate::recordings::context::Bench;
+use crate::search::fitted_candidate::{Profile, stiff};
+use crate::search::stepwise::with;
+
+/// Largest ratio of residuals beyond the floor, of a rival to the name, that replaces it (described values).
+const MUCH_LESS: f64 = 0.5;
+
+/// Largest ratio of a rival's residual to the floor with the described values. If it leaves more, these values have
+/// changed and do not decide.
+const STANDS: f64 = 2.0;
+
+/// Replaces names by equal ones that leave much less with the described values.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(crate) fn by_description(
+    judge: &Judge,
+    refit: &Refit,
+    bench: &Bench,
+    judged: Judged,
+) -> Result<Judged, DiagnoseError> {
+    // A load on the link also changes its inertia, which no other name explains. Then the description does not decide.
+    if !bench.anchor.stated || is_loaded(bench, refit, &judged.chosen) {
+        return Ok(judged);
+    }
+    let frozen = refit.frozen(bench);
+    let left = |list: &[Profile], joint: usize| with(&frozen, list, None).rms(joint);
+    // With the described gravity, a spring hidden behind it becomes visible.
+    let stands = |rival: &Profile, list: &[Profile], k: usize| {
+        let shows = || stiff(&with(&frozen, list, Some(k)), &rival.columns);
+        rival.vanished.is_none() || rival.candidate.kind == Kind::Spring && shows()
+    };
+    let mut chosen = judged.chosen.clone();
+    let mut moved = false;
+    for k in 0..chosen.len() {
+        // The description itself gives this name.
+        if judge.search.rank_of(&chosen[k].candidate) < 2 {
+            continue;
+        }
+        let joint = chosen[k].candidate.joint;
+        let floor = judged.quiet[joint];
+        let own = left(&chosen, joint);
+        if own < BEYOND_FLOOR * floor {
+            continue;
+        }
+        let rivals = judge.search.alternatives(judge.base, &chosen, k)?;
+        let best = (rivals.into_iter())
+            .filter(|rival| {
+                !(judge.search).is_not(&chosen[k].candidate, rival.candidate.kind)
+                    && equal(&chosen[k], rival)
+                    && stands(rival, &chosen, k)
+            })
+            .map(|rival| {
+                let mut list = chosen.clone();
+                list[k] = rival;
+                (left(&list, joint), list)
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((less, list)) = best
+            && less < STANDS * floor
+            && less - floor < MUCH_LESS * (own - floor)
+        {
+            chosen = list;
+            moved = true;
+        }
+    }
+    if moved {
+        judge.judged(chosen)
+    } else {
+        Ok(judged)
+    }
+}

@@ -1,0 +1,164 @@
+//! Recordings with a wrong sign, unit, ratio, clock or saturation.
+//!
+//! Every robot has positive friction and inertia, and gravity repeats once per turn. The description's values are right
+//! within a small factor. A deviation by a factor of units, ratios or senses is a data fault and is named; no effect
+//! explains it. A factor below five that no unit has is a change of the robot, which other modules judge.
+//!
+//! Leaves out: faults in consistent data where the description states nothing (both signs reversed, one factor on
+//! everything); a late torque of a slow arm with few harmonics, as many parameters compensate it; intermittent faults;
+//! a sign that many parameters compensate in a short motion.
+
+mod alike;
+mod candidates;
+mod columns;
+mod fit;
+mod gravity;
+mod link;
+mod magnitude;
+mod model;
+pub(crate) mod names;
+pub(crate) mod nnls;
+mod order;
+mod physical;
+mod place;
+pub(crate) mod refusal;
+mod rotor;
+mod rows;
+mod senses;
+mod trial;
+mod undo;
+mod wave;
+
+#[cfg(test)]
+mod tests;
+
+pub(crate) use columns::{moves, spoilt_columns, too_short_to_judge, too_short_to_learn};
+
+use crate::DiagnoseError;
+use crate::outcome::{About, DataFault};
+use rig_data::Source;
+use rig_data::prepare::{Beginning, LowPass, Recording, Resampled};
+use rig_data::runs::Run;
+use rig_data::runs::runs_of;
+use rig_model::robot::Robot;
+
+/// Cut-off of the judged positions, Hz.
+const BAND: f64 = 20.0;
+
+/// Returns the faults of each recording; empty if there are none.
+///
+/// A recording at rest is a fault only if no recording moves: a log with the drive off belongs to the experiments. Only
+/// the first 6000 rows of 20 ms are compared with the model.
+///
+/// # Errors
+/// [`DiagnoseError::Model`] if the description's geometry is no chain.
+pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseError> {
+    let recordings = runs.iter().map(|run| run.recording + 1).max().unwrap_or(0);
+    let n = robot.joints.len();
+    let moves = |run: &Run| (0..n).any(|j| columns::moves(run, j));
+    let any = runs.iter().any(moves);
+    let mut found = Vec::new();
+    for recording in 0..recordings {
+        let own: Vec<&Run> = runs.iter().filter(|r| r.recording == recording).collect();
+        if own.is_empty() {
+            continue;
+        }
+        // The clock determines the length of a recording.
+        if let Some(fault) = columns::clock(robot, &own).or_else(|| columns::too_short(&own)) {
+            found.push(fault);
+            continue;
+        }
+        if !own.iter().any(|run| moves(run)) {
+            if !any {
+                found.push(columns::fault(
+                    &own,
+                    "not-moving",
+                    About::Recording,
+                    "",
+                    "No joint moves by more than the noise of its encoder; record a motion, or check that the position column is alive.".to_owned(),
+                ));
+            }
+            continue;
+        }
+        found.extend(of_one(robot, &own)?);
+    }
+    Ok(found)
+}
+
+/// Returns faults in the first `rows` rows of a recording, before a fit: signs, units, ratios, clocks and exchanged
+/// columns. Saturation is reported as not certain: a fit excludes such rows.
+///
+/// # Errors
+/// Errors of reading, and [`DiagnoseError::Model`].
+pub fn faults_at_start(
+    robot: &Robot,
+    source: &Source,
+    rows: usize,
+) -> Result<Vec<DataFault>, DiagnoseError> {
+    let sampling = source.sampling();
+    let rate = 1.0 / sampling.period;
+    let Some(low_pass) = LowPass::butterworth(4, f64::min(BAND, 0.2 * rate), rate) else {
+        return Ok(Vec::new());
+    };
+    // Uneven rows must be resampled before differentiation.
+    let even = Resampled::new(source, sampling.period);
+    let recording: &dyn Recording = if sampling.irregular { &even } else { source };
+    let runs = runs_of(&Beginning { recording, rows }, 0, rate, &low_pass)?;
+    let own: Vec<&Run> = runs.iter().collect();
+    if own.is_empty() || columns::too_short(&own).is_some() {
+        return Ok(Vec::new());
+    }
+    let mut found = faults(robot, &runs)?;
+    found.retain(|fault| !["not-moving", "too-short"].contains(&fault.kind.as_str()));
+    // The fit excludes rows at a limit.
+    for fault in found.iter_mut().filter(|fault| fault.kind == "saturation") {
+        fault.certain = false;
+    }
+    Ok(found)
+}
+
+fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError> {
+    let n = robot.joints.len();
+    let units = columns::units(robot, runs);
+    if units
+        .iter()
+        .any(|(_, fault)| columns::spoils_the_model(fault))
+    {
+        return Ok(units.into_iter().map(|(_, fault)| fault).collect());
+    }
+    let torque = runs
+        .iter()
+        .all(|run| run.joints.len() == n && run.joints.iter().all(|j| j.tau.len() == j.q.len()));
+    let mut judged = if torque {
+        model::Judge::new(robot, runs)?.faults()?
+    } else {
+        Vec::new()
+    };
+    let (doubts, units): (Vec<_>, Vec<_>) =
+        units.into_iter().partition(|(_, fault)| !fault.certain);
+    if !units.is_empty() {
+        // Drops consequences: faults of other joints from a wrong unit, and torque faults from a wrong position.
+        let own = |f: &DataFault| units.iter().find(|(_, fault)| fault.joint == f.joint);
+        let of_torque = |f: &DataFault| f.about == About::Torque;
+        judged.retain(|f| own(f).is_some_and(|(_, unit)| of_torque(unit) || !of_torque(f)));
+    }
+    // Faults by the model are more precise than those by plausibility limits.
+    let mut found: Vec<DataFault> = units
+        .into_iter()
+        .map(|(_, fault)| fault)
+        .filter(|fault| judged.iter().all(|f| f.joint != fault.joint))
+        .collect();
+    found.extend(judged);
+    found.extend(doubts.into_iter().map(|(_, fault)| fault));
+    for j in 0..n {
+        // A wrong position also contradicts the measured velocity.
+        if found.iter().all(|f| f.joint != robot.joints[j].name) {
+            found.extend(columns::velocity(robot, runs, j));
+        }
+        if found.iter().all(|f| f.joint != robot.joints[j].name) {
+            found.extend(link::fault(robot, runs, j));
+        }
+        found.extend(columns::at_limit(robot, runs, j));
+    }
+    Ok(found)
+}

@@ -1,0 +1,419 @@
+//! Faults of clocks, torque cuts and position scales, by a refitted simple model.
+
+use nalgebra::DMatrix;
+
+use crate::DiagnoseError;
+use crate::faults::candidates::Found;
+use crate::faults::columns::fault;
+use crate::faults::fit::{Fit, Measured};
+use crate::faults::names;
+use crate::faults::rows::{Form, Rows};
+use crate::faults::trial::Suspicion;
+use crate::faults::undo::Undo;
+use crate::outcome::{About, DataFault};
+use rig_data::runs::Run;
+use rig_identify::preference;
+use rig_model::robot::{JointKind, Robot};
+use rig_output::format_trimmed;
+
+/// Residual share of the torque's variance above which other units or times are tried.
+pub(crate) const POOR: f64 = 0.1;
+/// The same for a single joint, whose few parameters cannot compensate a wrong unit or time; and for a shift in time of
+/// any robot, as many parameters of a slow arm compensate most of it.
+const POOR_ALONE: f64 = 0.01;
+/// … and ratio of residuals below which a trial is believed, if its own is below [`GOOD`] too.
+const BETTER: f64 = 0.35;
+/// Ratio of residuals below which a shift is suspected; the trial decides.
+const LESS: f64 = 0.7;
+/// The same for factors that no unit has and for a reversed position, which any model may prefer by chance.
+pub(crate) const MUCH_BETTER: f64 = 0.2;
+/// … and for a small misfit.
+const FAR_BETTER: f64 = 0.1;
+pub(crate) const GOOD: f64 = 0.2;
+/// Largest shift from filters and buses instead of clocks, s: half a row. The second is for several joints, whose many
+/// parameters may prefer a small shift by chance.
+const SHIFT: [f64; 2] = [0.01, 0.03];
+/// Largest shift that counts as small, s.
+const SMALL: f64 = 0.1;
+/// Largest shift that is tried, s; at most a quarter of the recording.
+const FARTHEST: f64 = 5.0;
+/// Time in motion that shows a shift, as a multiple of it. A shift can explain any single short motion (the last second
+/// of the Stäubli TX40's fifth joint).
+const SHOWN_BY: f64 = 5.0;
+/// Share of a joint's highest speed above which it moves.
+const IN_MOTION: f64 = 0.05;
+/// Position range above which a joint moves, rad or m.
+const STIRS: f64 = 0.01;
+/// Share of a joint's range by which a position may lie outside it: limits are described with some care.
+const OUTSIDE: f64 = 0.2;
+/// Relative difference below which two factors are the same.
+const SAME: f64 = 0.1;
+/// Rows of one trial.
+pub(crate) const TRIAL: usize = 500;
+/// Share of a torque's variance that rounding leaves, the least scale of data without noise.
+pub(crate) const EXACT: f64 = 1e-6;
+
+/// One recording, compared with models of the robot.
+pub(crate) struct Judge<'a> {
+    pub(crate) robot: &'a Robot,
+    pub(crate) runs: &'a [&'a Run],
+    pub(crate) form: Form,
+    pub(crate) rows: Rows,
+    pub(crate) order: Vec<usize>,
+    pub(crate) matrices: Vec<DMatrix<f64>>,
+    pub(crate) fits: Vec<Option<Fit>>,
+}
+
+pub(crate) fn model_error(error: impl ToString) -> DiagnoseError {
+    DiagnoseError::Model(error.to_string())
+}
+
+impl<'a> Judge<'a> {
+    pub(crate) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
+        Self::of_rows(robot, runs, Rows::of(runs, robot.joints.len()))
+    }
+
+    fn of_rows(robot: &'a Robot, runs: &'a [&'a Run], rows: Rows) -> Result<Self, DiagnoseError> {
+        let form = Form::of(robot)?;
+        let kinds: Vec<JointKind> = robot.joints.iter().map(|j| j.kind).collect();
+        let mut order = preference(&kinds);
+        order.extend(order.len()..form.width());
+        let matrices = rows.regressors(&form)?;
+        let fits = matrices
+            .iter()
+            .zip(&rows.tau)
+            .map(|(x, y)| Fit::of(x, y, &order))
+            .collect();
+        Ok(Self {
+            robot,
+            runs,
+            form,
+            rows,
+            order,
+            matrices,
+            fits,
+        })
+    }
+
+    /// Returns the faults in the torque that no other explanation fits better. A certain fault is undone and the search
+    /// repeats without its consequences.
+    pub(crate) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
+        let (mut found, mut undo) = self.tried(self.suspicions()?)?;
+        let lost = found
+            .iter()
+            .any(|fault| fault.kind == "magnitude" && fault.certain);
+        if !clipped.is_empty() && !lost {
+            return Ok(clipped);
+        }
+        let mut rows = self.rows.clone();
+        for _ in 0..n {
+            // Undoing a fault of the description gives another robot.
+            let Some(one) = undo.filter(|undo| !undo.is_of_robot()) else {
+                break;
+            };
+            rows = one.applied(self.robot, &rows);
+            let without = Judge::of_rows(self.robot, self.runs, rows.clone())?;
+            let (more, next) = without.tried(without.suspicions()?)?;
+            let new = |fault: &DataFault| fault.certain && !found.contains(fault);
+            let more: Vec<DataFault> = more.into_iter().filter(|fault| new(fault)).collect();
+            found.extend(more);
+            undo = next;
+        }
+        Ok(found)
+    }
+
+    /// Returns the faults that the torque suggests.
+    fn suspicions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        // The last joint's torque needs the fewest described links.
+        let described = self.stated(&self.rows, n.saturating_sub(1))?;
+        let described = described.as_ref();
+        let mut all: Vec<Suspicion> = (0..n)
+            .filter_map(|j| self.magnitude(j, described))
+            .collect();
+        // Factors that the torques show without a description.
+        let free = self.positions()?;
+        let known = |found: &Found| {
+            let of_free = |own: &Suspicion| own.undo.as_ref().is_some_and(|undo| found.is_of(undo));
+            free.iter().any(of_free)
+        };
+        let mut transformed = self.transformed()?;
+        transformed.retain(|found| !known(found));
+        all.extend(free);
+        let (turned, others): (Vec<_>, Vec<_>) =
+            transformed.into_iter().partition(|found| found.is_sense());
+        let (zeros, others): (Vec<_>, Vec<_>) =
+            others.into_iter().partition(|found| found.is_zero());
+        all.extend(others.iter().filter_map(|found| self.said(found)));
+        all.extend((0..n).filter_map(|j| self.shifted(j)));
+        all.extend(self.thousandfold(described));
+        all.extend(self.single_zero()?);
+        for j in (0..n).filter(|j| self.stirs(*j)) {
+            let before = all.len();
+            all.extend(self.against_description(j, described)?);
+            all.extend(self.sign(j, described)?);
+            if all.len() == before {
+                all.extend(self.alike(j, described)?);
+            }
+            all.extend(self.heavy_rotor(j)?);
+        }
+        // Senses and zeros come last: other explanations of a recording are likelier.
+        let last = turned.iter().chain(&zeros);
+        all.extend(last.filter_map(|found| self.said(found)));
+        // A suspicion with two reasons is tried once.
+        let mut once: Vec<Suspicion> = Vec::new();
+        for own in all {
+            if once.iter().all(|other| !other.is_like(&own)) {
+                once.push(own);
+            }
+        }
+        Ok(once)
+    }
+
+    pub(crate) fn name(&self, joint: usize) -> &str {
+        &self.robot.joints[joint].name
+    }
+
+    pub(crate) fn say(&self, kind: &str, about: About, joint: usize, text: String) -> DataFault {
+        fault(self.runs, kind, about, self.name(joint), text)
+    }
+
+    /// Returns a fault if a torque was cut where the motion needs more: a fit to the other rows exceeds the cut.
+    fn clipped(&self, j: usize) -> Option<DataFault> {
+        let cut = &self.rows.cut[j];
+        let (at, free): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
+        if at.len() < 10 || 50 * at.len() < cut.len() {
+            return None;
+        }
+        let tau = &self.rows.tau[j];
+        // Rows with part of a cut belong to neither.
+        let free: Vec<usize> = free.into_iter().filter(|k| cut[*k] == 0.0).collect();
+        let rest: Vec<f64> = free.iter().map(|k| tau[*k]).collect();
+        let fit = Fit::of(&self.matrices[j].select_rows(&free), &rest, &self.order)?;
+        let noise = (fit.residual.norm_squared() / rest.len() as f64).sqrt();
+        let beyond = fit.predict(&self.matrices[j].select_rows(&at));
+        let middle = 0.5 * (extreme(tau, f64::max) + extreme(tau, f64::min));
+        let excess = at
+            .iter()
+            .zip(&beyond)
+            .map(|(k, predicted)| (predicted - tau[*k]) * (tau[*k] - middle).signum())
+            .sum::<f64>()
+            / at.len() as f64;
+        let level = at.iter().map(|k| tau[*k].abs()).sum::<f64>() / at.len() as f64;
+        (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level)).then(
+            || {
+                self.say(
+                    "saturation",
+                    About::Torque,
+                    j,
+                    format!(
+                        "tau{} is cut at {level:.4} for {:.0} % of the time, where the motion needs {excess:.4} more on average; record without the limit, or a motion that needs less.",
+                        j + 1,
+                        100.0 * at.len() as f64 / cut.len() as f64
+                    ),
+                )
+            },
+        )
+    }
+
+    /// Suspects a torque that is shifted in time against the motion.
+    fn shifted(&self, j: usize) -> Option<Suspicion> {
+        let fit = self.fits[j].as_ref()?;
+        if fit.unexplained() < POOR_ALONE {
+            return None;
+        }
+        let time = self.rows.len() as f64 * self.rows.period;
+        let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
+        let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+        if left[reach] < POOR_ALONE || least > LESS * left[reach] {
+            return None;
+        }
+        // For a periodic motion, the nearest period.
+        let at = (0..left.len())
+            .filter(|k| left[*k] <= 1.3 * least)
+            .min_by_key(|k| k.abs_diff(reach))?;
+        let shift = (at as f64 - reach as f64) * self.rows.period;
+        if shift.abs() <= SMALL && least > BETTER * left[reach] {
+            return None;
+        }
+        let speed = &self.rows.qd[j];
+        let fastest = speed.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let moving = speed.iter().filter(|v| v.abs() > IN_MOTION * fastest);
+        let shown = moving.count() as f64 * self.rows.period > SHOWN_BY * shift.abs();
+        (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
+            let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
+            let fault = self.say(
+                "clock",
+                About::Torque,
+                j,
+                format!(
+                    "tau{} is {:.2} s {word} q{}: moved that much {mend}, the model leaves {:.1} % of its variance, as recorded {:.1} %; give both by one clock.",
+                    j + 1,
+                    shift.abs(),
+                    j + 1,
+                    100.0 * least,
+                    100.0 * left[reach]
+                ),
+            );
+            Suspicion::new(fault, Undo::Earlier(j, at as i64 - reach as i64))
+        })
+    }
+
+    /// Suspects positions that gravity and coupling show as multiples of the joint's.
+    fn positions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let left: Vec<f64> = self
+            .fits
+            .iter()
+            .map(|f| f.as_ref().map_or(0.0, Fit::unexplained))
+            .collect();
+        let mean = |left: &[f64]| left.iter().sum::<f64>() / left.len().max(1) as f64;
+        // For a single joint, whose gravity has a period, any residual may show a factor.
+        let poor = if n == 1 { EXACT } else { POOR };
+        if left.iter().all(|u| *u < poor) {
+            return Ok(Vec::new());
+        }
+        let rows = self.rows.thinned(TRIAL);
+        let try_out = |joint: Option<usize>, factor: f64| -> Result<Vec<f64>, DiagnoseError> {
+            let moved = rows.rescaled(joint, factor);
+            let matrices = moved.regressors(&self.form)?;
+            let fits = matrices.iter().zip(&moved.tau);
+            Ok(fits
+                .map(|(x, y)| Fit::of(x, y, &self.order).map_or(1.0, |f| f.unexplained()))
+                .collect())
+        };
+        if n > 1 && mean(&left) > POOR {
+            let factor = 1.0 / 57.296;
+            let all = mean(&try_out(None, factor)?);
+            if all < BETTER * mean(&left) && all < GOOD {
+                return Ok((0..n)
+                    .map(|j| self.scaled(j, &[factor], mean(&left), all))
+                    .collect());
+            }
+        }
+        let mut found = Vec::new();
+        for j in (0..n).filter(|j| left[*j] > poor) {
+            if self.robot.joints[j].kind == JointKind::Prismatic && n == 1 {
+                continue;
+            }
+            let mut tried: Vec<(f64, f64)> = Vec::new();
+            for factor in self.factors(j).into_iter().filter(|f| self.reaches(j, *f)) {
+                let all = try_out(Some(j), factor)?;
+                let own = all[j];
+                // A factor of up to 1.4 is left to effects.
+                let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
+                let unit = !(0.4..2.5).contains(&factor) && factor > 0.0;
+                let least = match unit {
+                    true => BETTER,
+                    false if left[j] < POOR => FAR_BETTER,
+                    false => MUCH_BETTER,
+                };
+                if far && own < GOOD && own < least * left[j] && mean(&all) < mean(&left) {
+                    tried.push((factor, own));
+                }
+            }
+            let least = tried
+                .iter()
+                .map(|(_, own)| *own)
+                .fold(f64::INFINITY, f64::min);
+            // Over a small range gravity is a parabola for every smaller factor too. A described inertia decides.
+            tried.retain(|(_, own)| *own <= 1.5 * least + 0.002);
+            let mut misses = Vec::new();
+            for (factor, own) in tried {
+                misses.push((
+                    self.misses(&rows.rescaled(Some(j), factor), j)?,
+                    factor,
+                    own,
+                ));
+            }
+            let nearest = misses
+                .iter()
+                .map(|(m, ..)| *m)
+                .fold(f64::INFINITY, f64::min);
+            misses.retain(|(m, ..)| *m <= nearest + f64::ln(3.0));
+            misses.sort_by(|a, b| a.2.total_cmp(&b.2));
+            if let Some((.., own)) = misses.first() {
+                let factors: Vec<f64> = misses.iter().map(|(_, factor, _)| *factor).collect();
+                found.push(self.scaled(j, &factors, left[j], *own));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Returns the distance of these rows' gravity and inertia from the described, as the sum of their logarithms; 0 if
+    /// none is described.
+    fn misses(&self, rows: &Rows, j: usize) -> Result<f64, DiagnoseError> {
+        let (gravity, inertia) = self.scales(rows, j, self.stated(rows, j)?.as_ref());
+        let miss = |m: Option<Measured>| m.map_or(0.0, |m| m.value.abs().max(1e-9).ln().abs());
+        Ok(miss(gravity) + miss(inertia))
+    }
+
+    /// Returns true if a joint moves enough to show the sense of friction and inertia; a held joint gives way a little.
+    fn stirs(&self, j: usize) -> bool {
+        let q = &self.rows.q[j];
+        extreme(q, f64::max) - extreme(q, f64::min) > STIRS
+    }
+
+    /// Returns true if the joint's limits allow its recorded position times `factor`. Otherwise the torque depends on
+    /// such a multiple for another reason, as with an eccentric gear once a motor turn.
+    pub(crate) fn reaches(&self, j: usize, factor: f64) -> bool {
+        let limits = self.robot.joints[j].limits.as_ref();
+        limits.map(|l| l.position).is_none_or(|[low, high]| {
+            let more = OUTSIDE * (high - low);
+            let mut places = self.rows.q[j].iter().map(|q| factor * q);
+            places.all(|q| (low - more..=high + more).contains(&q))
+        })
+    }
+
+    /// Returns the factors that are tried for a joint's position.
+    fn factors(&self, j: usize) -> Vec<f64> {
+        if self.robot.joints.len() == 1 {
+            // In steps of 3 %: finer than gravity's period over a turn needs.
+            return (-160..=160).map(|k| 1.03f64.powi(k)).collect();
+        }
+        let mut list = names::factors_of_position(&self.robot.joints[j]);
+        list.push(-1.0);
+        list
+    }
+
+    /// Suspects a scaled position and names it by the best factor with a name.
+    pub(crate) fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> Suspicion {
+        let named = factors
+            .iter()
+            .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));
+        let best = factors.first().copied().unwrap_or(1.0);
+        let (kind, factor, what) = match named {
+            Some((_, name)) if best < 0.0 => ("sign", best, format!("reverse it; {}", name.text)),
+            None if (best + 1.0).abs() < SAME => ("sign", best, "reverse it".to_owned()),
+            None if best < 0.0 => {
+                ("sign", best, "reverse it, and check its factor".to_owned())
+            }
+            Some((factor, name)) => (name.kind(), factor, name.text),
+            None => (
+                "ratio",
+                best,
+                "check the gear ratio, the counts of the encoder and the unit (turns for rad ask for 6.28)".to_owned(),
+            ),
+        };
+        let fault = self.say(
+            kind,
+            About::Motion,
+            j,
+            format!(
+                "q{} fits its torque {} times as large (the model then leaves {:.1} % of the torque's variance, as recorded {:.1} %): {what}.",
+                j + 1,
+                format_trimmed(factor, 4),
+                100.0 * after,
+                100.0 * before
+            ),
+        );
+        Suspicion::new(fault, Undo::Position(Some(j), factor))
+    }
+}
+
+fn extreme(values: &[f64], of: fn(f64, f64) -> f64) -> f64 {
+    values.iter().copied().reduce(of).unwrap_or(0.0)
+}

@@ -1,0 +1,167 @@
+//! Position zeros and factors, from their effect on the described torques.
+//!
+//! Gravity, inertia and coupling of a described robot depend on its joint positions. A grid search and then a fine
+//! search find the zero or factor with which the description explains the torques best.
+//!
+//! Leaves out: the zero of a joint without gravity, if no joint behind it shows it; a tilted base or tool
+//! (`gravity_tilt` and the payload are other names for that).
+
+use core::f64::consts::{PI, TAU};
+
+use crate::DiagnoseError;
+use crate::faults::candidates::Before;
+use crate::faults::columns::fault;
+use crate::faults::model::Judge;
+use crate::faults::names;
+use crate::faults::undo::Undo;
+use crate::outcome::{About, DataFault};
+use rig_model::robot::JointKind;
+use rig_output::{format_significant, format_trimmed};
+
+/// Steps of the grid over a whole turn.
+const DIRECTIONS: u32 = 24;
+/// Least zero error, rad; a smaller one is a calibration, which `identify` and `diagnose` estimate themselves.
+const LEAST_TURN: f64 = 0.35;
+/// Factors per decade on the grid of a position, from a tenth to ten times.
+const A_DECADE: i32 = 12;
+/// Steps of the fine search; each narrows it to two thirds.
+const CLOSER: usize = 12;
+/// Relative difference below which a found factor is a named one.
+const NAMED: f64 = 0.04;
+/// Least factor; one closer to one is left to effects.
+const LEAST_FACTOR: f64 = 1.4;
+
+impl Judge<'_> {
+    /// Returns the zero of joint `j` with which the description explains the recording best; `None` for its own zero.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] if the description is no chain.
+    pub(crate) fn zero(&self, j: usize, before: &Before) -> Result<Option<Undo>, DiagnoseError> {
+        if self.robot.joints[j].kind == JointKind::Prismatic {
+            return Ok(None);
+        }
+        let step = TAU / f64::from(DIRECTIONS);
+        let gain = |angle: f64| self.gain_without(&Undo::Zero(j, angle), before);
+        let grid = (1..DIRECTIONS).map(|k| f64::from(k) * step - PI);
+        let Some(near) = best(grid.chain([PI]), &gain)? else {
+            return Ok(None);
+        };
+        let angle = closely(near - step, near + step, &gain)?;
+        let turn = (angle + PI).rem_euclid(TAU) - PI;
+        Ok((turn.abs() > LEAST_TURN).then_some(Undo::Zero(j, turn)))
+    }
+
+    /// Returns the factor of joint `j`'s position, or of all positions, with which the description explains the
+    /// recording best; `None` for one.
+    ///
+    /// # Errors
+    /// As for [`Self::zero`].
+    pub(crate) fn factor(
+        &self,
+        j: Option<usize>,
+        before: &Before,
+    ) -> Result<Option<Undo>, DiagnoseError> {
+        // Limits show the unit of positions beyond them better than a rough description does.
+        if j.is_some_and(|j| !self.reaches(j, 1.0)) {
+            return Ok(None);
+        }
+        let gain = |factor: f64| self.gain_without(&Undo::Position(j, factor), before);
+        let step = 10f64.powf(1.0 / f64::from(A_DECADE));
+        let named = match j {
+            Some(j) => names::factors_of_position(&self.robot.joints[j]),
+            None => vec![TAU, 1.0 / 57.296, 57.296],
+        };
+        let reached = |factor: &f64| match j {
+            Some(j) => self.reaches(j, *factor),
+            None => (0..self.robot.joints.len()).all(|j| self.reaches(j, *factor)),
+        };
+        // A common factor of all positions without a name would mean another robot.
+        let decades = if j.is_some() { A_DECADE } else { 0 };
+        let grid = (-decades..=decades).flat_map(|k| [step.powi(k), -step.powi(k)]);
+        let far = |factor: &f64| factor.ln().abs() > LEAST_FACTOR.ln() || *factor < 0.0;
+        let tried: Vec<f64> = (grid.chain(named.iter().copied()))
+            .filter(|f| far(f) && *f != -1.0 && reached(f))
+            .collect();
+        let Some(near) = best(tried.into_iter(), &gain)? else {
+            return Ok(None);
+        };
+        let apart = |own: &f64| (near / own).ln().abs();
+        if let Some(own) = named.iter().find(|own| apart(own) < NAMED) {
+            return Ok(Some(Undo::Position(j, *own)));
+        }
+        let sense = near.signum();
+        let [low, high] = [near.abs() / step, near.abs() * step].map(f64::ln);
+        let close = sense * closely(low, high, &|log: f64| gain(sense * log.exp()))?.exp();
+        let own = named
+            .iter()
+            .copied()
+            .find(|own| (close / own).ln().abs() < NAMED);
+        let factor = own.unwrap_or(close);
+        Ok((far(&factor) && reached(&factor)).then_some(Undo::Position(j, factor)))
+    }
+
+    /// Returns another zero as a fault; `left` are residual variance shares as recorded and with it.
+    pub(crate) fn zero_said(&self, j: usize, angle: f64, left: [f64; 2]) -> DataFault {
+        let (n, name) = (j + 1, self.name(j));
+        let [recorded, without] = left.map(|share| 100.0 * share);
+        let text = format!(
+            "Gravity fits with the zero of joint {name} turned by {:.0} degrees (q{n} {} {} rad): the description then leaves {without:.1} % of the torque's variance at the joints that show it, as recorded {recorded:.1} %. Count q{n} from the description's zero, or turn the joint's origin in the description (`theta`, in a URDF the `rpy`).",
+            angle.to_degrees(),
+            if angle < 0.0 { "−" } else { "+" },
+            format_significant(angle.abs(), 3)
+        );
+        self.say("zero", About::Motion, j, text)
+    }
+
+    /// Returns one factor of all positions as a fault of the recording.
+    pub(crate) fn all_scaled(&self, factor: f64, left: [f64; 2]) -> DataFault {
+        let [recorded, without] = left.map(|share| 100.0 * share);
+        let what = match factor {
+            f if f == TAU => "they look like turns; give them in rad",
+            f if f < 1.0 => "they look like degrees; give them in rad",
+            _ => "they have been turned from degrees to rad twice",
+        };
+        fault(
+            self.runs,
+            "unit",
+            About::Motion,
+            "",
+            format!(
+                "All positions fit the torques {} times as large (the description then leaves {without:.1} % of the torque's variance, as recorded {recorded:.1} %): {what}.",
+                format_trimmed(factor, 4)
+            ),
+        )
+    }
+}
+
+/// Returns the value with the largest positive gain.
+fn best(
+    values: impl Iterator<Item = f64>,
+    gain: &dyn Fn(f64) -> Result<f64, DiagnoseError>,
+) -> Result<Option<f64>, DiagnoseError> {
+    let mut found: Option<(f64, f64)> = None;
+    for value in values {
+        let own = gain(value)?;
+        if own > found.map_or(0.0, |(_, most)| most) {
+            found = Some((value, own));
+        }
+    }
+    Ok(found.map(|(value, _)| value))
+}
+
+/// Returns the value with the largest gain between two; the gain has one maximum there.
+fn closely(
+    mut low: f64,
+    mut high: f64,
+    gain: &dyn Fn(f64) -> Result<f64, DiagnoseError>,
+) -> Result<f64, DiagnoseError> {
+    for _ in 0..CLOSER {
+        let third = (high - low) / 3.0;
+        if gain(low + third)? < gain(high - third)? {
+            low += third;
+        } else {
+            high -= third;
+        }
+    }
+    Ok(0.5 * (low + high))
+}

@@ -1,0 +1,62 @@
+//! Diagnosis of recordings with a certain fault.
+
+use crate::outcome::{About, Before, DataFault, Diagnosis, Residual, Verdict};
+use crate::result::sentences;
+use rig_data::prepare::PrepareError;
+use rig_model::robot::Robot;
+
+/// Returns the fault of a recording that prevents its preparation.
+pub(crate) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
+    let (kind, label) = match error {
+        PrepareError::TooShort { label, .. } => ("too-short", label),
+        PrepareError::NotMoving { label, .. } => ("not-moving", label),
+        PrepareError::Broken { label, .. } | PrepareError::Irregular { label, .. } => {
+            ("clock", label)
+        }
+        _ => return None,
+    };
+    Some(DataFault {
+        kind: kind.into(),
+        about: About::Preparation,
+        recording: label.clone(),
+        joint: String::new(),
+        certain: true,
+        text: error.to_string(),
+    })
+}
+
+/// Returns a diagnosis with the faults alone: on such data no model is meaningful.
+pub(crate) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
+    let mut diagnosis = Diagnosis {
+        schema: "rig-diagnosis/1".into(),
+        robot: robot.name.clone(),
+        verdict: Verdict::DataFault,
+        residual: Residual::Torque,
+        words: Vec::new(),
+        noise_floor_rms: Vec::new(),
+        noise_floor_from: Vec::new(),
+        left: Vec::new(),
+        noise_floor_how: String::new(),
+        motion_how: String::new(),
+        treatment: None,
+        torque_lead: Vec::new(),
+        places: Vec::new(),
+        described: Vec::new(),
+        steps: Vec::new(),
+        gap_closed: None,
+        absorbed: Vec::new(),
+        absorbed_before: Before::Described,
+        by_motion: None,
+        not_testable: Vec::new(),
+        detectable: Vec::new(),
+        next_experiment: None,
+        remainder: None,
+        data_faults,
+        waterfall: Vec::new(),
+        tried: Vec::new(),
+        maps: Vec::new(),
+        curves: Vec::new(),
+    };
+    diagnosis.words = sentences::verdict(&diagnosis, false);
+    diagnosis
+}

@@ -1,0 +1,62 @@
+//! A described rotor with more inertia than the whole joint.
+//!
+//! A rotor acts on its joint by the square of the gear ratio. With a recorded current, a ratio k times too large makes
+//! torque and all inertia k times too large, but the described rotor k² times. For a large k it exceeds the inertia of
+//! the whole joint. No change of links, friction or payload does that, only a wrong description of the rotor.
+//!
+//! Leaves out: motors that move several joints; ratios that are too small, which make the rotor lighter.
+
+use crate::DiagnoseError;
+use crate::faults::model::Judge;
+use crate::faults::trial::Suspicion;
+use crate::faults::undo::Undo;
+use crate::outcome::About;
+use rig_model::robot::JointKind;
+use rig_output::format_significant;
+
+/// Least ratio of the rotor's inertia to that of the whole joint.
+const HEAVIER: f64 = 1.5;
+/// Least difference of both, in standard deviations of the joint's inertia.
+const CLEAR: f64 = 5.0;
+/// Largest residual share of the torque's variance.
+const LEFT: f64 = 0.2;
+
+impl Judge<'_> {
+    /// Suspects a described rotor of joint `j` that exceeds the joint.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] if the description is no chain.
+    pub(crate) fn heavy_rotor(&self, j: usize) -> Result<Option<Suspicion>, DiagnoseError> {
+        let joint = &self.robot.joints[j];
+        let alone = (self.robot.joints.iter().filter_map(|j| j.drive.as_ref()))
+            .all(|drive| drive.couples.is_empty());
+        let Some((drive, fit)) =
+            (joint.drive.as_ref().filter(|_| alone)).zip(self.fits[j].as_ref())
+        else {
+            return Ok(None);
+        };
+        let rotor = drive.rotor_inertia * drive.gear_ratio * drive.gear_ratio;
+        let whole = fit.functional(&self.inertia(j)?);
+        let seen = whole.sigmas() > CLEAR && fit.unexplained() < LEFT;
+        if !seen || rotor < HEAVIER * whole.value || rotor - whole.value < CLEAR * whole.std {
+            return Ok(None);
+        }
+        let unit = match joint.kind {
+            JointKind::Revolute => "kg·m²",
+            JointKind::Prismatic => "kg",
+        };
+        let fault = self.say(
+            "ratio",
+            About::Torque,
+            j,
+            format!(
+                "The description makes the rotor of joint {} alone {} {unit} at the joint, by the square of the gear ratio {}; all that moves there was seen to have {} {unit}. Check the gear ratio, the rotor's inertia and the torque constant.",
+                joint.name,
+                format_significant(rotor, 3),
+                drive.gear_ratio,
+                format_significant(whole.value, 3),
+            ),
+        );
+        Ok(Some(Suspicion::new(fault, Undo::Rotor(j))))
+    }
+}

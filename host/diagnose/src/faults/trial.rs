@@ -1,0 +1,292 @@
+//! Test of a suspected fault against the best other explanation.
+//!
+//! Each suspected fault is undone in the data and the whole robot is refitted: with the description as prior, with an
+//! added payload, and with any masses and friction ([`crate::faults::physical`]). The same is done with the data as recorded.
+//! The test compares the prediction of left-out stretches, one by one. A fault is certain if its undoing predicts
+//! decisively better than every explanation without a fault: the description, a payload, or masses and friction within
+//! the description's uncertainty. It is also certain if it removes most of the description's misfit, and free
+//! parameters do no better with the recorded data. They can mirror every link, but one sign explains it. A certain
+//! fault is undone and the search repeats, which removes its consequences. If none is certain, faults that explain as
+//! well as the best are reported as open.
+//!
+//! Leaves out: two faults that hide each other, each without effect alone.
+
+use crate::DiagnoseError;
+use crate::faults::fit::Measured;
+use crate::faults::model::{GOOD, Judge};
+use crate::faults::physical::{Belief, INDEPENDENT, Load, Physical, Score};
+use crate::faults::rows::{Form, Rows};
+use crate::faults::undo::Undo;
+use crate::outcome::DataFault;
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+
+/// Rows in the test: over all joints, and least of each.
+const ROWS: (usize, usize) = (4000, 500);
+/// Least fall of the log left-out variance, summed over joints, for a fault: one joint's variance halves.
+const WORTH: f64 = core::f64::consts::LN_2;
+/// Standard deviations between stretches that are clear; chance reaches them once in a hundred.
+const CLEAR: f64 = 2.33;
+/// Least log odds of a fault, as its prior odds are one to a thousand.
+const ODDS: f64 = 6.9;
+/// Variance share that counts as none: no model is closer to a real robot.
+const EXACT: f64 = 1e-4;
+/// Heaviest payload as a multiple of the links' mass: a tool may weigh many times a light link.
+const CARRIED: f64 = 30.0;
+
+/// A suspected fault.
+#[derive(Clone, Debug)]
+pub(crate) struct Suspicion {
+    pub(crate) fault: DataFault,
+    /// How it is undone; `None` if columns alone show it, without a model.
+    pub(crate) undo: Option<Undo>,
+}
+
+impl Suspicion {
+    pub(crate) fn new(fault: DataFault, undo: Undo) -> Self {
+        Self {
+            fault,
+            undo: Some(undo),
+        }
+    }
+
+    /// Returns true if both are undone alike.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let both = self.undo.as_ref().zip(other.undo.as_ref());
+        both.is_some_and(|(own, other)| own.is_like(other))
+    }
+}
+
+/// Scores of a recording under each belief.
+struct Reading {
+    described: Option<Score>,
+    loaded: Option<Score>,
+    free: Option<Score>,
+}
+
+impl Reading {
+    fn of(
+        robot: &Robot,
+        rows: &Rows,
+        magnitude: Vec<bool>,
+        edge: usize,
+    ) -> Result<Self, DiagnoseError> {
+        let form = Form::of(robot)?;
+        let physical = Physical::of(robot, &form, rows, magnitude, edge)?;
+        let masses = robot.joints.iter().filter_map(|j| j.inertial.as_ref());
+        let most = CARRIED * masses.map(|i| i.mass).sum::<f64>();
+        Ok(Self {
+            described: physical.score(Belief::Described),
+            loaded: (physical.score(Belief::Loaded)).filter(|score| score.load.mass <= most),
+            free: physical.score(Belief::Free),
+        })
+    }
+
+    /// Returns the scores of the description, without and with a payload.
+    fn stated(&self) -> impl Iterator<Item = &Score> {
+        self.described.iter().chain(&self.loaded)
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Score> {
+        self.stated().chain(&self.free)
+    }
+}
+
+/// Returns how much better `a` predicts than `b`: the fall of the log left-out variance, summed over joints, mean over
+/// the stretches.
+fn gain(a: &Score, b: &Score) -> Measured {
+    let gains: Vec<f64> = (a.errors.iter().zip(&b.errors))
+        .map(|(a, b)| {
+            let both = a.iter().zip(b);
+            both.map(|(a, b)| (b.max(EXACT) / a.max(EXACT)).ln()).sum()
+        })
+        .collect();
+    let count = gains.len() as f64;
+    let mean = gains.iter().sum::<f64>() / count;
+    let squares: f64 = gains.iter().map(|g| (g - mean).powi(2)).sum();
+    Measured::new(
+        mean,
+        (squares / (count * (count - 1.0))).sqrt(),
+        count - 1.0,
+    )
+}
+
+/// Returns true if `a` predicts decisively better than `b`, by stretches or by the likelihood of all data.
+fn beats(a: &Score, b: &Score) -> bool {
+    gain(a, b).value > WORTH && (clearly(a, b) || odds(a, b) > ODDS)
+}
+
+/// Returns the log odds of the data under `a` against `b`, each with its own noise level.
+fn odds(a: &Score, b: &Score) -> f64 {
+    let joints = a.errors.first().map_or(0, Vec::len) as f64;
+    0.5 * joints * INDEPENDENT * (b.cost / a.cost).ln()
+}
+
+/// Returns true if `a` predicts clearly better than `b`, even if by little.
+fn clearly(a: &Score, b: &Score) -> bool {
+    gain(a, b).sigmas() > CLEAR
+}
+
+/// Returns true if neither predicts better by the worth of a fault or clearly; also if both are the same.
+fn equals(a: &Score, b: &Score) -> bool {
+    gain(a, b).value.abs() < WORTH && !clearly(a, b) && !clearly(b, a)
+}
+
+fn best<'a>(scores: impl Iterator<Item = &'a Score>) -> Option<&'a Score> {
+    scores.reduce(|a, b| if gain(b, a).value > 0.0 { b } else { a })
+}
+
+/// Returns true if undoing the fault improves the description (`recorded` to `own`) decisively more than `free`
+/// parameters improve it further, and predicts no worse. One fault is likelier than a wrong description of every link.
+fn explains(own: &Score, recorded: &Score, free: &Score) -> bool {
+    let (gained, beyond) = (recorded.cost - own.cost, own.cost - free.cost);
+    gained - beyond > ODDS && gain(own, recorded).value > 0.0
+}
+
+/// Result of testing a suspicion.
+enum Outcome {
+    /// It is the only explanation with such a prediction.
+    Certain(Score),
+    /// Another explanation is as good.
+    Open,
+    /// Another explanation is better.
+    Refuted,
+}
+
+/// Judges a suspicion by the data without it and as recorded.
+fn outcome(undo: &Undo, without: &Reading, recorded: &Reading) -> Outcome {
+    let (Some(own), Some(other)) = (best(without.all()), best(recorded.all())) else {
+        return Outcome::Open;
+    };
+    let alone = recorded.all().all(|other| beats(own, other));
+    let stated = best(without.stated()).filter(|own| {
+        let free =
+            (without.free.iter().chain(&recorded.free)).min_by(|a, b| a.cost.total_cmp(&b.cost));
+        let explained = |other| free.is_some_and(|free| explains(own, other, free));
+        let contradicted = recorded
+            .free
+            .iter()
+            .any(|as_recorded| (without.free.iter()).all(|without| beats(as_recorded, without)));
+        !contradicted && recorded.stated().all(explained)
+    });
+    // Senses that were guessed row by row also fit noise.
+    let shown = |own: &&Score| undo.guessed().is_none_or(|j| own.left(j) < GOOD);
+    match (
+        Some(own).filter(|_| alone).filter(shown),
+        stated.filter(shown),
+    ) {
+        (Some(own), _) | (_, Some(own)) => Outcome::Certain(own.clone()),
+        // A suspicion that predicts worse and is less likely is refuted, by however little.
+        _ if gain(own, other).value < 0.0 && odds(own, other) < 0.0 => Outcome::Refuted,
+        _ if beats(other, own) => Outcome::Refuted,
+        _ => Outcome::Open,
+    }
+}
+
+impl Judge<'_> {
+    /// Returns the certain suspicion and how it is undone, or, if none is certain, the open ones.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] if the description is no chain.
+    pub(crate) fn tried(
+        &self,
+        suspicions: Vec<Suspicion>,
+    ) -> Result<(Vec<DataFault>, Option<Undo>), DiagnoseError> {
+        let (mut left, mut found) = (Vec::new(), Vec::new());
+        for suspicion in suspicions {
+            match suspicion.undo {
+                Some(undo) => left.push((suspicion.fault, undo)),
+                None => found.push(suspicion.fault),
+            }
+        }
+        if left.is_empty() {
+            return Ok((found, None));
+        }
+        let edge = left.iter().map(|(_, undo)| undo.edge()).max().unwrap_or(0);
+        let recorded = self.reading(None, edge)?;
+        let (mut certain, mut open) = (Vec::new(), Vec::new());
+        for (k, (_, undo)) in left.iter().enumerate() {
+            match outcome(undo, &self.reading(Some(undo), edge)?, &recorded) {
+                Outcome::Certain(own) => certain.push((k, own)),
+                Outcome::Open => open.push(k),
+                Outcome::Refuted => {}
+            }
+        }
+        let better =
+            |a: &(usize, Score), b: &(usize, Score)| gain(&a.1, &b.1).value.total_cmp(&0.0);
+        if let Some(best) = certain.iter().max_by(|a, b| better(a, b)) {
+            let mut equal = certain.iter().filter(|one| equals(&one.1, &best.1));
+            // Among equals the first suspicion counts.
+            let first = equal.next().unwrap_or(best);
+            let (mut fault, undo) = left[first.0].clone();
+            if let Some((other, _)) = equal.next() {
+                let other = &left[*other].0.text;
+                fault.text = format!("{} Another explanation fits as well: {other}", fault.text);
+            }
+            found.push(fault);
+            return Ok((found, Some(undo)));
+        }
+        if found.is_empty() {
+            let other = self.other(&recorded);
+            found.extend(open.into_iter().map(|k| opened(left[k].0.clone(), &other)));
+        }
+        Ok((found, None))
+    }
+
+    fn reading(&self, undo: Option<&Undo>, edge: usize) -> Result<Reading, DiagnoseError> {
+        let (robot, rows, magnitude) = self.without(undo);
+        let (all, least) = ROWS;
+        let most = (all / robot.joints.len()).max(least);
+        let step = rows.len().div_ceil(most).max(1);
+        Reading::of(&robot, &rows.thinned(most), magnitude, edge.div_ceil(step))
+    }
+
+    /// Returns robot and data without a fault, and the joints whose torques have no sign.
+    fn without(&self, undo: Option<&Undo>) -> (Robot, Rows, Vec<bool>) {
+        let lost = |j: usize| matches!(undo, Some(Undo::Magnitude(k, _)) if *k == j);
+        let magnitude = (0..self.robot.joints.len()).map(lost).collect();
+        match undo {
+            Some(undo) => (
+                undo.robot(self.robot),
+                undo.applied(self.robot, &self.rows),
+                magnitude,
+            ),
+            None => (self.robot.clone(), self.rows.clone(), magnitude),
+        }
+    }
+
+    /// Returns the best explanation of the data as recorded, a clause.
+    fn other(&self, recorded: &Reading) -> String {
+        let best = best(recorded.all());
+        let is = |score: &Option<Score>| {
+            let pair = best.zip(score.as_ref());
+            pair.is_some_and(|(a, b)| std::ptr::eq(a, b))
+        };
+        if is(&recorded.described) {
+            "the description, with friction of its own, explains these data as well".to_owned()
+        } else if is(&recorded.loaded) {
+            let load = recorded.loaded.as_ref().map(|score| score.load);
+            load.map_or_else(String::new, |load| loaded(load, self.robot))
+        } else {
+            "other masses and friction than described explain these data as well".to_owned()
+        }
+    }
+}
+
+fn loaded(load: Load, robot: &Robot) -> String {
+    let last = robot.joints.last().map_or("", |joint| joint.name.as_str());
+    let place = robot.last_link.inverse_transform_point(&load.place.into());
+    let [x, y, z] =
+        [place.x, place.y, place.z].map(|p| format!("{:.2}", 0.0 + (100.0 * p).round() / 100.0));
+    format!(
+        "a payload of about {} kg at ({x}, {y}, {z}) m in the frame of joint {last} explains these data as well",
+        format_significant(load.mass, 2)
+    )
+}
+
+/// Marks a fault that something else explains as well.
+fn opened(mut fault: DataFault, other: &str) -> DataFault {
+    fault.certain = false;
+    fault.text = format!("{} This is not certain: {other}.", fault.text);
+    fault
+}

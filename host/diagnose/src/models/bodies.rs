@@ -1,0 +1,312 @@
+//! Description with the found effects; the links of an arm are physically consistent bodies.
+//!
+//! Freely fitted base parameters of several links need not be physically consistent. Noise dominates the weakly excited
+//! ones. The inertia matrix is then not positive definite and nothing can be simulated. So an arm gets the nearest
+//! consistent bodies in the metric of the data; held base parameters take part in this fit. The effects' gains are then
+//! refitted. A single link is consistent with any base parameters.
+//!
+//! Leaves out: effects formed anew with the consistent bodies; the cosine by which a tilted arm's gravity torque is too
+//! small.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::DMatrix;
+
+use crate::DiagnoseError;
+use crate::description::parameter_prior::{Anchor, Direction};
+use crate::fit::least_squares::{Fit, dot};
+use crate::fit::refit::Refit;
+use crate::fit::solution::solve;
+use crate::models::description::{completed, gravity_with, redistributed_over, with_gains};
+use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::noise_floor;
+use crate::rows::regression::{Column, combined};
+use crate::search::fitted_candidate::Profile;
+use crate::search::stepwise::with;
+use rig_data::runs::{JointRun, Run};
+use rig_identify::{Combinations, Sizes, as_bodies};
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+
+/// Relative increase of the residual above which the cost of consistent bodies is reported.
+const SAID: f64 = 1e-3;
+
+/// A model that was fitted to the training data.
+pub(crate) struct Standing {
+    /// Base parameters in the form of columns with the description's gravity.
+    values: Vec<f64>,
+    /// The same in the form of a description.
+    described: Vec<f64>,
+    /// Gains of the effects' columns.
+    gains: Vec<f64>,
+    /// Description with base parameters and effects.
+    pub(crate) model: Robot,
+    /// Remarks on the model, sentences.
+    pub(crate) remarks: Vec<String>,
+}
+
+impl Standing {
+    /// Returns base parameters and gains.
+    pub(crate) fn fitted(&self) -> [&[f64]; 2] {
+        [&self.values, &self.gains]
+    }
+
+    /// Returns the coefficients of the free nominal directions, then of the effects' columns.
+    pub(crate) fn coefficients(&self, anchor: &Anchor) -> Vec<f64> {
+        let along =
+            |direction: &Direction| direction.iter().map(|&(k, f)| f * self.described[k]).sum();
+        let free = anchor.free.iter().map(along);
+        free.chain(self.gains.iter().copied()).collect()
+    }
+}
+
+/// Data that models are fitted to. Each fit is cached for judging, simulation, drawing and writing.
+pub(crate) struct Fitting<'a, 'r> {
+    /// Robot and data treatment.
+    pub(crate) bench: &'a Bench<'a>,
+    refit: &'a Refit<'r>,
+    /// The training data.
+    runs: &'a [Run],
+    /// Base parameters that formed the effects' columns.
+    formed_at: &'a [f64],
+    /// Fitted models by the columns of their effects.
+    known: Mutex<Vec<(Vec<Arc<Vec<Column>>>, Arc<Standing>)>>,
+}
+
+/// Base parameters in the form of columns and of a description, gains, and the description with its remarks.
+type Linked = ([Vec<f64>; 2], Vec<f64>, (Robot, Vec<String>));
+
+impl<'a, 'r> Fitting<'a, 'r> {
+    /// Prepares fits to `runs`.
+    pub(crate) fn new(
+        bench: &'a Bench<'a>,
+        refit: &'a Refit<'r>,
+        runs: &'a [Run],
+        formed_at: &'a [f64],
+    ) -> Self {
+        Self {
+            bench,
+            refit,
+            runs,
+            formed_at,
+            known: Mutex::default(),
+        }
+    }
+
+    /// Returns the model of these effects.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] if its parameters are not identifiable.
+    pub(crate) fn of(&self, chosen: &[Profile]) -> Result<Arc<Standing>, DiagnoseError> {
+        let same = |known: &[Arc<Vec<Column>>]| {
+            known.len() == chosen.len()
+                && (known.iter().zip(chosen)).all(|(k, p)| Arc::ptr_eq(k, &p.columns))
+        };
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, standing)) = known().iter().find(|(k, _)| same(k)) {
+            return Ok(standing.clone());
+        }
+        let standing = Arc::new(self.fitted(chosen)?);
+        let key = chosen.iter().map(|p| p.columns.clone()).collect();
+        known().push((key, standing.clone()));
+        Ok(standing)
+    }
+
+    /// Stores `standing` as the model of these effects.
+    pub(crate) fn adopt(&self, chosen: &[Profile], standing: Standing) {
+        let key = chosen.iter().map(|p| p.columns.clone()).collect();
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.insert(0, (key, Arc::new(standing)));
+    }
+
+    /// Returns the RMS residual of this model on other recordings, joint by joint.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn unseen(
+        &self,
+        chosen: &[Profile],
+        others: &Loaded,
+    ) -> Result<Vec<f64>, DiagnoseError> {
+        self.bench.unseen(others, self.of(chosen)?.fitted(), chosen)
+    }
+
+    fn fitted(&self, chosen: &[Profile]) -> Result<Standing, DiagnoseError> {
+        let coefficients = self.refit.solution(chosen)?.values;
+        if self.bench.robot.joints.len() == 1 {
+            return Ok(self.alone(&coefficients, chosen));
+        }
+        let Bench { robot, anchor, .. } = self.bench;
+        let (free, gains) = coefficients.split_at(anchor.free.len());
+        let values = anchor.values(free);
+        let mut upright = values.clone();
+        self.turned(chosen, gains, &mut upright);
+        let ([values, described], gains, links) =
+            self.embodied(&coefficients, [values, upright], chosen);
+        let gravity = self.turned(chosen, &gains, &mut values.clone());
+        let (model, remarks) = completed(links, robot, gravity, &with_gains(chosen, &gains));
+        Ok(Standing {
+            values,
+            described,
+            gains,
+            model,
+            remarks,
+        })
+    }
+
+    /// Builds the model of one joint from coefficients of free directions and effects' columns.
+    pub(crate) fn alone(&self, coefficients: &[f64], chosen: &[Profile]) -> Standing {
+        let Bench {
+            robot,
+            nominal,
+            anchor,
+            ..
+        } = self.bench;
+        let (free, gains) = coefficients.split_at(anchor.free.len());
+        let values = anchor.values(free);
+        let mut upright = values.clone();
+        let gravity = self.turned(chosen, gains, &mut upright);
+        let links = redistributed_over(robot, nominal, &upright);
+        let (model, remarks) = completed(links, robot, gravity, &with_gains(chosen, gains));
+        Standing {
+            described: values.clone(),
+            values,
+            gains: gains.to_vec(),
+            model,
+            remarks,
+        }
+    }
+
+    /// Returns gravity turned by the effects, and adapts `values` to it.
+    fn turned(&self, chosen: &[Profile], gains: &[f64], values: &mut [f64]) -> [f64; 3] {
+        let effects = with_gains(chosen, gains);
+        let Bench { robot, nominal, .. } = self.bench;
+        gravity_with(robot, nominal, self.formed_at, &effects, values)
+    }
+
+    /// Fits the nearest bodies to the base parameters of a free fit, and refits the gains.
+    fn embodied(
+        &self,
+        coefficients: &[f64],
+        [values, upright]: [Vec<f64>; 2],
+        chosen: &[Profile],
+    ) -> Linked {
+        let Bench { robot, nominal, .. } = self.bench;
+        let effects: Vec<(&Column, bool)> = (chosen.iter())
+            .flat_map(|p| p.columns.iter().map(|c| (c, p.followed.is_none())))
+            .collect();
+        let fitted: Vec<&Column> = (effects.iter())
+            .filter(|(_, fitted)| *fitted)
+            .map(|(column, _)| *column)
+            .collect();
+        let (fit, mut information) = measure(self.refit, chosen, &fitted);
+        // Ratio of the moments in the form of columns to those of the description.
+        let taken: Vec<f64> = (values.iter().zip(&upright))
+            .map(|(as_taken, value)| if *value == 0.0 { 1.0 } else { as_taken / value })
+            .collect();
+        for (k, mut row) in information.row_iter_mut().enumerate() {
+            row *= taken[k];
+        }
+        for (k, mut column) in information.column_iter_mut().enumerate() {
+            column *= taken[k];
+        }
+        let base = Combinations {
+            combination: &nominal.base.combination,
+            columns: &nominal.base.columns,
+            values: &upright,
+        };
+        let mut gains = coefficients[self.refit.free.len()..].to_vec();
+        let bodies = match as_bodies(robot, &base, information, sizes(self.runs)) {
+            Ok(bodies) => bodies,
+            Err(error) => {
+                let (model, mut remarks) = redistributed_over(robot, nominal, &upright);
+                remarks.push(format!(
+                    "The links of model.toml are not made bodies that can exist ({error}); it may not be fit for simulation."
+                ));
+                return ([values, upright], gains, (model, remarks));
+            }
+        };
+        // Torque change caused by the bodies, and the part that effects compensate.
+        let n = robot.joints.len();
+        let free = (self.refit.free.iter()).chain(effects.iter().map(|(c, _)| *c));
+        let mut rest = fit;
+        rest.subtract(&combined(n, free.zip(coefficients.iter().copied())));
+        let before: Vec<f64> = (0..n).map(|j| rest.rms(j)).collect();
+        let near: Vec<f64> = (bodies.values.iter().zip(&taken))
+            .map(|(v, t)| v * t)
+            .collect();
+        let moved = near.iter().zip(&values).map(|(b, f)| b - f);
+        let nominal = rest.rows().nominal.iter().zip(moved);
+        rest.subtract(&combined(n, nominal));
+        if let Some(made_up) = solve(&rest, &fitted, &[]).filter(|_| !fitted.is_empty()) {
+            rest.subtract(&combined(
+                n,
+                fitted.iter().copied().zip(made_up.values.iter().copied()),
+            ));
+            let own = gains.iter_mut().zip(&effects).filter(|(_, (_, f))| *f);
+            own.zip(made_up.values)
+                .for_each(|((gain, _), change)| *gain += change);
+        }
+        let mut remarks = bodies.remarks;
+        let more = (0..n).map(|j| (j, rest.rms(j) / before[j].max(f64::MIN_POSITIVE) - 1.0));
+        let most = more.max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((j, share)) = most.filter(|(_, share)| *share > SAID) {
+            remarks.push(format!(
+                "Links are taken as bodies that can exist; of the training data that leaves up to {} % more than a fit that is free of it (joint {}).",
+                format_significant(100.0 * share, 2),
+                robot.joints[j].name
+            ));
+        }
+        ([near, bodies.values], gains, (bodies.robot, remarks))
+    }
+}
+
+/// Returns the data scaled by residual RMS, and the information on the base parameters beside `fitted` columns.
+fn measure<'r>(
+    refit: &Refit<'r>,
+    chosen: &[Profile],
+    fitted: &[&Column],
+) -> (Fit<'r>, DMatrix<f64>) {
+    let left = with(refit.footing(chosen)[1], chosen, None);
+    let rows = left.rows();
+    let joints = 0..rows.joints();
+    let residuals: Vec<Vec<f64>> = joints.clone().map(|j| left.residual(j)).collect();
+    let memory = noise_floor::memory(rows, &residuals);
+    let scale = joints.map(|j| 1.0 / left.rms(j).max(f64::MIN_POSITIVE));
+    let fit = Fit::new(rows, scale.collect(), memory);
+    let beside = fit.clone().taking(fitted.iter().copied());
+    let columns: Vec<Vec<f64>> = (rows.nominal.iter())
+        .map(|column| beside.projected(fit.weighted(column)))
+        .collect();
+    let rows_in_one = (memory / rows.period).max(1.0);
+    let mut information = DMatrix::zeros(columns.len(), columns.len());
+    for a in 0..columns.len() {
+        for b in 0..=a {
+            information[(a, b)] = dot(&columns[a], &columns[b]) / rows_in_one;
+            information[(b, a)] = information[(a, b)];
+        }
+    }
+    (fit, information)
+}
+
+/// Returns the RMS torque, speed and acceleration of the joints.
+fn sizes(runs: &[Run]) -> Sizes {
+    let joints = 0..runs.first().map_or(0, |run| run.joints.len());
+    let rms = |of: fn(&JointRun) -> &[f64]| -> Vec<f64> {
+        (joints.clone())
+            .map(|j| {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for x in runs.iter().flat_map(|run| of(&run.joints[j])) {
+                    sum += x * x;
+                    count += 1.0;
+                }
+                f64::sqrt(sum / f64::max(count, 1.0))
+            })
+            .collect()
+    };
+    Sizes {
+        torque: rms(|joint| &joint.tau),
+        speed: rms(|joint| &joint.qd),
+        acceleration: rms(|joint| &joint.qdd),
+    }
+}

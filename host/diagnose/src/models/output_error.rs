@@ -1,0 +1,304 @@
+//! Refit of all parameters of one joint to the simulated motion: closed-loop output error of the positions (Gautier,
+//! Janot and Vandanjon 2013), by Gauss-Newton.
+//!
+//! With a correct model, torque and motion give the same values. Position noise is in the torque's regressors but in no
+//! simulated motion. Effects that the controller suppresses are in no motion, so it identifies waves less well. The
+//! torque's values stay unless the motion improves significantly and the torque is no worse away from dwells and
+//! reversals. Near these a simulated joint sticks and turns back at its own time, and filters blur the torque.
+//!
+//! Leaves out: robots of several joints; gears, whose link is observed from the torque; whole numbers.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::DiagnoseError;
+use crate::columns::effect_columns::Source;
+use crate::fit::refit::{Joint, named};
+use crate::models::bodies::{Fitting, Standing};
+use crate::models::simulated_motion::{Departures, Replay};
+use crate::outcome::{ByMotion, Twice};
+use crate::recordings::noise_floor;
+use crate::search::fitted_candidate::Profile;
+use crate::search::stepwise::is_gear;
+use rig_model::batch::each_by;
+use rig_output::format_significant;
+
+/// Most Gauss-Newton passes.
+const PASSES: usize = 4;
+/// Largest parameter change of the last pass, in standard deviations; the derivatives are then kept.
+const SETTLED: f64 = 0.5;
+/// Most increases of the damping in a pass.
+const DAMPED: usize = 5;
+/// Relative increase of the torque RMS up to which the motion's values are adopted …
+const TORQUE_WORSE: f64 = 0.005;
+/// … and share of the motion's RMS below which `BLURRED` replaces it, to allow for the filters' blur.
+const FAR_BETTER: f64 = 0.5;
+const BLURRED: f64 = 0.05;
+/// Standard deviations above which two values of a parameter are reported as different.
+const APART: f64 = 4.0;
+
+/// Fitted values: coefficients of nominal directions and effects' columns, then shapes.
+struct Values {
+    coefficients: usize,
+    /// Effect and place of each shape.
+    shapes: Vec<(usize, usize)>,
+}
+
+impl Values {
+    /// Returns the effects with the shapes among `values`.
+    fn effects(&self, chosen: &[Profile], values: &[f64]) -> Vec<Profile> {
+        let mut effects = chosen.to_vec();
+        for ((k, place), value) in self.shapes.iter().zip(&values[self.coefficients..]) {
+            effects[*k].shapes[*place] = *value;
+        }
+        effects
+    }
+
+    /// Returns true if the values are within their physical bounds.
+    fn possible(&self, chosen: &[Profile], free: usize, values: &[f64]) -> bool {
+        let within = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
+        let mut gains = values[free..self.coefficients].iter();
+        let gains_can = chosen.iter().all(|p| {
+            let bounds = p.candidate.kind.about().gains.iter();
+            let own = gains.by_ref().take(p.columns.len());
+            own.zip(bounds).all(|(g, about)| within(*g, about.bounds))
+        });
+        let mut shapes = self.shapes.iter().zip(&values[self.coefficients..]);
+        gains_can
+            && shapes.all(|((k, place), value)| {
+                within(
+                    *value,
+                    chosen[*k].candidate.kind.about().shapes[*place].bounds,
+                )
+            })
+    }
+}
+
+/// Result of the refit.
+pub(crate) struct Again {
+    /// Report for the user.
+    pub(crate) told: ByMotion,
+    /// Model and effects to adopt, if any.
+    pub(crate) adopted: Option<(Standing, Vec<Profile>)>,
+}
+
+/// Fits `joint`'s values of the effects `chosen` to the simulated training motion; `None` if that is not possible.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(crate) fn by_motion(
+    fitting: &Fitting,
+    replay: &Replay,
+    source: &Source,
+    chosen: &[Profile],
+    joint: &Joint,
+    threads: usize,
+) -> Result<Option<Again>, DiagnoseError> {
+    let bench = fitting.bench;
+    let free = bench.anchor.free.len();
+    if bench.robot.joints.len() > 1 || chosen.iter().any(|p| is_gear(p.candidate.kind)) {
+        return Ok(None);
+    }
+    let coefficients = joint.solution.values.len();
+    let known = joint.shapes(chosen);
+    let values = Values {
+        coefficients,
+        shapes: known.iter().map(|(place, _)| *place).collect(),
+    };
+    let by_torque: Vec<[f64; 2]> = (0..coefficients)
+        .map(|k| [joint.solution.values[k], joint.solution.std(k)])
+        .chain(known.iter().map(|(_, value)| *value))
+        .collect();
+    let stds: Vec<f64> = by_torque.iter().map(|[_, std]| *std).collect();
+    if stds.iter().any(|std| !(std.is_finite() && *std > 0.0)) {
+        return Ok(None);
+    }
+    let model = |theta: &[f64]| {
+        let effects = values.effects(chosen, theta);
+        fitting.alone(&theta[..coefficients], &effects)
+    };
+    let departs = |theta: &[f64]| {
+        (values.possible(chosen, free, theta))
+            .then(|| replay.departures(&model(theta).model))
+            .flatten()
+    };
+    let start: Vec<f64> = by_torque.iter().map(|[value, _]| *value).collect();
+    let Some(first) = departs(&start) else {
+        return Ok(None);
+    };
+    let Some((theta, std)) = nearest(start.clone(), &stds, first, &departs, threads) else {
+        return Ok(None);
+    };
+    let standing = model(&theta);
+    let effects = (values.effects(chosen, &theta).into_iter())
+        .map(|p| {
+            let columns = source.columns_by(threads, &p.candidate, &p.shapes)?;
+            let columns = Arc::new(columns);
+            Ok(Profile { columns, ..p })
+        })
+        .collect::<Result<Vec<_>, DiagnoseError>>()?;
+    let before = model(&start);
+    let (Some(was), Some(is)) = (
+        replay.errors_of(&before.model),
+        replay.errors_of(&standing.model),
+    ) else {
+        return Ok(None);
+    };
+    let left = |model: &Standing, effects: &[Profile]| -> Result<[f64; 2], DiagnoseError> {
+        let residual = bench.remaining(replay.judged, model.fitted(), effects)?;
+        let rows = &replay.judged.rows;
+        let away = rows.away(0);
+        let all = noise_floor::rms(&residual[0], &rows.keep[0]);
+        let clear = match away.contains(&true) {
+            true => noise_floor::rms(&residual[0], &away),
+            false => all,
+        };
+        Ok([all, clear])
+    };
+    let [[all_was, clear_was], [all_is, clear_is]] =
+        [left(&before, chosen)?, left(&standing, &effects)?];
+    let torque_rms = [all_was, all_is];
+    let worse = match is.rms(0) < FAR_BETTER * was.rms(0) {
+        true => BLURRED,
+        false => TORQUE_WORSE,
+    };
+    let adopted = was.worse_than(&is, 0) && clear_is <= (1.0 + worse) * clear_was;
+    let names = named(bench, source, chosen, &values.shapes);
+    let parameters: Vec<Twice> = (names.into_iter().enumerate())
+        .map(|(k, (parameter, unit, scale))| Twice {
+            parameter,
+            unit,
+            torque: scale * start[k],
+            torque_std: scale * stds[k],
+            motion: scale * theta[k],
+            motion_std: scale * std[k],
+            sigmas: (theta[k] - start[k]).abs() / stds[k].hypot(std[k]),
+        })
+        .collect();
+    let unit = bench.robot.joints[0].kind.units();
+    let mut told = ByMotion {
+        unit: unit.0.to_owned(),
+        motion_rms: [was.rms(0), is.rms(0)],
+        torque_unit: unit.1.to_owned(),
+        torque_rms,
+        adopted,
+        parameters,
+        text: String::new(),
+    };
+    told.text = sentence(&told);
+    Ok(Some(Again {
+        told,
+        adopted: adopted.then_some((standing, effects)),
+    }))
+}
+
+/// Returns the values with the least motion error, and their standard deviations, robust to correlation within
+/// one-second blocks. `None` if the values are not identifiable.
+fn nearest(
+    mut theta: Vec<f64>,
+    stds: &[f64],
+    mut found: Departures,
+    departs: &(impl Fn(&[f64]) -> Option<Departures> + Sync),
+    threads: usize,
+) -> Option<(Vec<f64>, Vec<f64>)> {
+    let n = theta.len();
+    let squares = |d: &Departures| d.of.iter().map(|x| x * x).sum::<f64>();
+    for pass in 1.. {
+        let columns: Option<Vec<Vec<f64>>> = each_by(n, threads, |k| {
+            let at = |by: f64| {
+                let mut theta = theta.clone();
+                theta[k] += by;
+                departs(&theta)
+            };
+            let difference = |up: &Departures, down: &Departures, step: f64| -> Vec<f64> {
+                (up.of.iter().zip(&down.of))
+                    .map(|(a, b)| (a - b) / step)
+                    .collect()
+            };
+            // At a bound only one side exists.
+            match [at(stds[k]), at(-stds[k])] {
+                [Some(up), Some(down)] => Some(difference(&up, &down, 2.0 * stds[k])),
+                [Some(up), None] => Some(difference(&up, &found, stds[k])),
+                [None, Some(down)] => Some(difference(&found, &down, stds[k])),
+                [None, None] => None,
+            }
+        })
+        .into_iter()
+        .collect();
+        let columns = columns?;
+        // In units of the standard deviations, which differ by orders of magnitude.
+        let slopes = DMatrix::from_fn(found.of.len(), n, |row, k| stds[k] * columns[k][row]);
+        let information = slopes.tr_mul(&slopes);
+        let pull = slopes.tr_mul(&DVector::from_column_slice(&found.of));
+        let mut damping = 0.0;
+        let mut moved = 0.0_f64;
+        for _ in 0..DAMPED {
+            let mut damped = information.clone();
+            for k in 0..n {
+                damped[(k, k)] *= 1.0 + damping;
+            }
+            let step = damped.cholesky()?.solve(&pull);
+            let next: Vec<f64> = (0..n).map(|k| theta[k] - stds[k] * step[k]).collect();
+            match departs(&next).filter(|next| squares(next) < squares(&found)) {
+                Some(better) => {
+                    (theta, found) = (next, better);
+                    moved = step.amax();
+                    break;
+                }
+                None => damping = f64::max(10.0 * damping, 1e-2),
+            }
+        }
+        if moved <= SETTLED || pass == PASSES {
+            let inverse = information.cholesky()?.inverse();
+            let mut stretches: BTreeMap<(usize, usize), DVector<f64>> = BTreeMap::new();
+            for (row, (residual, stretch)) in found.of.iter().zip(&found.stretch).enumerate() {
+                let own = stretches.entry(*stretch);
+                *own.or_insert_with(|| DVector::zeros(n)) +=
+                    slopes.row(row).transpose() * *residual;
+            }
+            let mut spread = DMatrix::zeros(n, n);
+            for pull in stretches.values() {
+                spread += pull * pull.transpose();
+            }
+            let count = stretches.len() as f64;
+            let covariance = &inverse * spread * &inverse * (count / (count - 1.0));
+            let std = (0..n)
+                .map(|k| stds[k] * covariance[(k, k)].sqrt())
+                .collect();
+            return Some((theta, std));
+        }
+    }
+    None
+}
+
+fn sentence(told: &ByMotion) -> String {
+    let [was, is] = told.motion_rms.map(|rms| format_significant(1e3 * rms, 3));
+    let stands = if told.adopted {
+        "; away from rests and reversals, about which filters blur it, the torque is left hardly worse: those values stand."
+    } else {
+        "; the torque's values stand."
+    };
+    let furthest = (told.parameters.iter()).max_by(|a, b| a.sigmas.total_cmp(&b.sigmas));
+    let agree = match furthest {
+        Some(p) if p.sigmas > APART => format!(
+            "The two differ by {} standard deviations in {}: trust no more digits than they share.",
+            format_significant(p.sigmas, 2),
+            p.parameter
+        ),
+        Some(p) => format!(
+            "The two agree within {} of their standard deviations.",
+            format_significant(p.sigmas, 2)
+        ),
+        None => String::new(),
+    };
+    format!(
+        "Fitted once more, all {} parameters together, to the simulated motion of the training data, the model departs from it by {is} m{} RMS instead of {was}{stands} {agree}",
+        told.parameters.len(),
+        told.unit,
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,165 @@
+#![allow(clippy::unwrap_used)]
+
+use crate::tests::made::Diagnosed as _;
+use rand::{RngExt, SeedableRng};
+
+use crate::description::described_effects::Stated;
+use crate::fit::refit::Refit;
+use crate::models::output_error::*;
+use crate::recordings::context::Bench;
+use crate::{Diagnosis, Options};
+use rig_data::prepare::Recording;
+use rig_scenario::{Effect, Made, Scenario};
+
+const ASYMMETRIC: Effect = Effect::AsymmetricCoulomb { difference: 0.2 };
+
+fn diagnosed(made: &Made) -> Diagnosis {
+    made.diagnosed(&made.robot, &Options::default()).0
+}
+
+fn of<'d>(found: &'d Diagnosis, parameter: &str) -> &'d Twice {
+    let list = &found.by_motion.as_ref().unwrap().parameters;
+    list.iter().find(|p| p.parameter == parameter).unwrap()
+}
+
+#[test]
+fn torque_and_motion_agree_where_the_model_is_right() {
+    let made = Scenario::short([ASYMMETRIC], 61).make().unwrap();
+    let found = diagnosed(&made);
+    let again = found.by_motion.as_ref().unwrap();
+    println!("{again:#?}");
+    assert!(!again.adopted);
+    assert!(again.motion_rms[1] <= again.motion_rms[0]);
+    assert!(again.parameters.iter().all(|p| p.sigmas < APART));
+    assert!(
+        found
+            .words
+            .iter()
+            .any(|w| w.contains("of their standard deviations"))
+    );
+    let truth = &made.truth.nominal;
+    for (name, truth) in [("fv1", truth["viscous"]), ("fc1", truth["coulomb"])] {
+        let p = of(&found, name);
+        let off = (p.motion - truth).abs();
+        assert!(
+            off < 4.0 * p.motion_std + 0.01 * truth,
+            "{name}: {p:?}, {truth}"
+        );
+    }
+    // The effect's own value, half the difference between directions.
+    let p = of(&found, "asymmetric_coulomb.asymmetry");
+    assert!(
+        (p.motion.abs() / (0.1 * truth["coulomb"]) - 1.0).abs() < 0.05,
+        "{p:?}"
+    );
+}
+
+/// Position noise is in the torque's regressors and in no simulated motion.
+#[test]
+fn a_noisy_position_costs_the_motion_less_than_the_torque() {
+    let mut made = Scenario::short([ASYMMETRIC], 62).make().unwrap();
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(62);
+    let repeat = made.repeat.as_mut().unwrap();
+    for recording in [&mut made.train, repeat, &mut made.holdout] {
+        for q in recording.blocks.iter_mut().flat_map(|b| &mut b.joints[0].q) {
+            let spread: f64 = (0..12).map(|_| rng.random_range(-0.5..0.5)).sum();
+            *q += 2e-3 * spread;
+        }
+    }
+    let found = diagnosed(&made);
+    println!("{:#?}", found.by_motion);
+    // The noise is white, so the position's spectrum shows the motion's frequency, which the cut-off does not change.
+    let treated = found.treatment.as_ref().unwrap();
+    let why = &treated.position_cutoff_why;
+    assert!(
+        treated.position_cutoff > 4.9 * treated.motion_frequency,
+        "{why}"
+    );
+    for name in ["Izz1 + Ia1", "fv1", "fc1"] {
+        let p = of(&found, name);
+        assert!(p.motion_std < 0.7 * p.torque_std, "{p:?}");
+    }
+    let p = of(&found, "Izz1 + Ia1");
+    assert!(
+        (p.motion / made.truth.nominal["inertia"] - 1.0).abs() < 0.01,
+        "{p:?}"
+    );
+}
+
+/// Wrong values return to those of the torque and are adopted: the motion improves by far, and the torque too.
+#[test]
+fn values_that_are_off_are_mended_by_the_motion() {
+    let made = Scenario::short([], 63).make().unwrap();
+    let stated = Stated::of(&made.robot);
+    let training: [&dyn Recording; 2] = [&made.train, made.repeat.as_ref().unwrap()];
+    let bench = Bench::of(&stated, &training).unwrap();
+    let loaded = bench.load(&training).unwrap();
+    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let values = bench.anchor.values(&refit.before.values);
+    let source = bench.source(&loaded, &values).unwrap();
+    let fitting = Fitting::new(&bench, &refit, &loaded.runs, &values);
+    let replay = Replay::of(&fitting, &loaded).unwrap();
+    let pairs = crate::recordings::noise_floor::repeats(&loaded.runs);
+    let right = refit.joint(&source, &[], &pairs, &[Vec::new()]).unwrap();
+    let mut off = refit.joint(&source, &[], &pairs, &[Vec::new()]).unwrap();
+    for value in &mut off.solution.values {
+        *value *= 1.03;
+    }
+    let again = by_motion(&fitting, &replay, &source, &[], &off, 2)
+        .unwrap()
+        .unwrap();
+    println!("{:#?}", again.told);
+    let (standing, _) = again.adopted.unwrap();
+    assert!(again.told.adopted && again.told.text.contains("those values stand."));
+    assert!(again.told.torque_rms[1] < again.told.torque_rms[0]);
+    let mended = standing.coefficients(&bench.anchor);
+    for (k, (mended, right)) in mended.iter().zip(&right.solution.values).enumerate() {
+        assert!(
+            (mended / right - 1.0).abs() < 0.01,
+            "{k}: {mended}, {right}"
+        );
+    }
+    // Nothing is adopted, as expected.
+    let same = by_motion(&fitting, &replay, &source, &[], &right, 2)
+        .unwrap()
+        .unwrap();
+    assert!(same.adopted.is_none());
+}
+
+/// A line with correlated noise: least squares, with deviations by stretches.
+#[test]
+fn the_nearest_values_are_least_squares_and_their_deviations_count_stretches() {
+    let rows = 4000;
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+    let noise: Vec<f64> = (0..rows / 100)
+        .map(|_| rng.random_range(-1.0..1.0))
+        .collect();
+    let departs = |theta: &[f64]| {
+        let at = |k: usize| {
+            let x = k as f64 / rows as f64;
+            (theta[0] - 2.0) + (theta[1] - 3.0) * x - noise[k / 100]
+        };
+        Some(Departures {
+            of: (0..rows).map(at).collect(),
+            stretch: (0..rows).map(|k| (0, k / 100)).collect(),
+        })
+    };
+    let start = vec![0.0, 0.0];
+    let first = departs(&start).unwrap();
+    let (theta, std) = nearest(start, &[0.01, 10.0], first, &departs, 1).unwrap();
+    let left = departs(&theta).unwrap();
+    let sum: f64 = left.of.iter().sum();
+    assert!(sum.abs() < 1e-6 * rows as f64, "{sum}");
+    // For mean and slope over 40 independent values of variance 1/3.
+    let spread = (1.0_f64 / 3.0 / 40.0).sqrt();
+    assert!((std[0] / (2.0 * spread) - 1.0).abs() < 0.4, "{std:?}");
+    assert!(
+        (std[1] / (12.0_f64.sqrt() * spread) - 1.0).abs() < 0.4,
+        "{std:?}"
+    );
+    assert!((theta[0] - 2.0).abs() < 4.0 * std[0] && (theta[1] - 3.0).abs() < 4.0 * std[1]);
+    // A parameter without effect is not identifiable.
+    let blind = |theta: &[f64]| departs(&[theta[0] + theta[1], 0.0]);
+    let first = blind(&[0.0, 0.0]).unwrap();
+    assert!(nearest(vec![0.0, 0.0], &[1.0, 1.0], first, &blind, 1).is_none());
+}

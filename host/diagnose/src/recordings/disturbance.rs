@@ -1,0 +1,128 @@
+//! Disturbances in only one of two runs of a motion: contact, an impact, a moved zero.
+//!
+//! The difference of two runs is noise for any model. A few short stretches with most of it are an event and would hide
+//! all else. They are excluded from both runs and reported.
+//!
+//! Leaves out: events in both runs at the same place of the motion, which belong to the rig; lasting events; contact in
+//! a commanded dwell, where friction may hold the joint.
+
+use std::ops::Range;
+
+use crate::recordings::context::Loaded;
+use crate::recordings::noise_floor;
+use crate::recordings::outlier_segment::burst;
+use crate::rows::regression::Rows;
+use rig_data::runs::Run;
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+
+/// Time that is excluded on either side of a disturbance, s: the reach of a filter.
+const BESIDE: f64 = 0.25;
+
+/// Least duration of a standstill, s; a reversal is shorter.
+const LASTING: f64 = 0.3;
+
+/// Marks rows in which a joint stands: unused for at least [`LASTING`].
+fn lasting(keep: &[bool], period: f64) -> Vec<bool> {
+    keep.chunk_by(|a, b| a == b)
+        .flat_map(|part| {
+            let stands = !part[0] && part.len() as f64 * period >= LASTING;
+            std::iter::repeat_n(stands, part.len())
+        })
+        .collect()
+}
+
+/// Marks a run's first `length` rows in which its reference moves; all without a reference.
+fn asked(run: &Run, joint: usize, rows: &Rows, length: usize) -> Vec<bool> {
+    let period = rows.period;
+    let own = run.joints[joint].reference.as_ref();
+    (0..length)
+        .map(|k| {
+            let at = (rows.thinning.trimmed(run) + k as f64 * period) * run.rate;
+            let sample = |row: f64| (at + row * period * run.rate).max(0.0).round() as usize;
+            own.is_none_or(|r| match (r.get(sample(-0.5)), r.get(sample(0.5))) {
+                (Some(before), Some(after)) => before != after,
+                _ => false,
+            })
+        })
+        .collect()
+}
+
+/// Excludes disturbances from runs of one motion and returns sentences on them. `residuals` are those of the refitted
+/// model, joint by joint.
+pub(crate) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded) -> Vec<String> {
+    let rows = &loaded.rows;
+    let mut told = Vec::new();
+    // Run, and rows counted from its first.
+    let mut out: Vec<(usize, Range<usize>)> = Vec::new();
+    for (a, b) in noise_floor::repeats(&loaded.runs) {
+        for (j, joint) in robot.joints.iter().enumerate() {
+            let residual = &residuals[j];
+            let mut apart = vec![0.0; rows.count];
+            let mut keep = vec![false; rows.count];
+            let starts = [a, b].map(|run| rows.starts[run]);
+            let length = (rows.starts[a + 1] - starts[0]).min(rows.starts[b + 1] - starts[1]);
+            let known = |run: usize, row: usize| {
+                let mut rows = (out.iter()).filter(|(known, _)| *known == run);
+                rows.any(|(_, part)| part.contains(&row))
+            };
+            // Runs that come to rest at slightly different times differ without a disturbance.
+            let resting =
+                starts.map(|start| lasting(&rows.keep[j][start..start + length], rows.period));
+            let asked = asked(&loaded.runs[a], j, rows, length);
+            let commanded = lasting(&asked, rows.period);
+            let reach = (BESIDE / rows.period).ceil() as usize;
+            let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(length);
+            for k in 0..length {
+                let [x, y] = starts.map(|start| start + k);
+                let rests = resting.iter().all(|rests| rests[near(k)].contains(&true));
+                // In a commanded dwell, each run may stop on another side of its friction.
+                let at_rest = rests || commanded[near(k)].contains(&true);
+                let known = known(a, k) || known(b, k);
+                keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;
+                apart[x] = residual[x] - residual[y];
+            }
+            let Some(burst) = burst(&apart, &keep, &rows.starts, rows.period, &loaded.runs) else {
+                continue;
+            };
+            let squares = |run: usize| -> f64 {
+                (burst.rows.iter())
+                    .flat_map(|part| part.clone())
+                    .map(|x| residual[x - starts[0] + rows.starts[run]].powi(2))
+                    .sum()
+            };
+            let (own, other) = if squares(a) > squares(b) {
+                (a, b)
+            } else {
+                (b, a)
+            };
+            let [own_label, other_label] = [own, other].map(|run| &loaded.runs[run].label);
+            let [from, to] = burst
+                .time
+                .map(|t| t - loaded.runs[a].t.first().unwrap_or(&0.0));
+            told.push(format!(
+                "Joint {}: from {from:.1} to {to:.1} s after its start {own_label} differs from {other_label}, the same motion, {} times as much as elsewhere. Something touched the joint or held it there, or that piece is damaged; {} of half a second left out of both.",
+                joint.name,
+                format_significant(burst.times, 2),
+                match burst.count {
+                    1 => "one stretch is".to_owned(),
+                    n => format!("{n} stretches are"),
+                }
+            ));
+            for part in &burst.rows {
+                let own = part.start - starts[0]..part.end - starts[0];
+                out.extend([(a, own.clone()), (b, own)]);
+            }
+        }
+    }
+    let (period, thinning) = (rows.period, &rows.thinning);
+    for (run, part) in out {
+        let run: &mut Run = &mut loaded.runs[run];
+        let trimmed = thinning.trimmed(run);
+        let [from, to] = [part.start, part.end].map(|row| row as f64 * period + trimmed);
+        let sample = |t: f64| ((t * run.rate).max(0.0).round() as usize).min(run.t.len());
+        let part = sample(from - BESIDE)..sample(to + BESIDE);
+        run.left_out.push(part);
+    }
+    told
+}

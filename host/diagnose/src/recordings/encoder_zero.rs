@@ -1,0 +1,186 @@
+//! Recordings with different position zeros: gravity and other position-dependent effects act at another place in one
+//! of them. An incremental encoder gets a new zero each time, often by eye.
+//!
+//! Leaves out: robots of several joints, whose encoders are absolute; joints without a position-dependent torque; zeros
+//! that drift.
+
+use std::collections::BTreeSet;
+use std::f64::consts::{PI, TAU};
+
+use crate::DiagnoseError;
+use crate::columns::effect_columns::Source;
+use crate::fit::least_squares::Fit;
+use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::noise_floor;
+use crate::rows::nominal_torque::predict;
+use crate::search::fitted_candidate::SIGNIFICANT;
+use rig_data::runs::Run;
+use rig_model::robot::{Joint, JointKind};
+use rig_output::format_value;
+
+/// Least RMS reduction by another zero for a report …
+const LEAST: f64 = 0.2;
+/// … and least share of the effects' RMS reduction.
+const IN_THEIR_PLACE: f64 = 0.8;
+/// Least reported shift, rad or m: a spirit level leaves less.
+const SHIFT: f64 = 0.01;
+/// Least shift in standard deviations.
+const SURE: f64 = 6.0;
+
+/// Zeros over a whole turn that are tried for a large shift …
+const TURNS: u32 = 24;
+/// … and least RMS reduction by one of them.
+const MOST_OF_IT: f64 = 0.5;
+
+/// Estimated zero shift of a recording.
+struct Shift {
+    label: String,
+    /// Shift and its standard deviation, rad or m.
+    by: [f64; 2],
+    gain: f64,
+}
+
+impl Shift {
+    fn of(run: Option<&Run>, by: [f64; 2], gain: f64) -> Self {
+        let label = run.map_or_else(String::new, |run| run.label.clone());
+        Self { label, by, gain }
+    }
+
+    /// Returns the shift with the larger RMS reduction.
+    fn or(self, other: Option<Self>) -> Self {
+        match other {
+            Some(other) if other.gain >= self.gain => other,
+            _ => self,
+        }
+    }
+
+    fn told(&self, joint: &Joint, others: &str) -> String {
+        format!(
+            "In {} joint {} seems to stand {} {} off against {others}: with a zero of its own {:.0} % less is left. Give all recordings one zero (--home), or look whether something else has changed.",
+            self.label,
+            joint.name,
+            format_value(-self.by[0], self.by[1]),
+            joint.kind.units().0,
+            100.0 * self.gain
+        )
+    }
+}
+
+/// Returns a sentence if another zero of one recording would do most of what the found effects do. `base` is the
+/// refitted model; the effects reduce its RMS by the share `taken`.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(crate) fn another_zero(
+    source: &Source,
+    base: &Fit,
+    taken: f64,
+) -> Result<Option<String>, DiagnoseError> {
+    let [joint] = &source.robot.joints[..] else {
+        return Ok(None);
+    };
+    let recordings: BTreeSet<usize> = source.runs.iter().map(|run| run.recording).collect();
+    let mut most: Option<Shift> = None;
+    for &recording in recordings.iter().filter(|_| recordings.len() > 1) {
+        let column = vec![Some(shifted(source, Some(recording))?)];
+        let open = [[f64::NEG_INFINITY, f64::INFINITY]];
+        let evidence = (base.distinct(&[column])).and_then(|own| base.evidence(&own, &open));
+        let Some(e) = evidence else { continue };
+        let by = [e.gains[0], e.stds[0]];
+        let sure =
+            by[0].abs() > SHIFT.max(SURE * by[1]) && e.corrected(recordings.len()) < SIGNIFICANT;
+        if sure && e.gain > LEAST.max(IN_THEIR_PLACE * taken) {
+            let run = source.runs.iter().find(|run| run.recording == recording);
+            most = Some(Shift::of(run, by, e.gain).or(most));
+        }
+    }
+    Ok(most.map(|shift| shift.told(joint, "the other recordings")))
+}
+
+/// The same for a hold-out with the model's `residual`.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(crate) fn another_zero_held(
+    bench: &Bench,
+    sealed: &Loaded,
+    values: &[f64],
+    residual: &[Vec<f64>],
+) -> Result<Option<String>, DiagnoseError> {
+    let [joint] = &bench.robot.joints[..] else {
+        return Ok(None);
+    };
+    let (residual, keep) = (&residual[0], &sealed.rows.keep[0]);
+    let own = shifted(&bench.source(sealed, values)?, None)?;
+    let used = || (own.iter().zip(residual).zip(keep)).filter(|(_, keep)| **keep);
+    let (xx, xy) = used().fold((0.0, 0.0), |(xx, xy), ((x, r), _)| (xx + x * x, xy + x * r));
+    let mut most = None;
+    if xx > 0.0 {
+        let by = xy / xx;
+        let left: Vec<f64> = own.iter().zip(residual).map(|(x, r)| r - by * x).collect();
+        let [before, after] = [residual, &left].map(|r| noise_floor::rms(r, keep));
+        // Counts one row in ten as independent.
+        let std = after * (10.0 / xx).sqrt();
+        let gain = 1.0 - after / before;
+        if by.abs() > SHIFT.max(SURE * std) && gain > LEAST {
+            most = Some(Shift::of(sealed.runs.first(), [by, std], gain));
+        }
+    }
+    if most.is_none() && joint.kind == JointKind::Revolute {
+        most = turned(bench, sealed, values, residual)?;
+    }
+    Ok(most.map(|shift| shift.told(joint, "those to learn from")))
+}
+
+/// The same for a large shift of a single revolute joint.
+fn turned(
+    bench: &Bench,
+    sealed: &Loaded,
+    values: &[f64],
+    residual: &[f64],
+) -> Result<Option<Shift>, DiagnoseError> {
+    let (rows, nominal) = (&sealed.rows, &bench.nominal);
+    let torque = |by: f64| -> Result<Vec<f64>, DiagnoseError> {
+        let mut thin = Vec::new();
+        for run in &sealed.runs {
+            let mut elsewhere = run.clone();
+            for q in elsewhere.joints.iter_mut().flat_map(|joint| &mut joint.q) {
+                *q -= by;
+            }
+            let told = predict(nominal, bench.robot, values, &elsewhere)?;
+            rows.thinning.push_raw(&told.torque[0], &mut thin);
+        }
+        Ok(thin)
+    };
+    let here = torque(0.0)?;
+    let before = noise_floor::rms(residual, &rows.keep[0]);
+    let mut most: Option<Shift> = None;
+    for k in 1..TURNS {
+        let by = f64::from(k) * TAU / f64::from(TURNS);
+        let there = torque(by)?;
+        let left: Vec<f64> = (residual.iter().zip(here.iter().zip(&there)))
+            .map(|(r, (here, there))| r + here - there)
+            .collect();
+        let gain = 1.0 - noise_floor::rms(&left, &rows.keep[0]) / before;
+        if gain > MOST_OF_IT {
+            let by = if by > PI { by - TAU } else { by };
+            let std = PI / f64::from(TURNS);
+            most = Some(Shift::of(sealed.runs.first(), [by, std], gain).or(most));
+        }
+    }
+    Ok(most)
+}
+
+/// Returns the torque per rad or m of zero shift in one recording, or in all of them.
+fn shifted(source: &Source, recording: Option<usize>) -> Result<Vec<f64>, DiagnoseError> {
+    let mut column = Vec::new();
+    for (r, run) in source.runs.iter().enumerate() {
+        let there = recording.is_none_or(|own| own == run.recording);
+        let one = vec![f64::from(u8::from(there)); run.len()];
+        let torque = source.slopes(0, r)?.misread(&one, 1.0 / run.rate);
+        for from in torque.iter().flatten() {
+            source.thinning.push(from, &mut column);
+        }
+    }
+    Ok(column)
+}

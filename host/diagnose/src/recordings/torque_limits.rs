@@ -1,0 +1,54 @@
+//! Described torque limits that the recorded torque exceeds.
+//!
+//! Rows at a limit carry no information and are excluded, and a simulation stays within the limit. A wrong limit would
+//! exclude the most informative rows and restrict the simulated motion.
+
+use crate::description::described_effects::Stated;
+use rig_data::runs::Run;
+use rig_output::{format_significant, format_unit};
+
+/// Factor by which a torque must exceed the limit …
+const BEYOND: f64 = 1.05;
+/// … and excess in standard deviations of its reading, as readings scatter about a true limit.
+const SIGMAS: f64 = 4.0;
+/// Least share of all samples beyond the limit.
+const LEAST: f64 = 0.005;
+
+impl Stated {
+    /// Removes described limits that the recorded torque exceeds. Returns true if there was one.
+    pub(crate) fn lift_limits(&mut self, runs: &[Run]) -> bool {
+        let mut lifted = false;
+        for (j, joint) in self.robot.joints.iter_mut().enumerate() {
+            let Some(limits) = joint.limits.as_mut() else {
+                continue;
+            };
+            let Some(limit) = limits.torque else { continue };
+            let own = || runs.iter().filter_map(|run| run.joints.get(j));
+            let variances = own().map(|own| own.differences().variance());
+            let noise = variances.fold(0.0, f64::max).sqrt();
+            let least = (BEYOND * limit).max(limit + SIGMAS * noise);
+            let (mut count, mut beyond, mut most) = (0_usize, 0_usize, 0.0f64);
+            for own in own() {
+                for tau in own.recorded().iter() {
+                    count += 1;
+                    beyond += usize::from(tau.abs() > least);
+                    most = most.max(tau.abs());
+                }
+            }
+            if (beyond as f64) < LEAST * count as f64 || beyond == 0 {
+                continue;
+            }
+            limits.torque = None;
+            lifted = true;
+            let unit = format_unit(joint.kind.units().1);
+            self.lifted.push(format!(
+                "The torque of joint {} goes up to {} {unit}, beyond the {} {unit} that the description gives as its limit, for {} % of the time: that limit was left out, here and in the description that comes out. Correct it, or check the unit, the gear ratio and the torque constant.",
+                joint.name,
+                format_significant(most, 3),
+                format_significant(limit, 3),
+                format_significant(100.0 * beyond as f64 / count as f64, 2),
+            ));
+        }
+        lifted
+    }
+}

@@ -1,0 +1,9 @@
+//! Steps, limits, pictures and sentences of a result.
+
+pub(crate) mod finish;
+pub(crate) mod limits;
+pub(crate) mod pictures;
+pub(crate) mod remarks;
+pub(crate) mod sentences;
+pub(crate) mod steps;
+pub(crate) mod treatment;

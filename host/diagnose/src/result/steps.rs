@@ -1,0 +1,190 @@
+//! Steps of a result: the gain of each effect, and alternative names.
+
+use rig_shared::effects::Kind;
+
+use crate::DiagnoseError;
+use crate::acceptance::judge::{Judged, closed, rank};
+use crate::columns::waves::{is_of_the_motor, ratio_is_described};
+use crate::fit::refit::{Joint, Refit};
+use crate::models::parameter_change::Change;
+use crate::models::rms_path::Descent;
+use crate::models::simulated_motion::Errors;
+use crate::outcome::{Step, Tried};
+use crate::search::fitted_candidate::Profile;
+use crate::search::stepwise::Search;
+use rig_model::robot::{Robot, title_of};
+
+/// Returns one step for each effect that is not described, with its alternative names.
+pub(crate) fn steps(
+    search: &Search,
+    refit: &Refit,
+    judged: &Judged,
+    described: usize,
+    joint: &Joint,
+    descent: &Descent,
+    motion: &[Option<Errors>],
+) -> Result<Vec<Step>, DiagnoseError> {
+    let Judged { chosen, known, .. } = judged;
+    let held_floors = descent.floors(known);
+    let trials = search.trials();
+    let source = &search.source;
+    let mut steps = Vec::new();
+    for (k, profile) in chosen.iter().enumerate().skip(described) {
+        let j = profile.candidate.joint;
+        let at = k - described;
+        let train = descent.train.step(j, at);
+        let unseen = descent.holdout.as_ref().map(|fall| fall.step(j, at));
+        let about = profile.candidate.kind.about();
+        let mut step = Step {
+            effect: about.name.to_owned(),
+            law: about.law.map(str::to_owned),
+            joint: source.robot.joints[j].name.clone(),
+            set: Vec::new(),
+            parameters: joint.parameters(source, chosen, refit.free.len(), k),
+            p_value: profile.evidence.corrected(trials),
+            name_probability: f64::NAN,
+            runner_up: None,
+            runner_up_gap_closed: None,
+            rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
+            train_rms: train,
+            holdout_rms: unseen,
+            motion_rms: (motion[at].as_ref().zip(motion[at + 1].as_ref()))
+                .map(|pair| <[&Errors; 2]>::from(pair).map(|e| e.rms(j))),
+            gap_closed: share(unseen.unwrap_or(train), held_floors[j]),
+            why: String::new(),
+        };
+        if search.is_measured(&profile.candidate) {
+            step.set.push(step.effect.clone());
+        } else {
+            let rivals = search.alternatives(&refit.base, chosen, k)?;
+            let is_not = |kind| search.is_not(&profile.candidate, kind);
+            rank(&mut step, profile, &rivals, source.runs, &is_not);
+            // Without a gear ratio, motor and link waves are not distinguishable.
+            if is_of_the_motor(profile.candidate.kind)
+                && !ratio_is_described(&source.robot.joints[j])
+            {
+                step.name_probability *= 0.5;
+            }
+        }
+        steps.push(step);
+    }
+    Ok(steps)
+}
+
+/// Returns the share of the gap closed by a step; NaN if the RMS rises.
+fn share(rms: [f64; 2], floor: f64) -> f64 {
+    let share = closed(rms, floor);
+    if share < 0.0 { f64::NAN } else { share }
+}
+
+/// Notes in `tried` why an accepted effect was dropped.
+pub(crate) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: &str) {
+    let title = title_of(fallen.candidate.kind);
+    let joint = &robot.joints[fallen.candidate.joint].name;
+    let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
+    if let Some(taken) = tried.iter_mut().find(own) {
+        taken.refused = why.into();
+    }
+}
+
+/// Replaces the entry of a law by that of another law with the same name that took over.
+fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile, trials: usize) {
+    let (kind, joint) = (
+        profile.candidate.kind,
+        &robot.joints[profile.candidate.joint].name,
+    );
+    let of_name: Vec<String> = (Kind::ALL.iter())
+        .filter(|other| other.about().name == kind.about().name)
+        .map(|other| title_of(*other))
+        .collect();
+    let first = (tried.iter().enumerate())
+        .filter(|(_, t)| t.joint == *joint && of_name.contains(&t.effect))
+        .max_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
+    let Some((at, first)) = first else { return };
+    let step = first.step;
+    tried[at].refused = "another law of that name does better".into();
+    let taken = Tried {
+        effect: title_of(kind),
+        joint: joint.clone(),
+        step,
+        gain: profile.evidence.gain,
+        gain_sigmas: profile.evidence.gain_sigmas,
+        p_value: profile.evidence.corrected(trials),
+        refused: String::new(),
+    };
+    tried.insert(at, taken);
+}
+
+/// Makes the list of trials consistent with the final effects. Effects without a sweep of their own are marked as
+/// accepted, absent ones as dropped.
+pub(crate) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile], trials: usize) {
+    let is = |t: &Tried, p: &Profile| {
+        t.effect == title_of(p.candidate.kind) && t.joint == robot.joints[p.candidate.joint].name
+    };
+    for profile in found {
+        if tried.iter().any(|t| t.refused.is_empty() && is(t, profile)) {
+            continue;
+        }
+        let own = tried.iter_mut().filter(|t| is(t, profile));
+        match own.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+            Some(best) => best.refused.clear(),
+            None => took_over(robot, tried, profile, trials),
+        }
+    }
+    let mut rounds = vec![0; found.len()];
+    for fallen in tried.iter_mut().filter(|t| t.refused.is_empty()) {
+        let own: Vec<usize> = (0..found.len())
+            .filter(|k| is(fallen, &found[*k]))
+            .collect();
+        // Each order of a wave was accepted in a sweep of its own.
+        let stands = own.first().is_some_and(|first| {
+            rounds[*first] += 1;
+            found[*first].candidate.order.is_none() || rounds[*first] <= own.len()
+        });
+        if !stands {
+            fallen.refused =
+                "fell again: beside all others it takes too little away, or another name takes as much"
+                    .into();
+        }
+    }
+}
+
+/// Marks effects as refused that only approximated an unknown residual.
+pub(crate) fn refuse_guesses(robot: &Robot, tried: &mut [Tried], judged: &Judged) {
+    for guess in &judged.guesses {
+        let why = "closes less of the gap than stays open beside it, and may be a guess at what has no name";
+        refuse(robot, tried, guess, why);
+    }
+}
+
+/// Returns the step of a parameter change that has the name of an effect.
+pub(crate) fn change_step(
+    robot: &Robot,
+    change: &Change,
+    descent: &Descent,
+    floors: &[f64],
+) -> Option<Step> {
+    let about = change.effect?.about();
+    let held_floors = descent.floors(floors);
+    let j = robot.joints.len() - 1;
+    let [refitted, last] = descent.train.whole(j);
+    let train = [descent.train.frozen[j].max(refitted), last];
+    let unseen = (descent.holdout.as_ref()).map(|fall| [fall.frozen[j], fall.whole(j)[1]]);
+    Some(Step {
+        effect: about.name.to_owned(),
+        law: None,
+        joint: robot.joints[j].name.clone(),
+        set: vec![about.name.to_owned()],
+        parameters: change.parameters.clone(),
+        p_value: change.p_value,
+        name_probability: f64::NAN,
+        runner_up: None,
+        runner_up_gap_closed: None,
+        rms_unit: robot.joints[j].kind.units().1.to_owned(),
+        train_rms: train,
+        holdout_rms: unseen,
+        motion_rms: None,
+        gap_closed: share(unseen.unwrap_or(train), held_floors[j]),
+        why: change.words.clone(),
+    })
+}

@@ -1,0 +1,6 @@
+//! Regression rows of the recordings.
+
+pub(crate) mod nominal_torque;
+pub(crate) mod one_way;
+pub(crate) mod regression;
+pub(crate) mod row_weights;

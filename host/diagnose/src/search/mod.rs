@@ -1,0 +1,4 @@
+//! Search for effects: fit of each candidate, stepwise selection.
+
+pub(crate) mod fitted_candidate;
+pub(crate) mod stepwise;

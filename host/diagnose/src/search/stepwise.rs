@@ -1,0 +1,509 @@
+//! Stepwise search: fit of each candidate, acceptance tests, joint refinement, removal and exchange.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rig_shared::effects::{Kind, SHAPES};
+
+use crate::DiagnoseError;
+use crate::acceptance::judge::equal;
+use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::wave_orders::Orders;
+use crate::columns::waves;
+use crate::fit::least_squares::Fit;
+use crate::rows::regression::Column;
+use crate::search::fitted_candidate::{LEAST_GAIN, Profile, goes_straight, grid, grid_on};
+use rig_data::runs::{blurred, resolution};
+use rig_model::robot::Placed;
+
+mod begin;
+mod kinds;
+mod pairs;
+mod shadow;
+mod side;
+mod simplest;
+mod sweep;
+mod tentative;
+
+use kinds::{depends_on_model, doubles, has_many_orders};
+pub(crate) use kinds::{is_constant, is_first_law, is_friction, is_gear, rivals};
+use shadow::in_the_shadow;
+pub(crate) use shadow::shadow;
+
+/// Encoder steps below which a distance equals zero: the direction of motion is not known more precisely.
+const STEPS_OF_A_DISTANCE: f64 = 2.0;
+/// p-value below which an effect stays in the model.
+const STAYS: f64 = 1e-3;
+/// Rounds in which each law is compared with other laws of its name, beside the updated others.
+const LAWS_ANEW: usize = 2;
+/// Maximum number of effects beside the described ones. The orders of one wave count once.
+const MOST_EFFECTS: usize = 6;
+
+/// The search over a candidate library.
+pub(crate) struct Search<'a> {
+    /// Data for the columns.
+    pub(crate) source: Source<'a>,
+    /// Candidates.
+    pub(crate) library: Vec<Candidate>,
+    /// Described effects, with which the search begins.
+    pub(crate) described: Vec<Placed>,
+    /// Gears from link encoders, with their shapes. The torque does not change them.
+    pub(crate) measured: Vec<(Candidate, [f64; SHAPES])>,
+    /// Gears from the torque, with fixed shapes while all other effects are searched.
+    settled: Vec<(Candidate, [f64; SHAPES])>,
+    /// Threads.
+    pub(crate) threads: usize,
+    /// Encoder resolution, joint by joint.
+    pub(crate) resolution: Vec<f64>,
+    /// Travel since reversal within the blur time of the filter, joint by joint, rad or m.
+    blurred: Vec<f64>,
+    /// Range of positions, joint by joint, rad or m.
+    spans: Vec<f64>,
+    /// Orders of motor torque waves beyond the grid, joint by joint.
+    orders: Vec<Orders>,
+    /// Constants whose side of the gear is certain.
+    sided: Vec<Candidate>,
+    /// Candidates that the last search dropped.
+    dropped: Vec<Candidate>,
+    /// A backlash that almost passed.
+    pub(crate) nearly: Option<Profile>,
+    /// Backlash that the observer supports: its open-loop gain may be smaller.
+    pub(crate) heard: Vec<Candidate>,
+    cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
+}
+
+impl<'a> Search<'a> {
+    /// Creates a search.
+    pub(crate) fn new(
+        source: Source<'a>,
+        library: Vec<Candidate>,
+        described: Vec<Placed>,
+        threads: usize,
+    ) -> Self {
+        Self {
+            resolution: (0..source.nominal.joints())
+                .map(|joint| resolution(source.runs, joint))
+                .collect(),
+            blurred: (0..source.nominal.joints())
+                .map(|joint| blurred(source.runs, joint, source.thinning.smear()))
+                .collect(),
+            spans: (0..source.nominal.joints())
+                .map(|joint| waves::span(source.runs, joint))
+                .collect(),
+            orders: (0..source.nominal.joints())
+                .map(|joint| orders_of(&source, &library, joint))
+                .collect(),
+            source,
+            library,
+            described,
+            measured: Vec::new(),
+            settled: Vec::new(),
+            sided: Vec::new(),
+            dropped: Vec::new(),
+            nearly: None,
+            heard: Vec::new(),
+            threads,
+            cache: Mutex::new(HashMap::new()),
+        }
+    }
+
+    /// Returns the smallest distance that a law of this kind can resolve on a joint, rad or m: some encoder steps. For
+    /// friction at least the travel since reversal before the filter shows the reversal.
+    pub(crate) fn least_told(&self, kind: Kind, joint: usize) -> f64 {
+        let steps = STEPS_OF_A_DISTANCE * self.resolution[joint];
+        if is_gear(kind) {
+            steps
+        } else {
+            steps.max(self.blurred[joint])
+        }
+    }
+
+    /// Sets a source with new predictions, and clears cached columns that depend on them.
+    fn renewed(&mut self, source: Source<'a>) {
+        // Presliding changes the friction through its contact.
+        let slid = !(self.source.bent.is_empty() && source.bent.is_empty());
+        self.source = source;
+        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        cache.retain(|c, _| {
+            let kind = self.library[*c].kind;
+            !(depends_on_model(kind)
+                || slid && (kind.acts_through_contact() || kind.is_presliding()))
+        });
+    }
+
+    /// Returns true if the motion spans a candidate with these shapes; other effects than waves always pass.
+    pub(crate) fn shows(&self, candidate: &Candidate, shapes: &[f64; SHAPES]) -> bool {
+        let joint = &self.source.robot.joints[candidate.joint];
+        waves::shown(candidate.kind, joint, shapes, self.spans[candidate.joint])
+    }
+
+    /// Returns the index of a candidate in the library.
+    pub(crate) fn place(&self, candidate: &Candidate) -> Option<usize> {
+        self.library.iter().position(|l| *l == candidate.sort())
+    }
+
+    /// Returns the grid of a candidate's shapes.
+    pub(crate) fn grid(&self, candidate: &Candidate) -> Vec<[f64; SHAPES]> {
+        let joints = &self.source.robot.joints;
+        // On a single joint such waves replace the misfit of other laws: of load friction, on the emulated rig.
+        let mut points = if joints.len() == 1 {
+            grid(candidate.kind)
+        } else {
+            grid_on(candidate.kind, &joints[candidate.joint])
+        };
+        if has_many_orders(candidate.kind) {
+            points.extend(self.orders[candidate.joint].loud.iter().map(|order| {
+                let mut point = [0.0; SHAPES];
+                point[0] = *order;
+                point
+            }));
+        }
+        let running = self.source.running();
+        points.retain(|point| !goes_straight(candidate.kind, point, running));
+        points
+    }
+
+    /// Returns the columns at a candidate's grid points.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn cached(
+        &self,
+        c: usize,
+        points: &[[f64; SHAPES]],
+    ) -> Result<Vec<Arc<Vec<Column>>>, DiagnoseError> {
+        let cache = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(held) = cache().get(&c) {
+            return Ok(held.clone());
+        }
+        let columns: Vec<Arc<Vec<Column>>> =
+            (self.source.columns_of(1, &self.library[c], points)?)
+                .into_iter()
+                .map(Arc::new)
+                .collect();
+        cache().insert(c, columns.clone());
+        Ok(columns)
+    }
+
+    /// Finds effects one by one, after the described ones or after those `found` with other row weights. `base` holds
+    /// the nominal columns. `told` receives every sweep and the number of effects found. `renew` returns the source for
+    /// given effects.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn run(
+        &mut self,
+        base: &Fit,
+        found: Option<Vec<Profile>>,
+        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+        told: &mut dyn FnMut(usize, &[Profile]),
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let mut chosen = match found {
+            None => self.begun(base, renew)?,
+            Some(mut found) => {
+                self.renewed(renew(&found)?);
+                self.refine_all(base, &mut found)?;
+                self.standing(base, &mut found)?;
+                found
+            }
+        };
+        let trials = self.trials();
+        let most = sorts(&chosen) + MOST_EFFECTS;
+        let mut impossible: Vec<Candidate> = Vec::new();
+        let mut stood: Vec<Vec<Profile>> = Vec::new();
+        while sorts(&chosen) < most {
+            let fit = with(base, &chosen, None);
+            let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
+            let profiles = self.sweep(&fit, &present, &impossible)?;
+            let found = |p: &&Profile| !self.is_described(&p.candidate);
+            told(chosen.iter().filter(found).count(), &profiles);
+            let Some(best) = self.first_to_take(&fit, &profiles, trials) else {
+                let together =
+                    self.tried_together(base, &chosen, &profiles, trials, &impossible)?;
+                if let Some(together) =
+                    together.filter(|list| !stood.iter().any(|before| same(before, list)))
+                {
+                    stood.push(std::mem::replace(&mut chosen, together));
+                    self.anew(base, &mut chosen, renew)?;
+                    self.sides(base, &mut chosen, renew)?;
+                    continue;
+                }
+                self.nearly = profiles.into_iter().find(|p| p.is_nearly_a_play(trials));
+                break;
+            };
+            let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
+            let best = self.richer_law_first(base, &chosen, best, &profiles, trials)?;
+            let before = chosen.clone();
+            let newcomer = best.candidate;
+            chosen.push(best);
+            let vanished = self.settle(base, &mut chosen, trials, &impossible)?;
+            if vanished.contains(&newcomer) && !same(&before, &chosen) {
+                // It removed others that it needs.
+                impossible.push(newcomer);
+                chosen = before;
+                continue;
+            }
+            self.anew(base, &mut chosen, renew)?;
+            self.sides(base, &mut chosen, renew)?;
+            let place = chosen.iter().position(|p| p.candidate == newcomer);
+            if let Some(i) = place
+                && let Some(smaller) = self.smaller(base, &chosen, i, &profiles, trials)?
+            {
+                chosen[i] = smaller;
+                self.refine_all(base, &mut chosen)?;
+                chosen.retain(|profile| profile.vanished.is_none());
+            }
+            stood.push(before);
+            if stood.iter().any(|before| same(before, &chosen)) {
+                // It is not stable at its best shapes, or two effects remove each other in turn. A weaker one may stay.
+                if impossible.contains(&newcomer) {
+                    break;
+                }
+                impossible.push(newcomer);
+            }
+        }
+        for _ in 0..LAWS_ANEW {
+            let other = self.other_laws(base, &mut chosen)?;
+            if !self.springs(base, &mut chosen, trials)? && !other {
+                break;
+            }
+            self.anew(base, &mut chosen, renew)?;
+            self.sides(base, &mut chosen, renew)?;
+        }
+        chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
+        self.dropped = impossible;
+        Ok(chosen)
+    }
+
+    /// Recomputes predicted load, inertia and contact deflection with the current effects, then refits the effects.
+    /// Effects at a bound are removed.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    fn anew(
+        &mut self,
+        base: &Fit,
+        chosen: &mut Vec<Profile>,
+        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+    ) -> Result<(), DiagnoseError> {
+        let before = chosen.len();
+        for _ in 0..2 {
+            self.renewed(renew(chosen)?);
+            self.refine_all(base, chosen)?;
+        }
+        chosen.retain(|profile| profile.vanished.is_none());
+        if chosen.len() < before {
+            self.renewed(renew(chosen)?);
+            self.refine_all(base, chosen)?;
+        }
+        Ok(())
+    }
+
+    /// Returns replacements of the `i`-th effect beside all others, best first. Gears only if it is a gear or
+    /// confusable with one.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn alternatives(
+        &self,
+        base: &Fit,
+        chosen: &[Profile],
+        i: usize,
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let fit = with(base, chosen, Some(i));
+        let mut others: Vec<Candidate> = (chosen.iter().enumerate())
+            .filter(|(k, _)| *k != i)
+            .map(|(_, p)| p.candidate)
+            .collect();
+        let own = chosen[i].candidate.kind;
+        others.push(chosen[i].candidate);
+        if !is_gear(own) {
+            let like = |name: &str| own.about().confused.iter().any(|c| c.with == name);
+            let unlike = |c: &&Candidate| is_gear(c.kind) && !like(c.kind.about().name);
+            others.extend(self.library.iter().filter(unlike));
+        }
+        self.sweep_at(chosen[i].candidate.joint, &fit, &others, &[])
+    }
+
+    /// Returns candidates that the last search dropped but that have a large gain beside all effects, `chosen`.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn still_taking(
+        &self,
+        base: &Fit,
+        chosen: &[Profile],
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let fit = with(base, chosen, None);
+        let trials = self.trials();
+        let mut taking = Vec::new();
+        for candidate in &self.dropped {
+            let place = self.place(candidate);
+            let profile = place.map(|c| self.profile(&fit, c, None)).transpose()?;
+            taking.extend(profile.flatten().filter(|p| p.takes_much(trials)));
+        }
+        Ok(taking)
+    }
+
+    /// Returns the other laws that exclude a candidate, with library index: the same name or another transmission.
+    fn laws_beside(&self, present: Candidate) -> impl Iterator<Item = (usize, &Candidate)> {
+        let another = move |c: &Candidate| rivals(c, &present) && c.kind != present.kind;
+        (self.library.iter().enumerate()).filter(move |(_, c)| another(c))
+    }
+
+    /// Replaces effects by better laws of the same name. A law with more parameters, or in place of a described one,
+    /// must be clearly better. Returns true if it replaced one.
+    fn other_laws(&self, base: &Fit, chosen: &mut [Profile]) -> Result<bool, DiagnoseError> {
+        let mut changed = false;
+        for i in 0..chosen.len() {
+            let fit = with(base, chosen, Some(i));
+            let present = chosen[i].candidate;
+            for (c, law) in self.laws_beside(present) {
+                let bends_more = self.size(law) != self.size(&present) || is_gear(law.kind);
+                let least = match bends_more || self.is_described(&present) {
+                    true => LEAST_GAIN,
+                    false => 0.0,
+                };
+                if let Some(rival) = self.profile(&fit, c, None)?
+                    && rival.vanished.is_none()
+                    && rival.evidence.beyond(&chosen[i].evidence) > least
+                {
+                    chosen[i] = rival;
+                    changed = true;
+                }
+            }
+        }
+        Ok(changed)
+    }
+
+    /// Refines all shapes, removes effects that are not significant, and swaps effects for better ones. Returns those
+    /// at a bound.
+    fn settle(
+        &self,
+        base: &Fit,
+        chosen: &mut Vec<Profile>,
+        trials: usize,
+        impossible: &[Candidate],
+    ) -> Result<Vec<Candidate>, DiagnoseError> {
+        for _ in 0..2 {
+            self.refine_all(base, chosen)?;
+        }
+        // Substitutes go once the true effect is in the model.
+        let vanished = self.standing(base, chosen)?;
+        // Look for a better effect in the place of each earlier one.
+        if chosen.len() > 1 {
+            for i in 0..chosen.len() - 1 {
+                if self.fixed(&chosen[i].candidate).is_some() {
+                    continue;
+                }
+                let fit = with(base, chosen, Some(i));
+                let others: Vec<Candidate> = (chosen.iter().enumerate())
+                    .filter(|(k, _)| *k != i)
+                    .map(|(_, p)| p.candidate)
+                    .collect();
+                let rival = self
+                    .sweep_at(chosen[i].candidate.joint, &fit, &others, impossible)?
+                    .into_iter()
+                    .find(|p| p.refused(trials).is_none());
+                if let Some(rival) = rival
+                    && rival.candidate != chosen[i].candidate
+                    && rival.evidence.gain > chosen[i].evidence.gain
+                    // A described effect gives way to a better one, not to an equal one.
+                    && !(self.is_described(&chosen[i].candidate) && equal(&chosen[i], &rival))
+                {
+                    chosen[i] = rival;
+                    self.refine_all(base, chosen)?;
+                }
+            }
+        }
+        Ok(vanished)
+    }
+
+    /// Refines effects after others were removed, and drops those at a bound.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn possible(
+        &self,
+        base: &Fit,
+        mut chosen: Vec<Profile>,
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        self.refine_all(base, &mut chosen)?;
+        chosen.retain(|profile| profile.vanished.is_none());
+        Ok(chosen)
+    }
+
+    /// Refines the shapes of each effect, and updates its evidence, beside all others.
+    fn refine_all(&self, base: &Fit, chosen: &mut [Profile]) -> Result<(), DiagnoseError> {
+        for i in 0..chosen.len() {
+            let fit = with(base, chosen, Some(i));
+            let c = self.place(&chosen[i].candidate);
+            let Some(c) = c else { continue };
+            let mut better = self.profile(&fit, c, Some(chosen[i].shapes))?;
+            if better.is_none() && chosen[i].candidate.kind.is_presliding() {
+                // Beside other friction, a bristle of these shapes may be negative.
+                better = self.profile(&fit, c, None)?;
+            }
+            if let Some(mut better) = better {
+                better.doubled = (chosen.iter()).any(|p| doubles(&p.candidate, &better.candidate));
+                chosen[i] = better;
+            } else {
+                // Its columns are collinear, or have impossible signs.
+                chosen[i].evidence.gain = 0.0;
+                chosen[i].evidence.joint_gain = 0.0;
+                chosen[i].evidence.p_value = 1.0;
+                chosen[i].vanished = Some("gain");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns the orders of a joint beyond the grids of its motor waves.
+fn orders_of(source: &Source, library: &[Candidate], joint: usize) -> Orders {
+    let own = |c: &&Candidate| c.joint == joint && has_many_orders(c.kind);
+    let highest = (library.iter().filter(own))
+        .filter_map(|c| c.kind.about().shapes.first())
+        .map(|order| order.range[1])
+        .fold(0.0, f64::max);
+    let of = &source.robot.joints[joint];
+    if highest == 0.0 || !waves::motor_is_known(of) {
+        return Orders::default();
+    }
+    Orders::of(source.runs, joint, of.gear_ratio(), highest as usize)
+}
+
+/// Returns the number of effects. The orders of one wave count once.
+fn sorts(chosen: &[Profile]) -> usize {
+    let sort = |p: &Profile| p.candidate.sort();
+    let first = |k: &usize| !chosen[..*k].iter().any(|p| sort(p) == sort(&chosen[*k]));
+    (0..chosen.len()).filter(first).count()
+}
+
+/// Returns true if both lists have the same effects.
+pub(crate) fn same(a: &[Profile], b: &[Profile]) -> bool {
+    a.len() == b.len()
+        && a.iter()
+            .all(|p| b.iter().any(|q| q.candidate == p.candidate))
+}
+
+/// Returns the fit with the columns of all effects except `but`.
+pub(crate) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -> Fit<'f> {
+    let mut fit = base.clone();
+    for (k, profile) in chosen.iter().enumerate() {
+        if Some(k) == but {
+            continue;
+        }
+        for column in profile.columns.iter() {
+            if profile.followed.is_some() {
+                fit.subtract(column);
+            } else {
+                fit.push(column);
+            }
+        }
+    }
+    fit
+}
+
+#[cfg(test)]
+mod tests;

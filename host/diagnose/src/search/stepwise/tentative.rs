@@ -1,0 +1,51 @@
+//! Trial of effects that are not significant because another effect is missing or wrong.
+
+use crate::DiagnoseError;
+use crate::columns::effect_columns::Candidate;
+use crate::fit::least_squares::Fit;
+use crate::search::fitted_candidate::{Profile, SIGNIFICANT};
+use crate::search::stepwise::{Search, is_gear, same};
+
+/// RMS share that a candidate must remove for a trial although it is not significant. Other missing effects then
+/// dominate the residual, whose long correlation leaves few independent blocks.
+const WORTH_TRYING: f64 = 0.1;
+/// Maximum number of candidates on trial.
+const TRIES: usize = 2;
+
+impl Search<'_> {
+    /// Adds one of `profiles` that is not significant and settles all effects. Returns the larger model if each effect
+    /// passes in it; None if no such model exists.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn tried_together(
+        &self,
+        base: &Fit,
+        chosen: &[Profile],
+        profiles: &[Profile],
+        trials: usize,
+        impossible: &[Candidate],
+    ) -> Result<Option<Vec<Profile>>, DiagnoseError> {
+        // A lone candidate would stay not significant.
+        if chosen.is_empty() {
+            return Ok(None);
+        }
+        let unsure = |p: &&Profile| {
+            !is_gear(p.candidate.kind)
+                && p.vanished.is_none()
+                && p.evidence.joint_gain >= WORTH_TRYING
+                && p.corrected(trials) > SIGNIFICANT
+        };
+        for newcomer in profiles.iter().filter(unsure).take(TRIES) {
+            let mut list = chosen.to_vec();
+            list.push(newcomer.clone());
+            self.settle(base, &mut list, trials, impossible)?;
+            let passes =
+                |p: &Profile| self.is_described(&p.candidate) || p.refused(trials).is_none();
+            if !same(&list, chosen) && list.len() > chosen.len() && list.iter().all(passes) {
+                return Ok(Some(list));
+            }
+        }
+        Ok(None)
+    }
+}
