@@ -10,19 +10,19 @@ use crate::acceptance::judge::{
 };
 use crate::acceptance::model_check::{Proof, unexplained};
 use crate::acceptance::residual_dependence::coordinates;
-use crate::acceptance::trial::{Survivors, Trial};
+use crate::acceptance::trial::{Accepted, Trial};
 use crate::columns::waves::is_of_the_motor;
-use crate::description::described_effects::{Now, Stated};
-pub(crate) use crate::engine::follow::Follower;
+use crate::description::described_effects::{DescribedEffects, Now};
+pub(crate) use crate::engine::follow::ObserverModels;
 use crate::engine::pass::Pass;
 use crate::faults::refusal::{faulty, of_preparing};
 use crate::faults::spoilt_columns;
 use crate::fit::refit::Refit;
 use crate::link_encoder::{across, names_something, refutes, tell as tell_across};
-use crate::models::bodies::Fitting;
+use crate::models::bodies::ModelCache;
 use crate::models::output_error::by_motion;
 use crate::models::parameter_change::change;
-use crate::models::rms_path::Descent;
+use crate::models::rms_path::RmsPath;
 use crate::models::simulated_motion::Replay;
 use crate::motor_voltage::{
     contradict, left_of_voltage, name_something, settled, tell, windings, zeros,
@@ -38,7 +38,7 @@ use crate::result::finish::{Drawn, Found, finish};
 use crate::result::remarks::{remarks, weight_of_a_spring};
 use crate::result::steps::{change_step, reconcile, steps};
 use crate::result::treatment::treated;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::{is_friction, with};
 use crate::{DiagnoseError, Options};
 use rig_data::prepare::{Recording, as_recordings};
@@ -59,7 +59,7 @@ pub fn diagnose(
     if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }
-    let mut stated = Stated::of(robot);
+    let mut stated = DescribedEffects::of(robot);
     // A constant gets a name if sensor readings with the drive off were given, or if some recordings have all external
     // loads removed. Then it is searched for.
     let unburdened = training.iter().filter(|r| r.unburdened()).count();
@@ -103,12 +103,12 @@ pub fn diagnose(
 enum Attempt {
     Done(Box<(Diagnosis, Robot)>),
     /// Start again with more effects held, or with limits ignored.
-    Hold(Box<Stated>),
+    Hold(Box<DescribedEffects>),
 }
 
 fn attempt(
     robot: &Robot,
-    stated: &Stated,
+    stated: &DescribedEffects,
     training: &[&dyn Recording],
     holdout: &[&dyn Recording],
     options: &Options,
@@ -123,9 +123,9 @@ fn attempt(
         }
     };
     let Material {
-        bench,
-        loaded,
-        sealed,
+        context,
+        prepared,
+        held_out,
         open,
         nameless,
         touches,
@@ -137,30 +137,30 @@ fn attempt(
     };
     progress(0.1);
     let lead = {
-        let refit = Refit::of(&bench, &loaded.rows)?;
-        let source = bench.source(&loaded, &bench.anchor.values(&refit.before.values))?;
+        let refit = Refit::of(&context, &prepared.rows)?;
+        let source = context.source(&prepared, &context.anchor.values(&refit.before.values))?;
         leads(&source, &refit.base, &vec![0.0; robot.joints.len()])?
     };
-    let loaded = moved(&bench, loaded, &lead)?;
-    let first = Pass::over(&bench, &loaded, options, progress)?;
+    let prepared = moved(&context, prepared, &lead)?;
+    let first = Pass::over(&context, &prepared, options, progress)?;
     // A missing effect may look like a torque lead, or hide one. A delay may compensate a wrong lead.
-    let found: Vec<Profile> = (first.found.iter())
+    let found: Vec<FittedCandidate> = (first.found.iter())
         .filter(|p| p.candidate.kind != Kind::MeasurementDelay)
         .cloned()
         .collect();
     let beside = with(&first.refit.base, &found, None);
     let better = leads(&first.search.source, &beside, &lead)?;
     let again;
-    let (loaded, lead, pass) = if differ(&better, &lead, &loaded.runs) {
+    let (prepared, lead, pass) = if differ(&better, &lead, &prepared.runs) {
         let more: Vec<f64> = better.iter().zip(&lead).map(|(b, l)| b - l).collect();
-        let runs = loaded.runs.clone();
+        let runs = prepared.runs.clone();
         drop((first, beside));
-        drop(loaded.rows);
-        again = moved(&bench, bench.rows(runs, &loaded.treatment)?, &more)?;
-        let pass = Pass::over(&bench, &again, options, progress)?;
+        drop(prepared.rows);
+        again = moved(&context, context.rows(runs, &prepared.treatment)?, &more)?;
+        let pass = Pass::over(&context, &again, options, progress)?;
         (&again, better, pass)
     } else {
-        (&loaded, lead, first)
+        (&prepared, lead, first)
     };
     let refuted = |c: &_| refutes(&pass.across, c);
     let mut more = stated.clone();
@@ -174,8 +174,8 @@ fn attempt(
     {
         return Ok(Attempt::Hold(Box::new(more)));
     }
-    let sealed = sealed
-        .map(|sealed| moved(&bench, sealed, &lead))
+    let held_out = held_out
+        .map(|held_out| moved(&context, held_out, &lead))
         .transpose()?;
     let Pass {
         refit,
@@ -185,13 +185,13 @@ fn attempt(
         across: _,
     } = pass;
     progress(0.85);
-    let robot = bench.robot;
+    let robot = context.robot;
     let coordinates: Vec<_> = (0..robot.joints.len())
         .map(|j| {
             let predicted = &search.source.predicted;
             coordinates(
-                &loaded.rows,
-                &loaded.runs,
+                &prepared.rows,
+                &prepared.runs,
                 predicted,
                 robot,
                 j,
@@ -199,33 +199,33 @@ fn attempt(
             )
         })
         .collect();
-    let follower = Follower::new(&bench, loaded, &refit, &search);
+    let follower = ObserverModels::new(&context, prepared, &refit, &search);
     let judge = Judge {
         robot,
         follower: &follower,
         search: &search,
-        rows: &loaded.rows,
+        rows: &prepared.rows,
         coordinates: &coordinates,
-        pairs: noise_floor::repeats(&loaded.runs),
+        pairs: noise_floor::repeats(&prepared.runs),
         position_reading: PositionReading::of(
             &search.source,
-            &loaded.rows,
-            &loaded.position_filter()?,
+            &prepared.rows,
+            &prepared.position_filter()?,
         )?,
         base: &refit.base,
         seed: options.seed,
     };
     let values = &search.source.values;
-    let fitting = Fitting::new(&bench, &refit, &loaded.runs, values);
-    let learnt = Replay::of(&fitting, loaded)?;
-    let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
+    let fitting = ModelCache::new(&context, &refit, &prepared.runs, values);
+    let learnt = Replay::of(&fitting, prepared)?;
+    let (windings, silent) = windings(&context, prepared, held_out.as_ref(), options)?;
     let trial = Trial {
         judge: &judge,
         refit: &refit,
         fitting: &fitting,
         replay: &learnt,
     };
-    let Survivors {
+    let Accepted {
         mut judged,
         mut fallen,
     } = trial.stand(found.clone(), &mut tried)?;
@@ -258,17 +258,17 @@ fn attempt(
         }
         again.told
     });
-    let replay = match &sealed {
-        Some(sealed) => Replay::of(&fitting, sealed)?,
+    let replay = match &held_out {
+        Some(held_out) => Replay::of(&fitting, held_out)?,
         None => learnt,
     };
-    let descent = Descent::of(
+    let descent = RmsPath::of(
         &fitting,
         &refit,
         &judged.chosen,
         described,
-        loaded,
-        sealed.as_ref(),
+        prepared,
+        held_out.as_ref(),
         &search.source,
         judge.added(&judged.from),
     )?;
@@ -284,7 +284,7 @@ fn attempt(
             [&judged.floors, &descent.noise_held(&judged.floors)],
             &judged.chosen,
             &|joint| {
-                let rows = &sealed
+                let rows = &held_out
                     .as_ref()
                     .filter(|_| descent.is_held_twice(joint))?
                     .rows;
@@ -302,8 +302,8 @@ fn attempt(
         robot,
         fitting: &fitting,
         base: &refit.base,
-        loaded,
-        sealed: sealed.as_ref(),
+        prepared,
+        held_out: held_out.as_ref(),
         descent: &descent,
     };
     let sizes = proof.left(&judged, described)?;
@@ -327,22 +327,23 @@ fn attempt(
         ..
     } = &judged;
     let stands = fitting.of(chosen)?;
-    joint.solution.values = stands.coefficients(&bench.anchor);
+    joint.solution.values = stands.coefficients(&context.anchor);
     let after = &joint.solution;
     let first = &chosen[..described];
     let before = fitting.of(first)?;
     let across = {
-        let nominal = bench.anchor.values(&after.values[..refit.free.len()]);
-        let of = |loaded| -> Result<_, DiagnoseError> {
-            (bench.source(loaded, &nominal)?).loaded_by(chosen, &after.values[refit.free.len()..])
+        let nominal = context.anchor.values(&after.values[..refit.free.len()]);
+        let of = |prepared| -> Result<_, DiagnoseError> {
+            (context.source(prepared, &nominal)?)
+                .loaded_by(chosen, &after.values[refit.free.len()..])
         };
-        let held = (sealed.as_ref()).map(of).transpose()?;
+        let held = (held_out.as_ref()).map(of).transpose()?;
         across(
-            &of(loaded)?,
-            &bench.anchor,
+            &of(prepared)?,
+            &context.anchor,
             after,
-            loaded,
-            held.as_ref().zip(sealed.as_ref()),
+            prepared,
+            held.as_ref().zip(held_out.as_ref()),
             options,
         )?
     };
@@ -360,9 +361,9 @@ fn attempt(
     let without = &options.without;
     let friction = chosen.iter().any(|p| is_friction(p.candidate.kind));
     let change = change(
-        &bench,
+        &context,
         &refit,
-        &loaded.rows,
+        &prepared.rows,
         &explained,
         friction,
         left,
@@ -387,14 +388,14 @@ fn attempt(
             .collect(),
     );
     reconcile(robot, &mut tried, &chosen[described..], search.trials());
-    let absorbed = |before: &[f64]| refit.absorbed(&bench, before, after);
+    let absorbed = |before: &[f64]| refit.absorbed(&context, before, after);
     let (absorbed_before, absorbed) = if chosen.len() > described {
-        let without = before.coefficients(&bench.anchor);
+        let without = before.coefficients(&context.anchor);
         (Before::WithoutEffects, absorbed(&without))
-    } else if bench.anchor.stated {
-        let mut stated = bench.anchor.prior_coefficients();
+    } else if context.anchor.stated {
+        let mut stated = context.anchor.prior_coefficients();
         for (k, value) in stated.iter_mut().enumerate() {
-            if bench.anchor.is_unstated(k) {
+            if context.anchor.is_unstated(k) {
                 *value = f64::NAN;
             }
         }
@@ -419,7 +420,7 @@ fn attempt(
         left: sizes,
         noise_floor_how: String::new(),
         motion_how: replay.told(chosen, described)?,
-        treatment: Some(treated(robot, loaded, sealed.as_ref())),
+        treatment: Some(treated(robot, prepared, held_out.as_ref())),
         torque_lead: lead,
         places: judge.places(
             refit.footing(&chosen[..described])[1],
@@ -445,13 +446,13 @@ fn attempt(
         curves: Vec::new(),
     };
     let mut model = stands.model.clone();
-    let drawn = sealed.as_ref().unwrap_or(loaded);
+    let drawn = held_out.as_ref().unwrap_or(prepared);
     let found = Found {
         robot,
-        nominal: &bench.nominal,
-        anchor: &bench.anchor,
+        nominal: &context.nominal,
+        anchor: &context.anchor,
         search: &search,
-        rows: &loaded.rows,
+        rows: &prepared.rows,
         base: &refit.base,
         model: &model,
         chosen,
@@ -461,13 +462,13 @@ fn attempt(
         known,
         seed: options.seed,
         sensor_zeros: &options.sensor_zeros,
-        one_way: &bench.one_way,
+        one_way: &context.one_way,
         drawn: Drawn {
             runs: &drawn.runs,
             rows: &drawn.rows,
             left: [
-                bench.remaining(drawn, before.fitted(), first)?,
-                bench.remaining(drawn, stands.fitted(), chosen)?,
+                context.remaining(drawn, before.fitted(), first)?,
+                context.remaining(drawn, stands.fitted(), chosen)?,
             ],
             motion: replay.drawn(chosen, described)?,
         },
@@ -487,32 +488,32 @@ fn attempt(
         let [before, after] = [&refit.base, &with(&refit.base, chosen, None)].map(|fit| fit.rms(0));
         1.0 - after / before
     };
-    let zero = match (another_zero(&search.source, &refit.base, taken)?, &sealed) {
-        (None, Some(sealed)) if left => {
-            let residual = bench.remaining(sealed, stands.fitted(), chosen)?;
-            another_zero_held(&bench, sealed, &search.source.values, &residual)?
+    let zero = match (another_zero(&search.source, &refit.base, taken)?, &held_out) {
+        (None, Some(held_out)) if left => {
+            let residual = context.remaining(held_out, stands.fitted(), chosen)?;
+            another_zero_held(&context, held_out, &search.source.values, &residual)?
         }
         (told, _) => told,
     };
     diagnosis.words.extend(stated.lifted.iter().cloned());
     diagnosis.words.extend(zero);
     diagnosis.words.extend(remarks(
-        &bench,
-        loaded,
-        sealed.as_ref(),
+        &context,
+        prepared,
+        held_out.as_ref(),
         &open,
         &options.sensor_zeros,
         after,
     ));
     diagnosis.words.extend(change.map(|c| c.words));
-    (diagnosis.words).extend(weight_of_a_spring(&bench, chosen, after));
+    (diagnosis.words).extend(weight_of_a_spring(&context, chosen, after));
     progress(1.0);
     Ok(Attempt::Done(Box::new((diagnosis, model))))
 }
 
 /// Returns the orders per motor turn of the waves among the effects of a joint.
-fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
-    let wave = |p: &Profile| {
+fn waves(found: &[FittedCandidate], joint: usize) -> Vec<f64> {
+    let wave = |p: &FittedCandidate| {
         let motor = is_of_the_motor(p.candidate.kind);
         (p.candidate.joint == joint && motor).then_some(p.shapes[0])
     };

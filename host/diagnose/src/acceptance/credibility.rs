@@ -8,7 +8,7 @@ use crate::DiagnoseError;
 use crate::acceptance::judge::Judge;
 use crate::acceptance::plausibility::Asked;
 use crate::fit::refit::Refit;
-use crate::search::fitted_candidate::{Profile, SIGNIFICANT};
+use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
 use crate::search::stepwise::{Search, is_gear};
 
 /// p-value above which an effect is dropped: its 95 % interval contains zero.
@@ -29,7 +29,7 @@ pub(crate) fn unbelieved(
     refit: &Refit,
     search: &Search,
     judge: &Judge,
-    chosen: &[Profile],
+    chosen: &[FittedCandidate],
 ) -> Result<Option<(usize, &'static str)>, DiagnoseError> {
     let found = search.count_given(chosen)..chosen.len();
     if found.is_empty() {
@@ -90,7 +90,7 @@ pub(crate) fn unbelieved(
 }
 
 /// Returns the resonance of the link on its gear with the motor locked, Hz.
-fn resonance(search: &Search, gear: &Profile) -> Result<f64, DiagnoseError> {
+fn resonance(search: &Search, gear: &FittedCandidate) -> Result<f64, DiagnoseError> {
     let shapes = gear.candidate.kind.about().shapes;
     let stiffness = (shapes.iter().zip(&gear.shapes)).find(|(shape, _)| shape.name == "stiffness");
     let mass = search.source.mass(gear.candidate.joint, 0)?;

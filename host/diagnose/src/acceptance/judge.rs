@@ -14,7 +14,7 @@ use rig_shared::effects::Kind;
 use crate::DiagnoseError;
 use crate::acceptance::model_check::of_torque;
 use crate::acceptance::residual_dependence::{Coordinate, Known, Refitted, locate};
-use crate::engine::Follower;
+use crate::engine::ObserverModels;
 use crate::experiment::exact;
 use crate::fit::least_squares::Fit;
 use crate::outcome::{FloorFrom, Place, Remainder};
@@ -23,7 +23,7 @@ use crate::recordings::noise_floor::Repeated;
 use crate::recordings::outlier_segment::{Burst, burst};
 use crate::recordings::position_reading::PositionReading;
 use crate::rows::regression::Rows;
-use crate::search::fitted_candidate::{Profile, SIGNIFICANT};
+use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
 use crate::search::stepwise::{Search, is_gear, shadow, with};
 
 use rig_model::robot::{Joint, Robot};
@@ -56,7 +56,7 @@ pub(crate) struct Judge<'a, 'r> {
     /// The candidate library on the training data.
     pub(crate) search: &'a Search<'r>,
     /// Follower of links behind gears.
-    pub(crate) follower: &'a Follower<'a, 'r>,
+    pub(crate) follower: &'a ObserverModels<'a, 'r>,
     /// The training data.
     pub(crate) rows: &'a Rows,
     /// Coordinates of the training data, joint by joint.
@@ -74,7 +74,7 @@ pub(crate) struct Judge<'a, 'r> {
 /// Accepted effects and the residual.
 pub(crate) struct Judged {
     /// The effects.
-    pub(crate) chosen: Vec<Profile>,
+    pub(crate) chosen: Vec<FittedCandidate>,
     /// Noise floor, joint by joint.
     pub(crate) floors: Vec<f64>,
     /// Noise floor with row weights.
@@ -86,7 +86,7 @@ pub(crate) struct Judged {
     /// The unexplained residual.
     pub(crate) left: Option<Remainder>,
     /// Effects that only approximated it.
-    pub(crate) guesses: Vec<Profile>,
+    pub(crate) guesses: Vec<FittedCandidate>,
     /// True if it is so large that effects may be guesses.
     much_left: bool,
 }
@@ -96,7 +96,7 @@ impl Judge<'_, '_> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn judged(&self, found: Vec<Profile>) -> Result<Judged, DiagnoseError> {
+    pub(crate) fn judged(&self, found: Vec<FittedCandidate>) -> Result<Judged, DiagnoseError> {
         let mut judged = self.as_found(found);
         let mut guesses = Vec::new();
         // Beside an unknown effect, an effect that closes less of the gap than it leaves open is a guess, unless no
@@ -107,7 +107,7 @@ impl Judge<'_, '_> {
             let followed = followed.map(|list| self.as_found(list));
             // A misfit of an open-loop gear is no reason to doubt effects of its joint. Other joints stay as they are.
             let on = |joint: usize| {
-                let gear = |p: &Profile| p.candidate.joint == joint && p.followed.is_some();
+                let gear = |p: &FittedCandidate| p.candidate.joint == joint && p.followed.is_some();
                 followed
                     .as_ref()
                     .filter(|last| last.chosen.iter().any(gear))
@@ -118,7 +118,7 @@ impl Judge<'_, '_> {
                 // Test the effect as a whole: each order of a wave closes only a part of the gap.
                 let sort = chosen[k].candidate.sort();
                 let others = last.chosen.iter().filter(|p| p.candidate.sort() != sort);
-                let others: Vec<Profile> = others.cloned().collect();
+                let others: Vec<FittedCandidate> = others.cloned().collect();
                 let [before, after] =
                     [&others, &last.chosen].map(|list| with(self.base, list, None));
                 // A gear shows at its contacts, whose rows have small weights: compare without weights.
@@ -137,7 +137,7 @@ impl Judge<'_, '_> {
             doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
             let mut guess = None;
             for (k, share) in doubtful {
-                if share < QUARTER || !self.stands_out(chosen, k)? {
+                if share < QUARTER || !self.has_no_close_rival(chosen, k)? {
                     guess = Some(k);
                     break;
                 }
@@ -153,7 +153,11 @@ impl Judge<'_, '_> {
 
     /// Returns true if no rival on the joint has half the gain. Kinds that are the same function of the motion are no
     /// rivals.
-    fn stands_out(&self, chosen: &[Profile], k: usize) -> Result<bool, DiagnoseError> {
+    fn has_no_close_rival(
+        &self,
+        chosen: &[FittedCandidate],
+        k: usize,
+    ) -> Result<bool, DiagnoseError> {
         let own = &chosen[k];
         let own_kind = own.candidate.kind;
         let name = own_kind.about().name;
@@ -161,16 +165,17 @@ impl Judge<'_, '_> {
         Ok((rivals.iter())
             .filter(|r| r.candidate.joint == own.candidate.joint)
             .filter(|r| r.candidate.kind.about().name != name)
-            .filter(|r| r.vanished.is_none() && !exact([own_kind, r.candidate.kind]))
+            .filter(|r| r.at_bound.is_none() && !exact([own_kind, r.candidate.kind]))
             .all(|r| r.evidence.gain < HALF * own.evidence.gain))
     }
 
     /// Judges these effects without dropping any.
-    pub(crate) fn as_found(&self, chosen: Vec<Profile>) -> Judged {
+    pub(crate) fn as_found(&self, chosen: Vec<FittedCandidate>) -> Judged {
         let fit = with(self.base, &chosen, None);
         // At backlash contacts the residual is large anyway: no bursts there.
         let plays = |j: usize| {
-            let gear = |p: &Profile| p.candidate.kind == Kind::Backlash && p.candidate.joint == j;
+            let gear =
+                |p: &FittedCandidate| p.candidate.kind == Kind::Backlash && p.candidate.joint == j;
             chosen.iter().any(gear)
         };
         let bursts: Vec<Option<Burst>> = (0..self.rows.joints())
@@ -254,7 +259,12 @@ impl Judge<'_, '_> {
     }
 
     /// Locates the residual of the refitted description `base`, with its effects `described`.
-    pub(crate) fn places(&self, base: &Fit, floors: &[f64], described: &[Profile]) -> Vec<Place> {
+    pub(crate) fn places(
+        &self,
+        base: &Fit,
+        floors: &[f64],
+        described: &[FittedCandidate],
+    ) -> Vec<Place> {
         let fit = with(base, described, None);
         (0..self.rows.joints())
             .flat_map(|j| self.refitted_places(&fit, j, floors[j]))
@@ -311,7 +321,7 @@ impl Judge<'_, '_> {
     fn remainder_of(
         &self,
         fit: &Fit,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         joint: usize,
         (floor, own): (f64, Option<Repeated>),
         burst: Option<&Burst>,
@@ -369,7 +379,7 @@ impl Judge<'_, '_> {
     fn away_from_reversals(
         &self,
         fit: &Fit,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         besides: f64,
         joint: usize,
     ) -> bool {
@@ -418,7 +428,7 @@ impl Judge<'_, '_> {
 /// Returns squares that neither noise nor missing effects cause. They come from the treatment, and from the mismatch of
 /// the effects that reduce the RMS from `before` to `after`.
 pub(crate) fn besides(
-    chosen: &[Profile],
+    chosen: &[FittedCandidate],
     rows: &Rows,
     joint: usize,
     [before, after]: [f64; 2],

@@ -7,10 +7,10 @@
 use crate::DiagnoseError;
 use crate::acceptance::judge::{BEYOND_FLOOR, Judged, besides};
 use crate::fit::least_squares::Fit;
-use crate::models::bodies::Fitting;
-use crate::models::rms_path::Descent;
+use crate::models::bodies::ModelCache;
+use crate::models::rms_path::RmsPath;
 use crate::outcome::{FloorFrom, Left, Remainder};
-use crate::recordings::context::Loaded;
+use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::search::stepwise::with;
 use rig_model::robot::{Joint, Robot};
@@ -26,15 +26,15 @@ pub(crate) struct Proof<'a, 'r> {
     /// Robot as given.
     pub(crate) robot: &'a Robot,
     /// Models of the robot with effects.
-    pub(crate) fitting: &'a Fitting<'a, 'r>,
+    pub(crate) fitting: &'a ModelCache<'a, 'r>,
     /// The nominal model on the training data.
     pub(crate) base: &'a Fit<'r>,
     /// The training data.
-    pub(crate) loaded: &'a Loaded,
+    pub(crate) prepared: &'a PreparedData,
     /// The hold-out.
-    pub(crate) sealed: Option<&'a Loaded>,
+    pub(crate) held_out: Option<&'a PreparedData>,
     /// RMS residual, model by model.
-    pub(crate) descent: &'a Descent,
+    pub(crate) descent: &'a RmsPath,
 }
 
 impl Proof<'_, '_> {
@@ -49,11 +49,11 @@ impl Proof<'_, '_> {
     ) -> Result<Vec<Left>, DiagnoseError> {
         let Self { descent, .. } = self;
         let chosen = &judged.chosen;
-        let data = self.sealed.unwrap_or(self.loaded);
+        let data = self.held_out.unwrap_or(self.prepared);
         let floors = descent.floors(&judged.known);
         let fall = descent.holdout.as_ref().unwrap_or(&descent.train);
         let mut after = self.fitting.unseen(chosen, data)?;
-        if self.sealed.is_none() {
+        if self.held_out.is_none() {
             let unseen = with(self.base, chosen, None).left_out_in_turn();
             (after.iter_mut().zip(unseen)).for_each(|(rms, times)| *rms *= times);
         }
@@ -70,7 +70,7 @@ impl Proof<'_, '_> {
             Left {
                 joint: joint.name.clone(),
                 unit: joint.kind.units().1.to_owned(),
-                on_holdout: self.sealed.is_some(),
+                on_holdout: self.held_out.is_some(),
                 before,
                 after: after[j],
                 floor: floors[j],
@@ -106,7 +106,7 @@ fn explained(
 }
 
 /// Returns the RMS of a joint's recorded torque.
-fn torque_of(data: &Loaded, joint: usize) -> f64 {
+fn torque_of(data: &PreparedData, joint: usize) -> f64 {
     let (mut squares, mut count) = (0.0, 0_usize);
     for run in &data.runs {
         let recorded = run.joints[joint].recorded();
@@ -199,7 +199,7 @@ pub(crate) fn sizes(left: &[Left]) -> Option<String> {
 
 /// Returns the noise floor of a joint's torque from its own reading, in the residual's rows.
 pub(crate) fn of_torque(runs: &[rig_data::runs::Run], joint: usize, period: f64) -> Option<f64> {
-    noise_floor::of_reading(runs, joint, period)
+    noise_floor::sensor_noise(runs, joint, period)
         .or_else(|| noise_floor::beyond_band(runs, joint, period))
 }
 

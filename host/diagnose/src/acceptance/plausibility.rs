@@ -6,7 +6,7 @@
 use rig_shared::effects::Kind;
 
 use crate::fit::refit::Joint;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::Search;
 
 /// One physical limit.
@@ -28,7 +28,7 @@ pub(crate) struct Asked<'a, 'r> {
     /// Free nominal directions.
     pub(crate) free: usize,
     /// The effects.
-    pub(crate) chosen: &'a [Profile],
+    pub(crate) chosen: &'a [FittedCandidate],
 }
 
 /// Largest plausible twist of an arm's joint under its RMS load, rad. Lightweight arms are the softest without series

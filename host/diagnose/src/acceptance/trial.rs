@@ -5,11 +5,11 @@ use crate::acceptance::credibility::unbelieved;
 use crate::acceptance::judge::{Judge, Judged};
 use crate::description::preferred_values::by_description;
 use crate::fit::refit::Refit;
-use crate::models::bodies::Fitting;
+use crate::models::bodies::ModelCache;
 use crate::models::simulated_motion::Replay;
 use crate::outcome::Tried;
 use crate::result::steps::{refuse, refuse_guesses};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 
 /// Data for the acceptance tests.
 pub(crate) struct Trial<'a, 'r> {
@@ -18,17 +18,17 @@ pub(crate) struct Trial<'a, 'r> {
     /// The nominal model on them.
     pub(crate) refit: &'a Refit<'r>,
     /// Models with effects.
-    pub(crate) fitting: &'a Fitting<'a, 'r>,
+    pub(crate) fitting: &'a ModelCache<'a, 'r>,
     /// Simulation of the training motion.
     pub(crate) replay: &'a Replay<'a>,
 }
 
 /// Result of the acceptance tests.
-pub(crate) struct Survivors {
+pub(crate) struct Accepted {
     /// Accepted effects.
     pub(crate) judged: Judged,
     /// Dropped effects with a large gain.
-    pub(crate) fallen: Vec<Profile>,
+    pub(crate) fallen: Vec<FittedCandidate>,
 }
 
 impl Trial<'_, '_> {
@@ -38,16 +38,16 @@ impl Trial<'_, '_> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn stand(
         &self,
-        found: Vec<Profile>,
+        found: Vec<FittedCandidate>,
         tried: &mut [Tried],
-    ) -> Result<Survivors, DiagnoseError> {
+    ) -> Result<Accepted, DiagnoseError> {
         let Self { judge, refit, .. } = self;
         let (robot, search) = (judge.robot, judge.search);
         let judged = judge.judged(found)?;
         refuse_guesses(robot, tried, &judged);
-        let judged = by_description(judge, refit, self.fitting.bench, judged)?;
+        let judged = by_description(judge, refit, self.fitting.context, judged)?;
         refuse_guesses(robot, tried, &judged);
-        let mut left = Survivors {
+        let mut left = Accepted {
             judged,
             fallen: Vec::new(),
         };
@@ -63,11 +63,11 @@ impl Trial<'_, '_> {
     /// Drops effects that degrade the simulated training motion.
     fn unspoilt(
         &self,
-        mut left: Survivors,
+        mut left: Accepted,
         why: &str,
         tried: &mut [Tried],
-    ) -> Result<Survivors, DiagnoseError> {
-        let given = |chosen: &[Profile]| self.judge.search.count_given(chosen);
+    ) -> Result<Accepted, DiagnoseError> {
+        let given = |chosen: &[FittedCandidate]| self.judge.search.count_given(chosen);
         while let Some(k) = {
             let chosen = &left.judged.chosen;
             self.replay.spoiling(chosen, given(chosen))?
@@ -79,11 +79,11 @@ impl Trial<'_, '_> {
 
     fn without(
         &self,
-        Survivors { judged, mut fallen }: Survivors,
+        Accepted { judged, mut fallen }: Accepted,
         k: usize,
         why: &str,
         tried: &mut [Tried],
-    ) -> Result<Survivors, DiagnoseError> {
+    ) -> Result<Accepted, DiagnoseError> {
         let (robot, search) = (self.judge.robot, self.judge.search);
         let mut stand = judged.chosen;
         let gone = stand.remove(k);
@@ -94,6 +94,6 @@ impl Trial<'_, '_> {
         let stand = search.possible(&self.refit.base, stand)?;
         let judged = self.judge.judged(stand)?;
         refuse_guesses(robot, tried, &judged);
-        Ok(Survivors { judged, fallen })
+        Ok(Accepted { judged, fallen })
     }
 }

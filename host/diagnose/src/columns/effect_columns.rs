@@ -16,7 +16,7 @@ use crate::columns::transmission::{ABREAST, Driven, Seen};
 use crate::recordings::external_load;
 use crate::rows::nominal_torque::Predicted;
 use crate::rows::regression::{Column, Nominal, Thinning};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::is_gear;
 use rig_data::runs::Run;
 use rig_model::batch::each_by;
@@ -152,7 +152,7 @@ impl Source<'_> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn loaded_by(
         mut self,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         gains: &[f64],
     ) -> Result<Self, DiagnoseError> {
         let mut at = 0;
@@ -194,7 +194,7 @@ impl Source<'_> {
     fn saturate(
         &mut self,
         r: usize,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         gains: &[f64],
     ) -> Result<(), DiagnoseError> {
         let mut at = 0;
@@ -231,7 +231,7 @@ impl Source<'_> {
     fn sum(
         &self,
         r: usize,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         gains: &[f64],
         counts: &dyn Fn(Kind) -> bool,
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
@@ -446,7 +446,13 @@ impl Source<'_> {
     }
 
     /// Returns the effects' contact friction over the model's Coulomb friction, sample by sample.
-    fn beside(&self, joint: usize, r: usize, chosen: &[Profile], gains: &[f64]) -> Vec<f64> {
+    fn beside(
+        &self,
+        joint: usize,
+        r: usize,
+        chosen: &[FittedCandidate],
+        gains: &[f64],
+    ) -> Vec<f64> {
         let mut sum = vec![0.0; self.runs[r].len()];
         let [_, coulomb] = self.friction(joint);
         let mut at = 0;

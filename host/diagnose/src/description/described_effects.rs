@@ -16,7 +16,7 @@ use crate::DiagnoseError;
 use crate::columns::effect_columns::{Candidate, Source};
 use crate::fit::least_squares::Fit;
 use crate::outcome::{Described, Fate, Value};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::{is_gear, with};
 use rig_model::effects::{Effects, is_torque};
 use rig_model::robot::{JointKind, Placed, Robot, RobotEffect, title_of, unit_of};
@@ -58,7 +58,7 @@ impl Way {
 
 /// The effects of a description.
 #[derive(Clone, Debug)]
-pub(crate) struct Stated {
+pub(crate) struct DescribedEffects {
     /// The description without its effects; payloads are part of their links.
     pub(crate) robot: Robot,
     /// True if the format of the description has no constant torque.
@@ -70,7 +70,7 @@ pub(crate) struct Stated {
     effects: Vec<(RobotEffect, Placed, Way)>,
 }
 
-impl Stated {
+impl DescribedEffects {
     /// Reads the effects of a description.
     pub(crate) fn of(robot: &Robot) -> Self {
         let mut plain = robot.clone();
@@ -121,7 +121,7 @@ impl Stated {
 
     /// Removes held tilts if a tilt was found beside them. A wrong described tilt would otherwise appear as a
     /// difference. Returns true if any was removed.
-    pub(crate) fn give_up_tilts(&mut self, found: &[Profile]) -> bool {
+    pub(crate) fn give_up_tilts(&mut self, found: &[FittedCandidate]) -> bool {
         let tilted = |kind: Kind| kind == Kind::GravityTilt;
         let another = found.iter().any(|p| tilted(p.candidate.kind));
         let mut changed = false;
@@ -195,13 +195,13 @@ impl Stated {
         changed
     }
 
-    /// Holds delays of up to `slack`, s: without a description they would count as sampling. Returns true if there was
+    /// Holds delays of up to `sampling_jitter`, s: without a description they would count as sampling. Returns true if there was
     /// one.
-    pub(crate) fn hold_delays(&mut self, slack: f64) -> bool {
+    pub(crate) fn hold_delays(&mut self, sampling_jitter: f64) -> bool {
         let mut changed = false;
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
             let kind = placed.effect.kind;
-            if kind == Kind::MeasurementDelay && placed.effect.gains[0] <= slack {
+            if kind == Kind::MeasurementDelay && placed.effect.gains[0] <= sampling_jitter {
                 let why = "it is no longer than what the instants of sampling may make of it";
                 *way = Way::held(kind, why);
                 changed = true;
@@ -231,7 +231,7 @@ impl Stated {
         &mut self,
         source: &Source,
         base: &Fit,
-        found: &[Profile],
+        found: &[FittedCandidate],
         refuted: &dyn Fn(&Candidate) -> bool,
     ) -> Result<bool, DiagnoseError> {
         let stays = self.matched(found);
@@ -267,7 +267,7 @@ impl Stated {
     }
 
     /// Returns the index of each described effect among those found; with several orders, the nearest one.
-    pub(crate) fn matched(&self, found: &[Profile]) -> Vec<Option<usize>> {
+    pub(crate) fn matched(&self, found: &[FittedCandidate]) -> Vec<Option<usize>> {
         let mut taken = vec![false; found.len()];
         (self.effects.iter())
             .map(|(_, placed, way)| {

@@ -8,7 +8,7 @@
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
-use crate::description::described_effects::Stated;
+use crate::description::described_effects::DescribedEffects;
 use crate::rows::regression::{Column, Nominal, Rows, combined};
 use rig_model::robot::{Quantity, Robot, Worth, worth};
 
@@ -17,7 +17,7 @@ pub(crate) type Direction = Vec<(usize, f64)>;
 
 /// Free and held nominal parameters.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Anchor {
+pub(crate) struct ParameterPrior {
     /// Directions that a refit changes.
     pub(crate) free: Vec<Direction>,
     /// Described base parameters.
@@ -33,7 +33,7 @@ pub(crate) struct Anchor {
     unstated: Vec<usize>,
 }
 
-impl Anchor {
+impl ParameterPrior {
     /// Returns the free direction of a single link's first moment, if the direction of gravity is held.
     pub(crate) fn first_moment(&self, nominal: &Nominal) -> Option<usize> {
         let along = |d: &Direction| {
@@ -46,7 +46,7 @@ impl Anchor {
     }
 
     /// Creates the anchor of a robot whose description states `stated`.
-    pub(crate) fn of(robot: &Robot, nominal: &Nominal, stated: &Stated) -> Self {
+    pub(crate) fn of(robot: &Robot, nominal: &Nominal, stated: &DescribedEffects) -> Self {
         let n = robot.joints.len();
         let prior = nominal.stated(robot);
         let inertial = robot

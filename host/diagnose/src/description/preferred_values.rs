@@ -9,8 +9,8 @@ use crate::DiagnoseError;
 use crate::acceptance::judge::{BEYOND_FLOOR, Judge, Judged, equal};
 use crate::fit::refit::Refit;
 use crate::models::parameter_change::is_loaded;
-use crate::recordings::context::Bench;
-use crate::search::fitted_candidate::{Profile, stiff};
+use crate::recordings::context::DiagnosisContext;
+use crate::search::fitted_candidate::{FittedCandidate, stiff};
 use crate::search::stepwise::with;
 
 /// Largest ratio of residuals beyond the floor, of a rival to the name, that replaces it (described values).
@@ -27,19 +27,19 @@ const STANDS: f64 = 2.0;
 pub(crate) fn by_description(
     judge: &Judge,
     refit: &Refit,
-    bench: &Bench,
+    context: &DiagnosisContext,
     judged: Judged,
 ) -> Result<Judged, DiagnoseError> {
     // A load on the link also changes its inertia, which no other name explains. Then the description does not decide.
-    if !bench.anchor.stated || is_loaded(bench, refit, &judged.chosen) {
+    if !context.anchor.stated || is_loaded(context, refit, &judged.chosen) {
         return Ok(judged);
     }
-    let frozen = refit.frozen(bench);
-    let left = |list: &[Profile], joint: usize| with(&frozen, list, None).rms(joint);
+    let frozen = refit.frozen(context);
+    let left = |list: &[FittedCandidate], joint: usize| with(&frozen, list, None).rms(joint);
     // With the described gravity, a spring hidden behind it becomes visible.
-    let stands = |rival: &Profile, list: &[Profile], k: usize| {
+    let stands = |rival: &FittedCandidate, list: &[FittedCandidate], k: usize| {
         let shows = || stiff(&with(&frozen, list, Some(k)), &rival.columns);
-        rival.vanished.is_none() || rival.candidate.kind == Kind::Spring && shows()
+        rival.at_bound.is_none() || rival.candidate.kind == Kind::Spring && shows()
     };
     let mut chosen = judged.chosen.clone();
     let mut moved = false;

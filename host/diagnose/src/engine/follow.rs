@@ -13,9 +13,9 @@ use rig_shared::effects::{Kind, SHAPES};
 use crate::DiagnoseError;
 use crate::columns::effect_columns::{Candidate, Source};
 use crate::fit::refit::Refit;
-use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
-use crate::search::fitted_candidate::{Followed, Profile};
+use crate::search::fitted_candidate::{FittedCandidate, Followed};
 use crate::search::stepwise::{Search, with};
 
 /// Rounds in which the gear shapes and all other parameters are fitted alternately.
@@ -27,33 +27,33 @@ const TEETH: [f64; 2] = [2000.0, 8.0];
 const HEARD: f64 = 0.75;
 
 /// Estimates links behind gears on the training data.
-pub(crate) struct Follower<'a, 'r> {
+pub(crate) struct ObserverModels<'a, 'r> {
     /// Robot and treatment.
-    bench: &'a Bench<'a>,
+    context: &'a DiagnosisContext<'a>,
     /// The training data.
-    loaded: &'a Loaded,
+    prepared: &'a PreparedData,
     /// The refitted nominal model on them.
     refit: &'a Refit<'r>,
     /// The library on them.
     search: &'a Search<'r>,
     /// Last input and result: a fit takes seconds.
-    last: RefCell<Option<(Vec<Driven>, Vec<Profile>)>>,
+    last: RefCell<Option<(Vec<Driven>, Vec<FittedCandidate>)>>,
 }
 
 /// An effect and its shapes.
 type Driven = (Candidate, [f64; SHAPES]);
 
-impl<'a, 'r> Follower<'a, 'r> {
+impl<'a, 'r> ObserverModels<'a, 'r> {
     /// Creates a follower for these recordings.
     pub(crate) fn new(
-        bench: &'a Bench<'a>,
-        loaded: &'a Loaded,
+        context: &'a DiagnosisContext<'a>,
+        prepared: &'a PreparedData,
         refit: &'a Refit<'r>,
         search: &'a Search<'r>,
     ) -> Self {
         Self {
-            bench,
-            loaded,
+            context,
+            prepared,
             refit,
             search,
             last: RefCell::new(None),
@@ -61,7 +61,7 @@ impl<'a, 'r> Follower<'a, 'r> {
     }
 
     /// Returns true if an observer estimates the link behind this gear.
-    fn follows(&self, profile: &Profile) -> bool {
+    fn follows(&self, profile: &FittedCandidate) -> bool {
         self.search.is_gear_by_torque(&profile.candidate)
     }
 
@@ -72,9 +72,9 @@ impl<'a, 'r> Follower<'a, 'r> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn followed(
         &self,
-        driven: &[Profile],
+        driven: &[FittedCandidate],
         noise: &[f64],
-    ) -> Result<Option<Vec<Profile>>, DiagnoseError> {
+    ) -> Result<Option<Vec<FittedCandidate>>, DiagnoseError> {
         if !driven.iter().any(|profile| self.follows(profile)) {
             return Ok(None);
         }
@@ -106,11 +106,15 @@ impl<'a, 'r> Follower<'a, 'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn hears(&self, found: &[Profile], play: Profile) -> Result<bool, DiagnoseError> {
+    pub(crate) fn observer_supports(
+        &self,
+        found: &[FittedCandidate],
+        play: FittedCandidate,
+    ) -> Result<bool, DiagnoseError> {
         let joint = play.candidate.joint;
-        let of = |chosen: &[Profile]| with(self.refit.even(), chosen, None);
+        let of = |chosen: &[FittedCandidate]| with(self.refit.even(), chosen, None);
         let before = of(found);
-        let noise: Vec<f64> = (0..self.bench.robot.joints.len())
+        let noise: Vec<f64> = (0..self.context.robot.joints.len())
             .map(|j| before.rms(j))
             .collect();
         let mut chosen = found.to_vec();
@@ -119,18 +123,23 @@ impl<'a, 'r> Follower<'a, 'r> {
         Ok(followed.is_some_and(|followed| of(&followed).rms(joint) < HEARD * noise[joint]))
     }
 
-    fn follow(&self, chosen: &mut [Profile], k: usize, noise: &[f64]) -> Result<(), DiagnoseError> {
+    fn follow(
+        &self,
+        chosen: &mut [FittedCandidate],
+        k: usize,
+        noise: &[f64],
+    ) -> Result<(), DiagnoseError> {
         let Self {
-            loaded,
+            prepared,
             refit,
             search,
             ..
         } = self;
         let joint = chosen[k].candidate.joint;
-        let rms = |chosen: &[Profile]| with(refit.even(), chosen, None).rms(joint);
+        let rms = |chosen: &[FittedCandidate]| with(refit.even(), chosen, None).rms(joint);
         let driven = chosen[k].clone();
         let before = rms(chosen);
-        let reading = noise_floor::of_reading(&loaded.runs, joint, loaded.rows.period);
+        let reading = noise_floor::sensor_noise(&prepared.runs, joint, prepared.rows.period);
         let own = &mut chosen[k];
         own.followed = Some(Followed {
             noise: reading.unwrap_or(noise[joint]),
@@ -140,7 +149,7 @@ impl<'a, 'r> Follower<'a, 'r> {
         for _ in 0..ROUNDS {
             let source = self.source(chosen)?;
             let beside = with(refit.even(), chosen, Some(k));
-            let Profile {
+            let FittedCandidate {
                 candidate, shapes, ..
             } = &chosen[k];
             let (shapes, columns) = search.fitted_as_known(&source, &beside, candidate, shapes)?;
@@ -153,7 +162,7 @@ impl<'a, 'r> Follower<'a, 'r> {
         own.columns = Arc::new(source.columns(&own.candidate, &own.shapes)?);
         if rms(chosen) >= before {
             let otherwise = Some(chosen[k].shapes);
-            chosen[k] = Profile {
+            chosen[k] = FittedCandidate {
                 otherwise,
                 ..driven
             };
@@ -165,13 +174,13 @@ impl<'a, 'r> Follower<'a, 'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn source(&self, chosen: &[Profile]) -> Result<Source<'a>, DiagnoseError> {
+    pub(crate) fn source(&self, chosen: &[FittedCandidate]) -> Result<Source<'a>, DiagnoseError> {
         let solution = self.refit.solution(chosen)?;
         let (nominal, gains) = solution.values.split_at(self.refit.free.len());
-        self.bench
-            .source(self.loaded, &self.bench.anchor.values(nominal))?
+        self.context
+            .source(self.prepared, &self.context.anchor.values(nominal))?
             .loaded_by(chosen, gains)?
-            .following(&self.loaded.rows, chosen, gains)
+            .following(&self.prepared.rows, chosen, gains)
     }
 }
 

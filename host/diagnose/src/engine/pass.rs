@@ -2,12 +2,12 @@
 
 use crate::columns::effect_columns::Candidate;
 use crate::description::described_effects::candidate;
-use crate::engine::follow::Follower;
+use crate::engine::follow::ObserverModels;
 use crate::fit::refit::Refit;
 use crate::link_encoder::{Across, across, gears, refutes};
 use crate::outcome::Tried;
-use crate::recordings::context::{Bench, Loaded, library};
-use crate::search::fitted_candidate::Profile;
+use crate::recordings::context::{DiagnosisContext, PreparedData, library};
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::{Search, is_constant, same};
 use crate::{DiagnoseError, Options};
 use rig_model::robot::title_of;
@@ -22,7 +22,7 @@ pub(crate) struct Pass<'a> {
     /// The library, with the predictions of the last model.
     pub(crate) search: Search<'a>,
     /// The effects.
-    pub(crate) found: Vec<Profile>,
+    pub(crate) found: Vec<FittedCandidate>,
     /// All trials.
     pub(crate) tried: Vec<Tried>,
     /// Results of the link encoders.
@@ -39,21 +39,28 @@ struct Heard {
 impl<'a> Pass<'a> {
     /// Searches recordings whose torque lead is already compensated.
     pub(crate) fn over(
-        bench: &'a Bench,
-        loaded: &'a Loaded,
+        context: &'a DiagnosisContext,
+        prepared: &'a PreparedData,
         options: &Options,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Self, DiagnoseError> {
-        let refit = Refit::of(bench, &loaded.rows)?;
-        let source = bench.source(loaded, &bench.anchor.values(&refit.before.values))?;
+        let refit = Refit::of(context, &prepared.rows)?;
+        let source = context.source(prepared, &context.anchor.values(&refit.before.values))?;
         // Link encoders come before the torque: they confirm or exclude effects across a transmission.
-        let across = across(&source, &bench.anchor, &refit.before, loaded, None, options)?;
-        let mut library = library(bench.robot, &loaded.runs, &options.without);
+        let across = across(
+            &source,
+            &context.anchor,
+            &refit.before,
+            prepared,
+            None,
+            options,
+        )?;
+        let mut library = library(context.robot, &prepared.runs, &options.without);
         library.retain(|c| !refutes(&across, c));
         // If a joint moves in one direction only, every constant is collinear with its Coulomb friction.
-        let one_way = |c: &Candidate| bench.one_way.iter().any(|own| own.joint == c.joint);
+        let one_way = |c: &Candidate| context.one_way.iter().any(|own| own.joint == c.joint);
         library.retain(|c| !(is_constant(c.kind) && one_way(c)));
-        let mut described = bench.stated.free();
+        let mut described = context.stated.free();
         described.retain(|placed| !refutes(&across, &candidate(placed)));
         let mut search = Search::new(
             source,
@@ -62,15 +69,25 @@ impl<'a> Pass<'a> {
             rig_data::prepare::threads(options.threads),
         );
         search.measured = gears(&across);
-        let mut heard = Heard::default();
+        let mut accepted_by_observer = Heard::default();
         let mut further = |refit: &Refit, search: &mut Search<'a>, found| {
-            searched(bench, loaded, refit, search, found, &mut heard, progress)
+            searched(
+                context,
+                prepared,
+                refit,
+                search,
+                found,
+                &mut accepted_by_observer,
+                progress,
+            )
         };
         let mut found = further(&refit, &mut search, None)?;
         if let Some(play) = search.nearly.take() {
             let candidate = play.candidate;
-            if Follower::new(bench, loaded, &refit, &search).hears(&found, play)? {
-                search.heard.push(candidate);
+            if ObserverModels::new(context, prepared, &refit, &search)
+                .observer_supports(&found, play)?
+            {
+                search.accepted_by_observer.push(candidate);
                 found = further(&refit, &mut search, Some(found))?;
             }
         }
@@ -81,7 +98,7 @@ impl<'a> Pass<'a> {
                 break;
             }
             search.settle_gears(refit.even(), &mut found)?;
-            refit = refit.quieted(&found, &loud);
+            refit = refit.reweighted(&found, &loud);
             let before = found.clone();
             found = further(&refit, &mut search, Some(found))?;
             if same(&before, &found) {
@@ -98,7 +115,7 @@ impl<'a> Pass<'a> {
             refit,
             search,
             found,
-            tried: heard.tried,
+            tried: accepted_by_observer.tried,
             across,
         })
     }
@@ -106,34 +123,34 @@ impl<'a> Pass<'a> {
 
 /// Searches for effects, starting with those already `found`.
 fn searched<'a>(
-    bench: &'a Bench,
-    loaded: &'a Loaded,
+    context: &'a DiagnosisContext,
+    prepared: &'a PreparedData,
     refit: &Refit,
     search: &mut Search<'a>,
-    found: Option<Vec<Profile>>,
-    heard: &mut Heard,
+    found: Option<Vec<FittedCandidate>>,
+    accepted_by_observer: &mut Heard,
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Profile>, DiagnoseError> {
+) -> Result<Vec<FittedCandidate>, DiagnoseError> {
     let trials = search.trials();
     // If effect columns are collinear with nominal ones, the nominal values stay.
-    let renew = |chosen: &[Profile]| {
+    let renew = |chosen: &[FittedCandidate]| {
         let solution = refit.solution(chosen);
         let coefficients = solution.as_ref().unwrap_or(&refit.before);
         let nominal = &coefficients.values[..refit.free.len()];
-        let source = bench.source(loaded, &bench.anchor.values(nominal))?;
+        let source = context.source(prepared, &context.anchor.values(nominal))?;
         match &solution {
             Ok(solution) => source.loaded_by(chosen, &solution.values[refit.free.len()..]),
             Err(_) => Ok(source),
         }
     };
-    let mut told = |step: usize, profiles: &[Profile]| {
-        heard.sweeps += 1;
-        progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(heard.sweeps)));
+    let mut told = |step: usize, profiles: &[FittedCandidate]| {
+        accepted_by_observer.sweeps += 1;
+        progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(accepted_by_observer.sweeps)));
         let first = profiles.iter().position(|p| p.refused(trials).is_none());
         for (k, p) in profiles.iter().enumerate() {
-            heard.tried.push(Tried {
+            accepted_by_observer.tried.push(Tried {
                 effect: title_of(p.candidate.kind),
-                joint: bench.robot.joints[p.candidate.joint].name.clone(),
+                joint: context.robot.joints[p.candidate.joint].name.clone(),
                 step,
                 gain: p.evidence.gain,
                 gain_sigmas: p.evidence.gain_sigmas,

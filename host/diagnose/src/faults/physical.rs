@@ -55,7 +55,7 @@ pub(crate) enum Belief {
     /// The description.
     Described,
     /// The description and a payload on the last link.
-    Loaded,
+    PreparedData,
     /// The geometry, and masses and rotors within the uncertainty of a description (`robot::worth`).
     Free,
 }
@@ -447,7 +447,7 @@ impl Problem {
             .collect();
         let strongest = physical.strongest();
         let share = match belief {
-            Belief::Described | Belief::Loaded => DESCRIBED,
+            Belief::Described | Belief::PreparedData => DESCRIBED,
             Belief::Free => robot::DESCRIBED,
         };
         // Prior mean, standard deviation and lower bound of a coefficient.
@@ -460,8 +460,8 @@ impl Problem {
                 Some((1.0, share, LIGHTEST))
             } else if k < n + points {
                 let link = links[k - n];
-                let loaded = belief == Belief::Loaded && link + 1 == n;
-                (!loaded).then_some((0.0, share * physical.masses[link], 0.0))
+                let prepared = belief == Belief::PreparedData && link + 1 == n;
+                (!prepared).then_some((0.0, share * physical.masses[link], 0.0))
             } else if k < shared {
                 let motor = k - n - points;
                 let inertia = motor % MOTOR_COLUMNS == motor_column::INERTIA;

@@ -60,7 +60,7 @@ impl Suspicion {
 /// Scores of a recording under each belief.
 struct Reading {
     described: Option<Score>,
-    loaded: Option<Score>,
+    prepared: Option<Score>,
     free: Option<Score>,
 }
 
@@ -77,14 +77,15 @@ impl Reading {
         let most = CARRIED * masses.map(|i| i.mass).sum::<f64>();
         Ok(Self {
             described: physical.score(Belief::Described),
-            loaded: (physical.score(Belief::Loaded)).filter(|score| score.load.mass <= most),
+            prepared: (physical.score(Belief::PreparedData))
+                .filter(|score| score.load.mass <= most),
             free: physical.score(Belief::Free),
         })
     }
 
     /// Returns the scores of the description, without and with a payload.
     fn stated(&self) -> impl Iterator<Item = &Score> {
-        self.described.iter().chain(&self.loaded)
+        self.described.iter().chain(&self.prepared)
     }
 
     fn all(&self) -> impl Iterator<Item = &Score> {
@@ -264,16 +265,16 @@ impl Judge<'_> {
         };
         if is(&recorded.described) {
             "the description, with friction of its own, explains these data as well".to_owned()
-        } else if is(&recorded.loaded) {
-            let load = recorded.loaded.as_ref().map(|score| score.load);
-            load.map_or_else(String::new, |load| loaded(load, self.robot))
+        } else if is(&recorded.prepared) {
+            let load = recorded.prepared.as_ref().map(|score| score.load);
+            load.map_or_else(String::new, |load| prepared(load, self.robot))
         } else {
             "other masses and friction than described explain these data as well".to_owned()
         }
     }
 }
 
-fn loaded(load: Load, robot: &Robot) -> String {
+fn prepared(load: Load, robot: &Robot) -> String {
     let last = robot.joints.last().map_or("", |joint| joint.name.as_str());
     let place = robot.last_link.inverse_transform_point(&load.place.into());
     let [x, y, z] =

@@ -11,7 +11,7 @@ use rig_shared::multibody::{COLUMNS, column};
 
 use crate::fit::least_squares::dot;
 use crate::fit::refit::weighed;
-use crate::recordings::context::Bench;
+use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::Rows;
 
 /// Length share below which a column is collinear with the others. As in `rig identify`: its value would rest on a
@@ -41,8 +41,8 @@ struct Kept {
 
 /// Finds free base parameters of a single joint that are collinear with others in these rows. With them held, all
 /// others can be fitted.
-pub(crate) fn alike(bench: &Bench, rows: &Rows) -> Vec<Alike> {
-    let anchor = &bench.anchor;
+pub(crate) fn alike(context: &DiagnosisContext, rows: &Rows) -> Vec<Alike> {
+    let anchor = &context.anchor;
     if rows.joints() > 1 {
         return Vec::new();
     }
@@ -53,7 +53,7 @@ pub(crate) fn alike(bench: &Bench, rows: &Rows) -> Vec<Alike> {
     order.sort_by_key(|k| {
         let columns = anchor.free[*k]
             .iter()
-            .map(|(b, _)| bench.nominal.base.columns[*b] % COLUMNS);
+            .map(|(b, _)| context.nominal.base.columns[*b] % COLUMNS);
         columns.map(rank).min().unwrap_or(0)
     });
     let mut kept: Vec<Kept> = Vec::new();
@@ -111,10 +111,10 @@ fn rank(column: usize) -> usize {
 
 impl Alike {
     /// Returns a sentence.
-    pub(crate) fn said(&self, bench: &Bench) -> String {
-        let name = |k: usize| bench.nominal.base.expression(k);
+    pub(crate) fn said(&self, context: &DiagnosisContext) -> String {
+        let name = |k: usize| context.nominal.base.expression(k);
         let own = name(self.parameter);
-        let value = bench.anchor.prior[self.parameter];
+        let value = context.anchor.prior[self.parameter];
         if self.with.is_empty() {
             return format!(
                 "The training motion does not show {own}: it stays at {value}, as described or as none is stated."

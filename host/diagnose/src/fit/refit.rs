@@ -14,15 +14,15 @@ use crate::columns::effect_columns::Source;
 use crate::description::parameter_prior::{Direction, is_friction};
 use crate::fit::least_squares::{Fit, axpy, dot};
 use crate::fit::solution::{Solution, jackknifed, solve};
-use crate::fit::systematic_uncertainty::widened;
+use crate::fit::systematic_uncertainty::inflated;
 use crate::models::description::weights;
 use crate::outcome::{Absorbed, Value};
-use crate::recordings::context::Bench;
+use crate::recordings::context::DiagnosisContext;
 use crate::recordings::noise_floor;
-use crate::recordings::torque_lead::slack;
+use crate::recordings::torque_lead::sampling_jitter;
 use crate::rows::regression::{Column, Rows, combined};
 use crate::rows::row_weights::counts;
-use crate::search::fitted_candidate::{Profile, is_straight};
+use crate::search::fitted_candidate::{FittedCandidate, is_straight};
 use crate::search::stepwise::{is_gear, with};
 use rig_identify::contradicted;
 use rig_model::robot::DESCRIBED;
@@ -60,9 +60,9 @@ impl<'r> Refit<'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] if the nominal parameters are collinear along this motion.
-    pub(crate) fn of(bench: &Bench, rows: &'r Rows) -> Result<Self, DiagnoseError> {
+    pub(crate) fn of(context: &DiagnosisContext, rows: &'r Rows) -> Result<Self, DiagnoseError> {
         let n = rows.joints();
-        let free = bench.anchor.columns(rows);
+        let free = context.anchor.columns(rows);
         let (plain, _) = weighed(rows, &free);
         let base = plain.clone().taking(&free);
         let before = solve(&plain, &free.iter().collect::<Vec<_>>(), &[]).ok_or_else(|| {
@@ -82,7 +82,7 @@ impl<'r> Refit<'r> {
     }
 
     /// Adds row weights, from the residual with these effects, on the geared joints `loud`.
-    pub(crate) fn quieted(self, chosen: &[Profile], loud: &[usize]) -> Self {
+    pub(crate) fn reweighted(self, chosen: &[FittedCandidate], loud: &[usize]) -> Self {
         let left = with(&self.base, chosen, None);
         let counts = (0..self.joints)
             .map(|j| {
@@ -120,7 +120,7 @@ impl<'r> Refit<'r> {
 
     /// Returns the two fits for a model with these effects: without any column, and with the free nominal columns.
     /// Without a gear they have no row weights.
-    pub(crate) fn footing(&self, chosen: &[Profile]) -> [&Fit<'r>; 2] {
+    pub(crate) fn footing(&self, chosen: &[FittedCandidate]) -> [&Fit<'r>; 2] {
         match &self.even {
             Some([plain, base]) if !chosen.iter().any(|p| is_gear(p.candidate.kind)) => {
                 [plain, base]
@@ -130,7 +130,7 @@ impl<'r> Refit<'r> {
     }
 
     /// Returns the columns of the free nominal directions, then of the effects.
-    fn columns<'c>(&'c self, chosen: &'c [Profile]) -> Columns<'c> {
+    fn columns<'c>(&'c self, chosen: &'c [FittedCandidate]) -> Columns<'c> {
         let mut columns = Columns {
             fitted: self.free.iter().collect(),
             known: Vec::new(),
@@ -155,7 +155,7 @@ impl<'r> Refit<'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] if the columns are collinear along this motion.
-    pub(crate) fn solution(&self, chosen: &[Profile]) -> Result<Solution, DiagnoseError> {
+    pub(crate) fn solution(&self, chosen: &[FittedCandidate]) -> Result<Solution, DiagnoseError> {
         let columns = self.columns(chosen);
         let [plain, _] = self.footing(chosen);
         solve(&columns.beside(plain), &columns.fitted, &[])
@@ -175,7 +175,7 @@ impl<'r> Refit<'r> {
     pub(crate) fn joint(
         &self,
         source: &Source,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         pairs: &[(usize, usize)],
         coordinates: &[Vec<Coordinate>],
     ) -> Result<Joint, DiagnoseError> {
@@ -239,20 +239,20 @@ impl<'r> Refit<'r> {
     }
 
     /// Returns the torque of the effects with their gains.
-    pub(crate) fn explained(&self, chosen: &[Profile], after: &Solution) -> Column {
+    pub(crate) fn explained(&self, chosen: &[FittedCandidate], after: &Solution) -> Column {
         let columns = chosen.iter().flat_map(|p| p.columns.iter());
         let gains = after.values[self.free.len()..].iter().copied();
         combined(self.joints, columns.zip(gains))
     }
 
     /// Returns the fit with all parameters as described. Friction that the description does not state is fitted.
-    pub(crate) fn frozen(&self, bench: &Bench) -> Fit<'r> {
-        let anchor = &bench.anchor;
+    pub(crate) fn frozen(&self, context: &DiagnosisContext) -> Fit<'r> {
+        let anchor = &context.anchor;
         let prior = anchor.prior_coefficients();
         let stated = combined(self.joints, self.free.iter().zip(prior));
         let mut frozen = self.plain.clone();
         frozen.subtract(&stated);
-        let (base, joints) = (&bench.nominal.base, bench.robot.joints.len());
+        let (base, joints) = (&context.nominal.base, context.robot.joints.len());
         let unknown = |k: &usize| {
             let friction = matches!(anchor.free[*k].as_slice(), [(b, _)] if is_friction(base.columns[*b], joints));
             friction && anchor.is_unstated(*k)
@@ -265,11 +265,11 @@ impl<'r> Refit<'r> {
     /// the effects, or as described. NaN entries are skipped.
     pub(crate) fn absorbed(
         &self,
-        bench: &Bench,
+        context: &DiagnosisContext,
         before: &[f64],
         after: &Solution,
     ) -> Vec<Absorbed> {
-        let mut list: Vec<Absorbed> = (of_directions(bench).enumerate())
+        let mut list: Vec<Absorbed> = (of_directions(context).enumerate())
             .map(|(k, (parameter, unit, scale))| {
                 let (before, now) = (scale * before[k], scale * after.values[k]);
                 Absorbed {
@@ -288,23 +288,23 @@ impl<'r> Refit<'r> {
 }
 
 /// Returns name, unit and display factor of each free nominal direction.
-fn of_directions(bench: &Bench) -> impl Iterator<Item = (String, String, f64)> {
-    let base = &bench.nominal.base;
-    (bench.anchor.free.iter()).map(|direction| match direction.as_slice() {
-        [(b, _)] => (bench.expression(*b), base.unit(*b).to_owned(), 1.0),
+fn of_directions(context: &DiagnosisContext) -> impl Iterator<Item = (String, String, f64)> {
+    let base = &context.nominal.base;
+    (context.anchor.free.iter()).map(|direction| match direction.as_slice() {
+        [(b, _)] => (context.expression(*b), base.unit(*b).to_owned(), 1.0),
         // Only gravity combines several parameters: it points along the described first moment.
-        _ => (GRAVITY.to_owned(), "N*m".to_owned(), bench.nominal.pull()),
+        _ => (GRAVITY.to_owned(), "N*m".to_owned(), context.nominal.pull()),
     })
 }
 
 /// Returns the same for all fitted parameters: nominal directions, gains, and the given shapes (effect, index).
 pub(crate) fn named(
-    bench: &Bench,
+    context: &DiagnosisContext,
     source: &Source,
-    chosen: &[Profile],
+    chosen: &[FittedCandidate],
     shapes: &[(usize, usize)],
 ) -> Vec<(String, String, f64)> {
-    let of_effect = |profile: &Profile, parameter: &Parameter| {
+    let of_effect = |profile: &FittedCandidate, parameter: &Parameter| {
         let name = profile.candidate.kind.about().name;
         let unit = source.unit(&profile.candidate, parameter);
         (format!("{name}.{}", parameter.name), unit, 1.0)
@@ -316,7 +316,7 @@ pub(crate) fn named(
         let profile = &chosen[*k];
         of_effect(profile, &profile.candidate.kind.about().shapes[*place])
     });
-    of_directions(bench).chain(gains).chain(shapes).collect()
+    of_directions(context).chain(gains).chain(shapes).collect()
 }
 
 /// Fitted columns and columns of known torque.
@@ -361,8 +361,8 @@ pub(crate) struct Open {
 }
 
 /// Compares the description with the data. It counts as right to [`DESCRIBED`], and as unknown where it states nothing.
-pub(crate) fn open(bench: &Bench, rows: &Rows) -> Open {
-    let anchor = &bench.anchor;
+pub(crate) fn open(context: &DiagnosisContext, rows: &Rows) -> Open {
+    let anchor = &context.anchor;
     if rows.joints() < 2 || !anchor.stated {
         return Open::default();
     }
@@ -370,7 +370,7 @@ pub(crate) fn open(bench: &Bench, rows: &Rows) -> Open {
     let (fit, memory) = weighed(rows, &free);
     let columns: Vec<Vec<f64>> = free.iter().map(|column| fit.weighted(column)).collect();
     let torque = fit.weighted(&rows.torque.iter().cloned().map(Some).collect());
-    let mut spread: Vec<f64> = (described_sizes(bench).into_iter())
+    let mut spread: Vec<f64> = (described_sizes(context).into_iter())
         .map(|size| DESCRIBED * size)
         .collect();
     for (k, column) in columns.iter().enumerate() {
@@ -394,7 +394,7 @@ pub(crate) fn open(bench: &Bench, rows: &Rows) -> Open {
         axpy(-prior, column, &mut left);
     }
     let along = DVector::from_fn(size, |k, _| dot(&columns[k], &left) / rows_in_one);
-    let contradicted = refuted(bench, gram.clone(), &along, &spread);
+    let contradicted = refuted(context, gram.clone(), &along, &spread);
     for (k, _) in &contradicted {
         spread[*k] = f64::INFINITY;
     }
@@ -425,10 +425,10 @@ pub(crate) fn open(bench: &Bench, rows: &Rows) -> Open {
 
 /// Returns the natural size of each free direction, from its described parameters. Each of them counts with at least a
 /// share of the largest one of its kind.
-pub(crate) fn described_sizes(bench: &Bench) -> Vec<f64> {
-    let combination = &bench.nominal.base.combination;
-    let sizes = weights(bench.robot, combination.ncols());
-    (bench.anchor.free.iter())
+pub(crate) fn described_sizes(context: &DiagnosisContext) -> Vec<f64> {
+    let combination = &context.nominal.base.combination;
+    let sizes = weights(context.robot, combination.ncols());
+    (context.anchor.free.iter())
         .map(|direction| {
             let squares = (0..sizes.len()).map(|c| {
                 let along: f64 = direction
@@ -444,13 +444,13 @@ pub(crate) fn described_sizes(bench: &Bench) -> Vec<f64> {
 
 /// Returns the directions of described friction that the data contradict. `gram` and `along` are in units of the noise.
 fn refuted(
-    bench: &Bench,
+    context: &DiagnosisContext,
     gram: DMatrix<f64>,
     along: &DVector<f64>,
     spread: &[f64],
 ) -> Vec<(usize, f64)> {
-    let (anchor, base) = (&bench.anchor, &bench.nominal.base);
-    let joints = bench.robot.joints.len();
+    let (anchor, base) = (&context.anchor, &context.nominal.base);
+    let joints = context.robot.joints.len();
     let of_friction = |k: &usize| {
         matches!(anchor.free[*k].as_slice(), [(b, _)] if is_friction(base.columns[*b], joints))
             && !anchor.is_unstated(*k)
@@ -483,7 +483,7 @@ fn is_of_contact(kind: Kind, place: usize) -> bool {
 
 /// Returns the difference of a backlash gap between the open-loop and the observer-based fit. Each law has an error at
 /// tooth contact, larger than blocks and strata show, and mostly in opposite directions.
-fn between_ways(profile: &Profile, place: usize) -> f64 {
+fn between_ways(profile: &FittedCandidate, place: usize) -> f64 {
     let is_play = profile.candidate.kind == Kind::Backlash
         && profile.candidate.kind.about().shapes[place].name == "gap";
     let otherwise = profile.otherwise.filter(|_| is_play);
@@ -493,7 +493,7 @@ fn between_ways(profile: &Profile, place: usize) -> f64 {
 /// Returns the derivative of an effect's torque with respect to one shape, by a difference within the physical bounds.
 fn slope(
     source: &Source,
-    profile: &Profile,
+    profile: &FittedCandidate,
     place: usize,
     shape: &Parameter,
     gains: &[f64],
@@ -536,7 +536,7 @@ impl Joint {
     /// that also gives their intervals.
     pub(crate) fn of_nothing(
         &self,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         free: usize,
         k: usize,
         count: usize,
@@ -550,20 +550,26 @@ impl Joint {
     }
 
     /// Returns the gains of the `k`-th effect.
-    pub(crate) fn gains(&self, chosen: &[Profile], free: usize, k: usize) -> &[f64] {
+    pub(crate) fn gains(&self, chosen: &[FittedCandidate], free: usize, k: usize) -> &[f64] {
         let at = place(chosen, free, k);
         &self.solution.values[at..at + chosen[k].columns.len()]
     }
 
     /// Returns a gain of the `k`-th effect with its standard deviation.
-    pub(crate) fn gain(&self, chosen: &[Profile], free: usize, k: usize, gain: usize) -> [f64; 2] {
+    pub(crate) fn gain(
+        &self,
+        chosen: &[FittedCandidate],
+        free: usize,
+        k: usize,
+        gain: usize,
+    ) -> [f64; 2] {
         let at = place(chosen, free, k) + gain;
         [self.solution.values[at], self.solution.std(at)]
     }
 
     /// Returns effect and index of each identifiable shape, with value and standard deviation.
-    pub(crate) fn shapes(&self, chosen: &[Profile]) -> Vec<((usize, usize), [f64; 2])> {
-        let of_effect = |(k, profile): (usize, &Profile)| {
+    pub(crate) fn shapes(&self, chosen: &[FittedCandidate]) -> Vec<((usize, usize), [f64; 2])> {
+        let of_effect = |(k, profile): (usize, &FittedCandidate)| {
             let stds = self.stds[k];
             let places = 0..profile.candidate.kind.about().shapes.len();
             (places.filter(move |s| stds[*s] > 0.0 && stds[*s].is_finite()))
@@ -577,7 +583,7 @@ impl Joint {
     pub(crate) fn parameters(
         &self,
         source: &Source,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         free: usize,
         k: usize,
     ) -> BTreeMap<String, Value> {
@@ -597,12 +603,12 @@ impl Joint {
         });
         let shapes = (kind.about().shapes.iter().enumerate())
             .map(|(s, shape)| (*shape, profile.shapes[s], self.stds[k][s]));
-        let slack = slack(source.runs);
+        let sampling_jitter = sampling_jitter(source.runs);
         (gains.chain(shapes))
             .map(|(parameter, value, std)| {
                 let value = Value {
                     value,
-                    std: widened(kind, &parameter, value, std, slack),
+                    std: inflated(kind, &parameter, value, std, sampling_jitter),
                     unit: source.unit(&profile.candidate, &parameter),
                 };
                 (parameter.name.to_owned(), value)
@@ -622,7 +628,7 @@ pub(crate) fn turn(slopes: &[f64]) -> f64 {
 }
 
 /// Returns the index of the first coefficient of the `k`-th effect, after the `free` nominal directions.
-fn place(chosen: &[Profile], free: usize, k: usize) -> usize {
+fn place(chosen: &[FittedCandidate], free: usize, k: usize) -> usize {
     free + chosen[..k].iter().map(|p| p.columns.len()).sum::<usize>()
 }
 

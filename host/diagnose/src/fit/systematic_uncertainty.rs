@@ -18,15 +18,21 @@ const SHARE: f64 = 0.07;
 /// … of inertia and gravity of a link: eight rigs without hidden effects gave inertias 0.1 to 0.4 % too small.
 pub(crate) const LINK: f64 = 0.003;
 
-/// Returns the standard deviation of a parameter with its systematic error. `slack` is the largest torque delay from
+/// Returns the standard deviation of a parameter with its systematic error. `sampling_jitter` is the largest torque delay from
 /// sampling instants alone, s. Whole numbers are exact.
-pub(crate) fn widened(kind: Kind, parameter: &Parameter, value: f64, std: f64, slack: f64) -> f64 {
+pub(crate) fn inflated(
+    kind: Kind,
+    parameter: &Parameter,
+    value: f64,
+    std: f64,
+    sampling_jitter: f64,
+) -> f64 {
     if parameter.scale == Scale::Whole {
         return std;
     }
     let instants = match kind {
         // Uniformly distributed within it (4.3.7).
-        Kind::MeasurementDelay => slack / 3.0_f64.sqrt(),
+        Kind::MeasurementDelay => sampling_jitter / 3.0_f64.sqrt(),
         _ => 0.0,
     };
     let share = if kind.optional().contains(&parameter.name) {
@@ -44,13 +50,13 @@ mod tests {
     #[test]
     fn a_delay_is_known_no_better_than_the_instants_of_sampling() {
         let delay = &Kind::MeasurementDelay.about().gains[0];
-        let std = widened(Kind::MeasurementDelay, delay, 0.004, 1e-5, 0.0006);
+        let std = inflated(Kind::MeasurementDelay, delay, 0.004, 1e-5, 0.0006);
         assert!((std - 0.0006 / 3.0_f64.sqrt()).abs() < 5e-6, "{std}");
         let stiffness = &Kind::Spring.about().gains[0];
-        let std = widened(Kind::Spring, stiffness, 2.0, 0.0, 0.0006);
+        let std = inflated(Kind::Spring, stiffness, 2.0, 0.0, 0.0006);
         assert!((std - 0.02).abs() < 1e-12, "{std}");
         assert_eq!(
-            widened(Kind::Spring, stiffness, 2.0, f64::INFINITY, 0.0),
+            inflated(Kind::Spring, stiffness, 2.0, f64::INFINITY, 0.0),
             f64::INFINITY
         );
     }

@@ -7,7 +7,7 @@ use rig_shared::effects::Kind;
 use crate::DiagnoseError;
 use crate::acceptance::residual_dependence::Coordinate;
 use crate::columns::effect_columns::Source;
-use crate::recordings::context::Loaded;
+use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::rows::regression::{Column, Rows, links_of};
 use rig_data::prepare::{LowPass, central_difference};
@@ -53,7 +53,7 @@ pub(crate) struct Equation {
     pub(crate) change: Column,
     /// Direction of the link's motion.
     pub(crate) direction: Column,
-    /// Flank in contact, −½ to ½, for each of `sides`.
+    /// Flank in contact, −½ to ½, for each of `constant_side`.
     pub(crate) levels: Vec<Column>,
     pub(crate) sides: Vec<Side>,
     pub(crate) waves: Vec<Wave>,
@@ -79,14 +79,14 @@ pub(crate) struct Equation {
 
 impl Equation {
     /// Builds the rows of a joint; `None` without a link encoder. `filter` is that of the positions; signals from
-    /// unfiltered data pass it too. `sides` are those of the training data.
+    /// unfiltered data pass it too. `constant_side` are those of the training data.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(crate) fn of(
         source: &Source,
         joint: usize,
-        loaded: &Loaded,
+        prepared: &PreparedData,
         filter: &LowPass,
         sides: Option<&[Side]>,
     ) -> Result<Option<Self>, DiagnoseError> {
@@ -94,14 +94,14 @@ impl Equation {
         let own = &robot.joints[joint];
         let alone =
             (robot.joints.iter().filter_map(|j| j.drive.as_ref())).all(|d| d.couples.is_empty());
-        let here: Vec<usize> = (0..loaded.runs.len())
-            .filter(|r| loaded.runs[*r].joints[joint].link.is_some())
+        let here: Vec<usize> = (0..prepared.runs.len())
+            .filter(|r| prepared.runs[*r].joints[joint].link.is_some())
             .collect();
         if here.is_empty() || !alone {
             return Ok(None);
         }
-        let thinning = &loaded.rows.thinning;
-        let Some(band) = across_band(loaded.runs[here[0]].rate) else {
+        let thinning = &prepared.rows.thinning;
+        let Some(band) = across_band(prepared.runs[here[0]].rate) else {
             return Ok(None);
         };
         let loads = (here.iter())
@@ -110,7 +110,7 @@ impl Equation {
         let smooth: Vec<Vec<f64>> = loads.iter().map(|l| thinning.smooth(l)).collect();
         let friction = source.coulomb(joint);
         let sides = sides.map_or_else(|| sides_of(&smooth, friction), <[Side]>::to_vec);
-        let mut recordings: Vec<usize> = here.iter().map(|&r| loaded.runs[r].recording).collect();
+        let mut recordings: Vec<usize> = here.iter().map(|&r| prepared.runs[r].recording).collect();
         recordings.dedup();
         let constants = recordings.len();
         let mut x = Vec::new();
@@ -133,7 +133,7 @@ impl Equation {
         let mut starts = vec![0];
         let mut mass = 0.0;
         for ((&r, load_here), smooth) in here.iter().zip(&loads).zip(&smooth) {
-            let run = &loaded.runs[r];
+            let run = &prepared.runs[r];
             let joint_run = &run.joints[joint];
             let Some([q, v, _]) = &joint_run.link else {
                 continue;
@@ -196,22 +196,22 @@ impl Equation {
             mass += source.mass(joint, r)? / here.len() as f64;
             starts.push(before + rows);
         }
-        let parts = parts_of(source, joint, loaded, &here, &band)?;
+        let parts = parts_of(source, joint, prepared, &here, &band)?;
         let count = x.len();
         let places = |r: &usize| here.iter().position(|h| h == r);
-        let pairs = (noise_floor::repeats(&loaded.runs).iter())
+        let pairs = (noise_floor::repeats(&prepared.runs).iter())
             .filter_map(|(a, b)| places(a).zip(places(b)))
             .collect();
         let recorded: Vec<Run> = here
             .iter()
-            .map(|&r| apart(&loaded.runs[r], joint))
+            .map(|&r| apart(&prepared.runs[r], joint))
             .collect();
         Ok(Some(Self {
             rows: Rows {
                 thinning: thinning.clone(),
                 count,
                 starts,
-                period: loaded.rows.period,
+                period: prepared.rows.period,
                 torque: vec![x],
                 keep: vec![vec![true; count]],
                 legible: Vec::new(),
@@ -381,14 +381,14 @@ fn apart(run: &Run, joint: usize) -> Run {
 fn parts_of(
     source: &Source,
     joint: usize,
-    loaded: &Loaded,
+    prepared: &PreparedData,
     here: &[usize],
     band: &LowPass,
 ) -> Result<Vec<(usize, Column)>, DiagnoseError> {
     let mut parts: Vec<(usize, Vec<f64>)> = Vec::new();
     let mut before = 0;
     for &r in here {
-        let run = &loaded.runs[r];
+        let run = &prepared.runs[r];
         let motion = links_of(run);
         source
             .nominal
@@ -401,9 +401,9 @@ fn parts_of(
                     parts.push((k, vec![0.0; before]));
                     parts.len() - 1
                 });
-                (loaded.rows.thinning).push(&band.zero_phase(values), &mut parts[place].1);
+                (prepared.rows.thinning).push(&band.zero_phase(values), &mut parts[place].1);
             })?;
-        before += loaded.rows.starts[r + 1] - loaded.rows.starts[r];
+        before += prepared.rows.starts[r + 1] - prepared.rows.starts[r];
     }
     Ok(parts
         .into_iter()

@@ -6,7 +6,7 @@ use crate::fit::least_squares::Fit;
 use crate::link_encoder::contact::Contact;
 use crate::link_encoder::law;
 use crate::link_encoder::law::{Law, Laws};
-use crate::link_encoder::{Between, Solved, Term};
+use crate::link_encoder::{Solved, Term, TransmissionAnalysis};
 
 /// Least natural frequency of a link on closed contacts, Hz; a lower one shows another elasticity beside them.
 pub(crate) const CLOSED_TEETH: f64 = 16.0;
@@ -33,7 +33,7 @@ impl Gear {
     }
 }
 
-impl Between<'_, '_> {
+impl TransmissionAnalysis<'_, '_> {
     /// Returns the gear that the coefficients represent; `None` without elasticity and backlash.
     pub(crate) fn gear(
         &self,

@@ -25,17 +25,17 @@ use rig_shared::effects::{Kind, SHAPES};
 use crate::acceptance::judge::closed;
 use crate::acceptance::residual_dependence::locate;
 use crate::columns::effect_columns::{Candidate, Source};
-use crate::description::parameter_prior::Anchor;
+use crate::description::parameter_prior::ParameterPrior;
 use crate::fit::least_squares::{Fit, dot};
 use crate::fit::solution::{Solution, jackknifed, solve};
-use crate::fit::systematic_uncertainty::widened;
+use crate::fit::systematic_uncertainty::inflated;
 use crate::link_encoder::contact::contact;
 use crate::link_encoder::equation::{ACROSS, Equation};
 pub(crate) use crate::link_encoder::gear::CLOSED_TEETH;
 use crate::link_encoder::gear::Gear;
 use crate::link_encoder::law::{Found, Law, Laws, beside, laws};
 use crate::outcome::{Detectable, Map, Place, Step, Tried, Value};
-use crate::recordings::context::Loaded;
+use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
@@ -78,27 +78,28 @@ struct Named {
 /// [`DiagnoseError::Model`].
 pub(crate) fn across(
     source: &Source,
-    anchor: &Anchor,
+    anchor: &ParameterPrior,
     after: &Solution,
-    loaded: &Loaded,
-    sealed: Option<(&Source, &Loaded)>,
+    prepared: &PreparedData,
+    held_out: Option<(&Source, &PreparedData)>,
     options: &Options,
 ) -> Result<Vec<Across>, DiagnoseError> {
     let mut list = Vec::new();
     for joint in 0..source.robot.joints.len() {
-        let Some(training) = Equation::of(source, joint, loaded, &loaded.position_filter()?, None)?
+        let Some(training) =
+            Equation::of(source, joint, prepared, &prepared.position_filter()?, None)?
         else {
             continue;
         };
-        let held = match sealed {
-            Some((of, sealed)) => {
-                let filter = sealed.position_filter()?;
-                Equation::of(of, joint, sealed, &filter, Some(&training.sides))?
+        let held = match held_out {
+            Some((of, held_out)) => {
+                let filter = held_out.position_filter()?;
+                Equation::of(of, joint, held_out, &filter, Some(&training.sides))?
             }
             None => None,
         };
         list.extend(
-            Between {
+            TransmissionAnalysis {
                 source,
                 anchor,
                 after,
@@ -144,9 +145,9 @@ pub(crate) fn names_something(across: &[Across], stated: &dyn Fn(&Candidate) -> 
 }
 
 /// Analysis of one joint's transmission.
-struct Between<'a, 's> {
+struct TransmissionAnalysis<'a, 's> {
     source: &'a Source<'s>,
-    anchor: &'a Anchor,
+    anchor: &'a ParameterPrior,
     after: &'a Solution,
     joint: usize,
     training: &'a Equation,
@@ -170,7 +171,7 @@ enum Term {
     Wave(usize, usize),
 }
 
-impl Between<'_, '_> {
+impl TransmissionAnalysis<'_, '_> {
     fn said(&self) -> Option<Across> {
         let equation = self.training;
         let rows = &equation.rows;
@@ -350,7 +351,7 @@ impl Between<'_, '_> {
             let parameters = (about.gains.iter().chain(about.shapes).zip(values))
                 .map(|(p, [value, std])| {
                     let unit = unit_of(p, joint.kind);
-                    let std = widened(kind, p, value, std, 0.0);
+                    let std = inflated(kind, p, value, std, 0.0);
                     (p.name.to_owned(), Value { value, std, unit })
                 })
                 .collect();

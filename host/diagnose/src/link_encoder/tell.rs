@@ -3,16 +3,16 @@
 use rig_shared::effects::{Effect, Kind};
 
 use crate::fit::least_squares::Fit;
-use crate::fit::systematic_uncertainty::widened;
+use crate::fit::systematic_uncertainty::inflated;
 use crate::link_encoder::{
-    Across, Between, Found, Gear, Law, Laws, Named, SCALE_OFF, SURE, Solved, Term,
+    Across, Found, Gear, Law, Laws, Named, SCALE_OFF, SURE, Solved, Term, TransmissionAnalysis,
 };
 use crate::outcome::{Described, Diagnosis, Fate, Map};
 use crate::search::stepwise::is_gear;
 use rig_model::robot::{JointKind, Robot, RobotEffect};
 use rig_output::{format_significant, format_unit, format_value};
 
-impl Between<'_, '_> {
+impl TransmissionAnalysis<'_, '_> {
     /// Returns the reason to believe a law, one sentence.
     pub(crate) fn why(
         &self,
@@ -64,7 +64,7 @@ impl Between<'_, '_> {
             Some(gear) => {
                 let shapes = gear.kind.about().shapes;
                 let value = |k: usize, unit: &str| {
-                    let std = widened(gear.kind, &shapes[k], gear.shapes[k], gear.stds[k], 0.0);
+                    let std = inflated(gear.kind, &shapes[k], gear.shapes[k], gear.stds[k], 0.0);
                     let value = if std.is_finite() {
                         format_value(gear.shapes[k], std)
                     } else {

@@ -13,15 +13,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::DMatrix;
 
 use crate::DiagnoseError;
-use crate::description::parameter_prior::{Anchor, Direction};
+use crate::description::parameter_prior::{Direction, ParameterPrior};
 use crate::fit::least_squares::{Fit, dot};
 use crate::fit::refit::Refit;
 use crate::fit::solution::solve;
 use crate::models::description::{completed, gravity_with, redistributed_over, with_gains};
-use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::rows::regression::{Column, combined};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::with;
 use rig_data::runs::{JointRun, Run};
 use rig_identify::{Combinations, Sizes, as_bodies};
@@ -32,7 +32,7 @@ use rig_output::format_significant;
 const SAID: f64 = 1e-3;
 
 /// A model that was fitted to the training data.
-pub(crate) struct Standing {
+pub(crate) struct FittedModel {
     /// Base parameters in the form of columns with the description's gravity.
     values: Vec<f64>,
     /// The same in the form of a description.
@@ -45,14 +45,14 @@ pub(crate) struct Standing {
     pub(crate) remarks: Vec<String>,
 }
 
-impl Standing {
+impl FittedModel {
     /// Returns base parameters and gains.
     pub(crate) fn fitted(&self) -> [&[f64]; 2] {
         [&self.values, &self.gains]
     }
 
     /// Returns the coefficients of the free nominal directions, then of the effects' columns.
-    pub(crate) fn coefficients(&self, anchor: &Anchor) -> Vec<f64> {
+    pub(crate) fn coefficients(&self, anchor: &ParameterPrior) -> Vec<f64> {
         let along =
             |direction: &Direction| direction.iter().map(|&(k, f)| f * self.described[k]).sum();
         let free = anchor.free.iter().map(along);
@@ -61,31 +61,31 @@ impl Standing {
 }
 
 /// Data that models are fitted to. Each fit is cached for judging, simulation, drawing and writing.
-pub(crate) struct Fitting<'a, 'r> {
+pub(crate) struct ModelCache<'a, 'r> {
     /// Robot and data treatment.
-    pub(crate) bench: &'a Bench<'a>,
+    pub(crate) context: &'a DiagnosisContext<'a>,
     refit: &'a Refit<'r>,
     /// The training data.
     runs: &'a [Run],
     /// Base parameters that formed the effects' columns.
     formed_at: &'a [f64],
     /// Fitted models by the columns of their effects.
-    known: Mutex<Vec<(Vec<Arc<Vec<Column>>>, Arc<Standing>)>>,
+    known: Mutex<Vec<(Vec<Arc<Vec<Column>>>, Arc<FittedModel>)>>,
 }
 
 /// Base parameters in the form of columns and of a description, gains, and the description with its remarks.
 type Linked = ([Vec<f64>; 2], Vec<f64>, (Robot, Vec<String>));
 
-impl<'a, 'r> Fitting<'a, 'r> {
+impl<'a, 'r> ModelCache<'a, 'r> {
     /// Prepares fits to `runs`.
     pub(crate) fn new(
-        bench: &'a Bench<'a>,
+        context: &'a DiagnosisContext<'a>,
         refit: &'a Refit<'r>,
         runs: &'a [Run],
         formed_at: &'a [f64],
     ) -> Self {
         Self {
-            bench,
+            context,
             refit,
             runs,
             formed_at,
@@ -97,7 +97,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] if its parameters are not identifiable.
-    pub(crate) fn of(&self, chosen: &[Profile]) -> Result<Arc<Standing>, DiagnoseError> {
+    pub(crate) fn of(&self, chosen: &[FittedCandidate]) -> Result<Arc<FittedModel>, DiagnoseError> {
         let same = |known: &[Arc<Vec<Column>>]| {
             known.len() == chosen.len()
                 && (known.iter().zip(chosen)).all(|(k, p)| Arc::ptr_eq(k, &p.columns))
@@ -112,8 +112,8 @@ impl<'a, 'r> Fitting<'a, 'r> {
         Ok(standing)
     }
 
-    /// Stores `standing` as the model of these effects.
-    pub(crate) fn adopt(&self, chosen: &[Profile], standing: Standing) {
+    /// Stores `prune` as the model of these effects.
+    pub(crate) fn adopt(&self, chosen: &[FittedCandidate], standing: FittedModel) {
         let key = chosen.iter().map(|p| p.columns.clone()).collect();
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.insert(0, (key, Arc::new(standing)));
@@ -125,18 +125,19 @@ impl<'a, 'r> Fitting<'a, 'r> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn unseen(
         &self,
-        chosen: &[Profile],
-        others: &Loaded,
+        chosen: &[FittedCandidate],
+        others: &PreparedData,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        self.bench.unseen(others, self.of(chosen)?.fitted(), chosen)
+        self.context
+            .unseen(others, self.of(chosen)?.fitted(), chosen)
     }
 
-    fn fitted(&self, chosen: &[Profile]) -> Result<Standing, DiagnoseError> {
+    fn fitted(&self, chosen: &[FittedCandidate]) -> Result<FittedModel, DiagnoseError> {
         let coefficients = self.refit.solution(chosen)?.values;
-        if self.bench.robot.joints.len() == 1 {
+        if self.context.robot.joints.len() == 1 {
             return Ok(self.alone(&coefficients, chosen));
         }
-        let Bench { robot, anchor, .. } = self.bench;
+        let DiagnosisContext { robot, anchor, .. } = self.context;
         let (free, gains) = coefficients.split_at(anchor.free.len());
         let values = anchor.values(free);
         let mut upright = values.clone();
@@ -145,7 +146,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
             self.embodied(&coefficients, [values, upright], chosen);
         let gravity = self.turned(chosen, &gains, &mut values.clone());
         let (model, remarks) = completed(links, robot, gravity, &with_gains(chosen, &gains));
-        Ok(Standing {
+        Ok(FittedModel {
             values,
             described,
             gains,
@@ -155,20 +156,20 @@ impl<'a, 'r> Fitting<'a, 'r> {
     }
 
     /// Builds the model of one joint from coefficients of free directions and effects' columns.
-    pub(crate) fn alone(&self, coefficients: &[f64], chosen: &[Profile]) -> Standing {
-        let Bench {
+    pub(crate) fn alone(&self, coefficients: &[f64], chosen: &[FittedCandidate]) -> FittedModel {
+        let DiagnosisContext {
             robot,
             nominal,
             anchor,
             ..
-        } = self.bench;
+        } = self.context;
         let (free, gains) = coefficients.split_at(anchor.free.len());
         let values = anchor.values(free);
         let mut upright = values.clone();
         let gravity = self.turned(chosen, gains, &mut upright);
         let links = redistributed_over(robot, nominal, &upright);
         let (model, remarks) = completed(links, robot, gravity, &with_gains(chosen, gains));
-        Standing {
+        FittedModel {
             described: values.clone(),
             values,
             gains: gains.to_vec(),
@@ -178,9 +179,9 @@ impl<'a, 'r> Fitting<'a, 'r> {
     }
 
     /// Returns gravity turned by the effects, and adapts `values` to it.
-    fn turned(&self, chosen: &[Profile], gains: &[f64], values: &mut [f64]) -> [f64; 3] {
+    fn turned(&self, chosen: &[FittedCandidate], gains: &[f64], values: &mut [f64]) -> [f64; 3] {
         let effects = with_gains(chosen, gains);
-        let Bench { robot, nominal, .. } = self.bench;
+        let DiagnosisContext { robot, nominal, .. } = self.context;
         gravity_with(robot, nominal, self.formed_at, &effects, values)
     }
 
@@ -189,9 +190,9 @@ impl<'a, 'r> Fitting<'a, 'r> {
         &self,
         coefficients: &[f64],
         [values, upright]: [Vec<f64>; 2],
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
     ) -> Linked {
-        let Bench { robot, nominal, .. } = self.bench;
+        let DiagnosisContext { robot, nominal, .. } = self.context;
         let effects: Vec<(&Column, bool)> = (chosen.iter())
             .flat_map(|p| p.columns.iter().map(|c| (c, p.followed.is_none())))
             .collect();
@@ -264,7 +265,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
 /// Returns the data scaled by residual RMS, and the information on the base parameters beside `fitted` columns.
 fn measure<'r>(
     refit: &Refit<'r>,
-    chosen: &[Profile],
+    chosen: &[FittedCandidate],
     fitted: &[&Column],
 ) -> (Fit<'r>, DMatrix<f64>) {
     let left = with(refit.footing(chosen)[1], chosen, None);

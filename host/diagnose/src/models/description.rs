@@ -9,7 +9,7 @@ use rig_shared::multibody::{COLUMNS, column};
 use crate::columns::effect_columns::Candidate;
 use crate::fit::refit::turn;
 use crate::rows::regression::Nominal;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::is_gear;
 use rig_identify::{Combinations, described as standard, redistributed};
 use rig_model::robot::{Origin, Robot, RobotEffect, sane};
@@ -94,7 +94,7 @@ pub(crate) fn completed(
 }
 
 /// Returns the effects with their gains.
-pub(crate) fn with_gains<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fitted<'g>> {
+pub(crate) fn with_gains<'g>(chosen: &[FittedCandidate], mut gains: &'g [f64]) -> Vec<Fitted<'g>> {
     let mut effects = Vec::new();
     for profile in chosen {
         let (own, rest) = gains.split_at(profile.columns.len());

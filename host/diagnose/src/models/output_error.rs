@@ -16,11 +16,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
 use crate::fit::refit::{Joint, named};
-use crate::models::bodies::{Fitting, Standing};
+use crate::models::bodies::{FittedModel, ModelCache};
 use crate::models::simulated_motion::{Departures, Replay};
 use crate::outcome::{ByMotion, Twice};
 use crate::recordings::noise_floor;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::is_gear;
 use rig_model::batch::each_by;
 use rig_output::format_significant;
@@ -48,7 +48,7 @@ struct Values {
 
 impl Values {
     /// Returns the effects with the shapes among `values`.
-    fn effects(&self, chosen: &[Profile], values: &[f64]) -> Vec<Profile> {
+    fn effects(&self, chosen: &[FittedCandidate], values: &[f64]) -> Vec<FittedCandidate> {
         let mut effects = chosen.to_vec();
         for ((k, place), value) in self.shapes.iter().zip(&values[self.coefficients..]) {
             effects[*k].shapes[*place] = *value;
@@ -57,7 +57,7 @@ impl Values {
     }
 
     /// Returns true if the values are within their physical bounds.
-    fn possible(&self, chosen: &[Profile], free: usize, values: &[f64]) -> bool {
+    fn possible(&self, chosen: &[FittedCandidate], free: usize, values: &[f64]) -> bool {
         let within = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
         let mut gains = values[free..self.coefficients].iter();
         let gains_can = chosen.iter().all(|p| {
@@ -81,7 +81,7 @@ pub(crate) struct Again {
     /// Report for the user.
     pub(crate) told: ByMotion,
     /// Model and effects to adopt, if any.
-    pub(crate) adopted: Option<(Standing, Vec<Profile>)>,
+    pub(crate) adopted: Option<(FittedModel, Vec<FittedCandidate>)>,
 }
 
 /// Fits `joint`'s values of the effects `chosen` to the simulated training motion; `None` if that is not possible.
@@ -89,16 +89,16 @@ pub(crate) struct Again {
 /// # Errors
 /// [`DiagnoseError::Model`].
 pub(crate) fn by_motion(
-    fitting: &Fitting,
+    fitting: &ModelCache,
     replay: &Replay,
     source: &Source,
-    chosen: &[Profile],
+    chosen: &[FittedCandidate],
     joint: &Joint,
     threads: usize,
 ) -> Result<Option<Again>, DiagnoseError> {
-    let bench = fitting.bench;
-    let free = bench.anchor.free.len();
-    if bench.robot.joints.len() > 1 || chosen.iter().any(|p| is_gear(p.candidate.kind)) {
+    let context = fitting.context;
+    let free = context.anchor.free.len();
+    if context.robot.joints.len() > 1 || chosen.iter().any(|p| is_gear(p.candidate.kind)) {
         return Ok(None);
     }
     let coefficients = joint.solution.values.len();
@@ -136,7 +136,7 @@ pub(crate) fn by_motion(
         .map(|p| {
             let columns = source.columns_by(threads, &p.candidate, &p.shapes)?;
             let columns = Arc::new(columns);
-            Ok(Profile { columns, ..p })
+            Ok(FittedCandidate { columns, ..p })
         })
         .collect::<Result<Vec<_>, DiagnoseError>>()?;
     let before = model(&start);
@@ -146,17 +146,18 @@ pub(crate) fn by_motion(
     ) else {
         return Ok(None);
     };
-    let left = |model: &Standing, effects: &[Profile]| -> Result<[f64; 2], DiagnoseError> {
-        let residual = bench.remaining(replay.judged, model.fitted(), effects)?;
-        let rows = &replay.judged.rows;
-        let away = rows.away(0);
-        let all = noise_floor::rms(&residual[0], &rows.keep[0]);
-        let clear = match away.contains(&true) {
-            true => noise_floor::rms(&residual[0], &away),
-            false => all,
+    let left =
+        |model: &FittedModel, effects: &[FittedCandidate]| -> Result<[f64; 2], DiagnoseError> {
+            let residual = context.remaining(replay.judged, model.fitted(), effects)?;
+            let rows = &replay.judged.rows;
+            let away = rows.away(0);
+            let all = noise_floor::rms(&residual[0], &rows.keep[0]);
+            let clear = match away.contains(&true) {
+                true => noise_floor::rms(&residual[0], &away),
+                false => all,
+            };
+            Ok([all, clear])
         };
-        Ok([all, clear])
-    };
     let [[all_was, clear_was], [all_is, clear_is]] =
         [left(&before, chosen)?, left(&standing, &effects)?];
     let torque_rms = [all_was, all_is];
@@ -165,7 +166,7 @@ pub(crate) fn by_motion(
         false => TORQUE_WORSE,
     };
     let adopted = was.worse_than(&is, 0) && clear_is <= (1.0 + worse) * clear_was;
-    let names = named(bench, source, chosen, &values.shapes);
+    let names = named(context, source, chosen, &values.shapes);
     let parameters: Vec<Twice> = (names.into_iter().enumerate())
         .map(|(k, (parameter, unit, scale))| Twice {
             parameter,
@@ -177,7 +178,7 @@ pub(crate) fn by_motion(
             sigmas: (theta[k] - start[k]).abs() / stds[k].hypot(std[k]),
         })
         .collect();
-    let unit = bench.robot.joints[0].kind.units();
+    let unit = context.robot.joints[0].kind.units();
     let mut told = ByMotion {
         unit: unit.0.to_owned(),
         motion_rms: [was.rms(0), is.rms(0)],

@@ -9,9 +9,9 @@ use crate::fit::refit::{Refit, described_sizes};
 use crate::fit::solution::Solution;
 use crate::models::payload::{on_last_link, on_single_link};
 use crate::outcome::Value;
-use crate::recordings::context::Bench;
+use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
-use crate::search::fitted_candidate::{LEAST_GAIN, Profile, SIGNIFICANT};
+use crate::search::fitted_candidate::{FittedCandidate, LEAST_GAIN, SIGNIFICANT};
 
 /// Share of the whole change's gain that some parameters must reach to explain it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
@@ -52,7 +52,7 @@ pub(crate) struct Change {
 /// Compares the refit to `rows` with the description. `known` is the torque of the effects found. `beside_friction` is
 /// true if friction is among them, `left` if a residual remains. Kinds in `without` are not named.
 pub(crate) fn change(
-    bench: &Bench,
+    context: &DiagnosisContext,
     refit: &Refit,
     rows: &Rows,
     known: &Column,
@@ -61,12 +61,12 @@ pub(crate) fn change(
     after: &Solution,
     without: &[Kind],
 ) -> Option<Change> {
-    let (anchor, free) = (&bench.anchor, &refit.free);
+    let (anchor, free) = (&context.anchor, &refit.free);
     if !anchor.stated {
         return None;
     }
     let prior = anchor.prior_coefficients();
-    let mut frozen = refit.frozen(bench);
+    let mut frozen = refit.frozen(context);
     frozen.subtract(known);
     // An undescribed parameter cannot change.
     let (unstated, all): (Vec<usize>, Vec<usize>) =
@@ -89,7 +89,7 @@ pub(crate) fn change(
         return None;
     }
     // A value described as 0, or as a rounding of it, is no reference for a relative change.
-    let sizes = described_sizes(bench);
+    let sizes = described_sizes(context);
     let moved_most = (all.iter())
         .map(|&k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(sizes[k]))
         .fold(0.0, f64::max);
@@ -114,7 +114,7 @@ pub(crate) fn change(
             parameters,
             p_value: corrected(e),
         };
-        if let Some((parameters, directions)) = on_single_link(bench, after, &prior, least)
+        if let Some((parameters, directions)) = on_single_link(context, after, &prior, least)
             && let Some(e) = evidence(&directions)
             && (speaks(&e) || beside_friction && carries(&e, &directions))
         {
@@ -127,12 +127,12 @@ pub(crate) fn change(
             true => SPEAKS_BESIDE_FRICTION,
             false => SPEAKS_FOR_ALL,
         };
-        if let Some((load, e)) = on_last_link(bench, rows, &beside_constants)
+        if let Some((load, e)) = on_last_link(context, rows, &beside_constants)
             && load.mass.value > LEAST_SIGMAS * load.mass.std
             && let Some(whole) = evidence_in(&beside_constants, &all)
             && e.gain >= share * whole.gain
         {
-            return Some(told(load.words(bench.robot), load.parameters(), &e));
+            return Some(told(load.words(context.robot), load.parameters(), &e));
         }
     }
     let scale = combined(known.len(), free.iter().zip(prior.iter().copied()));
@@ -159,7 +159,7 @@ pub(crate) fn change(
         });
     }
     let name = |k: usize| match anchor.free[k].as_slice() {
-        [(b, _)] => bench.expression(*b),
+        [(b, _)] => context.expression(*b),
         _ => "the first moment (gravity)".into(),
     };
     for &k in &all {
@@ -209,8 +209,12 @@ pub(crate) fn change(
 }
 
 /// Returns true if inertia and gravity beside these effects have grown like a payload on a single link.
-pub(crate) fn is_loaded(bench: &Bench, refit: &Refit, chosen: &[Profile]) -> bool {
-    let prior = bench.anchor.prior_coefficients();
-    let grown = |after| on_single_link(bench, &after, &prior, LEAST_OF_BOTH_BESIDE).is_some();
+pub(crate) fn is_loaded(
+    context: &DiagnosisContext,
+    refit: &Refit,
+    chosen: &[FittedCandidate],
+) -> bool {
+    let prior = context.anchor.prior_coefficients();
+    let grown = |after| on_single_link(context, &after, &prior, LEAST_OF_BOTH_BESIDE).is_some();
     refit.solution(chosen).is_ok_and(grown)
 }

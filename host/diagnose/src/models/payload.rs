@@ -17,7 +17,7 @@ use crate::fit::solution::Solution;
 use crate::fit::systematic_uncertainty::LINK;
 use crate::models::parameter_change::LEAST_SIGMAS;
 use crate::outcome::Value;
-use crate::recordings::context::Bench;
+use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
 use rig_identify::independent_columns;
 use rig_model::robot::{Inertial, JointKind, Robot};
@@ -113,9 +113,9 @@ fn kilogram(place: Vector3<f64>, link: &Isometry3<f64>) -> [[f64; 10]; 4] {
 }
 
 /// Returns the torque of a change of the last link's inertial parameters.
-fn column_of(bench: &Bench, rows: &Rows, change: &[f64; 10]) -> Column {
-    let base = &bench.nominal.base;
-    let first = (bench.robot.joints.len() - 1) * COLUMNS;
+fn column_of(context: &DiagnosisContext, rows: &Rows, change: &[f64; 10]) -> Column {
+    let base = &context.nominal.base;
+    let first = (context.robot.joints.len() - 1) * COLUMNS;
     let terms = (0..base.columns.len()).map(|b| {
         let own = change.iter().enumerate();
         let factor: f64 = own.map(|(c, x)| base.combination[(b, first + c)] * x).sum();
@@ -126,8 +126,12 @@ fn column_of(bench: &Bench, rows: &Rows, change: &[f64; 10]) -> Column {
 
 /// Fits mass and place of a payload on the last of several links to the description's residual `frozen`. Returns them
 /// with their evidence; `None` if the mass is not identifiable.
-pub(crate) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(Load, Evidence)> {
-    let n = bench.robot.joints.len();
+pub(crate) fn on_last_link(
+    context: &DiagnosisContext,
+    rows: &Rows,
+    frozen: &Fit,
+) -> Option<(Load, Evidence)> {
+    let n = context.robot.joints.len();
     if n < 2 {
         return None;
     }
@@ -138,7 +142,7 @@ pub(crate) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
     let mut place = Vector3::zeros();
     for _ in 0..ROUNDS {
         let columns =
-            kilogram(place, &bench.robot.last_link).map(|body| column_of(bench, rows, &body));
+            kilogram(place, &context.robot.last_link).map(|body| column_of(context, rows, &body));
         let weighted: Vec<Vec<f64>> = (columns.iter())
             .map(|c| frozen.projected(frozen.weighted(c)))
             .collect();
@@ -166,7 +170,7 @@ pub(crate) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
             return None;
         }
         if moved < SETTLED {
-            let off = systematic(bench, rows, frozen, &picked)?;
+            let off = systematic(context, rows, frozen, &picked)?;
             let std = |k: usize| evidence.stds[k].hypot(off[k]);
             let mut at = [None, None, None];
             for (k, axis) in told.iter().enumerate().skip(1) {
@@ -189,10 +193,15 @@ pub(crate) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
 }
 
 /// Returns the error of these columns' coefficients if each joint's described torque is wrong by [`LINK`].
-fn systematic(bench: &Bench, rows: &Rows, frozen: &Fit, columns: &[Vec<f64>]) -> Option<Vec<f64>> {
+fn systematic(
+    context: &DiagnosisContext,
+    rows: &Rows,
+    frozen: &Fit,
+    columns: &[Vec<f64>],
+) -> Option<Vec<f64>> {
     let size = columns.len();
     let gram = DMatrix::from_fn(size, size, |r, c| dot(&columns[r], &columns[c])).cholesky()?;
-    let anchor = &bench.anchor;
+    let anchor = &context.anchor;
     let stated = combined(
         rows.joints(),
         rows.nominal.iter().zip(anchor.prior.iter().copied()),
@@ -212,13 +221,13 @@ fn systematic(bench: &Bench, rows: &Rows, frozen: &Fit, columns: &[Vec<f64>]) ->
 /// Returns mass and distance of a payload on a single link, and the free directions that it changes. `None` unless
 /// gravity and inertia change by a share of `least` or more.
 pub(crate) fn on_single_link(
-    bench: &Bench,
+    context: &DiagnosisContext,
     after: &Solution,
     prior: &[f64],
     least: f64,
 ) -> Option<(BTreeMap<String, Value>, [usize; 2])> {
-    let (nominal, anchor) = (&bench.nominal, &bench.anchor);
-    let [joint] = bench.robot.joints.as_slice() else {
+    let (nominal, anchor) = (&context.nominal, &context.anchor);
+    let [joint] = context.robot.joints.as_slice() else {
         return None;
     };
     if joint.kind != JointKind::Revolute {

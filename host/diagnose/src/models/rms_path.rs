@@ -3,24 +3,24 @@
 use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
 use crate::fit::refit::Refit;
-use crate::models::bodies::Fitting;
+use crate::models::bodies::ModelCache;
 use crate::outcome::Waterfall;
-use crate::recordings::context::Loaded;
+use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::recordings::position_reading::PositionReading;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::with;
 use rig_model::robot::{Robot, title_of};
 
 /// RMS on one set of recordings, joint by joint.
-pub(crate) struct Fall {
+pub(crate) struct RmsByModel {
     /// RMS of the description without a refit.
     pub(crate) frozen: Vec<f64>,
     /// RMS of the refitted description, then of each model with one more effect.
     pub(crate) models: Vec<Vec<f64>>,
 }
 
-impl Fall {
+impl RmsByModel {
     /// Adds the RMS of one more model.
     fn push(&mut self, found: Vec<f64>) {
         for (list, rms) in self.models.iter_mut().zip(found) {
@@ -46,11 +46,11 @@ impl Fall {
 }
 
 /// RMS on the training data and on the hold-out.
-pub(crate) struct Descent {
+pub(crate) struct RmsPath {
     /// Training RMS, each model refitted jointly.
-    pub(crate) train: Fall,
+    pub(crate) train: RmsByModel,
     /// Hold-out RMS with the coefficients of the training data; `None` without a hold-out.
-    pub(crate) holdout: Option<Fall>,
+    pub(crate) holdout: Option<RmsByModel>,
     /// Noise of hold-out rows divided by that of training rows. At a lower sample rate fewer samples form a row.
     louder: f64,
     /// Part of the training noise floor from position readings, joint by joint. It depends on the inertia of the poses.
@@ -61,31 +61,31 @@ pub(crate) struct Descent {
     repeated: Vec<Option<f64>>,
 }
 
-impl Descent {
+impl RmsPath {
     /// Computes the RMS for effects in the order found; the first `described` are from the description. `added` is the
     /// part of the training floor that comes from position readings, joint by joint.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(crate) fn of(
-        fitting: &Fitting,
+        fitting: &ModelCache,
         refit: &Refit,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         described: usize,
-        loaded: &Loaded,
-        sealed: Option<&Loaded>,
+        prepared: &PreparedData,
+        held_out: Option<&PreparedData>,
         source: &Source,
         added: Vec<f64>,
     ) -> Result<Self, DiagnoseError> {
-        let bench = fitting.bench;
-        let n = bench.robot.joints.len();
-        let frozen = |loaded| -> Result<Fall, DiagnoseError> {
-            Ok(Fall {
-                frozen: bench.frozen(loaded)?,
+        let context = fitting.context;
+        let n = context.robot.joints.len();
+        let frozen = |prepared| -> Result<RmsByModel, DiagnoseError> {
+            Ok(RmsByModel {
+                frozen: context.frozen(prepared)?,
                 models: vec![Vec::new(); n],
             })
         };
-        let mut train = frozen(loaded)?;
+        let mut train = frozen(prepared)?;
         for count in described..=chosen.len() {
             let part = &chosen[..count];
             // A single link keeps its free fit.
@@ -93,37 +93,39 @@ impl Descent {
                 let fit = with(refit.footing(part)[1], part, None);
                 vec![fit.even_rms(0)]
             } else {
-                fitting.unseen(part, loaded)?
+                fitting.unseen(part, prepared)?
             };
             train.push(found);
         }
         let mut holdout = None;
-        if let Some(sealed) = sealed {
-            let mut fall = frozen(sealed)?;
+        if let Some(held_out) = held_out {
+            let mut fall = frozen(held_out)?;
             for count in described..=chosen.len() {
-                fall.push(fitting.unseen(&chosen[..count], sealed)?);
+                fall.push(fitting.unseen(&chosen[..count], held_out)?);
             }
             holdout = Some(fall);
         }
-        let position_reading = match sealed {
-            Some(sealed) => PositionReading::of(
-                &bench.source(sealed, &source.values)?,
-                &sealed.rows,
-                &sealed.position_filter()?,
+        let position_reading = match held_out {
+            Some(held_out) => PositionReading::of(
+                &context.source(held_out, &source.values)?,
+                &held_out.rows,
+                &held_out.position_filter()?,
             )?,
             None => PositionReading::of_noise(added.clone()),
         };
         let mut repeated = vec![None; n];
-        if let Some(sealed) = sealed {
+        if let Some(held_out) = held_out {
             let stands = fitting.of(chosen)?;
-            let left = bench.remaining(sealed, stands.fitted(), chosen)?;
-            let pairs = noise_floor::repeats(&sealed.runs);
+            let left = context.remaining(held_out, stands.fitted(), chosen)?;
+            let pairs = noise_floor::repeats(&held_out.runs);
             for (j, own) in repeated.iter_mut().enumerate() {
-                *own = noise_floor::from_repeats(&sealed.rows, &pairs, &left[j], None, j)
+                *own = noise_floor::from_repeats(&held_out.rows, &pairs, &left[j], None, j)
                     .map(|repeated| repeated.noise);
             }
         }
-        let slower = sealed.map_or(1.0, |sealed| bench.rate() / sealed.treatment.sample_rate);
+        let slower = held_out.map_or(1.0, |held_out| {
+            context.rate() / held_out.treatment.sample_rate
+        });
         Ok(Self {
             train,
             holdout,
@@ -200,14 +202,14 @@ impl Descent {
     pub(crate) fn waterfall(
         &self,
         robot: &Robot,
-        found: &[Profile],
+        found: &[FittedCandidate],
         floors: &[f64],
     ) -> Vec<Waterfall> {
         let models: Vec<String> = (["frozen description", "refitted"].map(str::to_owned))
             .into_iter()
             .chain(found.iter().map(|p| title_of(p.candidate.kind)))
             .collect();
-        let list = |fall: &Fall, j: usize| {
+        let list = |fall: &RmsByModel, j: usize| {
             let mut list = vec![fall.frozen[j]];
             list.extend(&fall.models[j]);
             list

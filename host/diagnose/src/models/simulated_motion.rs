@@ -1,10 +1,10 @@
 //! Position errors of simulated motions ([`rig_validate::replay`]), model by model.
 
 use crate::DiagnoseError;
-use crate::models::bodies::Fitting;
-use crate::recordings::context::Loaded;
+use crate::models::bodies::ModelCache;
+use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::runs::Run;
 use rig_model::robot::{Controller, Robot, title_of};
 use rig_model::simulate::{Model, SimulateError};
@@ -56,9 +56,9 @@ pub(crate) struct Departures {
 
 /// Recordings to be simulated.
 pub(crate) struct Replay<'a> {
-    fitting: &'a Fitting<'a, 'a>,
+    fitting: &'a ModelCache<'a, 'a>,
     /// Data that models are judged on.
-    pub(crate) judged: &'a Loaded,
+    pub(crate) judged: &'a PreparedData,
     runs: &'a [Run],
     /// One per joint; `None` if nothing is simulated.
     controllers: Option<Vec<Controller>>,
@@ -72,11 +72,11 @@ impl<'a> Replay<'a> {
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(crate) fn of(
-        fitting: &'a Fitting<'a, 'a>,
-        judged: &'a Loaded,
+        fitting: &'a ModelCache<'a, 'a>,
+        judged: &'a PreparedData,
     ) -> Result<Self, DiagnoseError> {
         let moving = fitting.of(&[])?;
-        let (controllers, how) = of_joints(fitting.bench.robot, &moving.model, &judged.runs);
+        let (controllers, how) = of_joints(fitting.context.robot, &moving.model, &judged.runs);
         Ok(Self {
             fitting,
             judged,
@@ -117,7 +117,7 @@ impl<'a> Replay<'a> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn told(
         &self,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         described: usize,
     ) -> Result<String, DiagnoseError> {
         if self.controllers.is_none() {
@@ -182,7 +182,10 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn errors(&self, chosen: &[Profile]) -> Result<Option<Errors>, DiagnoseError> {
+    pub(crate) fn errors(
+        &self,
+        chosen: &[FittedCandidate],
+    ) -> Result<Option<Errors>, DiagnoseError> {
         if self.controllers.is_none() {
             return Ok(None);
         }
@@ -196,13 +199,13 @@ impl<'a> Replay<'a> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn drawn(
         &self,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         described: usize,
     ) -> Result<[Vec<Positions>; 2], DiagnoseError> {
         if self.controllers.is_none() {
             return Ok(Default::default());
         }
-        let of = |part: &[Profile]| -> Result<_, DiagnoseError> {
+        let of = |part: &[FittedCandidate]| -> Result<_, DiagnoseError> {
             Ok(self
                 .simulated(&self.fitting.of(part)?.model)
                 .unwrap_or_default())
@@ -224,7 +227,7 @@ impl<'a> Replay<'a> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn spoiling(
         &self,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         described: usize,
     ) -> Result<Option<usize>, DiagnoseError> {
         let mut before = self.errors(&chosen[..described])?;

@@ -2,7 +2,7 @@
 
 use crate::DiagnoseError;
 use crate::acceptance::residual_dependence::Coordinate;
-use crate::recordings::context::Loaded;
+use crate::recordings::context::PreparedData;
 use crate::rows::regression::{Column, Rows, combined};
 use rig_data::prepare::central_difference;
 use rig_data::runs::Run;
@@ -56,7 +56,7 @@ impl Equation {
     pub(crate) fn of(
         robot: &Robot,
         joint: usize,
-        loaded: &Loaded,
+        prepared: &PreparedData,
         clamped: &[Run],
     ) -> Result<Option<Self>, DiagnoseError> {
         let own = robot.joints.get(joint);
@@ -66,19 +66,19 @@ impl Equation {
         let torque_per_ampere = drive.gear_ratio * drive.torque_constant;
         let alone =
             (robot.joints.iter().filter_map(|j| j.drive.as_ref())).all(|d| d.couples.is_empty());
-        let recorded = !loaded.runs.is_empty()
-            && (loaded.runs.iter()).all(|run| run.joints[joint].voltage.is_some());
+        let recorded = !prepared.runs.is_empty()
+            && (prepared.runs.iter()).all(|run| run.joints[joint].voltage.is_some());
         if torque_per_ampere == 0.0 || !alone || !recorded {
             return Ok(None);
         }
-        let thinning = &loaded.rows.thinning;
+        let thinning = &prepared.rows.thinning;
         let mut columns = vec![Vec::new(); COLUMNS];
         let [mut voltage, mut current, mut speed] = [const { Vec::new() }; 3];
         let mut dead = vec![Vec::new(); FADES.len()];
         let mut keep = Vec::new();
         let mut starts = vec![0];
-        let rate = loaded.runs[0].rate;
-        for run in loaded.runs.iter().chain(clamped) {
+        let rate = prepared.runs[0].rate;
+        for run in prepared.runs.iter().chain(clamped) {
             if (run.rate / rate - 1.0).abs() > SAME_RATE {
                 return Err(DiagnoseError::Clamped {
                     label: run.label.clone(),
@@ -134,7 +134,7 @@ impl Equation {
                 thinning: thinning.clone(),
                 count,
                 starts,
-                period: loaded.rows.period,
+                period: prepared.rows.period,
                 torque: vec![voltage],
                 keep: vec![keep],
                 legible: Vec::new(),

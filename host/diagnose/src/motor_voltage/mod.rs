@@ -22,17 +22,17 @@ use crate::acceptance::residual_dependence::locate;
 use crate::columns::effect_columns::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::{Solution, jackknifed, solve};
-use crate::fit::systematic_uncertainty::widened;
+use crate::fit::systematic_uncertainty::inflated;
 use crate::motor_voltage::equation::{ACROSS, CONSTANT, CURRENT, Equation, FADES, SPEED};
 use crate::motor_voltage::left::{Rest, of_the_voltage};
 use crate::outcome::{
     Absorbed, Detectable, Diagnosis, Fate, Map, Place, Remainder, Step, Tried, Value,
 };
-use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
-use crate::search::fitted_candidate::{Profile, SIGNIFICANT};
+use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
 use crate::{DiagnoseError, Options};
 use rig_model::robot::{Robot, RobotEffect};
 use rig_output::{format_significant, format_value};
@@ -80,15 +80,15 @@ struct DeadZone {
 /// # Errors
 /// [`DiagnoseError::Model`].
 pub(crate) fn windings(
-    bench: &Bench,
-    loaded: &Loaded,
-    sealed: Option<&Loaded>,
+    context: &DiagnosisContext,
+    prepared: &PreparedData,
+    held_out: Option<&PreparedData>,
     options: &Options,
 ) -> Result<(Vec<Winding>, Vec<String>), DiagnoseError> {
     let (mut found, mut silent) = (Vec::new(), Vec::new());
-    for joint in 0..bench.robot.joints.len() {
-        let Some(training) = Equation::of(bench.robot, joint, loaded, &options.clamped)? else {
-            let name = &bench.robot.joints[joint].name;
+    for joint in 0..context.robot.joints.len() {
+        let Some(training) = Equation::of(context.robot, joint, prepared, &options.clamped)? else {
+            let name = &context.robot.joints[joint].name;
             if (options.clamped.iter()).any(|run| run.joints[joint].voltage.is_some()) {
                 silent.push(format!(
                     "The motor voltage of joint {name} with the joints clamped is not used: it takes that of all other recordings beside it, and a drive of its own."
@@ -96,15 +96,15 @@ pub(crate) fn windings(
             }
             continue;
         };
-        let held = match sealed {
-            Some(sealed) => Equation::of(bench.robot, joint, sealed, &[])?,
+        let held = match held_out {
+            Some(held_out) => Equation::of(context.robot, joint, held_out, &[])?,
             None => None,
         };
-        match winding(bench, joint, loaded, &training, held.as_ref(), options) {
+        match winding(context, joint, prepared, &training, held.as_ref(), options) {
             Ok(winding) => found.push(winding),
             Err(why) => silent.push(format!(
                 "Nothing is concluded from the motor voltage of joint {}: {why}.",
-                bench.robot.joints[joint].name
+                context.robot.joints[joint].name
             )),
         }
     }
@@ -112,9 +112,9 @@ pub(crate) fn windings(
 }
 
 fn winding(
-    bench: &Bench,
+    context: &DiagnosisContext,
     joint: usize,
-    loaded: &Loaded,
+    prepared: &PreparedData,
     training: &Equation,
     held: Option<&Equation>,
     options: &Options,
@@ -143,7 +143,7 @@ fn winding(
             return Err(format!("by it the {name} would not be positive"));
         }
     }
-    let robot = bench.robot;
+    let robot = context.robot;
     let own = &robot.joints[joint];
     let candidate = Candidate::on(Kind::DriveDeadzone, joint);
     let trials = robot.joints.len() * FADES.len();
@@ -155,16 +155,16 @@ fn winding(
         })
         .max_by(|a, b| a.1.explained.total_cmp(&b.1.explained));
     let fade = likeliest.as_ref().map_or(0, |(k, _)| *k);
-    let profile = likeliest.map(|(k, evidence)| Profile {
+    let profile = likeliest.map(|(k, evidence)| FittedCandidate {
         candidate,
         shapes: [0.0; SHAPES],
         columns: std::sync::Arc::new(dead(k).to_vec()),
         evidence,
-        vanished: None,
+        at_bound: None,
         followed: None,
         otherwise: None,
-        heard: false,
-        doubled: false,
+        accepted_by_observer: false,
+        near_collinear: false,
     });
     let left_out = options.without.contains(&Kind::DriveDeadzone);
     let refused = match &profile {
@@ -189,7 +189,7 @@ fn winding(
     if stands {
         last.push(&training.dead_zones[fade]);
     }
-    let pairs = noise_floor::repeats(&loaded.runs);
+    let pairs = noise_floor::repeats(&prepared.runs);
     let after = match stands {
         true => {
             let plain = plain.clustered(noise_floor::memory(rows, &[last.residual(0)]), &pairs);
@@ -250,7 +250,7 @@ fn winding(
         let at = before.values.len();
         let volts = after.values[at];
         DeadZone {
-            described: bench.stated.holds(Kind::DriveDeadzone, joint),
+            described: context.stated.holds(Kind::DriveDeadzone, joint),
             volts,
             step: Step {
                 effect: about.name.to_owned(),
@@ -311,7 +311,7 @@ pub(crate) fn left_of_voltage(windings: &[Winding]) -> Option<Remainder> {
 }
 
 /// Returns the reason why a small voltage step is not an inverter's: other errors of the equation are as large.
-fn too_small(profile: &Profile) -> Option<String> {
+fn too_small(profile: &FittedCandidate) -> Option<String> {
     let volts = profile.evidence.gains[0];
     let least = Kind::DriveDeadzone.about().gains[0].range[0];
     let share = profile.evidence.gain;
@@ -329,7 +329,7 @@ fn value(solution: &Solution, k: usize, volts: &Parameter) -> Value {
     let value = solution.values[k];
     Value {
         value,
-        std: widened(Kind::DriveDeadzone, volts, value, solution.std(k), 0.0),
+        std: inflated(Kind::DriveDeadzone, volts, value, solution.std(k), 0.0),
         unit: volts.unit.to_owned(),
     }
 }

@@ -8,7 +8,7 @@ use crate::columns::effect_columns::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::motor_voltage::Winding;
 use crate::outcome::Step;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::{Search, is_constant, with};
 
 /// Constant torques. Only a recording without external loads separates them.
@@ -63,7 +63,7 @@ pub(crate) fn settled(
     zeros: &[Option<[f64; 2]>],
     search: &Search,
     base: &Fit,
-    chosen: &mut [Profile],
+    chosen: &mut [FittedCandidate],
 ) -> Result<Vec<Word>, DiagnoseError> {
     let mut words = vec![Word::Open; chosen.len()];
     for k in 0..chosen.len() {
@@ -71,7 +71,7 @@ pub(crate) fn settled(
         let Some(zero) = zeros.get(candidate.joint).copied().flatten() else {
             continue;
         };
-        let in_its_place = |kind: Kind, chosen: &[Profile]| {
+        let in_its_place = |kind: Kind, chosen: &[FittedCandidate]| {
             let own = |c: &Candidate| c.kind == kind && c.joint == candidate.joint;
             match search.library.iter().position(own) {
                 Some(c) => search.profile(&with(base, chosen, Some(k)), c, None),
@@ -89,10 +89,11 @@ pub(crate) fn settled(
                 Word::Torque if candidate.kind == sensor => &TORQUES[..],
                 _ => continue,
             };
-            let mut best: Option<Profile> = None;
+            let mut best: Option<FittedCandidate> = None;
             for name in names {
-                let better =
-                    |p: &Profile| (best.as_ref()).is_none_or(|b| p.evidence.gain > b.evidence.gain);
+                let better = |p: &FittedCandidate| {
+                    (best.as_ref()).is_none_or(|b| p.evidence.gain > b.evidence.gain)
+                };
                 if let Some(profile) = in_its_place(*name, chosen)?.filter(better) {
                     best = Some(profile);
                 }
@@ -115,7 +116,7 @@ pub(crate) fn settled(
 }
 
 /// Returns the mean torque of a constant effect and its standard deviation.
-fn constant(profile: &Profile) -> Option<[f64; 2]> {
+fn constant(profile: &FittedCandidate) -> Option<[f64; 2]> {
     let column = profile.columns.first()?[profile.candidate.joint].as_ref()?;
     let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
     let [gain] = profile.evidence.gains.first_chunk()?;

@@ -8,8 +8,8 @@ use rig_shared::multibody::Chain;
 
 use crate::DiagnoseError;
 use crate::columns::effect_columns::{Candidate, DELAY, Source};
-use crate::description::described_effects::{Stated, candidate, gains};
-use crate::description::parameter_prior::Anchor;
+use crate::description::described_effects::{DescribedEffects, candidate, gains};
+use crate::description::parameter_prior::ParameterPrior;
 use crate::faults::moves;
 use crate::fit::least_squares::Evidence;
 use crate::fit::refit::Refit;
@@ -18,7 +18,7 @@ use crate::recordings::noise_floor;
 use crate::rows::nominal_torque::{Predicted, predict};
 use crate::rows::one_way::OneWay;
 use crate::rows::regression::{Column, ILLEGIBLE, Nominal, Rows, combined};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::Compensated;
 use rig_data::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
 use rig_data::runs::{Run, runs_of};
@@ -32,7 +32,7 @@ const LEAST_BAND: f64 = 30.0;
 const LOUD: f64 = 1.2;
 
 /// Prepared recordings under one treatment.
-pub(crate) struct Loaded {
+pub(crate) struct PreparedData {
     /// Recordings at the full rate.
     pub(crate) runs: Vec<Run>,
     /// Regression rows, without the torque of the held parameters.
@@ -41,7 +41,7 @@ pub(crate) struct Loaded {
     pub(crate) treatment: Treatment,
 }
 
-impl Loaded {
+impl PreparedData {
     /// Returns the filter of positions before differentiation.
     ///
     /// # Errors
@@ -52,17 +52,17 @@ impl Loaded {
 }
 
 /// Everything that is constant during a diagnosis.
-pub(crate) struct Bench<'a> {
+pub(crate) struct DiagnosisContext<'a> {
     /// The given robot, without its effects.
     pub(crate) robot: &'a Robot,
     /// The described effects.
-    pub(crate) stated: &'a Stated,
+    pub(crate) stated: &'a DescribedEffects,
     /// Held effects whose torque is subtracted, and those of the rig without external loads.
     held: [Option<(Effects, Chain<f64>)>; 2],
     /// Base parameters of the robot.
     pub(crate) nominal: Nominal,
     /// Which of them are free.
-    pub(crate) anchor: Anchor,
+    pub(crate) anchor: ParameterPrior,
     treatment: Treatment,
     /// Joints whose rows near standstill are used.
     rests: Vec<usize>,
@@ -70,18 +70,18 @@ pub(crate) struct Bench<'a> {
     pub(crate) one_way: Vec<OneWay>,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> DiagnosisContext<'a> {
     /// Creates the context for a robot. The training recordings decide on the treatment of all.
     ///
     /// # Errors
     /// [`DiagnoseError`].
     pub(crate) fn of(
-        stated: &'a Stated,
+        stated: &'a DescribedEffects,
         training: &[&dyn Recording],
     ) -> Result<Self, DiagnoseError> {
         let robot = &stated.robot;
         let nominal = Nominal::of(robot)?;
-        let anchor = Anchor::of(robot, &nominal, stated);
+        let anchor = ParameterPrior::of(robot, &nominal, stated);
         Ok(Self {
             robot,
             stated,
@@ -107,15 +107,21 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError`].
-    pub(crate) fn load(&self, recordings: &[&dyn Recording]) -> Result<Loaded, DiagnoseError> {
-        self.loaded(recordings, &self.treatment)
+    pub(crate) fn load(
+        &self,
+        recordings: &[&dyn Recording],
+    ) -> Result<PreparedData, DiagnoseError> {
+        self.prepared(recordings, &self.treatment)
     }
 
     /// The same for the hold-out, at its own sample rate.
     ///
     /// # Errors
     /// [`DiagnoseError`] for two sample rates, or for one that is too low for the band.
-    pub(crate) fn load_held(&self, recordings: &[&dyn Recording]) -> Result<Loaded, DiagnoseError> {
+    pub(crate) fn load_held(
+        &self,
+        recordings: &[&dyn Recording],
+    ) -> Result<PreparedData, DiagnoseError> {
         let joints = self.robot.joints.len();
         let mut own: Option<Treatment> = None;
         for recording in recordings {
@@ -125,14 +131,14 @@ impl<'a> Bench<'a> {
                 Some(treatment) => same_rate(&survey, treatment.sample_rate)?,
             }
         }
-        self.loaded(recordings, own.as_ref().unwrap_or(&self.treatment))
+        self.prepared(recordings, own.as_ref().unwrap_or(&self.treatment))
     }
 
-    fn loaded(
+    fn prepared(
         &self,
         recordings: &[&dyn Recording],
         treatment: &Treatment,
-    ) -> Result<Loaded, DiagnoseError> {
+    ) -> Result<PreparedData, DiagnoseError> {
         let position = position_filter(treatment)?;
         let mut runs = Vec::new();
         for (k, &recording) in recordings.iter().enumerate() {
@@ -156,7 +162,7 @@ impl<'a> Bench<'a> {
         &self,
         runs: Vec<Run>,
         treatment: &Treatment,
-    ) -> Result<Loaded, DiagnoseError> {
+    ) -> Result<PreparedData, DiagnoseError> {
         let mut rows = Rows::of(&runs, &self.nominal, treatment)?;
         let held = self.anchor.held_torque(&rows);
         take_off(&mut rows.torque, &held);
@@ -166,7 +172,7 @@ impl<'a> Bench<'a> {
         for own in &self.one_way {
             own.leave_out_rests(&mut rows);
         }
-        Ok(Loaded {
+        Ok(PreparedData {
             runs,
             rows,
             treatment: treatment.clone(),
@@ -178,11 +184,14 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError`] of the fit.
-    pub(crate) fn look_about_rests(&mut self, loaded: &Loaded) -> Result<bool, DiagnoseError> {
-        let rows = &loaded.rows;
+    pub(crate) fn look_about_rests(
+        &mut self,
+        prepared: &PreparedData,
+    ) -> Result<bool, DiagnoseError> {
+        let rows = &prepared.rows;
         let refit = Refit::of(self, rows)?;
         let values = &refit.before.values;
-        let source = self.source(loaded, &self.anchor.values(values))?;
+        let source = self.source(prepared, &self.anchor.values(values))?;
         let known = combined(rows.joints(), refit.free.iter().zip(values.iter().copied()));
         let mut residual = rows.torque.clone();
         take_off(&mut residual, &known);
@@ -218,17 +227,17 @@ impl<'a> Bench<'a> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn source<'s>(
         &'s self,
-        loaded: &'s Loaded,
+        prepared: &'s PreparedData,
         values: &[f64],
     ) -> Result<Source<'s>, DiagnoseError> {
-        let predicted = (loaded.runs.iter())
+        let predicted = (prepared.runs.iter())
             .map(|run| predict(&self.nominal, self.robot, values, run))
             .collect::<Result<Vec<Predicted>, _>>()?;
         Ok(Source {
             robot: self.robot,
-            runs: &loaded.runs,
+            runs: &prepared.runs,
             nominal: &self.nominal,
-            thinning: &loaded.rows.thinning,
+            thinning: &prepared.rows.thinning,
             predicted,
             values: values.to_vec(),
             free_constants: (0..self.robot.joints.len())
@@ -250,15 +259,15 @@ impl<'a> Bench<'a> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn remaining(
         &self,
-        loaded: &Loaded,
+        prepared: &PreparedData,
         [values, gains]: [&[f64]; 2],
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
-        let source = (self.source(loaded, values)?)
+        let source = (self.source(prepared, values)?)
             .loaded_by(chosen, gains)?
-            .following(&loaded.rows, chosen, gains)?
+            .following(&prepared.rows, chosen, gains)?
             .smoothed();
-        let rows = &loaded.rows;
+        let rows = &prepared.rows;
         let mut columns = Vec::new();
         for profile in chosen {
             columns.extend(source.columns(&profile.candidate, &profile.shapes)?);
@@ -277,28 +286,28 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn frozen(&self, loaded: &Loaded) -> Result<Vec<f64>, DiagnoseError> {
+    pub(crate) fn frozen(&self, prepared: &PreparedData) -> Result<Vec<f64>, DiagnoseError> {
         let (mut all, mut effects) = (Vec::new(), Vec::new());
         for placed in self.stated.free() {
             let gains = gains(&placed);
-            effects.push(Profile {
+            effects.push(FittedCandidate {
                 candidate: candidate(&placed),
                 shapes: placed.effect.shapes,
                 // One per gain; computed along these recordings later.
                 columns: Arc::new(vec![Column::new(); gains.len()]),
                 evidence: Evidence::default(),
-                vanished: None,
+                at_bound: None,
                 followed: None,
                 otherwise: None,
-                heard: false,
-                doubled: false,
+                accepted_by_observer: false,
+                near_collinear: false,
             });
             all.extend(gains);
         }
-        let mut residual = self.remaining(loaded, [&self.anchor.prior, &all], &effects)?;
+        let mut residual = self.remaining(prepared, [&self.anchor.prior, &all], &effects)?;
         for placed in self.stated.given_up() {
-            let mut torque = Vec::with_capacity(loaded.rows.count);
-            for run in &loaded.runs {
+            let mut torque = Vec::with_capacity(prepared.rows.count);
+            for run in &prepared.runs {
                 let of_row = |&position: &f64| {
                     let at = Instant {
                         position,
@@ -307,12 +316,12 @@ impl<'a> Bench<'a> {
                     placed.effect.torque(&mut Memory::default(), &at)
                 };
                 let along: Vec<f64> = run.joints[placed.joint].q.iter().map(of_row).collect();
-                loaded.rows.thinning.pick(&along, &mut torque);
+                prepared.rows.thinning.pick(&along, &mut torque);
             }
             let own = residual[placed.joint].iter_mut().zip(torque);
             own.for_each(|(left, torque)| *left -= torque);
         }
-        Ok(rms(&loaded.rows, &residual))
+        Ok(rms(&prepared.rows, &residual))
     }
 
     /// Returns the RMS residual per joint of a model on the used rows.
@@ -321,11 +330,14 @@ impl<'a> Bench<'a> {
     /// [`DiagnoseError::Model`].
     pub(crate) fn unseen(
         &self,
-        sealed: &Loaded,
+        held_out: &PreparedData,
         fitted: [&[f64]; 2],
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
     ) -> Result<Vec<f64>, DiagnoseError> {
-        Ok(rms(&sealed.rows, &self.remaining(sealed, fitted, chosen)?))
+        Ok(rms(
+            &held_out.rows,
+            &self.remaining(held_out, fitted, chosen)?,
+        ))
     }
 }
 

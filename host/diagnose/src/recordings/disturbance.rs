@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use crate::recordings::context::Loaded;
+use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::recordings::outlier_segment::burst;
 use crate::rows::regression::Rows;
@@ -50,12 +50,16 @@ fn asked(run: &Run, joint: usize, rows: &Rows, length: usize) -> Vec<bool> {
 
 /// Excludes disturbances from runs of one motion and returns sentences on them. `residuals` are those of the refitted
 /// model, joint by joint.
-pub(crate) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded) -> Vec<String> {
-    let rows = &loaded.rows;
+pub(crate) fn touched(
+    robot: &Robot,
+    residuals: &[Vec<f64>],
+    prepared: &mut PreparedData,
+) -> Vec<String> {
+    let rows = &prepared.rows;
     let mut told = Vec::new();
     // Run, and rows counted from its first.
     let mut out: Vec<(usize, Range<usize>)> = Vec::new();
-    for (a, b) in noise_floor::repeats(&loaded.runs) {
+    for (a, b) in noise_floor::repeats(&prepared.runs) {
         for (j, joint) in robot.joints.iter().enumerate() {
             let residual = &residuals[j];
             let mut apart = vec![0.0; rows.count];
@@ -69,7 +73,7 @@ pub(crate) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
             // Runs that come to rest at slightly different times differ without a disturbance.
             let resting =
                 starts.map(|start| lasting(&rows.keep[j][start..start + length], rows.period));
-            let asked = asked(&loaded.runs[a], j, rows, length);
+            let asked = asked(&prepared.runs[a], j, rows, length);
             let commanded = lasting(&asked, rows.period);
             let reach = (BESIDE / rows.period).ceil() as usize;
             let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(length);
@@ -82,7 +86,8 @@ pub(crate) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
                 keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;
                 apart[x] = residual[x] - residual[y];
             }
-            let Some(burst) = burst(&apart, &keep, &rows.starts, rows.period, &loaded.runs) else {
+            let Some(burst) = burst(&apart, &keep, &rows.starts, rows.period, &prepared.runs)
+            else {
                 continue;
             };
             let squares = |run: usize| -> f64 {
@@ -96,10 +101,10 @@ pub(crate) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
             } else {
                 (b, a)
             };
-            let [own_label, other_label] = [own, other].map(|run| &loaded.runs[run].label);
+            let [own_label, other_label] = [own, other].map(|run| &prepared.runs[run].label);
             let [from, to] = burst
                 .time
-                .map(|t| t - loaded.runs[a].t.first().unwrap_or(&0.0));
+                .map(|t| t - prepared.runs[a].t.first().unwrap_or(&0.0));
             told.push(format!(
                 "Joint {}: from {from:.1} to {to:.1} s after its start {own_label} differs from {other_label}, the same motion, {} times as much as elsewhere. Something touched the joint or held it there, or that piece is damaged; {} of half a second left out of both.",
                 joint.name,
@@ -117,7 +122,7 @@ pub(crate) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
     }
     let (period, thinning) = (rows.period, &rows.thinning);
     for (run, part) in out {
-        let run: &mut Run = &mut loaded.runs[run];
+        let run: &mut Run = &mut prepared.runs[run];
         let trimmed = thinning.trimmed(run);
         let [from, to] = [part.start, part.end].map(|row| row as f64 * period + trimmed);
         let sample = |t: f64| ((t * run.rate).max(0.0).round() as usize).min(run.t.len());

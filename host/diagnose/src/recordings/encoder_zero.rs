@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
 use crate::fit::least_squares::Fit;
-use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::rows::nominal_torque::predict;
 use crate::search::fitted_candidate::SIGNIFICANT;
@@ -102,16 +102,16 @@ pub(crate) fn another_zero(
 /// # Errors
 /// [`DiagnoseError::Model`].
 pub(crate) fn another_zero_held(
-    bench: &Bench,
-    sealed: &Loaded,
+    context: &DiagnosisContext,
+    held_out: &PreparedData,
     values: &[f64],
     residual: &[Vec<f64>],
 ) -> Result<Option<String>, DiagnoseError> {
-    let [joint] = &bench.robot.joints[..] else {
+    let [joint] = &context.robot.joints[..] else {
         return Ok(None);
     };
-    let (residual, keep) = (&residual[0], &sealed.rows.keep[0]);
-    let own = shifted(&bench.source(sealed, values)?, None)?;
+    let (residual, keep) = (&residual[0], &held_out.rows.keep[0]);
+    let own = shifted(&context.source(held_out, values)?, None)?;
     let used = || (own.iter().zip(residual).zip(keep)).filter(|(_, keep)| **keep);
     let (xx, xy) = used().fold((0.0, 0.0), |(xx, xy), ((x, r), _)| (xx + x * x, xy + x * r));
     let mut most = None;
@@ -123,31 +123,31 @@ pub(crate) fn another_zero_held(
         let std = after * (10.0 / xx).sqrt();
         let gain = 1.0 - after / before;
         if by.abs() > SHIFT.max(SURE * std) && gain > LEAST {
-            most = Some(Shift::of(sealed.runs.first(), [by, std], gain));
+            most = Some(Shift::of(held_out.runs.first(), [by, std], gain));
         }
     }
     if most.is_none() && joint.kind == JointKind::Revolute {
-        most = turned(bench, sealed, values, residual)?;
+        most = turned(context, held_out, values, residual)?;
     }
     Ok(most.map(|shift| shift.told(joint, "those to learn from")))
 }
 
 /// The same for a large shift of a single revolute joint.
 fn turned(
-    bench: &Bench,
-    sealed: &Loaded,
+    context: &DiagnosisContext,
+    held_out: &PreparedData,
     values: &[f64],
     residual: &[f64],
 ) -> Result<Option<Shift>, DiagnoseError> {
-    let (rows, nominal) = (&sealed.rows, &bench.nominal);
+    let (rows, nominal) = (&held_out.rows, &context.nominal);
     let torque = |by: f64| -> Result<Vec<f64>, DiagnoseError> {
         let mut thin = Vec::new();
-        for run in &sealed.runs {
+        for run in &held_out.runs {
             let mut elsewhere = run.clone();
             for q in elsewhere.joints.iter_mut().flat_map(|joint| &mut joint.q) {
                 *q -= by;
             }
-            let told = predict(nominal, bench.robot, values, &elsewhere)?;
+            let told = predict(nominal, context.robot, values, &elsewhere)?;
             rows.thinning.push_raw(&told.torque[0], &mut thin);
         }
         Ok(thin)
@@ -165,7 +165,7 @@ fn turned(
         if gain > MOST_OF_IT {
             let by = if by > PI { by - TAU } else { by };
             let std = PI / f64::from(TURNS);
-            most = Some(Shift::of(sealed.runs.first(), [by, std], gain).or(most));
+            most = Some(Shift::of(held_out.runs.first(), [by, std], gain).or(most));
         }
     }
     Ok(most)

@@ -168,7 +168,7 @@ pub(crate) fn rms(signal: &[f64], keep: &[bool]) -> f64 {
 ///
 /// From third differences, where a smooth torque vanishes. They have 20 times the variance of white noise, second
 /// differences 6 times.
-pub(crate) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
+pub(crate) fn sensor_noise(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
     let mut all = Differences::default();
     for run in runs {
         let own = run.joints[joint].differences();
@@ -302,7 +302,7 @@ mod tests {
             joints: vec![joint],
             ..Run::default()
         };
-        of_reading(&[run], 0, 0.01)
+        sensor_noise(&[run], 0, 0.01)
     }
 
     #[test]

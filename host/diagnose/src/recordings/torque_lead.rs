@@ -12,7 +12,7 @@ use rig_shared::effects::Kind;
 use crate::DiagnoseError;
 use crate::columns::effect_columns::{Candidate, Source};
 use crate::fit::least_squares::Fit;
-use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::context::{DiagnosisContext, PreparedData};
 use rig_data::runs::{JointRun, Run};
 
 /// Standard deviations above which a lead is significant.
@@ -28,7 +28,7 @@ const LATE: f64 = 0.6;
 const LATEST: f64 = 0.001;
 
 /// Returns the lateness that sampling alone may cause, s.
-pub(crate) fn slack(runs: &[Run]) -> f64 {
+pub(crate) fn sampling_jitter(runs: &[Run]) -> f64 {
     runs.first()
         .map_or(0.0, |run| (LATE / run.rate).min(LATEST))
 }
@@ -46,7 +46,7 @@ pub(crate) fn leads(
     let Some(rate) = source.runs.first().map(|run| run.rate) else {
         return Ok(present.to_vec());
     };
-    let late = slack(source.runs);
+    let late = sampling_jitter(source.runs);
     (present.iter().enumerate())
         .map(|(joint, &present)| {
             let candidate = Candidate::on(Kind::MeasurementDelay, joint);
@@ -76,19 +76,23 @@ pub(crate) fn differ(a: &[f64], b: &[f64], runs: &[Run]) -> bool {
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
-pub(crate) fn moved(bench: &Bench, loaded: Loaded, by: &[f64]) -> Result<Loaded, DiagnoseError> {
+pub(crate) fn moved(
+    context: &DiagnosisContext,
+    prepared: PreparedData,
+    by: &[f64],
+) -> Result<PreparedData, DiagnoseError> {
     if by.iter().all(|lead| *lead == 0.0) {
-        return Ok(loaded);
+        return Ok(prepared);
     }
-    let mut runs = loaded.runs;
+    let mut runs = prepared.runs;
     // The lateness is a share of a sample, so it scales with the sample rate of other recordings.
-    let rate = bench.rate();
+    let rate = context.rate();
     for run in &mut runs {
         for (joint, lead) in run.joints.iter_mut().zip(by) {
             put_later(joint, lead * rate);
         }
     }
-    bench.rows(runs, &loaded.treatment)
+    context.rows(runs, &prepared.treatment)
 }
 
 /// Delays a joint's torque by `samples`. The noise of the original reading is stored first, because this smooths it.
@@ -129,7 +133,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
-    use crate::recordings::noise_floor::of_reading;
+    use crate::recordings::noise_floor::sensor_noise;
 
     #[test]
     fn a_torque_that_was_moved_tells_its_readings_noise_as_before() {
@@ -143,18 +147,18 @@ mod tests {
             joints: vec![joint],
             ..Run::default()
         };
-        let before = of_reading(std::slice::from_ref(&run), 0, 0.01);
+        let before = sensor_noise(std::slice::from_ref(&run), 0, 0.01);
         put_later(&mut run.joints[0], 0.4);
         // Shifted again: a lead is found in two passes.
         put_later(&mut run.joints[0], 0.1);
         assert!(before.is_some());
-        assert_eq!(of_reading(&[run], 0, 0.01), before);
+        assert_eq!(sensor_noise(&[run], 0, 0.01), before);
     }
 
     #[test]
     fn no_more_than_half_a_sample_late_is_sampling() {
         let late = |rate: f64| {
-            slack(&[Run {
+            sampling_jitter(&[Run {
                 rate,
                 ..Run::default()
             }])
@@ -162,7 +166,7 @@ mod tests {
         // Half a sample at 1 kHz is sampling; three quarters with a current filter are not.
         assert!(late(1000.0) > 0.0005 && late(1000.0) < 0.00075);
         assert_eq!(late(100.0), LATEST);
-        assert_eq!(slack(&[]), 0.0);
+        assert_eq!(sampling_jitter(&[]), 0.0);
     }
 
     #[test]

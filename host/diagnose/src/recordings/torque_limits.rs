@@ -3,7 +3,7 @@
 //! Rows at a limit carry no information and are excluded, and a simulation stays within the limit. A wrong limit would
 //! exclude the most informative rows and restrict the simulated motion.
 
-use crate::description::described_effects::Stated;
+use crate::description::described_effects::DescribedEffects;
 use rig_data::runs::Run;
 use rig_output::{format_significant, format_unit};
 
@@ -14,7 +14,7 @@ const SIGMAS: f64 = 4.0;
 /// Least share of all samples beyond the limit.
 const LEAST: f64 = 0.005;
 
-impl Stated {
+impl DescribedEffects {
     /// Removes described limits that the recorded torque exceeds. Returns true if there was one.
     pub(crate) fn lift_limits(&mut self, runs: &[Run]) -> bool {
         let mut lifted = false;

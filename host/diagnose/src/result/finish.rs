@@ -2,7 +2,7 @@
 
 use crate::DiagnoseError;
 use crate::acceptance::residual_dependence::Coordinate;
-use crate::description::parameter_prior::Anchor;
+use crate::description::parameter_prior::ParameterPrior;
 use crate::fit::least_squares::Fit;
 use crate::models::simulated_motion::Positions;
 use crate::outcome::Diagnosis;
@@ -10,7 +10,7 @@ use crate::recordings::noise_floor::repeats;
 use crate::result::{limits, pictures, sentences};
 use crate::rows::one_way::OneWay;
 use crate::rows::regression::{Nominal, Rows};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::Search;
 use rig_data::runs::Run;
 use rig_model::robot::Robot;
@@ -22,7 +22,7 @@ pub(crate) struct Found<'a, 'r> {
     /// Base parameters of the robot.
     pub(crate) nominal: &'a Nominal,
     /// Free base parameters.
-    pub(crate) anchor: &'a Anchor,
+    pub(crate) anchor: &'a ParameterPrior,
     /// Candidate library with the training data.
     pub(crate) search: &'a Search<'r>,
     /// Training data minus the torque of held parameters.
@@ -32,7 +32,7 @@ pub(crate) struct Found<'a, 'r> {
     /// Description with the found effects.
     pub(crate) model: &'a Robot,
     /// All effects, those of the description first.
-    pub(crate) chosen: &'a [Profile],
+    pub(crate) chosen: &'a [FittedCandidate],
     /// Number of effects from the description.
     pub(crate) described: usize,
     /// Coordinates of the training data, joint by joint.
@@ -53,7 +53,7 @@ pub(crate) struct Found<'a, 'r> {
 
 impl<'a> Found<'a, '_> {
     /// Returns the effects that the description does not state.
-    pub(crate) fn found(&self) -> &'a [Profile] {
+    pub(crate) fn found(&self) -> &'a [FittedCandidate] {
         &self.chosen[self.described..]
     }
 }

@@ -15,7 +15,7 @@ use crate::fit::least_squares::{Fit, dot_self};
 use crate::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
 use crate::recordings::external_load::told_apart;
 use crate::result::finish::Found;
-use crate::search::fitted_candidate::{LEAST_GAIN, Profile, SIGNIFICANT, grid};
+use crate::search::fitted_candidate::{FittedCandidate, LEAST_GAIN, SIGNIFICANT, grid};
 use crate::search::stepwise::{is_first_law, is_gear, rivals, with};
 use rig_model::robot::Robot;
 use rig_model::simulate::Model;
@@ -267,7 +267,7 @@ fn given_already(found: &Found, joint: usize, kind: &str) -> Option<String> {
 }
 
 /// Returns an effect with its estimate. A tilt is fitted as an angle, which turns gravity's torque.
-fn effect(profile: &Profile, nominal: &Nominal) -> Effect<f64> {
+fn effect(profile: &FittedCandidate, nominal: &Nominal) -> Effect<f64> {
     let (kind, gains) = (profile.candidate.kind, &profile.evidence.gains);
     match (kind, gains.as_slice()) {
         (Kind::GravityTilt, [angle, ..]) => {

@@ -12,7 +12,7 @@ use crate::models::simulated_motion::Positions;
 use crate::outcome::{Curves, Map};
 use crate::result::finish::Found;
 use crate::rows::regression::Rows;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::with;
 use rig_model::robot::Joint;
 
@@ -78,7 +78,7 @@ impl Map {
 }
 
 /// Returns the coordinate that shows an effect.
-fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Coordinate> {
+fn telling(profile: &FittedCandidate, all: &[Coordinate], joints: &[Joint]) -> Option<Coordinate> {
     let Candidate {
         kind, joint, other, ..
     } = profile.candidate;

@@ -4,11 +4,11 @@ use rig_shared::effects::Kind;
 
 use crate::fit::refit::Open;
 use crate::fit::solution::Solution;
-use crate::recordings::context::{Bench, Loaded};
+use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::result::sentences::offsets;
 use crate::rows::one_way::told;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit, format_value};
 
@@ -19,16 +19,16 @@ const CLEAR: f64 = 5.0;
 
 /// Warns that a spring took part of a link's weight: a stiffening spring is like a linear one with less weight.
 pub(crate) fn weight_of_a_spring(
-    bench: &Bench,
-    chosen: &[Profile],
+    context: &DiagnosisContext,
+    chosen: &[FittedCandidate],
     last: &Solution,
 ) -> Option<String> {
-    let anchor = &bench.anchor;
+    let anchor = &context.anchor;
     if !anchor.stated || chosen.iter().all(|p| p.candidate.kind != Kind::Spring) {
         return None;
     }
     let prior = anchor.prior_coefficients();
-    let weight = anchor.first_moment(&bench.nominal)?;
+    let weight = anchor.first_moment(&context.nominal)?;
     let [now, described] = [last.values[weight], prior[weight]];
     let light =
         now.abs() < LIGHT * described.abs() && (described - now).abs() > CLEAR * last.std(weight);
@@ -44,28 +44,28 @@ pub(crate) fn weight_of_a_spring(
 /// Returns sentences on the recordings, the described parameters that are held or contradicted (`open`), the sensor
 /// readings with the drive off, and the constants of the last model.
 pub(crate) fn remarks(
-    bench: &Bench,
-    loaded: &Loaded,
-    sealed: Option<&Loaded>,
+    context: &DiagnosisContext,
+    prepared: &PreparedData,
+    held_out: Option<&PreparedData>,
     open: &Open,
     sensor_zeros: &[[f64; 2]],
     last: &Solution,
 ) -> Vec<String> {
     let mut words = Vec::new();
-    words.extend(sealed.and_then(|sealed| own_rate(bench, sealed)));
-    words.extend(read_off(bench.robot, sensor_zeros));
-    words.extend(offsets(bench, last));
-    words.extend(contradicted(bench, &open.contradicted));
-    words.extend(held(bench, &open.held));
-    words.extend(told(&bench.one_way, bench.robot, &bench.anchor, last));
-    words.extend(sealed.and_then(|sealed| no_other_motion(loaded, sealed)));
+    words.extend(held_out.and_then(|held_out| own_rate(context, held_out)));
+    words.extend(read_off(context.robot, sensor_zeros));
+    words.extend(offsets(context, last));
+    words.extend(contradicted(context, &open.contradicted));
+    words.extend(held(context, &open.held));
+    words.extend(told(&context.one_way, context.robot, &context.anchor, last));
+    words.extend(held_out.and_then(|held_out| no_other_motion(prepared, held_out)));
     words
 }
 
 /// Says that the hold-out has another sample rate than the training data.
-fn own_rate(bench: &Bench, sealed: &Loaded) -> Option<String> {
-    let [learnt, held] = [bench.rate(), sealed.treatment.sample_rate];
-    let label = &sealed.runs.first()?.label;
+fn own_rate(context: &DiagnosisContext, held_out: &PreparedData) -> Option<String> {
+    let [learnt, held] = [context.rate(), held_out.treatment.sample_rate];
+    let label = &held_out.runs.first()?.label;
     (learnt != held).then(|| {
         format!(
             "{label} is judged at its own rate, {held:.1} Hz where {learnt:.1} Hz were learnt from{}.",
@@ -92,8 +92,8 @@ fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
 }
 
 /// Says that the hold-out repeats the training motion.
-fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
-    let (own, same) = noise_floor::repeated(&loaded.runs, &sealed.runs)?;
+fn no_other_motion(prepared: &PreparedData, held_out: &PreparedData) -> Option<String> {
+    let (own, same) = noise_floor::repeated(&prepared.runs, &held_out.runs)?;
     Some(format!(
         "The hold-out {} repeats the motion of {}: it shows what noise a model has learnt, and not whether it holds for another motion; hold back another one.",
         own.label, same.label
@@ -101,14 +101,14 @@ fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
 }
 
 /// Lists described friction that the recordings contradict.
-fn contradicted(bench: &Bench, list: &[(usize, f64)]) -> Vec<String> {
+fn contradicted(context: &DiagnosisContext, list: &[(usize, f64)]) -> Vec<String> {
     (list.iter())
         .map(|&(k, times)| {
             format!(
                 "The recordings contradict the described {} = {} {} by {} standard deviations of the description's worth and theirs: it is not held to that.",
-                bench.nominal.base.expression(k),
-                format_significant(bench.anchor.prior[k], 3),
-                format_unit(bench.nominal.base.unit(k)),
+                context.nominal.base.expression(k),
+                format_significant(context.anchor.prior[k], 3),
+                format_unit(context.nominal.base.unit(k)),
                 format_significant(times, 2)
             )
         })
@@ -116,8 +116,8 @@ fn contradicted(bench: &Bench, list: &[(usize, f64)]) -> Vec<String> {
 }
 
 /// Lists parameters that stay as described.
-fn held(bench: &Bench, open: &[usize]) -> Option<String> {
-    let names: Vec<String> = (open.iter().map(|&k| bench.nominal.base.expression(k))).collect();
+fn held(context: &DiagnosisContext, open: &[usize]) -> Option<String> {
+    let names: Vec<String> = (open.iter().map(|&k| context.nominal.base.expression(k))).collect();
     (!names.is_empty()).then(|| {
         format!(
             "The training motion tells less of {} than the description, so {} as described as far as bodies can be so: {}.",

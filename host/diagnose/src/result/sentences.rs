@@ -8,10 +8,10 @@ use crate::columns::transmission::STRETCH;
 use crate::columns::waves::{is_of_the_motor, ratio_is_described};
 use crate::fit::solution::Solution;
 use crate::outcome::{Before, Diagnosis, Remainder, Residual, Step, Verdict, Waterfall};
-use crate::recordings::context::Bench;
+use crate::recordings::context::DiagnosisContext;
 use crate::recordings::external_load;
 use crate::result::finish::Found;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use rig_model::robot::Joint;
 use rig_output::{format_significant, format_unit, format_value, listed};
 
@@ -224,14 +224,14 @@ fn constant(d: &Diagnosis) -> Option<String> {
 }
 
 /// Lists significant constant torques that were fitted because the format of the description has none.
-pub(crate) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
-    let base = &bench.nominal.base.columns;
-    let found: Vec<String> = (bench.anchor.free.iter().enumerate())
-        .filter(|(k, _)| bench.anchor.is_unstated(*k))
+pub(crate) fn offsets(context: &DiagnosisContext, after: &Solution) -> Option<String> {
+    let base = &context.nominal.base.columns;
+    let found: Vec<String> = (context.anchor.free.iter().enumerate())
+        .filter(|(k, _)| context.anchor.is_unstated(*k))
         .filter(|(k, _)| after.values[*k].abs() > MOVED * after.std(*k))
         .filter_map(|(k, direction)| {
             let (b, _) = direction.first()?;
-            let joint = bench.robot.joints.get(base[*b] / COLUMNS)?;
+            let joint = context.robot.joints.get(base[*b] / COLUMNS)?;
             if base[*b] % COLUMNS != column::OFFSET {
                 return None;
             }
@@ -334,7 +334,7 @@ fn closest(d: &Diagnosis) -> Option<String> {
 }
 
 /// Gives the reason to believe a step.
-pub(crate) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
+pub(crate) fn why(found: &Found, step: &Step, profile: &FittedCandidate) -> String {
     let e = &profile.evidence;
     let j = profile.candidate.joint;
     let (unit, floor) = (effort(&found.robot.joints[j]), found.known[j]);
@@ -386,7 +386,7 @@ pub(crate) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
         .drive
         .as_ref()
         .map_or(0.0, |d| d.rotor_inertia);
-    let loaded = if profile.candidate.kind == Kind::LoadFriction && rotor == 0.0 {
+    let load = if profile.candidate.kind == Kind::LoadFriction && rotor == 0.0 {
         " The rotor's inertia is not described, so that its torque counts as load of the gear here: the coefficient comes out too small. Give rotor_inertia in [joint.drive]."
     } else {
         ""
@@ -401,7 +401,7 @@ pub(crate) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
         String::new()
     };
     format!(
-        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{gone}{loaded}{turn}{runner}{followed}",
+        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{gone}{load}{turn}{runner}{followed}",
         percent(e.gain),
         format_significant(e.gain_sigmas, 2)
     )

@@ -7,10 +7,10 @@ use crate::acceptance::judge::{Judged, closed, rank};
 use crate::columns::waves::{is_of_the_motor, ratio_is_described};
 use crate::fit::refit::{Joint, Refit};
 use crate::models::parameter_change::Change;
-use crate::models::rms_path::Descent;
+use crate::models::rms_path::RmsPath;
 use crate::models::simulated_motion::Errors;
 use crate::outcome::{Step, Tried};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::Search;
 use rig_model::robot::{Robot, title_of};
 
@@ -21,7 +21,7 @@ pub(crate) fn steps(
     judged: &Judged,
     described: usize,
     joint: &Joint,
-    descent: &Descent,
+    descent: &RmsPath,
     motion: &[Option<Errors>],
 ) -> Result<Vec<Step>, DiagnoseError> {
     let Judged { chosen, known, .. } = judged;
@@ -78,7 +78,7 @@ fn share(rms: [f64; 2], floor: f64) -> f64 {
 }
 
 /// Notes in `tried` why an accepted effect was dropped.
-pub(crate) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: &str) {
+pub(crate) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &FittedCandidate, why: &str) {
     let title = title_of(fallen.candidate.kind);
     let joint = &robot.joints[fallen.candidate.joint].name;
     let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
@@ -88,7 +88,7 @@ pub(crate) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: 
 }
 
 /// Replaces the entry of a law by that of another law with the same name that took over.
-fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile, trials: usize) {
+fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &FittedCandidate, trials: usize) {
     let (kind, joint) = (
         profile.candidate.kind,
         &robot.joints[profile.candidate.joint].name,
@@ -117,8 +117,13 @@ fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile, trials: u
 
 /// Makes the list of trials consistent with the final effects. Effects without a sweep of their own are marked as
 /// accepted, absent ones as dropped.
-pub(crate) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile], trials: usize) {
-    let is = |t: &Tried, p: &Profile| {
+pub(crate) fn reconcile(
+    robot: &Robot,
+    tried: &mut Vec<Tried>,
+    found: &[FittedCandidate],
+    trials: usize,
+) {
+    let is = |t: &Tried, p: &FittedCandidate| {
         t.effect == title_of(p.candidate.kind) && t.joint == robot.joints[p.candidate.joint].name
     };
     for profile in found {
@@ -161,7 +166,7 @@ pub(crate) fn refuse_guesses(robot: &Robot, tried: &mut [Tried], judged: &Judged
 pub(crate) fn change_step(
     robot: &Robot,
     change: &Change,
-    descent: &Descent,
+    descent: &RmsPath,
     floors: &[f64],
 ) -> Option<Step> {
     let about = change.effect?.about();

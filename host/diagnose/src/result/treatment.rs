@@ -1,13 +1,17 @@
 //! Treatment of the recordings before the comparison, for a report.
 
 use crate::outcome::{Rows, Treated};
-use crate::recordings::context::Loaded;
+use crate::recordings::context::PreparedData;
 use crate::rows::regression::Rows as Regression;
 use rig_data::prepare::Treatment;
 use rig_model::robot::Robot;
 
 /// Returns the treatment of the training recordings and of the hold-out.
-pub(crate) fn treated(robot: &Robot, training: &Loaded, holdout: Option<&Loaded>) -> Treated {
+pub(crate) fn treated(
+    robot: &Robot,
+    training: &PreparedData,
+    holdout: Option<&PreparedData>,
+) -> Treated {
     let treatment = &training.treatment;
     let rows = &training.rows;
     Treated {

@@ -4,7 +4,7 @@
 
 use rig_shared::multibody::{COLUMNS, column};
 
-use crate::description::parameter_prior::Anchor;
+use crate::description::parameter_prior::ParameterPrior;
 use crate::fit::solution::Solution;
 use crate::rows::regression::{Nominal, Rows};
 use rig_identify::{SLIDES, Slides};
@@ -88,7 +88,7 @@ pub(crate) fn one_way(nominal: &Nominal, rows: &Rows) -> Vec<OneWay> {
 pub(crate) fn told(
     list: &[OneWay],
     robot: &Robot,
-    anchor: &Anchor,
+    anchor: &ParameterPrior,
     last: &Solution,
 ) -> Vec<String> {
     (list.iter())

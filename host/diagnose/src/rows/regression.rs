@@ -76,7 +76,7 @@ pub(crate) struct Thinning {
     low_pass: LowPass,
     /// The position filter, and whether it removes anything that the low-pass passes.
     position: LowPass,
-    heard: bool,
+    accepted_by_observer: bool,
     /// The filter of the motion for link columns, if the position filter matters.
     wide: Option<(f64, LowPass)>,
     step: usize,
@@ -102,12 +102,12 @@ impl Thinning {
             - position
                 .gain(treatment.parallel_edge, treatment.sample_rate)
                 .powi(2);
-        let heard = taken > HEARD;
+        let accepted_by_observer = taken > HEARD;
         Ok(Self {
             low_pass,
             position,
-            heard,
-            wide: heard.then(|| wide(treatment)).flatten(),
+            accepted_by_observer,
+            wide: accepted_by_observer.then(|| wide(treatment)).flatten(),
             step: treatment.decimation.max(1),
             spoilt: treatment.trimmed,
             smear: SMEAR / treatment.cutoff,
@@ -167,7 +167,7 @@ impl Thinning {
 
     /// Appends the rows of a signal that has not passed the position filter.
     pub(crate) fn push_raw(&self, signal: &[f64], out: &mut Vec<f64>) {
-        match self.heard {
+        match self.accepted_by_observer {
             true => self.push(&self.position.zero_phase_even(signal), out),
             false => self.push(signal, out),
         }
@@ -190,7 +190,7 @@ impl Thinning {
 
     /// Returns the rows of signals that have not passed the position filter.
     pub(crate) fn thinned_raw(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        self.thinned_behind(self.heard.then_some(&self.position), signals)
+        self.thinned_behind(self.accepted_by_observer.then_some(&self.position), signals)
     }
 
     fn thinned_behind(&self, before: Option<&LowPass>, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
@@ -596,7 +596,7 @@ impl Rows {
 
     /// Returns, for each sample, true if the nearest row is usable by the observer of a link behind a gear. False
     /// outside the rows.
-    pub(crate) fn sure(&self, run: usize, joint: usize, samples: usize) -> Vec<bool> {
+    pub(crate) fn torque_valid(&self, run: usize, joint: usize, samples: usize) -> Vec<bool> {
         let all = self.legible.get(joint).map_or(&[][..], Vec::as_slice);
         let legible = all
             .get(self.starts[run]..self.starts[run + 1])
@@ -656,7 +656,7 @@ impl Rows {
             thinning: Thinning {
                 low_pass: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
                 position: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
-                heard: false,
+                accepted_by_observer: false,
                 wide: None,
                 step: 1,
                 spoilt: 0,

@@ -13,10 +13,10 @@ use crate::columns::effect_columns::{Candidate, Source};
 use crate::columns::transmission::ABREAST;
 use crate::fit::least_squares::{Evidence, Fit, dot_self};
 use crate::fit::simplex::{MOST_ANSWERS, Simplex};
-use crate::recordings::torque_lead::slack;
+use crate::recordings::torque_lead::sampling_jitter;
 use crate::rows::regression::{Column, combined};
 use crate::search::fitted_candidate::shapes::{
-    coordinate, is_distance, searched, spacing, value_at, vanished,
+    at_bound, coordinate, is_distance, searched, spacing, value_at,
 };
 pub(crate) use crate::search::fitted_candidate::shapes::{
     falls_throughout, goes_straight, grid, grid_on, is_straight,
@@ -74,7 +74,7 @@ type Best = (f64, [f64; SHAPES], Arc<Vec<Column>>);
 
 /// A candidate with fitted shapes.
 #[derive(Clone, Debug)]
-pub(crate) struct Profile {
+pub(crate) struct FittedCandidate {
     /// Which.
     pub(crate) candidate: Candidate,
     /// Its shapes.
@@ -85,11 +85,11 @@ pub(crate) struct Profile {
     pub(crate) evidence: Evidence,
     /// Name of the degenerate part: a shape at its lower search bound, a gain outside its bounds, or the stiffness of a
     /// spring that is a constant. For gears also an overdamped swing, or too small a share of the torque.
-    pub(crate) vanished: Option<&'static str>,
+    pub(crate) at_bound: Option<&'static str>,
     /// True for a backlash that the observer supports.
-    pub(crate) heard: bool,
+    pub(crate) accepted_by_observer: bool,
     /// True if a near-collinear effect is in the model.
-    pub(crate) doubled: bool,
+    pub(crate) near_collinear: bool,
     /// Set for an observer-based gear. Its columns are then a known torque, with gains of 1.
     pub(crate) followed: Option<Followed>,
     /// Shapes of a gear by the other of two methods, if both were used: open-loop and observer-based.
@@ -103,12 +103,12 @@ pub(crate) struct Followed {
     pub(crate) noise: f64,
 }
 
-impl Profile {
+impl FittedCandidate {
     /// Returns the reason for refusal at a p-value corrected for `tried` trials; None if the candidate passes.
     pub(crate) fn refused(&self, tried: usize) -> Option<String> {
         let e = &self.evidence;
         let p = self.corrected(tried);
-        if let Some(shape) = self.vanished {
+        if let Some(shape) = self.at_bound {
             Some(format!(
                 "its {shape} goes to the least that can be told from none"
             ))
@@ -149,7 +149,7 @@ impl Profile {
         };
         let least = if much {
             LEAST_SIGMAS_OF_MUCH
-        } else if self.doubled && e.joint_gain < LEAST_GAIN {
+        } else if self.near_collinear && e.joint_gain < LEAST_GAIN {
             LEAST_SIGMAS_BESIDE_ITS_DOUBLE
         } else {
             LEAST_SIGMAS
@@ -161,16 +161,16 @@ impl Profile {
     pub(crate) fn is_nearly_a_play(&self, tried: usize) -> bool {
         let e = &self.evidence;
         self.candidate.kind == Kind::Backlash
-            && self.vanished.is_none()
+            && self.at_bound.is_none()
             && self.corrected(tried) <= SIGNIFICANT
             && (LEAST_GAIN_OF_HEARD..LEAST_GAIN_OF_GEARS).contains(&e.joint_gain)
             && e.gain_sigmas >= CLEAR_SIGMAS
     }
 
     pub(crate) fn least_gain(&self) -> f64 {
-        if self.heard {
+        if self.accepted_by_observer {
             LEAST_GAIN_OF_HEARD
-        } else if self.doubled {
+        } else if self.near_collinear {
             LEAST_GAIN_BESIDE_ITS_DOUBLE
         } else if is_gear(self.candidate.kind) {
             LEAST_GAIN_OF_GEARS
@@ -236,7 +236,7 @@ impl Search<'_> {
         fit: &Fit,
         c: usize,
         start: Option<[f64; SHAPES]>,
-    ) -> Result<Option<Profile>, DiagnoseError> {
+    ) -> Result<Option<FittedCandidate>, DiagnoseError> {
         self.profile_but(fit, c, start, &[])
     }
 
@@ -250,7 +250,7 @@ impl Search<'_> {
         c: usize,
         start: Option<[f64; SHAPES]>,
         but: &[Candidate],
-    ) -> Result<Option<Profile>, DiagnoseError> {
+    ) -> Result<Option<FittedCandidate>, DiagnoseError> {
         let kind = self.library[c].kind;
         let fixed = self.fixed(&self.library[c]);
         let start = fixed.or(start);
@@ -322,10 +322,10 @@ impl Search<'_> {
             return Ok(None);
         };
         let joint = self.library[c].joint;
-        let mut vanished = vanished(kind, &best.1, self.least_told(kind, joint));
+        let mut at_bound = at_bound(kind, &best.1, self.least_told(kind, joint));
         if kind == Kind::JointElasticity && fixed.is_none() {
             let mass = self.source.mass(joint, 0)?;
-            vanished = vanished
+            at_bound = at_bound
                 .or_else(|| (damping_ratio(&best.1, mass) > MOST_DAMPED).then_some("swing"));
         }
         let least_share = if kind == Kind::JointElasticity {
@@ -335,19 +335,19 @@ impl Search<'_> {
         };
         let share = evidence.gains.first();
         if gear && share.is_some_and(|share| *share < least_share) {
-            vanished = vanished.or(Some("torque"));
+            at_bound = at_bound.or(Some("torque"));
         }
         if kind == Kind::Spring && !stiff(fit, &best.2) {
-            vanished = Some("stiffness");
+            at_bound = Some("stiffness");
         }
-        Ok(Some(Profile {
+        Ok(Some(FittedCandidate {
             candidate: self.library[c].shaped(&best.1),
             shapes: best.1,
             columns: best.2,
             evidence,
-            vanished,
-            heard: self.heard.contains(&self.library[c]),
-            doubled: false,
+            at_bound,
+            accepted_by_observer: self.accepted_by_observer.contains(&self.library[c]),
+            near_collinear: false,
             followed: None,
             otherwise: None,
         }))
@@ -530,7 +530,7 @@ impl Search<'_> {
     /// Returns the physical bounds of the gains. A delay within the sampling jitter is no effect.
     fn bounds(&self, candidate: &Candidate) -> Vec<[f64; 2]> {
         if candidate.kind == Kind::MeasurementDelay {
-            return vec![[slack(self.source.runs), f64::INFINITY]];
+            return vec![[sampling_jitter(self.source.runs), f64::INFINITY]];
         }
         let gains = self.source.gains(candidate);
         gains.iter().map(|g| g.bounds).collect()

@@ -12,7 +12,7 @@ use crate::columns::wave_orders::Orders;
 use crate::columns::waves;
 use crate::fit::least_squares::Fit;
 use crate::rows::regression::Column;
-use crate::search::fitted_candidate::{LEAST_GAIN, Profile, goes_straight, grid, grid_on};
+use crate::search::fitted_candidate::{FittedCandidate, LEAST_GAIN, goes_straight, grid, grid_on};
 use rig_data::runs::{blurred, resolution};
 use rig_model::robot::Placed;
 
@@ -66,9 +66,9 @@ pub(crate) struct Search<'a> {
     /// Candidates that the last search dropped.
     dropped: Vec<Candidate>,
     /// A backlash that almost passed.
-    pub(crate) nearly: Option<Profile>,
+    pub(crate) nearly: Option<FittedCandidate>,
     /// Backlash that the observer supports: its open-loop gain may be smaller.
-    pub(crate) heard: Vec<Candidate>,
+    pub(crate) accepted_by_observer: Vec<Candidate>,
     cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
 
@@ -101,7 +101,7 @@ impl<'a> Search<'a> {
             sided: Vec::new(),
             dropped: Vec::new(),
             nearly: None,
-            heard: Vec::new(),
+            accepted_by_observer: Vec::new(),
             threads,
             cache: Mutex::new(HashMap::new()),
         }
@@ -194,28 +194,28 @@ impl<'a> Search<'a> {
     pub(crate) fn run(
         &mut self,
         base: &Fit,
-        found: Option<Vec<Profile>>,
-        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
-        told: &mut dyn FnMut(usize, &[Profile]),
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+        found: Option<Vec<FittedCandidate>>,
+        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
+        told: &mut dyn FnMut(usize, &[FittedCandidate]),
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         let mut chosen = match found {
-            None => self.begun(base, renew)?,
+            None => self.warm_start(base, renew)?,
             Some(mut found) => {
                 self.renewed(renew(&found)?);
                 self.refine_all(base, &mut found)?;
-                self.standing(base, &mut found)?;
+                self.prune(base, &mut found)?;
                 found
             }
         };
         let trials = self.trials();
         let most = sorts(&chosen) + MOST_EFFECTS;
         let mut impossible: Vec<Candidate> = Vec::new();
-        let mut stood: Vec<Vec<Profile>> = Vec::new();
+        let mut stood: Vec<Vec<FittedCandidate>> = Vec::new();
         while sorts(&chosen) < most {
             let fit = with(base, &chosen, None);
             let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
             let profiles = self.sweep(&fit, &present, &impossible)?;
-            let found = |p: &&Profile| !self.is_described(&p.candidate);
+            let found = |p: &&FittedCandidate| !self.is_described(&p.candidate);
             told(chosen.iter().filter(found).count(), &profiles);
             let Some(best) = self.first_to_take(&fit, &profiles, trials) else {
                 let together =
@@ -224,8 +224,8 @@ impl<'a> Search<'a> {
                     together.filter(|list| !stood.iter().any(|before| same(before, list)))
                 {
                     stood.push(std::mem::replace(&mut chosen, together));
-                    self.anew(base, &mut chosen, renew)?;
-                    self.sides(base, &mut chosen, renew)?;
+                    self.refresh_predictions(base, &mut chosen, renew)?;
+                    self.constant_side(base, &mut chosen, renew)?;
                     continue;
                 }
                 self.nearly = profiles.into_iter().find(|p| p.is_nearly_a_play(trials));
@@ -236,22 +236,22 @@ impl<'a> Search<'a> {
             let before = chosen.clone();
             let newcomer = best.candidate;
             chosen.push(best);
-            let vanished = self.settle(base, &mut chosen, trials, &impossible)?;
-            if vanished.contains(&newcomer) && !same(&before, &chosen) {
+            let at_bound = self.refine_prune_swap(base, &mut chosen, trials, &impossible)?;
+            if at_bound.contains(&newcomer) && !same(&before, &chosen) {
                 // It removed others that it needs.
                 impossible.push(newcomer);
                 chosen = before;
                 continue;
             }
-            self.anew(base, &mut chosen, renew)?;
-            self.sides(base, &mut chosen, renew)?;
+            self.refresh_predictions(base, &mut chosen, renew)?;
+            self.constant_side(base, &mut chosen, renew)?;
             let place = chosen.iter().position(|p| p.candidate == newcomer);
             if let Some(i) = place
                 && let Some(smaller) = self.smaller(base, &chosen, i, &profiles, trials)?
             {
                 chosen[i] = smaller;
                 self.refine_all(base, &mut chosen)?;
-                chosen.retain(|profile| profile.vanished.is_none());
+                chosen.retain(|profile| profile.at_bound.is_none());
             }
             stood.push(before);
             if stood.iter().any(|before| same(before, &chosen)) {
@@ -264,11 +264,11 @@ impl<'a> Search<'a> {
         }
         for _ in 0..LAWS_ANEW {
             let other = self.other_laws(base, &mut chosen)?;
-            if !self.springs(base, &mut chosen, trials)? && !other {
+            if !self.springs_to_constants(base, &mut chosen, trials)? && !other {
                 break;
             }
-            self.anew(base, &mut chosen, renew)?;
-            self.sides(base, &mut chosen, renew)?;
+            self.refresh_predictions(base, &mut chosen, renew)?;
+            self.constant_side(base, &mut chosen, renew)?;
         }
         chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
         self.dropped = impossible;
@@ -280,18 +280,18 @@ impl<'a> Search<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    fn anew(
+    fn refresh_predictions(
         &mut self,
         base: &Fit,
-        chosen: &mut Vec<Profile>,
-        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+        chosen: &mut Vec<FittedCandidate>,
+        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
     ) -> Result<(), DiagnoseError> {
         let before = chosen.len();
         for _ in 0..2 {
             self.renewed(renew(chosen)?);
             self.refine_all(base, chosen)?;
         }
-        chosen.retain(|profile| profile.vanished.is_none());
+        chosen.retain(|profile| profile.at_bound.is_none());
         if chosen.len() < before {
             self.renewed(renew(chosen)?);
             self.refine_all(base, chosen)?;
@@ -307,9 +307,9 @@ impl<'a> Search<'a> {
     pub(crate) fn alternatives(
         &self,
         base: &Fit,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         i: usize,
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         let fit = with(base, chosen, Some(i));
         let mut others: Vec<Candidate> = (chosen.iter().enumerate())
             .filter(|(k, _)| *k != i)
@@ -332,8 +332,8 @@ impl<'a> Search<'a> {
     pub(crate) fn still_taking(
         &self,
         base: &Fit,
-        chosen: &[Profile],
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+        chosen: &[FittedCandidate],
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         let fit = with(base, chosen, None);
         let trials = self.trials();
         let mut taking = Vec::new();
@@ -353,7 +353,11 @@ impl<'a> Search<'a> {
 
     /// Replaces effects by better laws of the same name. A law with more parameters, or in place of a described one,
     /// must be clearly better. Returns true if it replaced one.
-    fn other_laws(&self, base: &Fit, chosen: &mut [Profile]) -> Result<bool, DiagnoseError> {
+    fn other_laws(
+        &self,
+        base: &Fit,
+        chosen: &mut [FittedCandidate],
+    ) -> Result<bool, DiagnoseError> {
         let mut changed = false;
         for i in 0..chosen.len() {
             let fit = with(base, chosen, Some(i));
@@ -365,7 +369,7 @@ impl<'a> Search<'a> {
                     false => 0.0,
                 };
                 if let Some(rival) = self.profile(&fit, c, None)?
-                    && rival.vanished.is_none()
+                    && rival.at_bound.is_none()
                     && rival.evidence.beyond(&chosen[i].evidence) > least
                 {
                     chosen[i] = rival;
@@ -378,10 +382,10 @@ impl<'a> Search<'a> {
 
     /// Refines all shapes, removes effects that are not significant, and swaps effects for better ones. Returns those
     /// at a bound.
-    fn settle(
+    fn refine_prune_swap(
         &self,
         base: &Fit,
-        chosen: &mut Vec<Profile>,
+        chosen: &mut Vec<FittedCandidate>,
         trials: usize,
         impossible: &[Candidate],
     ) -> Result<Vec<Candidate>, DiagnoseError> {
@@ -389,7 +393,7 @@ impl<'a> Search<'a> {
             self.refine_all(base, chosen)?;
         }
         // Substitutes go once the true effect is in the model.
-        let vanished = self.standing(base, chosen)?;
+        let at_bound = self.prune(base, chosen)?;
         // Look for a better effect in the place of each earlier one.
         if chosen.len() > 1 {
             for i in 0..chosen.len() - 1 {
@@ -416,7 +420,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        Ok(vanished)
+        Ok(at_bound)
     }
 
     /// Refines effects after others were removed, and drops those at a bound.
@@ -426,15 +430,15 @@ impl<'a> Search<'a> {
     pub(crate) fn possible(
         &self,
         base: &Fit,
-        mut chosen: Vec<Profile>,
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+        mut chosen: Vec<FittedCandidate>,
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         self.refine_all(base, &mut chosen)?;
-        chosen.retain(|profile| profile.vanished.is_none());
+        chosen.retain(|profile| profile.at_bound.is_none());
         Ok(chosen)
     }
 
     /// Refines the shapes of each effect, and updates its evidence, beside all others.
-    fn refine_all(&self, base: &Fit, chosen: &mut [Profile]) -> Result<(), DiagnoseError> {
+    fn refine_all(&self, base: &Fit, chosen: &mut [FittedCandidate]) -> Result<(), DiagnoseError> {
         for i in 0..chosen.len() {
             let fit = with(base, chosen, Some(i));
             let c = self.place(&chosen[i].candidate);
@@ -445,14 +449,15 @@ impl<'a> Search<'a> {
                 better = self.profile(&fit, c, None)?;
             }
             if let Some(mut better) = better {
-                better.doubled = (chosen.iter()).any(|p| doubles(&p.candidate, &better.candidate));
+                better.near_collinear =
+                    (chosen.iter()).any(|p| doubles(&p.candidate, &better.candidate));
                 chosen[i] = better;
             } else {
                 // Its columns are collinear, or have impossible signs.
                 chosen[i].evidence.gain = 0.0;
                 chosen[i].evidence.joint_gain = 0.0;
                 chosen[i].evidence.p_value = 1.0;
-                chosen[i].vanished = Some("gain");
+                chosen[i].at_bound = Some("gain");
             }
         }
         Ok(())
@@ -474,21 +479,21 @@ fn orders_of(source: &Source, library: &[Candidate], joint: usize) -> Orders {
 }
 
 /// Returns the number of effects. The orders of one wave count once.
-fn sorts(chosen: &[Profile]) -> usize {
-    let sort = |p: &Profile| p.candidate.sort();
+fn sorts(chosen: &[FittedCandidate]) -> usize {
+    let sort = |p: &FittedCandidate| p.candidate.sort();
     let first = |k: &usize| !chosen[..*k].iter().any(|p| sort(p) == sort(&chosen[*k]));
     (0..chosen.len()).filter(first).count()
 }
 
 /// Returns true if both lists have the same effects.
-pub(crate) fn same(a: &[Profile], b: &[Profile]) -> bool {
+pub(crate) fn same(a: &[FittedCandidate], b: &[FittedCandidate]) -> bool {
     a.len() == b.len()
         && a.iter()
             .all(|p| b.iter().any(|q| q.candidate == p.candidate))
 }
 
 /// Returns the fit with the columns of all effects except `but`.
-pub(crate) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -> Fit<'f> {
+pub(crate) fn with<'f>(base: &Fit<'f>, chosen: &[FittedCandidate], but: Option<usize>) -> Fit<'f> {
     let mut fit = base.clone();
     for (k, profile) in chosen.iter().enumerate() {
         if Some(k) == but {

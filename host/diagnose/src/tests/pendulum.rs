@@ -273,7 +273,7 @@ fn a_zero_that_is_a_quarter_turn_off_is_said_and_a_smaller_one_is_the_tilt_it_is
 /// hangs on the link is one all the same.
 #[test]
 fn a_payload_is_one_beside_friction_that_bends_its_parameters() {
-    let loaded = Pendulum {
+    let prepared = Pendulum {
         breakaway: 0.35,
         ..PLAIN
     };
@@ -283,7 +283,7 @@ fn a_payload_is_one_beside_friction_that_bends_its_parameters() {
     link.inertia[5] *= 0.85;
     let friction = robot.joints[0].friction.as_mut().unwrap();
     (friction.coulomb, friction.viscous) = (COULOMB, VISCOUS);
-    let (found, _) = loaded.diagnosed(&robot);
+    let (found, _) = prepared.diagnosed(&robot);
     let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();
     println!("{names:?} {:?}", found.words);
     assert_eq!(names, ["stribeck", "payload"]);

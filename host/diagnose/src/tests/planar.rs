@@ -8,8 +8,8 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 
-use crate::description::described_effects::Stated;
-use crate::recordings::context::Bench;
+use crate::description::described_effects::DescribedEffects;
+use crate::recordings::context::DiagnosisContext;
 use crate::{Options, diagnose};
 use rig_data::prepare::{InMemory, Recording};
 use rig_data::{Block, JointColumns};
@@ -256,24 +256,27 @@ fn the_exact_description_leaves_the_noise_whatever_filter_the_position_needs() {
         robot.origin = Origin::Own;
         robot
     };
-    let stated = Stated::of(&robot);
+    let stated = DescribedEffects::of(&robot);
     // The noisier the position the lower its filter's cut-off; the torque has none, so that what is left is the filters' making
     // and the acceleration's noise.
     for apart in [1e-6, 1e-5, 1e-4, 1e-3] {
         let quiet = recorded(1, 1, [0.0, apart]);
-        let bench = Bench::of(&stated, &[&quiet as &dyn Recording]).unwrap();
-        let loaded = bench.load(&[&quiet as &dyn Recording]).unwrap();
-        let left = bench.frozen(&loaded).unwrap();
+        let context = DiagnosisContext::of(&stated, &[&quiet as &dyn Recording]).unwrap();
+        let prepared = context.load(&[&quiet as &dyn Recording]).unwrap();
+        let left = context.frozen(&prepared).unwrap();
         let whole: Vec<f64> = (0..2)
             .map(|j| {
-                crate::recordings::noise_floor::rms(&loaded.rows.torque[j], &loaded.rows.keep[j])
+                crate::recordings::noise_floor::rms(
+                    &prepared.rows.torque[j],
+                    &prepared.rows.keep[j],
+                )
             })
             .collect();
         println!(
             "{apart:e}: cut-off {:.1} Hz, band {:.1} Hz, motion {:.2} Hz: left {left:?} of {whole:?}",
-            loaded.treatment.cutoff,
-            loaded.treatment.parallel_edge,
-            loaded.treatment.motion_frequency
+            prepared.treatment.cutoff,
+            prepared.treatment.parallel_edge,
+            prepared.treatment.motion_frequency
         );
     }
 }

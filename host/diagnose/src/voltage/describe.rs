@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::acceptance::judge::closed;
-use crate::description::described_effects::{Now, Stated};
+use crate::description::described_effects::{DescribedEffects, Now};
 use crate::outcome::{
     Absorbed, Before, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value,
     Verdict, Waterfall,
@@ -23,7 +23,7 @@ const LEFT: f64 = 1.2;
 /// All results.
 pub(crate) struct Told<'a> {
     /// The description, and the fate of its effects.
-    pub stated: &'a Stated,
+    pub stated: &'a DescribedEffects,
     /// Curves to draw.
     pub curves: Vec<Curves>,
     /// Noise floor, rad or m.

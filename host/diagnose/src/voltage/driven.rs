@@ -1,7 +1,7 @@
 //! Simulation of a voltage-driven joint by its description.
 
 use crate::DiagnoseError;
-use crate::description::described_effects::Stated;
+use crate::description::described_effects::DescribedEffects;
 use crate::voltage::free_run::{FreeRun, travel};
 use crate::voltage::halt::{Cause, Halt};
 use crate::voltage::law::Supply;
@@ -94,7 +94,7 @@ impl VoltageModel {
     /// # Errors
     /// [`DrivenError`] if the description is not sufficient.
     pub(crate) fn of(robot: &Robot) -> Result<Self, DrivenError> {
-        let mut stated = Stated::of(robot);
+        let mut stated = DescribedEffects::of(robot);
         let plant = plant(&stated.robot)?;
         let parts = stated.driven(&library(&[], false));
         let joint = &robot.joints[0];

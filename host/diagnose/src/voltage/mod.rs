@@ -41,7 +41,7 @@ mod validation;
 
 use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector};
 
-use crate::description::described_effects::Stated;
+use crate::description::described_effects::DescribedEffects;
 use crate::faults::refusal::faulty;
 use crate::outcome::{Curves, Diagnosis};
 pub use crate::voltage::controllers::terms as controller_terms;
@@ -82,14 +82,14 @@ pub fn diagnose_voltage(
     if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }
-    let mut stated = Stated::of(robot);
+    let mut stated = DescribedEffects::of(robot);
     let plant = plant(&stated.robot)?;
     let mut train = logs(training)?;
-    let mut sealed = logs(holdout)?;
+    let mut held_out = logs(holdout)?;
     let supply = Supply::of(&train);
     supply.give(&mut train);
-    supply.give(&mut sealed);
-    let wrong = faults::faults(robot, &plant, &[training, holdout], &[&train, &sealed])?;
+    supply.give(&mut held_out);
+    let wrong = faults::faults(robot, &plant, &[training, holdout], &[&train, &held_out])?;
     if !options.fits(&wrong) {
         return Ok((faulty(robot, wrong), robot.clone()));
     }
@@ -110,13 +110,13 @@ pub fn diagnose_voltage(
         rounds.push(trials.to_vec());
         progress(0.2 + 0.7 * (1.0 - 0.6_f64.powi(round as i32 + 1)));
     });
-    let judge = search(&plant, &sealed);
-    let holdout: Vec<FreeRun> = if sealed.is_empty() {
+    let judge = search(&plant, &held_out);
+    let holdout: Vec<FreeRun> = if held_out.is_empty() {
         Vec::new()
     } else {
         models.iter().map(|m| judge.freely(m)).collect()
     };
-    let drawn = if sealed.is_empty() { &bench } else { &judge };
+    let drawn = if held_out.is_empty() { &bench } else { &judge };
     let found = Told {
         curves: curves(&robot.joints[0].name, drawn, &models),
         stated: &stated,
@@ -128,7 +128,7 @@ pub fn diagnose_voltage(
         models,
         rounds,
         unseen,
-        driven: driven(&train, &sealed),
+        driven: driven(&train, &held_out),
     };
     let mut result = (found.diagnosis(), found.robot(&plant));
     result.0.data_faults = wrong;
@@ -137,7 +137,7 @@ pub fn diagnose_voltage(
 }
 
 /// Fits the model of the description's structure, with the description's effects.
-fn nominal(bench: &Search<'_>, stated: &mut Stated) -> Result<Model, DiagnoseError> {
+fn nominal(bench: &Search<'_>, stated: &mut DescribedEffects) -> Result<Model, DiagnoseError> {
     let parts = stated.driven(&bench.library);
     let nominal = bench.nominal().ok_or_else(|| {
         DiagnoseError::Model(
@@ -186,11 +186,11 @@ fn curves(joint: &str, search: &Search<'_>, models: &[Model]) -> Vec<Curves> {
 }
 
 /// Returns the voltage that drives the model, in words.
-fn driven(train: &[Log], sealed: &[Log]) -> String {
-    let all = train.len() + sealed.len();
+fn driven(train: &[Log], held_out: &[Log]) -> String {
+    let all = train.len() + held_out.len();
     let closed = train
         .iter()
-        .chain(sealed)
+        .chain(held_out)
         .filter(|log| log.law.is_some())
         .count();
     let law = "given by the controller that each recording shows, within the supply";

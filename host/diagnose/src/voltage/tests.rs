@@ -17,9 +17,9 @@ pub(crate) fn list<R: Recording>(sources: &[R]) -> Vec<&dyn Recording> {
     sources.iter().map(|s| s as &dyn Recording).collect()
 }
 
-pub(crate) fn found(train: &[&dyn Recording], sealed: &[&dyn Recording]) -> (Diagnosis, Robot) {
+pub(crate) fn found(train: &[&dyn Recording], held_out: &[&dyn Recording]) -> (Diagnosis, Robot) {
     let robot = robot();
-    diagnose_voltage(&robot, train, sealed, &Options::default(), &mut |_| ()).unwrap()
+    diagnose_voltage(&robot, train, held_out, &Options::default(), &mut |_| ()).unwrap()
 }
 
 /// A pendulum under voltage by small semi-implicit Euler steps: its own physics, independent of the tested simulation.

@@ -8,11 +8,11 @@ use std::sync::Arc;
 use crate::Options;
 use crate::acceptance::credibility::*;
 use crate::columns::effect_columns::Candidate;
-use crate::description::described_effects::Stated;
-use crate::engine::Follower;
+use crate::description::described_effects::DescribedEffects;
+use crate::engine::ObserverModels;
 use crate::fit::least_squares::Evidence;
 use crate::outcome::{Tried, Verdict};
-use crate::recordings::context::{Bench, Loaded, library};
+use crate::recordings::context::{DiagnosisContext, PreparedData, library};
 use crate::recordings::position_reading::PositionReading;
 use rig_data::prepare::Recording;
 use rig_scenario::{Arm, ArmScenario, Effect, Scenario};
@@ -28,22 +28,22 @@ const GEAR: Candidate = Candidate::on(Kind::JointElasticity, 0);
 fn on<T>(
     effect: Option<Effect>,
     seed: u64,
-    ask: impl FnOnce(&Bench, &Loaded, &Refit, &Search) -> T,
+    ask: impl FnOnce(&DiagnosisContext, &PreparedData, &Refit, &Search) -> T,
 ) -> T {
     let made = Scenario::short(effect, seed).make().unwrap();
-    let stated = Stated::of(&made.robot);
+    let stated = DescribedEffects::of(&made.robot);
     let training: [&dyn Recording; 1] = [&made.train];
-    let bench = Bench::of(&stated, &training).unwrap();
-    let loaded = bench.load(&training).unwrap();
-    let refit = Refit::of(&bench, &loaded.rows).unwrap();
-    let values = bench.anchor.values(&refit.before.values);
+    let context = DiagnosisContext::of(&stated, &training).unwrap();
+    let prepared = context.load(&training).unwrap();
+    let refit = Refit::of(&context, &prepared.rows).unwrap();
+    let values = context.anchor.values(&refit.before.values);
     let search = Search::new(
-        bench.source(&loaded, &values).unwrap(),
-        library(&made.robot, &loaded.runs, &[]),
+        context.source(&prepared, &values).unwrap(),
+        library(&made.robot, &prepared.runs, &[]),
         Vec::new(),
         2,
     );
-    ask(&bench, &loaded, &refit, &search)
+    ask(&context, &prepared, &refit, &search)
 }
 
 /// Stiffness, damping and friction share as shapes.
@@ -55,14 +55,14 @@ fn shapes(of: [f64; 3]) -> [f64; SHAPES] {
 
 /// Returns the reason against an elastic gear (rig: 700 N·m/rad) of this stiffness; its torque is scaled by `times`.
 fn said(stiffness: f64, times: f64) -> Option<&'static str> {
-    on(Some(SPRING), 5, |bench, loaded, refit, search| {
+    on(Some(SPRING), 5, |context, prepared, refit, search| {
         let shapes = shapes([stiffness, 0.3, 0.25]);
-        let follower = Follower::new(bench, loaded, refit, search);
+        let follower = ObserverModels::new(context, prepared, refit, search);
         let judge = Judge {
-            robot: bench.robot,
+            robot: context.robot,
             search,
             follower: &follower,
-            rows: &loaded.rows,
+            rows: &prepared.rows,
             coordinates: &[Vec::new()],
             pairs: Vec::new(),
             position_reading: PositionReading::of_noise(vec![0.0]),
@@ -73,16 +73,16 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
         for value in columns.iter_mut().flatten().flatten().flatten() {
             *value *= times;
         }
-        let gear = Profile {
+        let gear = FittedCandidate {
             candidate: GEAR,
             shapes,
             columns: Arc::new(columns),
             evidence: Evidence::default(),
-            vanished: None,
+            at_bound: None,
             followed: None,
             otherwise: None,
-            heard: false,
-            doubled: false,
+            accepted_by_observer: false,
+            near_collinear: false,
         };
         let fallen = unbelieved(refit, search, &judge, &[gear]).unwrap();
         fallen.map(|(_, why)| why)
@@ -121,7 +121,7 @@ fn a_gear_that_does_not_swing_is_none() {
 }
 
 /// Returns the elastic gear from a search that starts at these shapes.
-fn profiled(effect: Option<Effect>, seed: u64, begun: [f64; 3]) -> Profile {
+fn profiled(effect: Option<Effect>, seed: u64, begun: [f64; 3]) -> FittedCandidate {
     on(effect, seed, |_, _, refit, search| {
         let place = search.library.iter().position(|c| *c == GEAR).unwrap();
         let profile = search.profile(&refit.base, place, Some(shapes(begun)));
@@ -146,25 +146,25 @@ fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'st
     }
     .make()
     .unwrap();
-    let stated = Stated::of(&made.robot);
+    let stated = DescribedEffects::of(&made.robot);
     let training: [&dyn Recording; 1] = [&made.train[0]];
-    let bench = Bench::of(&stated, &training).unwrap();
-    let loaded = bench.load(&training).unwrap();
-    let refit = Refit::of(&bench, &loaded.rows).unwrap();
-    let values = bench.anchor.values(&refit.before.values);
+    let context = DiagnosisContext::of(&stated, &training).unwrap();
+    let prepared = context.load(&training).unwrap();
+    let refit = Refit::of(&context, &prepared.rows).unwrap();
+    let values = context.anchor.values(&refit.before.values);
     let search = Search::new(
-        bench.source(&loaded, &values).unwrap(),
-        library(&made.robot, &loaded.runs, &[]),
+        context.source(&prepared, &values).unwrap(),
+        library(&made.robot, &prepared.runs, &[]),
         Vec::new(),
         2,
     );
     let candidate = Candidate::on(kind, 1);
-    let follower = Follower::new(&bench, &loaded, &refit, &search);
+    let follower = ObserverModels::new(&context, &prepared, &refit, &search);
     let judge = Judge {
-        robot: bench.robot,
+        robot: context.robot,
         search: &search,
         follower: &follower,
-        rows: &loaded.rows,
+        rows: &prepared.rows,
         coordinates: &[Vec::new(), Vec::new()],
         pairs: Vec::new(),
         position_reading: PositionReading::of_noise(vec![0.0; 2]),
@@ -173,16 +173,16 @@ fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'st
     };
     let mut own = search.source.columns(&candidate, &shapes).unwrap();
     own.truncate(columns);
-    let profile = Profile {
+    let profile = FittedCandidate {
         candidate,
         shapes,
         columns: Arc::new(own),
         evidence: Evidence::default(),
-        vanished: None,
+        at_bound: None,
         followed: None,
         otherwise: None,
-        heard: false,
-        doubled: false,
+        accepted_by_observer: false,
+        near_collinear: false,
     };
     // A gear too soft to simulate has no column.
     let fallen = unbelieved(&refit, &search, &judge, &[profile]).ok()?;
@@ -211,34 +211,34 @@ fn one_joint_of_a_recorder_has_no_clock_of_its_own() {
 /// Backlash of a thousandth of a degree on a rig without any.
 #[test]
 fn a_gap_that_may_be_none_is_none() {
-    on(None, 6, |bench, loaded, refit, search| {
+    on(None, 6, |context, prepared, refit, search| {
         let candidate = Candidate {
             kind: Kind::Backlash,
             ..GEAR
         };
         let shapes = [2e-5, 1500.0, 15.0, 0.25];
-        let follower = Follower::new(bench, loaded, refit, search);
+        let follower = ObserverModels::new(context, prepared, refit, search);
         let judge = Judge {
-            robot: bench.robot,
+            robot: context.robot,
             search,
             follower: &follower,
-            rows: &loaded.rows,
+            rows: &prepared.rows,
             coordinates: &[Vec::new()],
             pairs: Vec::new(),
             position_reading: PositionReading::of_noise(vec![0.0]),
             base: &refit.base,
             seed: 1,
         };
-        let play = Profile {
+        let play = FittedCandidate {
             candidate,
             shapes,
             columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
             evidence: Evidence::default(),
-            vanished: None,
+            at_bound: None,
             followed: None,
             otherwise: None,
-            heard: false,
-            doubled: false,
+            accepted_by_observer: false,
+            near_collinear: false,
         };
         let fallen = unbelieved(refit, search, &judge, &[play]).unwrap();
         let why = fallen.map(|(_, why)| why);

@@ -7,7 +7,7 @@ use crate::outcome::{Place, Remainder};
 use crate::recordings::external_load;
 use crate::recordings::noise_floor;
 use crate::recordings::outlier_segment::Burst;
-use crate::search::fitted_candidate::{Profile, falls_throughout};
+use crate::search::fitted_candidate::{FittedCandidate, falls_throughout};
 use crate::search::stepwise::is_gear;
 use rig_model::robot::Joint;
 use rig_output::{format_significant, format_unit, format_value};
@@ -112,7 +112,7 @@ impl Judge<'_, '_> {
     pub(crate) fn unproven(
         &self,
         fit: &Fit,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         joint: usize,
     ) -> Option<Remainder> {
         if !self.pairs.is_empty() {
@@ -127,7 +127,7 @@ impl Judge<'_, '_> {
         } else {
             TIMES_READING
         };
-        let torque = noise_floor::of_reading(self.search.source.runs, joint, self.rows.period)?;
+        let torque = noise_floor::sensor_noise(self.search.source.runs, joint, self.rows.period)?;
         let own = torque.hypot(self.position_reading.whole(joint));
         let rms = fit.even_rms(joint);
         let Joint { name, kind, .. } = &self.robot.joints[joint];
@@ -150,12 +150,12 @@ impl Judge<'_, '_> {
     /// Detects friction that falls over nearly all speeds. Stribeck friction falls at lower speeds.
     pub(crate) fn falls_throughout(
         &self,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         joint: usize,
         (rms, floor): (f64, f64),
     ) -> Option<Remainder> {
         let fastest = self.search.source.fastest(joint);
-        let falls = |p: &&Profile| {
+        let falls = |p: &&FittedCandidate| {
             let kind = p.candidate.kind;
             p.candidate.joint == joint && falls_throughout(kind, &p.shapes, fastest)
         };
@@ -181,7 +181,7 @@ impl Judge<'_, '_> {
     pub(crate) fn doubt(
         &self,
         fit: &Fit,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         joint: usize,
         floor: f64,
     ) -> Option<Remainder> {

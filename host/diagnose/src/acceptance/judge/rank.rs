@@ -7,7 +7,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::experiment::testable;
 use crate::outcome::Step;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::runs::Run;
 
 /// Share of a step's gain from which on an alternative is equal, if the blocks show no difference.
@@ -25,8 +25,8 @@ const NO_DIFFERENCE: f64 = 2.5;
 /// runner-up. Kinds that it `is_not` are excluded.
 pub(crate) fn rank(
     step: &mut Step,
-    own: &Profile,
-    rivals: &[Profile],
+    own: &FittedCandidate,
+    rivals: &[FittedCandidate],
     runs: &[Run],
     is_not: &dyn Fn(Kind) -> bool,
 ) {
@@ -42,7 +42,8 @@ pub(crate) fn rank(
         }
     };
     exact(own.candidate.kind);
-    let possible = |rival: &&Profile| may_stand(rival, runs) && !is_not(rival.candidate.kind);
+    let possible =
+        |rival: &&FittedCandidate| may_stand(rival, runs) && !is_not(rival.candidate.kind);
     for rival in rivals.iter().filter(possible) {
         let name = rival.candidate.kind.about().name;
         if names.iter().any(|n| n == name) {
@@ -67,7 +68,7 @@ pub(crate) fn rank(
 /// Returns the posterior probability of a name among its rivals, with equal priors. The odds of each rival come from
 /// mean and spread of the paired differences on blocks outside both fits (pseudo-BMA with the uncertainty of a sum over
 /// blocks, Yao et al. 2018, Bayesian Analysis 13(3)).
-fn posterior<'p>(own: &Profile, rivals: impl Iterator<Item = &'p Profile>) -> f64 {
+fn posterior<'p>(own: &FittedCandidate, rivals: impl Iterator<Item = &'p FittedCandidate>) -> f64 {
     let normal = Normal::standard();
     let mut best: BTreeMap<&str, f64> = BTreeMap::new();
     for rival in rivals {
@@ -81,13 +82,13 @@ fn posterior<'p>(own: &Profile, rivals: impl Iterator<Item = &'p Profile>) -> f6
 
 /// Returns true if a rival is not at a bound. A spring may also be too soft to tell, if a slightly stiffer one would
 /// rest not far from the motion.
-pub(crate) fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
+pub(crate) fn may_stand(rival: &FittedCandidate, runs: &[Run]) -> bool {
     let (gains, stds) = (&rival.evidence.gains, &rival.evidence.stds);
     let (&[stiffness, preload], &[std, _]) = (&gains[..], &stds[..]) else {
-        return rival.vanished.is_none();
+        return rival.at_bound.is_none();
     };
-    if rival.vanished.is_none() || rival.candidate.kind != Kind::Spring {
-        return rival.vanished.is_none();
+    if rival.at_bound.is_none() || rival.candidate.kind != Kind::Spring {
+        return rival.at_bound.is_none();
     }
     let places = (runs.iter()).flat_map(|run| &run.joints[rival.candidate.joint].q);
     let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
@@ -98,7 +99,7 @@ pub(crate) fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
 }
 
 /// Returns true if the data support a rival equally well.
-pub(crate) fn equal(own: &Profile, rival: &Profile) -> bool {
+pub(crate) fn equal(own: &FittedCandidate, rival: &FittedCandidate) -> bool {
     rival.candidate.joint == own.candidate.joint
         && rival.evidence.gain >= AS_GOOD * own.evidence.gain
         && 1.0 - rival.evidence.gain <= LEAVES * (1.0 - own.evidence.gain)

@@ -14,8 +14,8 @@ use crate::fit::least_squares::Evidence;
 use crate::outcome::Step;
 use rig_data::runs::{JointRun, Run};
 
-fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
-    Profile {
+fn profile(kind: Kind, joint: usize, gain: f64) -> FittedCandidate {
+    FittedCandidate {
         candidate: Candidate::on(kind, joint),
         shapes: Default::default(),
         columns: Arc::default(),
@@ -23,11 +23,11 @@ fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
             gain,
             ..Evidence::default()
         },
-        vanished: None,
+        at_bound: None,
         followed: None,
         otherwise: None,
-        heard: false,
-        doubled: false,
+        accepted_by_observer: false,
+        near_collinear: false,
     }
 }
 
@@ -94,11 +94,11 @@ fn a_spring_may_stand_where_it_is_at_rest_not_far_away() {
         }],
         ..Run::default()
     };
-    let spring = |stiffness: f64, preload: f64, vanished| {
+    let spring = |stiffness: f64, preload: f64, at_bound| {
         let mut spring = profile(Kind::Spring, 0, 0.5);
         spring.evidence.gains = vec![stiffness, preload];
         spring.evidence.stds = vec![0.1, 0.1];
-        spring.vanished = vanished;
+        spring.at_bound = at_bound;
         may_stand(&spring, std::slice::from_ref(&run))
     };
     // At mid-motion, 2.5 rad, it pulls with 0.3 N·m; with 0.2 N·m/rad more it rests 1.5 rad away …
@@ -107,7 +107,7 @@ fn a_spring_may_stand_where_it_is_at_rest_not_far_away() {
     assert!(!spring(0.0, 0.6, Some("stiffness")));
     assert!(spring(0.0, 0.6, None));
     let mut other = profile(Kind::Stribeck, 0, 0.5);
-    other.vanished = Some("velocity");
+    other.at_bound = Some("velocity");
     assert!(!may_stand(&other, &[run]));
 }
 
@@ -120,7 +120,7 @@ fn what_is_held_back_twice_is_held_to_its_own_floor() {
         std::path::Path::new("one-link.toml"),
     )
     .unwrap();
-    let left = |held: f64, chosen: &[Profile], twice: Option<f64>| {
+    let left = |held: f64, chosen: &[FittedCandidate], twice: Option<f64>| {
         let floors: [&[f64]; 2] = [&[1.0], &[1.0]];
         left_of_held(&robot, &[held], &[1.02], floors, chosen, &|_| twice)
     };

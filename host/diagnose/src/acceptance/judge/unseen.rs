@@ -3,7 +3,7 @@
 use crate::fit::least_squares::Fit;
 use crate::outcome::Remainder;
 use crate::recordings::noise_floor;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::is_gear;
 use rig_model::robot::{Joint, Robot, title_of};
 use rig_output::{format_significant, format_unit};
@@ -24,13 +24,13 @@ pub(crate) fn left_of_held(
     held: &[f64],
     learnt: &[f64],
     floors: [&[f64]; 2],
-    chosen: &[Profile],
+    chosen: &[FittedCandidate],
     twice: &dyn Fn(usize) -> Option<f64>,
 ) -> Option<Remainder> {
     let [own, floors] = floors;
     let ratio = |j: usize| held[j] / floors[j];
     let gear = |j: usize| {
-        let there = |p: &Profile| p.candidate.joint == j && is_gear(p.candidate.kind);
+        let there = |p: &FittedCandidate| p.candidate.joint == j && is_gear(p.candidate.kind);
         chosen.iter().any(there)
     };
     let beyond = |j: &usize| match twice(*j).filter(|_| !gear(*j)) {
@@ -96,12 +96,13 @@ pub(crate) fn not_carried_over(
 /// Returns the residual that a dropped effect explained, on a joint without accepted effects.
 pub(crate) fn taken_by_none(
     robot: &Robot,
-    fallen: &[Profile],
-    chosen: &[Profile],
+    fallen: &[FittedCandidate],
+    chosen: &[FittedCandidate],
     floors: &[f64],
 ) -> Option<Remainder> {
-    let bare = |p: &&Profile| (chosen.iter()).all(|c| c.candidate.joint != p.candidate.joint);
-    let gain = |p: &&Profile| p.evidence.joint_gain;
+    let bare =
+        |p: &&FittedCandidate| (chosen.iter()).all(|c| c.candidate.joint != p.candidate.joint);
+    let gain = |p: &&FittedCandidate| p.evidence.joint_gain;
     let most = (fallen.iter().filter(bare)).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
     let (joint, left) = (most.candidate.joint, 1.0 - gain(&most));
     let Joint { name, kind, .. } = &robot.joints[joint];

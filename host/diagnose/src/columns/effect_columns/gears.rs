@@ -10,7 +10,7 @@ use crate::columns::transmission::{Driven, Load, Seen};
 use crate::recordings::noise_floor;
 use crate::rows::nominal_torque::predict;
 use crate::rows::regression::{Rows, links_of, motion_of};
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::is_gear;
 
 impl Source<'_> {
@@ -22,7 +22,7 @@ impl Source<'_> {
     pub(crate) fn following(
         mut self,
         rows: &Rows,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         gains: &[f64],
     ) -> Result<Self, DiagnoseError> {
         let asked: Vec<(usize, f64)> = (chosen.iter())
@@ -43,7 +43,7 @@ impl Source<'_> {
                 let left = torque.iter().zip(&known[joint]).map(|(t, k)| t - k);
                 let seen = Seen {
                     torque: left.collect(),
-                    sure: rows.sure(r, joint, run.len()),
+                    sure: rows.torque_valid(r, joint, run.len()),
                     noise: noise_floor::of_a_sample(noise, rows.period * run.rate),
                     unrest: noise,
                     smoothed: false,

@@ -216,7 +216,7 @@ fn a_payload_is_a_mass_of_its_link() {
     let robot =
         Robot::from_toml(rig_model::robot::ONE_LINK_TEMPLATE, Path::new("one.toml")).unwrap();
     let payload = Effect::new(Kind::Payload, &[0.5], &[0.4]);
-    let loaded = described(
+    let prepared = described(
         &robot,
         RobotEffect {
             joint: None,
@@ -224,7 +224,7 @@ fn a_payload_is_a_mass_of_its_link() {
             effect: payload,
         },
     );
-    let stated = Stated::of(&loaded);
+    let stated = DescribedEffects::of(&prepared);
     assert!(stated.robot.effects.is_empty() && stated.free().is_empty());
     let [link, own] =
         [&stated.robot, &robot].map(|robot| robot.joints[0].inertial.clone().unwrap());

@@ -4,7 +4,7 @@
 
 use crate::Options;
 use crate::columns::effect_columns::Candidate;
-use crate::description::described_effects::Stated;
+use crate::description::described_effects::DescribedEffects;
 use crate::engine::follow::*;
 use crate::fit::least_squares::Evidence;
 use crate::outcome::Verdict;
@@ -81,19 +81,19 @@ fn an_effect_as_large_as_the_noise_is_found_beside_play() {
 /// Returns the training residual RMS of a rig with a rigid gear: rigid model, and with a false observer-based gear.
 fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f64; 2] {
     let made = Scenario::short(effect, seed).make().unwrap();
-    let stated = Stated::of(&made.robot);
+    let stated = DescribedEffects::of(&made.robot);
     let training: [&dyn Recording; 2] = [&made.train, made.repeat.as_ref().unwrap()];
-    let bench = Bench::of(&stated, &training).unwrap();
-    let loaded = bench.load(&training).unwrap();
-    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let context = DiagnosisContext::of(&stated, &training).unwrap();
+    let prepared = context.load(&training).unwrap();
+    let refit = Refit::of(&context, &prepared.rows).unwrap();
     let source = || {
-        bench
-            .source(&loaded, &bench.anchor.values(&refit.before.values))
+        context
+            .source(&prepared, &context.anchor.values(&refit.before.values))
             .unwrap()
     };
     let search = Search::new(
         source(),
-        library(&made.robot, &loaded.runs, &[]),
+        library(&made.robot, &prepared.runs, &[]),
         Vec::new(),
         2,
     );
@@ -103,19 +103,19 @@ fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f
         shapes[..made_of.len()].copy_from_slice(made_of);
         shapes
     };
-    let made_up = Profile {
+    let made_up = FittedCandidate {
         candidate,
         shapes,
         columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
         evidence: Evidence::default(),
-        vanished: None,
+        at_bound: None,
         followed: None,
         otherwise: None,
-        heard: false,
-        doubled: false,
+        accepted_by_observer: false,
+        near_collinear: false,
     };
     let rigid = refit.base.rms(0);
-    let follower = Follower::new(&bench, &loaded, &refit, &search);
+    let follower = ObserverModels::new(&context, &prepared, &refit, &search);
     let chosen = follower.followed(&[made_up], &[rigid]).unwrap().unwrap();
     // Where the gear stays open-loop, the observer leaves more.
     let stands = chosen[0].followed.is_some();

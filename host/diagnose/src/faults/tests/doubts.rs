@@ -7,7 +7,7 @@ use crate::faults::tests::*;
 use rig_plant::effect::cogging::Cogging;
 
 /// Adds an undescribed mass at a place of the last link.
-fn loaded(robot: &mut Robot, mass: f64, [x, y, z]: [f64; 3]) {
+fn prepared(robot: &mut Robot, mass: f64, [x, y, z]: [f64; 3]) {
     let last = robot.joints.last_mut().unwrap();
     let inertial = last.inertial.as_mut().unwrap();
     inertial.mass += mass;
@@ -42,7 +42,7 @@ fn a_payload_is_no_fault() {
     for (seed, place) in places.into_iter().enumerate() {
         for mass in [0.5, 2.8] {
             let (robot, runs) = changed_wrist(folder.path(), 20.0, seed as u64, |robot| {
-                loaded(robot, mass, place);
+                prepared(robot, mass, place);
             });
             assert_eq!(certain(&robot, &runs), [""; 0], "{mass} kg at {place:?}");
         }

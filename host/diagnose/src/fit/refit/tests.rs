@@ -10,7 +10,7 @@ use rig_shared::effects::{GAINS, Kind};
 
 use crate::acceptance::residual_dependence::coordinates;
 use crate::columns::effect_columns::Candidate;
-use crate::description::described_effects::Stated;
+use crate::description::described_effects::DescribedEffects;
 use crate::fit::least_squares::Evidence;
 use crate::fit::refit::*;
 use rig_data::prepare::{InMemory, Recording};
@@ -83,23 +83,23 @@ struct Outcome {
 fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
     let runs = recorded(seed, unknown);
     let training: Vec<&dyn Recording> = runs.iter().map(|r| r as &dyn Recording).collect();
-    let stated = Stated::of(robot);
-    let bench = Bench::of(&stated, &training).unwrap();
-    let loaded = bench.load(&training).unwrap();
-    let refit = Refit::of(&bench, &loaded.rows).unwrap();
-    let source = (bench.source(&loaded, &bench.anchor.values(&refit.before.values))).unwrap();
+    let stated = DescribedEffects::of(robot);
+    let context = DiagnosisContext::of(&stated, &training).unwrap();
+    let prepared = context.load(&training).unwrap();
+    let refit = Refit::of(&context, &prepared.rows).unwrap();
+    let source = (context.source(&prepared, &context.anchor.values(&refit.before.values))).unwrap();
     let profile = |kind, shapes: [f64; SHAPES]| {
         let candidate = Candidate::on(kind, 0);
-        Profile {
+        FittedCandidate {
             candidate,
             shapes,
             columns: Arc::new(source.columns(&candidate, &shapes).unwrap()),
             evidence: Evidence::default(),
-            vanished: None,
+            at_bound: None,
             followed: None,
             otherwise: None,
-            heard: false,
-            doubled: false,
+            accepted_by_observer: false,
+            near_collinear: false,
         }
     };
     let mut third = [0.0; SHAPES];
@@ -109,15 +109,22 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
         profile(Kind::PositionFriction, third),
     ];
     let chosen = &both[..1];
-    let pairs = crate::recordings::noise_floor::repeats(&loaded.runs);
+    let pairs = crate::recordings::noise_floor::repeats(&prepared.runs);
     assert_eq!(pairs.len(), 1);
     let free = refit.free.len();
-    let viscous = (bench.anchor.free.iter())
+    let viscous = (context.anchor.free.iter())
         .position(
-            |d| matches!(d.as_slice(), [(b, _)] if bench.nominal.base.expression(*b) == "fv1"),
+            |d| matches!(d.as_slice(), [(b, _)] if context.nominal.base.expression(*b) == "fv1"),
         )
         .unwrap();
-    let along = coordinates(&loaded.rows, &loaded.runs, &source.predicted, robot, 0, &[]);
+    let along = coordinates(
+        &prepared.rows,
+        &prepared.runs,
+        &source.predicted,
+        robot,
+        0,
+        &[],
+    );
     let along = [along];
     let joint = refit.joint(&source, chosen, &pairs, &along).unwrap();
     let beside = refit.joint(&source, &both, &pairs, &along).unwrap();

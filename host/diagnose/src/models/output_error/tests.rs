@@ -3,10 +3,10 @@
 use crate::tests::made::Diagnosed as _;
 use rand::{RngExt, SeedableRng};
 
-use crate::description::described_effects::Stated;
+use crate::description::described_effects::DescribedEffects;
 use crate::fit::refit::Refit;
 use crate::models::output_error::*;
-use crate::recordings::context::Bench;
+use crate::recordings::context::DiagnosisContext;
 use crate::{Diagnosis, Options};
 use rig_data::prepare::Recording;
 use rig_scenario::{Effect, Made, Scenario};
@@ -90,16 +90,16 @@ fn a_noisy_position_costs_the_motion_less_than_the_torque() {
 #[test]
 fn values_that_are_off_are_mended_by_the_motion() {
     let made = Scenario::short([], 63).make().unwrap();
-    let stated = Stated::of(&made.robot);
+    let stated = DescribedEffects::of(&made.robot);
     let training: [&dyn Recording; 2] = [&made.train, made.repeat.as_ref().unwrap()];
-    let bench = Bench::of(&stated, &training).unwrap();
-    let loaded = bench.load(&training).unwrap();
-    let refit = Refit::of(&bench, &loaded.rows).unwrap();
-    let values = bench.anchor.values(&refit.before.values);
-    let source = bench.source(&loaded, &values).unwrap();
-    let fitting = Fitting::new(&bench, &refit, &loaded.runs, &values);
-    let replay = Replay::of(&fitting, &loaded).unwrap();
-    let pairs = crate::recordings::noise_floor::repeats(&loaded.runs);
+    let context = DiagnosisContext::of(&stated, &training).unwrap();
+    let prepared = context.load(&training).unwrap();
+    let refit = Refit::of(&context, &prepared.rows).unwrap();
+    let values = context.anchor.values(&refit.before.values);
+    let source = context.source(&prepared, &values).unwrap();
+    let fitting = ModelCache::new(&context, &refit, &prepared.runs, &values);
+    let replay = Replay::of(&fitting, &prepared).unwrap();
+    let pairs = crate::recordings::noise_floor::repeats(&prepared.runs);
     let right = refit.joint(&source, &[], &pairs, &[Vec::new()]).unwrap();
     let mut off = refit.joint(&source, &[], &pairs, &[Vec::new()]).unwrap();
     for value in &mut off.solution.values {
@@ -112,7 +112,7 @@ fn values_that_are_off_are_mended_by_the_motion() {
     let (standing, _) = again.adopted.unwrap();
     assert!(again.told.adopted && again.told.text.contains("those values stand."));
     assert!(again.told.torque_rms[1] < again.told.torque_rms[0]);
-    let mended = standing.coefficients(&bench.anchor);
+    let mended = standing.coefficients(&context.anchor);
     for (k, (mended, right)) in mended.iter().zip(&right.solution.values).enumerate() {
         assert!(
             (mended / right - 1.0).abs() < 0.01,

@@ -150,7 +150,7 @@ pub(crate) fn falls_throughout(kind: Kind, shapes: &[f64; SHAPES], fastest: f64)
 
 /// Returns the first shape of a law if it is at its lower search bound: then there is no effect. For gears this applies
 /// only to a backlash gap.
-pub(crate) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
+pub(crate) fn at_bound(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
     let shape = kind.about().shapes.first()?;
     let least = (1.0 + AT_THE_END) * searched(shape, told, [f64::INFINITY; 2])[0];
     let counts = shape.scale == Scale::Logarithmic && (!is_gear(kind) || is_distance(shape));

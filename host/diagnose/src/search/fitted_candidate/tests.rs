@@ -2,8 +2,8 @@
 
 use crate::search::fitted_candidate::*;
 
-fn profile(kind: Kind, joint_gain: f64, gain_sigmas: f64) -> Profile {
-    Profile {
+fn profile(kind: Kind, joint_gain: f64, gain_sigmas: f64) -> FittedCandidate {
+    FittedCandidate {
         candidate: Candidate::on(kind, 0),
         shapes: Default::default(),
         columns: Arc::default(),
@@ -14,11 +14,11 @@ fn profile(kind: Kind, joint_gain: f64, gain_sigmas: f64) -> Profile {
             p_value: 1e-20,
             ..Evidence::default()
         },
-        vanished: None,
+        at_bound: None,
         followed: None,
         otherwise: None,
-        heard: false,
-        doubled: false,
+        accepted_by_observer: false,
+        near_collinear: false,
     }
 }
 
@@ -64,9 +64,9 @@ fn a_play_that_takes_little_is_heard_where_that_is_clear() {
     }
     assert!(!profile(Kind::JointElasticity, 0.08, 6.0).is_nearly_a_play(300));
     assert!(play(0.08, 6.0).refused(300).is_some());
-    let heard = Profile {
-        heard: true,
+    let accepted_by_observer = FittedCandidate {
+        accepted_by_observer: true,
         ..play(0.08, 6.0)
     };
-    assert_eq!(heard.refused(300), None);
+    assert_eq!(accepted_by_observer.refused(300), None);
 }

@@ -9,7 +9,7 @@ use crate::columns::effect_columns::{Candidate, Source};
 use crate::description::described_effects::{candidate, is_one};
 use crate::fit::least_squares::{Evidence, Fit};
 use crate::search::fitted_candidate::LEAST_GAIN;
-use crate::search::stepwise::{Profile, STAYS, Search, in_the_shadow, is_gear, with};
+use crate::search::stepwise::{FittedCandidate, STAYS, Search, in_the_shadow, is_gear, with};
 
 impl<'a> Search<'a> {
     /// Returns true if the description states an effect.
@@ -41,7 +41,7 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the joints with such a gear.
-    pub(crate) fn loud(&self, chosen: &[Profile]) -> Vec<usize> {
+    pub(crate) fn loud(&self, chosen: &[FittedCandidate]) -> Vec<usize> {
         (chosen.iter().map(|p| &p.candidate))
             .filter(|c| self.is_gear_by_torque(c))
             .map(|c| c.joint)
@@ -55,12 +55,12 @@ impl<'a> Search<'a> {
     pub(crate) fn settle_gears(
         &mut self,
         base: &Fit,
-        chosen: &mut [Profile],
+        chosen: &mut [FittedCandidate],
     ) -> Result<(), DiagnoseError> {
         self.settled.clear();
         let mut settled = Vec::new();
         for i in 0..chosen.len() {
-            let Profile {
+            let FittedCandidate {
                 candidate, shapes, ..
             } = chosen[i];
             if !self.is_gear_by_torque(&candidate) {
@@ -89,14 +89,14 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the number of effects that no search by torque found. They come first.
-    pub(crate) fn count_given(&self, chosen: &[Profile]) -> usize {
-        let given = |p: &&Profile| self.rank_of(&p.candidate) < 2;
+    pub(crate) fn count_given(&self, chosen: &[FittedCandidate]) -> usize {
+        let given = |p: &&FittedCandidate| self.rank_of(&p.candidate) < 2;
         chosen.iter().take_while(given).count()
     }
 
     /// Returns the number of described effects. They come first.
-    pub(crate) fn count_described(&self, chosen: &[Profile]) -> usize {
-        let described = |p: &&Profile| self.is_described(&p.candidate);
+    pub(crate) fn count_described(&self, chosen: &[FittedCandidate]) -> usize {
+        let described = |p: &&FittedCandidate| self.is_described(&p.candidate);
         chosen.iter().take_while(described).count()
     }
 
@@ -104,11 +104,11 @@ impl<'a> Search<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn begun(
+    pub(crate) fn warm_start(
         &mut self,
         base: &Fit,
-        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         let mut chosen = Vec::new();
         let described = self.described.iter().map(|placed| {
             let own = candidate(placed);
@@ -116,16 +116,16 @@ impl<'a> Search<'a> {
         });
         let measured = (self.measured.iter().copied()).filter(|(c, _)| !self.is_described(c));
         for (candidate, shapes) in described.chain(measured) {
-            chosen.push(Profile {
+            chosen.push(FittedCandidate {
                 columns: Arc::new(self.source.columns(&candidate, &shapes)?),
                 candidate,
                 shapes,
                 evidence: Evidence::default(),
-                vanished: None,
+                at_bound: None,
                 followed: None,
                 otherwise: None,
-                heard: false,
-                doubled: false,
+                accepted_by_observer: false,
+                near_collinear: false,
             });
         }
         if chosen.is_empty() {
@@ -144,18 +144,18 @@ impl<'a> Search<'a> {
             self.renewed(renew(&chosen)?);
             self.refine_all(base, &mut chosen)?;
         }
-        self.standing(base, &mut chosen)?;
+        self.prune(base, &mut chosen)?;
         Ok(chosen)
     }
 
     /// Removes effects that are no longer significant; returns those at a bound. Given effects are exempt from the
     /// minimum-gain and mismatch tests.
-    pub(crate) fn standing(
+    pub(crate) fn prune(
         &self,
         base: &Fit,
-        chosen: &mut Vec<Profile>,
+        chosen: &mut Vec<FittedCandidate>,
     ) -> Result<Vec<Candidate>, DiagnoseError> {
-        let mut vanished = Vec::new();
+        let mut at_bound = Vec::new();
         let mut i = 0;
         while i < chosen.len() {
             let e = &chosen[i].evidence;
@@ -168,15 +168,15 @@ impl<'a> Search<'a> {
                         || e.joint_gain < LEAST_GAIN.min(chosen[i].least_gain())
                         || in_the_shadow(self.source.robot, chosen, i))
             };
-            if weak || chosen[i].vanished.is_some() {
+            if weak || chosen[i].at_bound.is_some() {
                 let gone = chosen.remove(i);
-                vanished.extend(gone.vanished.map(|_| gone.candidate));
+                at_bound.extend(gone.at_bound.map(|_| gone.candidate));
                 self.refine_all(base, chosen)?;
                 i = 0;
             } else {
                 i += 1;
             }
         }
-        Ok(vanished)
+        Ok(at_bound)
     }
 }

@@ -3,7 +3,7 @@
 use crate::DiagnoseError;
 use crate::columns::effect_columns::Candidate;
 use crate::fit::least_squares::Fit;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::kinds::is_searched;
 use crate::search::stepwise::{Search, is_gear, with};
 
@@ -16,11 +16,11 @@ impl Search<'_> {
     pub(crate) fn plain_before_gear(
         &self,
         base: &Fit,
-        chosen: &[Profile],
-        best: Profile,
-        profiles: &[Profile],
+        chosen: &[FittedCandidate],
+        best: FittedCandidate,
+        profiles: &[FittedCandidate],
         trials: usize,
-    ) -> Result<Profile, DiagnoseError> {
+    ) -> Result<FittedCandidate, DiagnoseError> {
         let joint = best.candidate.joint;
         let plain = (profiles.iter())
             .filter(|p| !is_gear(p.candidate.kind) && p.candidate.joint == joint)
@@ -42,18 +42,19 @@ impl Search<'_> {
     pub(crate) fn richer_law_first(
         &self,
         base: &Fit,
-        chosen: &[Profile],
-        best: Profile,
-        profiles: &[Profile],
+        chosen: &[FittedCandidate],
+        best: FittedCandidate,
+        profiles: &[FittedCandidate],
         trials: usize,
-    ) -> Result<Profile, DiagnoseError> {
+    ) -> Result<FittedCandidate, DiagnoseError> {
         let joint = best.candidate.joint;
         if is_gear(best.candidate.kind) {
             return Ok(best);
         }
         let fit = with(base, chosen, None);
-        let mut rich: Option<Profile> = None;
-        let passing = |p: &&Profile| p.candidate.joint == joint && p.refused(trials).is_none();
+        let mut rich: Option<FittedCandidate> = None;
+        let passing =
+            |p: &&FittedCandidate| p.candidate.joint == joint && p.refused(trials).is_none();
         for first in profiles.iter().filter(passing) {
             for (c, law) in self.laws_beside(first.candidate) {
                 if is_searched(law.kind) || is_gear(law.kind) {
@@ -79,10 +80,10 @@ impl Search<'_> {
     fn pair(
         &self,
         base: &Fit,
-        chosen: &[Profile],
-        first: &Profile,
+        chosen: &[FittedCandidate],
+        first: &FittedCandidate,
         trials: usize,
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         let mut pair = and(chosen, first);
         let taken = pair.iter().map(|p| p.candidate);
         let gears = self.library.iter().filter(|c| is_gear(c.kind));
@@ -97,10 +98,10 @@ impl Search<'_> {
     }
 }
 
-fn and(chosen: &[Profile], more: &Profile) -> Vec<Profile> {
+fn and(chosen: &[FittedCandidate], more: &FittedCandidate) -> Vec<FittedCandidate> {
     chosen.iter().chain([more]).cloned().collect()
 }
 
-fn left(base: &Fit, list: &[Profile], joint: usize) -> f64 {
+fn left(base: &Fit, list: &[FittedCandidate], joint: usize) -> f64 {
     with(base, list, None).rms(joint)
 }

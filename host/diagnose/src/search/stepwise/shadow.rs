@@ -4,7 +4,7 @@ use rig_shared::effects::Kind;
 
 use crate::columns::effect_columns::Candidate;
 use crate::fit::least_squares::sigmas;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::{is_constant, is_gear};
 use rig_model::robot::Robot;
 
@@ -26,8 +26,8 @@ const CLEAR: f64 = 3.0;
 const SHADOW_OF_AN_UNKNOWN_DRIVE: f64 = 0.4;
 
 /// Returns true if an effect removes no more than the mismatch of another one on its joint.
-pub(crate) fn in_the_shadow(robot: &Robot, chosen: &[Profile], i: usize) -> bool {
-    let taken = |p: &Profile| -> Vec<f64> { p.evidence.taken().collect() };
+pub(crate) fn in_the_shadow(robot: &Robot, chosen: &[FittedCandidate], i: usize) -> bool {
+    let taken = |p: &FittedCandidate| -> Vec<f64> { p.evidence.taken().collect() };
     let own = taken(&chosen[i]);
     (chosen.iter().enumerate()).any(|(k, other)| {
         let casting = taken(other);
@@ -64,7 +64,7 @@ fn is_harmonic(own: &Candidate, of: &Candidate) -> bool {
 }
 
 /// Returns true if the description states the motor's share of the inertia, which no gear carries.
-fn knows_drive(robot: &Robot, of: &Profile) -> bool {
+fn knows_drive(robot: &Robot, of: &FittedCandidate) -> bool {
     let drive = robot.joints[of.candidate.joint].drive.as_ref();
     drive.is_some_and(|d| d.joint_inertia + d.rotor_inertia > 0.0)
 }
@@ -96,7 +96,7 @@ fn clear(own: &[f64], casting: &[f64], share: f64) -> bool {
 }
 
 /// Returns the mismatch as a share of the squares that an effect removes.
-pub(crate) fn shadow(of: &Profile) -> f64 {
+pub(crate) fn shadow(of: &FittedCandidate) -> f64 {
     match of.candidate.kind {
         kind if is_gear(kind) => SHADOW_OF_A_GEAR,
         kind if is_constant(kind) || kind == Kind::GravityTilt => SHADOW_OF_A_CONSTANT,

@@ -8,7 +8,7 @@ use rig_shared::effects::Kind;
 use crate::DiagnoseError;
 use crate::columns::effect_columns::{Candidate, Source};
 use crate::fit::least_squares::Fit;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::{Search, is_constant, is_gear, with};
 
 /// One constant for each side.
@@ -23,11 +23,11 @@ impl<'a> Search<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn sides(
+    pub(crate) fn constant_side(
         &mut self,
         base: &Fit,
-        chosen: &mut Vec<Profile>,
-        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+        chosen: &mut Vec<FittedCandidate>,
+        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
     ) -> Result<(), DiagnoseError> {
         self.sided.clear();
         for i in 0..chosen.len() {
@@ -37,7 +37,7 @@ impl<'a> Search<'a> {
                 ELSEWHERE | Kind::AsymmetricCoulomb => ON_THE_LINK,
                 _ => continue,
             };
-            let carries = |p: &Profile| {
+            let carries = |p: &FittedCandidate| {
                 let Candidate { kind, joint, .. } = p.candidate;
                 joint == own.joint && (kind == Kind::LoadFriction || is_gear(kind))
             };
@@ -55,8 +55,8 @@ impl<'a> Search<'a> {
                 // First refines its own columns, then its evidence beside the others.
                 self.refine_all(base, &mut turned)?;
             }
-            let left = |chosen: &[Profile]| with(base, chosen, None).rms(own.joint);
-            let stands = turned.iter().all(|p| p.vanished.is_none());
+            let left = |chosen: &[FittedCandidate]| with(base, chosen, None).rms(own.joint);
+            let stands = turned.iter().all(|p| p.at_bound.is_none());
             if stands && left(&turned) < left(chosen) {
                 std::mem::swap(chosen, &mut turned);
             } else {

@@ -10,7 +10,7 @@ use crate::DiagnoseError;
 use crate::acceptance::judge::equal;
 use crate::columns::effect_columns::Candidate;
 use crate::fit::least_squares::Fit;
-use crate::search::fitted_candidate::{LEAST_GAIN, Profile, SIGNIFICANT, about_its_middle};
+use crate::search::fitted_candidate::{FittedCandidate, LEAST_GAIN, SIGNIFICANT, about_its_middle};
 use crate::search::stepwise::{Search, is_gear, with};
 
 impl Search<'_> {
@@ -24,9 +24,9 @@ impl Search<'_> {
     pub(crate) fn first_to_take(
         &self,
         fit: &Fit,
-        profiles: &[Profile],
+        profiles: &[FittedCandidate],
         trials: usize,
-    ) -> Option<Profile> {
+    ) -> Option<FittedCandidate> {
         let passing = || profiles.iter().filter(|p| p.refused(trials).is_none());
         let best = passing().next()?;
         // Prefer the transmission without backlash, unless backlash has a clearly larger gain.
@@ -54,18 +54,18 @@ impl Search<'_> {
     pub(crate) fn smaller(
         &self,
         base: &Fit,
-        chosen: &[Profile],
+        chosen: &[FittedCandidate],
         i: usize,
-        rivals: &[Profile],
+        rivals: &[FittedCandidate],
         trials: usize,
-    ) -> Result<Option<Profile>, DiagnoseError> {
+    ) -> Result<Option<FittedCandidate>, DiagnoseError> {
         let own = &chosen[i];
         let fit = with(base, chosen, Some(i));
         let taken = |c: &Candidate| {
             (chosen.iter().enumerate())
                 .any(|(k, p)| k != i && crate::search::stepwise::rivals(&p.candidate, c))
         };
-        let mut best: Option<Profile> = None;
+        let mut best: Option<FittedCandidate> = None;
         for rival in rivals {
             let c = &rival.candidate;
             if c.joint != own.candidate.joint
@@ -99,10 +99,10 @@ impl Search<'_> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn springs(
+    pub(crate) fn springs_to_constants(
         &self,
         base: &Fit,
-        chosen: &mut [Profile],
+        chosen: &mut [FittedCandidate],
         trials: usize,
     ) -> Result<bool, DiagnoseError> {
         let mut changed = false;
@@ -125,8 +125,8 @@ impl Search<'_> {
     fn as_good_and_smaller(
         &self,
         fit: &Fit,
-        best: &Profile,
-        other: &Profile,
+        best: &FittedCandidate,
+        other: &FittedCandidate,
         trials: usize,
     ) -> bool {
         let gears = is_gear(best.candidate.kind) || is_gear(other.candidate.kind);
@@ -145,7 +145,7 @@ impl Search<'_> {
 }
 
 /// Returns true if the smaller one's columns are combinations of the larger one's and of the model's.
-fn holds(fit: &Fit, larger: &Profile, smaller: &Profile) -> bool {
+fn holds(fit: &Fit, larger: &FittedCandidate, smaller: &FittedCandidate) -> bool {
     let mut beside = fit.clone();
     for column in larger.columns.iter() {
         beside.push(column);
@@ -154,7 +154,7 @@ fn holds(fit: &Fit, larger: &Profile, smaller: &Profile) -> bool {
 }
 
 /// Returns true if the additional part of the larger one is significant and large enough.
-fn adds(fit: &Fit, larger: &Profile, smaller: &Profile, trials: usize) -> bool {
+fn adds(fit: &Fit, larger: &FittedCandidate, smaller: &FittedCandidate, trials: usize) -> bool {
     let mut beside = fit.clone();
     for column in smaller.columns.iter() {
         beside.push(column);

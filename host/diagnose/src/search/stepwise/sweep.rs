@@ -5,7 +5,7 @@ use rig_shared::effects::Kind;
 use crate::DiagnoseError;
 use crate::columns::effect_columns::Candidate;
 use crate::fit::least_squares::Fit;
-use crate::search::fitted_candidate::Profile;
+use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::kinds::{doubles, has_many_orders, is_searched};
 use crate::search::stepwise::{Search, is_first_law, rivals};
 use rig_model::batch::each_by;
@@ -20,7 +20,7 @@ impl Search<'_> {
         fit: &Fit,
         present: &[Candidate],
         impossible: &[Candidate],
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         self.sweep_of(fit, present, impossible, &|_| true)
     }
 
@@ -34,7 +34,7 @@ impl Search<'_> {
         fit: &Fit,
         present: &[Candidate],
         impossible: &[Candidate],
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         // A tilt acts on all joints.
         let there = |c: &Candidate| c.joint == joint || c.kind == Kind::GravityTilt;
         self.sweep_of(fit, present, impossible, &there)
@@ -46,7 +46,7 @@ impl Search<'_> {
         present: &[Candidate],
         impossible: &[Candidate],
         among: &dyn Fn(&Candidate) -> bool,
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         let open: Vec<usize> = (0..self.library.len())
             .filter(|c| {
                 let candidate = &self.library[*c];
@@ -65,7 +65,7 @@ impl Search<'_> {
         .collect::<Result<Vec<_>, _>>()?;
         better_laws(&mut profiles);
         for profile in &mut profiles {
-            profile.doubled = present.iter().any(|p| doubles(p, &profile.candidate));
+            profile.near_collinear = present.iter().any(|p| doubles(p, &profile.candidate));
         }
         profiles.sort_by(|a, b| {
             b.evidence
@@ -95,8 +95,8 @@ impl Search<'_> {
 }
 
 /// Keeps the best law of each name, if the laws are equally flexible: a second law is no second effect.
-fn better_laws(profiles: &mut Vec<Profile>) {
-    let rank = |p: &Profile| (p.vanished.is_none(), p.evidence.gain);
+fn better_laws(profiles: &mut Vec<FittedCandidate>) {
+    let rank = |p: &FittedCandidate| (p.at_bound.is_none(), p.evidence.gain);
     let beaten: Vec<bool> = (profiles.iter())
         .map(|own| {
             (profiles.iter()).any(|other| {

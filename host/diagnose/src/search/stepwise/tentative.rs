@@ -3,7 +3,7 @@
 use crate::DiagnoseError;
 use crate::columns::effect_columns::Candidate;
 use crate::fit::least_squares::Fit;
-use crate::search::fitted_candidate::{Profile, SIGNIFICANT};
+use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
 use crate::search::stepwise::{Search, is_gear, same};
 
 /// RMS share that a candidate must remove for a trial although it is not significant. Other missing effects then
@@ -21,27 +21,28 @@ impl Search<'_> {
     pub(crate) fn tried_together(
         &self,
         base: &Fit,
-        chosen: &[Profile],
-        profiles: &[Profile],
+        chosen: &[FittedCandidate],
+        profiles: &[FittedCandidate],
         trials: usize,
         impossible: &[Candidate],
-    ) -> Result<Option<Vec<Profile>>, DiagnoseError> {
+    ) -> Result<Option<Vec<FittedCandidate>>, DiagnoseError> {
         // A lone candidate would stay not significant.
         if chosen.is_empty() {
             return Ok(None);
         }
-        let unsure = |p: &&Profile| {
+        let unsure = |p: &&FittedCandidate| {
             !is_gear(p.candidate.kind)
-                && p.vanished.is_none()
+                && p.at_bound.is_none()
                 && p.evidence.joint_gain >= WORTH_TRYING
                 && p.corrected(trials) > SIGNIFICANT
         };
         for newcomer in profiles.iter().filter(unsure).take(TRIES) {
             let mut list = chosen.to_vec();
             list.push(newcomer.clone());
-            self.settle(base, &mut list, trials, impossible)?;
-            let passes =
-                |p: &Profile| self.is_described(&p.candidate) || p.refused(trials).is_none();
+            self.refine_prune_swap(base, &mut list, trials, impossible)?;
+            let passes = |p: &FittedCandidate| {
+                self.is_described(&p.candidate) || p.refused(trials).is_none()
+            };
             if !same(&list, chosen) && list.len() > chosen.len() && list.iter().all(passes) {
                 return Ok(Some(list));
             }
