@@ -37,7 +37,7 @@ use crate::{DiagnoseError, Options};
 use rig_model::robot::{Robot, RobotEffect};
 use rig_output::{format_significant, format_value};
 
-pub(crate) use crate::motor_voltage::settle::{settled, zeros};
+pub(crate) use crate::motor_voltage::settle::{Word, settled, zeros};
 
 /// Share of the voltage's squares in the residual above which the winding's equation does not fit.
 const EXPLAINED: f64 = 0.1;
