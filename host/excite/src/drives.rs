@@ -4,9 +4,11 @@ use rig_shared::dual::Dual;
 use rig_shared::scalar::Real;
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission, TransmissionError, motor_column};
 
-use super::interval::Interval;
-use super::problem::{L, SIGN_WIDTH};
-use super::{ExciteError, frame::Bounds};
+use crate::ExciteError;
+use crate::bounds::Bounds;
+use crate::interval::Interval;
+use crate::lanes::L;
+use crate::sign::SIGN_WIDTH;
 use rig_model::robot::Robot;
 use rig_model::simulate::{Motors, SimulateError};
 

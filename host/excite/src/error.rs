@@ -137,3 +137,8 @@ fn limitless(joints: &[String]) -> String {
         _ => format!("joints \"{list}\" have"),
     }
 }
+
+/// Returns the error of an option: its name, its value and a remedy.
+pub(super) fn wrong(name: &'static str, value: String, right: String) -> ExciteError {
+    ExciteError::Option { name, value, right }
+}

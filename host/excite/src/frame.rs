@@ -4,17 +4,19 @@ use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rig_shared::lanes::Lanes;
 use rig_shared::multibody::{COLUMNS, Chain, column, differential_regressor};
-use rig_shared::trajectory::HARMONICS;
 use rig_shared::transmission::MOTOR_COLUMNS;
 
-use super::criterion::Values;
-use super::drives::{Combined, Drives};
-use super::problem::LANES;
-use super::schedule::{JointMotion, Schedule};
-use super::workspace::{Plane, planes_of};
-use super::{Criterion, ExciteError, Options, Parameters, Scaling};
+use crate::bounds::{Bounds, Room, bounds_of, named, prior};
+use crate::criterion::Values;
+use crate::drives::{Combined, Drives};
+use crate::error::wrong;
+use crate::lanes::LANES;
+use crate::period::schedule_of;
+use crate::schedule::{JointMotion, Schedule};
+use crate::workspace::{Plane, planes_of};
+use crate::{Criterion, ExciteError, Options, Parameters, Scaling};
 use rig_identify::{Base, ModelKind};
-use rig_model::robot::{Robot, sound};
+use rig_model::robot::Robot;
 use rig_model::simulate::{Model, SimulateError};
 
 /// Number of states for the size of a column; the size is a unit and need not be precise.
@@ -22,31 +24,6 @@ const SIZE_STATES: usize = 4000;
 /// Seed of these states and of those for the base parameters. Not the user's seed, so that results of different seeds
 /// are comparable.
 const SIZE_SEED: u64 = 1;
-
-/// Bounds of a joint's motion.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    /// Lowest position.
-    pub low: f64,
-    /// Highest position.
-    pub high: f64,
-    pub velocity: f64,
-    pub acceleration: Option<f64>,
-    pub torque: Option<f64>,
-    /// Velocity and acceleration that the torque limit allows the described joint, if it has no acceleration limit;
-    /// infinite if unknown.
-    pub driven: [f64; 2],
-}
-
-impl Bounds {
-    pub(super) fn half(&self) -> f64 {
-        0.5 * (self.high - self.low)
-    }
-
-    pub(super) fn middle(&self) -> f64 {
-        0.5 * (self.high + self.low)
-    }
-}
 
 /// Data common to all starts.
 pub(super) struct Frame {
@@ -71,206 +48,6 @@ pub(super) struct Frame {
     /// Start positions of the joints, unless free.
     pub fixed: Option<Vec<f64>>,
     pub criterion: Criterion,
-}
-
-/// Highest velocity for which a motion is sized, rad/s or m/s: above that of any robot joint.
-const FASTEST: f64 = 1e4;
-
-/// Shortest chosen period, s. Limits that mean "none" would give a motion of a fraction of a second, too short to
-/// settle and to record.
-const SHORTEST: f64 = 1.0;
-
-/// Returns a period whose harmonics can use the limits. The fundamental is slow enough to sweep the position range at
-/// the highest velocity. The fastest harmonic is at most where highest velocity and acceleration meet. The longest over
-/// the joints, rounded up to 0.1 s, at least 1 s. The highest values are the limits. Without an acceleration limit they
-/// are the torque limit's values, with the described inertia and viscous friction.
-pub fn default_period(robot: &Robot, harmonics: usize) -> Result<f64, ExciteError> {
-    period_within(&bounds_of(robot, Room::ALL, None)?.0, harmonics)
-}
-
-fn period_within(bounds: &[Bounds], harmonics: usize) -> Result<f64, ExciteError> {
-    use core::f64::consts::TAU;
-    let mut period = SHORTEST;
-    for bounds in bounds {
-        let [velocity, acceleration] = bounds.driven;
-        let acceleration = bounds
-            .acceleration
-            .map_or(acceleration, |a| a.min(acceleration));
-        let within = (acceleration * (bounds.high - bounds.low)).sqrt();
-        let velocity = velocity.min(bounds.velocity).min(within);
-        period = period
-            .max(TAU * bounds.half() / velocity)
-            .max(TAU * harmonics as f64 * velocity / acceleration);
-    }
-    // Rounding errors must not raise an exact tenth to the next.
-    Ok((period * 10.0 - 1e-9).ceil() / 10.0)
-}
-
-/// Margin of a motion within the limits, for the controller.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Room {
-    /// Free share of the position range, half of it at each end.
-    pub margin: f64,
-    /// Used share of the velocity limit; its square of the acceleration limit, as if time ran slower.
-    pub speed: f64,
-}
-
-impl Room {
-    /// The limits themselves.
-    pub(super) const ALL: Self = Self {
-        margin: 0.0,
-        speed: 1.0,
-    };
-
-    /// # Errors
-    /// [`ExciteError::Option`] if a share is invalid.
-    pub(super) fn new(margin: f64, speed: f64) -> Result<Self, ExciteError> {
-        if !(0.0..=0.95).contains(&margin) {
-            return Err(wrong(
-                "margin",
-                margin.to_string(),
-                "it must be a share of the position range between 0 and 0.95".into(),
-            ));
-        }
-        if !(speed > 0.0 && speed <= 1.0) {
-            return Err(wrong(
-                "speed share",
-                speed.to_string(),
-                "it must be above 0 and at most 1".into(),
-            ));
-        }
-        Ok(Self { margin, speed })
-    }
-
-    /// Returns the reference's position range; the limit itself on a side where `start` is already in the margin.
-    fn positions(&self, [low, high]: [f64; 2], start: Option<f64>) -> [f64; 2] {
-        let free = 0.5 * self.margin * (high - low);
-        let (inner_low, inner_high) = (low + free, high - free);
-        match start {
-            Some(at) if low < at && at <= inner_low => [low, inner_high],
-            Some(at) if inner_high <= at && at < high => [inner_low, high],
-            _ => [inner_low, inner_high],
-        }
-    }
-}
-
-/// Returns the limits of all joints minus the controller's margin, and notes on missing limits.
-pub(super) fn bounds_of(
-    robot: &Robot,
-    room: Room,
-    start: Option<&[f64]>,
-) -> Result<(Vec<Bounds>, Vec<String>), ExciteError> {
-    let mut notes = Vec::new();
-    let mut list = Vec::new();
-    let mut boundless = Vec::new();
-    let mut limitless = Vec::new();
-    for (j, joint) in robot.joints.iter().enumerate() {
-        let Some(limits) = joint.limits.as_ref() else {
-            limitless.push(joint.name.clone());
-            continue;
-        };
-        let [mut low, mut high] = limits.for_motions();
-        if !low.is_finite() || !high.is_finite() {
-            (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
-            notes.push(format!(
-                "Joint \"{}\" turns endlessly; the motion stays within one turn, -pi to pi.",
-                joint.name
-            ));
-        } else {
-            let stated = [low, high];
-            let at = start.and_then(|s| s.get(j).copied());
-            [low, high] = room.positions(stated, at);
-            if room.margin > 0.0 && (low == stated[0] || high == stated[1]) {
-                notes.push(format!(
-                    "Joint \"{}\" starts within the margin of its position limit; on that side the motion keeps the limit itself.",
-                    joint.name
-                ));
-            }
-        }
-        // A value beyond any drive often means "no limit"; a row weighted by it would be lost.
-        let reachable = |limit: &f64| sound(*limit);
-        let acceleration = limits
-            .acceleration
-            .filter(reachable)
-            .map(|a| a * room.speed.powi(2));
-        if acceleration.is_none() {
-            boundless.push(joint.name.as_str());
-        }
-        // The fastest motion: from rest over the whole range to rest, at the highest acceleration.
-        let within = acceleration.map_or(f64::INFINITY, |a| (a * (high - low)).sqrt());
-        let stated = room.speed * limits.velocity;
-        let velocity = stated.min(within);
-        if velocity > FASTEST {
-            return Err(ExciteError::Boundless {
-                joint: joint.name.clone(),
-                velocity,
-            });
-        }
-        if velocity < stated {
-            notes.push(format!(
-                "Joint \"{}\" cannot reach its velocity limit within its range at its acceleration limit; the motion is \
-                 sized by the {velocity:.3} that it can reach (SI units).",
-                joint.name
-            ));
-        }
-        list.push(Bounds {
-            low,
-            high,
-            velocity,
-            acceleration,
-            torque: limits.torque.filter(reachable),
-            driven: [f64::INFINITY; 2],
-        });
-    }
-    if !limitless.is_empty() {
-        return Err(ExciteError::NoLimits { joints: limitless });
-    }
-    if !boundless.is_empty() {
-        notes.push(format!(
-            "No acceleration limit in [joint.limits] of {}; acceleration is bounded by velocity and harmonics only.",
-            named(&boundless)
-        ));
-    }
-    drive(robot, &mut list)?;
-    Ok((list, notes))
-}
-
-/// Sets the values that torque limits allow mid-range, if links are described and acceleration limits are not.
-fn drive(robot: &Robot, list: &mut [Bounds]) -> Result<(), ExciteError> {
-    let model = Model::from_robot(robot)?;
-    if prior(robot, &model).is_err() {
-        return Ok(());
-    }
-    let middle: Vec<f64> = list.iter().map(Bounds::middle).collect();
-    let mut mass = vec![0.0; middle.len().pow(2)];
-    model.inertia_matrix(&middle, &mut mass)?;
-    for (j, bounds) in list.iter_mut().enumerate() {
-        if bounds.acceleration.is_some() {
-            continue;
-        }
-        let viscous = model.parameters[j][column::VISCOUS];
-        let reach = |per: f64| match bounds.torque {
-            Some(torque) if per > 0.0 => torque / per,
-            _ => f64::INFINITY,
-        };
-        bounds.driven = [reach(viscous), reach(mass[j * (middle.len() + 1)])];
-    }
-    Ok(())
-}
-
-/// "joint \"a\"", "joints \"a\", \"b\"".
-fn named(joints: &[&str]) -> String {
-    let quoted: Vec<String> = joints.iter().map(|name| format!("\"{name}\"")).collect();
-    let plural = if joints.len() == 1 { "" } else { "s" };
-    format!("joint{plural} {}", quoted.join(", "))
-}
-
-/// Returns the prior parameters if every link has its own; otherwise the name of the first joint without.
-pub(super) fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>, String> {
-    match robot.joints.iter().find(|j| j.inertial.is_none()) {
-        Some(joint) => Err(joint.name.clone()),
-        None => Ok(model.parameters.clone()),
-    }
 }
 
 /// Returns the columns of the motors, n × 3n; empty if there are none.
@@ -386,61 +163,7 @@ pub(super) fn values_of(
     })
 }
 
-fn micros(name: &'static str, seconds: f64) -> Result<u32, ExciteError> {
-    let micros = (seconds * 1e6).round();
-    // An hour: the trajectory's own times are 32 bits of microseconds.
-    if (1e3..=3.6e9).contains(&micros) {
-        Ok(micros as u32)
-    } else {
-        Err(ExciteError::Option {
-            name,
-            value: seconds.to_string(),
-            right: "it must be between 0.001 and 3600 s".into(),
-        })
-    }
-}
-
-fn wrong(name: &'static str, value: String, right: String) -> ExciteError {
-    ExciteError::Option { name, value, right }
-}
-
-fn schedule_of(bounds: &[Bounds], options: &Options) -> Result<Schedule, ExciteError> {
-    if !(1..=HARMONICS).contains(&options.harmonics) {
-        return Err(wrong(
-            "number of harmonics",
-            options.harmonics.to_string(),
-            format!("it must be between 1 and {HARMONICS}"),
-        ));
-    }
-    for (name, count) in [
-        ("number of starts", options.starts),
-        ("number of periods", u32::from(options.periods)),
-    ] {
-        if count == 0 {
-            return Err(wrong(name, "0".into(), "there must be at least one".into()));
-        }
-    }
-    let period = match options.period {
-        Some(period) => period,
-        None => period_within(bounds, options.harmonics)?,
-    };
-    let period_us = micros("period", period)?;
-    let ramp_us = micros("ramp", options.ramp.unwrap_or(period))?;
-    if ramp_us / 4 > period_us {
-        return Err(wrong(
-            "ramp",
-            format!("{} s", f64::from(ramp_us) * 1e-6),
-            format!("it must not be longer than four periods of {period} s"),
-        ));
-    }
-    Ok(Schedule {
-        period_us,
-        ramp_us,
-        periods: options.periods,
-        harmonics: options.harmonics,
-    })
-}
-
+/// Rejects a start outside the limits of the joints or of the cranks.
 fn check_start(
     robot: &Robot,
     start: &[f64],
@@ -524,6 +247,7 @@ fn weights_of(
         .collect())
 }
 
+/// Returns the data common to all starts, the base parameters and notes for the user.
 pub(super) fn frame_of(
     robot: &Robot,
     options: &Options,

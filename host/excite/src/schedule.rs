@@ -42,7 +42,7 @@ pub(super) struct JointMotion {
 /// with its envelope, so that the optimised motion is the one that runs.
 pub(super) struct Basis {
     /// Number of samples of one whole period, which come first; those of the two ramps follow. Both are multiples of
-    /// [`LANES`](super::problem::LANES).
+    /// [`LANES`](crate::lanes::LANES).
     pub whole: usize,
     /// samples × 2·harmonics
     pub tables: [DMatrix<f64>; 3],

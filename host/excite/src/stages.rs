@@ -9,9 +9,9 @@ use rig_shared::trajectory::{
 };
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
-use super::drives::{Combined, into_cranks};
-use super::frame::{Bounds, Room, bounds_of, prior};
-use super::{ExciteError, JointTrajectory, TrajectoryFile};
+use crate::bounds::{Bounds, Room, bounds_of, prior};
+use crate::drives::{Combined, into_cranks};
+use crate::{ExciteError, JointTrajectory, TrajectoryFile};
 use rig_model::robot::{JointKind, Robot};
 use rig_model::simulate::{Model, SimulateError};
 
@@ -418,7 +418,7 @@ fn refuse_fast(options: &StagedOptions, bounds: &Bounds) -> Result<(), ExciteErr
 /// Designs a motion of one joint, with the others at rest, within 80 % of the limits or as `options` require.
 ///
 /// Returns the file and notes for the user. Torque is checked at samples, with the prior parameters if there are any;
-/// the optimal motions of [`super::design`] are proved instead.
+/// the optimal motions of [`crate::design`] are proved instead.
 ///
 /// # Errors
 /// [`ExciteError`]: no limits, no such joint, options out of range, or no room.

@@ -7,8 +7,10 @@ use rig_shared::multibody::{
 use rig_shared::scalar::Real;
 use rig_shared::transmission::MOTOR_COLUMNS;
 
-use super::{L, LANES, Problem, soft_sign, soft_sign_slope};
+use super::state::Problem;
 use crate::ExciteError;
+use crate::lanes::{L, LANES};
+use crate::sign::{soft_sign, soft_sign_slope};
 
 /// Share of each limit that the optimiser keeps free for peaks between its samples. With 48 samples per period of the
 /// fastest harmonic, such a peak adds at most (π/48)²/2 = 0.2 % of that harmonic's amplitude.

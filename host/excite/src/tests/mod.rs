@@ -13,9 +13,10 @@ use nalgebra::DVector;
 use rig_shared::multibody::inverse_dynamics;
 
 use super::*;
+use crate::frame::frame_of;
 use crate::optimise::Objective;
 use crate::problem::Problem;
-use rig_model::robot::ONE_LINK_TEMPLATE;
+use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 use rig_model::simulate::Model;
 
 pub(super) fn one_link() -> Robot {

@@ -9,7 +9,7 @@ use rig_shared::trajectory::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{DesignRecord, JointTrajectory, TrajectoryFile};
+use super::content::{DesignRecord, JointTrajectory, TrajectoryFile};
 use crate::{Criterion, ExciteError};
 use rig_model::robot::Place;
 

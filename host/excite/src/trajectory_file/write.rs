@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use rig_shared::trajectory::{Sweep, Trajectory};
 
-use super::TrajectoryFile;
+use super::content::TrajectoryFile;
 use rig_model::robot::{JointKind, Robot};
 
 fn number(value: f64) -> String {

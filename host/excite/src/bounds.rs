@@ -1,0 +1,202 @@
+//! Limits of the joints within which a motion is designed.
+
+use crate::ExciteError;
+use crate::error::wrong;
+use rig_model::robot::{Robot, sound};
+use rig_model::simulate::Model;
+use rig_shared::multibody::{COLUMNS, column};
+
+/// Highest velocity for which a motion is sized, rad/s or m/s: above that of any robot joint.
+const FASTEST: f64 = 1e4;
+
+/// Bounds of a joint's motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// Lowest position.
+    pub low: f64,
+    /// Highest position.
+    pub high: f64,
+    pub velocity: f64,
+    pub acceleration: Option<f64>,
+    pub torque: Option<f64>,
+    /// Velocity and acceleration that the torque limit allows the described joint, if it has no acceleration limit;
+    /// infinite if unknown.
+    pub driven: [f64; 2],
+}
+
+impl Bounds {
+    pub(super) fn half(&self) -> f64 {
+        0.5 * (self.high - self.low)
+    }
+
+    pub(super) fn middle(&self) -> f64 {
+        0.5 * (self.high + self.low)
+    }
+}
+
+/// Margin of a motion within the limits, for the controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Room {
+    /// Free share of the position range, half of it at each end.
+    pub margin: f64,
+    /// Used share of the velocity limit; its square of the acceleration limit, as if time ran slower.
+    pub speed: f64,
+}
+
+impl Room {
+    /// The limits themselves.
+    pub(super) const ALL: Self = Self {
+        margin: 0.0,
+        speed: 1.0,
+    };
+
+    /// # Errors
+    /// [`ExciteError::Option`] if a share is invalid.
+    pub(super) fn new(margin: f64, speed: f64) -> Result<Self, ExciteError> {
+        if !(0.0..=0.95).contains(&margin) {
+            return Err(wrong(
+                "margin",
+                margin.to_string(),
+                "it must be a share of the position range between 0 and 0.95".into(),
+            ));
+        }
+        if !(speed > 0.0 && speed <= 1.0) {
+            return Err(wrong(
+                "speed share",
+                speed.to_string(),
+                "it must be above 0 and at most 1".into(),
+            ));
+        }
+        Ok(Self { margin, speed })
+    }
+
+    /// Returns the reference's position range; the limit itself on a side where `start` is already in the margin.
+    fn positions(&self, [low, high]: [f64; 2], start: Option<f64>) -> [f64; 2] {
+        let free = 0.5 * self.margin * (high - low);
+        let (inner_low, inner_high) = (low + free, high - free);
+        match start {
+            Some(at) if low < at && at <= inner_low => [low, inner_high],
+            Some(at) if inner_high <= at && at < high => [inner_low, high],
+            _ => [inner_low, inner_high],
+        }
+    }
+}
+
+/// Returns the limits of all joints minus the controller's margin, and notes on missing limits.
+pub(super) fn bounds_of(
+    robot: &Robot,
+    room: Room,
+    start: Option<&[f64]>,
+) -> Result<(Vec<Bounds>, Vec<String>), ExciteError> {
+    let mut notes = Vec::new();
+    let mut list = Vec::new();
+    let mut boundless = Vec::new();
+    let mut limitless = Vec::new();
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let Some(limits) = joint.limits.as_ref() else {
+            limitless.push(joint.name.clone());
+            continue;
+        };
+        let [mut low, mut high] = limits.for_motions();
+        if !low.is_finite() || !high.is_finite() {
+            (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
+            notes.push(format!(
+                "Joint \"{}\" turns endlessly; the motion stays within one turn, -pi to pi.",
+                joint.name
+            ));
+        } else {
+            let stated = [low, high];
+            let at = start.and_then(|s| s.get(j).copied());
+            [low, high] = room.positions(stated, at);
+            if room.margin > 0.0 && (low == stated[0] || high == stated[1]) {
+                notes.push(format!(
+                    "Joint \"{}\" starts within the margin of its position limit; on that side the motion keeps the limit itself.",
+                    joint.name
+                ));
+            }
+        }
+        // A value beyond any drive often means "no limit"; a row weighted by it would be lost.
+        let reachable = |limit: &f64| sound(*limit);
+        let acceleration = limits
+            .acceleration
+            .filter(reachable)
+            .map(|a| a * room.speed.powi(2));
+        if acceleration.is_none() {
+            boundless.push(joint.name.as_str());
+        }
+        // The fastest motion: from rest over the whole range to rest, at the highest acceleration.
+        let within = acceleration.map_or(f64::INFINITY, |a| (a * (high - low)).sqrt());
+        let stated = room.speed * limits.velocity;
+        let velocity = stated.min(within);
+        if velocity > FASTEST {
+            return Err(ExciteError::Boundless {
+                joint: joint.name.clone(),
+                velocity,
+            });
+        }
+        if velocity < stated {
+            notes.push(format!(
+                "Joint \"{}\" cannot reach its velocity limit within its range at its acceleration limit; the motion is \
+                 sized by the {velocity:.3} that it can reach (SI units).",
+                joint.name
+            ));
+        }
+        list.push(Bounds {
+            low,
+            high,
+            velocity,
+            acceleration,
+            torque: limits.torque.filter(reachable),
+            driven: [f64::INFINITY; 2],
+        });
+    }
+    if !limitless.is_empty() {
+        return Err(ExciteError::NoLimits { joints: limitless });
+    }
+    if !boundless.is_empty() {
+        notes.push(format!(
+            "No acceleration limit in [joint.limits] of {}; acceleration is bounded by velocity and harmonics only.",
+            named(&boundless)
+        ));
+    }
+    drive(robot, &mut list)?;
+    Ok((list, notes))
+}
+
+/// Sets the values that torque limits allow mid-range, if links are described and acceleration limits are not.
+fn drive(robot: &Robot, list: &mut [Bounds]) -> Result<(), ExciteError> {
+    let model = Model::from_robot(robot)?;
+    if prior(robot, &model).is_err() {
+        return Ok(());
+    }
+    let middle: Vec<f64> = list.iter().map(Bounds::middle).collect();
+    let mut mass = vec![0.0; middle.len().pow(2)];
+    model.inertia_matrix(&middle, &mut mass)?;
+    for (j, bounds) in list.iter_mut().enumerate() {
+        if bounds.acceleration.is_some() {
+            continue;
+        }
+        let viscous = model.parameters[j][column::VISCOUS];
+        let reach = |per: f64| match bounds.torque {
+            Some(torque) if per > 0.0 => torque / per,
+            _ => f64::INFINITY,
+        };
+        bounds.driven = [reach(viscous), reach(mass[j * (middle.len() + 1)])];
+    }
+    Ok(())
+}
+
+/// "joint \"a\"", "joints \"a\", \"b\"".
+pub(super) fn named(joints: &[&str]) -> String {
+    let quoted: Vec<String> = joints.iter().map(|name| format!("\"{name}\"")).collect();
+    let plural = if joints.len() == 1 { "" } else { "s" };
+    format!("joint{plural} {}", quoted.join(", "))
+}
+
+/// Returns the prior parameters if every link has its own; otherwise the name of the first joint without.
+pub(super) fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>, String> {
+    match robot.joints.iter().find(|j| j.inertial.is_none()) {
+        Some(joint) => Err(joint.name.clone()),
+        None => Ok(model.parameters.clone()),
+    }
+}

@@ -1,0 +1,91 @@
+//! The period of a motion, and the times that follow from it.
+
+use rig_shared::trajectory::HARMONICS;
+
+use crate::bounds::{Bounds, Room, bounds_of};
+use crate::error::wrong;
+use crate::schedule::Schedule;
+use crate::{ExciteError, Options};
+use rig_model::robot::Robot;
+
+/// Shortest chosen period, s. Limits that mean "none" would give a motion of a fraction of a second, too short to
+/// settle and to record.
+const SHORTEST: f64 = 1.0;
+
+/// Returns a period whose harmonics can use the limits. The fundamental is slow enough to sweep the position range at
+/// the highest velocity. The fastest harmonic is at most where highest velocity and acceleration meet. The longest over
+/// the joints, rounded up to 0.1 s, at least 1 s. The highest values are the limits. Without an acceleration limit they
+/// are the torque limit's values, with the described inertia and viscous friction.
+pub fn default_period(robot: &Robot, harmonics: usize) -> Result<f64, ExciteError> {
+    period_within(&bounds_of(robot, Room::ALL, None)?.0, harmonics)
+}
+
+fn period_within(bounds: &[Bounds], harmonics: usize) -> Result<f64, ExciteError> {
+    use core::f64::consts::TAU;
+    let mut period = SHORTEST;
+    for bounds in bounds {
+        let [velocity, acceleration] = bounds.driven;
+        let acceleration = bounds
+            .acceleration
+            .map_or(acceleration, |a| a.min(acceleration));
+        let within = (acceleration * (bounds.high - bounds.low)).sqrt();
+        let velocity = velocity.min(bounds.velocity).min(within);
+        period = period
+            .max(TAU * bounds.half() / velocity)
+            .max(TAU * harmonics as f64 * velocity / acceleration);
+    }
+    // Rounding errors must not raise an exact tenth to the next.
+    Ok((period * 10.0 - 1e-9).ceil() / 10.0)
+}
+
+fn micros(name: &'static str, seconds: f64) -> Result<u32, ExciteError> {
+    let micros = (seconds * 1e6).round();
+    // An hour: the trajectory's own times are 32 bits of microseconds.
+    if (1e3..=3.6e9).contains(&micros) {
+        Ok(micros as u32)
+    } else {
+        Err(ExciteError::Option {
+            name,
+            value: seconds.to_string(),
+            right: "it must be between 0.001 and 3600 s".into(),
+        })
+    }
+}
+
+/// Returns the times of a motion from the options, with the period from the limits if it is not given.
+pub(super) fn schedule_of(bounds: &[Bounds], options: &Options) -> Result<Schedule, ExciteError> {
+    if !(1..=HARMONICS).contains(&options.harmonics) {
+        return Err(wrong(
+            "number of harmonics",
+            options.harmonics.to_string(),
+            format!("it must be between 1 and {HARMONICS}"),
+        ));
+    }
+    for (name, count) in [
+        ("number of starts", options.starts),
+        ("number of periods", u32::from(options.periods)),
+    ] {
+        if count == 0 {
+            return Err(wrong(name, "0".into(), "there must be at least one".into()));
+        }
+    }
+    let period = match options.period {
+        Some(period) => period,
+        None => period_within(bounds, options.harmonics)?,
+    };
+    let period_us = micros("period", period)?;
+    let ramp_us = micros("ramp", options.ramp.unwrap_or(period))?;
+    if ramp_us / 4 > period_us {
+        return Err(wrong(
+            "ramp",
+            format!("{} s", f64::from(ramp_us) * 1e-6),
+            format!("it must not be longer than four periods of {period} s"),
+        ));
+    }
+    Ok(Schedule {
+        period_us,
+        ramp_us,
+        periods: options.periods,
+        harmonics: options.harmonics,
+    })
+}
