@@ -7,6 +7,7 @@
 
 use rig_shared::multibody::{COLUMNS, Chain, inverse_dynamics, point_position};
 use rig_shared::scalar::Real;
+use rig_shared::trajectory::Trajectory;
 use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::ExciteError;
@@ -77,124 +78,228 @@ pub(super) fn reach(
     motions: &[JointMotion],
     chain: &Chain<Interval>,
 ) -> Result<Reached, ExciteError> {
-    let n = motions.len();
     let schedule = &frame.schedule;
-    let trajectories: Vec<_> = motions
-        .iter()
-        .map(|m| schedule.trajectory(&m.coefficients))
-        .collect();
-    let rows: Option<Vec<[Interval; COLUMNS]>> = frame
-        .parameters
-        .as_ref()
-        .map(|rows| rows.iter().map(|row| row.map(Interval::from_f64)).collect());
-    let mut reaches: Vec<Reach> = motions
-        .iter()
-        .map(|m| Reach {
-            position: [m.base, m.base],
-            velocity: 0.0,
-            acceleration: 0.0,
-            torque: rows.as_ref().map(|_| 0.0),
-        })
-        .collect();
-    let mut combined = vec![[f64::INFINITY, f64::NEG_INFINITY]; frame.combined.len()];
-    let mut motors = vec![Interval::default(); n * n * MOTOR_COLUMNS];
-    let mut heights = vec![f64::INFINITY; frame.planes.len()];
     let ramp = f64::from(schedule.ramp_us) * 1e-6;
     let period = f64::from(schedule.period_us) * 1e-6;
     let whole = if schedule.periods > 0 { period } else { 0.0 };
     let down = ramp + period * f64::from(schedule.periods);
     let per_second = (CELLS * schedule.harmonics) as f64 / period;
-    let mut state = vec![[Interval::default(); 3]; n];
-    let mut tau = vec![Interval::default(); n];
-    let mut jacobian = vec![[0.0; 3]; n];
+    let mut proof = Proof::new(frame, motions, chain);
     // One period represents all of them.
-    for (from, length, on_ramp) in [(0.0, ramp, true), (ramp, whole, false), (down, ramp, true)] {
+    for (from, length, ramp) in [
+        (0.0, ramp, Some(ramp)),
+        (ramp, whole, None),
+        (down, ramp, Some(ramp)),
+    ] {
         let cells = (length * per_second).ceil() as usize;
         let h = length / cells.max(1) as f64;
-        let slack: Vec<[f64; 3]> = motions
+        proof.cover(&Segment {
+            from,
+            ramp,
+            cells,
+            h,
+        })?;
+    }
+    Ok(proof.reached)
+}
+
+/// A part of the motion: a ramp or one whole period.
+struct Segment {
+    /// Start, s.
+    from: f64,
+    /// Length of the ramp, s; none for the period at full amplitude.
+    ramp: Option<f64>,
+    /// Number of cells.
+    cells: usize,
+    /// Length of a cell, s.
+    h: f64,
+}
+
+/// Bounds of a motion, extended cell by cell.
+struct Proof<'a> {
+    frame: &'a Frame,
+    chain: &'a Chain<Interval>,
+    motions: &'a [JointMotion],
+    trajectories: Vec<Trajectory<f64>>,
+    /// Prior parameters, if the description has them all.
+    rows: Option<Vec<[Interval; COLUMNS]>>,
+    /// Bounds so far.
+    reached: Reached,
+    /// Position, velocity and acceleration of each joint within the cell.
+    state: Vec<[Interval; 3]>,
+    motors: Vec<Interval>,
+    tau: Vec<Interval>,
+    jacobian: Vec<[f64; 3]>,
+}
+
+impl<'a> Proof<'a> {
+    /// Creates the bounds of the start, at rest.
+    fn new(frame: &'a Frame, motions: &'a [JointMotion], chain: &'a Chain<Interval>) -> Self {
+        let n = motions.len();
+        let rows: Option<Vec<[Interval; COLUMNS]>> = frame
+            .parameters
+            .as_ref()
+            .map(|rows| rows.iter().map(|row| row.map(Interval::from_f64)).collect());
+        let joints = motions
             .iter()
-            .map(|m| {
-                [2, 3, 4].map(|order| {
-                    let ramp = on_ramp.then_some(ramp);
-                    derivative_bound(order, schedule.omega(), &m.coefficients, ramp) * h * h / 8.0
-                })
+            .map(|m| Reach {
+                position: [m.base, m.base],
+                velocity: 0.0,
+                acceleration: 0.0,
+                torque: rows.as_ref().map(|_| 0.0),
             })
             .collect();
-        let at = |joint: usize, k: usize| {
-            // At the end of a segment the next one begins, continuously.
-            let here = trajectories[joint].at(from + h * k as f64);
-            [
-                motions[joint].base + here.position,
-                here.velocity,
-                here.acceleration,
-            ]
-        };
-        let mut heights_at = |q: &[[f64; 3]]| -> Result<Vec<f64>, ExciteError> {
-            let q: Vec<f64> = q.iter().map(|state| state[0]).collect();
-            let mut list = Vec::with_capacity(frame.planes.len());
-            for plane in &frame.planes {
-                let at = point_position(&frame.plain, &q, plane.link, plane.point, &mut jacobian)?;
-                list.push(plane.height(at));
-            }
-            Ok(list)
-        };
-        let mut before: Vec<[f64; 3]> = (0..n).map(|j| at(j, 0)).collect();
-        let mut heights_before = heights_at(&before)?;
-        for k in 1..=cells {
-            for j in 0..n {
-                let now = at(j, k);
-                for d in 0..3 {
-                    state[j][d] = Interval::hull(before[j][d], now[d]).widened(slack[j][d]);
-                }
-                before[j] = now;
-                let reach = &mut reaches[j];
-                let [q, qd, qdd] = state[j];
-                reach.position[0] = reach.position[0].min(q.low);
-                reach.position[1] = reach.position[1].max(q.high);
-                reach.velocity = reach.velocity.max(qd.magnitude());
-                reach.acceleration = reach.acceleration.max(qdd.magnitude());
-            }
-            for ([low, high], limit) in combined.iter_mut().zip(&frame.combined) {
-                let mut sum = Interval::default();
-                for (weight, s) in limit.weights.iter().zip(&state) {
-                    sum += Interval::from_f64(*weight) * s[0];
-                }
-                (*low, *high) = (low.min(sum.low), high.max(sum.high));
-            }
-            if let Some(rows) = &rows {
-                let [q, qd, qdd] =
-                    [0, 1, 2].map(|d| state.iter().map(|s| s[d]).collect::<Vec<_>>());
-                inverse_dynamics(chain, rows, &q, &qd, &qdd, &mut tau)?;
-                if let Some(drives) = &frame.drives {
-                    drives
-                        .enclosing
-                        .motor_columns(&q, &qd, &qdd, &mut motors)
-                        .map_err(SimulateError::from)?;
-                    for (t, row) in tau.iter_mut().zip(motors.chunks_exact(n * MOTOR_COLUMNS)) {
-                        for (column, value) in row.iter().zip(&drives.parameters) {
-                            *t += *column * Interval::from_f64(*value);
-                        }
-                    }
-                }
-                for (reach, t) in reaches.iter_mut().zip(&tau) {
-                    reach.torque = reach.torque.map(|most| most.max(t.magnitude()));
-                }
-            }
-            if !frame.planes.is_empty() {
-                let heights_now = heights_at(&before)?;
-                for (p, plane) in frame.planes.iter().enumerate() {
-                    let bend = plane.acceleration_bound(&state) * h * h / 8.0;
-                    let lowest = heights_before[p].min(heights_now[p]) - bend;
-                    // Allow for rounding errors of sums of a few lengths.
-                    heights[p] = heights[p].min(lowest - 1e-12 * plane.reach);
-                }
+        Self {
+            frame,
+            chain,
+            motions,
+            trajectories: motions
+                .iter()
+                .map(|m| frame.schedule.trajectory(&m.coefficients))
+                .collect(),
+            rows,
+            reached: Reached {
+                joints,
+                combined: vec![[f64::INFINITY, f64::NEG_INFINITY]; frame.combined.len()],
+                heights: vec![f64::INFINITY; frame.planes.len()],
+            },
+            state: vec![[Interval::default(); 3]; n],
+            motors: vec![Interval::default(); n * n * MOTOR_COLUMNS],
+            tau: vec![Interval::default(); n],
+            jacobian: vec![[0.0; 3]; n],
+        }
+    }
+
+    /// Extends the bounds by all cells of a segment.
+    fn cover(&mut self, segment: &Segment) -> Result<(), ExciteError> {
+        let slack = self.slack(segment);
+        let mut before: Vec<[f64; 3]> = (0..self.motions.len())
+            .map(|j| self.at(segment, j, 0))
+            .collect();
+        let mut heights_before = self.heights_at(&before)?;
+        for k in 1..=segment.cells {
+            self.enclose(segment, k, &slack, &mut before);
+            self.cover_cranks();
+            self.cover_torques()?;
+            if !self.frame.planes.is_empty() {
+                let heights_now = self.heights_at(&before)?;
+                self.cover_planes(segment.h, &heights_before, &heights_now);
                 heights_before = heights_now;
             }
         }
+        Ok(())
     }
-    Ok(Reached {
-        joints: reaches,
-        combined,
-        heights,
-    })
+
+    /// Returns per joint and order the largest deviation from a straight line within a cell.
+    fn slack(&self, segment: &Segment) -> Vec<[f64; 3]> {
+        let (omega, h) = (self.frame.schedule.omega(), segment.h);
+        self.motions
+            .iter()
+            .map(|m| {
+                [2, 3, 4].map(|order| {
+                    derivative_bound(order, omega, &m.coefficients, segment.ramp) * h * h / 8.0
+                })
+            })
+            .collect()
+    }
+
+    /// Returns position, velocity and acceleration of a joint at the end of cell `k`.
+    fn at(&self, segment: &Segment, joint: usize, k: usize) -> [f64; 3] {
+        // At the end of a segment the next one begins, continuously.
+        let here = self.trajectories[joint].at(segment.from + segment.h * k as f64);
+        [
+            self.motions[joint].base + here.position,
+            here.velocity,
+            here.acceleration,
+        ]
+    }
+
+    /// Returns the distance of each point along the normal of its plane.
+    fn heights_at(&mut self, q: &[[f64; 3]]) -> Result<Vec<f64>, ExciteError> {
+        let frame = self.frame;
+        let q: Vec<f64> = q.iter().map(|state| state[0]).collect();
+        let mut list = Vec::with_capacity(frame.planes.len());
+        for plane in &frame.planes {
+            let at = point_position(
+                &frame.plain,
+                &q,
+                plane.link,
+                plane.point,
+                &mut self.jacobian,
+            )?;
+            list.push(plane.height(at));
+        }
+        Ok(list)
+    }
+
+    /// Encloses the motion within cell `k` and extends the joints' bounds; `before` moves on to the cell's end.
+    fn enclose(
+        &mut self,
+        segment: &Segment,
+        k: usize,
+        slack: &[[f64; 3]],
+        before: &mut [[f64; 3]],
+    ) {
+        for j in 0..before.len() {
+            let now = self.at(segment, j, k);
+            for d in 0..3 {
+                self.state[j][d] = Interval::hull(before[j][d], now[d]).widened(slack[j][d]);
+            }
+            before[j] = now;
+            let reach = &mut self.reached.joints[j];
+            let [q, qd, qdd] = self.state[j];
+            reach.position[0] = reach.position[0].min(q.low);
+            reach.position[1] = reach.position[1].max(q.high);
+            reach.velocity = reach.velocity.max(qd.magnitude());
+            reach.acceleration = reach.acceleration.max(qdd.magnitude());
+        }
+    }
+
+    /// Extends the bounds of the cranks by the cell.
+    fn cover_cranks(&mut self) {
+        let limits = &self.frame.combined;
+        for ([low, high], limit) in self.reached.combined.iter_mut().zip(limits) {
+            let mut sum = Interval::default();
+            for (weight, s) in limit.weights.iter().zip(&self.state) {
+                sum += Interval::from_f64(*weight) * s[0];
+            }
+            (*low, *high) = (low.min(sum.low), high.max(sum.high));
+        }
+    }
+
+    /// Extends the bounds of the torques by the cell, if the prior parameters are known.
+    fn cover_torques(&mut self) -> Result<(), ExciteError> {
+        let Some(rows) = &self.rows else {
+            return Ok(());
+        };
+        let [q, qd, qdd] = [0, 1, 2].map(|d| self.state.iter().map(|s| s[d]).collect::<Vec<_>>());
+        inverse_dynamics(self.chain, rows, &q, &qd, &qdd, &mut self.tau)?;
+        if let Some(drives) = &self.frame.drives {
+            drives
+                .enclosing
+                .motor_columns(&q, &qd, &qdd, &mut self.motors)
+                .map_err(SimulateError::from)?;
+            let width = q.len() * MOTOR_COLUMNS;
+            for (t, row) in self.tau.iter_mut().zip(self.motors.chunks_exact(width)) {
+                for (column, value) in row.iter().zip(&drives.parameters) {
+                    *t += *column * Interval::from_f64(*value);
+                }
+            }
+        }
+        for (reach, t) in self.reached.joints.iter_mut().zip(&self.tau) {
+            reach.torque = reach.torque.map(|most| most.max(t.magnitude()));
+        }
+        Ok(())
+    }
+
+    /// Extends the bounds of the points' distances by a cell of length `h` between two instants.
+    fn cover_planes(&mut self, h: f64, before: &[f64], now: &[f64]) {
+        for (p, plane) in self.frame.planes.iter().enumerate() {
+            let bend = plane.acceleration_bound(&self.state) * h * h / 8.0;
+            let lowest = before[p].min(now[p]) - bend;
+            // Allow for rounding errors of sums of a few lengths.
+            let heights = &mut self.reached.heights;
+            heights[p] = heights[p].min(lowest - 1e-12 * plane.reach);
+        }
+    }
 }

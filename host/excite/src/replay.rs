@@ -62,19 +62,7 @@ pub fn replay(
     seed: u64,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Replay, ExciteError> {
-    for (name, value) in [
-        ("position noise", noise.position),
-        ("velocity noise", noise.velocity),
-        ("torque noise", noise.torque),
-    ] {
-        if !(value >= 0.0 && value.is_finite()) {
-            return Err(ExciteError::Option {
-                name,
-                value: value.to_string(),
-                right: "it is a standard deviation: 0 or more".into(),
-            });
-        }
-    }
+    check_noise(noise)?;
     let model = Model::from_robot(robot)?;
     let start: Vec<f64> = reference
         .position
@@ -82,27 +70,11 @@ pub fn replay(
         .map(|q| q.first().copied().unwrap_or(0.0))
         .collect();
     let (controllers, stand_ins) = controllers(robot, &model, &start)?;
-    let mut notes = Vec::new();
-    if !stand_ins.is_empty() {
-        notes.push(format!(
-            "No [joint.controller] is described for {}; a stand-in of {STAND_IN_BANDWIDTH} Hz bandwidth with feed-forward \
-             of the reference ran {}.",
-            stand_ins.join(", "),
-            if stand_ins.len() == 1 { "it" } else { "each" }
-        ));
-    }
+    let mut notes: Vec<String> = stand_in_note(&stand_ins).into_iter().collect();
     notes.extend(model.effects.unsimulated());
     let (step, cells) = cells(reference.period);
     let settling = (SETTLING / reference.period).ceil() as usize * cells;
-    let asked: Vec<Vec<f64>> = reference
-        .position
-        .iter()
-        .zip(&start)
-        .map(|(q, first)| {
-            let rest = std::iter::repeat_n(*first, settling);
-            rest.chain(refined(q, cells)).collect()
-        })
-        .collect();
+    let asked = asked_positions(reference, &start, settling, cells);
     let total = asked.iter().map(Vec::len).min().unwrap_or(0);
     let gains = controllers.iter().zip(&robot.joints).map(|(own, joint)| {
         let stand_in = joint.controller.is_none();
@@ -123,6 +95,73 @@ pub fn replay(
     let mut motion = closed_loop(robot, &model, &controllers, &inputs, |done| {
         progress(done as u64, total as u64);
     })?;
+    notes.extend(saturation_notes(robot, &motion, step, total));
+    notes.extend(tracking_notes(robot, &motion, &asked));
+    for series in [&mut motion.q, &mut motion.qd, &mut motion.tau] {
+        for list in series {
+            *list = list.iter().skip(settling).step_by(cells).copied().collect();
+        }
+    }
+    disturb(&mut motion, noise, seed);
+    Ok(Replay {
+        period: reference.period,
+        reference: reference.position.clone(),
+        motion,
+        notes,
+    })
+}
+
+/// Rejects noise that is no standard deviation.
+fn check_noise(noise: Noise) -> Result<(), ExciteError> {
+    for (name, value) in [
+        ("position noise", noise.position),
+        ("velocity noise", noise.velocity),
+        ("torque noise", noise.torque),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(ExciteError::Option {
+                name,
+                value: value.to_string(),
+                right: "it is a standard deviation: 0 or more".into(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Returns a note on joints with a substitute for the controller, if there are any.
+fn stand_in_note(stand_ins: &[String]) -> Option<String> {
+    (!stand_ins.is_empty()).then(|| {
+        format!(
+            "No [joint.controller] is described for {}; a stand-in of {STAND_IN_BANDWIDTH} Hz bandwidth with feed-forward \
+             of the reference ran {}.",
+            stand_ins.join(", "),
+            if stand_ins.len() == 1 { "it" } else { "each" }
+        )
+    })
+}
+
+/// Returns the reference at every cell, after `settling` cells at its start.
+fn asked_positions(
+    reference: &SampledReference,
+    start: &[f64],
+    settling: usize,
+    cells: usize,
+) -> Vec<Vec<f64>> {
+    reference
+        .position
+        .iter()
+        .zip(start)
+        .map(|(q, first)| {
+            let rest = std::iter::repeat_n(*first, settling);
+            rest.chain(refined(q, cells)).collect()
+        })
+        .collect()
+}
+
+/// Returns notes on joints at their torque limit, of `total` steps.
+fn saturation_notes(robot: &Robot, motion: &Motion, step: f64, total: usize) -> Vec<String> {
+    let mut notes = Vec::new();
     for (joint, cut) in robot.joints.iter().zip(&motion.saturated) {
         if *cut > 0 {
             notes.push(format!(
@@ -133,7 +172,13 @@ pub fn replay(
             ));
         }
     }
-    for ((joint, q), asked) in robot.joints.iter().zip(&motion.q).zip(&asked) {
+    notes
+}
+
+/// Returns notes on joints with a large tracking error.
+fn tracking_notes(robot: &Robot, motion: &Motion, asked: &[Vec<f64>]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for ((joint, q), asked) in robot.joints.iter().zip(&motion.q).zip(asked) {
         let (off, moved) = followed(q, asked);
         if off > OFF * moved {
             notes.push(format!(
@@ -145,28 +190,23 @@ pub fn replay(
             ));
         }
     }
-    for series in [&mut motion.q, &mut motion.qd, &mut motion.tau] {
-        for list in series {
-            *list = list.iter().skip(settling).step_by(cells).copied().collect();
-        }
-    }
+    notes
+}
+
+/// Adds noise to the measured columns.
+fn disturb(motion: &mut Motion, noise: Noise, seed: u64) {
     let mut random = Pcg64::seed_from_u64(seed);
-    let mut disturb = |series: &mut Vec<Vec<f64>>, deviation: f64| {
+    for (series, deviation) in [
+        (&mut motion.q, noise.position),
+        (&mut motion.qd, noise.velocity),
+        (&mut motion.tau, noise.torque),
+    ] {
         for list in series {
             for value in list.iter_mut() {
                 *value += drawn(&mut random, deviation);
             }
         }
-    };
-    disturb(&mut motion.q, noise.position);
-    disturb(&mut motion.qd, noise.velocity);
-    disturb(&mut motion.tau, noise.torque);
-    Ok(Replay {
-        period: reference.period,
-        reference: reference.position.clone(),
-        motion,
-        notes,
-    })
+    }
 }
 
 /// Draws noise of a deviation, also for 0, so that one noise does not change the numbers of another.

@@ -28,7 +28,7 @@ const FINALIST_SHARE: usize = 6;
 const LEAST_FINALISTS: usize = 3;
 /// Samples per period of the fastest harmonic in the first improvement: enough to rank the starts.
 const COARSE: usize = 16;
-/// The same in the refinement; see `MARGIN` in `problem/constraints.rs`.
+/// The same in the refinement; see `MARGIN` in `problem/penalty.rs`.
 const FINE: usize = 48;
 /// Samples per period of the fastest harmonic for the reported values.
 const REPORT_SAMPLES: usize = 200;

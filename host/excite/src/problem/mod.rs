@@ -8,7 +8,9 @@
 mod constraints;
 mod motion;
 mod objective;
+mod penalty;
 mod rows;
 mod state;
+mod torque;
 
 pub(super) use state::Problem;

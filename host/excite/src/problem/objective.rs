@@ -2,12 +2,18 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::constraints::Pass;
+use super::penalty::Pass;
 use super::state::Problem;
 use crate::ExciteError;
 use crate::optimise::{Objective, Round};
 
 impl Problem<'_> {
+    /// Returns the sum of all penalties, and adds their derivative by the motion or renews the multipliers.
+    fn penalties(&mut self, pass: Pass) -> Result<f64, ExciteError> {
+        let kinematic = self.kinematic(pass) + self.cranks(pass);
+        Ok(kinematic + self.torque_and_rows(pass)? + self.cartesian(pass)?)
+    }
+
     /// Returns the criterion and the penalties, and sets their derivative by the motion.
     fn objective(&mut self, x: &DVector<f64>) -> Result<f64, ExciteError> {
         self.place(x);
