@@ -117,14 +117,72 @@ fn at_most<T>(name: &str, list: &[T], most: usize) -> Result<(), String> {
     }
 }
 
+/// Returns the whole microseconds of several times.
+fn all_micros(name: &str, list: &[f64]) -> Result<Vec<u32>, String> {
+    list.iter().map(|s| micros(name, *s)).collect()
+}
+
+/// Returns the sweep of a name.
+fn sweep_of(name: &str) -> Result<Sweep, String> {
+    match name {
+        "linear" => Ok(Sweep::Linear),
+        "logarithmic" => Ok(Sweep::Logarithmic),
+        other => Err(format!(
+            "sweep is \"{other}\", but it must be \"linear\" or \"logarithmic\""
+        )),
+    }
+}
+
+/// Returns a Fourier series; `period` and `ramp` in s.
+fn fourier(
+    period: f64,
+    periods: u16,
+    ramp: f64,
+    sine: &[f64],
+    cosine: &[f64],
+) -> Result<Fourier<f64>, String> {
+    at_most("sine", sine, HARMONICS)?;
+    at_most("cosine", cosine, HARMONICS)?;
+    Ok(Fourier {
+        period_us: micros("period", period)?,
+        periods,
+        ramp_us: micros("ramp", ramp)?,
+        sine: sine.iter().copied().collect(),
+        cosine: cosine.iter().copied().collect(),
+    })
+}
+
+/// Returns a friction sweep; all times in s.
+fn friction_sweep(
+    half_span: f64,
+    cruise: &[f64],
+    [ramp, dwell, lead]: [f64; 3],
+) -> Result<FrictionSweep<f64>, String> {
+    at_most("cruise", cruise, SPEEDS)?;
+    Ok(FrictionSweep {
+        half_span,
+        cruise_us: all_micros("cruise", cruise)?.into_iter().collect(),
+        ramp_us: micros("ramp", ramp)?,
+        dwell_us: micros("dwell", dwell)?,
+        lead_us: micros("lead", lead)?,
+    })
+}
+
 impl MotionText {
+    /// Returns the motion, checked.
     fn trajectory(&self) -> Result<Trajectory<f64>, String> {
-        let all = |name: &str, list: &[f64]| {
-            list.iter()
-                .map(|s| micros(name, *s))
-                .collect::<Result<Vec<u32>, String>>()
-        };
-        let trajectory = match self {
+        let trajectory = self.stated()?;
+        trajectory.validate().map_err(|e| {
+            format!(
+                "{e}; times and amplitudes must be finite, above zero and fit each other (see `rig excite --help`)"
+            )
+        })?;
+        Ok(trajectory)
+    }
+
+    /// Returns the motion as the file states it.
+    fn stated(&self) -> Result<Trajectory<f64>, String> {
+        Ok(match self {
             Self::Hold { duration } => Trajectory::Hold(micros("duration", *duration)?),
             Self::Fourier {
                 period,
@@ -132,17 +190,7 @@ impl MotionText {
                 ramp,
                 sine,
                 cosine,
-            } => {
-                at_most("sine", sine, HARMONICS)?;
-                at_most("cosine", cosine, HARMONICS)?;
-                Trajectory::Fourier(Fourier {
-                    period_us: micros("period", *period)?,
-                    periods: *periods,
-                    ramp_us: micros("ramp", *ramp)?,
-                    sine: sine.iter().copied().collect(),
-                    cosine: cosine.iter().copied().collect(),
-                })
-            }
+            } => Trajectory::Fourier(fourier(*period, *periods, *ramp, sine, cosine)?),
             Self::Chirp {
                 start_hz,
                 end_hz,
@@ -156,15 +204,7 @@ impl MotionText {
             } => Trajectory::Chirp(Chirp {
                 start_hz: *start_hz,
                 end_hz: *end_hz,
-                sweep: match sweep.as_str() {
-                    "linear" => Sweep::Linear,
-                    "logarithmic" => Sweep::Logarithmic,
-                    other => {
-                        return Err(format!(
-                            "sweep is \"{other}\", but it must be \"linear\" or \"logarithmic\""
-                        ));
-                    }
-                },
+                sweep: sweep_of(sweep)?,
                 duration_us: micros("duration", *duration)?,
                 ramp_us: micros("ramp", *ramp)?,
                 amplitude: *amplitude,
@@ -194,7 +234,7 @@ impl MotionText {
                 Trajectory::SlowReversals(SlowReversals {
                     speed: *speed,
                     half_turn_us: micros("half_turn", *half_turn)?,
-                    quarter_us: all("quarter", quarter)?.into_iter().collect(),
+                    quarter_us: all_micros("quarter", quarter)?.into_iter().collect(),
                     cycles: *cycles,
                 })
             }
@@ -205,23 +245,53 @@ impl MotionText {
                 dwell,
                 lead,
             } => {
-                at_most("cruise", cruise, SPEEDS)?;
-                Trajectory::FrictionSweep(FrictionSweep {
-                    half_span: *half_span,
-                    cruise_us: all("cruise", cruise)?.into_iter().collect(),
-                    ramp_us: micros("ramp", *ramp)?,
-                    dwell_us: micros("dwell", *dwell)?,
-                    lead_us: micros("lead", *lead)?,
-                })
+                let times = [*ramp, *dwell, *lead];
+                Trajectory::FrictionSweep(friction_sweep(*half_span, cruise, times)?)
             }
-        };
-        trajectory.validate().map_err(|e| {
-            format!(
-                "{e}; times and amplitudes must be finite, above zero and fit each other (see `rig excite --help`)"
-            )
-        })?;
-        Ok(trajectory)
+        })
     }
+}
+
+/// Returns the record of a design; the error has the position in the text.
+fn design_of(text: &Spanned<DesignText>) -> Result<DesignRecord, (usize, String)> {
+    let d = text.get_ref();
+    let criterion = Criterion::from_name(&d.criterion).ok_or_else(|| {
+        (
+            text.span().start,
+            format!(
+                "criterion is \"{}\", but it must be cond, min-singular or d-optimal",
+                d.criterion
+            ),
+        )
+    })?;
+    Ok(DesignRecord {
+        criterion,
+        value: d.value,
+        condition_number: d.condition_number,
+        seed: d.seed,
+    })
+}
+
+/// Returns the motion of one joint; the error has the position in the text.
+fn joint_of(joint: &JointText) -> Result<JointTrajectory, (usize, String)> {
+    let start = *joint.start.get_ref();
+    if !start.is_finite() {
+        return Err((
+            joint.start.span().start,
+            format!("start is {start}, but it must be a finite number, in rad or m"),
+        ));
+    }
+    let trajectory = joint.trajectory.get_ref().trajectory().map_err(|message| {
+        (
+            joint.trajectory.span().start,
+            format!("in the trajectory of joint \"{}\", {message}", joint.name),
+        )
+    })?;
+    Ok(JointTrajectory {
+        name: joint.name.clone(),
+        start,
+        trajectory,
+    })
 }
 
 impl TrajectoryFile {
@@ -251,48 +321,16 @@ impl TrajectoryFile {
                 "there is no [[joint]]; a trajectory moves at least one".into(),
             ));
         }
+        let at = |(offset, message)| wrong(offset, message);
         let design = match &file.design {
             None => None,
-            Some(spanned) => {
-                let d = spanned.get_ref();
-                let criterion = Criterion::from_name(&d.criterion).ok_or_else(|| {
-                    wrong(
-                        spanned.span().start,
-                        format!(
-                            "criterion is \"{}\", but it must be cond, min-singular or d-optimal",
-                            d.criterion
-                        ),
-                    )
-                })?;
-                Some(DesignRecord {
-                    criterion,
-                    value: d.value,
-                    condition_number: d.condition_number,
-                    seed: d.seed,
-                })
-            }
+            Some(spanned) => Some(design_of(spanned).map_err(at)?),
         };
-        let mut joints = Vec::new();
-        for joint in &file.joints {
-            let start = *joint.start.get_ref();
-            if !start.is_finite() {
-                return Err(wrong(
-                    joint.start.span().start,
-                    format!("start is {start}, but it must be a finite number, in rad or m"),
-                ));
-            }
-            let trajectory = joint.trajectory.get_ref().trajectory().map_err(|message| {
-                wrong(
-                    joint.trajectory.span().start,
-                    format!("in the trajectory of joint \"{}\", {message}", joint.name),
-                )
-            })?;
-            joints.push(JointTrajectory {
-                name: joint.name.clone(),
-                start,
-                trajectory,
-            });
-        }
+        let joints = file
+            .joints
+            .iter()
+            .map(|joint| joint_of(joint).map_err(at))
+            .collect::<Result<Vec<_>, _>>()?;
         let found = Self {
             robot: file.robot,
             design,
