@@ -6,10 +6,10 @@ use rand::{RngExt, SeedableRng};
 
 use super::*;
 use rig_data::Block;
-use rig_data::prepare::{Choice, InMemory};
+use rig_data::prepare::{Choice, InMemory, PrepareOptions};
 use rig_excite::{Noise, SampledReference, replay};
-use rig_model::robot::{Controller, JointFriction};
-use rig_model::simulate::{Inputs, closed_loop};
+use rig_model::robot::{Controller, JointFriction, Robot};
+use rig_model::simulate::{Inputs, Model, closed_loop};
 
 /// EMPS with the published values (Janot, Gautier & Brunot 2019).
 fn emps() -> Robot {

@@ -6,9 +6,9 @@ use rig_shared::effects::{Effect, Kind};
 use super::controller::regressed;
 use super::*;
 use rig_data::past::in_sessions;
-use rig_data::runs::JointRun;
-use rig_model::robot::{JointFriction, ONE_LINK_TEMPLATE, RobotEffect};
-use rig_model::simulate::closed_loop;
+use rig_data::runs::{JointRun, Run};
+use rig_model::robot::{Controller, JointFriction, ONE_LINK_TEMPLATE, Robot, RobotEffect};
+use rig_model::simulate::{Inputs, Model, closed_loop};
 
 const RATE: f64 = 1000.0;
 
