@@ -1,6 +1,8 @@
 //! The processor's side: the effects of a load, a store and a block of instructions.
 
-use super::{BRIDGE, CONTROL_EXCEPTION, Chip, ChipError, Reading, TIMERS, code_of, timer_index};
+use super::error::ChipError;
+use super::pins::code_of;
+use super::state::{BRIDGE, CONTROL_EXCEPTION, Chip, Reading, TIMERS, timer_index};
 use crate::cost::{REFILL, WAIT_STATES};
 use crate::cpu::{Block, Bus, Masks, Memory};
 use crate::map::{self, Peripheral};
@@ -101,18 +103,7 @@ impl Chip {
             return told(format!("a store of {size} bytes is not modelled there"));
         }
         match peripheral {
-            Peripheral::Tim(number) => {
-                let tim = &mut self.tim[timer_index(number)];
-                tim.advance(now);
-                if matches!(number, 2 | 5) {
-                    self.count_edges();
-                }
-                let ran = self.timer(1).sends_enable();
-                self.timer(number).write(now, offset, value)?;
-                if !ran && self.timer(1).sends_enable() {
-                    self.timer(4).internal_trigger_0(now);
-                }
-            }
+            Peripheral::Tim(number) => self.store_timer(number, offset, value)?,
             Peripheral::Iwdg => self.iwdg.write(now, offset, value)?,
             Peripheral::Pwr => self.pwr.write(offset, value)?,
             Peripheral::Lpuart => self.lpuart.write(now, offset, value)?,
@@ -120,56 +111,13 @@ impl Chip {
             Peripheral::Exti => self.exti.write(offset, value)?,
             Peripheral::Dma(n) => self.dma[usize::from(n) - 1].write(offset, value)?,
             Peripheral::Dmamux => self.dmamux.write(offset, value)?,
-            Peripheral::Rcc => {
-                let changed = self.rcc.write(offset, value)?;
-                if Rcc::is_reset(offset) {
-                    self.reset_held();
-                }
-                if changed {
-                    self.clocks_changed()?;
-                }
-            }
+            Peripheral::Rcc => self.store_clocks(offset, value)?,
             Peripheral::Flash => self.flash.write(now, offset, value)?,
-            Peripheral::Gpio(n) => {
-                // Counts up to now use the pulls up to now.
-                if n == 0 {
-                    self.count_edges();
-                }
-                self.gpio[usize::from(n)].write(offset, value)?;
-                if n == 0 {
-                    self.count_edges();
-                }
-            }
+            Peripheral::Gpio(n) => self.store_port(n, offset, value)?,
             Peripheral::Comp => self.comp.write(offset, value)?,
             Peripheral::Dac3 => self.dac.write(offset, value)?,
-            Peripheral::Adc12 => {
-                let (system, kernel) = (self.period, self.rcc.adc_period());
-                let codes = self.codes();
-                self.adc
-                    .write(now, offset, value, system, kernel, &|channel, held| {
-                        code_of(&codes, channel, held)
-                    })?;
-            }
-            Peripheral::Dwt => match offset {
-                0 => {
-                    let count = u64::from(self.cycles());
-                    let on = value & 1 != 0;
-                    let cycle = now / self.period;
-                    self.cycle_counter = (on, if on { cycle.wrapping_sub(count) } else { count });
-                }
-                4 => {
-                    let cycle = now / self.period;
-                    let start = if self.cycle_counter.0 {
-                        cycle.wrapping_sub(value.into())
-                    } else {
-                        value.into()
-                    };
-                    self.cycle_counter.1 = start;
-                }
-                // LAR: no lock on this core.
-                0xFB0 => {}
-                _ => return Err(Refusal::NoRegister),
-            },
+            Peripheral::Adc12 => self.store_converter(offset, value)?,
+            Peripheral::Dwt => self.store_cycles(offset, value)?,
             Peripheral::Scs => self.nvic.write(now, self.period, offset, size, value)?,
             Peripheral::Dbgmcu => match offset {
                 4..=0x10 => self.debug_unit[offset as usize / 4 - 1] = value,
@@ -182,6 +130,84 @@ impl Chip {
         ) {
             self.update_pins();
             self.update_bridge(now)?;
+        }
+        Ok(())
+    }
+
+    /// Stores to a timer.
+    fn store_timer(&mut self, number: u8, offset: u32, value: u32) -> Result<(), Refusal> {
+        let now = self.work.now;
+        let tim = &mut self.tim[timer_index(number)];
+        tim.advance(now);
+        if matches!(number, 2 | 5) {
+            self.count_edges();
+        }
+        let ran = self.timer(1).sends_enable();
+        self.timer(number).write(now, offset, value)?;
+        if !ran && self.timer(1).sends_enable() {
+            self.timer(4).internal_trigger_0(now);
+        }
+        Ok(())
+    }
+
+    /// Stores to the clock control.
+    fn store_clocks(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
+        let changed = self.rcc.write(offset, value)?;
+        if Rcc::is_reset(offset) {
+            self.reset_held();
+        }
+        if changed {
+            self.clocks_changed()?;
+        }
+        Ok(())
+    }
+
+    /// Stores to a port of pins.
+    fn store_port(&mut self, n: u8, offset: u32, value: u32) -> Result<(), Refusal> {
+        // Counts up to now use the pulls up to now.
+        if n == 0 {
+            self.count_edges();
+        }
+        self.gpio[usize::from(n)].write(offset, value)?;
+        if n == 0 {
+            self.count_edges();
+        }
+        Ok(())
+    }
+
+    /// Stores to the converter.
+    fn store_converter(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
+        let now = self.work.now;
+        let (system, kernel) = (self.period, self.rcc.adc_period());
+        let codes = self.codes();
+        self.adc
+            .write(now, offset, value, system, kernel, &|channel, held| {
+                code_of(&codes, channel, held)
+            })
+    }
+
+    /// Stores to the cycle counter.
+    fn store_cycles(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
+        let now = self.work.now;
+        match offset {
+            0 => {
+                let count = u64::from(self.cycles());
+                let on = value & 1 != 0;
+                let cycle = now / self.period;
+                self.cycle_counter = (on, if on { cycle.wrapping_sub(count) } else { count });
+            }
+            4 => {
+                let cycle = now / self.period;
+                let start = if self.cycle_counter.0 {
+                    cycle.wrapping_sub(value.into())
+                } else {
+                    value.into()
+                };
+                self.cycle_counter.1 = start;
+            }
+            // LAR: no lock on this core.
+            0xFB0 => {}
+            _ => return Err(Refusal::NoRegister),
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! The lines within the chip: interrupts, clocks, triggers, requests to the DMA.
 
-use super::{ADC1_2, Chip, NON_MASKABLE, REQUEST_RX, REQUEST_TX, TIMERS, code_of};
+use super::pins::code_of;
+use super::state::{ADC1_2, Chip, NON_MASKABLE, REQUEST_RX, REQUEST_TX, TIMERS};
 use crate::cpu::Memory;
 use crate::map::Peripheral;
 use crate::peripheral::rcc::Crystal;

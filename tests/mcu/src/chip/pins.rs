@@ -1,6 +1,7 @@
 //! The lines between the chip's pins and the board around it.
 
-use super::{Chip, ChipError};
+use super::error::ChipError;
+use super::state::Chip;
 use crate::board::Bridge;
 use crate::peripheral::Refusal;
 use crate::peripheral::gpio::Function;

@@ -120,17 +120,7 @@ impl Nvic {
             0x400..=0x4EF => self.set_priorities(16 + (offset as usize - 0x400), size, value),
             0xD18..=0xD23 => self.set_priorities(4 + (offset as usize - 0xD18), size, value),
             _ if size != 4 => return told("only whole words of this register are modelled"),
-            0x010 => {
-                if value & !7 != 0 && value & !0x1_0007 != 0 {
-                    return told("SYST_CSR has reserved bits set");
-                }
-                let was = self.tick.control & 1;
-                self.tick.control = value & 7;
-                self.tick.period = if value & 4 != 0 { period } else { 8 * period };
-                if was == 0 && value & 1 != 0 {
-                    self.tick.base = now;
-                }
-            }
+            0x010 => self.control_tick(now, period, value)?,
             0x014 => self.tick.reload = value & 0xFF_FFFF,
             0x018 => {
                 self.tick.base = now;
@@ -140,19 +130,7 @@ impl Nvic {
             0x180..=0x19C => self.bits(offset, 0x180, |s, w| s.enabled[w] &= !value)?,
             0x200..=0x21C => self.bits(offset, 0x200, |s, w| s.pending[w] |= value)?,
             0x280..=0x29C => self.bits(offset, 0x280, |s, w| s.pending[w] &= !value)?,
-            0xD04 => {
-                if value & 1 << 31 != 0 {
-                    return told("NMI by software is not modelled");
-                }
-                for (set, clear, exception) in [(28, 27, PEND_SV), (26, 25, SYS_TICK)] {
-                    if value & 1 << set != 0 {
-                        self.system_pending |= 1 << exception;
-                    }
-                    if value & 1 << clear != 0 {
-                        self.system_pending &= !(1 << exception);
-                    }
-                }
-            }
+            0xD04 => self.pend_by_software(value)?,
             0xD08 => self.vectors = value & 0xFFFF_FF80,
             0xD0C => {
                 if value >> 16 == 0x05FA {
@@ -189,6 +167,36 @@ impl Nvic {
             _ => return Err(Refusal::NoRegister),
         }
         self.choose();
+        Ok(())
+    }
+
+    /// Stores SYST_CSR; `period` is that of the processor's clock.
+    fn control_tick(&mut self, now: Instant, period: u64, value: u32) -> Result<(), Refusal> {
+        if value & !7 != 0 && value & !0x1_0007 != 0 {
+            return told("SYST_CSR has reserved bits set");
+        }
+        let was = self.tick.control & 1;
+        self.tick.control = value & 7;
+        self.tick.period = if value & 4 != 0 { period } else { 8 * period };
+        if was == 0 && value & 1 != 0 {
+            self.tick.base = now;
+        }
+        Ok(())
+    }
+
+    /// Stores ICSR: sets and clears the pending bits of PendSV and SysTick.
+    fn pend_by_software(&mut self, value: u32) -> Result<(), Refusal> {
+        if value & 1 << 31 != 0 {
+            return told("NMI by software is not modelled");
+        }
+        for (set, clear, exception) in [(28, 27, PEND_SV), (26, 25, SYS_TICK)] {
+            if value & 1 << set != 0 {
+                self.system_pending |= 1 << exception;
+            }
+            if value & 1 << clear != 0 {
+                self.system_pending &= !(1 << exception);
+            }
+        }
         Ok(())
     }
 
