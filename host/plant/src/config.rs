@@ -248,6 +248,124 @@ impl Equivalent {
     }
 }
 
+/// Velocity weakening of the documentation's rig, at the joint.
+const WEAKENING: VelocityWeakening = VelocityWeakening {
+    breakaway_ratio: 1.33,
+    velocity: 0.025,
+};
+/// Presliding of the documentation's rig, at the joint.
+const PRESLIDING: Presliding = Presliding {
+    stroke: 1.0e-3,
+    damping_time: 1.0e-3,
+    lag: 1.0e-3,
+};
+
+/// Returns the motor of the documentation's rig with another drive.
+fn motor_of(hardware: &Hardware) -> Motor {
+    // The sign of the gear ratio does not affect friction.
+    let ratio = hardware.gear_ratio.abs();
+    Motor {
+        resistance: hardware.resistance,
+        inductance: hardware.inductance,
+        torque_constant: hardware.torque_constant,
+        rotor_inertia: hardware.rotor_inertia,
+        // 0.1 N·m and 0.1 N·m·s/rad of the joint's friction act on the rotor.
+        friction: Friction {
+            coulomb: 0.1 / ratio,
+            asymmetry: 0.0,
+            viscous: 0.1 / (ratio * ratio),
+            weakening: Some(VelocityWeakening {
+                velocity: WEAKENING.velocity * ratio,
+                ..WEAKENING
+            }),
+            presliding: Presliding {
+                stroke: PRESLIDING.stroke * ratio,
+                ..PRESLIDING
+            },
+            load: None,
+            position: None,
+            drag: None,
+        },
+        heat_capacity: 60.0,
+        thermal_resistance: 4.0,
+        temperature: None,
+        cogging: None,
+        ripple: None,
+        saturation: None,
+    }
+}
+
+/// Returns gear and link of the documentation's rig with another drive.
+fn mechanism_of(hardware: &Hardware) -> Mechanism {
+    Mechanism {
+        ratio: hardware.gear_ratio,
+        bodies: vec![Body {
+            mass: 1.0,
+            distance: 0.3,
+            angle: 0.0,
+            inertia: 0.03,
+        }],
+        gravity: [0.0, 0.0, -9.81],
+        tilt: None,
+        friction: Friction {
+            coulomb: 0.3,
+            asymmetry: 0.0,
+            viscous: 0.2,
+            weakening: Some(WEAKENING),
+            presliding: PRESLIDING,
+            load: None,
+            position: None,
+            drag: None,
+        },
+        warmup: None,
+        elasticity: None,
+        backlash: None,
+        eccentricity: None,
+        spring: None,
+        end_stops: Some(EndStops {
+            range: [-1.5 * PI, 1.5 * PI],
+            stiffness: 2.0e4,
+            damping: 20.0,
+        }),
+        torque_offset: None,
+        disturbance: None,
+    }
+}
+
+/// Returns the sensors of the documentation's rig with another encoder.
+fn sensors_of(hardware: &Hardware) -> Sensors {
+    Sensors {
+        encoder: Encoder {
+            counts_per_turn: hardware.counts_per_turn,
+            zero: -FRAC_PI_2,
+            eccentricity: None,
+            unequal_lines: None,
+            timed: true,
+        },
+        link_encoder: None,
+        current: Channel {
+            noise: Some(0.02),
+            offset: 0.03,
+            gain_error: 0.0,
+            lag: None,
+        },
+        supply: Channel {
+            noise: Some(0.02),
+            offset: 0.0,
+            gain_error: 0.0,
+            lag: None,
+        },
+        temperature: Channel {
+            noise: Some(0.1),
+            offset: 0.0,
+            gain_error: 0.0,
+            lag: None,
+        },
+        current_delay: None,
+        scaling: Scaling::default(),
+    }
+}
+
 impl PlantConfig {
     /// Returns the true six parameters from masses and geometry, for the joint's own angle ([`Equivalent::about`]
     /// converts them to the encoder's zero). They apply to a cold rig without payload. They exclude effects that the
@@ -286,121 +404,21 @@ impl PlantConfig {
     /// arm. It starts hanging at rest, where its incremental counter is 0. Link and friction at the joint are equal for
     /// every drive.
     pub fn with_hardware(hardware: &Hardware) -> Self {
-        let weakening = Some(VelocityWeakening {
-            breakaway_ratio: 1.33,
-            velocity: 0.025,
-        });
-        let presliding = Presliding {
-            stroke: 1.0e-3,
-            damping_time: 1.0e-3,
-            lag: 1.0e-3,
-        };
-        // The sign of the gear ratio does not affect friction.
-        let ratio = hardware.gear_ratio.abs();
         Self {
             tick: 1.0e-4,
             substeps: 10,
             initial_position: -FRAC_PI_2,
             held: false,
             ambient: 25.0,
-            motor: Motor {
-                resistance: hardware.resistance,
-                inductance: hardware.inductance,
-                torque_constant: hardware.torque_constant,
-                rotor_inertia: hardware.rotor_inertia,
-                // 0.1 N·m and 0.1 N·m·s/rad of the joint's friction act on the rotor.
-                friction: Friction {
-                    coulomb: 0.1 / ratio,
-                    asymmetry: 0.0,
-                    viscous: 0.1 / (ratio * ratio),
-                    weakening: weakening.map(|w| VelocityWeakening {
-                        velocity: w.velocity * ratio,
-                        ..w
-                    }),
-                    presliding: Presliding {
-                        stroke: presliding.stroke * ratio,
-                        ..presliding
-                    },
-                    load: None,
-                    position: None,
-                    drag: None,
-                },
-                heat_capacity: 60.0,
-                thermal_resistance: 4.0,
-                temperature: None,
-                cogging: None,
-                ripple: None,
-                saturation: None,
-            },
+            motor: motor_of(hardware),
             bridge: Bridge {
                 supply: 24.0,
                 supply_resistance: 0.0,
                 diode_drop: 0.8,
                 dead_time: None,
             },
-            mechanism: Mechanism {
-                ratio: hardware.gear_ratio,
-                bodies: vec![Body {
-                    mass: 1.0,
-                    distance: 0.3,
-                    angle: 0.0,
-                    inertia: 0.03,
-                }],
-                gravity: [0.0, 0.0, -9.81],
-                tilt: None,
-                friction: Friction {
-                    coulomb: 0.3,
-                    asymmetry: 0.0,
-                    viscous: 0.2,
-                    weakening,
-                    presliding,
-                    load: None,
-                    position: None,
-                    drag: None,
-                },
-                warmup: None,
-                elasticity: None,
-                backlash: None,
-                eccentricity: None,
-                spring: None,
-                end_stops: Some(EndStops {
-                    range: [-1.5 * PI, 1.5 * PI],
-                    stiffness: 2.0e4,
-                    damping: 20.0,
-                }),
-                torque_offset: None,
-                disturbance: None,
-            },
-            sensors: Sensors {
-                encoder: Encoder {
-                    counts_per_turn: hardware.counts_per_turn,
-                    zero: -FRAC_PI_2,
-                    eccentricity: None,
-                    unequal_lines: None,
-                    timed: true,
-                },
-                link_encoder: None,
-                current: Channel {
-                    noise: Some(0.02),
-                    offset: 0.03,
-                    gain_error: 0.0,
-                    lag: None,
-                },
-                supply: Channel {
-                    noise: Some(0.02),
-                    offset: 0.0,
-                    gain_error: 0.0,
-                    lag: None,
-                },
-                temperature: Channel {
-                    noise: Some(0.1),
-                    offset: 0.0,
-                    gain_error: 0.0,
-                    lag: None,
-                },
-                current_delay: None,
-                scaling: Scaling::default(),
-            },
+            mechanism: mechanism_of(hardware),
+            sensors: sensors_of(hardware),
         }
     }
 
