@@ -7,7 +7,7 @@
 
 use rig_shared::trajectory::Trajectory;
 
-use super::Nameplate;
+use super::nameplate::Nameplate;
 use crate::{Equivalent, PlantConfig};
 use rig_model::robot::Robot;
 use rig_output::format_significant;

@@ -1,6 +1,8 @@
 //! The registers (Armv7-M ARM, B3.2 to B3.4).
 
-use super::*;
+use super::controller::{INTERRUPTS, Nvic, PEND_SV, SYS_TICK, WORDS};
+use crate::peripheral::{Refusal, told};
+use crate::time::Instant;
 
 impl Nvic {
     /// A load; offsets from 0xE000_E000.

@@ -1,6 +1,7 @@
 //! Exceptions by their priorities, and SysTick.
 
-use super::*;
+use super::controller::*;
+use crate::cpu::Masks;
 
 fn with(priorities: &[(u32, u8)]) -> Nvic {
     let mut nvic = Nvic::default();

@@ -1,6 +1,6 @@
 //! Loads and stores.
 
-use super::{
+use super::converter::{
     ADCAL, ADDIS, ADEN, ADRDY, ADSTART, ADVREGEN, Adc, CALIBRATION, COMMON, CR, Codes, DEEPPWD, DR,
     EOC, ISR, JADSTART, JEOC, JSQR, REGULATOR,
 };

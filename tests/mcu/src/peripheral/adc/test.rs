@@ -1,6 +1,8 @@
 #![allow(clippy::unwrap_used)]
 
-use super::*;
+use super::converter::*;
+use crate::peripheral::Refusal;
+use crate::time::Instant;
 
 fn code(channel: u32, _: Instant) -> Option<u16> {
     (channel < 10).then_some(100 * channel as u16)

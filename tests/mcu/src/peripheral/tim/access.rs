@@ -1,6 +1,6 @@
 //! Loads and stores.
 
-use super::{
+use super::timer::{
     AF1, ARPE, ARR, BDTR, BIF, CCER, CCMR1, CCMR2, CCR1, CEN, CNT, CR1, EGR, PSC, RCR, SBIF, SMCR,
     SMS, SMS_TRIGGER, SR, TS, TS_ITR0, Tim, UDIS, UIF,
 };

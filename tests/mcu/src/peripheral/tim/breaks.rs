@@ -1,6 +1,6 @@
 //! Sources that disable the outputs: break input and system break (RM0440 section 28.3.17).
 
-use super::{AF1, BDTR, BIF, BKE, BKP, MOE, SBIF, SR, Tim};
+use super::timer::{AF1, BDTR, BIF, BKE, BKP, MOE, SBIF, SR, Tim};
 
 impl Tim {
     /// Sets the level of the break input's pin.

@@ -1,6 +1,6 @@
 //! Counts an encoder's edges and index, and captures their times (RM0440 sections 30.4.20 and 30.4.7).
 
-use super::{
+use super::timer::{
     CC1OF, CCER, CCMR1, CCMR2, CCR1, CEN, CR1, CR2, ECR, IDXF, MMS, MMS_ENCODER_CLOCK, SMCR, SR,
     TERRF, TS, TS_ITR1, Tim,
 };

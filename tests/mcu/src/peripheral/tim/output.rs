@@ -1,6 +1,6 @@
 //! PWM outputs.
 
-use super::{BDTR, CCER, CCMR1, CCMR2, CEN, CR1, MOE, Tim};
+use super::timer::{BDTR, CCER, CCMR1, CCMR2, CEN, CR1, MOE, Tim};
 use crate::peripheral::{Refusal, told};
 use crate::time::Instant;
 

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use super::*;
+use super::timer::*;
 
 const CLOCK: u64 = 24;
 
