@@ -1,10 +1,15 @@
 //! Entry to exceptions, return from them, and faults.
 
-use super::{ENTRY, Emulation, EmulationError, RETURN, Running};
+use super::error::EmulationError;
+use super::state::{Emulation, Running};
 use crate::chip::Chip;
 use crate::cpu::{Cpu, Register};
 use crate::map;
 use crate::nvic::HARD_FAULT;
+
+/// Exception entry and return on a Cortex-M4 without wait states (ARM DDI 0439B, section 3.9.1).
+const ENTRY: u64 = 12;
+const RETURN: u64 = 10;
 
 impl<C: Cpu<Chip>> Emulation<C> {
     pub(super) fn fault(
