@@ -1,10 +1,11 @@
 //! Limits of the joints within which a motion is designed.
 
+use rig_shared::multibody::{COLUMNS, column};
+
 use crate::ExciteError;
 use crate::error::wrong;
 use rig_model::robot::{Robot, sound};
 use rig_model::simulate::Model;
-use rig_shared::multibody::{COLUMNS, column};
 
 /// Highest velocity for which a motion is sized, rad/s or m/s: above that of any robot joint.
 const FASTEST: f64 = 1e4;

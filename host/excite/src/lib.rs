@@ -33,7 +33,6 @@
 mod bounds;
 mod certificate;
 mod criterion;
-mod design;
 mod drives;
 
 mod error;
@@ -42,6 +41,7 @@ mod frame;
 mod interval;
 mod lanes;
 mod optimise;
+mod optimum;
 mod options;
 mod period;
 mod problem;
@@ -58,8 +58,8 @@ mod tests;
 
 pub use certificate::Reach;
 pub use criterion::{Criterion, Values};
-pub use design::{Clearance, Design, design};
 pub use error::ExciteError;
+pub use optimum::{Clearance, Design, design};
 pub use options::{Options, Parameters, Scaling};
 pub use period::default_period;
 pub use replay::STEP as REPLAY_STEP;

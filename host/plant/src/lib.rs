@@ -1,5 +1,6 @@
-//! The emulated rig that replaces hardware: motor, bridge, gear, link, friction and sensors. It turns a [`Command`] per
-//! control tick into the raw [`Sample`] of the next.
+//! The emulated rig that replaces hardware: motor, bridge, gear, link, friction and sensors. It turns a
+//! [`Command`](rig_firmware::sample::Command) per control tick into the raw [`Sample`](rig_firmware::sample::Sample) of
+//! the next.
 //!
 //! It has a richer description than the identified model and shares no equation with it. It uses masses and centres of
 //! mass instead of lumped parameters, and friction with memory and another form of velocity weakening. Its winding has
