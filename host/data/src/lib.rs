@@ -4,7 +4,7 @@
 //! before they lead to wrong parameters. [`prepare`] filters, differentiates and decimates recordings. [`runs`] holds
 //! them in memory at the full rate, and [`Compensated`] subtracts the torques that a description already explains.
 //!
-//! ```
+//! ```no_run
 //! use rig_data::Source;
 //! use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 //!

@@ -16,9 +16,9 @@ pub struct Options {
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
-    /// Zero of each joint's sensor and its standard deviation, from [`sensor_zeros`]; empty if not recorded.
+    /// Zero of each joint's sensor and its standard deviation, from [`crate::sensor_zeros`]; empty if not recorded.
     pub sensor_zeros: Vec<[f64; 2]>,
-    /// Recordings of clamped joints, from [`clamped`]; only their voltage is fitted.
+    /// Recordings of clamped joints, from [`fn@crate::clamped`]; only their voltage is fitted.
     pub clamped: Vec<Run>,
     /// True if the description's format has no field for a constant torque. The constant is then fitted with the
     /// friction, as in an identification.

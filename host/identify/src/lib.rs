@@ -12,7 +12,7 @@
 //!
 //! The parameters of a simulated pendulum, from its motion and torque:
 //!
-//! ```
+//! ```no_run
 //! use rig_data::prepare::InMemory;
 //! use rig_data::{Block, JointColumns};
 //! use rig_identify::{Options, identify};

@@ -26,7 +26,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let robot = Robot::load("model.toml".as_ref())?;
 //! let recording = Source::open("holdout.csv".as_ref(), &robot)?;
-//! let found = validate(&robot, &[&recording], &Options::default(), |_| ())?;
+//! let found = validate(&robot, &[&recording], &Options::default(), &mut |_| ())?;
 //! println!("{}", found.warnings.join("\n"));
 //! # Ok(())
 //! # }
