@@ -7,12 +7,10 @@ use rig_shared::effects::{GAINS, Kind};
 use crate::DiagnoseError;
 use crate::acceptance::judge::Judge;
 use crate::acceptance::plausibility::Asked;
-use crate::fit::refit::Refit;
+use crate::fit::refit::{NOTHING, Refit};
 use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
 use crate::search::stepwise::{Search, is_gear};
 
-/// p-value above which an effect is dropped: its 95 % interval contains zero.
-const NOTHING: f64 = 0.05;
 /// Number of inertia gains of a coupling. They come first; the last gain is friction.
 const OF_INERTIA: usize = 2;
 /// Largest share of the twist torque that an accepted gear may have. Mass and load of the link give 1 at most; real

@@ -12,6 +12,7 @@ pub(crate) use crate::acceptance::judge::unseen::{
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
+use crate::acceptance::lack_of_fit::misfit;
 use crate::acceptance::model_check::of_torque;
 use crate::acceptance::residual_dependence::{Coordinate, Known, Refitted, locate};
 use crate::engine::ObserverModels;
@@ -99,56 +100,88 @@ impl Judge<'_, '_> {
     pub(crate) fn judged(&self, found: Vec<FittedCandidate>) -> Result<Judged, DiagnoseError> {
         let mut judged = self.as_found(found);
         let mut guesses = Vec::new();
-        // Beside an unknown effect, an effect that closes less of the gap than it leaves open is a guess, unless no
-        // rival comes near.
-        while judged.much_left {
-            let chosen = &judged.chosen;
-            let followed = self.follower.followed(chosen, &judged.quiet)?;
-            let followed = followed.map(|list| self.as_found(list));
-            // A misfit of an open-loop gear is no reason to doubt effects of its joint. Other joints stay as they are.
-            let on = |joint: usize| {
-                let gear = |p: &FittedCandidate| p.candidate.joint == joint && p.followed.is_some();
-                followed
-                    .as_ref()
-                    .filter(|last| last.chosen.iter().any(gear))
-            };
-            let closes = |k: usize| {
-                let j = chosen[k].candidate.joint;
-                let last = on(j).unwrap_or(&judged);
-                // Test the effect as a whole: each order of a wave closes only a part of the gap.
-                let sort = chosen[k].candidate.sort();
-                let others = last.chosen.iter().filter(|p| p.candidate.sort() != sort);
-                let others: Vec<FittedCandidate> = others.cloned().collect();
-                let [before, after] =
-                    [&others, &last.chosen].map(|list| with(self.base, list, None));
-                // A gear shows at its contacts, whose rows have small weights: compare without weights.
-                if is_gear(chosen[k].candidate.kind) {
-                    closed([before.even_rms(j), after.even_rms(j)], last.floors[j])
-                } else {
-                    closed([before.rms(j), after.rms(j)], last.quiet[j])
-                }
-            };
-            // Described effects are no guesses.
-            let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
-                .filter(|k| on(chosen[*k].candidate.joint).is_none_or(|last| last.much_left))
-                .map(|k| (k, closes(k)))
-                .filter(|(_, share)| *share < HALF)
-                .collect();
-            doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
-            let mut guess = None;
-            for (k, share) in doubtful {
-                if share < QUARTER || !self.has_no_close_rival(chosen, k)? {
-                    guess = Some(k);
-                    break;
-                }
-            }
-            let Some(guess) = guess else { break };
+        while let Some(guess) = self.guess(&judged)? {
             let mut stand = judged.chosen;
             guesses.push(stand.remove(guess));
             judged = self.as_found(self.search.possible(self.base, stand)?);
         }
         judged.guesses = guesses;
         Ok(judged)
+    }
+
+    /// Returns the effect that is most likely a guess at an unknown one; None if all are better than that. Described
+    /// effects are no guesses.
+    fn guess(&self, judged: &Judged) -> Result<Option<usize>, DiagnoseError> {
+        match judged.much_left {
+            true => self.beside_a_remainder(judged),
+            false => Ok(self.beside_a_lack_of_fit(judged)),
+        }
+    }
+
+    /// Returns the effect that closes less of the gap than it leaves open, unless no rival comes near.
+    fn beside_a_remainder(&self, judged: &Judged) -> Result<Option<usize>, DiagnoseError> {
+        let chosen = &judged.chosen;
+        let followed = self.follower.followed(chosen, &judged.quiet)?;
+        let followed = followed.map(|list| self.as_found(list));
+        // A misfit of an open-loop gear is no reason to doubt effects of its joint. Other joints stay as they are.
+        let on = |joint: usize| {
+            let gear = |p: &FittedCandidate| p.candidate.joint == joint && p.followed.is_some();
+            followed
+                .as_ref()
+                .filter(|last| last.chosen.iter().any(gear))
+        };
+        let closes = |k: usize| {
+            let j = chosen[k].candidate.joint;
+            let last = on(j).unwrap_or(judged);
+            // Test the effect as a whole: each order of a wave closes only a part of the gap.
+            let sort = chosen[k].candidate.sort();
+            let others = last.chosen.iter().filter(|p| p.candidate.sort() != sort);
+            let others: Vec<FittedCandidate> = others.cloned().collect();
+            let [before, after] = [&others, &last.chosen].map(|list| with(self.base, list, None));
+            // A gear shows at its contacts, whose rows have small weights: compare without weights.
+            if is_gear(chosen[k].candidate.kind) {
+                closed([before.even_rms(j), after.even_rms(j)], last.floors[j])
+            } else {
+                closed([before.rms(j), after.rms(j)], last.quiet[j])
+            }
+        };
+        let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
+            .filter(|k| on(chosen[*k].candidate.joint).is_none_or(|last| last.much_left))
+            .map(|k| (k, closes(k)))
+            .filter(|(_, share)| *share < HALF)
+            .collect();
+        doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for (k, share) in doubtful {
+            if share < QUARTER || !self.has_no_close_rival(chosen, k)? {
+                return Ok(Some(k));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Returns the weakest effect of a joint of whose residual a free function still takes more than all effects of the
+    /// joint took together: what they stand for is the smaller part of something unknown.
+    fn beside_a_lack_of_fit(&self, judged: &Judged) -> Option<usize> {
+        let chosen = &judged.chosen;
+        let found = self.search.count_given(chosen)..chosen.len();
+        let fit = with(self.base, chosen, None);
+        (0..self.rows.joints()).find_map(|j| {
+            let own: Vec<usize> = (found.clone())
+                .filter(|k| chosen[*k].candidate.joint == j)
+                .collect();
+            if own.is_empty() || own.iter().any(|k| is_gear(chosen[*k].candidate.kind)) {
+                return None;
+            }
+            let free = misfit(&self.search.source, self.rows, &fit, j)?;
+            let others = (chosen.iter().enumerate()).filter(|(k, _)| !own.contains(k));
+            let others: Vec<FittedCandidate> = others.map(|(_, p)| p.clone()).collect();
+            let [before, after] = [with(self.base, &others, None).rms(j), fit.rms(j)];
+            let taken = before * before - after * after;
+            let gain = |k: &usize| chosen[*k].evidence.joint_gain;
+            (free.taken(after) > taken)
+                .then(|| own.into_iter().min_by(|a, b| gain(a).total_cmp(&gain(b))))
+                .flatten()
+        })
     }
 
     /// Returns true if no rival on the joint has half the gain. Kinds that are the same function of the motion are no

@@ -40,6 +40,13 @@ pub(crate) struct Misfit {
     pub(crate) gain: f64,
 }
 
+impl Misfit {
+    /// Returns the mean square that it removes from a residual of the RMS `rms`.
+    pub(crate) fn taken(&self, rms: f64) -> f64 {
+        rms * rms * (1.0 - (1.0 - self.gain).powi(2)).max(0.0)
+    }
+}
+
 /// Returns the free function with the largest gain on the residual of `joint`; None if the right effects could leave as
 /// much.
 pub(crate) fn misfit(source: &Source, rows: &Rows, fit: &Fit, joint: usize) -> Option<Misfit> {

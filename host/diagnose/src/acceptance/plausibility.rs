@@ -35,12 +35,12 @@ pub(crate) struct Asked<'a, 'r> {
 /// elastic actuators: 6 to 15 kN·m/rad at up to 200 N·m, 20 mrad at full torque (Albu-Schäffer et al. 2007, "The DLR
 /// lightweight robot", Industrial Robot 34(5)). On a softer joint the sag is visible, so the user describes it.
 const MOST_SAG: f64 = 0.02;
-/// Least backlash gap over its standard deviation. Two: the 95 % interval then excludes zero.
-const SURE_OF_A_GAP: f64 = 2.0;
+/// Least ratio of a distance (gap, stroke) to its standard deviation. Two: the 95 % interval then excludes zero.
+const SURE_OF_A_DISTANCE: f64 = 2.0;
 /// Standard deviations by which two joints' delays on one recorder may differ. Three: by chance 1 pair in 400.
 const ONE_CLOCK: f64 = 3.0;
 
-const TABLE: [Belief; 4] = [
+const TABLE: [Belief; 5] = [
     Belief {
         kinds: &[Kind::JointElasticity],
         fails: sags,
@@ -48,8 +48,14 @@ const TABLE: [Belief; 4] = [
     },
     Belief {
         kinds: &[Kind::Backlash],
-        fails: gap_may_be_none,
+        fails: |asked, k| may_be_none(asked, k, "gap"),
         why: "its gap is less than two of its standard deviations",
+    },
+    // Without a stroke it is the Coulomb friction that the description has.
+    Belief {
+        kinds: &[Kind::PreslidingDahl],
+        fails: |asked, k| may_be_none(asked, k, "stroke"),
+        why: "its stroke is less than two of its standard deviations",
     },
     Belief {
         kinds: &[Kind::MeasurementDelay],
@@ -115,11 +121,11 @@ fn sags(asked: &Asked, k: usize) -> bool {
     loads.fold(0.0, f64::max) > MOST_SAG * stiffness
 }
 
-/// Returns true if a gap is not significantly larger than zero.
-fn gap_may_be_none(asked: &Asked, k: usize) -> bool {
-    // A gap without standard deviation is not identifiable.
-    (asked.shape(k, "gap"))
-        .is_some_and(|(gap, std)| std.is_none_or(|std| gap < SURE_OF_A_GAP * std))
+/// Returns true if a distance is not significantly larger than zero. One without a standard deviation is not
+/// identifiable.
+fn may_be_none(asked: &Asked, k: usize, name: &str) -> bool {
+    (asked.shape(k, name))
+        .is_some_and(|(value, std)| std.is_none_or(|std| value < SURE_OF_A_DISTANCE * std))
 }
 
 /// Returns true if not all moving joints of an arm have this delay.

@@ -77,7 +77,11 @@ impl Trial<'_, '_> {
         Ok(left)
     }
 
-    fn without(
+    /// Drops the `k`-th effect with the reason `why`, and judges the others.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn without(
         &self,
         Accepted { judged, mut fallen }: Accepted,
         k: usize,

@@ -5,9 +5,8 @@ use crate::DiagnoseError;
 use crate::acceptance::judge::Judged;
 use crate::acceptance::trial::{Accepted, Trial};
 use crate::fit::refit::Joint;
-use crate::models::output_error::by_motion;
+use crate::models::output_error::{Again, by_motion};
 use crate::models::simulated_motion::Replay;
-
 use crate::motor_voltage::{Winding, Word, settled, windings, zeros};
 use crate::outcome::{ByMotion, Tried};
 use crate::search::fitted_candidate::FittedCandidate;
@@ -61,25 +60,21 @@ impl Named {
             fitting: work.fitting,
             replay: learnt,
         };
-        let Accepted { mut judged, fallen } = trial.stand(found, tried)?;
-        let said = settled_names(work, &windings, &mut judged)?;
-        let mut followed = None;
-        if let Some(chosen) = judge.follower.followed(&judged.chosen, &judged.quiet)? {
-            judged = judge.as_found(chosen);
-            followed = Some(judge.follower.source(&judged.chosen)?);
-        }
+        let mut accepted = trial.stand(found, tried)?;
+        let (said, joint, again) = loop {
+            let said = settled_names(work, &windings, &mut accepted.judged)?;
+            let (joint, again) = fitted(work, learnt, &mut accepted.judged)?;
+            // The fit to the motion sees the motion itself: what it takes for nothing stands in for another effect.
+            match again.as_ref().and_then(Again::first_of_nothing) {
+                Some(k) if k >= search.count_given(&accepted.judged.chosen) => {
+                    let why = "fitted to the simulated motion as well, it could as well be nothing";
+                    accepted = trial.without(accepted, k, why, tried)?;
+                }
+                _ => break (said, joint, again),
+            }
+        };
+        let Accepted { mut judged, fallen } = accepted;
         let described = search.count_described(&judged.chosen);
-        let source = followed.as_ref().unwrap_or(&search.source);
-        let joint = refit.joint(source, &judged.chosen, &judge.pairs, judge.coordinates)?;
-        let threads = rig_data::prepare::threads(work.data.options.threads);
-        let again = by_motion(
-            work.fitting,
-            learnt,
-            source,
-            &judged.chosen,
-            &joint,
-            threads,
-        )?;
         let by_motion = again.map(|again| {
             if let Some((model, effects)) = again.adopted {
                 work.fitting.adopt(&effects, model);
@@ -103,6 +98,38 @@ impl Named {
     pub(super) fn found(&self) -> &[FittedCandidate] {
         &self.judged.chosen[self.described..]
     }
+}
+
+/// Fits all parameters together, to the torque and then to the simulated motion. Links behind gears are estimated by
+/// their observers from here on.
+fn fitted(
+    work: &Work,
+    learnt: &Replay,
+    judged: &mut Judged,
+) -> Result<(Joint, Option<Again>), DiagnoseError> {
+    let Work {
+        search,
+        refit,
+        judge,
+        ..
+    } = work;
+    let mut followed = None;
+    if let Some(chosen) = judge.follower.followed(&judged.chosen, &judged.quiet)? {
+        *judged = judge.as_found(chosen);
+        followed = Some(judge.follower.source(&judged.chosen)?);
+    }
+    let source = followed.as_ref().unwrap_or(&search.source);
+    let joint = refit.joint(source, &judged.chosen, &judge.pairs, judge.coordinates)?;
+    let threads = rig_data::prepare::threads(work.data.options.threads);
+    let again = by_motion(
+        work.fitting,
+        learnt,
+        source,
+        &judged.chosen,
+        &joint,
+        threads,
+    )?;
+    Ok((joint, again))
 }
 
 /// Renames constants by the drive's zero and the voltage, and sorts the effects by their names.

@@ -523,6 +523,9 @@ fn difference_step(shape: &Parameter, value: f64) -> f64 {
     DIFFERENCE * size
 }
 
+/// p-value above which an effect is dropped: the 95 % region of its gains contains zero.
+pub(crate) const NOTHING: f64 = 0.05;
+
 /// Estimates of the joint fit.
 pub(crate) struct Joint {
     /// Coefficients of the free nominal directions, then of the columns. The covariance also contains the shapes.
@@ -542,11 +545,8 @@ impl Joint {
         count: usize,
     ) -> f64 {
         let gains = self.gains(chosen, free, k);
-        let gains = DVector::from_column_slice(&gains[..count.min(gains.len())]);
-        let (at, count) = (place(chosen, free, k), gains.len());
-        let own = (self.solution.covariance.view((at, at), (count, count))).into_owned();
-        let wald = own.cholesky().map(|c| gains.dot(&c.solve(&gains)));
-        (wald.zip(ChiSquared::new(count as f64).ok())).map_or(1.0, |(wald, law)| law.sf(wald))
+        let gains = &gains[..count.min(gains.len())];
+        wald(gains, &self.solution.covariance, place(chosen, free, k))
     }
 
     /// Returns the gains of the `k`-th effect.
@@ -625,6 +625,16 @@ pub(crate) fn turn(slopes: &[f64]) -> f64 {
     } else {
         slope.atan() / slope
     }
+}
+
+/// Returns the p-value of `values` being zero (Wald 1943), from the rows of their `covariance` that begin with `at`; 1
+/// if it is not positive definite.
+pub(crate) fn wald(values: &[f64], covariance: &DMatrix<f64>, at: usize) -> f64 {
+    let values = DVector::from_column_slice(values);
+    let count = values.len();
+    let own = covariance.view((at, at), (count, count)).into_owned();
+    let wald = own.cholesky().map(|c| values.dot(&c.solve(&values)));
+    (wald.zip(ChiSquared::new(count as f64).ok())).map_or(1.0, |(wald, law)| law.sf(wald))
 }
 
 /// Returns the index of the first coefficient of the `k`-th effect, after the `free` nominal directions.

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
-use crate::fit::refit::{Joint, named};
+use crate::fit::refit::{Joint, NOTHING, named, wald};
 use crate::models::bodies::{FittedModel, ModelCache};
 use crate::models::simulated_motion::{Departures, Replay};
 use crate::outcome::{ByMotion, Twice};
@@ -82,6 +82,16 @@ pub(crate) struct Again {
     pub(crate) told: ByMotion,
     /// Model and effects to adopt, if any.
     pub(crate) adopted: Option<(FittedModel, Vec<FittedCandidate>)>,
+    /// p-values of each effect's gains being zero by the motion (Wald 1943).
+    of_nothing: Vec<f64>,
+}
+
+impl Again {
+    /// Returns the first effect whose adopted gains do not differ from zero: their 95 % region contains it.
+    pub(crate) fn first_of_nothing(&self) -> Option<usize> {
+        self.adopted.as_ref()?;
+        self.of_nothing.iter().position(|p| *p > NOTHING)
+    }
 }
 
 /// Fits `joint`'s values of the effects `chosen` to the simulated training motion; `None` if that is not possible.
@@ -128,9 +138,10 @@ pub(crate) fn by_motion(
     let Some(first) = departs(&start) else {
         return Ok(None);
     };
-    let Some((theta, std)) = nearest(start.clone(), &stds, first, &departs, threads) else {
+    let Some((theta, covariance)) = nearest(start.clone(), &stds, first, &departs, threads) else {
         return Ok(None);
     };
+    let std: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
     let standing = model(&theta);
     let effects = (values.effects(chosen, &theta).into_iter())
         .map(|p| {
@@ -189,21 +200,30 @@ pub(crate) fn by_motion(
         text: String::new(),
     };
     told.text = sentence(&told);
+    let mut at = free;
+    let of_nothing = (chosen.iter())
+        .map(|p| {
+            let own = at..at + p.columns.len();
+            at = own.end;
+            wald(&theta[own.clone()], &covariance, own.start)
+        })
+        .collect();
     Ok(Some(Again {
         told,
+        of_nothing,
         adopted: adopted.then_some((standing, effects)),
     }))
 }
 
-/// Returns the values with the least motion error, and their standard deviations, robust to correlation within
-/// one-second blocks. `None` if the values are not identifiable.
+/// Returns the values with the least motion error, and their covariance, robust to correlation within one-second
+/// blocks. `None` if the values are not identifiable.
 fn nearest(
     mut theta: Vec<f64>,
     stds: &[f64],
     mut found: Departures,
     departs: &(impl Fn(&[f64]) -> Option<Departures> + Sync),
     threads: usize,
-) -> Option<(Vec<f64>, Vec<f64>)> {
+) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = theta.len();
     let squares = |d: &Departures| d.of.iter().map(|x| x * x).sum::<f64>();
     for pass in 1.. {
@@ -265,10 +285,8 @@ fn nearest(
             }
             let count = stretches.len() as f64;
             let covariance = &inverse * spread * &inverse * (count / (count - 1.0));
-            let std = (0..n)
-                .map(|k| stds[k] * covariance[(k, k)].sqrt())
-                .collect();
-            return Some((theta, std));
+            let of_values = DMatrix::from_fn(n, n, |a, b| stds[a] * covariance[(a, b)] * stds[b]);
+            return Some((theta, of_values));
         }
     }
     None

@@ -92,6 +92,7 @@ pub(crate) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
     if !d.steps.is_empty() {
         words.push(effects(d));
     }
+    words.extend(d.steps.iter().filter_map(contradicted));
     words.extend(constant(d));
     words.extend(tilt_alike(d).map(str::to_owned));
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
@@ -142,6 +143,19 @@ fn apart(a: f64, b: f64) -> [String; 2] {
 }
 
 /// Lists the effects found and their gains.
+/// Returns the sentence on an effect that increases the residual of the hold-out.
+fn contradicted(step: &Step) -> Option<String> {
+    let [before, after] = step.holdout_rms.filter(|_| step.is_contradicted())?;
+    Some(format!(
+        "The hold-out contradicts {} at joint {}: with it the residual there rises from {} to {} {} RMS. It explains the motions of the training data alone; give a recording like the hold-out with --data.",
+        step.effect,
+        step.joint,
+        number(before),
+        number(after),
+        format_unit(&step.rms_unit),
+    ))
+}
+
 fn effects(d: &Diagnosis) -> String {
     let names: Vec<String> = (d.steps.iter())
         .map(|s| {

@@ -199,7 +199,7 @@ impl Judge<'_, '_> {
         );
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         let percent = format_significant(100.0 * found.gain, 2);
-        let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
+        let left = found.taken(rms).sqrt();
         if names.is_empty() {
             // Friction and filters of the rig itself leave some lack of fit.
             return (found.gain > UNNAMED).then(|| Remainder {
