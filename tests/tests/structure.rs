@@ -258,7 +258,6 @@ const KNOWN: &[(&str, usize)] = &[
     ("host/identify", 54),
     ("host/model", 28),
     ("host/report", 6),
-    ("host/rig", 17),
     ("host/scenario", 7),
 ];
 

@@ -1,6 +1,7 @@
 //! The page of a friction map.
 
-use super::{Context, parts};
+use super::context::Context;
+use super::parts;
 use rig_identify::FrictionMap;
 use rig_model::robot::{JointKind, Robot};
 use rig_output::{format_significant, format_value};

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{Context, parts};
+use super::context::Context;
+use super::parts;
 use rig_identify::{Identification, ModelKind};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_value};

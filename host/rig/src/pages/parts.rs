@@ -2,6 +2,7 @@
 
 pub(super) use rig_output::format_unit as unit;
 
+use super::context::Context;
 use rig_data::prepare::Treatment;
 use rig_identify::{Dependence, FrictionFit, FrictionMap, ResidualReport, Series as Curves};
 use rig_model::robot::{Joint, JointKind};
@@ -85,7 +86,7 @@ pub(super) fn warnings(groups: &[&[String]]) -> Option<Section> {
 }
 
 /// The command that repeats the result, and the description that was written.
-pub(super) fn repeat(context: &super::Context) -> Section {
+pub(super) fn repeat(context: &Context) -> Section {
     let mut section =
         Section::new("repeat", "How to repeat this", "").with(Block::Code(context.command.clone()));
     if let Some((name, text)) = &context.identified {

@@ -1,6 +1,7 @@
 //! The page of a validation.
 
-use super::{Context, parts};
+use super::context::Context;
+use super::parts;
 use rig_model::robot::{Joint, Robot};
 use rig_output::format_significant;
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};

@@ -1,6 +1,7 @@
 //! The page of a validation under voltage.
 
-use super::{Context, parts};
+use super::context::Context;
+use super::parts;
 use rig_diagnose::voltage::FreeRun;
 use rig_diagnose::voltage::{DrivenBy, VoltageChecked, VoltageValidation};
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};

@@ -1,6 +1,6 @@
 //! Short diagnosis of the identified model.
 
-use super::super::verdict;
+use crate::pages::diagnosis::verdict;
 use rig_diagnose::outcome::Diagnosis;
 use rig_output::format_p_value;
 use rig_report::{Block, Column, Section, Table};

@@ -1,6 +1,7 @@
 //! Measured curves and the predictions of the models.
 
-use super::{parts, words};
+use super::words;
+use crate::pages::parts;
 use rig_diagnose::outcome::{Curves, Diagnosis};
 use rig_report::{Axis, Block, Marker, Plot, Role, Section, Series};
 

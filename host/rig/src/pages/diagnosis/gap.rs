@@ -1,6 +1,7 @@
 //! Size of the gap and its dependence on the motion.
 
-use super::{parts, words};
+use super::words;
+use crate::pages::parts;
 use rig_diagnose::outcome::{Diagnosis, Map, Place, Residual, Waterfall};
 use rig_diagnose::what_falls;
 use rig_output::{format_p_value, format_significant};
@@ -12,6 +13,24 @@ const ROOM: usize = 48;
 const LEAST_SHARE: f64 = 0.005;
 /// Ratio of highest residual to noise floor from which on the axis is logarithmic, to show the last steps.
 const TALL: f64 = 20.0;
+
+/// Returns true if there are figures for a hold-out beside those for the training recordings.
+pub(super) fn held_out(found: &Diagnosis) -> bool {
+    found.waterfall.iter().any(|w| !w.holdout.is_empty())
+}
+
+/// Ratio of the last model's residual RMS to the noise floor, worst joint; on the hold-out if there is one.
+pub(super) fn left_over(found: &Diagnosis) -> Option<f64> {
+    found
+        .waterfall
+        .iter()
+        .filter_map(|w| {
+            let rms = w.holdout.last().or(w.train.last())?;
+            // A run that diverged has no residual.
+            (w.floor > 0.0 && !rms.is_nan()).then(|| rms / w.judged_floor())
+        })
+        .reduce(f64::max)
+}
 
 /// Residual from the description to the final model.
 pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
@@ -137,7 +156,7 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
 }
 
 fn figures(found: &Diagnosis) -> Block {
-    let held = super::held_out(found);
+    let held = held_out(found);
     let mut columns = vec![
         Column::text("Joint"),
         Column::number("No.", ""),

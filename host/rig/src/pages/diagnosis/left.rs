@@ -1,6 +1,7 @@
 //! Bias of the parameters by the missing effects, and the unexplained residual.
 
-use super::{gap, parts, words};
+use super::{gap, words};
+use crate::pages::parts;
 use rig_diagnose::outcome::{Absorbed, Before, Diagnosis, FloorFrom, Remainder};
 use rig_output::{format_significant, format_value};
 use rig_report::{Block, Column, Section, Table};
@@ -208,6 +209,12 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     }
     section.blocks.extend(maps);
     Some(section)
+}
+
+/// Returns true if the unexplained residual of a joint makes the name of its effects doubtful.
+pub(super) fn doubted(found: &Diagnosis, joint: &str) -> bool {
+    let speaks = |left: &Remainder| left.joint == joint && left.doubt && !left.of_a_voltage();
+    found.remainder.as_ref().is_some_and(speaks)
 }
 
 /// Describes the remainder of a joint in numbers.

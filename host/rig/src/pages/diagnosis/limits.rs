@@ -1,6 +1,7 @@
 //! Limits of the data, effects that were tried, and the next experiment.
 
-use super::{parts, words};
+use super::words;
+use crate::pages::parts;
 use rig_diagnose::outcome::{Diagnosis, NotTestable, Residual, Tried};
 use rig_output::{format_p_value, format_significant};
 use rig_report::{self, Block, Column, Section, Table};

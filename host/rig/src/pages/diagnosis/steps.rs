@@ -1,6 +1,7 @@
 //! The section of one effect: signature, parameters, reduction of the residual, evidence.
 
-use super::{gap, parts, words};
+use super::{gap, left, words};
+use crate::pages::parts;
 use rig_diagnose::outcome::{Diagnosis, Residual, Step};
 use rig_diagnose::values_alike;
 use rig_output::format_p_value;
@@ -49,7 +50,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
     section
         .with(worth(found, step))
         .with(Block::Note {
-            kind: match super::doubted(found, &step.joint) {
+            kind: match left::doubted(found, &step.joint) {
                 true => NoteKind::Info,
                 false => NoteKind::Good,
             },

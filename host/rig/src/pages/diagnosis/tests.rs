@@ -3,11 +3,12 @@
 #[path = "../../../examples/made_up/diagnosis.rs"]
 mod made_up;
 
-use super::*;
+use super::{diagnosis, gap, limits};
+use crate::pages::context::Context;
 use rig_diagnose::outcome;
 use rig_diagnose::outcome::Diagnosis;
 use rig_output::format_value;
-use rig_report::render;
+use rig_report::{Block, Document, Section, Tone, render};
 
 fn context() -> Context {
     Context {

@@ -2,7 +2,7 @@
 
 use rig_shared::effects::{About, Kind};
 
-use super::parts;
+use crate::pages::parts;
 use rig_diagnose::outcome::{Diagnosis, Residual, Step, Verdict};
 use rig_output::format_significant;
 use rig_report::{NoteKind, Tone};
