@@ -18,8 +18,8 @@ use rig_link::{EmulatedPort, RecordedRun, Session, SessionSettings};
 use rig_model::robot::{EMPS, TX40, template};
 use rig_output::data_dir;
 use rig_plant::PlantConfig;
-use rig_plant::emulated::{EmulatedRig, Nameplate};
-use rig_shared::trajectory::{FrictionSweep, Trajectory};
+use rig_plant::emulated::{EmulatedRig, Nameplate, description_of, friction_sweep};
+use rig_shared::trajectory::Trajectory;
 use rig_shared::wire::message::RequestBody;
 
 /// A robot with its recordings.
@@ -110,11 +110,7 @@ fn times(column: &mut [f64], factor: f64) {
 fn emulated() -> (Robot, Vec<Run>) {
     let folder = tempfile::tempdir().unwrap();
     let plant = PlantConfig::laboratory(7);
-    let mut robot = text("one-link.toml", template("one-link").unwrap());
-    let drive = robot.joints[0].drive.as_mut().unwrap();
-    drive.torque_constant = plant.motor.torque_constant;
-    drive.resistance = Some(plant.motor.resistance);
-    drive.inductance = Some(plant.motor.inductance);
+    let robot = description_of(&plant).unwrap();
     let home = plant.initial_position;
     let designed = |seed: u64| {
         let options = rig_excite::Options {
@@ -125,10 +121,7 @@ fn emulated() -> (Robot, Vec<Run>) {
         let design = rig_excite::design(&robot, &options, |_, _| ()).unwrap();
         design.file.joints[0].trajectory.clone()
     };
-    let speeds = [
-        0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6, 1.0, 1.5, 2.0,
-    ];
-    let sweep = FrictionSweep::new(&speeds, 0.4, 0.1, 0.3, 1.0).unwrap();
+    let sweep = friction_sweep().unwrap();
     let motions = [designed(7), designed(8), Trajectory::FrictionSweep(sweep)];
     let nameplate = Nameplate::from_robot(&robot).unwrap();
     let cooling = f64::from(nameplate.config.monitor.thermal_time);

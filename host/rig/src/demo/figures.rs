@@ -5,7 +5,8 @@ use core::f64::consts::FRAC_PI_2;
 use rig_shared::link::{PARAMETER_COUNT, PARAMETER_NAMES};
 use rig_shared::multibody::{COLUMNS, column, gravity_vector};
 
-use super::{Demo, DemoError};
+use super::error::DemoError;
+use super::result::Demo;
 use crate::pages;
 use crate::pages::{
     Context, DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire,
