@@ -2,7 +2,7 @@
 
 mod missing;
 
-use super::parts;
+use super::{friction, parts, residuals};
 use rig_diagnose::Diagnosis;
 use rig_identify::{FrictionMap, ResidualReport};
 use rig_model::robot::{JointKind, Robot};
@@ -501,7 +501,7 @@ fn holdout(figures: &DemoFigures) -> Section {
     for (joint, report) in figures.robot.joints.iter().zip(&figures.holdout) {
         section
             .blocks
-            .extend(parts::torque_plots(joint, report, "hold-out"));
+            .extend(residuals::torque_plots(joint, report, "hold-out"));
     }
     if figures.holdout.is_empty() {
         section = section.with(parts::warning("There is no hold-out."));
@@ -523,7 +523,7 @@ fn friction(figures: &DemoFigures) -> Section {
                 .first()
                 .map_or(JointKind::Revolute, |j| j.kind);
             Section {
-                blocks: parts::friction(kind, map),
+                blocks: friction::friction(kind, map),
                 ..section
             }
         }

@@ -1,7 +1,7 @@
 //! The page of a friction map.
 
 use super::context::Context;
-use super::parts;
+use super::{friction, parts};
 use rig_identify::FrictionMap;
 use rig_model::robot::{JointKind, Robot};
 use rig_output::{format_significant, format_value};
@@ -13,14 +13,35 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
         .joint_index(&map.joint)
         .and_then(|j| robot.joints.get(j))
         .map_or(JointKind::Revolute, |j| j.kind);
-    let [_, velocity, torque] = parts::units(kind);
+    let velocity = parts::units(kind)[1];
+    let mut sections: Vec<Section> = parts::warnings(&[&context.warnings]).into_iter().collect();
+    let mut section = Section::new(
+        "map",
+        "Friction over velocity",
+        "Friction on stretches of constant speed; the identified gravity, inertia and offset are subtracted.",
+    );
+    section.blocks = friction::friction(kind, map);
+    sections.push(section);
+    sections.push(points(kind, map));
+    sections.extend(dropped(map, velocity));
+    sections.push(parts::repeat(context));
+    Document {
+        title: format!("{}: friction of joint {}", robot.name, map.joint),
+        subtitle: map.text.clone(),
+        summary: summary(kind, map, context),
+        sections,
+        footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
+    }
+}
+
+fn summary(kind: JointKind, map: &FrictionMap, context: &Context) -> Vec<Fact> {
+    let [_, _, torque] = parts::units(kind);
+    let fit = chosen(map);
     let value = |v: f64, k: usize| {
-        let fit = chosen(map);
         fit.half_interval
             .get(k)
             .map_or_else(|| format_significant(v, 3), |h| format_value(v, *h))
     };
-    let fit = chosen(map);
     let mut summary = vec![
         Fact::new(
             "Friction law",
@@ -39,11 +60,7 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
             .unit(torque)
             .note("± half the 95 % interval"),
         Fact::new("Viscous", value(fit.viscous, 1))
-            .unit(if kind == JointKind::Revolute {
-                "N·m·s/rad"
-            } else {
-                "N·s/m"
-            })
+            .unit(parts::viscous_unit(kind))
             .note("± half the 95 % interval"),
     ];
     if map.warranted {
@@ -56,50 +73,37 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
     if !context.warnings.is_empty() {
         summary.push(Fact::new("Warnings", context.warnings.len().to_string()).tone(Tone::Warning));
     }
-    let mut sections: Vec<Section> = parts::warnings(&[&context.warnings]).into_iter().collect();
-    let mut section = Section::new(
-        "map",
-        "Friction over velocity",
-        "Friction on stretches of constant speed; the identified gravity, inertia and offset are subtracted.",
-    );
-    section.blocks = parts::friction(kind, map);
-    sections.push(section);
-    sections.push(
-        Section::new("points", "The points", "").with(Block::Details {
-            summary: format!("All {} stretches", map.points.len()),
-            blocks: vec![Block::Table(Table {
-                caption: "Stretches of constant speed".into(),
-                columns: vec![
-                    Column::number("Start", "s"),
-                    Column::number("Duration", "s"),
-                    Column::number("Velocity", velocity),
-                    Column::number("Friction ± standard deviation", torque),
-                ],
-                rows: map
-                    .points
-                    .iter()
-                    .map(|p| {
-                        vec![
-                            format_significant(p.start, 4),
-                            format_significant(p.duration, 3),
-                            format_significant(p.speed, 3),
-                            format_value(p.friction, p.std),
-                        ]
-                    })
-                    .collect(),
-                note: String::new(),
-            })],
-        }),
-    );
-    sections.extend(dropped(map, velocity));
-    sections.push(parts::repeat(context));
-    Document {
-        title: format!("{}: friction of joint {}", robot.name, map.joint),
-        subtitle: map.text.clone(),
-        summary,
-        sections,
-        footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
-    }
+    summary
+}
+
+/// All stretches that gave a point.
+fn points(kind: JointKind, map: &FrictionMap) -> Section {
+    let [_, velocity, torque] = parts::units(kind);
+    Section::new("points", "The points", "").with(Block::Details {
+        summary: format!("All {} stretches", map.points.len()),
+        blocks: vec![Block::Table(Table {
+            caption: "Stretches of constant speed".into(),
+            columns: vec![
+                Column::number("Start", "s"),
+                Column::number("Duration", "s"),
+                Column::number("Velocity", velocity),
+                Column::number("Friction ± standard deviation", torque),
+            ],
+            rows: map
+                .points
+                .iter()
+                .map(|p| {
+                    vec![
+                        format_significant(p.start, 4),
+                        format_significant(p.duration, 3),
+                        format_significant(p.speed, 3),
+                        format_value(p.friction, p.std),
+                    ]
+                })
+                .collect(),
+            note: String::new(),
+        })],
+    })
 }
 
 /// Stretches that gave no point, with the reason.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::context::Context;
-use super::parts;
+use super::{parts, residuals, treatment};
 use rig_identify::{Identification, ModelKind};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_value};
@@ -281,12 +281,12 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
         {
             section
                 .blocks
-                .extend(parts::torque_plots(joint, report, "hold-out"));
+                .extend(residuals::torque_plots(joint, report, "hold-out"));
         }
         if let Some(report) = found.details.train.get(j) {
             section
                 .blocks
-                .extend(parts::torque_plots(joint, report, "training data"));
+                .extend(residuals::torque_plots(joint, report, "training data"));
         }
     }
     section.with(parts::info(
@@ -447,7 +447,7 @@ fn data(robot: &Robot, found: &Identification) -> Section {
     }));
     section
         .blocks
-        .extend(parts::treatment(&robot.joints, &d.treatment));
+        .extend(treatment::treatment(&robot.joints, &d.treatment));
     if let Some((_, why)) = &d.window {
         section = section.with(Block::Text(format!("Windows of the integral model: {why}")));
     }
@@ -486,7 +486,7 @@ fn residuals(robot: &Robot, found: &Identification) -> Section {
     );
     let period = 1.0 / d.treatment.kept_rate();
     for (joint, report) in robot.joints.iter().zip(&d.train) {
-        let blocks = parts::residual_tests(joint, report, period);
+        let blocks = residuals::residual_tests(joint, report, period);
         if robot.joints.len() == 1 {
             section.blocks.extend(blocks);
         } else {

@@ -7,11 +7,14 @@ mod context;
 mod demo;
 mod diagnosis;
 mod estimators;
+mod friction;
 mod friction_map;
 mod identification;
 mod parts;
+mod residuals;
 #[cfg(test)]
 mod tests;
+mod treatment;
 mod validation;
 mod validation_voltage;
 

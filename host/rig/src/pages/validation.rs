@@ -1,10 +1,12 @@
 //! The page of a validation.
 
+mod motion;
+
 use super::context::Context;
-use super::parts;
-use rig_model::robot::{Joint, Robot};
+use super::{parts, residuals, treatment};
+use rig_model::robot::Robot;
 use rig_output::format_significant;
-use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
+use rig_report::{Block, Column, Document, Fact, Section, Table, Tone};
 use rig_validate::{Checked, Motion, MotionCheck, Validation};
 
 /// Composes the page of a validation.
@@ -15,7 +17,7 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
     let names = names(found);
     for (k, (checked, name)) in found.recordings.iter().zip(&names).enumerate() {
         sections.push(torque(robot, checked, name, k));
-        sections.push(motion(robot, checked, name, k));
+        sections.push(motion::section(robot, checked, name, k));
     }
     let mut data = Section::new(
         "data",
@@ -38,7 +40,7 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
             .collect(),
     ));
     data.blocks
-        .extend(parts::treatment(&robot.joints, &found.treatment));
+        .extend(treatment::treatment(&robot.joints, &found.treatment));
     sections.push(data);
     let mut tests = Section::new(
         "residuals",
@@ -50,7 +52,7 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
         for (joint, check) in robot.joints.iter().zip(&checked.torque) {
             tests.blocks.push(Block::Details {
                 summary: format!("{name}, joint {}", joint.name),
-                blocks: parts::residual_tests(joint, &check.residual, period),
+                blocks: residuals::residual_tests(joint, &check.residual, period),
             });
         }
     }
@@ -195,7 +197,7 @@ fn torque(robot: &Robot, checked: &Checked, name: &str, k: usize) -> Section {
     for (joint, check) in robot.joints.iter().zip(&checked.torque) {
         section
             .blocks
-            .extend(parts::torque_plots(joint, &check.residual, name));
+            .extend(residuals::torque_plots(joint, &check.residual, name));
     }
     section
 }
@@ -212,171 +214,4 @@ fn names(found: &Validation) -> Vec<String> {
     } else {
         labels().map(str::to_owned).collect()
     }
-}
-
-fn motion(robot: &Robot, checked: &Checked, name: &str, k: usize) -> Section {
-    let section = Section::new(format!("motion-{}", k + 1), format!("Motion: {name}"), "");
-    match &checked.motion {
-        Motion::NotSimulated { why } => section.with(parts::warning(format!(
-            "The motion was not simulated. {why}"
-        ))),
-        Motion::Simulated {
-            joints,
-            remarks,
-            samples,
-            ..
-        } => {
-            let mut section = section
-                .with(Block::List(remarks.clone()))
-                .with(steps(joints));
-            for (joint, check) in robot.joints.iter().zip(joints) {
-                section.blocks.extend(motion_plots(joint, check, *samples));
-            }
-            section
-        }
-    }
-}
-
-fn steps(joints: &[MotionCheck]) -> Block {
-    Block::Table(Table {
-        caption: "Simulation and measurement".into(),
-        columns: vec![
-            Column::text("Joint"),
-            Column::number("Position RMS", ""),
-            Column::number("largest", ""),
-            Column::number("half step", ""),
-            Column::number("Torque RMS", ""),
-            Column::number("largest", ""),
-            Column::number("half step", ""),
-            Column::number("At limit", ""),
-        ],
-        rows: joints
-            .iter()
-            .map(|m| {
-                let unit = parts::unit(&m.torque_unit);
-                vec![
-                    m.joint.clone(),
-                    parts::length(m.position_rms_error, &m.position_unit),
-                    parts::length(m.position_max_error, &m.position_unit),
-                    parts::length(m.position_step_change, &m.position_unit),
-                    format!("{} {unit}", format_significant(m.torque_rms_error, 3)),
-                    format!("{} {unit}", format_significant(m.torque_max_error, 3)),
-                    format!("{} {unit}", format_significant(m.torque_step_change, 2)),
-                    parts::count(m.saturated),
-                ]
-            })
-            .collect(),
-        note: "Errors of the simulation. Half step: RMS change of the simulation when its step is halved. At limit: samples at which the torque limit cut the controller's command.".into(),
-    })
-}
-
-fn motion_plots(joint: &Joint, m: &MotionCheck, samples: u64) -> Vec<Block> {
-    let [position, _, torque] = parts::units(joint.kind);
-    let s = &m.series;
-    let n = parts::count(samples);
-    let time = || Axis::new("time", "s");
-    let mut place = Plot::new(
-        format!("Joint {}: position, measured and simulated", joint.name),
-        time(),
-        Axis::new("position", position),
-    )
-    .with(Series::line(
-        "measured",
-        Role::Measured,
-        s.t.clone(),
-        s.measured.clone(),
-    ))
-    .with(Series::line("simulated", Role::Model, s.t.clone(), s.simulated.clone()).dashed())
-    .note(format!(
-        "n = {n}, RMS error {}, largest {}.",
-        parts::length(m.position_rms_error, position),
-        parts::length(m.position_max_error, position)
-    ));
-    place.height = 240;
-    let scale = if m.tracking_rms < 1e-3 {
-        (1e6, "µ")
-    } else {
-        (1e3, "m")
-    };
-    let less = |a: &[f64], b: &[f64]| {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| scale.0 * (a - b))
-            .collect::<Vec<_>>()
-    };
-    let mut tracking = Plot::new(
-        format!(
-            "Joint {}: tracking error (reference less position)",
-            joint.name
-        ),
-        time(),
-        Axis::new("tracking error", &format!("{}{position}", scale.1)),
-    )
-    .with(Series::line(
-        "measured",
-        Role::Measured,
-        s.t.clone(),
-        less(&s.reference, &s.measured),
-    ))
-    .with(Series::line(
-        "simulated",
-        Role::Model,
-        s.t.clone(),
-        less(&s.reference, &s.simulated),
-    ))
-    .note(format!(
-        "n = {n}, measured RMS {}; the error of the simulation is {} % of it.",
-        parts::length(m.tracking_rms, position),
-        parts::percent(m.tracking_relative_error)
-    ));
-    tracking.height = 260;
-    let mut error = Plot::new(
-        format!(
-            "Joint {}: position error (measured less simulated)",
-            joint.name
-        ),
-        time(),
-        Axis::new("error", &format!("{}{position}", scale.1)),
-    )
-    .with(Series::line(
-        "error",
-        Role::Residual,
-        s.t.clone(),
-        less(&s.measured, &s.simulated),
-    ))
-    .note(format!(
-        "n = {n}, RMS {}.",
-        parts::length(m.position_rms_error, position)
-    ));
-    error.height = 220;
-    let what = parts::effort(joint.kind);
-    let mut torques = Plot::new(
-        format!("Joint {}: {what}, measured and simulated", joint.name),
-        time(),
-        Axis::new(what, torque),
-    )
-    .with(Series::line(
-        "measured",
-        Role::Measured,
-        s.t.clone(),
-        s.torque_measured.clone(),
-    ))
-    .with(Series::line(
-        "simulated",
-        Role::Model,
-        s.t.clone(),
-        s.torque_simulated.clone(),
-    ))
-    .note(format!(
-        "n = {n}, RMS error {} {torque}, {} % of the {what}'s RMS; not filtered.",
-        format_significant(m.torque_rms_error, 3),
-        parts::percent(m.torque_relative_error)
-    ));
-    torques.height = 280;
-    vec![
-        Block::Plot(tracking),
-        Block::Plot(error),
-        Block::Plot(torques),
-        Block::Plot(place),
-    ]
 }
