@@ -1,7 +1,7 @@
 //! Further sections of an identification: comparison of estimators, essential and full parameters.
 
 use super::parts;
-use rig_identify::{Comparison, EssentialSet, Identification, StandardSet};
+use rig_identify::{Compared, Comparison, EssentialSet, Identification, StandardSet};
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 use rig_report::{Block, Column, NoteKind, Section, Table};
@@ -37,7 +37,43 @@ fn percents(list: Option<&Vec<f64>>) -> String {
     })
 }
 
+/// The comparison of the estimators, with the recommendation.
 fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> Section {
+    let mut section = Section::new(
+        "estimators",
+        "Comparison of estimators",
+        "Every estimator predicts the torque on stretches of time that were left out of its fit.",
+    )
+    .with(Block::Note {
+        kind: if comparison.recommended == found.estimator {
+            NoteKind::Good
+        } else {
+            NoteKind::Warning
+        },
+        text: comparison.recommendation.clone(),
+    })
+    .with(Block::Table(table(robot, comparison)));
+    if !comparison.repeated_holdout.is_empty() {
+        section = section.with(Block::Text(format!(
+            "These hold-outs repeat a training motion: {}. They do not show how well another motion is predicted.",
+            comparison.repeated_holdout.join(", ")
+        )));
+    }
+    if let Some(endogeneity) = &comparison.endogeneity {
+        section = section.with(Block::Text(endogeneity.text.clone()));
+    }
+    let notes = progress(comparison);
+    if !notes.is_empty() {
+        section = section.with(Block::Details {
+            summary: "Progress of each estimator".into(),
+            blocks: notes,
+        });
+    }
+    section
+}
+
+/// The table of the estimators that were compared.
+fn table(robot: &Robot, comparison: &Comparison) -> Table {
     let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
     let held = comparison
         .estimators
@@ -55,77 +91,53 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
         Column::number("Distance to consistent", "std"),
         Column::number("Largest shift", "std"),
     ]);
-    let mut notes: Vec<Block> = Vec::new();
-    let rows = comparison
-        .estimators
-        .iter()
-        .map(|row| {
-            for sentence in &row.said {
-                notes.push(Block::Text(format!(
-                    "{}: {sentence}",
-                    row.estimator.words()
-                )));
-            }
-            let number = |v: Option<f64>| v.map_or("–".into(), |v| format_significant(v, 2));
-            let mut cells = vec![
-                row.estimator.name().to_owned(),
-                percents(row.cross_validated_relative_error.as_ref()),
-            ];
-            if held {
-                cells.push(percents(row.holdout_relative_error.as_ref()));
-            }
-            cells.extend([
-                match row.physically_consistent {
-                    Some(true) => "yes",
-                    Some(false) => "no",
-                    None => "–",
-                }
-                .to_owned(),
-                number(row.distance_to_consistent),
-                number(row.largest_shift),
-            ]);
-            cells
-        })
-        .collect();
-    let mut section = Section::new(
-        "estimators",
-        "Comparison of estimators",
-        "Every estimator predicts the torque on stretches of time that were left out of its fit.",
-    )
-    .with(Block::Note {
-        kind: if comparison.recommended == found.estimator {
-            NoteKind::Good
-        } else {
-            NoteKind::Warning
-        },
-        text: comparison.recommendation.clone(),
-    })
-    .with(Block::Table(Table {
+    Table {
         caption: "Estimators".into(),
         columns,
-        rows,
+        rows: comparison
+            .estimators
+            .iter()
+            .map(|row| cells(row, held))
+            .collect(),
         note: format!(
             "Residual: residual RMS over torque RMS for each joint ({}), on {} stretches, each predicted from a fit to the others. Distance: from all parameters together to the nearest physically consistent set. Shift: largest difference from the weighted fit.",
             joints.join(", "),
             comparison.folds
         ),
-    }));
-    if !comparison.repeated_holdout.is_empty() {
-        section = section.with(Block::Text(format!(
-            "These hold-outs repeat a training motion: {}. They do not show how well another motion is predicted.",
-            comparison.repeated_holdout.join(", ")
-        )));
     }
-    if let Some(endogeneity) = &comparison.endogeneity {
-        section = section.with(Block::Text(endogeneity.text.clone()));
+}
+
+/// One row of the table. `held`: the table has a column for the hold-out.
+fn cells(row: &Compared, held: bool) -> Vec<String> {
+    let number = |v: Option<f64>| v.map_or("–".into(), |v| format_significant(v, 2));
+    let mut cells = vec![
+        row.estimator.name().to_owned(),
+        percents(row.cross_validated_relative_error.as_ref()),
+    ];
+    if held {
+        cells.push(percents(row.holdout_relative_error.as_ref()));
     }
-    if !notes.is_empty() {
-        section = section.with(Block::Details {
-            summary: "Progress of each estimator".into(),
-            blocks: notes,
-        });
-    }
-    section
+    cells.extend([
+        match row.physically_consistent {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "–",
+        }
+        .to_owned(),
+        number(row.distance_to_consistent),
+        number(row.largest_shift),
+    ]);
+    cells
+}
+
+/// What each estimator said while it was fitted.
+fn progress(comparison: &Comparison) -> Vec<Block> {
+    let sentences = |row: &Compared| -> Vec<Block> {
+        (row.said.iter())
+            .map(|sentence| Block::Text(format!("{}: {sentence}", row.estimator.words())))
+            .collect()
+    };
+    comparison.estimators.iter().flat_map(sentences).collect()
 }
 
 fn essential(set: &EssentialSet) -> Section {

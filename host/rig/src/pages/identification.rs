@@ -1,22 +1,14 @@
 //! The page of an identification.
 
-use std::f64::consts::TAU;
+mod confidence;
+mod summary;
 
 use super::context::Context;
 use super::{parts, residuals, treatment};
 use rig_identify::{Identification, ModelKind};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_value};
-use rig_report::{
-    Axis, Block, Column, Document, Fact, NoteKind, Plot, Role, Section, Series, Style, Table, Tone,
-};
-
-/// Largest number of parameters that get a card each; more share one card.
-const CARDS: usize = 6;
-/// Largest number of confidence ellipses.
-const ELLIPSES: usize = 4;
-/// Correlation below which no ellipse is drawn: it would be nearly upright and add nothing to the table.
-const CORRELATED: f64 = 0.3;
+use rig_report::{Block, Column, Document, NoteKind, Section, Table};
 
 /// Composes the page of an identification.
 pub fn identification(robot: &Robot, found: &Identification, context: &Context) -> Document {
@@ -26,7 +18,7 @@ pub fn identification(robot: &Robot, found: &Identification, context: &Context) 
     sections.push(not_excited(found));
     sections.push(fit(robot, found));
     sections.extend(super::estimators::sections(robot, found));
-    sections.push(confidence(found));
+    sections.push(confidence::section(found));
     sections.push(data(robot, found));
     sections.push(residuals(robot, found));
     sections.push(parts::repeat(context));
@@ -38,105 +30,10 @@ pub fn identification(robot: &Robot, found: &Identification, context: &Context) 
     Document {
         title: format!("{}: identified parameters", found.robot),
         subtitle: format!("{} base parameters by {estimator}, {model}.", found.rank),
-        summary: summary(found, context),
+        summary: summary::facts(found, context),
         sections,
         footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
     }
-}
-
-fn summary(found: &Identification, context: &Context) -> Vec<Fact> {
-    let worst = |of: &dyn Fn(&rig_identify::JointFigures) -> Option<f64>| {
-        found.joints.iter().filter_map(of).reduce(f64::max)
-    };
-    let several = if found.joints.len() > 1 {
-        ", worst joint"
-    } else {
-        ""
-    };
-    let train = worst(&|j| Some(j.train_relative_error));
-    let mut facts = Vec::new();
-    match worst(&|j| j.holdout_relative_error) {
-        Some(held) => facts.push(
-            Fact::new("Residual on the hold-out", parts::percent(held))
-                .unit("%")
-                .note(format!(
-                    "residual RMS over torque RMS{several}; on the training data {} %",
-                    train.map_or("–".into(), parts::percent)
-                ))
-                .tone(if held > 0.3 {
-                    Tone::Warning
-                } else {
-                    Tone::Plain
-                }),
-        ),
-        None => facts.push(
-            Fact::new(
-                "Residual on the training data",
-                train.map_or("–".into(), parts::percent),
-            )
-            .unit("%")
-            .note(format!(
-                "residual RMS over torque RMS{several}; no hold-out was given"
-            ))
-            .tone(Tone::Warning),
-        ),
-    }
-    let warnings = found.warnings.len() + context.warnings.len();
-    facts.push(if warnings == 0 {
-        Fact::new("Warnings", "none").tone(Tone::Good)
-    } else {
-        Fact::new("Warnings", warnings.to_string())
-            .note("at the top of the page")
-            .tone(Tone::Warning)
-    });
-    facts.push(
-        Fact::new(
-            "Condition number",
-            format_significant(found.condition_number, 2),
-        )
-        .note(format!(
-            "{} with columns scaled to one length",
-            format_significant(found.details.estimate.scaled_condition, 2)
-        )),
-    );
-    if found.base_parameters.len() <= CARDS {
-        for b in &found.base_parameters {
-            facts.push(
-                Fact::new(&b.expression, format_value(b.value, half(b.interval)))
-                    .unit(parts::unit(&b.unit))
-                    .note("± half the 95 % interval"),
-            );
-        }
-    } else {
-        let mut relative: Vec<f64> = found
-            .base_parameters
-            .iter()
-            .map(|b| b.relative_std_percent)
-            .collect();
-        relative.sort_by(f64::total_cmp);
-        let median = relative
-            .get(relative.len() / 2)
-            .copied()
-            .unwrap_or(f64::NAN);
-        facts.push(
-            Fact::new("Base parameters", found.base_parameters.len().to_string()).note(format!(
-                "median relative standard deviation {} %",
-                format_significant(median, 2)
-            )),
-        );
-    }
-    if !found.not_excited.is_empty() {
-        facts.push(
-            Fact::new("Not excited", found.not_excited.len().to_string())
-                .note("combinations that these data alone do not determine")
-                .tone(Tone::Warning),
-        );
-    }
-    facts
-}
-
-fn half(interval: [f64; 2]) -> f64 {
-    0.5 * (interval[1] - interval[0])
 }
 
 fn parameters(found: &Identification) -> Section {
@@ -292,128 +189,6 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
     section.with(parts::info(
         "Drag over a plot to zoom; double-click to reset.",
     ))
-}
-
-fn confidence(found: &Identification) -> Section {
-    let e = &found.details.estimate;
-    let names: Vec<String> = found
-        .base_parameters
-        .iter()
-        .map(|b| b.expression.clone())
-        .collect();
-    let n = names.len();
-    let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (0..a).map(move |b| (b, a))).collect();
-    pairs.sort_by(|x, y| {
-        e.correlation[y.0][y.1]
-            .abs()
-            .total_cmp(&e.correlation[x.0][x.1].abs())
-    });
-    let mut section = Section::new(
-        "confidence",
-        "Correlation of the parameters",
-        "Strongly correlated parameters can compensate each other: only their combination is well determined.",
-    );
-    let strong: Vec<_> = pairs
-        .iter()
-        .filter(|(a, b)| e.correlation[*a][*b].abs() > CORRELATED)
-        .take(ELLIPSES)
-        .collect();
-    if strong.is_empty() && n > 1 {
-        section = section.with(parts::info(format!(
-            "No two parameters are correlated by more than {CORRELATED}."
-        )));
-    }
-    for &&(a, b) in &strong {
-        let Some(ellipse) = e.ellipse(a, b) else {
-            continue;
-        };
-        let (x, y): (Vec<f64>, Vec<f64>) = (0..=180)
-            .map(|k| (f64::from(k) * TAU / 180.0).sin_cos())
-            .map(|(s, c)| {
-                (
-                    ellipse.centre[0] + c * ellipse.first[0] + s * ellipse.second[0],
-                    ellipse.centre[1] + c * ellipse.first[1] + s * ellipse.second[1],
-                )
-            })
-            .unzip();
-        let unit = |k: usize| parts::unit(&found.base_parameters[k].unit);
-        let mut plot = Plot::new(
-            format!(
-                "{} and {}: correlation {}",
-                names[a],
-                names[b],
-                signed(e.correlation[a][b])
-            ),
-            Axis::new(&names[a], &unit(a)),
-            Axis::new(&names[b], &unit(b)),
-        )
-        .with(Series::line("95 % region of both", Role::Model, x, y))
-        .with(Series::new(
-            "estimate, 95 % interval of one",
-            Role::Measured,
-            Style::ErrorBars {
-                half_width: vec![half(e.interval[b])],
-            },
-            vec![e.values[a]],
-            vec![e.values[b]],
-        ))
-        .note(format!(
-            "Allows for correlation in time; {} rows count as {} independent rows.",
-            parts::count(e.rows),
-            parts::count(e.effective_rows as u64)
-        ));
-        plot.height = 260;
-        section = section.with(Block::Plot(plot));
-    }
-    if n > 12 {
-        // A wide matrix is hard to read, so only the strongest pairs are listed.
-        section = section.with(Block::Table(Table {
-            caption: "The twenty strongest correlations".into(),
-            columns: vec![
-                Column::text("Parameter"),
-                Column::text("Parameter"),
-                Column::number("Correlation", ""),
-            ],
-            rows: pairs
-                .iter()
-                .take(20)
-                .map(|&(a, b)| {
-                    vec![
-                        names[a].clone(),
-                        names[b].clone(),
-                        signed(e.correlation[a][b]),
-                    ]
-                })
-                .collect(),
-            note: String::new(),
-        }));
-    } else if n > 1 {
-        section = section.with(Block::Table(Table {
-            caption: "Correlation of the estimates".into(),
-            columns: std::iter::once(Column::text("Parameter"))
-                .chain(names.iter().map(|name| Column::number(name, "")))
-                .collect(),
-            rows: (0..n)
-                .map(|a| {
-                    std::iter::once(names[a].clone())
-                        .chain((0..n).map(|b| {
-                            if a == b {
-                                "1".into()
-                            } else {
-                                signed(e.correlation[a][b])
-                            }
-                        }))
-                        .collect()
-                })
-                .collect(),
-            note: String::new(),
-        }));
-    }
-    section
-}
-
-fn signed(rho: f64) -> String {
-    format!("{rho:+.2}").replace('-', "−")
 }
 
 fn data(robot: &Robot, found: &Identification) -> Section {

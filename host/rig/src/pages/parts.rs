@@ -5,7 +5,7 @@ pub(super) use rig_output::format_unit as unit;
 use super::context::Context;
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
-use rig_report::{Block, NoteKind, Section};
+use rig_report::{Block, Fact, NoteKind, Section, Tone};
 
 /// Returns "torque" or "force".
 pub(super) fn effort(kind: JointKind) -> &'static str {
@@ -50,6 +50,11 @@ pub(super) fn percent(share: f64) -> String {
     format_significant(value, if value.abs() < 10.0 { 2 } else { 3 })
 }
 
+/// Half the width of an interval.
+pub(super) fn half(interval: [f64; 2]) -> f64 {
+    0.5 * (interval[1] - interval[0])
+}
+
 /// Formats a small length or angle with a suitable unit prefix.
 pub(super) fn length(value: f64, unit: &str) -> String {
     let (scale, prefix) = if value < 1e-6 {
@@ -87,6 +92,17 @@ pub(super) fn warnings(groups: &[&[String]]) -> Option<Section> {
         lead: String::new(),
         blocks,
     })
+}
+
+/// Returns the fact of the number of warnings.
+pub(super) fn warning_count(warnings: usize) -> Fact {
+    if warnings == 0 {
+        Fact::new("Warnings", "none").tone(Tone::Good)
+    } else {
+        Fact::new("Warnings", warnings.to_string())
+            .note("at the top of the page")
+            .tone(Tone::Warning)
+    }
 }
 
 /// The command that repeats the result, and the description that was written.

@@ -132,14 +132,9 @@ fn summary(found: &Validation, context: &Context) -> Vec<Fact> {
             );
         }
     }
-    let warnings = found.warnings.len() + context.warnings.len();
-    facts.push(if warnings == 0 {
-        Fact::new("Warnings", "none").tone(Tone::Good)
-    } else {
-        Fact::new("Warnings", warnings.to_string())
-            .note("at the top of the page")
-            .tone(Tone::Warning)
-    });
+    facts.push(parts::warning_count(
+        found.warnings.len() + context.warnings.len(),
+    ));
     facts
 }
 
