@@ -1,7 +1,9 @@
 //! `rig diagnose`: finds the effects that the model lacks.
 
+mod printed;
+
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use rig_shared::effects::Kind;
@@ -20,11 +22,10 @@ use rig_data::prepare::Recording;
 use rig_data::prepare::Unburdened;
 use rig_data::runs::Run;
 use rig_diagnose::experiment::FILE;
-use rig_diagnose::outcome::{DataFault, Diagnosis, Step, Verdict};
+use rig_diagnose::outcome::Diagnosis;
 use rig_diagnose::voltage::diagnose_voltage;
 use rig_diagnose::{DiagnoseError, Options, clamped, diagnose, sensor_zeros};
 use rig_model::robot::Robot;
-use rig_output::format_significant;
 use rig_output::{can_take, folder, write_whole};
 
 /// File with the description and the effects that were found.
@@ -100,6 +101,44 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_folder(&args.out, &[], args.force)?;
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
+    refuse_repeated(args)?;
+    // Wrong units do not stop the command: they give a verdict.
+    let (training, holdout, workflow) = read(&robot, args)?;
+    refuse_without_effort(args, &training)?;
+    let logs = Logs {
+        unburdened: Inputs::read(&robot, &args.pulls_off)?,
+        training,
+        holdout,
+    };
+    let mut warnings = logs.warnings();
+    for warning in &warnings {
+        ui.remark(warning);
+    }
+    for inputs in [&logs.training, &logs.holdout] {
+        for sentence in inputs.strange_references(&robot)? {
+            ui.remark(&format!(
+                "{sentence} References are used to find recordings that repeat one motion and, under voltage, to identify the controller."
+            ));
+        }
+    }
+    let options = options(&robot, args, description.urdf.is_some(), ui)?;
+    let (mut found, model) = logs.diagnosed(&robot, workflow, &options, ui)?;
+    let heard = logs.heard();
+    for warning in &heard {
+        ui.remark(warning);
+    }
+    warnings.extend(heard);
+    if !args.without.is_empty() {
+        let names = args.without.join(", ");
+        (found.words).push(format!("Left out of the library, as asked: {names}."));
+    }
+    write(args, &found, &model, warnings)?;
+    printed::print(ui, &found, &args.out.join(REPORT));
+    Ok(())
+}
+
+/// Refuses recordings that are given twice or for two uses.
+fn refuse_repeated(args: &Args) -> Result<(), CommandError> {
     let learnt: Vec<PathBuf> = args.data.iter().chain(&args.pulls_off).cloned().collect();
     refuse_twice(&learnt, "give it once")?;
     refuse_shared(&learnt, &args.holdout)?;
@@ -111,8 +150,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for path in &args.clamped {
         refuse_as_rest(["--clamped", "the joints clamped"], path, &moved)?;
     }
-    // Wrong units do not stop the command: they give a verdict.
-    let (training, holdout, workflow) = read(&robot, args)?;
+    Ok(())
+}
+
+/// Refuses recordings for a special use if the training recordings hold only the motor voltage.
+fn refuse_without_effort(args: &Args, training: &Inputs) -> Result<(), CommandError> {
     let special = (args.drive_off.iter().map(|path| ("--drive-off", path)))
         .chain(args.pulls_off.iter().map(|path| ("--pulls-off", path)))
         .chain(args.clamped.iter().map(|path| ("--clamped", path)));
@@ -122,65 +164,96 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             path.display()
         )));
     }
-    let unburdened = Inputs::read(&robot, &args.pulls_off)?;
-    let all = [&training, &unburdened, &holdout];
-    let warnings: Vec<String> = all.iter().flat_map(|inputs| inputs.warnings()).collect();
-    for warning in &warnings {
-        ui.remark(warning);
-    }
-    for inputs in [&training, &holdout] {
-        for sentence in inputs.strange_references(&robot)? {
-            ui.remark(&format!(
-                "{sentence} References are used to find recordings that repeat one motion and, under voltage, to identify the controller."
-            ));
-        }
-    }
-    let options = Options {
+    Ok(())
+}
+
+/// Options of the diagnosis. `from_urdf`: the robot was read from a URDF file.
+fn options(robot: &Robot, args: &Args, from_urdf: bool, ui: &Ui) -> Result<Options, CommandError> {
+    Ok(Options {
         even_if_wrong: args.even_if_wrong,
         seed: args.seed,
-        sensor_zeros: zeros(&robot, args, ui)?,
-        clamped: clamps(&robot, args, ui)?,
-        no_offsets: description.urdf.is_some(),
+        sensor_zeros: zeros(robot, args, ui)?,
+        clamped: clamps(robot, args, ui)?,
+        no_offsets: from_urdf,
         without: (Kind::ALL.iter().copied())
             .filter(|kind| args.without.iter().any(|name| name == kind.about().name))
             .collect(),
         ..Options::default()
-    };
-    let mut progress = ui.progress("diagnosing", 1000);
-    let (listened, free) = (training.listened(), unburdened.listened());
-    let free: Vec<Unburdened> = free.iter().map(|recording| Unburdened(recording)).collect();
-    let mut learnt = recordings(&listened);
-    learnt.extend(free.iter().map(|recording| recording as &dyn Recording));
-    let (mut found, model) = workflow(
-        &robot,
-        &learnt,
-        &recordings(&holdout.listened()),
-        &options,
-        &mut |share| progress.at((1000.0 * share) as u64),
-    )?;
-    drop(progress);
-    for fault in &mut found.data_faults {
-        for inputs in all {
-            inputs.in_its_names(&fault.recording, &mut fault.text);
+    })
+}
+
+/// The recordings of motions, by their use.
+struct Logs {
+    training: Inputs,
+    /// Training recordings made without external loads.
+    unburdened: Inputs,
+    holdout: Inputs,
+}
+
+impl Logs {
+    fn all(&self) -> [&Inputs; 3] {
+        [&self.training, &self.unburdened, &self.holdout]
+    }
+
+    /// Warnings from the headers.
+    fn warnings(&self) -> Vec<String> {
+        (self.all().iter())
+            .flat_map(|inputs| inputs.warnings())
+            .collect()
+    }
+
+    /// Warnings about the rows that were read.
+    fn heard(&self) -> Vec<String> {
+        (self.all().iter())
+            .flat_map(|inputs| inputs.heard())
+            .collect()
+    }
+
+    /// Runs the diagnosis; its faults name columns as the files do.
+    fn diagnosed(
+        &self,
+        robot: &Robot,
+        workflow: Workflow,
+        options: &Options,
+        ui: &Ui,
+    ) -> Result<(Diagnosis, Robot), CommandError> {
+        let mut progress = ui.progress("diagnosing", 1000);
+        let (listened, free) = (self.training.listened(), self.unburdened.listened());
+        let free: Vec<Unburdened> = free.iter().map(|recording| Unburdened(recording)).collect();
+        let mut learnt = recordings(&listened);
+        learnt.extend(free.iter().map(|recording| recording as &dyn Recording));
+        let (mut found, model) = workflow(
+            robot,
+            &learnt,
+            &recordings(&self.holdout.listened()),
+            options,
+            &mut |share| progress.at((1000.0 * share) as u64),
+        )?;
+        for fault in &mut found.data_faults {
+            for inputs in self.all() {
+                inputs.in_its_names(&fault.recording, &mut fault.text);
+            }
         }
+        Ok((found, model))
     }
-    let heard: Vec<String> = all.iter().flat_map(|inputs| inputs.heard()).collect();
-    for warning in &heard {
-        ui.remark(warning);
-    }
-    if !args.without.is_empty() {
-        let names = args.without.join(", ");
-        (found.words).push(format!("Left out of the library, as asked: {names}."));
-    }
+}
+
+/// Writes all files of the result.
+fn write(
+    args: &Args,
+    found: &Diagnosis,
+    model: &Robot,
+    warnings: Vec<String>,
+) -> Result<(), CommandError> {
     let text = model.to_toml()?;
     let context = Context {
         command: command_line(),
         identified: Some((MODEL.into(), text.clone())),
         remarks: Vec::new(),
-        warnings: warnings.into_iter().chain(heard).collect(),
+        warnings,
     };
-    let page = rig_report::render(&pages::diagnosis(&found, &context))?;
-    let json = serde_json::to_string_pretty(&found).map_err(|error| {
+    let page = rig_report::render(&pages::diagnosis(found, &context))?;
+    let json = serde_json::to_string_pretty(found).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
     folder(&args.out)?;
@@ -192,9 +265,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     write_whole(&args.out.join(MODEL), text.as_bytes())?;
     write_whole(&args.out.join(DIAGNOSIS), (json + "\n").as_bytes())?;
     write_whole(&args.out.join(REPORT), page.as_bytes())?;
-    pictures::write(&args.out, &found)?;
-    print(ui, &found, &args.out);
-    Ok(())
+    pictures::write(&args.out, found)
 }
 
 /// Parses the name of an effect.
@@ -261,114 +332,3 @@ fn clamps(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<Run>, CommandError>
     }
     Ok(runs)
 }
-
-/// Prints the result in short.
-fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
-    let lines = summary(found);
-    for fault in &found.data_faults {
-        ui.remark(&match fault.recording.as_str() {
-            recording if fault.text.contains(recording) => fault.text.clone(),
-            recording => format!("{recording}: {}", fault.text),
-        });
-    }
-    for line in lines {
-        ui.say(&line);
-    }
-    if found.verdict == Verdict::DataFault {
-        let way_on = match found.data_faults.iter().all(DataFault::leaves_rows) {
-            true => " Give --even-if-wrong to fit in spite of this.",
-            false => "",
-        };
-        ui.remark(&format!(
-            "nothing was fitted; model.toml is the unchanged description.{way_on}"
-        ));
-    }
-    ui.say(&format!("report: {}", out.join(REPORT).display()));
-}
-
-/// Lines of the short result: verdict and effects first, further sentences of the diagnosis last.
-fn summary(found: &Diagnosis) -> Vec<String> {
-    let mut lines = vec![format!("verdict: {}", pages::verdict(found.verdict))];
-    let (first, besides) = found.words.split_at(found.words.len().min(1));
-    lines.extend(first.iter().cloned());
-    let of_joint = found.waterfall.len() > 1;
-    for (k, step) in found.steps.iter().enumerate() {
-        lines.push(effect(k + 1, step, of_joint));
-        lines.extend(step.parameters.iter().map(|(name, value)| {
-            let unit = match value.unit.as_str() {
-                "1" => String::new(),
-                unit => format!(" {}", rig_output::format_unit(unit)),
-            };
-            format!("    {name} = {}", value.said(&unit))
-        }));
-    }
-    if let Some(share) = found.gap_closed {
-        let on = if found.steps.iter().any(|step| step.holdout_rms.is_some()) {
-            "on the hold-out"
-        } else {
-            "on the training data (no hold-out was given)"
-        };
-        let refit = (found.closed_by_effects()).map_or(String::new(), |own| {
-            format!(
-                ", counted from the given description; the effects close {} % of the gap that remains after the refit",
-                format_significant(100.0 * own, 3)
-            )
-        });
-        lines.push(format!(
-            "gap closed: {} %, {on}{refit}",
-            format_significant(100.0 * share, 3)
-        ));
-    }
-    if let Some(remainder) = &found.remainder {
-        lines.push(format!("remainder: {}", remainder.text));
-    }
-    if let Some(next) = &found.next_experiment {
-        lines.push(match (next.separates.as_slice(), &next.file) {
-            // The text of an experiment for one effect is long; the report holds it.
-            ([one], Some(file)) => {
-                format!("next experiment: {file} would make {one} testable; the report says how")
-            }
-            _ => format!("next experiment: {}", next.text),
-        });
-    }
-    if !besides.is_empty() {
-        lines.push("also:".into());
-        lines.extend(besides.iter().map(|sentence| format!("  - {sentence}")));
-    }
-    lines
-}
-
-/// Describes one step in a line. `of_joint`: the robot has several joints, each with its own gap.
-fn effect(number: usize, step: &Step, of_joint: bool) -> String {
-    let law = step
-        .law
-        .as_ref()
-        .map_or(String::new(), |law| format!(" ({law})"));
-    let rivals: Vec<&str> = step
-        .set
-        .iter()
-        .filter(|name| **name != step.effect)
-        .map(String::as_str)
-        .collect();
-    let open = if rivals.is_empty() {
-        String::new()
-    } else {
-        format!("; these data support equally: {}", rivals.join(", "))
-    };
-    format!(
-        "{number}. {}{law} at joint {}, {}{open}",
-        step.effect,
-        step.joint,
-        match (0.0..=1.0).contains(&step.gap_closed) {
-            true => format!(
-                "closes {} of the remaining gap{}",
-                step.fall(),
-                if of_joint { " of that joint" } else { "" }
-            ),
-            false => format!("residual RMS {}", step.fall()),
-        },
-    )
-}
-
-#[cfg(test)]
-mod tests;

@@ -1,0 +1,119 @@
+//! Terminal output of `rig diagnose`.
+
+use std::path::Path;
+
+use super::super::ui::Ui;
+use crate::pages;
+use rig_diagnose::outcome::{DataFault, Diagnosis, Step, Verdict};
+use rig_output::{format_significant, format_unit};
+
+/// Prints the result in short, and the path of the report.
+pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
+    let lines = summary(found);
+    for fault in &found.data_faults {
+        ui.remark(&match fault.recording.as_str() {
+            recording if fault.text.contains(recording) => fault.text.clone(),
+            recording => format!("{recording}: {}", fault.text),
+        });
+    }
+    for line in lines {
+        ui.say(&line);
+    }
+    if found.verdict == Verdict::DataFault {
+        let way_on = match found.data_faults.iter().all(DataFault::leaves_rows) {
+            true => " Give --even-if-wrong to fit in spite of this.",
+            false => "",
+        };
+        ui.remark(&format!(
+            "nothing was fitted; model.toml is the unchanged description.{way_on}"
+        ));
+    }
+    ui.say(&format!("report: {}", report.display()));
+}
+
+/// Lines of the short result: verdict and effects first, further sentences of the diagnosis last.
+fn summary(found: &Diagnosis) -> Vec<String> {
+    let mut lines = vec![format!("verdict: {}", pages::verdict(found.verdict))];
+    let (first, besides) = found.words.split_at(found.words.len().min(1));
+    lines.extend(first.iter().cloned());
+    let of_joint = found.waterfall.len() > 1;
+    for (k, step) in found.steps.iter().enumerate() {
+        lines.push(effect(k + 1, step, of_joint));
+        lines.extend(step.parameters.iter().map(|(name, value)| {
+            let unit = match value.unit.as_str() {
+                "1" => String::new(),
+                unit => format!(" {}", format_unit(unit)),
+            };
+            format!("    {name} = {}", value.said(&unit))
+        }));
+    }
+    if let Some(share) = found.gap_closed {
+        let on = if found.steps.iter().any(|step| step.holdout_rms.is_some()) {
+            "on the hold-out"
+        } else {
+            "on the training data (no hold-out was given)"
+        };
+        let refit = (found.closed_by_effects()).map_or(String::new(), |own| {
+            format!(
+                ", counted from the given description; the effects close {} % of the gap that remains after the refit",
+                format_significant(100.0 * own, 3)
+            )
+        });
+        lines.push(format!(
+            "gap closed: {} %, {on}{refit}",
+            format_significant(100.0 * share, 3)
+        ));
+    }
+    if let Some(remainder) = &found.remainder {
+        lines.push(format!("remainder: {}", remainder.text));
+    }
+    if let Some(next) = &found.next_experiment {
+        lines.push(match (next.separates.as_slice(), &next.file) {
+            // The text of an experiment for one effect is long; the report holds it.
+            ([one], Some(file)) => {
+                format!("next experiment: {file} would make {one} testable; the report says how")
+            }
+            _ => format!("next experiment: {}", next.text),
+        });
+    }
+    if !besides.is_empty() {
+        lines.push("also:".into());
+        lines.extend(besides.iter().map(|sentence| format!("  - {sentence}")));
+    }
+    lines
+}
+
+/// Describes one step in a line. `of_joint`: the robot has several joints, each with its own gap.
+fn effect(number: usize, step: &Step, of_joint: bool) -> String {
+    let law = step
+        .law
+        .as_ref()
+        .map_or(String::new(), |law| format!(" ({law})"));
+    let rivals: Vec<&str> = step
+        .set
+        .iter()
+        .filter(|name| **name != step.effect)
+        .map(String::as_str)
+        .collect();
+    let open = if rivals.is_empty() {
+        String::new()
+    } else {
+        format!("; these data support equally: {}", rivals.join(", "))
+    };
+    format!(
+        "{number}. {}{law} at joint {}, {}{open}",
+        step.effect,
+        step.joint,
+        match (0.0..=1.0).contains(&step.gap_closed) {
+            true => format!(
+                "closes {} of the remaining gap{}",
+                step.fall(),
+                if of_joint { " of that joint" } else { "" }
+            ),
+            false => format!("residual RMS {}", step.fall()),
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests;
