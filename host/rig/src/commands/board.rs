@@ -1,29 +1,23 @@
 //! `rig board`: health, stored settings, faults and single control ticks of the board.
 
+mod health;
+mod ticks;
+
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args as ClapArgs, Subcommand};
-use rig_shared::safety::{FaultRecord, SnapshotSample};
-use rig_shared::wire::message::{
-    Greeting, Health, Refusal, Report, RequestBody, SettingsOrigin, SnapshotPart,
-};
+use rig_shared::wire::message::{Refusal, Report, RequestBody};
 
 use super::error::CommandError;
 use super::input::described;
 use super::record::{emulated, open_probe, uploaded};
 use super::ui::Ui;
-use rig_data::{Column, CsvWriter};
 use rig_link::experiment::when_calibrated;
 use rig_link::serial::DEFAULT_BAUD;
 use rig_link::{
     EmulatedPort, LinkError, Port, SerialLine, Session, SessionSettings, describe_fault,
 };
-
-/// Longest wait for a health report, which the board sends once a second.
-const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
-/// Longest wait for all parts of a capture, in addition to the time of the ticks that are still to be captured.
-const PART_PATIENCE: Duration = Duration::from_secs(2);
 
 /// Reads health, faults and single control ticks from the rig's board, and changes its stored settings.
 #[derive(Debug, ClapArgs)]
@@ -138,8 +132,8 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
     let mut session = Session::open(port, SessionSettings::default())?;
     match &args.action {
         Action::Health => {
-            let health = health(&mut session)?;
-            ui.say(&describe(session.greeting(), &health));
+            let health = health::fetch(&mut session)?;
+            ui.say(&health::describe(session.greeting(), &health));
         }
         Action::Store => {
             when_calibrated(&mut session, RequestBody::Store)?;
@@ -147,45 +141,8 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
                 "The present settings are stored; the rig starts with them at the next power-on.",
             );
         }
-        Action::Capture { after, out, .. } => {
-            session.request(RequestBody::Capture(*after))?;
-            session.request(RequestBody::GetCapture)?;
-            let rate = f64::from(session.greeting().control_rate_hz);
-            let wait = PART_PATIENCE + Duration::from_secs_f64(f64::from(*after) / rate);
-            let burst = fetch(&mut session, wait, |report| match report {
-                Report::Capture(part) => Some(part),
-                _ => None,
-            })?;
-            write(session.greeting(), &burst.ticks, out)?;
-            ui.say(&format!(
-                "{}: {} control ticks",
-                out.display(),
-                burst.ticks.len()
-            ));
-        }
-        Action::Fault { out, .. } => {
-            session.request(RequestBody::GetSnapshot)?;
-            let kept = fetch(&mut session, PART_PATIENCE, |report| match report {
-                Report::Snapshot(part) => Some(part),
-                _ => None,
-            })?;
-            let Some(record) = kept.fault else {
-                ui.say("No fault is latched.");
-                return Ok(());
-            };
-            ui.say(&format!(
-                "{} docs/firmware.md describes each fault; `rig board clear` clears it.",
-                describe_fault(&record, f64::from(session.greeting().control_rate_hz)),
-            ));
-            if let Some(out) = out {
-                write(session.greeting(), &kept.ticks, out)?;
-                ui.say(&format!(
-                    "{}: {} control ticks around it",
-                    out.display(),
-                    kept.ticks.len()
-                ));
-            }
-        }
+        Action::Capture { after, out, .. } => capture(&mut session, *after, out, ui)?,
+        Action::Fault { out, .. } => fault(&mut session, out.as_deref(), ui)?,
         Action::Clear => {
             session.request(RequestBody::ClearFault)?;
             ui.say("No fault is latched. After a fault of the encoder, tell the rig the position of the link (--home).");
@@ -197,155 +154,93 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
         Action::Upload {
             model, unstored, ..
         } => {
-            when_calibrated(&mut session, RequestBody::Disarm)?;
-            for body in sent {
-                when_calibrated(&mut session, body)?;
-            }
-            let kept = if *unstored {
-                "until the next power-on"
-            } else {
-                match when_calibrated(&mut session, RequestBody::Store) {
-                    Err(LinkError::Refused {
-                        refusal: Refusal::NoStorage,
-                        ..
-                    }) => {
-                        return Err(CommandError::Sentence(format!(
-                            "{} was sent to the rig but not stored, because the rig has no memory for it; give --unstored to send without storing.",
-                            model.display()
-                        )));
-                    }
-                    other => other?,
-                }
-                "and stored"
-            };
+            let kept = upload(&mut session, sent, model, *unstored)?;
             ui.say(&format!("{}: sent to the rig {kept}.", model.display()));
         }
     }
     Ok(())
 }
 
-fn health<P: Port>(session: &mut Session<P>) -> Result<Health, CommandError> {
-    let until = session.port().now() + HEALTH_PATIENCE;
-    loop {
-        let left = until.saturating_sub(session.port().now());
-        match session.next_report(left)? {
-            Some(Report::Health(health)) => return Ok(health),
-            Some(_) => {}
-            None => {
-                return Err(CommandError::Sentence(format!(
-                    "No health report came in {} s; only a board sends one, the emulated rig has none.",
-                    HEALTH_PATIENCE.as_secs()
-                )));
-            }
-        }
-    }
-}
-
-fn describe(greeting: &Greeting, health: &Health) -> String {
-    let settings = match health.settings {
-        SettingsOrigin::Defaults => "the firmware's defaults; none were ever stored",
-        SettingsOrigin::Stored => "as stored",
-        SettingsOrigin::OlderCopy => {
-            "one of two stored copies; the other is damaged, belongs to another firmware or cannot be used"
-        }
-        SettingsOrigin::Damaged => "the firmware's defaults; the stored settings are damaged",
-        SettingsOrigin::Unusable => {
-            "the firmware's defaults; the stored settings belong to another firmware or cannot be used"
-        }
-    };
-    let period = f64::from(health.clock_hz) / f64::from(greeting.control_rate_hz);
-    let share = |cycles: u32| 100.0 * f64::from(cycles) / period;
-    format!(
-        "firmware        {}\n\
-         running for     {:.1} s\n\
-         started by      {:?}\n\
-         started with    {settings}\n\
-         clock           {:.3} MHz, {}\n\
-         control tick    {:.1} % of its time on average, {:.1} % at most in the last second\n\
-         stack           {} bytes never used\n\
-         line            {} damaged requests, {} telemetry samples without room",
-        greeting.firmware,
-        health.tick as f64 / f64::from(greeting.control_rate_hz),
-        health.reset,
-        f64::from(health.clock_hz) * 1e-6,
-        if health.crystal {
-            "from the crystal"
-        } else {
-            "from the chip's internal oscillator: times may be wrong by 1 %"
-        },
-        share(health.tick_cycles_mean),
-        share(health.tick_cycles_max),
-        health.stack_free,
-        health.bad_requests,
-        health.dropped,
-    )
-}
-
-/// Control ticks stored by the rig, and the fault that they belong to.
-#[derive(Default)]
-struct Kept {
-    ticks: Vec<SnapshotSample>,
-    fault: Option<FaultRecord>,
-}
-
-/// Fetches the requested control ticks, part by part.
-fn fetch<P: Port>(
+/// Fetches the control ticks up to `after` ticks from now, and writes them to `out`.
+fn capture<P: Port>(
     session: &mut Session<P>,
-    patience: Duration,
-    part_of: impl Fn(&Report) -> Option<&SnapshotPart>,
-) -> Result<Kept, CommandError> {
-    let begin = session.port().now();
-    let (mut kept, mut total) = (Kept::default(), usize::MAX);
-    while kept.ticks.len() < total {
-        let left = (begin + patience).saturating_sub(session.port().now());
-        let report = session.next_report(left)?;
-        if let Some(Report::Fault(record)) = &report {
-            kept.fault = Some(*record);
-        }
-        let got = kept.ticks.len();
-        let Some(report) = report else {
-            return Err(CommandError::Sentence(format!(
-                "The rig stopped sending after {got} of its stored control ticks; run the command again."
-            )));
-        };
-        let Some(part) = part_of(&report) else {
-            continue;
-        };
-        if usize::from(part.first) != got {
-            return Err(CommandError::Sentence(format!(
-                "A part of the stored control ticks, after tick {got}, was lost on the line; run the command again."
-            )));
-        }
-        total = usize::from(part.total);
-        kept.ticks.extend(part.samples.iter().copied());
-    }
-    Ok(kept)
+    after: u16,
+    out: &Path,
+    ui: &Ui,
+) -> Result<(), CommandError> {
+    session.request(RequestBody::Capture(after))?;
+    session.request(RequestBody::GetCapture)?;
+    let rate = f64::from(session.greeting().control_rate_hz);
+    let time = Duration::from_secs_f64(f64::from(after) / rate);
+    let burst = ticks::fetch(session, time, |report| match report {
+        Report::Capture(part) => Some(part),
+        _ => None,
+    })?;
+    ticks::write(session.greeting(), &burst.ticks, out)?;
+    ui.say(&format!(
+        "{}: {} control ticks",
+        out.display(),
+        burst.ticks.len()
+    ));
+    Ok(())
 }
 
-/// Writes control ticks as CSV, in SI units.
-fn write(greeting: &Greeting, ticks: &[SnapshotSample], out: &Path) -> Result<(), CommandError> {
-    let rate = f64::from(greeting.control_rate_hz);
-    let per_count = core::f64::consts::TAU
-        / (f64::from(greeting.counts_per_motor_turn) * f64::from(greeting.gear_ratio));
-    let columns = [
-        ("t", "s"),
-        ("q1", "rad"),
-        ("i1", "A"),
-        ("duty1", ""),
-        ("supply", "V"),
-        ("ref1", "rad"),
-    ];
-    let mut writer = CsvWriter::create(out, &columns.map(|(name, unit)| Column::new(name, unit)))?;
-    for sample in ticks {
-        writer.push_row(&[
-            sample.tick as f64 / rate,
-            sample.position as f64 * per_count,
-            f64::from(sample.current),
-            f64::from(sample.duty),
-            f64::from(sample.supply),
-            f64::from(sample.reference),
-        ])?;
+/// Names the latched fault, and writes the control ticks around it to `out`.
+fn fault<P: Port>(
+    session: &mut Session<P>,
+    out: Option<&Path>,
+    ui: &Ui,
+) -> Result<(), CommandError> {
+    session.request(RequestBody::GetSnapshot)?;
+    let kept = ticks::fetch(session, Duration::ZERO, |report| match report {
+        Report::Snapshot(part) => Some(part),
+        _ => None,
+    })?;
+    let Some(record) = kept.fault else {
+        ui.say("No fault is latched.");
+        return Ok(());
+    };
+    ui.say(&format!(
+        "{} docs/firmware.md describes each fault; `rig board clear` clears it.",
+        describe_fault(&record, f64::from(session.greeting().control_rate_hz)),
+    ));
+    if let Some(out) = out {
+        ticks::write(session.greeting(), &kept.ticks, out)?;
+        ui.say(&format!(
+            "{}: {} control ticks around it",
+            out.display(),
+            kept.ticks.len()
+        ));
     }
-    writer.finish()?;
     Ok(())
+}
+
+/// Sends the settings of a description, and stores them unless `unstored`. Returns how long the rig keeps them, in
+/// words.
+fn upload<P: Port>(
+    session: &mut Session<P>,
+    sent: Vec<RequestBody>,
+    model: &Path,
+    unstored: bool,
+) -> Result<&'static str, CommandError> {
+    when_calibrated(session, RequestBody::Disarm)?;
+    for body in sent {
+        when_calibrated(session, body)?;
+    }
+    if unstored {
+        return Ok("until the next power-on");
+    }
+    match when_calibrated(session, RequestBody::Store) {
+        Err(LinkError::Refused {
+            refusal: Refusal::NoStorage,
+            ..
+        }) => {
+            return Err(CommandError::Sentence(format!(
+                "{} was sent to the rig but not stored, because the rig has no memory for it; give --unstored to send without storing.",
+                model.display()
+            )));
+        }
+        other => other?,
+    }
+    Ok("and stored")
 }

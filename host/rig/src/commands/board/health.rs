@@ -1,0 +1,70 @@
+//! The board's health report.
+
+use std::time::Duration;
+
+use rig_shared::wire::message::{Greeting, Health, Report, SettingsOrigin};
+
+use super::super::error::CommandError;
+use rig_link::{Port, Session};
+
+/// Longest wait for a health report, which the board sends once a second.
+const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
+
+/// Waits for a health report.
+pub(super) fn fetch<P: Port>(session: &mut Session<P>) -> Result<Health, CommandError> {
+    let until = session.port().now() + HEALTH_PATIENCE;
+    loop {
+        let left = until.saturating_sub(session.port().now());
+        match session.next_report(left)? {
+            Some(Report::Health(health)) => return Ok(health),
+            Some(_) => {}
+            None => {
+                return Err(CommandError::Sentence(format!(
+                    "No health report came in {} s; only a board sends one, the emulated rig has none.",
+                    HEALTH_PATIENCE.as_secs()
+                )));
+            }
+        }
+    }
+}
+
+/// Describes a health report in lines.
+pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
+    let settings = match health.settings {
+        SettingsOrigin::Defaults => "the firmware's defaults; none were ever stored",
+        SettingsOrigin::Stored => "as stored",
+        SettingsOrigin::OlderCopy => {
+            "one of two stored copies; the other is damaged, belongs to another firmware or cannot be used"
+        }
+        SettingsOrigin::Damaged => "the firmware's defaults; the stored settings are damaged",
+        SettingsOrigin::Unusable => {
+            "the firmware's defaults; the stored settings belong to another firmware or cannot be used"
+        }
+    };
+    let period = f64::from(health.clock_hz) / f64::from(greeting.control_rate_hz);
+    let share = |cycles: u32| 100.0 * f64::from(cycles) / period;
+    format!(
+        "firmware        {}\n\
+         running for     {:.1} s\n\
+         started by      {:?}\n\
+         started with    {settings}\n\
+         clock           {:.3} MHz, {}\n\
+         control tick    {:.1} % of its time on average, {:.1} % at most in the last second\n\
+         stack           {} bytes never used\n\
+         line            {} damaged requests, {} telemetry samples without room",
+        greeting.firmware,
+        health.tick as f64 / f64::from(greeting.control_rate_hz),
+        health.reset,
+        f64::from(health.clock_hz) * 1e-6,
+        if health.crystal {
+            "from the crystal"
+        } else {
+            "from the chip's internal oscillator: times may be wrong by 1 %"
+        },
+        share(health.tick_cycles_mean),
+        share(health.tick_cycles_max),
+        health.stack_free,
+        health.bad_requests,
+        health.dropped,
+    )
+}
