@@ -1,13 +1,15 @@
 //! `rig identify`: estimates parameters and their uncertainty from recordings and a description.
 
+mod impossible;
 mod printed;
+mod urdf;
 
 use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use rig_shared::multibody::{COLUMNS, column};
 
+use self::impossible::Impossible;
 use super::error::CommandError;
 use super::input::{
     Inputs, RobotArg, command_line, recordings, refuse_faults, refuse_shared, refuse_twice,
@@ -20,9 +22,17 @@ use rig_data::prepare::{Choice, PrepareOptions};
 use rig_identify::{
     Estimator, Identification, Loss, ModelKind, Options, identified_robot, identify,
 };
-use rig_model::robot::{MOST_LEAD, Robot};
+use rig_model::robot::{Description, MOST_LEAD, Robot};
 use rig_output::{can_take, folder, write_whole};
-use rig_output::{format_significant, format_unit, listed};
+
+/// File with the description and the identified values.
+const TOML: &str = "identified.toml";
+/// The same as URDF.
+const URDF: &str = "identified.urdf";
+/// File with the result for programs.
+const JSON: &str = "identification.json";
+/// File with the result for people.
+const REPORT: &str = "report.html";
 
 /// Equations that are fitted.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -95,14 +105,6 @@ pub(crate) enum Compare {
 
 /// Largest size of recordings that are compared by default, bytes: up to this size a comparison takes a few seconds.
 const COMPARED_BYTES: u64 = 32 << 20;
-/// Half-widths of a 95 % interval (2.5: five standard deviations) by which a value must lie below zero to count as
-/// impossible. In a recording of a few seconds friction and other parameters are nearly collinear. With many joints,
-/// one friction value may then be below zero by chance.
-const CLEARLY: f64 = 2.5;
-/// Half-width of a 95 % interval in standard deviations, about.
-const WIDTH: f64 = 2.0;
-/// Coefficients of a base parameter below this are rounding errors.
-const ROUNDING: f64 = 1e-9;
 
 impl Compare {
     fn list(self, bytes: u64) -> Vec<Estimator> {
@@ -244,21 +246,39 @@ impl Args {
 /// # Errors
 /// A sentence that names the wrong file, line or value.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let names = [
-        "identified.toml",
-        "identified.urdf",
-        "identification.json",
-        "report.html",
-    ];
-    can_take(&args.out, &names)?;
+    can_take(&args.out, &[TOML, URDF, JSON, REPORT])?;
     refuse_folder(&args.out, &[], args.force)?;
     let description = args.robot.describe(ui)?;
-    let robot = description.robot;
-    let training = Inputs::read(&robot, &args.data)?;
-    let holdout = Inputs::read(&robot, &args.holdout)?;
-    for warning in training.warnings().chain(holdout.warnings()) {
-        ui.remark(&warning);
+    let robot = &description.robot;
+    let training = Inputs::read(robot, &args.data)?;
+    let holdout = Inputs::read(robot, &args.holdout)?;
+    let warnings: Vec<String> = training.warnings().chain(holdout.warnings()).collect();
+    for warning in &warnings {
+        ui.remark(warning);
     }
+    refuse_repeated(args)?;
+    let wrong = strange_columns(robot, args, [&training, &holdout], ui)?;
+    refuse_faults(robot, &[&training, &holdout], wrong, args.even_if_wrong, ui)?;
+    let found = identified(robot, args, [&training, &holdout], ui)?;
+    folder(&args.out)?;
+    let said = write(args, &description, &found, warnings)?;
+    printed::print(ui, &found);
+    if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
+        ui.say(&format!(
+            "No estimators were compared, so none is recommended: the recordings have {:.0} MiB, and a comparison takes long beyond {} MiB. Give --compare all to run it.",
+            training.bytes() as f64 / f64::from(1 << 20),
+            COMPARED_BYTES >> 20
+        ));
+    }
+    for sentence in &said {
+        ui.say(&format!("{URDF}: {sentence}"));
+    }
+    ui.say(&format!("report: {}", args.out.join(REPORT).display()));
+    Ok(())
+}
+
+/// Refuses recordings that are given twice or for two uses, and weights without a recording.
+fn refuse_repeated(args: &Args) -> Result<(), CommandError> {
     refuse_shared(&args.data, &args.holdout)?;
     refuse_twice(
         &args.data,
@@ -271,8 +291,19 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             args.data.len()
         )));
     }
+    Ok(())
+}
+
+/// Returns sentences about references and rates that cannot be right and are used. Prints those about references that
+/// are not used.
+fn strange_columns(
+    robot: &Robot,
+    args: &Args,
+    [training, holdout]: [&Inputs; 2],
+    ui: &Ui,
+) -> Result<Vec<String>, CommandError> {
     let mut wrong = Vec::new();
-    let strange = training.strange_references(&robot)?;
+    let strange = training.strange_references(robot)?;
     if matches!(args.estimator, Some(Fit::OutputError)) {
         wrong.extend(strange);
     } else {
@@ -283,209 +314,80 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         }
     }
     if args.measured_derivatives {
-        for inputs in [&training, &holdout] {
-            wrong.extend(inputs.strange_rates(&robot)?);
+        for inputs in [training, holdout] {
+            wrong.extend(inputs.strange_rates(robot)?);
         }
     }
-    refuse_faults(
-        &robot,
-        &[&training, &holdout],
-        wrong,
-        args.even_if_wrong,
-        ui,
-    )?;
+    Ok(wrong)
+}
+
+/// Identifies the parameters, and refuses values that no robot can have.
+fn identified(
+    robot: &Robot,
+    args: &Args,
+    [training, holdout]: [&Inputs; 2],
+    ui: &Ui,
+) -> Result<Identification, CommandError> {
     // Three passes over the training data, two over the hold-out: see `identify`.
     let progress =
         RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
-    let mut identification = identify(
-        &robot,
+    let mut found = identify(
+        robot,
         &recordings(&training.watched(&progress)),
         &recordings(&holdout.watched(&progress)),
-        &args.options(&robot, training.bytes()),
+        &args.options(robot, training.bytes()),
     )?;
     drop(progress);
-    for inputs in [&training, &holdout] {
-        identification.warnings.extend(inputs.heard());
-        identification.warnings.extend(inputs.outside());
+    for inputs in [training, holdout] {
+        found.warnings.extend(inputs.heard());
+        found.warnings.extend(inputs.outside());
     }
-    let (refused, doubtful) = impossible(&robot, &identification);
+    let Impossible { refused, doubtful } = Impossible::of(robot, &found);
     if !args.even_if_wrong && !refused.is_empty() {
         return Err(CommandError::Implausible(format!(
             "{} Nothing was written; give --even-if-wrong to write the files in spite of this.",
             refused.join(" ")
         )));
     }
-    (identification.warnings).splice(0..0, refused.into_iter().chain(doubtful));
-    folder(&args.out)?;
-    let (identified, mut remarks) = identified_robot(&robot, &identification);
+    (found.warnings).splice(0..0, refused.into_iter().chain(doubtful));
+    Ok(found)
+}
+
+/// Writes all files of the result. Returns the remarks on the written URDF. `warnings`: from the recordings.
+fn write(
+    args: &Args,
+    description: &Description,
+    found: &Identification,
+    warnings: Vec<String>,
+) -> Result<Vec<String>, CommandError> {
+    let robot = &description.robot;
+    let (identified, mut remarks) = identified_robot(robot, found);
     let text = identified.to_toml()?;
-    // URDF needs a full set of parameters for each link; base parameters do not give one.
-    let (mut urdf, mut said) = (None, Vec::new());
-    if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
-        let found = match &description.urdf {
-            Some(original) => original.with_values(&identified),
-            None => identified.to_urdf(),
-        };
-        match found {
-            Ok(found) => {
-                said = found.remarks;
-                said.extend(chosen(&robot, &identification));
-                urdf = Some(found.text);
-            }
-            Err(error) => remarks.push(format!("No identified.urdf was written: {error}")),
+    let urdf = match urdf::of(description, found, &identified) {
+        Some(Ok(urdf)) => Some(urdf),
+        Some(Err(error)) => {
+            remarks.push(format!("No {URDF} was written: {error}"));
+            None
         }
-    }
-    remarks.extend(
-        said.iter()
-            .map(|sentence| format!("identified.urdf: {sentence}")),
-    );
+        None => None,
+    };
+    let (urdf, said) = urdf.map_or((None, Vec::new()), |urdf| (Some(urdf.text), urdf.remarks));
+    remarks.extend(said.iter().map(|sentence| format!("{URDF}: {sentence}")));
     let context = Context {
         command: command_line(),
-        identified: Some(("identified.toml".into(), text.clone())),
+        identified: Some((TOML.into(), text.clone())),
         remarks,
-        warnings: training.warnings().chain(holdout.warnings()).collect(),
+        warnings,
     };
-    let page = pages::identification(&robot, &identification, &context);
-
-    let json = serde_json::to_string_pretty(&identification).map_err(|error| {
+    let page = pages::identification(robot, found, &context);
+    let json = serde_json::to_string_pretty(found).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
-    write_whole(&args.out.join("identified.toml"), text.as_bytes())?;
+    write_whole(&args.out.join(TOML), text.as_bytes())?;
     if let Some(urdf) = urdf {
-        write_whole(&args.out.join("identified.urdf"), urdf.as_bytes())?;
+        write_whole(&args.out.join(URDF), urdf.as_bytes())?;
     }
-    write_whole(
-        &args.out.join("identification.json"),
-        (json + "\n").as_bytes(),
-    )?;
-    rig_report::write(&args.out.join("report.html"), &page)?;
-    printed::print(ui, &identification);
-    if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
-        ui.say(&format!(
-            "No estimators were compared, so none is recommended: the recordings have {:.0} MiB, and a comparison takes long beyond {} MiB. Give --compare all to run it.",
-            training.bytes() as f64 / f64::from(1 << 20),
-            COMPARED_BYTES >> 20
-        ));
-    }
-    for sentence in &said {
-        ui.say(&format!("identified.urdf: {sentence}"));
-    }
-    ui.say(&format!(
-        "report: {}",
-        args.out.join("report.html").display()
-    ));
-    Ok(())
-}
-
-/// Sentences about drive inertias and constant torques that were identified only in sums with other parameters.
-fn chosen(robot: &Robot, found: &Identification) -> Vec<String> {
-    let in_a_sum = |place: usize| -> Option<String> {
-        let set = found.standard_parameters.as_ref()?;
-        let joints = robot.joints.iter().enumerate();
-        let names: Vec<&str> = joints
-            .filter(|(j, _)| {
-                let own = set.parameters.get(j * COLUMNS + place);
-                own.is_some_and(|own| !own.determined && own.value != 0.0)
-            })
-            .map(|(_, joint)| joint.name.as_str())
-            .collect();
-        (!names.is_empty()).then(|| names.join(", "))
-    };
-    let kinds = [
-        (column::DRIVE_INERTIA, "drive inertias", "inertias of links"),
-        (column::OFFSET, "constant torques", "weights of links"),
-    ];
-    let one = |(place, what, with)| {
-        in_a_sum(place).map(|names| {
-            format!(
-                "The {what} of {names} are not identified on their own, only their sums with {with}; the file holds the split nearest to the description. Use these values together with the links of this file only."
-            )
-        })
-    };
-    kinds.into_iter().filter_map(one).collect()
-}
-
-/// Returns sentences about friction and inertia that lie below zero by many standard deviations: first those that
-/// refuse the result, then those that are only warnings.
-///
-/// A base parameter that is a sum of masses, moments of inertia and friction with positive factors cannot be negative.
-/// In an arm, inertias compensate each other: a negative one may be a model error that others cancel, so it is a
-/// warning.
-fn impossible(robot: &Robot, found: &Identification) -> (Vec<String>, Vec<String>) {
-    let details = &found.details;
-    let below_zero = |row: usize| {
-        let [value, _, high] = details.free[row];
-        value + CLEARLY * (high - value) < 0.0
-    };
-    let positive = [
-        column::MASS,
-        // Ixx, Iyy, Izz of Ixx Ixy Ixz Iyy Iyz Izz.
-        column::INERTIA,
-        column::INERTIA + 3,
-        column::INERTIA + 5,
-        column::DRIVE_INERTIA,
-        column::VISCOUS,
-        column::COULOMB,
-    ];
-    let is_sum = |row: usize| {
-        let own = details.combination.row(row);
-        let may = |(c, x): (usize, &f64)| {
-            x.abs() < ROUNDING || (*x > 0.0 && positive.contains(&(c % COLUMNS)))
-        };
-        own.iter().enumerate().all(may)
-    };
-    let wrong: Vec<usize> = (0..details.free.len())
-        .filter(|row| below_zero(*row) && is_sum(*row))
-        .collect();
-    let of = |j: usize, place: usize| {
-        let column = j * COLUMNS + place;
-        wrong.iter().any(|row| details.columns[*row] == column)
-    };
-    let driving: Vec<usize> = (0..robot.joints.len())
-        .filter(|j| of(*j, column::VISCOUS) && of(*j, column::COULOMB))
-        .collect();
-    let driven: Vec<String> = (driving.iter())
-        .map(|&j| {
-            format!(
-                "viscous and Coulomb friction of joint \"{}\" are both below zero, so friction would drive the motion: the sign of tau{n} or i{n}, of q{n}, or of gear_ratio is wrong.",
-                robot.joints[j].name,
-                n = j + 1
-            )
-        })
-        .collect();
-    let alone = |row: &&usize| {
-        let column = details.columns[**row];
-        let friction = [column::VISCOUS, column::COULOMB].contains(&(column % COLUMNS));
-        !(friction && driving.contains(&(column / COLUMNS)))
-    };
-    let (mut refused, mut doubtful) = (Vec::new(), Vec::new());
-    for row in wrong.iter().filter(alone) {
-        let [value, _, high] = details.free[*row];
-        let own = &found.base_parameters[*row];
-        let column = details.columns[*row];
-        let friction = [column::VISCOUS, column::COULOMB].contains(&(column % COLUMNS));
-        let list = match friction || robot.joints.len() == 1 {
-            true => &mut refused,
-            false => &mut doubtful,
-        };
-        list.push(format!(
-            "{} of joint \"{}\" is {} {}, below zero by {} of its standard deviations",
-            own.expression,
-            robot.joints[column / COLUMNS].name,
-            format_significant(value, 3),
-            format_unit(&own.unit),
-            format_significant(-value * WIDTH / (high - value), 2),
-        ));
-    }
-    let said = |list: Vec<String>| match list.is_empty() {
-        true => Vec::new(),
-        false => vec![format!(
-            "No robot can have these values: {}. Check the columns (unit, sign, time, single rows), the description and the cut-off.",
-            listed(&list)
-        )],
-    };
-    (
-        driven.into_iter().chain(said(refused)).collect(),
-        said(doubtful),
-    )
+    write_whole(&args.out.join(JSON), (json + "\n").as_bytes())?;
+    rig_report::write(&args.out.join(REPORT), &page)?;
+    Ok(said)
 }
