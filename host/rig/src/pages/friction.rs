@@ -51,24 +51,28 @@ fn over_velocity(kind: JointKind, map: &FrictionMap) -> Plot {
         plot =
             plot.with(Series::line("with Stribeck term", Role::After, v.clone(), at(fit)).dashed());
     }
-    plot
-        .with(Series::new(
-            "mean over a stretch ± 1.96 standard deviations",
-            Role::Measured,
-            Style::ErrorBars {
-                half_width: map.points.iter().map(|p| 1.96 * p.std).collect(),
-            },
-            map.points.iter().map(|p| p.speed).collect(),
-            map.points.iter().map(|p| p.friction).collect(),
-        ))
-        .note(format!(
-            "n = {} stretches of constant speed, {}. Leave-one-out RMS error: {} {torque} without a Stribeck term{}.",
-            map.points.len(),
-            if map.from_reference { "found in the reference" } else { "found in the position" },
-            format_significant(map.simple.leave_one_out_rms, 2),
-            map.stribeck_left_out_rms
-                .map_or(String::new(), |rms| format!(", {} {torque} with it", format_significant(rms, 2))),
-        ))
+    let found_in = if map.from_reference {
+        "found in the reference"
+    } else {
+        "found in the position"
+    };
+    let with_stribeck = map.stribeck_left_out_rms.map_or(String::new(), |rms| {
+        format!(", {} {torque} with it", format_significant(rms, 2))
+    });
+    plot.with(Series::new(
+        "mean over a stretch ± 1.96 standard deviations",
+        Role::Measured,
+        Style::ErrorBars {
+            half_width: map.points.iter().map(|p| 1.96 * p.std).collect(),
+        },
+        map.points.iter().map(|p| p.speed).collect(),
+        map.points.iter().map(|p| p.friction).collect(),
+    ))
+    .note(format!(
+        "n = {} stretches of constant speed, {found_in}. Leave-one-out RMS error: {} {torque} without a Stribeck term{with_stribeck}.",
+        map.points.len(),
+        format_significant(map.simple.leave_one_out_rms, 2),
+    ))
 }
 
 /// Velocities at which the laws are drawn: two branches with a gap at rest, where the laws jump. They are denser at low
