@@ -43,7 +43,7 @@ fn torque() -> Plot {
         *value = f64::NAN;
     }
     Plot::new(
-        "Torque at the joint, measured and predicted, on data held back",
+        "Joint link: torque, hold-out",
         Axis::new("time", "s"),
         Axis::new("torque", "N·m"),
     )
@@ -53,9 +53,9 @@ fn torque() -> Plot {
         t.clone(),
         measured,
     ))
-    .with(Series::line("model", Role::Model, t, model))
+    .with(Series::line("predicted", Role::Model, t, model))
     .mark(Marker::vertical(9.2, "recording interrupted"))
-    .note("n = 20 000, residual RMS 0.173 N·m. rig validate --robot robot.toml --data holdout.csv")
+    .note("20 000 rows, residual RMS 0.173 N·m, torque RMS 2.26 N·m: the residual is 7.7 % of it.")
 }
 
 fn friction() -> Plot {
@@ -72,12 +72,12 @@ fn friction() -> Plot {
         .collect();
     let half_width = sampled.iter().map(|v| 0.06 + 0.03 * v.abs()).collect();
     Plot::new(
-        "Friction over velocity",
-        Axis::new("joint velocity", "rad/s"),
+        "Joint link: friction torque over velocity",
+        Axis::new("velocity", "rad/s"),
         Axis::new("friction torque", "N·m"),
     )
     .with(Series::band(
-        "95 % of the model",
+        "95 % of the law",
         Role::Model,
         v.clone(),
         low,
@@ -94,15 +94,15 @@ fn friction() -> Plot {
     )
     .with(Series::line("with Stribeck term", Role::Model, v, middle))
     .with(Series::new(
-        "bin means ± 2 σ",
+        "mean over a stretch ± 1.96 standard deviations",
         Role::Measured,
         Style::ErrorBars { half_width },
         sampled,
         means,
     ))
-    .mark(Marker::horizontal(0.4, "Coulomb level 0.40 N·m"))
+    .mark(Marker::horizontal(0.4, "Coulomb 0.40 N·m"))
     .mark(Marker::horizontal(0.71, "breakaway 0.71 N·m"))
-    .note("Bins of equal count, n = 20 000.")
+    .note("n = 20 stretches of constant speed.")
 }
 
 fn ellipses() -> Plot {
@@ -129,15 +129,25 @@ fn ellipses() -> Plot {
         })
         .unzip();
     let mut plot = Plot::new(
-        "Inertia and gravity coefficient: 95 % confidence",
+        "J and gc: correlation +0.93",
         Axis::new("J", "kg·m²"),
         Axis::new("gc", "N·m"),
     )
     .with(Series::points("runs", Role::Noise, cx, cy))
-    .with(Series::line("one motion", Role::Before, x1, y1))
-    .with(Series::line("optimal motion", Role::After, x2, y2))
-    .mark(Marker::vertical(0.12, "true J"))
-    .mark(Marker::vertical(0.121, "catalogue J"));
+    .with(Series::line(
+        "95 % region, first motion",
+        Role::Before,
+        x1,
+        y1,
+    ))
+    .with(Series::line(
+        "95 % region, optimal motion",
+        Role::After,
+        x2,
+        y2,
+    ))
+    .mark(Marker::vertical(0.12, "truth"))
+    .mark(Marker::vertical(0.121, "description"));
     plot.equal_aspect = true;
     plot.height = 380;
     plot
@@ -164,7 +174,7 @@ fn spectrum() -> Plot {
     )
     .with(Series::line("residual", Role::Residual, f.clone(), rough))
     .with(Series::line("noise floor", Role::Noise, f.clone(), vec![1e-7; 500]).dashed())
-    .mark(Marker::vertical(50.0, "mains 50 Hz"))
+    .mark(Marker::vertical(50.0, "mains, 50 Hz"))
     .mark(Marker::vertical(62.0, "cogging at 1 rad/s"))
 }
 
@@ -172,19 +182,19 @@ fn bars() -> Plot {
     let places: Vec<f64> = (0..6).map(f64::from).collect();
     let names = (1..=6).map(|k| format!("joint {k}")).collect();
     Plot::new(
-        "Residual RMS by joint",
+        "Residuals by joint",
         Axis::categories("", names),
         Axis::new("residual RMS", "N·m"),
     )
     .with(Series::new(
-        "before",
+        "without the effects",
         Role::Before,
         Style::Bars,
         places.clone(),
         vec![3.1, 4.2, 2.6, 0.91, 0.85, 0.66],
     ))
     .with(Series::new(
-        "after",
+        "with the effects",
         Role::After,
         Style::Bars,
         places,
@@ -199,9 +209,9 @@ fn steps() -> Plot {
         .map(|k| f64::from((k / 7) % 5) * 2.4e-5 - 3e-5)
         .collect();
     let mut plot = Plot::new(
-        "Encoder angle, one count a step",
+        "Encoder position, one count a step",
         Axis::new("time", "s"),
-        Axis::new("angle", "rad"),
+        Axis::new("position", "rad"),
     )
     .with(Series::new("encoder", Role::Measured, Style::Steps, k, y));
     plot.height = 220;
@@ -218,11 +228,11 @@ fn parameters() -> Table {
         ]
     };
     Table {
-        caption: "Base parameters with their standard deviations".into(),
+        caption: "Base parameters".into(),
         columns: vec![
             Column::text("Parameter"),
-            Column::number("Value", "kg·m²"),
-            Column::number("Relative deviation", "%"),
+            Column::number("Value ± std", "kg·m²"),
+            Column::number("Std", "%"),
             Column::number("p", ""),
         ],
         rows: vec![
@@ -241,48 +251,49 @@ fn parameters() -> Table {
                 0.4,
             ),
         ],
-        note: "Deviations hold for white noise; see the section on the residual.".into(),
+        note: "Std: standard deviation. It allows for the correlation of the residual in time."
+            .into(),
     }
 }
 
 fn document() -> Document {
     let empty = Plot::new(
-        "Hold-out residual",
+        "Joint link: residual (measured less predicted), hold-out",
         Axis::new("time", "s"),
-        Axis::new("torque", "N·m"),
+        Axis::new("residual", "N·m"),
     );
     Document {
-        title: "One-link rig: what the model leaves out".into(),
+        title: "one-link rig: diagnosis of the model".into(),
         subtitle: "Every block and every style of plot on one page; the numbers are made up.".into(),
         summary: vec![
-            Fact::new("Verdict", "explained").note("Two effects close the gap to the noise floor.").tone(Tone::Good),
-            Fact::new("Gap closed, hold-out", "97").unit("%").note("RMS 0.224 → 0.059 N·m"),
-            Fact::new("Noise floor", format_value(0.0512, 0.0011)).unit("N·m"),
-            Fact::new("Not testable", "2 effects").note("One payload only; constant temperature.").tone(Tone::Warning),
+            Fact::new("Verdict", "Explained").note("the effects explain the residual").tone(Tone::Good),
+            Fact::new("Gap closed", "97").unit("%").note("of the residual above the noise floor, on the hold-out"),
+            Fact::new("Noise floor", format_value(0.0512, 0.0011)).unit("N·m").note("RMS of the part that no model can predict"),
+            Fact::new("Not testable", "2 effects").note("these data can neither show nor exclude them").tone(Tone::Warning),
         ],
         sections: vec![
-            Section::new("fit", "How well the model fits", "The model predicts torque on data that were not used for fitting it. What remains is compared with the noise of the measurement itself.")
+            Section::new("fit", "How well the model fits", "Measured torque, and torque predicted with the identified parameters, behind the same filters. The hold-out was not used in the fit.")
                 .with(Block::Plot(torque()))
-                .with(Block::Note { kind: NoteKind::Good, text: "The residual on data held back is as small as on the data used for fitting: no sign of overfitting.".into() })
+                .with(Block::Note { kind: NoteKind::Good, text: "The residual on the hold-out is as small as on the training data.".into() })
                 .with(Block::Plot(bars())),
-            Section::new("friction", "Friction", "Below 0.1 rad/s friction rises: the Stribeck effect.")
+            Section::new("friction", "Friction over velocity", "Friction on stretches of constant speed; the identified gravity, inertia and offset are subtracted.")
                 .with(Block::Plot(friction()))
-                .with(Block::Text("The band is the 95 % region of the fitted curve.\n\nA second paragraph follows after an empty line.".into()))
-                .with(Block::List(vec!["Coulomb level from both directions".into(), "Breakaway from slow reversals".into()]))
-                .with(Block::Note { kind: NoteKind::Warning, text: "Below 0.02 rad/s there are only 14 samples.".into() }),
-            Section::new("parameters", "Parameters and their uncertainty", "")
+                .with(Block::Text("The band is the 95 % interval of the fitted law.\n\nA second paragraph follows after an empty line.".into()))
+                .with(Block::List(vec!["Coulomb friction from both directions".into(), "Breakaway from slow reversals".into()]))
+                .with(Block::Note { kind: NoteKind::Warning, text: "Only one stretch is slower than 0.02 rad/s.".into() }),
+            Section::new("parameters", "Parameters", "")
                 .with(Block::Table(parameters()))
                 .with(Block::Plot(ellipses())),
-            Section::new("residual", "What is left", "")
+            Section::new("left", "Remaining residual", "")
                 .with(Block::Plot(spectrum()))
                 .with(Block::Plot(steps()))
                 .with(Block::Plot(empty))
                 .with(Block::Details { summary: "How the noise floor was found".into(), blocks: vec![
-                    Block::Text("From the differences between repeated periods of the same motion.".into()),
+                    Block::Text("From the differences between repeated runs of the same motion.".into()),
                     Block::Plot(steps()),
                     Block::Code("rig diagnose --robot robot.toml --data train.csv --holdout holdout.csv --out result-of-a-long-command-line".into()),
                 ] })
-                .with(Block::Note { kind: NoteKind::Info, text: "Drag over a plot to zoom, double-click to see all of it again.".into() }),
+                .with(Block::Note { kind: NoteKind::Info, text: "Drag over a plot to zoom; double-click to reset.".into() }),
         ],
         footer: "rig 0.1.0 · rig diagnose --robot robot.toml --data train.csv --out result".into(),
     }

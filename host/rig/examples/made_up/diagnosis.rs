@@ -260,7 +260,7 @@ pub(super) fn explained() -> Diagnosis {
             kind: "slow turn at two loads".into(),
             separates: vec!["cogging".into(), "torque_ripple".into()],
             text: "Turn slowly through the top and through the side, so that the motor passes the same angles at two currents: ripple grows with the current, cogging does not.".into(),
-            file: Some("next.toml".into()),
+            file: Some("next_experiment.toml".into()),
             separation: Some(7.4),
             duration: Some(24.0),
             hands: false,
@@ -285,7 +285,7 @@ pub(super) fn explained() -> Diagnosis {
         ..empty(
             Verdict::Explained,
             &[
-                "Stribeck friction and cogging at joint link close 97 % of the gap on data held back.",
+                "Stribeck friction and cogging at joint link close 97 % of the gap on the hold-out.",
                 "Cogging and torque ripple cannot be told apart with these data; the next experiment would do it.",
             ],
         )
