@@ -4,9 +4,9 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::error::{DataError, Warning};
+use super::header::Header;
 use super::motors::MotorSide;
 use super::place::Place;
-use super::source::Header;
 use rig_model::robot::Robot;
 
 /// Whether every joint needs a torque.

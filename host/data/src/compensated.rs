@@ -4,11 +4,11 @@ use rig_shared::effects::{Kind, Memory};
 use rig_shared::multibody::{Chain, column, inverse_dynamics};
 use rig_shared::scalar::Real as _;
 
+use crate::block::{Block, JointColumns};
 use crate::prepare::{
     LowPass, Piece, PrepareError, Recording, Treatment, central_difference, each_piece, later,
     second_difference, stretch,
 };
-use crate::{Block, JointColumns};
 use rig_model::effects::{Effects, State, Turn, is_torque, outruns, shifted};
 
 /// Rows that are processed together.

@@ -9,10 +9,10 @@ use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
 use super::columns::{FileColumn, Layout};
 use super::csv_header::{Lines, Separator, find_header};
 use super::error::DataError;
+use super::header::Header;
 use super::number::{decimal, number};
 use super::place::Place;
 use super::remark::Remark;
-use super::source::Header;
 
 /// Maximum length of a line, bytes: hundreds of joints fit; a file without line ends does not.
 const LONGEST_LINE: usize = 1 << 20;

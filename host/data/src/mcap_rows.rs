@@ -7,6 +7,7 @@ use ::mcap::records::{Record, op};
 
 use super::columns::{FileColumn, Layout};
 use super::error::DataError;
+use super::header::Header;
 use super::joint_states::{JointStates, Refusal};
 use super::json_samples::{JsonSamples, written};
 use super::mcap_records::Records;
@@ -14,7 +15,6 @@ use super::place::Place;
 use super::remark::Remark;
 use super::ros_layout::{Field, joint_state};
 use super::ros_message::Encoding;
-use super::source::Header;
 use rig_output::format_short;
 
 /// Topic of the joint samples.

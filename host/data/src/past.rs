@@ -1,81 +1,14 @@
 //! Thermal history: motion of the joints in their session before a stretch of a recording.
-//!
-//! Heat changes slowly compared with the motion, so means over 0.1 s are sufficient.
 
 use std::sync::Arc;
 
-use rig_shared::effects::{Effect, Instant, Kind, Memory};
-
+use super::history::Spell;
 use super::runs::Run;
+
+pub use super::history::Past;
 
 /// Longest pause within a session, s: a gear stays warm for some minutes.
 const ONE_SESSION: f64 = 60.0;
-
-/// Averaging time of the motion, s: a hundredth of the shortest time constant of the search.
-const SPAN: f64 = 0.1;
-
-/// Earlier stretches of the session in order of time, each with the pause after it, s.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Past(Vec<(Arc<Spell>, f64)>);
-
-/// Motion in a stretch: mean speed and mean square velocity over each span, per joint.
-#[derive(Debug, PartialEq)]
-struct Spell {
-    /// Length of a span, s.
-    period: f64,
-    joints: Vec<Vec<[f64; 2]>>,
-}
-
-impl Spell {
-    fn of(run: &Run) -> Self {
-        let samples = ((SPAN * run.rate).round() as usize).max(1);
-        let mean = |span: &[f64]| {
-            let count = span.len() as f64;
-            let speed: f64 = span.iter().map(|v| v.abs()).sum();
-            let squares: f64 = span.iter().map(|v| v * v).sum();
-            [speed / count, squares / count]
-        };
-        Self {
-            period: samples as f64 / run.rate,
-            joints: (run.joints.iter())
-                .map(|joint| joint.qd.chunks(samples).map(mean).collect())
-                .collect(),
-        }
-    }
-}
-
-impl Past {
-    /// Returns the state of an effect after this history, for a joint with the given viscous and Coulomb friction. Only
-    /// thermal effects keep a state over a pause.
-    pub fn remembered(
-        &self,
-        effect: &Effect<f64>,
-        joint: usize,
-        [viscous, coulomb]: [f64; 2],
-    ) -> Memory<f64> {
-        let mut memory = Memory::default();
-        if effect.kind != Kind::ViscousWarmupHeat {
-            return memory;
-        }
-        for (spell, pause) in &self.0 {
-            for [speed, square] in &spell.joints[joint] {
-                // Friction that does, at this velocity, the same work as in the span.
-                let velocity = square.sqrt();
-                let work = coulomb * speed + viscous * square;
-                let friction = if velocity > 0.0 { work / velocity } else { 0.0 };
-                let at = Instant {
-                    velocity,
-                    friction,
-                    period: spell.period,
-                    ..Instant::default()
-                };
-                effect.torque(&mut memory, &at);
-            }
-            memory = effect.rested(memory, *pause);
-        }
-        memory
-    }
-}
 
 /// A stretch that another stretch may continue.
 struct Known {
@@ -93,9 +26,14 @@ impl Known {
             began: run.began,
             end: run.t.last().copied().unwrap_or(run.began),
             past: run.past.clone(),
-            spell: Arc::new(Spell::of(run)),
+            spell: spell_of(run),
         }
     }
+}
+
+fn spell_of(run: &Run) -> Arc<Spell> {
+    let velocities = run.joints.iter().map(|joint| joint.qd.as_slice());
+    Arc::new(Spell::of(run.rate, velocities))
 }
 
 /// Links each stretch of `runs` to the earlier stretches of its session, in `runs` or `before`. A recording continues

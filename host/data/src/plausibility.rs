@@ -3,14 +3,17 @@
 //! Each rule keeps a wide margin to correct recordings; unit mistakes have factors of 57 (degrees) and 1000 (milli).
 //! Without limits in the robot's description, the columns are only compared with each other.
 
+use super::block::{Block, JointColumns};
 use super::held::held;
 use super::jump::jump;
 use super::rate_spike::rate_spike;
 use super::spike::spike;
 use super::unsigned::{Unsigned, unsigned};
-use super::{Block, JointColumns};
 use rig_model::robot::{Joint, JointKind, Robot, is_placeholder};
 use rig_output::{format_significant, format_time, format_trimmed, listed};
+
+/// Number of rows at the start by which the columns are checked: a wrong unit or direction shows from the start.
+pub const JUDGED_ROWS: usize = 100_000;
 
 /// A column that cannot have the required unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

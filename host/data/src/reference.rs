@@ -5,8 +5,8 @@
 
 use core::f64::consts::TAU;
 
+use super::block::{Block, JointColumns};
 use super::plausibility::{Implausible, range};
-use super::{Block, JointColumns};
 use rig_model::robot::{Joint, JointKind, Robot};
 use rig_output::format_significant;
 

@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use rig_shared::safety::Mode;
 
-use super::past::Past;
-use crate::Block;
-use crate::prepare::PrepareError;
-use crate::prepare::{LowPass, Recording, central_difference, second_difference};
+use super::block::Block;
+use super::history::Past;
+use super::prepare::PrepareError;
+use super::prepare::{LowPass, Recording, central_difference, second_difference};
 
 /// Ratio of the noise variance from third differences to that from second differences above which noise counts as
 /// white. White noise has a ratio of 1; a low-pass filter lowers it. Noise that rises with frequency also counts as

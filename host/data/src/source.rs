@@ -4,128 +4,28 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::block::{Block, JointColumns};
 use super::bursts::bursts;
 use super::columns::{EffortNeed, Layout, Role, layout};
 use super::csv::CsvRows;
 use super::error::{DataError, Warning};
 use super::foreign::{ForeignFormat, HEAD};
+use super::header::Header;
 use super::mcap_records::MAGIC;
 use super::mcap_rows::McapRows;
 use super::motors::{MotorPass, MotorSide};
 use super::place::Place;
 use super::quantity::Quantity;
 use super::remark::Remark;
-use super::{Block, JointColumns};
+use super::sampling::Sampling;
 use rig_model::robot::Robot;
 use rig_output::format_trimmed;
 
 /// Number of rows that determine the sample period.
 const PROBED_ROWS: usize = 1001;
 
-/// Spread of the intervals (5th to 95th percentile over the median) above which the recording counts
-/// as irregular. Clocked recordings stay below 0.03 (KUKA LWR over a network: 0.02), polled servos
-/// begin at 0.07.
-const IRREGULAR: f64 = 0.05;
-
-/// Intervals longer than this multiple of the period are a gap: one sample is missing.
-const GAP: f64 = 1.5;
-
-/// The same for irregular recordings, whose intervals vary.
-const IRREGULAR_GAP: f64 = 5.0;
-
-/// Relative deviation of an interval from the period that splits a regular recording. Causes are controllers whose loop
-/// settles over the first rows (3.6 instead of 2 ms) and rows sent twice. Stamps in single precision and clocks with
-/// jitter stay well below. A single stamp off the grid (KUKA LWR over a network: 3.4 and 6.5 ms instead of twice 5 ms)
-/// does not split.
-const UNEVEN: f64 = 0.2;
-
 /// Number of warnings kept per recording; more are only counted, so that memory does not grow.
 pub const KEPT_WARNINGS: usize = 1000;
-
-/// Sampling of a recording, determined from its first 1001 rows.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sampling {
-    /// Median interval, s; 0 for a single row.
-    pub period: f64,
-    /// True if the intervals vary (5th to 95th percentile more than 5 % of the median apart). The rows must then not be
-    /// treated as evenly spaced.
-    pub irregular: bool,
-}
-
-impl Sampling {
-    fn of(times: &[f64]) -> Self {
-        let mut intervals: Vec<f64> = times
-            .iter()
-            .zip(times.iter().skip(1))
-            .map(|(a, b)| b - a)
-            .collect();
-        intervals.sort_by(f64::total_cmp);
-        let Some(last) = intervals.len().checked_sub(1) else {
-            return Self {
-                period: 0.0,
-                irregular: false,
-            };
-        };
-        let at = |share: f64| intervals[(share * last as f64).round() as usize];
-        let period = at(0.5);
-        Self {
-            period,
-            irregular: at(0.95) - at(0.05) > IRREGULAR * period,
-        }
-    }
-
-    /// Returns the longest interval that is not a gap, s.
-    pub fn longest_interval(&self) -> f64 {
-        self.period * if self.irregular { IRREGULAR_GAP } else { GAP }
-    }
-
-    /// Returns true if this interval separates two blocks.
-    fn parts(&self, interval: f64) -> bool {
-        let uneven = !self.irregular && (interval - self.period).abs() > UNEVEN * self.period;
-        uneven || interval > self.longest_interval()
-    }
-
-    /// Returns the warning for such an interval.
-    fn parting(&self, place: Place, from: f64, now: f64) -> Warning {
-        if now - from > self.longest_interval() {
-            Warning::Gap {
-                place,
-                from,
-                lost: now - from - self.period,
-            }
-        } else {
-            Warning::Uneven {
-                place,
-                step: now - from,
-                period: self.period,
-            }
-        }
-    }
-}
-
-/// Columns of a file.
-#[derive(Debug, Default)]
-pub(super) struct Header {
-    /// Names that determine the meaning of the columns.
-    pub names: Vec<String>,
-    /// Names for messages, one per column.
-    pub labels: Vec<String>,
-    /// Line of the header; `None` if the file has no lines.
-    pub line: Option<u64>,
-    /// Reason for the missing torque, if the file could have one.
-    pub without_effort: Option<String>,
-}
-
-impl Header {
-    /// Builds a header whose messages use the column names.
-    pub(super) fn of(names: Vec<String>) -> Self {
-        Self {
-            labels: names.clone(),
-            names,
-            ..Self::default()
-        }
-    }
-}
 
 /// A recording whose header fits the robot.
 #[derive(Clone, Debug)]
@@ -559,7 +459,7 @@ impl Blocks<'_> {
         };
         let then = values[self.source.layout.time];
         self.ahead = Some((next, values));
-        self.pardoned = (then - from - 2.0 * sampling.period).abs() <= UNEVEN * sampling.period;
+        self.pardoned = sampling.fits_twice(then - from);
         if self.pardoned {
             self.warn(Warning::Misplaced {
                 place: self.source.place(line),

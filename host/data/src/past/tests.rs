@@ -1,4 +1,5 @@
 #![allow(clippy::unwrap_used)]
+use rig_shared::effects::{Effect, Instant, Kind, Memory};
 use rig_shared::scalar::Real as _;
 
 use super::*;
@@ -52,7 +53,7 @@ fn of_equal_clocks_each_stretch_goes_on_from_its_own_recording() {
     in_sessions(&mut runs, &[]);
     for (first, second) in [(0, 1), (2, 3)] {
         assert_eq!(runs[first].past, Past::default());
-        let own = Arc::new(Spell::of(&runs[first]));
+        let own = spell_of(&runs[first]);
         assert_eq!(runs[second].past, Past(vec![(own, 10.0)]));
     }
     let mut held = vec![run(0, 0.0, &[0.0, 50.0])];

@@ -1,0 +1,72 @@
+//! Rows of a recording in memory.
+
+use rig_model::simulate::Motion;
+
+/// Columns of one joint over a stretch of rows: equal length, SI units, joint side.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointColumns {
+    /// Position, rad or m (from `q<k>`, or from `qm<k>` of the motors through the drives).
+    pub q: Vec<f64>,
+    /// Joint torque or force, N·m or N (from `tau<k>`, or from `taum<k>` or `i<k>` of the motors through the drives).
+    /// Empty if the recording has neither and was opened with [`EffortNeed::Optional`].
+    pub tau: Vec<f64>,
+    /// Measured velocity, if recorded.
+    pub qd: Option<Vec<f64>>,
+    /// Measured acceleration, if recorded.
+    pub qdd: Option<Vec<f64>>,
+    /// Reference position, if recorded.
+    pub reference: Option<Vec<f64>>,
+    /// Motor voltage, if recorded (`u<k>`, or `duty<k>` times `supply`), V.
+    pub voltage: Option<Vec<f64>>,
+    /// Temperature, if recorded, °C.
+    pub temperature: Option<Vec<f64>>,
+    /// Reading of an encoder on the link side of the transmission, if recorded (`ql<k>`), rad or m; any zero.
+    pub link: Option<Vec<f64>>,
+    /// Torque of the described effects, N·m or N; not from a file but from [`crate::Compensated`].
+    pub effects: Option<Vec<f64>>,
+}
+
+/// A stretch of consecutive, evenly sampled rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Block {
+    /// Time, s.
+    pub t: Vec<f64>,
+    /// One entry per joint of the robot.
+    pub joints: Vec<JointColumns>,
+    /// Columns without a meaning for the model, kept by name (for instance `pulses`).
+    pub extra: Vec<(String, Vec<f64>)>,
+    /// Line of the first row in the file (1-based; in MCAP the number of the message).
+    pub first_line: u64,
+    /// True if this block follows the previous one without a gap in time.
+    pub continues: bool,
+}
+
+impl Block {
+    /// Builds the block of a simulated motion: t, and per joint q, tau and, if given, ref.
+    pub fn of_motion(motion: Motion, period: f64, reference: &[Vec<f64>]) -> Self {
+        let rows = motion.q.first().map_or(0, Vec::len);
+        let joints = motion.q.into_iter().zip(motion.tau).enumerate();
+        Self {
+            t: (0..rows).map(|k| k as f64 * period).collect(),
+            joints: joints
+                .map(|(j, (q, tau))| JointColumns {
+                    q,
+                    tau,
+                    reference: reference.get(j).cloned(),
+                    ..JointColumns::default()
+                })
+                .collect(),
+            first_line: 2,
+            ..Self::default()
+        }
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+    /// Returns true if there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+}
