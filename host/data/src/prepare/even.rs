@@ -1,10 +1,11 @@
 //! Recordings as all commands take them: unchanged, or interpolated to an even step.
 
-use super::PrepareError;
+use super::error::PrepareError;
 use super::pieces::Recording;
-use super::resample::{LONGEST_STEP, Resampled};
+use super::resample::Resampled;
+use super::spacing::LONGEST_STEP;
 use super::survey::Survey;
-use crate::Block;
+use crate::block::Block;
 
 /// A recording with an even step.
 pub enum Evened<'a> {

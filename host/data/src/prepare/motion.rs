@@ -1,6 +1,6 @@
 //! Filtered motion, piece by piece.
 
-use super::PrepareError;
+use super::error::PrepareError;
 use super::filter::{LowPass, central_difference, second_difference};
 use super::pieces::{Piece, Recording, each_piece};
 use super::treatment::Treatment;

@@ -1,7 +1,7 @@
 //! A recording in pieces with margins: filters over whole recordings in constant memory.
 
-use super::PrepareError;
-use crate::{Block, JointColumns};
+use super::error::PrepareError;
+use crate::block::{Block, JointColumns};
 
 /// A source of rows in blocks that can be read repeatedly.
 pub trait Recording {

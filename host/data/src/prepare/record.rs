@@ -5,7 +5,7 @@
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 
-use super::PrepareError;
+use super::error::PrepareError;
 
 /// Returns the error for a temporary file that cannot be used.
 pub fn unusable(e: std::io::Error) -> PrepareError {

@@ -1,12 +1,8 @@
 //! Interpolation of rows with uneven time stamps to an even step.
 
-use super::PrepareError;
+use super::error::PrepareError;
 use super::pieces::Recording;
-use crate::{Block, JointColumns};
-
-/// Longest step between neighbouring rows that is interpolated, as a multiple of the mean step. The reader already
-/// splits recordings at five usual steps, so no recording from a file is refused for this.
-pub(super) const LONGEST_STEP: f64 = 5.0;
+use crate::block::{Block, JointColumns};
 
 /// A recording whose stretches between gaps are interpolated at t₀, t₀ + Δ, t₀ + 2Δ, …; its time stamps are trusted.
 ///

@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::Seek;
 use std::sync::{Mutex, PoisonError};
 
-use super::PrepareError;
+use super::error::PrepareError;
 use super::pieces::{Recording, stretch};
 use super::record::{self, Record, begin, put_count, put_numbers, unusable};
-use crate::{Block, JointColumns};
+use crate::block::{Block, JointColumns};
 
 /// A recording that is written to a temporary file while it is first read, and read from there afterwards. Text is thus
 /// parsed once and memory stays constant. Keeps time, position, torque, measured derivatives and temperature; drops

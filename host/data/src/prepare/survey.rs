@@ -2,19 +2,10 @@
 
 use serde::Serialize;
 
-use super::PrepareError;
+use super::error::PrepareError;
 use super::pieces::Recording;
+use super::spacing::Spacing;
 use super::spectrum::{PositionSpectrum, Welch};
-
-/// Allowed deviation of the time from the even grid over [`STEPS_TOGETHER`] rows, as a share of a step. Accepts stamps
-/// of single precision, a clock with jitter and single stamps off the grid. A lost or doubled row exceeds it.
-const STEP_TOLERANCE: f64 = 0.4;
-
-/// Number of rows over which the deviation from the grid is measured.
-const STEPS_TOGETHER: usize = 8;
-
-/// Relative difference below which steps count as equal: the first of them is reported.
-const ROUNDING: f64 = 1e-9;
 
 /// Minimum number of rows for a spectrum.
 const FEWEST_ROWS: u64 = 256;
@@ -86,6 +77,7 @@ impl Extreme {
     }
 }
 
+/// Ranges and spectrum of one joint over the rows so far.
 struct Running {
     position: [f64; 2],
     last: f64,
@@ -94,6 +86,55 @@ struct Running {
     high: Extreme,
     low: Extreme,
     welch: Delayed,
+}
+
+impl Running {
+    fn new() -> Self {
+        Self {
+            position: [f64::INFINITY, f64::NEG_INFINITY],
+            last: 0.0,
+            step: 0.0,
+            square: 0.0,
+            high: Extreme::new(),
+            low: Extreme::new(),
+            welch: Delayed::default(),
+        }
+    }
+
+    /// Takes position and torque of a row of a recording of `rate` Hz, as far as the rate is known.
+    fn push(&mut self, q: f64, tau: f64, follows: bool, rate: f64) {
+        self.position = [self.position[0].min(q), self.position[1].max(q)];
+        if follows {
+            self.step = self.step.max((q - self.last).abs());
+        }
+        self.last = q;
+        self.square += tau * tau;
+        self.high.push(tau);
+        self.low.push(-tau);
+        self.welch.push(q, follows, rate);
+    }
+
+    fn still(&self) -> bool {
+        self.position[0] == self.position[1]
+    }
+
+    /// Returns the survey of `rows` rows; `None` if no stretch is long enough for a spectrum.
+    fn finish(self, rows: u64, sample_rate: f64) -> Option<JointSurvey> {
+        let still = self.still();
+        let (frequency, density) = (self.welch.finish(sample_rate)).density(sample_rate)?;
+        Some(JointSurvey {
+            position: self.position,
+            peak_speed: self.step * sample_rate,
+            torque_rms: (self.square / rows as f64).sqrt(),
+            torque: [-self.low.value, self.high.value],
+            clipped: [self.low.clipped().map(|v| -v), self.high.clipped()],
+            spectrum: if still {
+                PositionSpectrum::still(frequency)
+            } else {
+                PositionSpectrum::judge(frequency, density)
+            },
+        })
+    }
 }
 
 /// Number of rows of the longest spectrum segments up to 1 kHz; there they resolve 0.25 Hz.
@@ -184,22 +225,8 @@ impl Survey {
     /// # Errors
     /// [`PrepareError`]: too short, unevenly sampled, no joint moving, wrong number of joints.
     pub fn take(recording: &dyn Recording, joints: usize) -> Result<Self, PrepareError> {
-        let mut running: Vec<Running> = (0..joints)
-            .map(|_| Running {
-                position: [f64::INFINITY, f64::NEG_INFINITY],
-                last: 0.0,
-                step: 0.0,
-                square: 0.0,
-                high: Extreme::new(),
-                low: Extreme::new(),
-                welch: Delayed::default(),
-            })
-            .collect();
-        let (mut rows, mut longest, mut run) = (0u64, 0u64, 0u64);
-        let (mut span, mut steps, mut longest_step) = (0.0, 0u64, 0.0f64);
-        let mut last_time = 0.0;
-        let mut recent = [0.0; STEPS_TOGETHER];
-        let (mut shortest, mut widest) = ((f64::INFINITY, 0u64), (0.0f64, 0u64));
+        let mut running: Vec<Running> = (0..joints).map(|_| Running::new()).collect();
+        let mut spacing = Spacing::new();
         recording.each_block(1 << 16, &mut |block| {
             if block.joints.len() != joints {
                 return Err(PrepareError::JointCount {
@@ -209,106 +236,58 @@ impl Survey {
                 });
             }
             for k in 0..block.len() {
-                let follows = rows > 0 && (k > 0 || block.continues);
-                let t = block.t[k];
-                if follows {
-                    let step = t - last_time;
-                    span += step;
-                    longest_step = longest_step.max(step);
-                    steps += 1;
-                    let line = block.first_line + k as u64;
-                    if run >= STEPS_TOGETHER as u64 {
-                        let together = t - recent[rows as usize % STEPS_TOGETHER];
-                        if together < shortest.0 * (1.0 - ROUNDING) {
-                            shortest = (together, line);
-                        }
-                        if together > widest.0 * (1.0 + ROUNDING) {
-                            widest = (together, line);
-                        }
-                    }
-                    run += 1;
-                } else {
-                    run = 1;
-                }
-                longest = longest.max(run);
-                recent[rows as usize % STEPS_TOGETHER] = t;
-                last_time = t;
-                rows += 1;
+                let line = block.first_line + k as u64;
+                let follows = spacing.push(block.t[k], line, k > 0 || block.continues);
+                let rate = spacing.rate();
                 for (r, column) in running.iter_mut().zip(&block.joints) {
-                    let (q, tau) = (column.q[k], column.tau[k]);
-                    r.position = [r.position[0].min(q), r.position[1].max(q)];
-                    if follows {
-                        r.step = r.step.max((q - r.last).abs());
-                    }
-                    r.last = q;
-                    r.square += tau * tau;
-                    r.high.push(tau);
-                    r.low.push(-tau);
-                    r.welch.push(q, follows, steps as f64 / span);
+                    r.push(column.q[k], column.tau[k], follows, rate);
                 }
             }
             Ok(())
         })?;
+        Self::of(running, &spacing, recording.label())
+    }
+
+    /// Judges what the pass over the whole recording has found.
+    fn of(running: Vec<Running>, spacing: &Spacing, label: String) -> Result<Self, PrepareError> {
+        let (rows, longest) = (spacing.rows, spacing.longest);
         if rows < FEWEST_ROWS {
             return Err(PrepareError::TooShort {
-                label: recording.label(),
+                label,
                 rows,
                 needed: FEWEST_ROWS,
             });
         }
-        let mean = span / steps.max(1) as f64;
-        for (together, line) in [shortest, widest] {
-            // Skipped if no stretch was long enough.
-            if !together.is_finite() || line == 0 {
-                continue;
-            }
-            // The step if a single row caused the whole deviation.
-            let step = together - (STEPS_TOGETHER - 1) as f64 * mean;
-            let deviation = (step / mean - 1.0).abs();
-            if deviation > STEP_TOLERANCE || deviation.is_nan() {
-                return Err(PrepareError::Irregular {
-                    label: recording.label(),
-                    line,
-                    mean,
-                    longest: longest_step,
-                });
-            }
+        let mean = spacing.mean();
+        if let Some(line) = spacing.uneven_line() {
+            return Err(PrepareError::Irregular {
+                label,
+                line,
+                mean,
+                longest: spacing.longest_step,
+            });
         }
-        let sample_rate = 1.0 / mean;
-        let still = |r: &Running| r.position[0] == r.position[1];
-        if let (Some(first), true) = (running.first(), running.iter().all(still)) {
+        if let (Some(first), true) = (running.first(), running.iter().all(Running::still)) {
             return Err(PrepareError::NotMoving {
-                label: recording.label(),
+                label,
                 joint: 1,
                 position: first.position[0],
             });
         }
-        let joints = running
-            .into_iter()
-            .map(|r| {
-                let (frequency, density) = (r.welch.finish(sample_rate).density(sample_rate))
-                    .ok_or_else(|| PrepareError::Broken {
-                        label: recording.label(),
-                        longest,
-                        rows,
-                        needed: FEWEST_ROWS,
-                    })?;
-                Ok(JointSurvey {
-                    position: r.position,
-                    peak_speed: r.step * sample_rate,
-                    torque_rms: (r.square / rows as f64).sqrt(),
-                    torque: [-r.low.value, r.high.value],
-                    clipped: [r.low.clipped().map(|v| -v), r.high.clipped()],
-                    spectrum: if r.position[0] == r.position[1] {
-                        PositionSpectrum::still(frequency)
-                    } else {
-                        PositionSpectrum::judge(frequency, density)
-                    },
-                })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+        let sample_rate = 1.0 / mean;
+        let joints: Option<Vec<JointSurvey>> = (running.into_iter())
+            .map(|joint| joint.finish(rows, sample_rate))
+            .collect();
+        let Some(joints) = joints else {
+            return Err(PrepareError::Broken {
+                label,
+                longest,
+                rows,
+                needed: FEWEST_ROWS,
+            });
+        };
         Ok(Self {
-            label: recording.label(),
+            label,
             rows,
             longest,
             sample_rate,

@@ -3,7 +3,7 @@
 use rig_model::robot::IdentifiedBand;
 use serde::Serialize;
 
-use super::PrepareError;
+use super::error::PrepareError;
 use super::filter::{LowPass, decimator_edge};
 use super::rate::{parallel_pass, same_rate, trimmed_rows};
 use super::spectrum::{NOISE_SHARE, PositionSpectrum};

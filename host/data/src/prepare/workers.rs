@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError, mpsc};
 
-use super::PrepareError;
+use super::error::PrepareError;
 
 /// Maximum number of threads: the number of items in memory grows with it.
 const MOST_THREADS: usize = 16;
