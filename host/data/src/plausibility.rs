@@ -424,59 +424,7 @@ fn check_joint(
     if columns.q.is_empty() {
         return;
     }
-    if let Some(lost) = unsigned(&columns.q) {
-        found.push(lost_sign("q", k, lost));
-    } else if let Some(jump) = jump(t, &columns.q) {
-        found.push(Implausible::Jump {
-            joint: k,
-            at: t[jump.row],
-            by: jump.by,
-            more: more(jump.count),
-            fastest: jump.fastest,
-            mend: if unit == "rad" && (jump.by.abs() / core::f64::consts::TAU - 1.0).abs() < 0.02 {
-                "that is a turn: give the angle counted on beyond it"
-            } else {
-                "give recordings that were put together one by one, and check the encoder for lost counts"
-            },
-            unit,
-        });
-    } else if let Some(limits) = &joint.limits {
-        let [lower, upper] = limits.position;
-        let reach = lower.abs().max(upper.abs());
-        let farthest = lowest.abs().max(highest.abs());
-        let or = motor_angle(joint, farthest / reach);
-        let degrees = farthest.to_radians() <= 1.2 * reach;
-        if reach.is_finite() && farthest > 5.0 * reach {
-            found.push(if joint.kind == JointKind::Revolute && degrees {
-                Implausible::Degrees {
-                    joint: k,
-                    lowest,
-                    highest,
-                    limit: reach,
-                    or,
-                }
-            } else {
-                Implausible::Position {
-                    joint: k,
-                    lowest,
-                    highest,
-                    lower,
-                    upper,
-                    unit,
-                    or,
-                }
-            });
-        } else if let Some(speed) = highest_speed(t, &columns.q)
-            && speed > 10.0 * limits.velocity
-        {
-            found.push(Implausible::Velocity {
-                joint: k,
-                speed,
-                limit: limits.velocity,
-                unit,
-            });
-        }
-    }
+    found.extend(position_fault(k, t, &columns.q, joint, unit));
     if let Some(ratio) = columns
         .qd
         .as_ref()
@@ -492,6 +440,70 @@ fn check_joint(
         }
     }
     check_effort(k, t, columns, joint, effort_unit, highest - lowest, found);
+}
+
+/// Returns the first fault of a position; `unit` is rad or m.
+fn position_fault(
+    k: usize,
+    t: &[f64],
+    q: &[f64],
+    joint: &Joint,
+    unit: &'static str,
+) -> Option<Implausible> {
+    if let Some(lost) = unsigned(q) {
+        return Some(lost_sign("q", k, lost));
+    }
+    if let Some(jump) = jump(t, q) {
+        let turns = jump.by.abs() / core::f64::consts::TAU;
+        return Some(Implausible::Jump {
+            joint: k,
+            at: t[jump.row],
+            by: jump.by,
+            more: more(jump.count),
+            fastest: jump.fastest,
+            mend: if joint.kind == JointKind::Revolute && (turns - 1.0).abs() < 0.02 {
+                "that is a turn: give the angle counted on beyond it"
+            } else {
+                "give recordings that were put together one by one, and check the encoder for lost counts"
+            },
+            unit,
+        });
+    }
+    let limits = joint.limits.as_ref()?;
+    let [lower, upper] = limits.position;
+    let (lowest, highest) = range(q);
+    let reach = lower.abs().max(upper.abs());
+    let farthest = lowest.abs().max(highest.abs());
+    if reach.is_finite() && farthest > 5.0 * reach {
+        let or = motor_angle(joint, farthest / reach);
+        let degrees = farthest.to_radians() <= 1.2 * reach;
+        return Some(if joint.kind == JointKind::Revolute && degrees {
+            Implausible::Degrees {
+                joint: k,
+                lowest,
+                highest,
+                limit: reach,
+                or,
+            }
+        } else {
+            Implausible::Position {
+                joint: k,
+                lowest,
+                highest,
+                lower,
+                upper,
+                unit,
+                or,
+            }
+        });
+    }
+    let speed = highest_speed(t, q)?;
+    (speed > 10.0 * limits.velocity).then_some(Implausible::Velocity {
+        joint: k,
+        speed,
+        limit: limits.velocity,
+        unit,
+    })
 }
 
 /// Returns the number of rows per second.

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use super::block::{Block, JointColumns};
 use super::bursts::bursts;
-use super::columns::{EffortNeed, Layout, Role, layout};
+use super::columns::{EffortNeed, Layout, Role};
 use super::csv::CsvRows;
 use super::error::{DataError, Warning};
 use super::foreign::{ForeignFormat, HEAD};
 use super::header::Header;
+use super::layout::layout;
 use super::mcap_records::MAGIC;
 use super::mcap_rows::McapRows;
 use super::motors::{MotorPass, MotorSide};

@@ -1,0 +1,263 @@
+//! Finds the meaning of each column of a recording for a given robot.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use super::columns::{EffortNeed, FileColumn, Layout, Role, Signal, shown};
+use super::efforts::{Efforts, efforts};
+use super::error::{DataError, Warning};
+use super::header::Header;
+use super::motors::MotorSide;
+use super::place::Place;
+use rig_model::robot::Robot;
+
+/// Columns with a meaning that belong to no joint: wrist sensor and supply.
+const NUMERIC_EXTRAS: [&str; 7] = ["fx", "fy", "fz", "mx", "my", "mz", "supply"];
+
+/// Returns the columns of a file for `robot`.
+///
+/// # Errors
+/// [`DataError::Header`]: columns that are missing, without a name, there twice, or of no joint of the robot.
+pub(super) fn layout(
+    path: &Path,
+    described: &Header,
+    robot: &Robot,
+    need: EffortNeed,
+) -> Result<Layout, DataError> {
+    let header = |message: String| DataError::Header {
+        path: path.into(),
+        place: described.line.map(Place::Line),
+        message,
+    };
+    let names = described.names.as_slice();
+    let joints = robot.joints.len();
+    let time = time_column(names).map_err(header)?;
+    check_names(names).map_err(header)?;
+    let signals = signals(names, robot).map_err(header)?;
+    let from_motors = motor_positions(names, robot, joints).map_err(header)?;
+    if let (Some(why), EffortNeed::Required) = (&described.without_effort, need) {
+        return Err(header(why.clone()));
+    }
+    let efforts = efforts(names, robot, need).map_err(header)?;
+    let roles = Roles {
+        names,
+        robot,
+        from_motors,
+        efforts: &efforts,
+    };
+    let mut warnings = Vec::new();
+    let mut extras = 0;
+    let mut columns = Vec::with_capacity(names.len());
+    for ((name, label), signal) in names.iter().zip(&described.labels).zip(signals) {
+        let role = match signal {
+            _ if name == "t" => Role::Time,
+            None => Role::None,
+            Some((signal, joint)) => roles.of(name, signal, joint, &mut warnings),
+        };
+        let keep = matches!(role, Role::None | Role::Duty(..));
+        let strict =
+            role != Role::None || signal.is_some() || NUMERIC_EXTRAS.contains(&name.as_str());
+        columns.push(FileColumn {
+            name: name.clone(),
+            label: label.clone(),
+            role,
+            extra: keep.then_some(extras),
+            strict,
+        });
+        extras += usize::from(keep);
+    }
+    let movers = |j: usize| (0..joints).filter(|m| robot.moves(*m, j)).collect();
+    let movers = (0..joints).map(movers).collect();
+    let motors = motor_side(robot, from_motors, efforts.turned).map_err(header)?;
+    Ok(Layout {
+        columns,
+        time,
+        joints,
+        extras,
+        motors,
+        movers,
+        warnings,
+    })
+}
+
+/// Returns the index of the column with this name.
+fn find(names: &[String], name: &str) -> Option<usize> {
+    names.iter().position(|n| n == name)
+}
+
+fn time_column(names: &[String]) -> Result<usize, String> {
+    find(names, "t").ok_or_else(|| {
+        let only = names.first().map_or("", String::as_str);
+        let hint = if only.parse::<f64>().is_ok() {
+            "; the first line must name the columns"
+        } else {
+            ""
+        };
+        format!(
+            "there is no column `t` (time in s); the columns are {}{hint}",
+            shown(names)
+        )
+    })
+}
+
+/// Checks that every column has a name of its own.
+fn check_names(names: &[String]) -> Result<(), String> {
+    let mut seen = HashSet::new();
+    for (i, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            return Err(format!(
+                "column {} has no name; every column needs one (is there a separator too many?)",
+                i + 1
+            ));
+        }
+        if !seen.insert(name.as_str()) {
+            return Err(format!(
+                "column `{name}` is there twice; every column must have a name of its own"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Returns what each column holds and its joint from 0, for columns that belong to a joint.
+fn signals(names: &[String], robot: &Robot) -> Result<Vec<Option<(Signal, usize)>>, String> {
+    let joints = robot.joints.len();
+    // The duty cycle of a single joint needs no number.
+    let bare = joints == 1 && find(names, "duty1").is_none();
+    let split = |name: &String| {
+        Signal::split(name).or_else(|| (bare && name == "duty").then_some((Signal::Duty, 1)))
+    };
+    let of = |name: &String| match split(name) {
+        None => Ok(None),
+        Some((signal, k)) if (1..=joints).contains(&k) => Ok(Some((signal, k - 1))),
+        Some((signal, k)) => Err(format!(
+            "column `{name}` belongs to joint {k}, but robot `{}` has joint{} (`{}1` is the first); correct the column or give the robot that was recorded",
+            robot.name,
+            if joints == 1 {
+                " 1 only".to_owned()
+            } else {
+                format!("s 1 to {joints}")
+            },
+            signal.prefix()
+        )),
+    };
+    names.iter().map(of).collect()
+}
+
+/// What decides the roles of the joints' columns.
+struct Roles<'a> {
+    names: &'a [String],
+    robot: &'a Robot,
+    /// True if the positions are those of the motors.
+    from_motors: bool,
+    efforts: &'a Efforts,
+}
+
+impl Roles<'_> {
+    /// Returns the role of a column of a joint.
+    fn of(&self, name: &str, signal: Signal, joint: usize, warnings: &mut Vec<Warning>) -> Role {
+        match signal {
+            Signal::Position if self.from_motors => Role::None,
+            Signal::Position => Role::Position(joint),
+            Signal::MotorPosition if self.from_motors => Role::MotorPosition(joint),
+            Signal::MotorPosition => Role::None,
+            Signal::Torque => Role::Effort(joint, 1.0),
+            // If the joint torque is recorded, the model does not need that of the motor.
+            Signal::MotorTorque | Signal::Current => {
+                self.efforts.role(name, joint).unwrap_or(Role::None)
+            }
+            Signal::Velocity => Role::Velocity(joint),
+            Signal::Acceleration => Role::Acceleration(joint),
+            Signal::Reference => Role::Reference(joint),
+            Signal::Voltage => Role::Voltage(joint),
+            Signal::Temperature => Role::Temperature(joint),
+            Signal::LinkPosition => Role::LinkPosition(joint),
+            Signal::Duty => self.duty(name, joint, warnings),
+        }
+    }
+
+    /// Returns the role of a duty cycle, which needs the supply voltage and yields to a recorded voltage.
+    fn duty(&self, name: &str, joint: usize, warnings: &mut Vec<Warning>) -> Role {
+        if find(self.names, &format!("u{}", joint + 1)).is_some() {
+            return Role::None;
+        }
+        match find(self.names, "supply") {
+            Some(column) => Role::Duty(joint, column, duty_scale(self.robot, joint)),
+            None => {
+                warnings.push(Warning::DutyWithoutSupply {
+                    column: name.to_owned(),
+                });
+                Role::None
+            }
+        }
+    }
+}
+
+/// Returns the conversion from motors to joints, if positions or torques need it.
+fn motor_side(
+    robot: &Robot,
+    from_motors: bool,
+    turned: Vec<bool>,
+) -> Result<Option<MotorSide>, String> {
+    if !from_motors && !turned.contains(&true) {
+        return Ok(None);
+    }
+    let side = MotorSide::new(robot, from_motors, turned);
+    side.map(Some).map_err(|e| {
+        format!(
+            "the drives of robot `{}` cannot turn motor columns to the joints: {e}",
+            robot.name
+        )
+    })
+}
+
+/// Returns the share of the supply voltage per unit of a joint's duty column.
+fn duty_scale(robot: &Robot, joint: usize) -> f64 {
+    let drive = robot.joints.get(joint).and_then(|j| j.drive.as_ref());
+    drive
+        .and_then(|d| d.duty_full_scale)
+        .map_or(1.0, |full| 1.0 / full)
+}
+
+/// Returns true if the positions are those of the motors.
+fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<bool, String> {
+    let missing = |quantity: &str| -> Vec<usize> {
+        (1..=joints)
+            .filter(|k| !names.iter().any(|n| *n == format!("{quantity}{k}")))
+            .collect()
+    };
+    let (joint, motor) = (missing("q"), missing("qm"));
+    let Some(&first) = joint.first() else {
+        return Ok(false);
+    };
+    let Some(&first_motor) = motor.first() else {
+        return match robot.joints.iter().position(|j| j.drive.is_none()) {
+            None => Ok(true),
+            Some(k) => Err(format!(
+                "there is no column `q{}`, and column `qm{}` is a motor position, but joint `{}` of robot `{}` has no [joint.drive]; add its gear_ratio (and couples, zero) to the robot",
+                first,
+                k + 1,
+                robot.joints[k].name,
+                robot.name
+            )),
+        };
+    };
+    let name = &robot.joints[first - 1].name;
+    // Some joints are recorded and others not, for example those of a gripper.
+    let unmoved = if joint.len() < joints {
+        format!("where joint `{name}` never moves, make it type=\"fixed\" in the URDF; ")
+    } else {
+        String::new()
+    };
+    Err(if motor.len() == joints {
+        format!(
+            "there is no column `q{first}` (position of joint `{name}`, in rad or m); {unmoved}the columns are {}",
+            shown(names)
+        )
+    } else {
+        format!(
+            "there is neither `q{first}` (position of joint `{name}`, in rad or m) nor `qm{first_motor}` (motor position, rad); the position must be given by q for every joint or by qm for every motor, and the columns are {}",
+            shown(names)
+        )
+    })
+}
