@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::ReportError;
 use super::document::{Alignment, Block, Document, Fact, NoteKind, Section, Table, Tone};
+use super::error::ReportError;
 use super::escape::text;
 use super::plot::{Plot, Role};
 use super::scene::Scene;

@@ -1,6 +1,6 @@
 //! Content of a figure: series over two axes, markers, and texts.
 
-use super::ReportError;
+use super::error::ReportError;
 
 /// Meaning of a series; each role has one colour throughout a document.
 ///

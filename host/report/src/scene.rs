@@ -2,9 +2,10 @@
 //! the data of the zoomable figure both start from here.
 
 use super::axis::{drawable, extent, padded};
-use super::plot::{Direction, Plot, Role, Series, Style};
+use super::error::ReportError;
+use super::escape;
+use super::plot::{Axis, Direction, Marker, Plot, Role, Series, Style};
 use super::thin::thin;
-use super::{ReportError, escape};
 
 /// Maximum number of points of a series in a page.
 pub(crate) const POINTS: usize = 4000;
@@ -135,7 +136,7 @@ impl<'a> Scene<'a> {
         let plot = self.plot;
         let x_digits = Digits::of(self.x_range, plot.x.log);
         let y_digits = Digits::of(self.y_range, plot.y.log);
-        let axis = |axis: &super::plot::Axis| {
+        let axis = |axis: &Axis| {
             let names: Vec<String> = axis.categories.iter().map(|c| escape::json(c)).collect();
             format!(
                 "{{\"title\":{},\"log\":{},\"names\":[{}]}}",
@@ -200,7 +201,7 @@ impl<'a> Scene<'a> {
 }
 
 /// Returns true if the marker's position can be drawn on its axis.
-pub(crate) fn marker_drawable(plot: &Plot, marker: &super::plot::Marker) -> bool {
+pub(crate) fn marker_drawable(plot: &Plot, marker: &Marker) -> bool {
     let axis = match marker.direction {
         Direction::Vertical => &plot.x,
         Direction::Horizontal => &plot.y,

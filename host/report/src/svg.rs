@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::ReportError;
 use super::axis::{Tick, linear_ticks, log_ticks};
+use super::error::ReportError;
 use super::escape::text;
 use super::plot::{Axis, Direction, Plot, Role};
 use super::scene::{Drawn, Scene, Shape, marker_drawable};
@@ -66,6 +66,14 @@ pub(crate) fn inline(scene: &Scene<'_>, id: &str) -> String {
 /// Estimates the width of a text in most sans-serif fonts, rather too large than too small.
 fn width_of(text: &str) -> f64 {
     text.chars().count() as f64 * FONT * 0.58
+}
+
+/// Returns the ticks that lie in a range.
+fn within(ticks: &[Tick], (low, high): (f64, f64)) -> impl Iterator<Item = &Tick> {
+    let slack = (high - low) * 1e-9;
+    ticks
+        .iter()
+        .filter(move |t| t.at >= low - slack && t.at <= high + slack)
 }
 
 /// Geometry of one picture.
@@ -243,17 +251,29 @@ impl<'a> Canvas<'a> {
         );
     }
 
+    /// Draws grid, frame, numbers and titles of both axes.
     fn axes(&self, out: &mut String) {
-        let grid = self.palette.named("grid", "#e6e9ed");
-        let quiet = self.palette.named("quiet", "#5b6570");
+        self.grid(out);
         let frame = self.palette.named("axis", "#aab2bb");
-        let plot = self.scene.plot;
-        let within = |at: f64, (low, high): (f64, f64)| {
-            let slack = (high - low) * 1e-9;
-            at >= low - slack && at <= high + slack
-        };
+        let _ = write!(
+            out,
+            "<path d=\"M{0} {1}V{2}H{3}\" style=\"stroke:{frame};stroke-width:1;fill:none\"/>",
+            coordinate(self.left),
+            coordinate(self.top),
+            coordinate(self.bottom),
+            coordinate(self.right)
+        );
+        let quiet = self.palette.named("quiet", "#5b6570");
+        let _ = write!(out, "<g style=\"fill:{quiet}\">");
+        self.numbers(out);
+        self.titles(out);
+        out.push_str("</g>");
+    }
+
+    fn grid(&self, out: &mut String) {
+        let grid = self.palette.named("grid", "#e6e9ed");
         let _ = write!(out, "<g style=\"stroke:{grid};stroke-width:1;fill:none\">");
-        for tick in self.x_ticks.iter().filter(|t| within(t.at, self.x_range)) {
+        for tick in within(&self.x_ticks, self.x_range) {
             let x = coordinate(self.x(tick.at));
             let _ = write!(
                 out,
@@ -262,7 +282,7 @@ impl<'a> Canvas<'a> {
                 coordinate(self.bottom)
             );
         }
-        for tick in self.y_ticks.iter().filter(|t| within(t.at, self.y_range)) {
+        for tick in within(&self.y_ticks, self.y_range) {
             let y = coordinate(self.y(tick.at));
             let _ = write!(
                 out,
@@ -272,19 +292,15 @@ impl<'a> Canvas<'a> {
             );
         }
         out.push_str("</g>");
-        let _ = write!(
-            out,
-            "<path d=\"M{0} {1}V{2}H{3}\" style=\"stroke:{frame};stroke-width:1;fill:none\"/>",
-            coordinate(self.left),
-            coordinate(self.top),
-            coordinate(self.bottom),
-            coordinate(self.right)
-        );
-        let _ = write!(out, "<g style=\"fill:{quiet}\">");
+    }
+
+    /// Writes the numbers or names beside the ticks.
+    fn numbers(&self, out: &mut String) {
+        let named = !self.scene.plot.x.categories.is_empty();
         let mut free = f64::NEG_INFINITY;
-        for tick in self.x_ticks.iter().filter(|t| within(t.at, self.x_range)) {
+        for tick in within(&self.x_ticks, self.x_range) {
             let (x, half) = (self.x(tick.at), 0.5 * width_of(&tick.label));
-            if tick.label.is_empty() || (x - half < free && plot.x.categories.is_empty()) {
+            if tick.label.is_empty() || (x - half < free && !named) {
                 continue;
             }
             free = x + half + 6.0;
@@ -298,7 +314,7 @@ impl<'a> Canvas<'a> {
                 text(&tick.label)
             );
         }
-        for tick in self.y_ticks.iter().filter(|t| within(t.at, self.y_range)) {
+        for tick in within(&self.y_ticks, self.y_range) {
             if tick.label.is_empty() {
                 continue;
             }
@@ -310,6 +326,11 @@ impl<'a> Canvas<'a> {
                 text(&tick.label)
             );
         }
+    }
+
+    /// Writes quantity and unit of both axes.
+    fn titles(&self, out: &mut String) {
+        let plot = self.scene.plot;
         let (x_title, y_title) = (plot.x.title(), plot.y.title());
         if !x_title.is_empty() {
             let _ = write!(
@@ -328,7 +349,6 @@ impl<'a> Canvas<'a> {
                 text(&y_title)
             );
         }
-        out.push_str("</g>");
     }
 
     /// Returns the indices to draw: fewer than in the zoomable figure.
@@ -373,26 +393,13 @@ impl<'a> Canvas<'a> {
         let stroke = format!(
             "fill:none;stroke:{colour};stroke-width:1.6;stroke-linejoin:round;stroke-linecap:round{dash}"
         );
-        let mut dots = String::new();
-        let mut dot = |x: f64, y: f64| {
-            let _ = write!(
-                dots,
-                "M{} {}h0",
-                coordinate(self.x(x)),
-                coordinate(self.y(y))
-            );
-        };
         match series.shape {
             Shape::Line | Shape::Steps => {
                 let path = self.curve(series, &series.y, series.shape == Shape::Steps);
                 let _ = write!(out, "<path d=\"{path}\" style=\"{stroke}\"/>");
             }
             Shape::Points => {
-                for i in self.chosen(series) {
-                    if !series.x[i].is_nan() && !series.y[i].is_nan() {
-                        dot(series.x[i], series.y[i]);
-                    }
-                }
+                let dots = self.dots(series);
                 let _ = write!(
                     out,
                     "<path d=\"{dots}\" style=\"fill:none;stroke:{colour};stroke-width:4.4;\
@@ -411,57 +418,14 @@ impl<'a> Canvas<'a> {
                 }
             }
             Shape::Bars { width, offset } => {
-                let base = if self.scene.plot.y.log {
-                    self.bottom
-                } else {
-                    self.y(0.0)
-                };
-                let mut path = String::new();
-                for (x, y) in series.x.iter().zip(&series.y) {
-                    if x.is_nan() || y.is_nan() {
-                        continue;
-                    }
-                    let a = coordinate(self.x(x + offset - 0.5 * width));
-                    let b = coordinate(self.x(x + offset + 0.5 * width));
-                    let _ = write!(
-                        path,
-                        "M{a} {0}V{1}H{b}V{0}z",
-                        coordinate(base),
-                        coordinate(self.y(*y))
-                    );
-                }
+                let path = self.bars(series, width, offset);
                 let _ = write!(
                     out,
                     "<path d=\"{path}\" style=\"fill:{colour};fill-opacity:.85;stroke:none\"/>"
                 );
             }
             Shape::ErrorBars => {
-                let mut path = String::new();
-                for i in self.chosen(series) {
-                    let (x, y) = (series.x[i], series.y[i]);
-                    if x.is_nan() || y.is_nan() {
-                        continue;
-                    }
-                    dot(x, y);
-                    // An edge that a logarithmic axis cannot show extends to the end of the axis.
-                    let low = Some(series.low[i]).filter(|v| !v.is_nan());
-                    let high = Some(series.high[i]).filter(|v| !v.is_nan());
-                    let (Some(bottom), Some(top)) = (
-                        low.map(|v| self.y(v)).or_else(|| high.map(|_| self.bottom)),
-                        high.map(|v| self.y(v)),
-                    ) else {
-                        continue;
-                    };
-                    let px = self.x(x);
-                    let _ = write!(
-                        path,
-                        "M{0} {1}V{2}M{3} {1}h8M{3} {2}h8",
-                        coordinate(px),
-                        coordinate(bottom),
-                        coordinate(top),
-                        coordinate(px - 4.0)
-                    );
-                }
+                let (path, dots) = (self.error_bars(series), self.dots(series));
                 let _ = write!(
                     out,
                     "<path d=\"{path}\" style=\"fill:none;stroke:{colour};stroke-width:1.3\"/>\
@@ -469,6 +433,77 @@ impl<'a> Canvas<'a> {
                 );
             }
         }
+    }
+
+    /// Returns one point of no length for every sample.
+    fn dots(&self, series: &Drawn<'_>) -> String {
+        let mut dots = String::new();
+        for i in self.chosen(series) {
+            let (x, y) = (series.x[i], series.y[i]);
+            if !x.is_nan() && !y.is_nan() {
+                let _ = write!(
+                    dots,
+                    "M{} {}h0",
+                    coordinate(self.x(x)),
+                    coordinate(self.y(y))
+                );
+            }
+        }
+        dots
+    }
+
+    /// Returns the outlines of bars from zero; `width` and `offset` are in units of x.
+    fn bars(&self, series: &Drawn<'_>, width: f64, offset: f64) -> String {
+        let base = if self.scene.plot.y.log {
+            self.bottom
+        } else {
+            self.y(0.0)
+        };
+        let mut path = String::new();
+        for (x, y) in series.x.iter().zip(&series.y) {
+            if x.is_nan() || y.is_nan() {
+                continue;
+            }
+            let a = coordinate(self.x(x + offset - 0.5 * width));
+            let b = coordinate(self.x(x + offset + 0.5 * width));
+            let _ = write!(
+                path,
+                "M{a} {0}V{1}H{b}V{0}z",
+                coordinate(base),
+                coordinate(self.y(*y))
+            );
+        }
+        path
+    }
+
+    /// Returns the vertical bars of dots with errors, with a cross stroke at each end.
+    fn error_bars(&self, series: &Drawn<'_>) -> String {
+        let mut path = String::new();
+        for i in self.chosen(series) {
+            let (x, y) = (series.x[i], series.y[i]);
+            if x.is_nan() || y.is_nan() {
+                continue;
+            }
+            // An edge that a logarithmic axis cannot show extends to the end of the axis.
+            let low = Some(series.low[i]).filter(|v| !v.is_nan());
+            let high = Some(series.high[i]).filter(|v| !v.is_nan());
+            let (Some(bottom), Some(top)) = (
+                low.map(|v| self.y(v)).or_else(|| high.map(|_| self.bottom)),
+                high.map(|v| self.y(v)),
+            ) else {
+                continue;
+            };
+            let px = self.x(x);
+            let _ = write!(
+                path,
+                "M{0} {1}V{2}M{3} {1}h8M{3} {2}h8",
+                coordinate(px),
+                coordinate(bottom),
+                coordinate(top),
+                coordinate(px - 4.0)
+            );
+        }
+        path
     }
 
     /// Returns the closed outline of a band, one piece for each run without gaps.
