@@ -10,12 +10,12 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::dice::Dice;
+use super::error::ScenarioError;
 use super::fault::{Fault, Hidden};
 use super::written::write_all;
-use crate::ScenarioError;
 use rig_data::prepare::InMemory;
 use rig_data::{Block, JointColumns};
-use rig_model::robot::{Drive, EDDA_TEMPLATE, JointFriction, Robot, TX40};
+use rig_model::robot::{Drive, EDDA_TEMPLATE, Joint, JointFriction, Robot, TX40};
 use rig_model::simulate::{Model, SimulateError, Stepper};
 
 /// Control rate, Hz; every second control period is recorded.
@@ -126,7 +126,7 @@ fn described(arm: Arm) -> Result<Robot, ScenarioError> {
     Ok(robot)
 }
 
-fn limit(joint: &rig_model::robot::Joint) -> f64 {
+fn limit(joint: &Joint) -> f64 {
     let stated = joint.limits.as_ref().and_then(|l| l.torque);
     stated.unwrap_or(100.0)
 }
@@ -214,20 +214,14 @@ impl ArmScenario {
         let mut stepper = Stepper::new(&model)?;
         let mut dice = Dice::new(self.seed, 100 + run);
         let limits: Vec<f64> = robot.joints.iter().map(limit).collect();
-        let step: Vec<f64> = (robot.joints.iter())
-            .map(|j| {
-                let counts = j.drive.as_ref().and_then(|d| d.encoder_counts_per_rev);
-                TAU / (counts.unwrap_or(COUNTS[0]) * j.gear_ratio())
-            })
-            .collect();
+        let step: Vec<f64> = robot.joints.iter().map(encoder_step).collect();
         let offset = |j: usize| match self.fault {
             Some((joint, Fault::JointOffset(error))) if joint == j => error,
             _ => 0.0,
         };
-        let at = |k: usize, j: usize| motion[j][k.min(motion[j].len() - 1)];
-        let mut q: Vec<f64> = (0..n).map(|j| at(0, j) - offset(j)).collect();
+        let mut q: Vec<f64> = (0..n).map(|j| at(motion, 0, j) - offset(j)).collect();
         let mut v = vec![0.0; n];
-        let mut last: Vec<f64> = (0..n).map(|j| at(0, j)).collect();
+        let mut last: Vec<f64> = (0..n).map(|j| at(motion, 0, j)).collect();
         let mut speed = vec![0.0; n];
         let mut current = vec![0.0; n];
         nominal.inverse_dynamics(&last, &v, &v, &mut current)?;
@@ -242,17 +236,8 @@ impl ArmScenario {
             joints: vec![JointColumns::default(); n],
             ..Block::default()
         };
-        for column in &mut block.joints {
-            column.reference = Some(Vec::new());
-        }
         for k in 0..motion[0].len() {
-            let [mut target, mut rate, mut second] = [(); 3].map(|()| vec![0.0; n]);
-            for j in 0..n {
-                let (before, now, after) = (at(k.saturating_sub(1), j), at(k, j), at(k + 1, j));
-                target[j] = now;
-                rate[j] = 0.5 * (after - before) * RATE;
-                second[j] = (after - 2.0 * now + before) * RATE * RATE;
-            }
+            let [target, rate, second] = wanted(motion, k);
             nominal.inverse_dynamics(&target, &rate, &second, &mut wish)?;
             nominal.inertia_matrix(&target, &mut mass)?;
             for j in 0..n {
@@ -298,6 +283,31 @@ impl ArmScenario {
         }
         Ok(block)
     }
+}
+
+/// Returns the step of a joint's position reading, rad.
+fn encoder_step(joint: &Joint) -> f64 {
+    let counts = joint.drive.as_ref().and_then(|d| d.encoder_counts_per_rev);
+    TAU / (counts.unwrap_or(COUNTS[0]) * joint.gear_ratio())
+}
+
+/// Returns the reference of joint `j` at control period `k`; the last one after the end.
+fn at(motion: &[Vec<f64>], k: usize, j: usize) -> f64 {
+    motion[j][k.min(motion[j].len() - 1)]
+}
+
+/// Returns position, velocity and acceleration of the references of all joints; rad, rad/s, rad/s².
+fn wanted(motion: &[Vec<f64>], k: usize) -> [Vec<f64>; 3] {
+    let mut wanted = [(); 3].map(|()| Vec::with_capacity(motion.len()));
+    let [target, rate, second] = &mut wanted;
+    for j in 0..motion.len() {
+        let before = at(motion, k.saturating_sub(1), j);
+        let (now, after) = (at(motion, k, j), at(motion, k + 1, j));
+        target.push(now);
+        rate.push(0.5 * (after - before) * RATE);
+        second.push((after - 2.0 * now + before) * RATE * RATE);
+    }
+    wanted
 }
 
 /// Returns the reference for each joint: a sum of five sines, first fast, then slow, with rest at both ends of each

@@ -4,8 +4,8 @@
 
 use super::arm::{Arm, ArmScenario, OF_LIMIT, limits_of};
 use super::dice::Dice;
+use super::error::ScenarioError;
 use super::fault::Fault;
-use crate::ScenarioError;
 
 /// Purpose of the draws of the first fault; others follow.
 const DRAW: u64 = 50;

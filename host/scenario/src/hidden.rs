@@ -218,6 +218,80 @@ impl Effect {
         let motor = &mut config.motor;
         let mechanism = &mut config.mechanism;
         match *self {
+            Self::Stribeck { .. }
+            | Self::AsymmetricCoulomb { .. }
+            | Self::QuadraticDrag { .. }
+            | Self::LoadFriction { .. }
+            | Self::PositionFriction { .. }
+            | Self::Presliding { .. }
+            | Self::ViscousWarmup { .. } => self.hide_in_friction(config),
+            Self::GearEccentricity { .. }
+            | Self::Backlash { .. }
+            | Self::JointElasticity { .. } => self.hide_in_gear(config),
+            Self::Cogging {
+                amplitude,
+                order,
+                phase,
+            } => {
+                motor.cogging = Some(Cogging {
+                    amplitude: amplitude / ratio,
+                    order,
+                    phase,
+                });
+            }
+            Self::TorqueRipple {
+                amplitude,
+                order,
+                phase,
+            } => {
+                motor.ripple = Some(TorqueRipple {
+                    amplitude,
+                    order,
+                    phase,
+                });
+            }
+            Self::EncoderEccentricity { amplitude, phase } => {
+                config.sensors.encoder.eccentricity =
+                    Some(EncoderEccentricity { amplitude, phase });
+            }
+            Self::CurrentOffset { current } => config.sensors.current.offset = current,
+            Self::TorqueSaturation { loss } => {
+                motor.saturation = Some(TorqueSaturation {
+                    knee: Self::PEAK_CURRENT * ((1.0 - loss) / loss).sqrt(),
+                });
+            }
+            Self::MeasurementDelay { delay } => {
+                config.sensors.current_delay = Some((delay * TICK_RATE).round() as usize);
+            }
+            Self::GravityTilt { angle } => {
+                mechanism.tilt = Some(Tilt {
+                    about_x: 0.0,
+                    about_y: angle,
+                });
+            }
+            Self::Payload { mass, distance } => mechanism.bodies.push(payload(mass, distance)),
+            Self::Spring { stiffness, rest } => {
+                mechanism.spring = Some(Spring {
+                    stiffness,
+                    rest: config.sensors.encoder.zero + rest,
+                });
+            }
+            Self::DriveDeadzone { voltage } => {
+                config.bridge.dead_time = Some(DeadTime {
+                    voltage,
+                    fade_current: 0.1,
+                });
+            }
+            Self::TorqueOffset { torque } => mechanism.torque_offset = Some(torque),
+        }
+    }
+
+    /// Adds an effect of the friction on both sides of the gear.
+    fn hide_in_friction(&self, config: &mut PlantConfig) {
+        let ratio = config.mechanism.ratio;
+        let motor = &mut config.motor;
+        let mechanism = &mut config.mechanism;
+        match *self {
             Self::Stribeck {
                 ratio: excess,
                 velocity,
@@ -268,28 +342,14 @@ impl Effect {
                     coulomb_rate: 0.0,
                 });
             }
-            Self::Cogging {
-                amplitude,
-                order,
-                phase,
-            } => {
-                motor.cogging = Some(Cogging {
-                    amplitude: amplitude / ratio,
-                    order,
-                    phase,
-                });
-            }
-            Self::TorqueRipple {
-                amplitude,
-                order,
-                phase,
-            } => {
-                motor.ripple = Some(TorqueRipple {
-                    amplitude,
-                    order,
-                    phase,
-                });
-            }
+            _ => {}
+        }
+    }
+
+    /// Adds an effect of the gear between rotor and link.
+    fn hide_in_gear(&self, config: &mut PlantConfig) {
+        let mechanism = &mut config.mechanism;
+        match *self {
             Self::GearEccentricity { amplitude, phase } => {
                 mechanism.eccentricity = Some(GearEccentricity {
                     amplitude,
@@ -312,39 +372,7 @@ impl Effect {
                     damping,
                 });
             }
-            Self::EncoderEccentricity { amplitude, phase } => {
-                config.sensors.encoder.eccentricity =
-                    Some(EncoderEccentricity { amplitude, phase });
-            }
-            Self::CurrentOffset { current } => config.sensors.current.offset = current,
-            Self::TorqueSaturation { loss } => {
-                motor.saturation = Some(TorqueSaturation {
-                    knee: Self::PEAK_CURRENT * ((1.0 - loss) / loss).sqrt(),
-                });
-            }
-            Self::MeasurementDelay { delay } => {
-                config.sensors.current_delay = Some((delay * TICK_RATE).round() as usize);
-            }
-            Self::GravityTilt { angle } => {
-                mechanism.tilt = Some(Tilt {
-                    about_x: 0.0,
-                    about_y: angle,
-                });
-            }
-            Self::Payload { mass, distance } => mechanism.bodies.push(payload(mass, distance)),
-            Self::Spring { stiffness, rest } => {
-                mechanism.spring = Some(Spring {
-                    stiffness,
-                    rest: config.sensors.encoder.zero + rest,
-                });
-            }
-            Self::DriveDeadzone { voltage } => {
-                config.bridge.dead_time = Some(DeadTime {
-                    voltage,
-                    fade_current: 0.1,
-                });
-            }
-            Self::TorqueOffset { torque } => mechanism.torque_offset = Some(torque),
+            _ => {}
         }
     }
 }

@@ -2,10 +2,13 @@
 
 use rig_shared::effects::Kind;
 
+use super::error::ScenarioError;
+use super::hidden::Effect;
+use super::made::Made;
 use super::record::{Manner, drive_off};
 use super::reference::RATE;
-use super::{Effect, Made, Scenario, drive_of, rig};
-use crate::ScenarioError;
+use super::rig;
+use super::scenario::{Scenario, drive_of};
 use rig_data::prepare::InMemory;
 use rig_excite::{COASTING, JointTrajectory, TrajectoryFile};
 

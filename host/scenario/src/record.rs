@@ -169,33 +169,43 @@ pub(super) fn record(
         references.push(if command.bridge { position } else { q });
         voltages.push(f64::from(command.duty.0) * control.supply);
 
-        let before = reference.get(k.wrapping_sub(1)).copied();
-        let after = reference.get(k + 1).copied();
-        let (before, after) = (before.unwrap_or(position), after.unwrap_or(position));
-        let wanted = [
-            position,
-            0.5 * (after - before) * RATE,
-            (after - 2.0 * position + before) * RATE * RATE,
-        ];
         command.bridge = off.is_none_or(|off| k + 1 < off);
         command.duty = Duty(if command.bridge {
-            control.duty(q, wanted) as f32
+            control.duty(q, wanted(reference, k)) as f32
         } else {
             0.0
         });
     }
     if let Some(off) = off {
-        let modes = (0..reference.len()).map(|k| match k < off {
-            true => Mode::Running,
-            false => Mode::Disarmed,
-        });
-        block.extra = vec![("mode".into(), modes.map(|m| f64::from(m as u8)).collect())];
+        block.extra = vec![("mode".into(), modes(off, reference.len()))];
     }
     joint.reference = Some(references);
     joint.voltage = Some(voltages);
     joint.link = (!links.is_empty()).then_some(links);
     block.joints.push(joint);
     block
+}
+
+/// Returns position, velocity and acceleration of a reference at sample `k`; rad, rad/s, rad/s².
+fn wanted(reference: &[f64], k: usize) -> [f64; 3] {
+    let position = reference[k];
+    let before = reference.get(k.wrapping_sub(1)).copied();
+    let after = reference.get(k + 1).copied();
+    let (before, after) = (before.unwrap_or(position), after.unwrap_or(position));
+    [
+        position,
+        0.5 * (after - before) * RATE,
+        (after - 2.0 * position + before) * RATE * RATE,
+    ]
+}
+
+/// Returns the recorded mode of `samples` samples with the drive off from sample `off` on.
+fn modes(off: usize, samples: usize) -> Vec<f64> {
+    let mode = |k: usize| match k < off {
+        true => Mode::Running,
+        false => Mode::Disarmed,
+    };
+    (0..samples).map(|k| f64::from(mode(k) as u8)).collect()
 }
 
 /// Records `samples` samples of the hanging rig with its drive off, without reference and voltage.

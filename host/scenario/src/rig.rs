@@ -6,7 +6,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::dice::Dice;
-use crate::ScenarioError;
+use super::error::ScenarioError;
 use rig_model::robot::{JointFriction, ONE_LINK_TEMPLATE, Robot};
 use rig_plant::effect::disturbance::Disturbance;
 use rig_plant::{Body, Friction, LinkEncoder, PlantConfig, Presliding};
@@ -31,6 +31,14 @@ pub(super) const LINK_ENCODER: LinkEncoder = LinkEncoder {
     noise: Some(2.4e-5),
     eccentricity: None,
 };
+
+/// Kind of rig.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rig {
+    /// A geared link in a vertical plane.
+    #[default]
+    OneLink,
+}
 
 /// Noise of the sensors and disturbance torque.
 #[derive(Clone, Copy, Debug, PartialEq)]

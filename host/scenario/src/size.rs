@@ -5,12 +5,12 @@
 //! undefined at rest. The excess comes from two recordings without noise, with and without the effect.
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
-use crate::ScenarioError;
+use super::error::ScenarioError;
+use super::reference::RATE;
 use rig_data::Block;
 use rig_data::prepare::{LowPass, central_difference, second_difference};
-
-use super::reference::RATE;
 
 /// Cut-off of the filter for residuals, Hz.
 const BAND: f64 = 40.0;
@@ -19,6 +19,39 @@ const STRIDE: usize = 10;
 
 /// Speed above which the joint counts as moving, rad/s.
 const MOVING: f64 = 0.01;
+
+/// Size of a hidden effect.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Size {
+    /// RMS of the part of the residual that the effect causes after a refit of the nominal model.
+    pub excess_rms: f64,
+    /// As `excess_rms`, with the nominal parameters from before instead of a refit.
+    pub frozen_rms: f64,
+    /// Noise floor: residual RMS after a refit, with noise and without the hidden effect.
+    pub floor_rms: f64,
+    /// As `floor_rms`, but without noise: the residual from filtering and reversals.
+    pub base_rms: f64,
+    /// Unit of the RMS values, ASCII; V for an effect that shows only in the voltage.
+    pub unit: &'static str,
+    /// True if the effect is a change of parameters, which a refit removes.
+    pub parameter_change: bool,
+}
+
+/// Ratio of an effect's residual after a refit to the noise floor from which on a diagnosis should find it.
+pub const ABOVE_FLOOR: f64 = 0.5;
+
+impl Size {
+    /// Returns true if a diagnosis should find the effect: its residual is at least [`ABOVE_FLOOR`] times the noise
+    /// floor. For a change of parameters this is the residual without a refit.
+    pub fn above_floor(&self) -> bool {
+        let rms = if self.parameter_change {
+            self.frozen_rms
+        } else {
+            self.excess_rms
+        };
+        rms >= ABOVE_FLOOR * self.floor_rms
+    }
+}
 
 /// Equation that is refitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,10 +3,10 @@
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 
-use super::Made;
 use super::dice::Dice;
+use super::error::ScenarioError;
+use super::made::Made;
 use super::size::{Equation, Problem};
-use crate::ScenarioError;
 use rig_data::prepare::InMemory;
 
 impl Made {

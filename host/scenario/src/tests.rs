@@ -2,6 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
+use crate::size::{Equation, Problem};
+use rig_data::Block;
+use rig_model::robot::Robot;
 
 #[test]
 #[ignore = "prints a measurement"]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::ScenarioError;
+use super::error::ScenarioError;
 use rig_data::prepare::InMemory;
 use rig_data::{Block, Column, DataError, JointColumns, RecordingWriter};
 use rig_model::robot::Robot;
