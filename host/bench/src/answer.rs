@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rig_shared::effects::Kind;
 use serde::Serialize;
 
-use crate::BenchError;
+use super::error::BenchError;
 use rig_diagnose::experiment::PULLS_OFF;
 use rig_diagnose::outcome::{Diagnosis, Value, Verdict};
 use rig_scenario::Made;

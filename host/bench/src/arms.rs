@@ -1,13 +1,14 @@
 //! Benchmark of arms with one faulty joint.
 
+use rig_shared::effects::Kind;
 use serde::Serialize;
 
 use super::answer::is_right;
-use super::counted;
+use super::counted::counted;
+use super::error::BenchError;
 use super::score::median;
 use super::table::{Rows, percent};
 use super::wilson::Proportion;
-use crate::BenchError;
 use rig_data::prepare::Recording;
 use rig_diagnose::outcome::{Diagnosis, Verdict};
 use rig_diagnose::{Options, diagnose};
@@ -149,7 +150,7 @@ impl ArmOutcome {
     /// Returns true if effect and joint are right. A tilt of the base counts at any joint.
     fn is_right(&self, (effect, joint): &(String, String)) -> bool {
         let right = |(fault, place): &(&str, String)| {
-            is_right(effect, fault) && (joint == place || *fault == "gravity_tilt")
+            is_right(effect, fault) && (joint == place || *fault == Kind::GravityTilt.about().name)
         };
         self.hidden.as_ref().is_some_and(right)
     }
@@ -169,7 +170,7 @@ impl ArmOutcome {
 
     /// Returns true if the diagnosis only says that values of the description have changed.
     fn changed(&self) -> bool {
-        let other = |(effect, _): &(String, String)| effect != "payload";
+        let other = |(effect, _): &(String, String)| effect != Kind::Payload.about().name;
         self.verdict == Some(Verdict::ParameterChange) && !self.named.iter().any(other)
     }
 
@@ -178,44 +179,55 @@ impl ArmOutcome {
     }
 }
 
+/// Outcomes of one arm.
+type Own<'a> = Vec<&'a ArmOutcome>;
+/// Question to an outcome.
+type Is = fn(&ArmOutcome) -> bool;
+
 /// Returns the figures as Markdown, one column for each arm.
 pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
-    let arms: Vec<(&str, Vec<&ArmOutcome>)> = (Arm::ALL.iter())
+    let arms: Vec<(&str, Own)> = (Arm::ALL.iter())
         .map(|(name, _)| (*name, outcomes.iter().filter(|o| o.arm == *name).collect()))
         .collect();
     let mut rows = Rows::new("arms, one joint at fault", &arms);
-    let mut row = |name: &str, aim: &str, of: &dyn Fn(&[&ArmOutcome]) -> String| {
-        rows.row(name, aim, &|own| of(own));
-    };
-    type Is = fn(&ArmOutcome) -> bool;
-    let share = |of: Is, is: Is| {
-        move |own: &[&ArmOutcome]| {
-            Proportion::of(own.iter().filter(|o| of(o)).map(|o| is(o))).to_string()
-        }
-    };
-    let named: Is = |o| o.calls_for(CallsFor::Name);
-    let middle = |of: fn(&ArmOutcome) -> Option<f64>| {
-        move |own: &[&ArmOutcome]| {
-            let right = own.iter().filter(|o| named(o) && o.right_first());
-            percent(median(right.filter_map(|o| of(o)).collect()))
-        }
-    };
-    row(
+    names(&mut rows);
+    other_verdicts(&mut rows);
+    improvement(&mut rows);
+    rows.row("failed, or data said to be at fault", "0", &|own| {
+        let fault = |o: &&&ArmOutcome| matches!(o.verdict, None | Some(Verdict::DataFault));
+        own.iter().filter(fault).count().to_string()
+    });
+    rows.text
+}
+
+/// Returns the proportion of `is` among the outcomes that are `of`.
+fn share(of: Is, is: Is) -> impl Fn(&Own) -> String {
+    move |own| Proportion::of(own.iter().filter(|o| of(o)).map(|o| is(o))).to_string()
+}
+
+/// Returns true if the fault calls for its name.
+fn named(outcome: &ArmOutcome) -> bool {
+    outcome.calls_for(CallsFor::Name)
+}
+
+/// Adds the rows on right and wrong names.
+fn names(rows: &mut Rows<Own>) {
+    rows.row(
         "right name and joint first, above the floor",
         "≥ 97 %",
         &share(named, ArmOutcome::right_first),
     );
-    row(
+    rows.row(
         "exactly that name",
         "≥ 95 %",
         &share(named, ArmOutcome::exact),
     );
-    row(
+    rows.row(
         "false alarm, nothing wrong",
         "≤ 2 %",
         &share(|o| o.hidden.is_none(), ArmOutcome::alarmed),
     );
-    row(
+    rows.row(
         "a wrong name, below the floor",
         "",
         &share(
@@ -223,7 +235,11 @@ pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
             |o| o.named.iter().any(|name| !o.is_right(name)),
         ),
     );
-    row(
+}
+
+/// Adds the rows on faults without a name in the library.
+fn other_verdicts(rows: &mut Rows<Own>) {
+    rows.row(
         "wrong values of the description: that is said, and no other name",
         "",
         &share(
@@ -231,7 +247,7 @@ pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
             ArmOutcome::changed,
         ),
     );
-    row(
+    rows.row(
         "fault outside the library: a name and no remainder",
         "≤ 10 %",
         &share(
@@ -239,26 +255,31 @@ pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
             |o| !o.named.is_empty() && !o.remainder(),
         ),
     );
-    row(
+    rows.row(
         "fault outside the library: a remainder",
         "≥ 95 %",
         &share(|o| o.calls_for(CallsFor::Remainder), ArmOutcome::remainder),
     );
-    row(
+}
+
+/// Adds the rows on what a right first effect improves.
+fn improvement(rows: &mut Rows<Own>) {
+    let middle = |of: fn(&ArmOutcome) -> Option<f64>| {
+        move |own: &Own| {
+            let right = own.iter().filter(|o| named(o) && o.right_first());
+            percent(median(right.filter_map(|o| of(o)).collect()))
+        }
+    };
+    rows.row(
         "gap closed on the hold-out at the joint, median",
         "≥ 97 %",
         &middle(|o| o.gap_closed),
     );
-    row(
+    rows.row(
         "error of the simulated motion, of what it was before, median",
         "",
         &middle(|o| o.motion),
     );
-    row("failed, or data said to be at fault", "0", &|own| {
-        let fault = |o: &&&ArmOutcome| matches!(o.verdict, None | Some(Verdict::DataFault));
-        own.iter().filter(fault).count().to_string()
-    });
-    rows.text
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use rig_shared::effects::Kind;
 use serde::Serialize;
 
 use super::answer::{exact_class, one_holds_both};
-use crate::BenchError;
+use super::error::BenchError;
 use rig_scenario::{Effect, Excitation, Hidden, Intrusion, Made, Noise, Scenario, Size, Truth};
 
 /// Purpose of a scenario.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::answer::{Answer, Method};
 use super::cases::Case;
-use crate::BenchError;
+use super::error::BenchError;
 use rig_diagnose::experiment::{FILE, Family, OFF_LOG, PULLS_OFF};
 use rig_excite::TrajectoryFile;
 use rig_scenario::Made;

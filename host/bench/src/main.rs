@@ -200,11 +200,8 @@ fn bar(what: &'static str, total: usize) -> ProgressBar {
     }
 }
 
-fn run(args: &Args) -> Result<(), BenchError> {
-    let results = [RESULTS.as_slice(), &[TRUTHS]].concat();
-    if !args.force && results.iter().any(|name| args.out.join(name).exists()) {
-        return Err(BenchError::Results(args.out.clone()));
-    }
+/// Returns the noise levels that are asked for, with their names.
+fn levels(args: &Args) -> Result<Vec<(&'static str, Noise)>, BenchError> {
     let levels = args.noise.iter().map(|name| {
         let known = Noise::LEVELS.into_iter().find(|(level, _)| level == name);
         known.ok_or_else(|| {
@@ -213,6 +210,11 @@ fn run(args: &Args) -> Result<(), BenchError> {
             ))
         })
     });
+    levels.collect()
+}
+
+/// Returns the settings of the cases with one joint.
+fn plan(args: &Args) -> Result<Plan, BenchError> {
     for (flag, seconds) in [("--train", args.train), ("--holdout", args.holdout)] {
         if !(20.0..=3600.0).contains(&seconds) {
             return Err(BenchError::Option(format!(
@@ -226,12 +228,12 @@ fn run(args: &Args) -> Result<(), BenchError> {
     } else {
         args.effects.clone()
     };
-    let plan = Plan {
+    Ok(Plan {
         effects,
         seeds: args.seeds,
         first_seed: args.first_seed,
         nothing: args.nothing,
-        levels: levels.collect::<Result<_, _>>()?,
+        levels: levels(args)?,
         combinations: args.combinations.clone(),
         combined: args.combined,
         leave_out: args.leave_out,
@@ -239,8 +241,15 @@ fn run(args: &Args) -> Result<(), BenchError> {
         follow: args.follow,
         seconds: [args.train, args.holdout],
         second_encoder: args.second_encoder,
-    };
-    let cases = plan.cases()?;
+    })
+}
+
+fn run(args: &Args) -> Result<(), BenchError> {
+    let results = [RESULTS.as_slice(), &[TRUTHS]].concat();
+    if !args.force && results.iter().any(|name| args.out.join(name).exists()) {
+        return Err(BenchError::Results(args.out.clone()));
+    }
+    let cases = plan(args)?.cases()?;
     if cases.is_empty() && args.arms == 0 {
         return Err(BenchError::Option(
             "these counts make no case; give at least one of --seeds, --nothing, --combinations, --leave-out or --arms.".into(),
@@ -251,6 +260,11 @@ fn run(args: &Args) -> Result<(), BenchError> {
     if args.keep {
         return keep(&args.out, &cases, &arms);
     }
+    judge(args, &cases, &arms)
+}
+
+/// Asks the methods about every case, prints their figures and writes them.
+fn judge(args: &Args, cases: &[Case], arms: &[ArmCase]) -> Result<(), BenchError> {
     let methods: Vec<&dyn Method> = args
         .only
         .iter()
@@ -266,8 +280,8 @@ fn run(args: &Args) -> Result<(), BenchError> {
     let count = cases.len() + arms.len();
     let progress = bar("hiding and seeking", count);
     let at = |done: usize| progress.set_position(done as u64);
-    let outcomes = ask(&cases, &methods, threads, &|done, _| at(done))?;
-    let of_arms = run_arms(&arms, threads, &|done, _| at(cases.len() + done))?;
+    let outcomes = ask(cases, &methods, threads, &|done, _| at(done))?;
+    let of_arms = run_arms(arms, threads, &|done, _| at(cases.len() + done))?;
     progress.finish_and_clear();
     let scores: Vec<Score> = methods
         .iter()

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::Kind;
 
 use super::answer::{Answer, Method, Named};
-use crate::BenchError;
+use super::error::BenchError;
 use rig_scenario::Made;
 
 mod dictionary;

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rig_shared::effects::Kind;
 
 use super::answer::{one_holds_both, same_by_voltage};
-use super::score::one_each;
+use super::outcome::one_each;
 use super::*;
 use rig_scenario::{Effect, Hidden, Made, Noise, Scenario};
 

@@ -3,11 +3,11 @@
 use nalgebra::DVector;
 use rig_shared::effects::{Channel, Instant, Kind, MEMORY, SHAPES, Scale};
 
-use crate::BenchError;
+use crate::error::BenchError;
 use rig_data::prepare::{InMemory, LowPass, central_difference, second_difference};
-use rig_data::runs::{Run, runs_of};
+use rig_data::runs::{JointRun, Run, runs_of};
 use rig_diagnose::DiagnoseError;
-use rig_model::robot::Robot;
+use rig_model::robot::{Joint, Robot};
 
 /// Sample rate of the recordings, Hz.
 const RATE: f64 = 1000.0;
@@ -86,93 +86,139 @@ impl Dictionary {
         else {
             return Err(DiagnoseError::NoRecording.into());
         };
-        let inertial = described.inertial.as_ref();
-        let inertia = inertial.map_or(0.0, |i| i.inertia[5]);
-        let moment = inertial.map_or(0.0, |i| i.first_moment[0]);
-        let drive = described.drive.as_ref();
-        let ratio = drive.map_or(1.0, |d| d.gear_ratio);
-        let rotor = drive.map_or(0.0, |d| d.rotor_inertia * ratio * ratio);
-        // The joint axis is horizontal: gravity depends on the link's angle to the horizontal.
-        let weight = -moment * robot.gravity[2];
         let gravity: Vec<f64> = joint
             .q
             .iter()
             .map(|q| (q + described.theta).cos())
             .collect();
-        let load: Vec<f64> = (joint.qdd.iter().zip(&gravity))
-            .map(|(a, g)| inertia * a + weight * g)
-            .collect();
-        let torque = signals.filter.zero_phase(&joint.tau);
         let sign: Vec<f64> = joint.qd.iter().map(|v| v.signum()).collect();
         let nominal = [&joint.qdd, &gravity, &joint.qd, &sign]
             .map(|signal| signals.column(signal))
             .to_vec();
-
-        let at = |k: usize| Instant {
-            position: joint.q[k],
-            velocity: joint.qd[k],
-            acceleration: joint.qdd[k],
-            direction: sign[k],
-            motor_angle: joint.q[k] * ratio,
-            drive_torque: torque[k],
-            load: load[k],
-            time: signals.run.t[k],
-            period: 1.0 / RATE,
-            ..Instant::default()
-        };
+        let motion = Motion::of(&signals, joint, described, robot.gravity, &gravity, sign);
         let mut terms = Vec::new();
         for &kind in Kind::ALL.iter().filter(|k| !without.contains(k)) {
-            let about = kind.about();
-            let mut push = |signal: &[f64]| {
+            motion.columns(kind, &mut |signal| {
                 let column = signals.column(signal);
                 terms.push(Term { kind, column });
-            };
-            match kind {
-                Kind::MeasurementDelay => push(&central_difference(&torque, 1.0 / RATE)),
-                // Motor side: the deflection of the spring accelerates the rotor.
-                Kind::JointElasticity => {
-                    let bend = second_difference(&load, 1.0 / RATE);
-                    push(&bend.iter().map(|b| rotor * b).collect::<Vec<_>>());
-                }
-                Kind::InertiaCoupling
-                | Kind::Payload
-                | Kind::ViscousWarmupTemperature
-                | Kind::ViscousWarmupHeat => {}
-                _ if about.shapes.len() > 1 => {}
-                _ if matches!(about.channel, Channel::Transmission | Channel::Voltage) => {}
-                _ => {
-                    for shapes in grid(kind) {
-                        let mut memory = [0.0; MEMORY];
-                        let mut columns = vec![Vec::new(); about.gains.len()];
-                        for k in 0..signals.run.len() {
-                            let values = kind.terms(&shapes, &mut memory, &at(k));
-                            for (column, value) in columns.iter_mut().zip(values) {
-                                column.push(value);
-                            }
-                        }
-                        for column in columns {
-                            if about.channel == Channel::Position {
-                                // An error of the position reading acts through the inertia.
-                                let column = second_difference(&column, 1.0 / RATE);
-                                push(
-                                    &column
-                                        .iter()
-                                        .map(|e| (inertia + rotor) * e)
-                                        .collect::<Vec<_>>(),
-                                );
-                            } else {
-                                push(&column);
-                            }
-                        }
-                    }
-                }
-            }
+            });
         }
         Ok(Self {
             nominal,
             terms,
             torque: signals.column(&joint.tau),
         })
+    }
+}
+
+/// Motion and torques of the joint, with the values of its description.
+struct Motion<'a> {
+    joint: &'a JointRun,
+    t: &'a [f64],
+    /// Direction of motion.
+    sign: Vec<f64>,
+    /// Filtered torque, N·m.
+    torque: Vec<f64>,
+    /// Torque of inertia and weight of the link, N·m.
+    load: Vec<f64>,
+    /// Inertia of the link, and of the rotor at the joint, kg·m².
+    inertia: f64,
+    rotor: f64,
+    ratio: f64,
+}
+
+impl<'a> Motion<'a> {
+    fn of(
+        signals: &'a Signals,
+        joint: &'a JointRun,
+        described: &Joint,
+        pull: [f64; 3],
+        gravity: &[f64],
+        sign: Vec<f64>,
+    ) -> Self {
+        let inertial = described.inertial.as_ref();
+        let inertia = inertial.map_or(0.0, |i| i.inertia[5]);
+        let moment = inertial.map_or(0.0, |i| i.first_moment[0]);
+        let drive = described.drive.as_ref();
+        let ratio = drive.map_or(1.0, |d| d.gear_ratio);
+        // The joint axis is horizontal: gravity depends on the link's angle to the horizontal.
+        let weight = -moment * pull[2];
+        Self {
+            joint,
+            t: &signals.run.t,
+            sign,
+            torque: signals.filter.zero_phase(&joint.tau),
+            load: (joint.qdd.iter().zip(gravity))
+                .map(|(a, g)| inertia * a + weight * g)
+                .collect(),
+            inertia,
+            rotor: drive.map_or(0.0, |d| d.rotor_inertia * ratio * ratio),
+            ratio,
+        }
+    }
+
+    fn at(&self, k: usize) -> Instant<f64> {
+        Instant {
+            position: self.joint.q[k],
+            velocity: self.joint.qd[k],
+            acceleration: self.joint.qdd[k],
+            direction: self.sign[k],
+            motor_angle: self.joint.q[k] * self.ratio,
+            drive_torque: self.torque[k],
+            load: self.load[k],
+            time: self.t[k],
+            period: 1.0 / RATE,
+            ..Instant::default()
+        }
+    }
+
+    /// Passes each column of an effect to `push`; none if no column is linear in it.
+    fn columns(&self, kind: Kind, push: &mut dyn FnMut(&[f64])) {
+        let about = kind.about();
+        match kind {
+            Kind::MeasurementDelay => push(&central_difference(&self.torque, 1.0 / RATE)),
+            // Motor side: the deflection of the spring accelerates the rotor.
+            Kind::JointElasticity => {
+                let bend = second_difference(&self.load, 1.0 / RATE);
+                push(&bend.iter().map(|b| self.rotor * b).collect::<Vec<_>>());
+            }
+            Kind::InertiaCoupling
+            | Kind::Payload
+            | Kind::ViscousWarmupTemperature
+            | Kind::ViscousWarmupHeat => {}
+            _ if about.shapes.len() > 1 => {}
+            _ if matches!(about.channel, Channel::Transmission | Channel::Voltage) => {}
+            _ => {
+                for shapes in grid(kind) {
+                    for column in self.terms(kind, &shapes) {
+                        push(&column);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Returns the torque per gain of an effect with the given shape parameters, one column for each gain.
+    fn terms(&self, kind: Kind, shapes: &[f64; SHAPES]) -> Vec<Vec<f64>> {
+        let about = kind.about();
+        let mut memory = [0.0; MEMORY];
+        let mut columns = vec![Vec::new(); about.gains.len()];
+        for k in 0..self.t.len() {
+            let values = kind.terms(shapes, &mut memory, &self.at(k));
+            for (column, value) in columns.iter_mut().zip(values) {
+                column.push(value);
+            }
+        }
+        if about.channel == Channel::Position {
+            // An error of the position reading acts through the inertia.
+            for column in &mut columns {
+                *column = second_difference(column, 1.0 / RATE)
+                    .iter()
+                    .map(|e| (self.inertia + self.rotor) * e)
+                    .collect();
+            }
+        }
+        columns
     }
 }
 
