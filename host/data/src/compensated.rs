@@ -89,16 +89,8 @@ struct Seen {
 }
 
 impl Recording for Compensated<'_> {
-    fn label(&self) -> String {
-        self.inner.label()
-    }
-
-    fn passed(&self, share: f64) {
-        self.inner.passed(share);
-    }
-
-    fn unburdened(&self) -> bool {
-        self.inner.unburdened()
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.inner)
     }
 
     fn each_block(

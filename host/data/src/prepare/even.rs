@@ -35,13 +35,18 @@ pub fn interpolation(error: &PrepareError) -> Option<(f64, String)> {
     })
 }
 
-impl Recording for Evened<'_> {
-    fn label(&self) -> String {
-        self.inner().label()
+impl Evened<'_> {
+    fn inner(&self) -> &dyn Recording {
+        match self {
+            Self::AsItIs(recording) => *recording,
+            Self::Resampled(recording) => recording,
+        }
     }
+}
 
-    fn unburdened(&self) -> bool {
-        self.inner().unburdened()
+impl Recording for Evened<'_> {
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.inner())
     }
 
     fn each_block(
@@ -50,19 +55,6 @@ impl Recording for Evened<'_> {
         take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
     ) -> Result<(), PrepareError> {
         self.inner().each_block(rows, take)
-    }
-
-    fn passed(&self, share: f64) {
-        self.inner().passed(share);
-    }
-}
-
-impl Evened<'_> {
-    fn inner(&self) -> &dyn Recording {
-        match self {
-            Self::AsItIs(recording) => *recording,
-            Self::Resampled(recording) => recording,
-        }
     }
 }
 

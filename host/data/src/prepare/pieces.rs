@@ -2,24 +2,34 @@
 
 use super::error::PrepareError;
 use crate::block::{Block, JointColumns};
+use crate::source::Source;
 
 /// A source of rows in blocks that can be read repeatedly.
 pub trait Recording {
-    /// Name for messages and reports.
-    fn label(&self) -> String;
     /// Calls `take` with each block in turn, from the first row on.
     fn each_block(
         &self,
         rows: usize,
         take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
     ) -> Result<(), PrepareError>;
+    /// Returns the recording that this one is made from; name, progress and loads are its own unless stated otherwise.
+    fn source(&self) -> Option<&dyn Recording> {
+        None
+    }
+    /// Name for messages and reports; to be given by a recording without a source.
+    fn label(&self) -> String {
+        self.source()
+            .map_or_else(String::new, |source| source.label())
+    }
     /// Called when `share` of the recording has been processed again without reading it: for progress.
     fn passed(&self, share: f64) {
-        let _ = share;
+        if let Some(source) = self.source() {
+            source.passed(share);
+        }
     }
     /// Returns true if all external loads on the joints had been removed.
     fn unburdened(&self) -> bool {
-        false
+        self.source().is_some_and(|source| source.unburdened())
     }
 }
 
@@ -47,8 +57,8 @@ pub fn first_block(recording: &dyn Recording, rows: usize) -> Result<Option<Bloc
 pub struct Unburdened<'a>(pub &'a dyn Recording);
 
 impl Recording for Unburdened<'_> {
-    fn label(&self) -> String {
-        self.0.label()
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.0)
     }
 
     fn each_block(
@@ -57,10 +67,6 @@ impl Recording for Unburdened<'_> {
         take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
     ) -> Result<(), PrepareError> {
         self.0.each_block(rows, take)
-    }
-
-    fn passed(&self, share: f64) {
-        self.0.passed(share);
     }
 
     fn unburdened(&self) -> bool {
@@ -77,8 +83,8 @@ pub struct Beginning<'a> {
 }
 
 impl Recording for Beginning<'_> {
-    fn label(&self) -> String {
-        self.recording.label()
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.recording)
     }
 
     fn each_block(
@@ -128,7 +134,7 @@ impl Recording for InMemory {
     }
 }
 
-impl Recording for crate::Source {
+impl Recording for Source {
     fn label(&self) -> String {
         self.path().display().to_string()
     }

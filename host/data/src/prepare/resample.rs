@@ -212,12 +212,8 @@ impl Grid {
 }
 
 impl Recording for Resampled<'_> {
-    fn label(&self) -> String {
-        self.source.label()
-    }
-
-    fn unburdened(&self) -> bool {
-        self.source.unburdened()
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.source)
     }
 
     fn each_block(
@@ -269,10 +265,6 @@ impl Recording for Resampled<'_> {
         })?;
         grid.end();
         give(&mut grid)
-    }
-
-    fn passed(&self, share: f64) {
-        self.source.passed(share);
     }
 }
 

@@ -33,13 +33,12 @@ impl<'a> Spooled<'a> {
 }
 
 impl Recording for Spooled<'_> {
-    fn label(&self) -> String {
-        self.source.label()
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.source)
     }
 
-    fn unburdened(&self) -> bool {
-        self.source.unburdened()
-    }
+    /// The source hears only of the readings of its own spool.
+    fn passed(&self, _: f64) {}
 
     fn each_block(
         &self,
