@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError, mpsc};
 
 use super::error::PrepareError;
+use rig_model::batch::each_by;
 
 /// Maximum number of threads: the number of items in memory grows with it.
 const MOST_THREADS: usize = 16;
@@ -22,6 +23,8 @@ pub fn threads(wanted: usize) -> usize {
 /// `produce` and `take` run in the calling thread, `work` in `threads` others (in the calling thread if `threads` is
 /// 1). At most `threads` items are in progress. The results do not depend on the number of threads if `work` depends
 /// only on its argument.
+///
+/// By hand: no usual library of threads gives results in order while it holds a bounded number of items of a stream.
 ///
 /// # Errors
 /// The first error of `work` or `take` in the order of the items, otherwise that of `produce`.
@@ -108,27 +111,11 @@ impl<R> Queue<R> {
 
 /// Calls `work` with the index of each item and the item, spread over `threads`.
 pub fn each_of<T: Send>(threads: usize, items: &mut [T], work: &(dyn Fn(usize, &mut T) + Sync)) {
-    if threads <= 1 || items.len() <= 1 {
-        items
-            .iter_mut()
-            .enumerate()
-            .for_each(|(k, item)| work(k, item));
-        return;
-    }
-    let threads = threads.min(items.len());
-    let queue = Mutex::new(items.iter_mut().enumerate());
-    let serve = || {
-        loop {
-            let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let Some((k, item)) = next else { break };
-            work(k, item);
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..threads {
-            scope.spawn(serve);
-        }
-        serve();
+    // Each lock is taken once: it only proves that no two threads have the same item.
+    let items: Vec<Mutex<&mut T>> = items.iter_mut().map(Mutex::new).collect();
+    each_by(items.len(), threads, |k| {
+        let mut item = items[k].lock().unwrap_or_else(PoisonError::into_inner);
+        work(k, &mut item);
     });
 }
 
