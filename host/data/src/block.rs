@@ -8,7 +8,7 @@ pub struct JointColumns {
     /// Position, rad or m (from `q<k>`, or from `qm<k>` of the motors through the drives).
     pub q: Vec<f64>,
     /// Joint torque or force, N·m or N (from `tau<k>`, or from `taum<k>` or `i<k>` of the motors through the drives).
-    /// Empty if the recording has neither and was opened with [`EffortNeed::Optional`].
+    /// Empty if the recording has neither and was opened with [`crate::EffortNeed::Optional`].
     pub tau: Vec<f64>,
     /// Measured velocity, if recorded.
     pub qd: Option<Vec<f64>>,
