@@ -4,11 +4,11 @@
 //! through each of the n·14n entries. Reverse accumulation (Griewank & Walther 2008, ch. 3.2) takes one sweep inwards
 //! for any number of joints.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, JointKind, MultibodyError, check};
 use super::inverse::LinkMotion;
 use super::parameters::{COLUMNS, column, inertia};
 use super::spatial::{Motion, Transform, Vector3, Wrench};
-use super::with_capacity;
 use crate::scalar::Real;
 
 /// Motion of a link in the outward pass, with the values that the backward pass needs.

@@ -1,9 +1,9 @@
 //! Forward dynamics by articulated bodies.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, Joint, JointKind, MultibodyError, check};
 use super::parameters::{COLUMNS, column, inertia};
 use super::spatial::{Inertia, Motion, Symmetric3, Transform, Vector3, Wrench};
-use super::with_capacity;
 use crate::scalar::{Mask, Real};
 
 /// Computes the accelerations q̈ (length n) under the torques `tau` by the articulated-body algorithm (Featherstone

@@ -1,9 +1,9 @@
 //! Coefficients of the products and squares of the joint velocities.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, MAX_JOINTS, MultibodyError, check};
 use super::coriolis::coriolis_matrix;
 use super::parameters::COLUMNS;
-use super::with_capacity;
 use crate::scalar::Real;
 
 /// Computes B(q), n × n(n−1)/2, and C̄(q), n × n, row-major, so that the Coriolis and centrifugal torques are

@@ -1,9 +1,9 @@
 //! The matrix of Coriolis and centrifugal torques.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, MultibodyError, check};
 use super::parameters::{COLUMNS, inertia};
 use super::spatial::{Motion, Wrench};
-use super::with_capacity;
 use crate::scalar::Real;
 
 /// Computes the matrix C(q, q̇), n × n row-major, by the Christoffel symbols. C(q, q̇)·q̇ are the Coriolis and

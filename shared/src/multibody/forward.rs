@@ -1,10 +1,10 @@
 //! Forward dynamics.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, MAX_JOINTS, MultibodyError, check};
 use super::inertia_matrix::inertia_matrix;
 use super::inverse::bias_torque;
 use super::parameters::COLUMNS;
-use super::with_capacity;
 use crate::scalar::{Mask, Real};
 
 /// Computes the accelerations q̈ (length n) under the torques `tau`: A(q)·q̈ = τ − bias(q, q̇), with the inertia matrix

@@ -1,9 +1,9 @@
 //! The inertia matrix by the composite-rigid-body algorithm.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, MultibodyError, check};
 use super::parameters::{COLUMNS, column, inertia};
 use super::spatial::{Inertia, Transform};
-use super::with_capacity;
 use crate::scalar::Real;
 
 /// Computes the inertia matrix A(q), n × n row-major and symmetric, with the drive inertias Ia on its diagonal:

@@ -1,9 +1,9 @@
 //! Inverse dynamics by the recursive Newton–Euler algorithm.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, Joint, JointKind, MAX_JOINTS, MultibodyError, check};
 use super::parameters::{COLUMNS, column, inertia};
 use super::spatial::{Motion, Transform, Vector3, Wrench};
-use super::with_capacity;
 use crate::scalar::Real;
 
 /// Velocity and acceleration of a link, in its frame, during an outward recursion.

@@ -22,6 +22,7 @@
 mod adjoint;
 mod articulated;
 pub mod block;
+mod capacity;
 mod chain;
 mod coefficients;
 mod coriolis;
@@ -62,16 +63,3 @@ pub use kinematics::point_position;
 pub use momentum::{momentum_loss_regressor, momentum_regressor};
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;
-
-/// Calls a kernel with the smallest of a few fixed capacities that holds the chain. One joint must not pay for buffers
-/// of sixteen, and one copy of the code for each length would not fit into the microcontroller.
-macro_rules! with_capacity {
-    ($n:expr, $kernel:ident($($argument:expr),* $(,)?)) => {
-        match $n {
-            0 | 1 => $kernel::<_, 1>($($argument),*),
-            2..=8 => $kernel::<_, 8>($($argument),*),
-            _ => $kernel::<_, { $crate::multibody::MAX_JOINTS }>($($argument),*),
-        }
-    };
-}
-use with_capacity;

@@ -8,12 +8,12 @@
 //! regressor of the differential model without q̈ (Hsu, Bodson, Sastry & Paden 1987; Slotine & Li 1991, sec. 9.2). The
 //! caller has the filter, which must be the same for torque, P and R.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, MultibodyError, check};
 use super::inverse::LinkMotion;
 use super::parameters::{COLUMNS, column};
 use super::regressor::link_columns;
 use super::spatial::{Motion, Vector3};
-use super::with_capacity;
 use crate::scalar::Real;
 
 /// Computes the regressor P of the momentum, A(q)·q̇ = P·π with the drives' Ia·q̇, n × 14n row-major like

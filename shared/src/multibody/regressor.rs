@@ -1,10 +1,10 @@
 //! The regressor of the differential model: τ = Y(q, q̇, q̈)·π.
 
+use super::capacity::with_capacity;
 use super::chain::{Chain, MultibodyError, check};
 use super::inverse::LinkMotion;
 use super::parameters::{COLUMNS, column};
 use super::spatial::{Motion, Vector3};
-use super::with_capacity;
 use crate::scalar::Real;
 
 /// Computes the regressor Y of the differential model (Atkeson, An & Hollerbach 1986; Khalil & Dombre 2002, ch. 12),

@@ -1,6 +1,6 @@
 //! Destination of a block's results.
 
-use super::{LANES, Lane};
+use super::lane::{LANES, Lane};
 
 /// Columns of results, in which a block writes its own samples.
 pub(super) trait Columns {

@@ -1,8 +1,10 @@
 //! Forward dynamics of a block.
 
+use super::body::Body;
+use super::frame::Frame;
 use super::inertia::{CompositeBlock, composite_bodies, lower};
-use super::inverse::inverse_dynamics;
-use super::{Body, Frame, JointBlock, LANES, Lane, ZERO};
+use super::inverse::{JointBlock, inverse_dynamics};
+use super::lane::{LANES, Lane, ZERO};
 use crate::lanes::MulAdd;
 
 /// First sample of a block with a pivot of the inertia matrix that is not positive, and the joint of that pivot.

@@ -2,7 +2,7 @@
 
 use super::super::chain::{Chain, JointKind};
 use super::super::spatial::Vector3;
-use super::{LANES, Lane};
+use super::lane::{LANES, Lane};
 use crate::lanes::{self, MulAdd};
 use core::marker::PhantomData;
 

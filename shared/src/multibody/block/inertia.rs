@@ -1,9 +1,11 @@
 //! Inertia matrix of a block.
 
 use super::super::spatial::Vector3;
+use super::body::Body;
 use super::columns::{Columns, Section};
-use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
-use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use super::frame::{Frame, MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
+use super::inverse::JointBlock;
+use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 
 /// Buffer for the links from a joint outwards, as one body in its frame, and for its wrench at unit acceleration.

@@ -1,8 +1,9 @@
 //! Inverse dynamics of a block.
 
 use super::super::spatial::Vector3;
-use super::frame::{GENERAL, Place, at_each_lane, placed, slid, spin};
-use super::{Body, Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use super::body::Body;
+use super::frame::{Frame, GENERAL, Place, at_each_lane, placed, slid, spin};
+use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 use crate::scalar::Real;
 

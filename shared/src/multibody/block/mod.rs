@@ -18,11 +18,8 @@ mod forward;
 mod frame;
 mod inertia;
 mod inverse;
+mod lane;
 mod regressor;
-
-use core::ops::{Deref, DerefMut};
-
-use super::spatial::Vector3;
 
 pub use body::Body;
 pub use columns::Section;
@@ -30,54 +27,5 @@ pub use forward::{NotPositive, forward_dynamics};
 pub use frame::Frame;
 pub use inertia::{CompositeBlock, inertia_matrix, lower};
 pub use inverse::{JointBlock, inverse_dynamics};
+pub use lane::{LANES, Lane, Lane3};
 pub use regressor::{AxisBlock, differential_regressor, energy_regressor};
-
-/// Samples in a block.
-pub const LANES: usize = 32;
-
-/// One quantity at the samples of a block, aligned so that no vector crosses a cache line.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-pub struct Lane(pub [f64; LANES]);
-
-impl Lane {
-    /// All zero.
-    pub const ZERO: Self = Self([0.0; LANES]);
-}
-
-impl Deref for Lane {
-    type Target = [f64; LANES];
-
-    #[inline(always)]
-    fn deref(&self) -> &Self::Target {
-        &self.0
-    }
-}
-
-impl DerefMut for Lane {
-    #[inline(always)]
-    fn deref_mut(&mut self) -> &mut Self::Target {
-        &mut self.0
-    }
-}
-
-/// A vector at the samples of a block.
-pub type Lane3 = [Lane; 3];
-
-/// Returns the vector of one sample.
-#[inline(always)]
-fn get(v: &Lane3, k: usize) -> Vector3<f64> {
-    Vector3([v[0][k], v[1][k], v[2][k]])
-}
-
-/// Sets the vector of one sample.
-#[inline(always)]
-fn set(v: &mut Lane3, k: usize, value: Vector3<f64>) {
-    let [x, y, z] = value.0;
-    v[0][k] = x;
-    v[1][k] = y;
-    v[2][k] = z;
-}
-
-const ZERO: Lane = Lane::ZERO;
-const ZERO3: Lane3 = [ZERO; 3];

@@ -3,8 +3,8 @@
 use super::super::parameters::{COLUMNS, column};
 use super::super::spatial::Vector3;
 use super::columns::{Columns, Section};
-use super::frame::{Place, at_each_lane, spin};
-use super::{Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use super::frame::{Frame, Place, at_each_lane, spin};
+use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 use crate::scalar::Real;
 
