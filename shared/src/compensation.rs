@@ -30,29 +30,25 @@
 //! Leaves out: the attenuation of fast torques by the current loop; effects that name another joint.
 
 mod compensated;
+mod list;
 mod now;
 mod role;
 mod wave;
 
+pub use list::{EFFECTS, Effects};
 pub use now::Now;
 pub use role::{EffectFault, Role};
 
-use crate::effects::{Effect, Instant, Kind, Memory};
+use crate::effects::{Instant, Kind, Memory};
 use crate::precompensation::{PrecompensationSettings, direction, finite, share};
 use crate::scalar::{Real, Scalar};
 use compensated::{Compensated, evaluate};
 use wave::{Stand, Waves};
 
-/// Maximum number of effects that a rig compensates.
-pub const EFFECTS: usize = 8;
-
 /// Number of ticks for which the given periodic torques are stored. [`Now::lead_ticks`] is at most this less 2.
 pub const GIVEN: usize = 64;
 // A slot is the tick number modulo the number of slots, and the tick number wraps at 256.
 const _: () = assert!(GIVEN.is_power_of_two() && GIVEN <= 256);
-
-/// The effects of a rig; unused places are at the end.
-pub type Effects<T> = [Option<Effect<T>>; EFFECTS];
 
 /// Result of the compensation in a control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
-use crate::effects::{Kind, Parameter};
+use crate::effects::{Effect, Kind, Parameter};
 use crate::friction::Friction;
 use crate::precompensation;
 use crate::trajectory::Reference;

@@ -8,8 +8,8 @@
 //! A wave whose phase moves by more than 1.5 rad between two rotations (order 84 over 50 : 1 above 1.8 rad/s) is 0. A
 //! current loop of a twentieth of the tick's rate gives at best half of it, and a jump makes the phase unknown.
 
-use super::EFFECTS;
 use super::compensated::Compensated;
+use super::list::EFFECTS;
 use super::now::Now;
 use super::role::Role;
 use crate::effects::Periodic;

@@ -12,49 +12,14 @@
 //!
 //! Leaves out: velocity-weakening friction, for which the inequality above does not hold.
 
-use super::law::Config;
+pub use super::adaptation::Adaptation;
+
+use super::config::Config;
 use super::{Measured, Torque};
 use crate::link::{LinkParameters, PARAMETER_COUNT};
 use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
-
-/// Bounds and rates of the adaptation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Adaptation<T> {
-    /// Diagonal of Γ, in unit of the parameter squared per joule.
-    pub rate: [T; PARAMETER_COUNT],
-    /// Smallest value of each parameter.
-    pub lower: [T; PARAMETER_COUNT],
-    /// Largest value of each parameter.
-    pub upper: [T; PARAMETER_COUNT],
-    /// |s| below which nothing is learnt, rad/s.
-    pub dead_zone: T,
-}
-
-impl<T: Real> Adaptation<T> {
-    /// Returns Γ for a band: adaptation·width²/(torque limit·velocity limit). With s at the highest speed, a parameter
-    /// that makes the full torque then crosses its band in 1/adaptation seconds.
-    pub fn design(
-        adaptation: T,
-        lower: [T; PARAMETER_COUNT],
-        upper: [T; PARAMETER_COUNT],
-        torque_limit: T,
-        velocity_limit: T,
-        dead_zone: T,
-    ) -> Self {
-        let mut rate = [T::ZERO; PARAMETER_COUNT];
-        for ((rate, low), high) in rate.iter_mut().zip(lower).zip(upper) {
-            *rate = adaptation * (high - low).squared() / (torque_limit * velocity_limit);
-        }
-        Self {
-            rate,
-            lower,
-            upper,
-            dead_zone,
-        }
-    }
-}
 
 /// State of the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -7,7 +7,7 @@
 //! The viscous part is the model's, at the measured velocity. Precompensation adds dry friction only; if it is off, the
 //! torque contains no dry friction.
 
-use super::law::Config;
+use super::config::Config;
 use super::{Measured, Torque};
 use crate::friction::Friction;
 use crate::precompensation;

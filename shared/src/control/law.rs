@@ -1,35 +1,10 @@
 //! Selection of the position law by [`ControlKind`].
 
-use super::adaptive::{self, Adaptation};
-use super::{ControlKind, Gains, Measured, Torque, computed_torque, pd};
-use crate::friction::Friction;
-use crate::link::LinkParameters;
-use crate::precompensation::PrecompensationSettings;
+pub use super::config::Config;
+
+use super::{ControlKind, Measured, Torque, adaptive, computed_torque, pd};
 use crate::scalar::Real;
 use crate::trajectory::Reference;
-
-/// Constants of a law while it runs.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Config<T> {
-    /// Kind of law.
-    pub kind: ControlKind,
-    /// Feedback gains.
-    pub gains: Gains<T>,
-    /// Inertia that the gains were designed for, kg·m².
-    pub design_inertia: T,
-    /// Model for feed-forward and computed torque.
-    pub model: LinkParameters<T>,
-    /// Friction law for precompensation.
-    pub friction: Friction<T>,
-    /// Settings of the friction precompensation.
-    pub precompensation: PrecompensationSettings<T>,
-    /// Bounds and rates of the adaptive law.
-    pub adaptation: Adaptation<T>,
-    /// Highest joint torque, N·m.
-    pub torque_limit: T,
-    /// Time between two steps, s.
-    pub period: T,
-}
 
 /// State of the laws.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,7 +35,12 @@ pub fn step<T: Real<Mask = bool>>(
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
+    use crate::control::Gains;
+    use crate::control::adaptive::Adaptation;
     use crate::control::rig::{LINK, advance, reference};
+    use crate::friction::Friction;
+    use crate::link::LinkParameters;
+    use crate::precompensation::PrecompensationSettings;
 
     const LOWER: [f64; 6] = [0.02, -6.0, -6.0, 0.0, 0.0, -1.0];
     const UPPER: [f64; 6] = [0.6, 6.0, 6.0, 1.5, 1.5, 1.0];

@@ -3,8 +3,10 @@
 //! Each law is a pure function `step(&Config, &mut State, Input) -> Output`, or without a state if it has none. [`law`]
 //! selects among the position laws by [`ControlKind`]; [`current`] turns the torque's current into a bridge duty cycle.
 
+mod adaptation;
 pub mod adaptive;
 pub mod computed_torque;
+mod config;
 pub mod current;
 pub mod law;
 pub mod pd;

@@ -4,7 +4,7 @@
 //! is stable for any gains (Takegaki and Arimoto 1981). The friction part is that of [`precompensation`]. Without it
 //! the feedback has to overcome friction.
 
-use super::law::Config;
+use super::config::Config;
 use super::{Measured, Torque};
 use crate::precompensation;
 use crate::scalar::Real;

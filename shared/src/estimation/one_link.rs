@@ -8,7 +8,9 @@
 //!
 //! Leaves out: delay between torque and motion, friction beyond Coulomb and viscous; both show in `residual_rms`.
 
-use super::{EstimatorSettings, Report, SettingsFault, Update, recursive};
+use super::recursive;
+use super::report::{Report, Update};
+use super::settings::{EstimatorSettings, SettingsFault};
 use crate::link::PARAMETER_COUNT;
 use crate::model::filtered;
 use crate::scalar::Real;

@@ -10,10 +10,11 @@
 //! of rows overshoot. Cutting x there would keep an error that P no longer covers (measured: coverage of the 95 %
 //! interval of J fell to 36 %).
 
-use super::least_squares;
+use super::report::{Report, Update};
+use super::settings::{EstimatorKind, finite};
 use super::ud::UdFactor;
 use super::uncertainty::{self, Block, Uncertainty};
-use super::{EstimatorKind, Report, Update, gradient};
+use super::{gradient, least_squares};
 use crate::scalar::Real;
 
 /// Blocks during which a parameter is not trusted after it was at its band's edge.
@@ -132,13 +133,6 @@ impl<T: Real<Mask = bool>, const N: usize> State<T, N> {
     pub fn changes(&self) -> u32 {
         self.changes
     }
-}
-
-/// Returns true if a value is neither infinite nor NaN.
-#[inline(always)]
-pub(super) fn finite<T: Real<Mask = bool>>(value: T) -> bool {
-    // ∞·0 and NaN·0 are NaN, and no comparison with NaN is true.
-    (value * T::ZERO).le(T::ZERO)
 }
 
 /// Processes one measurement y = row·θ + noise. Input that is not finite changes nothing.
