@@ -3,19 +3,12 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use super::elapsed::Elapsed;
 use super::fourier::envelope;
 use super::phase::Phase;
-use super::{Elapsed, Reference};
+use super::reference::Reference;
+use super::sweep::Sweep;
 use crate::scalar::Scalar;
-
-/// Law of the frequency from start to end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Sweep {
-    /// The same change each second.
-    Linear,
-    /// The same ratio each second; both frequencies above zero.
-    Logarithmic,
-}
 
 /// q(t) = E(t)·A(f)·sin φ(t) with φ' = 2πf and A(f) = A₀/√(1 + (ω/ωv)² + (ω/ωa)⁴), ωv = v/A₀, ωa² = a/A₀: then A ≤ A₀,
 /// A·ω ≤ v and A·ω² ≤ a. Envelope and sweep add to that; the part is small for slow sweeps, and the check includes it.

@@ -4,9 +4,13 @@ use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use super::elapsed::Elapsed;
+use super::reference::Reference;
 use super::segment::quintic;
-use super::{Elapsed, HARMONICS, Reference};
 use crate::scalar::Real;
+
+/// Largest number of harmonics of a Fourier trajectory.
+pub const HARMONICS: usize = 8;
 
 /// q(t) = E(t)·Σ (aₖ·sin kωt + bₖ·cos kωt), k from 1. The envelope E rises from 0 to 1 over the ramp by the quintic
 /// 10s³ − 15s⁴ + 6s⁵, stays at 1 for whole periods and falls likewise, so the motion begins and ends at rest at 0.

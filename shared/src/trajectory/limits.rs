@@ -1,10 +1,13 @@
 //! Check of a trajectory against the limits.
 
-use core::fmt;
-
+use super::Trajectory;
+use super::elapsed::Elapsed;
+use super::error::TrajectoryError;
+use super::extremes::Extremes;
 use super::phase::{HIGHEST_HZ, MOST_OCTAVES};
+use super::reference::Reference;
 use super::segment::Segment;
-use super::{Elapsed, Reference, SlowReversals, Trajectory};
+use super::staged::SlowReversals;
 use crate::safety::Limits;
 use crate::scalar::Scalar;
 
@@ -13,101 +16,6 @@ use crate::scalar::Scalar;
 const SAMPLES: u32 = 256;
 /// Samples of a sweep's amplitude bound over its whole length, along which it is smooth.
 const SWEEP_SAMPLES: u32 = 1024;
-
-/// Extreme values of a trajectory, relative to its start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Extremes<T> {
-    /// Lowest position, rad.
-    pub lowest: T,
-    /// Highest position, rad.
-    pub highest: T,
-    /// Highest speed, rad/s.
-    pub velocity: T,
-    /// Highest acceleration, rad/s².
-    pub acceleration: T,
-}
-
-/// Reason why a trajectory cannot run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TrajectoryError<T> {
-    /// A value is not finite or describes no motion; the field's name.
-    BadValue(&'static str),
-    /// Below the lowest position.
-    PositionLow {
-        /// Time of the first violation, s.
-        time: T,
-        /// Position there, rad.
-        value: T,
-        /// The limit, rad.
-        limit: T,
-    },
-    /// Above the highest position.
-    PositionHigh {
-        /// Time of the first violation, s.
-        time: T,
-        /// Position there, rad.
-        value: T,
-        /// The limit, rad.
-        limit: T,
-    },
-    /// Faster than allowed.
-    Velocity {
-        /// Time of the first violation, s.
-        time: T,
-        /// Speed there, rad/s.
-        value: T,
-        /// The limit, rad/s.
-        limit: T,
-    },
-    /// Accelerates harder than allowed.
-    Acceleration {
-        /// Time of the first violation, s.
-        time: T,
-        /// Acceleration there, rad/s².
-        value: T,
-        /// The limit, rad/s².
-        limit: T,
-    },
-}
-
-impl<T: Scalar> fmt::Display for TrajectoryError<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (what, unit, time, value, limit) = match *self {
-            Self::BadValue(name) => {
-                return write!(f, "trajectory value {name} is out of its range");
-            }
-            Self::PositionLow { time, value, limit } => {
-                ("falls below its lowest position", "rad", time, value, limit)
-            }
-            Self::PositionHigh { time, value, limit } => (
-                "rises above its highest position",
-                "rad",
-                time,
-                value,
-                limit,
-            ),
-            Self::Velocity { time, value, limit } => {
-                ("exceeds its highest speed", "rad/s", time, value, limit)
-            }
-            Self::Acceleration { time, value, limit } => (
-                "exceeds its highest acceleration",
-                "rad/s^2",
-                time,
-                value,
-                limit,
-            ),
-        };
-        write!(
-            f,
-            "the trajectory {what} at {:.3} s: {:.4} {unit} where {:.4} is allowed",
-            time.to_f64(),
-            value.to_f64(),
-            limit.to_f64()
-        )
-    }
-}
-
-impl<T: Scalar> core::error::Error for TrajectoryError<T> {}
 
 /// A sample: a time, and the lowest and highest reference there.
 struct Probe<T> {

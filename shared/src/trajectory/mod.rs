@@ -12,78 +12,32 @@
 //! Leaves out: the joint's zero position and its limits; [`Trajectory::check`] gets them as arguments.
 
 mod chirp;
+mod elapsed;
+mod error;
+mod extremes;
 mod fourier;
 mod limits;
 mod phase;
+mod reference;
 mod segment;
 mod staged;
+mod sweep;
 
-pub use chirp::{Chirp, Sweep};
-pub use fourier::Fourier;
-pub use limits::{Extremes, TrajectoryError};
-pub use staged::{FrictionSweep, SlowReversals, Staircase};
+pub use chirp::Chirp;
+pub use error::TrajectoryError;
+pub use extremes::Extremes;
+pub use fourier::{Fourier, HARMONICS};
+pub use reference::Reference;
+pub use staged::{AMPLITUDES, FrictionSweep, LEVELS, SPEEDS, SlowReversals, Staircase};
+pub use sweep::Sweep;
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::{Real, Scalar};
+use elapsed::{Elapsed, MICROS};
 use phase::Phase;
 use segment::Segment;
-
-/// Largest number of harmonics of a Fourier trajectory.
-pub const HARMONICS: usize = 8;
-/// Largest number of speeds of a friction sweep.
-pub const SPEEDS: usize = 16;
-/// Largest number of levels of a staircase.
-pub const LEVELS: usize = 16;
-/// Largest number of amplitudes of slow reversals.
-pub const AMPLITUDES: usize = 8;
-
-/// Microseconds in a second.
-const MICROS: u64 = 1_000_000;
-
-/// Position, velocity and acceleration of the reference.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reference<T> {
-    /// rad
-    pub position: T,
-    /// rad/s
-    pub velocity: T,
-    /// rad/s²
-    pub acceleration: T,
-}
-
-impl<T: Real> Reference<T> {
-    /// Returns a reference at rest at a position.
-    fn rest(position: T) -> Self {
-        Self {
-            position,
-            velocity: T::ZERO,
-            acceleration: T::ZERO,
-        }
-    }
-
-    /// Returns the reference multiplied by a number.
-    fn scaled(self, share: T) -> Self {
-        Self {
-            position: share * self.position,
-            velocity: share * self.velocity,
-            acceleration: share * self.acceleration,
-        }
-    }
-
-    /// Returns the motion multiplied by an envelope with its own first and second derivative (product rule).
-    fn under(self, envelope: Self) -> Self {
-        let two = T::from_f64(2.0);
-        Self {
-            position: envelope.position * self.position,
-            velocity: envelope.velocity * self.position + envelope.position * self.velocity,
-            acceleration: envelope.acceleration * self.position
-                + two * envelope.velocity * self.velocity
-                + envelope.position * self.acceleration,
-        }
-    }
-}
 
 /// A reference motion relative to its start position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -101,46 +55,6 @@ pub enum Trajectory<T> {
     SlowReversals(SlowReversals<T>),
     /// Pairs of constant speed: the friction map.
     FrictionSweep(FrictionSweep<T>),
-}
-
-/// A point in time: whole microseconds and a fraction.
-#[derive(Clone, Copy, Debug)]
-struct Elapsed<T> {
-    micros: u64,
-    /// Share of a microsecond, 0 to 1.
-    fraction: T,
-}
-
-impl<T: Real> Elapsed<T> {
-    fn from_tick(tick: u64, rate_hz: u32) -> Self {
-        // With a period of whole microseconds, as on the rig, no 64-bit division is needed. The microcontroller has no
-        // hardware for it.
-        let (step, odd) = (
-            MICROS as u32 / rate_hz.max(1),
-            MICROS as u32 % rate_hz.max(1),
-        );
-        if odd == 0 {
-            return Self {
-                micros: tick.saturating_mul(u64::from(step)),
-                fraction: T::ZERO,
-            };
-        }
-        let rate = u64::from(rate_hz.max(1));
-        let within = (tick % rate) * MICROS;
-        // The rate fits into 32 bits, and so does its remainder.
-        let rest = T::from_u32((within % rate) as u32) / T::from_u32(rate_hz.max(1));
-        Self {
-            micros: (tick / rate)
-                .saturating_mul(MICROS)
-                .saturating_add(within / rate),
-            fraction: rest,
-        }
-    }
-
-    /// Returns the time within a span, s. The microseconds of the span fit into 32 bits.
-    fn seconds(micros: u32, fraction: T) -> T {
-        (T::from_u32(micros) + fraction) * T::from_f64(1.0e-6)
-    }
 }
 
 impl<T: Scalar> Trajectory<T> {

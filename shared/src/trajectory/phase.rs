@@ -6,7 +6,7 @@
 //!
 //! Leaves out: lanes; sweeps above 10⁵ Hz or over more than 31 octaves, which no rig gets.
 
-use super::Sweep;
+use super::sweep::Sweep;
 use crate::scalar::Scalar;
 
 /// Highest frequency of a sweep, Hz.

@@ -1,6 +1,7 @@
 //! The two segment shapes of staged trajectories.
 
-use super::{Elapsed, Reference};
+use super::elapsed::Elapsed;
+use super::reference::Reference;
 use crate::scalar::Real;
 
 /// Part of a trajectory, starting at the end of the previous one.

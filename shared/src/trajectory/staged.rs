@@ -4,9 +4,17 @@ use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use super::elapsed::Elapsed;
+use super::reference::Reference;
 use super::segment::{self, Segment, Shape};
-use super::{AMPLITUDES, Elapsed, LEVELS, Reference, SPEEDS};
 use crate::scalar::{Real, Scalar};
+
+/// Largest number of speeds of a friction sweep.
+pub const SPEEDS: usize = 16;
+/// Largest number of levels of a staircase.
+pub const LEVELS: usize = 16;
+/// Largest number of amplitudes of slow reversals.
+pub const AMPLITUDES: usize = 8;
 
 /// Moves by quintics to each level in turn, then back to the start, with a dwell after each move.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]

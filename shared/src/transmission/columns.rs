@@ -1,8 +1,8 @@
 //! Regressor columns of the motor parameters, and the motors' part in the matrices of the dynamics.
 
-use super::{
-    DriveKind, MOTOR_COLUMNS, Motor, Transmission, TransmissionError, check, motor_column,
-};
+use super::drives::{DriveKind, MOTOR_COLUMNS, motor_column};
+use super::error::{TransmissionError, check};
+use super::motors::{Motor, Transmission};
 use crate::multibody::MAX_JOINTS;
 use crate::scalar::Real;
 

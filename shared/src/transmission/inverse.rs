@@ -1,7 +1,8 @@
 //! From motors to joints.
 
+use super::error::{TransmissionError, check};
+use super::motors::Transmission;
 use super::solve::Factors;
-use super::{Transmission, TransmissionError, check};
 use crate::multibody::MAX_JOINTS;
 use crate::scalar::{Mask, Real};
 

@@ -1,6 +1,7 @@
 //! Motor positions, velocities and accelerations from those of the joints; joint torques from those of the motors.
 
-use super::{Motor, Screw, Transmission, TransmissionError, check};
+use super::error::{TransmissionError, check};
+use super::motors::{Motor, Screw, Transmission};
 use crate::multibody::MAX_JOINTS;
 use crate::scalar::Real;
 

@@ -13,6 +13,7 @@ use crate::lanes::Lanes;
 use crate::multibody::{
     COLUMNS, Chain, JointGeometry, JointKind, bias_torque, inertia_matrix, inverse_dynamics,
 };
+use crate::scalar::Real;
 
 /// Owned numbers of a drive.
 #[derive(Clone, Debug)]
