@@ -32,12 +32,14 @@
 mod compensated;
 mod list;
 mod now;
+mod refusal;
 mod role;
 mod wave;
 
 pub use list::{EFFECTS, Effects};
 pub use now::Now;
-pub use role::{EffectFault, Role};
+pub use refusal::EffectFault;
+pub use role::Role;
 
 use crate::effects::{Instant, Kind, Memory};
 use crate::precompensation::{PrecompensationSettings, direction, finite, share};

@@ -1,6 +1,7 @@
 //! One effect that has passed its checks.
 
-use super::role::{EffectFault, Role};
+use super::refusal::EffectFault;
+use super::role::Role;
 use crate::effects::{Effect, Instant, Memory, Parameter, Scale};
 use crate::precompensation::finite;
 use crate::scalar::{Real, Scalar};

@@ -9,7 +9,9 @@
 //! Leaves out: friction that differs with the direction (a constant beside symmetric friction). If presliding
 //! holds only a part of the model's dry friction, the other friction makes the contact stiffer.
 
-use super::{Effect, Instant, Kind, Memory};
+use super::effect::{Effect, Memory};
+use super::instant::Instant;
+use super::kind::Kind;
 use crate::scalar::Real;
 
 impl Kind {

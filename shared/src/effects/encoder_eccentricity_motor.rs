@@ -1,9 +1,8 @@
 //! A code disc or magnet off the motor's axis.
 
-use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, Periodic,
-    SHAPES, Scale, wave,
-};
+use super::about::{About, Channel, Confusion, Direction, Need, Parameter, Periodic, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES, wave};
 use crate::scalar::Real;
 
 pub(super) struct EncoderEccentricityMotor;

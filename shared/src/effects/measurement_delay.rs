@@ -1,9 +1,8 @@
 //! A torque or current reading that is delayed against the position.
 
-use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
-};
+use super::about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES};
 use crate::scalar::Real;
 
 pub(super) struct MeasurementDelay;

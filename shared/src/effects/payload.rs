@@ -1,9 +1,8 @@
 //! A mass on the link. Inertia and gravity are not two independent gains: both follow from mass and distance.
 
-use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
-};
+use super::about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES};
 use crate::scalar::Real;
 
 pub(super) struct Payload;

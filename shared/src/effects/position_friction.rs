@@ -1,9 +1,8 @@
 //! Tight spots of seals, bearings and a bent shaft.
 
-use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale, wave,
-};
+use super::about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES, wave};
 use crate::scalar::Real;
 
 pub(super) struct PositionFriction;

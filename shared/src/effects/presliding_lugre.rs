@@ -1,9 +1,8 @@
 //! Presliding friction with memory of distance and speed, LuGre law (Canudas de Wit).
 
-use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
-};
+use super::about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES};
 use crate::scalar::Real;
 
 pub(super) struct PreslidingLugre;

@@ -1,7 +1,9 @@
 //! Friction that falls at once as the joint starts to slide, with a long tail.
 
+use super::about::About;
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES};
 use super::stribeck::Stribeck;
-use super::{About, GAINS, Instant, Law, MEMORY, SHAPES};
 use crate::scalar::Real;
 
 pub(super) struct StribeckExponential;

@@ -6,6 +6,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::*;
+use crate::scalar::Real;
 
 /// Returns an effect in the middle of its searched range, with positive gains.
 fn example(kind: Kind) -> Effect<f64> {

@@ -1,9 +1,8 @@
 //! A torque constant that falls at high current.
 
-use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
-};
+use super::about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES};
 use crate::scalar::Real;
 
 pub(super) struct TorqueSaturation;

@@ -1,7 +1,9 @@
 //! Viscous friction that falls as friction heats the joint.
 
+use super::about::{About, Channel, Direction, Parameter, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES};
 use super::viscous_warmup_time::ViscousWarmupTime;
-use super::{About, Channel, Direction, GAINS, Instant, Law, MEMORY, Parameter, SHAPES, Scale};
 use crate::scalar::Real;
 
 pub(super) struct ViscousWarmupHeat;

@@ -1,9 +1,9 @@
 //! Viscous friction that falls with a measured temperature.
 
+use super::about::{About, Channel, Direction, Need, Parameter, Scale};
+use super::instant::Instant;
+use super::law::{GAINS, Law, MEMORY, SHAPES};
 use super::viscous_warmup_time::ViscousWarmupTime;
-use super::{
-    About, Channel, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES, Scale,
-};
 use crate::scalar::Real;
 
 pub(super) struct ViscousWarmupTemperature;
