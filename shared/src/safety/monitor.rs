@@ -114,8 +114,18 @@ pub fn step(
     state: &mut MonitorState,
     now: &Readings,
 ) -> Option<(Fault, f32)> {
-    let magnitude = now.current.abs();
-    let n = config.persistence;
+    heat_up(config, limits, state, now);
+    let found = check(config, limits, state, now);
+    // A fault is rare, and building the list costs more than this test.
+    if !found.any(state, now) {
+        return None;
+    }
+    found.first(state, now)
+}
+
+/// Updates the heat of the winding, and whether the motor is overloaded.
+#[inline(always)]
+fn heat_up(config: &MonitorConfig, limits: &Limits<f32>, state: &mut MonitorState, now: &Readings) {
     // With the bridge off the winding is open, so a current reading of a broken converter heats nothing.
     let heating = if now.driving {
         now.current * now.current
@@ -131,7 +141,32 @@ pub fn step(
         } else {
             rating
         });
+}
 
+/// Which checks of a tick fail, beside those that [`Readings`] and [`MonitorState`] tell directly.
+struct Failing {
+    over_current: bool,
+    at_rail: bool,
+    bad_supply: bool,
+    hot: bool,
+    over_speed: bool,
+    stuck: bool,
+    outside: bool,
+    jumped: bool,
+    lost: bool,
+    late: bool,
+}
+
+/// Updates all counters, and returns the checks that fail.
+#[inline(always)]
+fn check(
+    config: &MonitorConfig,
+    limits: &Limits<f32>,
+    state: &mut MonitorState,
+    now: &Readings,
+) -> Failing {
+    let magnitude = now.current.abs();
+    let n = config.persistence;
     // All counters are updated before any is judged: an early return must not stop the others.
     let over_current = persists(
         &mut state.over_current,
@@ -170,57 +205,73 @@ pub fn step(
     let outside = now.driving
         && !(limits.position_low - config.position_margin <= now.position
             && now.position <= limits.position_high + config.position_margin);
-
-    let jumped = now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs();
-    let lost = now.encoder_open || lost && !suspect;
-    let late = now.overrun && now.driving;
-    // A fault is rare, and building the list costs more than this test.
-    let any = now.driver_fault
-        | at_rail
-        | stuck
-        | over_current
-        | now.comparator
-        | jumped
-        | lost
-        | over_speed
-        | outside
-        | bad_supply
-        | hot
-        | state.overloaded
-        | late;
-    if !any {
-        return None;
+    Failing {
+        over_current,
+        at_rail,
+        bad_supply,
+        hot,
+        over_speed,
+        stuck,
+        outside,
+        jumped: now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs(),
+        lost: now.encoder_open || lost && !suspect,
+        late: now.overrun && now.driving,
     }
-    let faults = [
-        (now.driver_fault, Fault::Driver, 0.0),
-        // Before over-current: a code at the rail is no measurement, although it reads as a large current.
-        (
-            at_rail || stuck,
-            Fault::AdcStuck,
-            f32::from(now.current_code),
-        ),
-        (
-            over_current || now.comparator,
-            Fault::OverCurrent,
-            now.current,
-        ),
-        (jumped, Fault::EncoderJump, now.encoder_step as f32),
-        (lost, Fault::EncoderLost, state.voltage.unexplained),
-        (over_speed, Fault::OverSpeed, now.velocity),
-        (outside, Fault::Position, now.position),
-        (bad_supply, Fault::Supply, now.supply),
-        (hot, Fault::Temperature, now.temperature),
-        (state.overloaded, Fault::Overload, state.heat),
-        (late, Fault::Deadline, 0.0),
-    ];
-    faults
-        .into_iter()
-        .find(|(failing, _, _)| *failing)
-        .map(|(_, fault, value)| match fault {
-            // Computed only for a report: a square root in each tick is too expensive.
-            Fault::Overload => (fault, libm::sqrtf(value)),
-            _ => (fault, value),
-        })
+}
+
+impl Failing {
+    /// Returns true if any check fails.
+    #[inline(always)]
+    fn any(&self, state: &MonitorState, now: &Readings) -> bool {
+        now.driver_fault
+            | self.at_rail
+            | self.stuck
+            | self.over_current
+            | now.comparator
+            | self.jumped
+            | self.lost
+            | self.over_speed
+            | self.outside
+            | self.bad_supply
+            | self.hot
+            | state.overloaded
+            | self.late
+    }
+
+    /// Returns the gravest fault, with the value that was out of range.
+    #[inline(always)]
+    fn first(&self, state: &MonitorState, now: &Readings) -> Option<(Fault, f32)> {
+        let faults = [
+            (now.driver_fault, Fault::Driver, 0.0),
+            // Before over-current: a code at the rail is no measurement, although it reads as a large current.
+            (
+                self.at_rail || self.stuck,
+                Fault::AdcStuck,
+                f32::from(now.current_code),
+            ),
+            (
+                self.over_current || now.comparator,
+                Fault::OverCurrent,
+                now.current,
+            ),
+            (self.jumped, Fault::EncoderJump, now.encoder_step as f32),
+            (self.lost, Fault::EncoderLost, state.voltage.unexplained),
+            (self.over_speed, Fault::OverSpeed, now.velocity),
+            (self.outside, Fault::Position, now.position),
+            (self.bad_supply, Fault::Supply, now.supply),
+            (self.hot, Fault::Temperature, now.temperature),
+            (state.overloaded, Fault::Overload, state.heat),
+            (self.late, Fault::Deadline, 0.0),
+        ];
+        faults
+            .into_iter()
+            .find(|(failing, _, _)| *failing)
+            .map(|(_, fault, value)| match fault {
+                // Computed only for a report: a square root in each tick is too expensive.
+                Fault::Overload => (fault, libm::sqrtf(value)),
+                _ => (fault, value),
+            })
+    }
 }
 
 /// Returns true if the converter is stuck: a live one follows the duty, a stuck one keeps its code.
