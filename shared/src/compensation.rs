@@ -42,7 +42,7 @@ pub use refusal::EffectFault;
 pub use role::Role;
 
 use crate::effects::{Instant, Kind, Memory};
-use crate::precompensation::{PrecompensationSettings, direction, finite, share};
+use crate::precompensation::{PrecompensationSettings, finite, share};
 use crate::scalar::{Real, Scalar};
 use compensated::{Compensated, evaluate};
 use wave::{Stand, Waves};
@@ -417,21 +417,7 @@ impl<T: Scalar> Compensation<T> {
             instant.direction = measured.sgn();
             (&mut state.sliding, sliding)
         } else {
-            let dry = one.role == Role::Dry;
-            let ahead = wanted.abs().lt(measured.abs());
-            // The faster speed, in the reference's direction.
-            let backwards = wanted.lt(T::ZERO);
-            let faster = T::select(backwards, -measured.abs(), measured.abs());
-            instant.velocity = if dry && one.falls && ahead {
-                faster
-            } else {
-                wanted
-            };
-            instant.direction = if dry {
-                direction(wanted, measured, settings.velocity_threshold)
-            } else {
-                wanted.sgn()
-            };
+            one.plan(&mut instant, settings.velocity_threshold, wanted, measured);
             (&mut state.planned, planned)
         };
         // Dry friction gives no torque where the direction is 0, for any hidden state.

@@ -3,7 +3,7 @@
 use super::refusal::EffectFault;
 use super::role::Role;
 use crate::effects::{Effect, Instant, Memory, Parameter, Scale};
-use crate::precompensation::finite;
+use crate::precompensation::{direction, finite};
 use crate::scalar::{Real, Scalar};
 
 /// A slow and a fast speed, rad/s. Their comparison shows if an effect falls with speed.
@@ -47,6 +47,33 @@ impl<T: Scalar> Compensated<T> {
             whole: effect.shapes.iter().all(whole),
             falls: sliding(SPEEDS[1]).lt(sliding(SPEEDS[0])),
         })
+    }
+
+    /// Sets the velocity and the direction of the planned motion at which the law is evaluated, from those of the
+    /// reference (`wanted`) and of the link (`measured`), rad/s. `velocity_threshold` is that of the friction law.
+    #[inline(always)]
+    pub(super) fn plan(
+        &self,
+        instant: &mut Instant<T>,
+        velocity_threshold: T,
+        wanted: T,
+        measured: T,
+    ) {
+        let dry = self.role == Role::Dry;
+        let ahead = wanted.abs().lt(measured.abs());
+        // The faster speed, in the reference's direction.
+        let backwards = wanted.lt(T::ZERO);
+        let faster = T::select(backwards, -measured.abs(), measured.abs());
+        instant.velocity = if dry && self.falls && ahead {
+            faster
+        } else {
+            wanted
+        };
+        instant.direction = if dry {
+            direction(wanted, measured, velocity_threshold)
+        } else {
+            wanted.sgn()
+        };
     }
 }
 

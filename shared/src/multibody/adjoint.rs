@@ -65,16 +65,7 @@ fn gradient<T: Real, const CAPACITY: usize>(
         motion: base,
     }; CAPACITY];
     let mut axes = [[Motion::ZERO; CAPACITY]; CAPACITY];
-    let mut motion = base;
-    for (i, joint) in chain.joints.iter().enumerate() {
-        let transform = joint.transform(q[i]);
-        motion = motion.next(joint, &transform, qd[i], qdd[i]);
-        steps[i] = Step { transform, motion };
-        for j in 0..i {
-            axes[i][j] = transform.motion_to_child(axes[i - 1][j]);
-        }
-        axes[i][i] = joint.axis();
-    }
+    outwards(chain, q, qd, qdd, &mut steps, &mut axes);
     // Derivatives of the sum by the values that the link further in passes outwards.
     let mut by_axes = [Wrench::ZERO; CAPACITY];
     let mut by_motion = LinkMotion {
@@ -92,56 +83,103 @@ fn gradient<T: Real, const CAPACITY: usize>(
             link_gradient(row, motion, &axes[i][j], &mut by_motion, &mut by_axes[j]);
         }
         let own = &weights[i * width + i * COLUMNS..];
-        let mut dq = T::ZERO;
-        let mut dqd = own[column::VISCOUS];
-        let mut dqdd = own[column::DRIVE_INERTIA];
+        let mut by_joint = JointGradient {
+            q: T::ZERO,
+            qd: own[column::VISCOUS],
+            qdd: own[column::DRIVE_INERTIA],
+        };
 
         // Seen from this link, an axis further in turns against the joint.
         let axis = axes[i][i];
         for j in 0..i {
-            dq -= axis.cross(axes[i][j]).dot(by_axes[j]);
+            by_joint.q -= axis.cross(axes[i][j]).dot(by_axes[j]);
             by_axes[j] = transform.wrench_to_parent(by_axes[j]);
         }
 
         let parent = if i == 0 { base } else { steps[i - 1].motion };
+        by_motion = by_joint.across(joint.kind, &steps[i], &parent, qd[i], &by_motion);
+        by_q[i] = by_joint.q;
+        by_qd[i] = by_joint.qd;
+        by_qdd[i] = by_joint.qdd;
+    }
+}
+
+/// Computes the motions of all links and, in the frame of each, the axes of the joints up to it.
+#[inline(always)]
+fn outwards<T: Real, const CAPACITY: usize>(
+    chain: &Chain<T>,
+    q: &[T],
+    qd: &[T],
+    qdd: &[T],
+    steps: &mut [Step<T>; CAPACITY],
+    axes: &mut [[Motion<T>; CAPACITY]; CAPACITY],
+) {
+    let mut motion = LinkMotion::base(chain.gravity);
+    for (i, joint) in chain.joints.iter().enumerate() {
+        let transform = joint.transform(q[i]);
+        motion = motion.next(joint, &transform, qd[i], qdd[i]);
+        steps[i] = Step { transform, motion };
+        for j in 0..i {
+            axes[i][j] = transform.motion_to_child(axes[i - 1][j]);
+        }
+        axes[i][i] = joint.axis();
+    }
+}
+
+/// Derivatives of the sum by the motion of one joint.
+struct JointGradient<T> {
+    q: T,
+    qd: T,
+    qdd: T,
+}
+
+impl<T: Real> JointGradient<T> {
+    /// Adds what the motion of the joint's own link, `step`, depends on. Returns the derivatives by the motion of its
+    /// `parent` from those by that of the link, `by_motion`.
+    #[inline(always)]
+    fn across(
+        &mut self,
+        kind: JointKind,
+        step: &Step<T>,
+        parent: &LinkMotion<T>,
+        qd: T,
+        by_motion: &LinkMotion<T>,
+    ) -> LinkMotion<T> {
+        let Step { transform, motion } = step;
         let carried = transform.direction_to_child(parent.velocity);
         let z = Vector3([T::ZERO, T::ZERO, T::ONE]);
         let across = carried.cross_z(T::ONE);
         let mut by_carried = by_motion.velocity;
         let outer = transform.direction_to_parent(by_motion.proper);
-        match joint.kind {
+        match kind {
             JointKind::Revolute => {
-                dqdd += by_motion.acceleration.z();
-                dqd += by_motion.velocity.z() + by_motion.acceleration.dot(across);
-                by_carried += z.cross(by_motion.acceleration).scaled(qd[i]);
+                self.qdd += by_motion.acceleration.z();
+                self.qd += by_motion.velocity.z() + by_motion.acceleration.dot(across);
+                by_carried += z.cross(by_motion.acceleration).scaled(qd);
                 let turning = transform.direction_to_child(parent.acceleration);
                 // A rotated constant vector v changes by −z × v.
-                dq -= by_carried.dot(z.cross(carried))
+                self.q -= by_carried.dot(z.cross(carried))
                     + by_motion.acceleration.dot(z.cross(turning))
                     + by_motion.proper.dot(z.cross(motion.proper));
             }
             JointKind::Prismatic => {
                 let two = T::ONE + T::ONE;
-                dqdd += by_motion.proper.z();
-                dqd += two * by_motion.proper.dot(across);
-                by_carried += z.cross(by_motion.proper).scaled(two * qd[i]);
+                self.qdd += by_motion.proper.z();
+                self.qd += two * by_motion.proper.dot(across);
+                by_carried += z.cross(by_motion.proper).scaled(two * qd);
                 let by_origin = outer.cross(parent.acceleration)
                     + parent.velocity.cross(parent.velocity.cross(outer));
-                dq += by_origin.dot(transform.direction_to_parent(z));
+                self.q += by_origin.dot(transform.direction_to_parent(z));
             }
         }
-        by_q[i] = dq;
-        by_qd[i] = dqd;
-        by_qdd[i] = dqdd;
-
         let origin = transform.origin;
-        by_motion = LinkMotion {
+        LinkMotion {
             velocity: transform.direction_to_parent(by_carried)
                 + centripetal(parent.velocity, origin, outer),
             acceleration: transform.direction_to_parent(by_motion.acceleration)
                 + origin.cross(outer),
             proper: outer,
-        };
+        }
     }
 }
 

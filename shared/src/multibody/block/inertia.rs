@@ -169,24 +169,13 @@ fn inwards<
                 [xx[k], xy[k], xz[k], yy[k], yz[k], zz[k]],
             )
         };
-        let Vector3([mx, my, mz]) = spin_back::<F>(s, c, Vector3([hxk, hyk, hzk]));
-        let Vector3([mut ixz, mut iyz, mut izz]) = spin_back::<F>(s, c, Vector3([xzk, yzk, zzk]));
+        let moment_back = spin_back::<F>(s, c, Vector3([hxk, hyk, hzk]));
+        let Vector3([ixz, iyz, izz]) = spin_back::<F>(s, c, Vector3([xzk, yzk, zzk]));
 
         let (f, m) = if prismatic {
             place.wrench_back(s, c, Vector3([0.0, 0.0, mass]), Vector3([hyk, -hxk, 0.0]))
         } else {
-            let (mut x, mut y, mut z) = (ixz, iyz, izz);
-            if A {
-                z = F::mul_add(place.a, mx, z);
-            }
-            if D {
-                x = F::mul_add(-place.d, mx, x);
-                y = F::mul_add(-place.d, my, y);
-            }
-            (
-                place.turn_back(Vector3([-my, mx, 0.0])),
-                place.turn_back(Vector3([x, y, z])),
-            )
+            started_turn(&place, moment_back, [ixz, iyz, izz])
         };
         entry[k] = if slides { f.z() } else { m.z() };
         if !LAST {
@@ -194,42 +183,13 @@ fn inwards<
             set(moment, k, m);
         }
 
-        let [mut ixx, mut ixy, mut iyy] = turned::<F>(s, c, xxk, xyk, yyk);
-        // Parallel axes with p = (a, 0, d): the mixed term of p with m·c + m·p/2.
-        let bx = F::mul_add(0.5 * mass, place.a, mx);
-        let bz = F::mul_add(0.5 * mass, place.d, mz);
-        if A {
-            ixy = F::mul_add(-place.a, my, ixy);
-            ixz = F::mul_add(-place.a, bz, ixz);
-            iyy = F::mul_add(2.0 * place.a, bx, iyy);
-            izz = F::mul_add(2.0 * place.a, bx, izz);
-        }
-        if D {
-            ixx = F::mul_add(2.0 * place.d, bz, ixx);
-            ixz = F::mul_add(-place.d, bx, ixz);
-            iyy = F::mul_add(2.0 * place.d, bz, iyy);
-            iyz = F::mul_add(-place.d, my, iyz);
-        }
-        let [ixx, ixy, ixz, iyy, iyz, izz] = match TWIST {
-            NONE => [ixx, ixy, ixz, iyy, iyz, izz],
-            QUARTER => [ixx, -ixz, ixy, izz, -iyz, iyy],
-            MINUS_QUARTER => [ixx, ixz, -ixy, izz, -iyz, iyy],
-            _ => {
-                let (s, c) = (place.sin_alpha, place.cos_alpha);
-                let [iyy, iyz, izz] = turned::<F>(s, c, iyy, iyz, izz);
-                [
-                    ixx,
-                    F::mul_add(c, ixy, -(s * ixz)),
-                    F::mul_add(s, ixy, c * ixz),
-                    iyy,
-                    iyz,
-                    izz,
-                ]
-            }
-        };
+        let [ixx, ixy, iyy] = turned::<F>(s, c, xxk, xyk, yyk);
+        let [ixx, ixy, ixz, iyy, iyz, izz] =
+            moved_inertia(&place, mass, moment_back, [ixx, ixy, ixz, iyy, iyz, izz]);
         let about_z = izz + inertia[5];
         diagonal[k] = if slides { total } else { about_z + own.drive };
         if !LAST {
+            let Vector3([mx, my, mz]) = moment_back;
             let moved = Vector3([
                 F::mul_add(mass, place.a, mx),
                 my,
@@ -246,6 +206,74 @@ fn inwards<
             yy[k] = iyy;
             yz[k] = iyz + inertia[4];
             zz[k] = about_z;
+        }
+    }
+}
+
+/// Returns force and moment, in the frame before, that turn the composite body at unit acceleration about its joint,
+/// from its first `moment` and the entries xz, yz, zz of its `inertia`, both after the turn back about z.
+#[inline(always)]
+fn started_turn<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: &Place<F, TWIST, A, D>,
+    moment: Vector3<f64>,
+    inertia: [f64; 3],
+) -> (Vector3<f64>, Vector3<f64>) {
+    let Vector3([mx, my, _]) = moment;
+    let [mut x, mut y, mut z] = inertia;
+    if A {
+        z = F::mul_add(place.a, mx, z);
+    }
+    if D {
+        x = F::mul_add(-place.d, mx, x);
+        y = F::mul_add(-place.d, my, y);
+    }
+    (
+        place.turn_back(Vector3([-my, mx, 0.0])),
+        place.turn_back(Vector3([x, y, z])),
+    )
+}
+
+/// Returns the inertia of the composite body (xx, xy, xz, yy, yz, zz) about the origin of the frame before and along its
+/// axes. `mass`, first `moment` and inertia of the body are given after the turn back about z.
+#[inline(always)]
+fn moved_inertia<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: &Place<F, TWIST, A, D>,
+    mass: f64,
+    moment: Vector3<f64>,
+    inertia: [f64; 6],
+) -> [f64; 6] {
+    let Vector3([mx, my, mz]) = moment;
+    let [mut ixx, mut ixy, mut ixz, mut iyy, mut iyz, mut izz] = inertia;
+    // Parallel axes with p = (a, 0, d): the mixed term of p with m·c + m·p/2.
+    let bx = F::mul_add(0.5 * mass, place.a, mx);
+    let bz = F::mul_add(0.5 * mass, place.d, mz);
+    if A {
+        ixy = F::mul_add(-place.a, my, ixy);
+        ixz = F::mul_add(-place.a, bz, ixz);
+        iyy = F::mul_add(2.0 * place.a, bx, iyy);
+        izz = F::mul_add(2.0 * place.a, bx, izz);
+    }
+    if D {
+        ixx = F::mul_add(2.0 * place.d, bz, ixx);
+        ixz = F::mul_add(-place.d, bx, ixz);
+        iyy = F::mul_add(2.0 * place.d, bz, iyy);
+        iyz = F::mul_add(-place.d, my, iyz);
+    }
+    match TWIST {
+        NONE => [ixx, ixy, ixz, iyy, iyz, izz],
+        QUARTER => [ixx, -ixz, ixy, izz, -iyz, iyy],
+        MINUS_QUARTER => [ixx, ixz, -ixy, izz, -iyz, iyy],
+        _ => {
+            let (s, c) = (place.sin_alpha, place.cos_alpha);
+            let [iyy, iyz, izz] = turned::<F>(s, c, iyy, iyz, izz);
+            [
+                ixx,
+                F::mul_add(c, ixy, -(s * ixz)),
+                F::mul_add(s, ixy, c * ixz),
+                iyy,
+                iyz,
+                izz,
+            ]
         }
     }
 }
