@@ -24,7 +24,4 @@ pub use chain::{ChainBatch, RegressorBlock};
 pub use error::BatchError;
 pub use model::ModelBatch;
 pub use rig_shared::multibody::block::lower;
-pub use threads::{each_by, over_threads};
-
-/// Samples of a block whose regressor stays in the cache.
-pub const BLOCK: usize = 64;
+pub use threads::{BLOCK, each_by, over_threads};

@@ -4,7 +4,8 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-use super::BLOCK;
+/// Samples of a block whose regressor stays in the cache.
+pub const BLOCK: usize = 64;
 
 /// Cuts `samples` into at most `threads` stretches of nearly equal length and runs `work` on all in parallel. Returns
 /// the results in the order of the stretches. Cuts lie on multiples of [`BLOCK`]. So a result depends on the number of

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Fault, Step};
-use super::written::{float, line, list};
+use super::fault::{Fault, Step};
+use super::toml_lines::{float, line, list};
 
 /// Largest torque lead, s. A torque that acts later than this belongs to another motion.
 pub const MOST_LEAD: f64 = 1.0;

@@ -1,7 +1,9 @@
 //! Robots with known geometry and nothing else.
 
-use super::dh::GRAVITY;
-use super::{Joint, JointKind, Origin, Robot};
+use super::frame::GRAVITY;
+use super::joint::{Joint, JointKind};
+use super::serial_robot::Robot;
+use super::worth::Origin;
 
 impl Joint {
     /// A joint of this geometry: alpha, a, theta and d of the modified Denavit–Hartenberg convention, rad and m.

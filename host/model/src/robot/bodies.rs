@@ -1,14 +1,14 @@
-//! Remarks on inertial values that no body can have.
+//! Bodies: whether one can have a link's inertial values, and values that simulators accept.
 //!
-//! Such values are not refused: identified values are often known only in combinations, and values that no motion shows
-//! are often left at zero. Only values that the link's motion shows are judged: the mass of a link that only slides,
-//! the moment of inertia about the axis of a link that turns about one direction, and the whole inertia of all others.
+//! Only values that the link's motion shows are judged: the mass of a link that only slides, the moment of inertia about
+//! the axis of a link that turns about one direction, and the whole inertia of all others.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::dh::step;
+use super::frame::step;
+use super::joint::JointKind;
+use super::serial_robot::Robot;
 use super::urdf::SpatialInertia;
-use super::{JointKind, Original, Robot};
 use rig_output::format_significant;
 
 /// Axes closer to parallel than this turn a link about one direction. Sine of the angle between them.
@@ -17,34 +17,16 @@ const PARALLEL: f64 = 1e-6;
 const ROUNDED: f64 = 0.02;
 
 /// The part of a link's inertia that its motion shows.
-enum Shown {
+pub(super) enum Shown {
     Mass,
     About(Vector3<f64>),
     All,
 }
 
 impl Robot {
-    /// Returns one sentence for each link (and its joint) whose inertial values no body can have.
-    pub fn implausible_bodies(&self, urdf: Option<&Original>) -> Vec<String> {
-        (0..self.joints.len())
-            .filter_map(|k| {
-                let inertial = self.joints[k].inertial.as_ref()?;
-                let why = strange(&SpatialInertia::of(inertial), &self.shown(k))?;
-                let joint = &self.joints[k].name;
-                let link = match urdf.and_then(|original| original.link(k)) {
-                    Some(link) => format!("Link `{link}`, moved by joint `{joint}`,"),
-                    None => format!("The link of joint `{joint}`"),
-                };
-                Some(format!(
-                    "{link} {why}. No body is like that: `rig identify` takes a uniform block for what is known of it, a simulation takes it as it stands."
-                ))
-            })
-            .collect()
-    }
-
     /// Returns the directions about which link `k` turns, in frame k at zero position. Neighbouring axes keep their
     /// angle at every position. So axes that are parallel here stay parallel, or an axis between them is not parallel.
-    fn shown(&self, k: usize) -> Shown {
+    pub(super) fn shown(&self, k: usize) -> Shown {
         let mut direction: Option<Vector3<f64>> = None;
         for joint in &self.joints[..=k] {
             let turn = step(joint.alpha, joint.a, joint.theta, joint.d).rotation;
@@ -61,7 +43,7 @@ impl Robot {
 }
 
 /// Returns the fault of a body as the rest of a sentence about its link; `None` if it has no fault.
-fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
+pub(super) fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
     let about_origin_is_zero = body.inertia == Matrix3::zeros();
     if body.mass <= 0.0 {
         return Some(

@@ -2,8 +2,11 @@
 
 use rig_shared::transmission::TransmissionError;
 
-use super::check::{Fault, LARGEST, Must, Step, number, sound, written};
-use super::{Drive, Joint, Robot, Screw};
+use super::drive::Drive;
+use super::fault::{Fault, LARGEST, Must, Step, number, sound, written};
+use super::joint::Joint;
+use super::screw::Screw;
+use super::serial_robot::Robot;
 
 /// Margin around the crank's range within which a dead centre is refused, rad. There the ratio is 1 % of its maximum.
 const MARGIN: f64 = 0.01;
@@ -220,26 +223,44 @@ fn spread(robot: &Robot, middle: &[f64], draw: usize) -> Vec<f64> {
 
 /// Checks a drive on its own. [`check_transmission`] checks the drives together.
 pub(super) fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative, NotZero, Positive};
-    use Step::{At, Key};
-    let way = |k| [Key("drive"), Key(k)];
+    check_ratio(joint, drive)?;
+    check_numbers(joint, drive)?;
+    match &drive.screw {
+        Some(screw) => check_screw(joint, screw),
+        None => Ok(()),
+    }
+}
+
+/// Returns the way from a joint to a key of its drive.
+fn of_drive(key: &'static str) -> [Step; 2] {
+    [Step::Key("drive"), Step::Key(key)]
+}
+
+/// Checks that either a gear ratio or a screw moves the joint.
+fn check_ratio(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
     if drive.screw.is_none() {
         number(
             joint,
-            &way("gear_ratio"),
+            &of_drive("gear_ratio"),
             "gear ratio",
             "motor turns per joint turn",
-            NotZero,
+            Must::NotZero,
             drive.gear_ratio,
         )?;
     } else if drive.gear_ratio != 0.0 {
         return Err(Fault {
-            way: way("gear_ratio").to_vec(),
+            way: of_drive("gear_ratio").to_vec(),
             what: format!("the gear ratio of joint `{}`", joint.name),
             found: drive.gear_ratio.to_string(),
             right: "a screw moves this joint ([joint.drive.screw]); leave gear_ratio out".into(),
         });
     }
+    Ok(())
+}
+
+/// Checks the single numbers of motor, gear and encoder.
+fn check_numbers(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
+    use Must::{Finite, NotNegative, Positive};
     let numbers = [
         ("zero", "motor zero", "rad", Finite, drive.zero),
         (
@@ -279,7 +300,7 @@ pub(super) fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
         ),
     ];
     for (key, what, unit, must, value) in numbers {
-        number(joint, &way(key), what, unit, must, value)?;
+        number(joint, &of_drive(key), what, unit, must, value)?;
     }
     let optional = [
         ("resistance", "Ω", drive.resistance),
@@ -297,49 +318,54 @@ pub(super) fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
     ];
     for (key, unit, value) in optional {
         if let Some(v) = value {
-            number(joint, &way(key), key, unit, Positive, v)?;
+            number(joint, &of_drive(key), key, unit, Positive, v)?;
         }
     }
-    if let Some(screw) = &drive.screw {
-        let way = |k| [Key("drive"), Key("screw"), Key(k)];
-        number(
-            joint,
-            &way("lead"),
-            "lead of the screw",
-            "m per motor turn",
-            NotZero,
-            screw.lead,
-        )?;
-        number(
-            joint,
-            &way("crank"),
-            "crank of the screw",
-            "m",
-            Positive,
-            screw.crank,
-        )?;
-        for (i, v) in screw.anchor.iter().enumerate() {
-            let way = [Key("drive"), Key("screw"), Key("anchor"), At(i)];
-            number(joint, &way, "anchor of the screw", "m", Finite, *v)?;
-        }
-        number(
-            joint,
-            &way("offset"),
-            "crank's offset",
-            "rad",
-            Finite,
-            screw.offset,
-        )?;
-        if let Some([low, high]) = screw.range
-            && !(low.is_finite() && high.is_finite() && low < high)
-        {
-            return Err(Fault {
-                way: way("range").to_vec(),
-                what: format!("the range of the crank of joint `{}`", joint.name),
-                found: format!("[{low}, {high}]"),
-                right: "it must be [lowest, highest], two finite angles in rad".into(),
-            });
-        }
+    Ok(())
+}
+
+/// Checks the numbers of a screw.
+fn check_screw(joint: &Joint, screw: &Screw) -> Result<(), Fault> {
+    use Must::{Finite, NotZero, Positive};
+    use Step::{At, Key};
+    let way = |k| [Key("drive"), Key("screw"), Key(k)];
+    number(
+        joint,
+        &way("lead"),
+        "lead of the screw",
+        "m per motor turn",
+        NotZero,
+        screw.lead,
+    )?;
+    number(
+        joint,
+        &way("crank"),
+        "crank of the screw",
+        "m",
+        Positive,
+        screw.crank,
+    )?;
+    for (i, v) in screw.anchor.iter().enumerate() {
+        let way = [Key("drive"), Key("screw"), Key("anchor"), At(i)];
+        number(joint, &way, "anchor of the screw", "m", Finite, *v)?;
+    }
+    number(
+        joint,
+        &way("offset"),
+        "crank's offset",
+        "rad",
+        Finite,
+        screw.offset,
+    )?;
+    if let Some([low, high]) = screw.range
+        && !(low.is_finite() && high.is_finite() && low < high)
+    {
+        return Err(Fault {
+            way: way("range").to_vec(),
+            what: format!("the range of the crank of joint `{}`", joint.name),
+            found: format!("[{low}, {high}]"),
+            right: "it must be [lowest, highest], two finite angles in rad".into(),
+        });
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Remarks on limits that look like degrees, before a motion is designed from them.
 
-use super::{JointKind, Robot};
+use super::joint::{Joint, JointKind};
+use super::serial_robot::Robot;
 use rig_output::format_significant;
 
 /// Turns to either side of zero above which a limit gets a remark. Wrists of arms have up to two.
@@ -13,7 +14,7 @@ impl Robot {
     /// One sentence for each revolute joint whose limits look like degrees.
     pub fn limits_in_degrees(&self) -> Vec<String> {
         let number = |v: f64| format_significant(v, 4);
-        let of_joint = |joint: &super::Joint| {
+        let of_joint = |joint: &Joint| {
             let limits = joint.limits.as_ref()?;
             let [low, high] = limits.position;
             if joint.kind != JointKind::Revolute || !low.is_finite() || !high.is_finite() {

@@ -4,16 +4,17 @@
 //! its zero. x of frame i lies along the common normal to the next axis; frame 0 takes z from the base
 //! link, so that gravity stays (0, 0, −g).
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::angles::{ROUNDING, angle_about, right_angle, squared_poses, squared_theta};
+use super::angles::{angle_about, squared_poses, squared_theta};
+use super::drive::Drive;
+use super::frame::step;
+use super::joint::{Joint, JointKind};
+use super::right_angle::{ROUNDING, right_angle};
+use super::serial_robot::Robot;
 use super::urdf::{Body, Chain};
-use super::{Drive, Joint, JointKind, Origin, Robot};
+use super::worth::Origin;
 use rig_output::format_significant;
-
-/// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the base link. It is
-/// the rounded value that robot descriptions and simulators commonly use.
-pub(super) const GRAVITY: f64 = 9.81;
 
 /// Axes closer to parallel than this are parallel, rad. [`squared_poses`] leaves no angles between rounding and its own
 /// limit.
@@ -31,16 +32,6 @@ pub(super) struct Converted {
     pub links: Vec<Isometry3<f64>>,
     /// Angles that were replaced, one sentence each.
     pub remarks: Vec<String>,
-}
-
-/// Modified DH step without the joint's own motion.
-pub(super) fn step(alpha: f64, a: f64, theta: f64, d: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::identity(),
-        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha),
-    ) * Translation3::new(a, 0.0, 0.0)
-        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), theta)
-        * Translation3::new(0.0, 0.0, d)
 }
 
 /// A line in the base link's frame.

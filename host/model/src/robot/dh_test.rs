@@ -10,8 +10,9 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use roxmltree::Document;
 
+use super::super::frame::GRAVITY;
 use super::super::urdf;
-use super::{GRAVITY, convert, joint_pose};
+use super::{convert, joint_pose};
 use crate::robot::{JointKind, Robot};
 
 type Mat = [[f64; 4]; 4];

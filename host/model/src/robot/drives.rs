@@ -6,7 +6,10 @@ use rig_shared::transmission::{
     DriveKind, DriveMap, MOTOR_COLUMNS, Transmission, TransmissionError, motor_column,
 };
 
-use super::{JointKind, Robot, Screw};
+use super::drive::Drive;
+use super::joint::{Inertial, JointFriction, JointKind};
+use super::screw::Screw;
+use super::serial_robot::Robot;
 
 /// The numbers of one drive.
 struct Numbers {
@@ -224,7 +227,7 @@ impl Robot {
             let rest = row[column::DRIVE_INERTIA] - shares[k][0];
             if joint.drive.is_none() && rest != 0.0 {
                 // Rotor inertia added to the link would make a body that cannot exist.
-                joint.drive = Some(super::Drive {
+                joint.drive = Some(Drive {
                     gear_ratio: 1.0,
                     ..Default::default()
                 });
@@ -242,12 +245,12 @@ impl Robot {
                     }
                 }
             }
-            joint.inertial = Some(super::Inertial {
+            joint.inertial = Some(Inertial {
                 mass: row[column::MASS],
                 first_moment,
                 inertia,
             });
-            joint.friction = Some(super::JointFriction {
+            joint.friction = Some(JointFriction {
                 coulomb: at_least_zero("Coulomb friction", k, row[column::COULOMB]),
                 viscous: at_least_zero(
                     "Viscous friction",

@@ -1,15 +1,39 @@
-//! The `[[effect]]` tables of a description: read, checked, written.
+//! The `[[effect]]` tables of a description, as data and as TOML.
 
 use std::collections::HashSet;
-use std::fmt::Write as _;
 
-use rig_shared::effects::{Channel, Effect, Kind, Parameter};
+use rig_shared::effects::{Effect, Kind, Parameter};
 use serde::{Deserialize, Serialize};
 
-use super::check::{EFFECT_NAMES, Fault, Step};
-use super::sizes::LARGEST_LINK;
-use super::written::{float, line, quoted};
-use super::{JointKind, Robot};
+use super::fault::{Fault, Step};
+use super::joint::JointKind;
+use super::link_size::LARGEST_LINK;
+
+/// Names of effects beyond the standard model.
+pub const EFFECT_NAMES: [&str; 22] = [
+    "stribeck",
+    "asymmetric_coulomb",
+    "quadratic_drag",
+    "load_friction",
+    "position_friction",
+    "presliding",
+    "viscous_warmup",
+    "cogging",
+    "torque_ripple",
+    "gear_eccentricity",
+    "backlash",
+    "joint_elasticity",
+    "encoder_eccentricity",
+    "current_offset",
+    "torque_saturation",
+    "measurement_delay",
+    "gravity_tilt",
+    "payload",
+    "spring",
+    "drive_deadzone",
+    "inertia_coupling",
+    "torque_offset",
+];
 
 /// An effect beyond the standard model, as a description states it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,24 +47,13 @@ pub struct RobotEffect {
     pub effect: Effect<f64>,
 }
 
-/// An effect with its joints as indices from 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
-    /// The joint that it acts on.
-    pub joint: usize,
-    /// The other joint, if the law depends on the motion of a second joint.
-    pub other: Option<usize>,
-    /// Kind and parameters.
-    pub effect: Effect<f64>,
-}
-
 /// The fault of one table.
 pub(super) struct Refusal {
     /// The key at fault; `None` for the whole table.
-    key: Option<String>,
-    what: String,
-    found: String,
-    right: String,
+    pub key: Option<String>,
+    pub what: String,
+    pub found: String,
+    pub right: String,
 }
 
 impl Refusal {
@@ -80,7 +93,7 @@ pub fn title_of(kind: Kind) -> String {
 }
 
 /// Returns true if the law depends on the motion of a second joint.
-fn has_other(kind: Kind) -> bool {
+pub(super) fn has_other(kind: Kind) -> bool {
     kind == Kind::InertiaCoupling
 }
 
@@ -292,110 +305,6 @@ impl From<RobotEffect> for toml::Table {
             table.insert(p.name.into(), value.into());
         }
         table
-    }
-}
-
-/// Returns the first fault of the effect tables themselves.
-pub(super) fn check_tables(tables: &[toml::Value]) -> Result<(), Fault> {
-    for (i, table) in tables.iter().enumerate() {
-        if let Some(table) = table.as_table() {
-            RobotEffect::from_table(table).map_err(|refusal| refusal.at(i))?;
-        }
-    }
-    Ok(())
-}
-
-/// Checks that the joints of all effects exist and can have these effects.
-pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
-    let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
-    let names = format!("this robot's joints are {}", joints.join(", "));
-    let (mut elastic, mut presliding) = (HashSet::new(), HashSet::new());
-    for (i, effect) in robot.effects.iter().enumerate() {
-        let table = toml::Table::from(effect.clone());
-        RobotEffect::from_table(&table).map_err(|refusal| refusal.at(i))?;
-        let kind = effect.effect.kind;
-        let refuse = |key: &str, found: &Option<String>, right: &str| {
-            Refusal {
-                key: Some(key.to_owned()),
-                what: format!("the {key}"),
-                found: found
-                    .as_ref()
-                    .map_or_else(|| "missing".into(), |name| format!("`{name}`")),
-                right: right.to_owned(),
-            }
-            .at(i)
-        };
-        let Some(joint) = robot.joint_of(effect) else {
-            return Err(refuse("joint", &effect.joint, &names));
-        };
-        if has_other(kind) {
-            let other = effect.other.as_deref().and_then(|n| robot.joint_index(n));
-            if other.is_none_or(|other| other == joint) {
-                let right = format!("it must name another joint; {names}");
-                return Err(refuse("other", &effect.other, &right));
-            }
-        }
-        let found = Some(kind.about().name.to_owned());
-        if kind.about().channel == Channel::Transmission && !elastic.insert(joint) {
-            let right = "the joint has another effect between motor and link; state one of them, backlash with the stiffness of both";
-            return Err(refuse("kind", &found, right));
-        }
-        if kind.is_presliding() && !presliding.insert(joint) {
-            let right = "the joint has another presliding, and one contact through which its friction acts; state one of them";
-            return Err(refuse("kind", &found, right));
-        }
-    }
-    Ok(())
-}
-
-impl Robot {
-    fn joint_of(&self, effect: &RobotEffect) -> Option<usize> {
-        match &effect.joint {
-            Some(name) => self.joint_index(name),
-            None => (self.joints.len() == 1).then_some(0),
-        }
-    }
-
-    /// Returns the effects with their joints as indices. Leaves out effects whose joint this robot does not have; a
-    /// loaded description has no such effect.
-    pub fn placed_effects(&self) -> Vec<Placed> {
-        self.effects
-            .iter()
-            .filter_map(|effect| {
-                Some(Placed {
-                    joint: self.joint_of(effect)?,
-                    other: effect.other.as_deref().and_then(|n| self.joint_index(n)),
-                    effect: effect.effect,
-                })
-            })
-            .collect()
-    }
-}
-
-/// Writes one table, with units in comments.
-pub(super) fn write_effect(out: &mut String, robot: &Robot, effect: &RobotEffect) {
-    let about = effect.effect.kind.about();
-    // Writing to a String cannot fail.
-    let _ = writeln!(out, "\n[[effect]]");
-    line(out, "kind", &quoted(about.name), about.title);
-    if let Some(law) = about.law {
-        line(out, "law", &quoted(law), about.source);
-    }
-    let joints = [
-        ("joint", &effect.joint, "on which it acts"),
-        ("other", &effect.other, "whose motion it depends on"),
-    ];
-    for (key, name, comment) in joints {
-        if let Some(name) = name {
-            line(out, key, &quoted(name), comment);
-        }
-    }
-    let kind = robot
-        .joint_of(effect)
-        .map_or(JointKind::Revolute, |j| robot.joints[j].kind);
-    for (p, value) in effect.values() {
-        let comment = format!("{}, {}", unit_of(p, kind), p.meaning);
-        line(out, p.name, &float(value), &comment);
     }
 }
 

@@ -1,9 +1,10 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use super::*;
-use crate::robot::ONE_LINK_TEMPLATE;
+use crate::robot::{ONE_LINK_TEMPLATE, Robot};
 
 fn with(effect: &str) -> Result<Robot, String> {
     let text = format!("{ONE_LINK_TEMPLATE}\n[[effect]]\n{effect}\n");

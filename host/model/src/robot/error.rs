@@ -3,6 +3,9 @@
 use std::fmt;
 use std::path::PathBuf;
 
+/// Largest robot description that is read. The largest published URDF files have a hundredth of this size.
+pub const MAX_BYTES: u64 = 16 << 20;
+
 /// A place in a text file, 1-based.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -52,7 +55,7 @@ pub enum RobotError {
         path: PathBuf,
     },
     /// The file is larger than any description.
-    #[error("{} is larger than {} MiB, but a robot description is a short text (.toml or .urdf); is this a recording?", path.display(), super::MAX_BYTES >> 20)]
+    #[error("{} is larger than {} MiB, but a robot description is a short text (.toml or .urdf); is this a recording?", path.display(), MAX_BYTES >> 20)]
     TooLarge {
         /// The file.
         path: PathBuf,

@@ -7,8 +7,9 @@
 use rig_shared::multibody::{COLUMNS, Chain, column, inertia_matrix};
 use rig_shared::transmission::DriveKind;
 
-use super::check::{Fault, Step, written};
-use super::{JointKind, Robot};
+use super::fault::{Fault, Step, written};
+use super::joint::JointKind;
+use super::serial_robot::Robot;
 
 /// Share of the largest term below which a difference is rounding.
 const ROUNDING: f64 = 1e-12;

@@ -2,12 +2,13 @@
 
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind as Kind, column};
 
-use super::{JointKind, Robot};
+use super::joint::{Joint, JointKind};
+use super::serial_robot::Robot;
 
 impl Robot {
     /// Returns the geometry, joint by joint, for [`rig_shared::multibody::Chain::new`].
     pub fn geometry(&self) -> Vec<JointGeometry<f64>> {
-        let joint = |joint: &super::Joint| JointGeometry {
+        let joint = |joint: &Joint| JointGeometry {
             kind: match joint.kind {
                 JointKind::Revolute => Kind::Revolute,
                 JointKind::Prismatic => Kind::Prismatic,
@@ -31,7 +32,7 @@ impl Robot {
     /// stated. Inertia and friction of the drives are on the joint side. [`Self::motor_parameters`] returns the terms
     /// of coupled drives and screws beyond the joints' diagonals.
     pub fn standard_parameters(&self) -> Vec<[f64; COLUMNS]> {
-        let joint = |joint: &super::Joint| {
+        let joint = |joint: &Joint| {
             let mut row = [0.0; COLUMNS];
             if let Some(inertial) = &joint.inertial {
                 row[..column::DRIVE_INERTIA].copy_from_slice(&inertial.parameters());

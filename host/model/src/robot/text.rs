@@ -6,10 +6,12 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::angles::square;
-use super::check::{Fault, Step, check};
-use super::effects::check_tables;
+use super::check::check;
+use super::check_effects::check_tables;
+use super::drive::Drive;
 use super::error::{Place, RobotError};
-use super::{Drive, Robot};
+use super::fault::{Fault, Step};
+use super::serial_robot::Robot;
 
 /// Returns the robot and the remarks on the text, one sentence each.
 pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), RobotError> {

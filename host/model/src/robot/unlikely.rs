@@ -1,6 +1,7 @@
 //! Remarks on values that no robot on the earth has: they have another unit, or a ratio is inverted.
 
-use super::{Joint, JointKind, Robot};
+use super::joint::{Joint, JointKind};
+use super::serial_robot::Robot;
 use rig_output::format_trimmed;
 
 /// Standard gravity, m/s².

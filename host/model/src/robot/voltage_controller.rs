@@ -2,9 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Joint;
-use super::check::{Fault, Must, Step, number};
-
 /// Behaviour of the integral of the position error while the output is at its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -97,61 +94,4 @@ impl VoltageController {
         let share = 2.0 * voltage.abs() / (none + root);
         none + slope * share
     }
-}
-
-/// Refuses values that no controller has.
-pub(super) fn check_voltage_controller(joint: &Joint, c: &VoltageController) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative, Positive};
-    let way = |key| [Step::Key("voltage_controller"), Step::Key(key)];
-    let unit = joint.kind.units().0;
-    for (key, what, per, must, value) in [
-        (
-            "proportional",
-            "proportional gain",
-            "1/",
-            NotNegative,
-            c.proportional,
-        ),
-        ("integral", "integral gain", "1/s/", NotNegative, c.integral),
-        ("derivative", "derivative gain", "s/", Finite, c.derivative),
-        (
-            "velocity_feedforward",
-            "velocity feed-forward",
-            "s/",
-            Finite,
-            c.velocity_feedforward,
-        ),
-        (
-            "acceleration_feedforward",
-            "acceleration feed-forward",
-            "s^2/",
-            Finite,
-            c.acceleration_feedforward,
-        ),
-    ] {
-        number(joint, &way(key), what, &format!("{per}{unit}"), must, value)?;
-    }
-    number(joint, &way("bias"), "constant share", "1", Finite, c.bias)?;
-    if let Some(limit) = c.limit {
-        number(
-            joint,
-            &way("limit"),
-            "largest share of the supply",
-            "1",
-            Positive,
-            limit,
-        )?;
-    }
-    for (place, what, must) in [
-        (0, "supply without load", Positive),
-        (1, "change of the supply", Finite),
-    ] {
-        let way = [
-            Step::Key("voltage_controller"),
-            Step::Key("supply"),
-            Step::At(place),
-        ];
-        number(joint, &way, what, "V", must, c.supply[place])?;
-    }
-    Ok(())
 }

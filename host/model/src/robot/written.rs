@@ -1,31 +1,17 @@
 //! Writes a description as TOML, each line with its unit.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::effects::{check_effects, write_effect};
+use super::check_effects::check_effects;
+use super::drive::Drive;
+use super::effects::{RobotEffect, unit_of};
 use super::error::RobotError;
-use super::{AntiWindup, Drive, Joint, JointKind, Region, Robot, Screw, VoltageController};
-
-/// Returns the shortest form that reads back to the same number, always with a point or an exponent.
-pub(super) fn float(value: f64) -> String {
-    format!("{value:?}")
-}
-
-pub(super) fn list(values: &[f64]) -> String {
-    let items: Vec<String> = values.iter().map(|v| float(*v)).collect();
-    format!("[{}]", items.join(", "))
-}
-
-pub(super) fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
-}
-
-pub(super) fn line(out: &mut String, key: &str, value: &str, comment: &str) {
-    let assignment = format!("{key} = {value}");
-    // Writing to a String cannot fail.
-    let _ = writeln!(out, "{assignment:<40} # {comment}");
-}
+use super::joint::{Controller, Inertial, Joint, JointFriction, JointKind, JointLimits};
+use super::screw::Screw;
+use super::serial_robot::Robot;
+use super::toml_lines::{float, line, list, optional, quoted, table};
+use super::voltage_controller::{AntiWindup, VoltageController};
+use super::workspace::Region;
 
 pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     let mut out = String::new();
@@ -101,11 +87,33 @@ fn write_region(out: &mut String, region: &Region) {
 }
 
 fn write_joint(out: &mut String, joint: &Joint) {
+    let (angle, force) = joint.kind.units();
+    write_geometry(out, joint);
+    if let Some(i) = &joint.inertial {
+        write_inertial(out, i);
+    }
+    if let Some(l) = &joint.limits {
+        write_limits(out, l, angle, force);
+    }
+    if let Some(f) = &joint.friction {
+        write_friction(out, f, angle, force);
+    }
+    if let Some(d) = &joint.drive {
+        write_drive(out, d);
+    }
+    if let Some(c) = &joint.controller {
+        write_controller(out, c, angle, force);
+    }
+    if let Some(c) = &joint.voltage_controller {
+        write_voltage_controller(out, c, angle);
+    }
+}
+
+fn write_geometry(out: &mut String, joint: &Joint) {
     let kind = match joint.kind {
         JointKind::Revolute => "revolute",
         JointKind::Prismatic => "prismatic",
     };
-    let (angle, force) = joint.kind.units();
     out.push_str("\n[[joint]]\n");
     line(out, "name", &quoted(&joint.name), "unique in the robot");
     line(out, "kind", &quoted(kind), "revolute or prismatic");
@@ -133,75 +141,73 @@ fn write_joint(out: &mut String, joint: &Joint) {
         &float(joint.d),
         "m, translation along z of frame i (offset where prismatic)",
     );
-    if let Some(i) = &joint.inertial {
-        out.push_str("\n[joint.inertial]\n");
-        line(out, "mass", &float(i.mass), "kg");
+}
+
+fn write_inertial(out: &mut String, i: &Inertial) {
+    out.push_str("\n[joint.inertial]\n");
+    line(out, "mass", &float(i.mass), "kg");
+    line(
+        out,
+        "first_moment",
+        &list(&i.first_moment),
+        "m*c in frame i, kg*m",
+    );
+    line(
+        out,
+        "inertia",
+        &list(&i.inertia),
+        "Ixx Ixy Ixz Iyy Iyz Izz about the origin of frame i, kg*m^2",
+    );
+}
+
+fn write_limits(out: &mut String, l: &JointLimits, angle: &str, force: &str) {
+    out.push_str("\n[joint.limits]\n");
+    line(out, "position", &list(&l.position), angle);
+    if let Some(soft) = &l.soft_position {
         line(
             out,
-            "first_moment",
-            &list(&i.first_moment),
-            "m*c in frame i, kg*m",
-        );
-        line(
-            out,
-            "inertia",
-            &list(&i.inertia),
-            "Ixx Ixy Ixz Iyy Iyz Izz about the origin of frame i, kg*m^2",
+            "soft_position",
+            &list(soft),
+            &format!("{angle}, range of designed motions"),
         );
     }
-    if let Some(l) = &joint.limits {
-        out.push_str("\n[joint.limits]\n");
-        line(out, "position", &list(&l.position), angle);
-        if let Some(soft) = &l.soft_position {
-            line(
-                out,
-                "soft_position",
-                &list(soft),
-                &format!("{angle}, range of designed motions"),
-            );
-        }
-        line(out, "velocity", &float(l.velocity), &format!("{angle}/s"));
-        optional(out, "acceleration", l.acceleration, &format!("{angle}/s^2"));
-        optional(out, "torque", l.torque, force);
-    }
-    if let Some(f) = &joint.friction {
-        out.push_str("\n[joint.friction]\n");
-        line(out, "coulomb", &float(f.coulomb), force);
-        line(
-            out,
-            "viscous",
-            &float(f.viscous),
-            &format!("{force}*s/{angle}"),
-        );
-        line(
-            out,
-            "offset",
-            &float(f.offset),
-            &format!("{force}, constant torque or force at the joint"),
-        );
-    }
-    if let Some(d) = &joint.drive {
-        write_drive(out, d);
-    }
-    if let Some(c) = &joint.controller {
-        out.push_str("\n[joint.controller]\n");
-        line(out, "position_gain", &float(c.position_gain), "1/s");
-        line(
-            out,
-            "velocity_gain",
-            &float(c.velocity_gain),
-            &format!("controller output per {angle}/s"),
-        );
-        line(
-            out,
-            "torque_gain",
-            &float(c.torque_gain),
-            &format!("{force} per controller output"),
-        );
-    }
-    if let Some(c) = &joint.voltage_controller {
-        write_voltage_controller(out, c, angle);
-    }
+    line(out, "velocity", &float(l.velocity), &format!("{angle}/s"));
+    optional(out, "acceleration", l.acceleration, &format!("{angle}/s^2"));
+    optional(out, "torque", l.torque, force);
+}
+
+fn write_friction(out: &mut String, f: &JointFriction, angle: &str, force: &str) {
+    out.push_str("\n[joint.friction]\n");
+    line(out, "coulomb", &float(f.coulomb), force);
+    line(
+        out,
+        "viscous",
+        &float(f.viscous),
+        &format!("{force}*s/{angle}"),
+    );
+    line(
+        out,
+        "offset",
+        &float(f.offset),
+        &format!("{force}, constant torque or force at the joint"),
+    );
+}
+
+fn write_controller(out: &mut String, c: &Controller, angle: &str, force: &str) {
+    out.push_str("\n[joint.controller]\n");
+    line(out, "position_gain", &float(c.position_gain), "1/s");
+    line(
+        out,
+        "velocity_gain",
+        &float(c.velocity_gain),
+        &format!("controller output per {angle}/s"),
+    );
+    line(
+        out,
+        "torque_gain",
+        &float(c.torque_gain),
+        &format!("{force} per controller output"),
+    );
 }
 
 fn write_voltage_controller(out: &mut String, c: &VoltageController, angle: &str) {
@@ -366,44 +372,29 @@ fn write_screw(out: &mut String, s: &Screw) {
     }
 }
 
-/// Returns an inline table of numbers by name.
-fn table(values: &BTreeMap<String, f64>) -> String {
-    let key = |name: &str| {
-        let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        if !name.is_empty() && name.chars().all(bare) {
-            name.to_owned()
-        } else {
-            quoted_key(name)
-        }
-    };
-    let items: Vec<String> = values
-        .iter()
-        .map(|(name, v)| format!("{} = {}", key(name), float(*v)))
-        .collect();
-    format!("{{ {} }}", items.join(", "))
-}
-
-/// Returns a name as a basic TOML string on one line.
-fn quoted_key(name: &str) -> String {
-    let mut text = String::from("\"");
-    for c in name.chars() {
-        match c {
-            '"' | '\\' => {
-                text.push('\\');
-                text.push(c);
-            }
-            c if c.is_control() => {
-                let _ = write!(text, "\\u{:04X}", u32::from(c));
-            }
-            c => text.push(c),
+/// Writes one table, with units in comments.
+fn write_effect(out: &mut String, robot: &Robot, effect: &RobotEffect) {
+    let about = effect.effect.kind.about();
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "\n[[effect]]");
+    line(out, "kind", &quoted(about.name), about.title);
+    if let Some(law) = about.law {
+        line(out, "law", &quoted(law), about.source);
+    }
+    let joints = [
+        ("joint", &effect.joint, "on which it acts"),
+        ("other", &effect.other, "whose motion it depends on"),
+    ];
+    for (key, name, comment) in joints {
+        if let Some(name) = name {
+            line(out, key, &quoted(name), comment);
         }
     }
-    text.push('"');
-    text
-}
-
-fn optional(out: &mut String, key: &str, value: Option<f64>, comment: &str) {
-    if let Some(v) = value {
-        line(out, key, &float(v), comment);
+    let kind = robot
+        .joint_of(effect)
+        .map_or(JointKind::Revolute, |j| robot.joints[j].kind);
+    for (p, value) in effect.values() {
+        let comment = format!("{}, {}", unit_of(p, kind), p.meaning);
+        line(out, p.name, &float(value), &comment);
     }
 }

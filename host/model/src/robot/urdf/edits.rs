@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use roxmltree::Document;
 
-use super::Body;
+use super::chain::Body;
 use super::reader::{Xml, child};
 use super::spatial::SpatialInertia;
 use super::write::{comment, inertial_element};

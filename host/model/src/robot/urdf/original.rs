@@ -10,14 +10,17 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rig_shared::multibody::column;
 use roxmltree::Document;
 
+use super::chain::Chain;
 use super::edits::{Edit, at, put_friction, put_inertia, spliced};
 use super::reader::{Xml, parsed};
+use super::sizes::check_sizes;
 use super::spatial::SpatialInertia;
-use super::write::{comment, escaped, levelled, rpy};
-use super::{Chain, Urdf};
+use super::tree::read;
+use super::write::{Urdf, comment, escaped, levelled, rpy};
 use crate::robot::dh::convert;
 use crate::robot::error::RobotError;
-use crate::robot::{Inertial, Joint, Robot};
+use crate::robot::joint::{Inertial, Joint};
+use crate::robot::serial_robot::Robot;
 
 /// Values that agree within this share of the largest of their kind are equal: the rounding of a change of frames.
 const ROUNDING: f64 = 1e-12;
@@ -42,9 +45,9 @@ impl Original {
     /// # Errors
     /// [`RobotError`], as [`Robot::from_urdf`].
     pub fn read(text: String, path: &Path) -> Result<Self, RobotError> {
-        let mut chain = super::read(&text, path)?;
+        let mut chain = read(&text, path)?;
         let converted = convert(&chain);
-        super::check_sizes(&chain, &converted.robot, path)?;
+        check_sizes(&chain, &converted.robot, path)?;
         chain.remarks.extend(converted.remarks);
         Ok(Self {
             text,

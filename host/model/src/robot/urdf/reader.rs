@@ -7,9 +7,9 @@ use std::path::Path;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
-use crate::robot::angles::WRITTEN;
-use crate::robot::check::{LARGEST, sound};
 use crate::robot::error::{Place, RobotError};
+use crate::robot::fault::{LARGEST, sound};
+use crate::robot::right_angle::WRITTEN;
 
 /// A file being read.
 pub(super) struct Reader<'a> {

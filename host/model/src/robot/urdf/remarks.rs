@@ -4,8 +4,9 @@ use rig_shared::effects::Parameter;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::DriveKind;
 
-use crate::robot::effects::{title_of, unit_of};
-use crate::robot::{JointKind, Robot, RobotEffect};
+use crate::robot::effects::{RobotEffect, title_of, unit_of};
+use crate::robot::joint::JointKind;
+use crate::robot::serial_robot::Robot;
 use rig_output::format_significant;
 
 impl Robot {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::robot::Inertial;
+use crate::robot::joint::Inertial;
 
 /// Mass, first moment and inertia of a rigid body, all about the origin of one frame.
 #[derive(Clone, Copy, Debug)]

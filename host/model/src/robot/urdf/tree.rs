@@ -1,15 +1,28 @@
 //! Converts the tree of links to a chain of bodies, each moved by one joint.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
+use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
 use rig_shared::multibody::MAX_JOINTS;
 
-use super::reader::{Reader, Xml, child};
+use super::chain::{Body, Chain};
+use super::reader::{Reader, Xml, child, parsed};
 use super::spatial::SpatialInertia;
-use super::{Body, Chain};
-use crate::robot::JointKind;
 use crate::robot::error::{Place, RobotError};
+use crate::robot::joint::JointKind;
+
+/// Reads the text of a file; `path` only names it in messages.
+pub(in crate::robot) fn read(text: &str, path: &Path) -> Result<Chain, RobotError> {
+    let document = parsed(text, path)?;
+    Reader {
+        path,
+        document: &document,
+        remarks: RefCell::default(),
+    }
+    .chain()
+}
 
 /// A movable joint with the pose of its parent link in the frame of the body before it.
 type Outgoing<'a> = (Xml<'a>, Isometry3<f64>);

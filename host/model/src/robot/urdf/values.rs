@@ -7,8 +7,8 @@ use nalgebra::Matrix3;
 use super::reader::{Reader, Xml, child};
 use super::spatial::SpatialInertia;
 use crate::robot::error::RobotError;
-use crate::robot::sizes::too_wide;
-use crate::robot::{JointFriction, JointLimits};
+use crate::robot::joint::{JointFriction, JointLimits};
+use crate::robot::link_size::too_wide;
 use rig_output::format_significant;
 
 /// Round effort limits from this value on count as placeholders, N·m or N.

@@ -11,10 +11,11 @@ use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 use rig_shared::multibody::column;
 use rig_shared::transmission::DriveKind;
 
-use super::SpatialInertia;
-use crate::robot::dh::{GRAVITY, step};
+use super::spatial::SpatialInertia;
 use crate::robot::error::RobotError;
-use crate::robot::{Joint, JointKind, Robot};
+use crate::robot::frame::{GRAVITY, step};
+use crate::robot::joint::{Joint, JointKind};
+use crate::robot::serial_robot::Robot;
 
 /// Limit written if the description has none: URDF demands one.
 const NO_LIMIT: f64 = 1e6;

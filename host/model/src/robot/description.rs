@@ -1,0 +1,125 @@
+//! Descriptions read from files, and written.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::encoding::{Decoded, decoded};
+use super::error::{MAX_BYTES, RobotError};
+use super::serial_robot::Robot;
+use super::urdf::{self, Original};
+use super::{dh, text, written};
+
+impl Robot {
+    /// Reads a description. The extension selects TOML or URDF; for other extensions the first character does.
+    pub fn load(path: &Path) -> Result<Self, RobotError> {
+        Ok(Description::load(path)?.robot)
+    }
+
+    /// Reads TOML text; `path` only names the source in messages. [`Description::load`] also returns the remarks.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, RobotError> {
+        Ok(text::read(text, path)?.0)
+    }
+
+    /// Reads URDF text (serial chain; fixed joints are merged) and converts it to modified
+    /// Denavit–Hartenberg frames; `path` only names the source in messages.
+    ///
+    /// Every joint keeps the URDF's zero and positive sense: z of its frame is the URDF axis.
+    pub fn from_urdf(text: &str, path: &Path) -> Result<Self, RobotError> {
+        let chain = urdf::read(text, path)?;
+        let robot = dh::convert(&chain).robot;
+        urdf::check_sizes(&chain, &robot, path)?;
+        Ok(robot)
+    }
+
+    /// Returns the description as TOML with units in comments. [`Robot::from_toml`] reads back an equal description.
+    pub fn to_toml(&self) -> Result<String, RobotError> {
+        written::write(self)
+    }
+}
+
+/// A file that describes a robot.
+#[derive(Debug)]
+pub struct Description {
+    /// The robot.
+    pub robot: Robot,
+    /// The file itself, if it is URDF.
+    pub urdf: Option<Original>,
+    /// Remarks for the user, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+impl Description {
+    /// Reads a description. The extension selects TOML or URDF; for other extensions the first character does.
+    ///
+    /// # Errors
+    /// [`RobotError`] with the fault of the file and its line.
+    pub fn load(path: &Path) -> Result<Self, RobotError> {
+        let (text, from) = read_text(path)?;
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase);
+        let urdf = match extension.as_deref() {
+            Some("toml") => false,
+            Some("urdf") => true,
+            _ => text.trim_start().starts_with('<'),
+        };
+        if !urdf {
+            let (robot, mut remarks) = text::read(&text, path)?;
+            remarks.extend(robot.implausible_bodies(None));
+            remarks.extend(robot.limits_in_degrees());
+            remarks.extend(robot.unlikely_values());
+            return Ok(Self {
+                remarks,
+                robot,
+                urdf: None,
+            });
+        }
+        let original = Original::read(text, path)?;
+        let robot = original.robot().clone();
+        let mut remarks = original.remarks().to_vec();
+        remarks.extend(from.map(|name| {
+            format!(
+                "{} was read as {name}; a URDF that is written from it is UTF-8.",
+                path.display()
+            )
+        }));
+        remarks.extend(robot.implausible_bodies(Some(&original)));
+        remarks.extend(robot.limits_in_degrees());
+        remarks.extend(robot.unlikely_values());
+        Ok(Self {
+            robot,
+            urdf: Some(original),
+            remarks,
+        })
+    }
+}
+
+/// Reads the whole file as text. Returns its encoding too if that is not UTF-8. Refuses a directory, and a file that is
+/// too large, empty or not text.
+fn read_text(path: &Path) -> Result<(String, Option<&'static str>), RobotError> {
+    let failed = |source| RobotError::Read {
+        path: path.into(),
+        source,
+    };
+    if std::fs::metadata(path).map_err(failed)?.is_dir() {
+        return Err(RobotError::Directory { path: path.into() });
+    }
+    let mut bytes = Vec::new();
+    // One byte more than allowed: this detects an oversized file even if its length is unknown.
+    let mut limited = File::open(path).map_err(failed)?.take(MAX_BYTES + 1);
+    limited.read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(RobotError::TooLarge { path: path.into() });
+    }
+    let Decoded { text, from } = decoded(&bytes).map_err(|wrong| RobotError::NotText {
+        path: path.into(),
+        offset: wrong.offset,
+        line: wrong.line,
+    })?;
+    if text.trim().is_empty() {
+        return Err(RobotError::Empty { path: path.into() });
+    }
+    Ok((text, from))
+}

@@ -1,0 +1,47 @@
+//! The whole robot: its joints, and what concerns all of them.
+
+use serde::{Deserialize, Serialize};
+
+use super::array::exact;
+use super::band::IdentifiedBand;
+use super::effects::RobotEffect;
+use super::joint::Joint;
+use super::workspace::Region;
+use super::worth::Origin;
+
+/// A serial robot as a file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Robot {
+    /// Name for titles and files.
+    pub name: String,
+    /// Gravity acceleration in the base frame, m/s².
+    #[serde(deserialize_with = "exact")]
+    pub gravity: [f64; 3],
+    /// Joints from the base outwards.
+    #[serde(rename = "joint")]
+    pub joints: Vec<Joint>,
+    /// Regions that points of the links must not leave.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub workspace: Vec<Region>,
+    /// Effects beyond the standard model, as `diagnose` adds them.
+    #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<RobotEffect>,
+    /// Band of the identification, if the values were identified.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identified: Option<IdentifiedBand>,
+    /// Source of the values. It decides how far they are trusted ([`worth`](fn@super::worth)). Not stored in the file.
+    #[serde(skip)]
+    pub origin: Origin,
+    /// Frame of the last URDF link in the frame of the last joint. Identity if no URDF was read. Not stored in the
+    /// file.
+    #[serde(skip)]
+    pub last_link: nalgebra::Isometry3<f64>,
+}
+
+impl Robot {
+    /// Returns the index (from 0) of the joint called `name`.
+    pub fn joint_index(&self, name: &str) -> Option<usize> {
+        self.joints.iter().position(|j| j.name == name)
+    }
+}

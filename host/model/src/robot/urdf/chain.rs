@@ -1,0 +1,42 @@
+//! The chain of bodies that a URDF file describes.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::spatial::SpatialInertia;
+use crate::robot::error::Place;
+use crate::robot::joint::{JointFriction, JointKind, JointLimits};
+
+/// A joint and the body that it moves.
+#[derive(Debug)]
+pub(in crate::robot) struct Body {
+    pub joint: String,
+    /// Line and column of the joint.
+    pub place: Place,
+    /// The link that the joint moves.
+    pub link: String,
+    /// Links of this body with an `<inertial>`: the link that the joint moves, and links fixed to it.
+    pub heavy: Vec<String>,
+    pub kind: JointKind,
+    /// Frame of this joint (its child link) in the frame of the previous body at q = 0.
+    pub origin: Isometry3<f64>,
+    /// Unit vector of the axis in the joint's frame.
+    pub axis: Vector3<f64>,
+    /// Inertia in the joint's frame, including everything fixed to the link.
+    pub inertia: SpatialInertia,
+    pub limits: Option<JointLimits>,
+    pub friction: Option<JointFriction>,
+    pub reduction: Option<f64>,
+}
+
+/// The movable bodies from the base outwards; gravity points along −z of the base link.
+#[derive(Debug)]
+pub(in crate::robot) struct Chain {
+    pub name: String,
+    /// Name of the file.
+    pub file: String,
+    /// The base link.
+    pub base: String,
+    pub bodies: Vec<Body>,
+    /// Remarks for the user, one sentence each.
+    pub remarks: Vec<String>,
+}

@@ -1,0 +1,27 @@
+//! Refuses chains that no robot has, with the place in the file.
+
+use std::path::Path;
+
+use super::chain::Chain;
+use crate::robot::error::RobotError;
+use crate::robot::inertia::negative_inertia;
+use crate::robot::serial_robot::Robot;
+use crate::robot::sizes::oversized;
+
+/// Refuses a chain whose links, as `joints` describe them, are larger than any real link.
+pub(in crate::robot) fn check_sizes(
+    chain: &Chain,
+    robot: &Robot,
+    path: &Path,
+) -> Result<(), RobotError> {
+    match oversized(&robot.joints).or_else(|| negative_inertia(robot)) {
+        None => Ok(()),
+        Some((k, fault)) => Err(RobotError::Value {
+            path: path.into(),
+            place: chain.bodies[k].place,
+            what: fault.what,
+            found: fault.found,
+            right: fault.right,
+        }),
+    }
+}
