@@ -81,6 +81,18 @@ fn snap_length(length: f64) -> f64 {
     if length.abs() < ROUNDING { 0.0 } else { length }
 }
 
+/// Returns frame 0 in the base link's frame, by the first axis.
+fn base_frame(first: Line) -> Isometry3<f64> {
+    let base_line = Line {
+        point: Vector3::zeros(),
+        direction: Vector3::z(),
+    };
+    let (origin, x) = common_normal(base_line, first, Vector3::zeros(), Vector3::x());
+    let y = Vector3::z().cross(&x);
+    let rotation = UnitQuaternion::from_basis_unchecked(&[x, y, Vector3::z()]);
+    Isometry3::from_parts(origin.into(), rotation)
+}
+
 /// Converts a URDF chain. Never fails: every chain of axes has such frames.
 pub(super) fn convert(chain: &Chain) -> Converted {
     let (poses, mut remarks) = squared_poses(chain);
@@ -93,14 +105,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         point: poses[i].translation.vector,
         direction: poses[i].rotation * chain.bodies[i].axis,
     };
-    let base_line = Line {
-        point: Vector3::zeros(),
-        direction: Vector3::z(),
-    };
-    let (origin, x) = common_normal(base_line, axis_of(0), Vector3::zeros(), Vector3::x());
-    let y = Vector3::z().cross(&x);
-    let rotation = UnitQuaternion::from_basis_unchecked(&[x, y, Vector3::z()]);
-    let base = Isometry3::from_parts(origin.into(), rotation);
+    let base = base_frame(axis_of(0));
 
     // Each frame is placed relative to the frame that the parameters produce so far. So neither the snapping above nor
     // the file's rounding accumulates along the chain.

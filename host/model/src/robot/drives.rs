@@ -7,7 +7,7 @@ use rig_shared::transmission::{
 };
 
 use super::drive::Drive;
-use super::joint::{Inertial, JointFriction, JointKind};
+use super::joint::{Inertial, Joint, JointFriction, JointKind};
 use super::screw::Screw;
 use super::serial_robot::Robot;
 
@@ -171,20 +171,28 @@ impl Robot {
         motors: &[[f64; MOTOR_COLUMNS]],
     ) -> (Self, Vec<String>) {
         let mut robot = self.clone();
-        let mut remarks = Vec::new();
-        let mut at_least_zero = |name: &str, k: usize, value: f64| {
-            if value < 0.0 {
-                remarks.push(format!(
-                    "{name} of joint {} came out as {value}, which feeds energy in; 0 stands in the description.",
-                    self.joints[k].name
-                ));
-                0.0
-            } else {
-                value
-            }
+        let mut floor = Floor {
+            joints: &self.joints,
+            remarks: Vec::new(),
         };
         let kinds = self.drive_kinds();
-        // Contributions of the coupled motors to the diagonals.
+        let shares = self.put_motors(&mut robot, motors, &kinds, &mut floor);
+        for (k, (joint, row)) in robot.joints.iter_mut().zip(rows).enumerate() {
+            let simple = kinds[k] == DriveKind::Simple;
+            put_joint(joint, k, row, simple, shares[k], &mut floor);
+        }
+        (robot, floor.remarks)
+    }
+
+    /// Puts the parameters of the motors into the drives of `robot`. Returns the contributions of the coupled motors to
+    /// the diagonals: inertia and viscous friction, one pair a joint.
+    fn put_motors(
+        &self,
+        robot: &mut Self,
+        motors: &[[f64; MOTOR_COLUMNS]],
+        kinds: &[DriveKind],
+        floor: &mut Floor<'_>,
+    ) -> Vec<[f64; 2]> {
         let mut shares = vec![[0.0; 2]; self.joints.len()];
         for (k, kind) in kinds.iter().enumerate() {
             let (Some(drive), Some(own)) = (&mut robot.joints[k].drive, motors.get(k)) else {
@@ -196,17 +204,17 @@ impl Robot {
                 DriveKind::Coupled => drive.gear_ratio.abs(),
                 DriveKind::Varying => 1.0,
             };
-            drive.rotor_inertia = at_least_zero(
+            drive.rotor_inertia = floor.at_least_zero(
                 "Inertia of the motor",
                 k,
                 own[motor_column::INERTIA] / (scale * scale),
             );
-            drive.viscous = at_least_zero(
+            drive.viscous = floor.at_least_zero(
                 "Viscous friction of the motor",
                 k,
                 own[motor_column::VISCOUS] / (scale * scale),
             );
-            drive.coulomb = at_least_zero(
+            drive.coulomb = floor.at_least_zero(
                 "Coulomb friction of the motor",
                 k,
                 own[motor_column::COULOMB] / scale,
@@ -219,48 +227,7 @@ impl Robot {
                 }
             }
         }
-        for (k, (joint, row)) in robot.joints.iter_mut().zip(rows).enumerate() {
-            let mut first_moment = [0.0; 3];
-            first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
-            let mut inertia = [0.0; 6];
-            inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
-            let rest = row[column::DRIVE_INERTIA] - shares[k][0];
-            if joint.drive.is_none() && rest != 0.0 {
-                // Rotor inertia added to the link would make a body that cannot exist.
-                joint.drive = Some(Drive {
-                    gear_ratio: 1.0,
-                    ..Default::default()
-                });
-            }
-            if let Some(drive) = &mut joint.drive {
-                if kinds[k] == DriveKind::Simple && rest >= 0.0 {
-                    let kept = drive.joint_inertia.clamp(0.0, rest);
-                    drive.joint_inertia = kept;
-                    drive.rotor_inertia = (rest - kept) / (drive.gear_ratio * drive.gear_ratio);
-                } else {
-                    let total = at_least_zero("Drive inertia", k, row[column::DRIVE_INERTIA]);
-                    drive.joint_inertia = without_rounding(total - shares[k][0], total);
-                    if kinds[k] == DriveKind::Simple {
-                        drive.rotor_inertia = 0.0;
-                    }
-                }
-            }
-            joint.inertial = Some(Inertial {
-                mass: row[column::MASS],
-                first_moment,
-                inertia,
-            });
-            joint.friction = Some(JointFriction {
-                coulomb: at_least_zero("Coulomb friction", k, row[column::COULOMB]),
-                viscous: at_least_zero(
-                    "Viscous friction",
-                    k,
-                    without_rounding(row[column::VISCOUS] - shares[k][1], row[column::VISCOUS]),
-                ),
-                offset: row[column::OFFSET],
-            });
-        }
-        (robot, remarks)
+        shares
     }
 
     /// Returns the middle of the joints' limits, shifted so that every crank is within its range. It is the start
@@ -351,6 +318,78 @@ impl Robot {
             (_, true) => "N",
         }
     }
+}
+
+/// Puts zero for values that no description can hold, and collects a sentence on each.
+struct Floor<'a> {
+    joints: &'a [Joint],
+    remarks: Vec<String>,
+}
+
+impl Floor<'_> {
+    /// Returns a value of joint `k` (from 0), at least 0.
+    fn at_least_zero(&mut self, name: &str, k: usize, value: f64) -> f64 {
+        if value < 0.0 {
+            self.remarks.push(format!(
+                "{name} of joint {} came out as {value}, which feeds energy in; 0 stands in the description.",
+                self.joints[k].name
+            ));
+            0.0
+        } else {
+            value
+        }
+    }
+}
+
+/// Puts the parameters `row` into joint `k` (from 0), except for the `share` of the coupled motors: inertia and viscous
+/// friction. `simple`: its drive moves only this joint, at a constant ratio.
+fn put_joint(
+    joint: &mut Joint,
+    k: usize,
+    row: &[f64; COLUMNS],
+    simple: bool,
+    share: [f64; 2],
+    floor: &mut Floor<'_>,
+) {
+    let mut first_moment = [0.0; 3];
+    first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
+    let mut inertia = [0.0; 6];
+    inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
+    let rest = row[column::DRIVE_INERTIA] - share[0];
+    if joint.drive.is_none() && rest != 0.0 {
+        // Rotor inertia added to the link would make a body that cannot exist.
+        joint.drive = Some(Drive {
+            gear_ratio: 1.0,
+            ..Default::default()
+        });
+    }
+    if let Some(drive) = &mut joint.drive {
+        if simple && rest >= 0.0 {
+            let kept = drive.joint_inertia.clamp(0.0, rest);
+            drive.joint_inertia = kept;
+            drive.rotor_inertia = (rest - kept) / (drive.gear_ratio * drive.gear_ratio);
+        } else {
+            let total = floor.at_least_zero("Drive inertia", k, row[column::DRIVE_INERTIA]);
+            drive.joint_inertia = without_rounding(total - share[0], total);
+            if simple {
+                drive.rotor_inertia = 0.0;
+            }
+        }
+    }
+    joint.inertial = Some(Inertial {
+        mass: row[column::MASS],
+        first_moment,
+        inertia,
+    });
+    joint.friction = Some(JointFriction {
+        coulomb: floor.at_least_zero("Coulomb friction", k, row[column::COULOMB]),
+        viscous: floor.at_least_zero(
+            "Viscous friction",
+            k,
+            without_rounding(row[column::VISCOUS] - share[1], row[column::VISCOUS]),
+        ),
+        offset: row[column::OFFSET],
+    });
 }
 
 /// Returns the difference, or zero if it is only rounding of `part`.

@@ -176,43 +176,49 @@ fn allowed(parameter: &Parameter) -> String {
     }
 }
 
-impl RobotEffect {
-    /// Reads a table. Checks its keys and values, but not its joints.
-    pub(super) fn from_table(table: &toml::Table) -> Result<Self, Refusal> {
-        let refuse = |key: Option<&str>, what: &str, found: String, right: String| Refusal {
-            key: key.map(str::to_owned),
-            what: what.to_owned(),
-            found,
-            right,
-        };
-        let text = |key: &str| match table.get(key) {
-            None => Ok(None),
-            Some(toml::Value::String(text)) => Ok(Some(text.clone())),
-            Some(other) => Err(refuse(
-                Some(key),
-                &format!("the {key}"),
-                other.to_string(),
-                "it must be a name in quotes".into(),
-            )),
-        };
-        let missing = || "missing".to_owned();
-        let name = text("kind")?;
-        let law = text("law")?;
-        let Some(name) = name.filter(|name| EFFECT_NAMES.contains(&name.as_str())) else {
-            return Err(refuse(
-                Some("kind"),
-                "the kind",
-                name_found(table.get("kind")),
-                format!("it must be one of {}", EFFECT_NAMES.join(", ")),
-            ));
-        };
-        let laws = laws(&name);
-        let kind = Kind::named(&name, law.as_deref());
-        let Some(kind) = kind.filter(|kind| kind.about().law.is_some() == law.is_some()) else {
-            return Err(refuse(
-                Some("law"),
+fn refuse(key: &str, what: &str, found: String, right: String) -> Refusal {
+    Refusal {
+        key: Some(key.to_owned()),
+        what: what.to_owned(),
+        found,
+        right,
+    }
+}
+
+/// Returns a text of a table; `None` if the key is missing.
+fn text_of(table: &toml::Table, key: &str) -> Result<Option<String>, Refusal> {
+    match table.get(key) {
+        None => Ok(None),
+        Some(toml::Value::String(text)) => Ok(Some(text.clone())),
+        Some(other) => Err(refuse(
+            key,
+            &format!("the {key}"),
+            other.to_string(),
+            "it must be a name in quotes".into(),
+        )),
+    }
+}
+
+/// Returns the kind that name and law of a table mean.
+fn kind_of(table: &toml::Table) -> Result<Kind, Refusal> {
+    let name = text_of(table, "kind")?;
+    let law = text_of(table, "law")?;
+    let Some(name) = name.filter(|name| EFFECT_NAMES.contains(&name.as_str())) else {
+        return Err(refuse(
+            "kind",
+            "the kind",
+            name_found(table.get("kind")),
+            format!("it must be one of {}", EFFECT_NAMES.join(", ")),
+        ));
+    };
+    let laws = laws(&name);
+    let kind = Kind::named(&name, law.as_deref());
+    kind.filter(|kind| kind.about().law.is_some() == law.is_some())
+        .ok_or_else(|| {
+            refuse(
+                "law",
                 "the law",
-                law.map_or_else(missing, |law| format!("`{law}`")),
+                law.map_or_else(|| "missing".to_owned(), |law| format!("`{law}`")),
                 if laws.is_empty() {
                     format!("{name} has one law only; remove this key")
                 } else {
@@ -224,43 +230,61 @@ impl RobotEffect {
                     };
                     format!("{name} has the laws {}{or}", laws.join(", "))
                 },
-            ));
-        };
-        let mut known: HashSet<&str> = HashSet::from(["kind", "joint"]);
-        known.extend((!laws.is_empty()).then_some("law"));
-        known.extend(has_other(kind).then_some("other"));
-        known.extend(parameters(kind).map(|p| p.name));
-        if let Some(key) = table.keys().find(|key| !known.contains(key.as_str())) {
+            )
+        })
+}
+
+/// Refuses a key that effects of this kind do not have.
+fn refuse_unknown(table: &toml::Table, kind: Kind) -> Result<(), Refusal> {
+    let name = kind.about().name;
+    let mut known: HashSet<&str> = HashSet::from(["kind", "joint"]);
+    known.extend((!laws(name).is_empty()).then_some("law"));
+    known.extend(has_other(kind).then_some("other"));
+    known.extend(parameters(kind).map(|p| p.name));
+    match table.keys().find(|key| !known.contains(key.as_str())) {
+        None => Ok(()),
+        Some(key) => {
             let names: Vec<&str> = parameters(kind).map(|p| p.name).collect();
-            return Err(refuse(
-                Some(key),
+            Err(refuse(
+                key,
                 "a key",
                 format!("`{key}`"),
                 format!("{name} has the parameters {}", names.join(", ")),
-            ));
+            ))
         }
-        let value = |p: &Parameter| {
-            let number = match table.get(p.name) {
-                None if kind.optional().contains(&p.name) => Some(0.0),
-                Some(toml::Value::Float(x)) => Some(*x),
-                Some(toml::Value::Integer(x)) => Some(*x as f64),
-                _ => None,
-            };
-            let [low, high] = sane(p);
-            number.filter(|x| (low..=high).contains(x)).ok_or_else(|| {
-                refuse(
-                    Some(p.name),
-                    &format!("the {}", p.name),
-                    table.get(p.name).map_or_else(missing, ToString::to_string),
-                    allowed(p),
-                )
-            })
-        };
+    }
+}
+
+/// Returns the value of a parameter.
+fn value_of(table: &toml::Table, kind: Kind, p: &Parameter) -> Result<f64, Refusal> {
+    let number = match table.get(p.name) {
+        None if kind.optional().contains(&p.name) => Some(0.0),
+        Some(toml::Value::Float(x)) => Some(*x),
+        Some(toml::Value::Integer(x)) => Some(*x as f64),
+        _ => None,
+    };
+    let [low, high] = sane(p);
+    number.filter(|x| (low..=high).contains(x)).ok_or_else(|| {
+        refuse(
+            p.name,
+            &format!("the {}", p.name),
+            (table.get(p.name)).map_or_else(|| "missing".to_owned(), ToString::to_string),
+            allowed(p),
+        )
+    })
+}
+
+impl RobotEffect {
+    /// Reads a table. Checks its keys and values, but not its joints.
+    pub(super) fn from_table(table: &toml::Table) -> Result<Self, Refusal> {
+        let kind = kind_of(table)?;
+        refuse_unknown(table, kind)?;
+        let value = |p| value_of(table, kind, p);
         let gains: Vec<f64> = (kind.about().gains.iter().map(value)).collect::<Result<_, _>>()?;
         let shapes: Vec<f64> = (kind.about().shapes.iter().map(value)).collect::<Result<_, _>>()?;
         Ok(Self {
-            joint: text("joint")?,
-            other: text("other")?,
+            joint: text_of(table, "joint")?,
+            other: text_of(table, "other")?,
             effect: Effect::new(kind, &gains, &shapes),
         })
     }

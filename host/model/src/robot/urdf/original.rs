@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use rig_shared::multibody::column;
+use rig_shared::multibody::{COLUMNS, column};
 use roxmltree::Document;
 
 use super::chain::Chain;
@@ -84,58 +84,10 @@ impl Original {
         let document = parsed(&self.text, Path::new(&self.chain.name))?;
         let mut edits = Vec::new();
         let mut remarks = Vec::new();
-        let (mut inertias, mut frictions) = (Vec::new(), Vec::new());
-        let (rows, before) = (
-            robot.standard_parameters(),
-            self.robot.standard_parameters(),
-        );
-        let (bodies, chosen) = robot.with_bodies();
-        for (k, (joint, body)) in robot.joints.iter().zip(&self.chain.bodies).enumerate() {
-            if let (Some(inertial), Some(written)) = (&joint.inertial, &bodies.joints[k].inertial)
-                && self.robot.joints[k]
-                    .inertial
-                    .as_ref()
-                    .is_none_or(|own| !same(own, inertial))
-            {
-                let seen = SpatialInertia::of(written).seen_from(&self.links[k].inverse());
-                let (link, merged) =
-                    put_inertia(&document, body, &seen, &mut edits).map_err(|why| {
-                        RobotError::NotUrdf {
-                            joint: joint.name.clone(),
-                            why,
-                        }
-                    })?;
-                inertias.push(link);
-                remarks.extend(merged);
-            }
-            let places = [column::VISCOUS, column::COULOMB];
-            let [new, old] = [&rows, &before].map(|rows| places.map(|place| rows[k][place]));
-            if new != old && put_friction(&document, &joint.name, new, &mut edits) {
-                frictions.push(joint.name.as_str());
-            }
-        }
-        let listed = |names: &[&str], what: &str| {
-            (!names.is_empty()).then(|| format!("{what} of {}", names.join(", ")))
-        };
-        let replaced: Vec<String> = [
-            listed(&inertias, "the inertial values"),
-            listed(&frictions, "damping and friction"),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        if !inertias.is_empty() {
-            remarks.extend(chosen);
-        }
-        if !replaced.is_empty() {
-            remarks.insert(
-                0,
-                format!(
-                    "Replaced by those of the description \"{}\", in the links' own frames: {}; everything else is as it was.",
-                    robot.name,
-                    replaced.join("; ")
-                ),
-            );
+        let rows = robot.standard_parameters();
+        let replaced = self.put_values(robot, &rows, &document, &mut edits, &mut remarks)?;
+        if let Some(told) = replaced.told(&robot.name) {
+            remarks.insert(0, told);
         }
         self.level(&document, robot, &mut edits, &mut remarks);
         robot.left_out(&rows, &mut remarks);
@@ -164,6 +116,47 @@ impl Original {
             text: spliced(&self.text, edits),
             remarks,
         })
+    }
+
+    /// Writes the inertias and frictions of `robot` that differ from the file's. `rows`: its standard parameters.
+    fn put_values<'a>(
+        &'a self,
+        robot: &'a Robot,
+        rows: &[[f64; COLUMNS]],
+        document: &Document<'_>,
+        edits: &mut Vec<Edit>,
+        remarks: &mut Vec<String>,
+    ) -> Result<Replaced<'a>, RobotError> {
+        let mut replaced = Replaced::default();
+        let before = self.robot.standard_parameters();
+        let (bodies, chosen) = robot.with_bodies();
+        for (k, (joint, body)) in robot.joints.iter().zip(&self.chain.bodies).enumerate() {
+            if let (Some(inertial), Some(written)) = (&joint.inertial, &bodies.joints[k].inertial)
+                && self.robot.joints[k]
+                    .inertial
+                    .as_ref()
+                    .is_none_or(|own| !same(own, inertial))
+            {
+                let seen = SpatialInertia::of(written).seen_from(&self.links[k].inverse());
+                let (link, merged) = put_inertia(document, body, &seen, edits).map_err(|why| {
+                    RobotError::NotUrdf {
+                        joint: joint.name.clone(),
+                        why,
+                    }
+                })?;
+                replaced.inertias.push(link);
+                remarks.extend(merged);
+            }
+            let places = [column::VISCOUS, column::COULOMB];
+            let [new, old] = [rows, &before].map(|rows| places.map(|place| rows[k][place]));
+            if new != old && put_friction(document, &joint.name, new, edits) {
+                replaced.frictions.push(joint.name.as_str());
+            }
+        }
+        if !replaced.inertias.is_empty() {
+            remarks.extend(chosen);
+        }
+        Ok(replaced)
     }
 
     /// Refuses a description with other joints or frames.
@@ -251,6 +244,37 @@ impl Original {
                 text,
             });
         }
+    }
+}
+
+/// Names of what was replaced in a file.
+#[derive(Default)]
+struct Replaced<'a> {
+    /// Links with other inertias.
+    inertias: Vec<&'a str>,
+    /// Joints with another friction.
+    frictions: Vec<&'a str>,
+}
+
+impl Replaced<'_> {
+    /// Returns a sentence on the values that now are those of the description `name`; `None` if there are none.
+    fn told(&self, name: &str) -> Option<String> {
+        let listed = |names: &[&str], what: &str| {
+            (!names.is_empty()).then(|| format!("{what} of {}", names.join(", ")))
+        };
+        let replaced: Vec<String> = [
+            listed(&self.inertias, "the inertial values"),
+            listed(&self.frictions, "damping and friction"),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        (!replaced.is_empty()).then(|| {
+            format!(
+                "Replaced by those of the description \"{name}\", in the links' own frames: {}; everything else is as it was.",
+                replaced.join("; ")
+            )
+        })
     }
 }
 

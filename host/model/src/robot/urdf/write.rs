@@ -177,6 +177,25 @@ fn write_link(out: &mut String, joint: &Joint, link: &str) -> Result<(), RobotEr
     Ok(())
 }
 
+/// Kind of a joint in URDF.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum UrdfKind {
+    Prismatic,
+    Revolute,
+    /// A revolute joint that turns without end.
+    Continuous,
+}
+
+impl UrdfKind {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Prismatic => "prismatic",
+            Self::Revolute => "revolute",
+            Self::Continuous => "continuous",
+        }
+    }
+}
+
 fn write_joint(
     out: &mut String,
     joint: &Joint,
@@ -190,20 +209,21 @@ fn write_joint(
         .map(|l| l.position)
         .filter(|[low, high]| low.is_finite() && high.is_finite());
     let kind = match (joint.kind, position) {
-        (JointKind::Prismatic, _) => "prismatic",
-        (JointKind::Revolute, Some(_)) => "revolute",
-        (JointKind::Revolute, None) => "continuous",
+        (JointKind::Prismatic, _) => UrdfKind::Prismatic,
+        (JointKind::Revolute, Some(_)) => UrdfKind::Revolute,
+        (JointKind::Revolute, None) => UrdfKind::Continuous,
     };
     let pose = step(joint.alpha, joint.a, joint.theta, joint.d);
     let _ = writeln!(
         out,
-        "  <joint name=\"{}\" type=\"{kind}\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{link}\"/>\n    <origin xyz=\"{}\" rpy=\"{}\"/>\n    <axis xyz=\"0 0 1\"/>",
+        "  <joint name=\"{}\" type=\"{}\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{link}\"/>\n    <origin xyz=\"{}\" rpy=\"{}\"/>\n    <axis xyz=\"0 0 1\"/>",
         escaped(&joint.name),
+        kind.name(),
         three(&pose.translation.vector),
         rpy(&pose.rotation.to_rotation_matrix())
     );
     let torque = limits.and_then(|l| l.torque);
-    if limits.is_some() || kind == "prismatic" {
+    if limits.is_some() || kind == UrdfKind::Prismatic {
         let mut unknown = Vec::new();
         let mut known = |value: Option<f64>, what: &'static str| {
             value.unwrap_or_else(|| {
@@ -212,7 +232,7 @@ fn write_joint(
             })
         };
         let range = match (kind, position) {
-            ("continuous", _) => String::new(),
+            (UrdfKind::Continuous, _) => String::new(),
             (_, Some([low, high])) => format!("lower=\"{low:?}\" upper=\"{high:?}\" "),
             (_, None) => {
                 let far = known(None, "position");
