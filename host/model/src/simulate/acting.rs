@@ -3,7 +3,8 @@
 use rig_shared::effects::{Direction, GAINS, Kind, Memory};
 use rig_shared::scalar::Real as _;
 
-use super::{SimulateError, Since};
+use super::error::SimulateError;
+use super::history::Since;
 use crate::effects::{Effects, State, Turn, is_torque};
 
 /// Share of its size by which friction may have the wrong sign, as rounding.

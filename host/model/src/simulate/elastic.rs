@@ -7,7 +7,8 @@
 use rig_shared::effects::{Kind, SHAPES, transmitted};
 use rig_shared::multibody::{bias_torque, column, inertia_matrix};
 
-use super::{Model, SimulateError};
+use super::error::SimulateError;
+use super::model::Model;
 
 /// Largest phase of spring and damping within one step, rad. It limits the step length.
 const ANGLE: f64 = 0.1;

@@ -1,6 +1,6 @@
 //! Inverses of the small matrices of a step.
 
-use super::SimulateError;
+use super::error::SimulateError;
 
 /// Inverts a symmetric positive definite matrix by Cholesky; the factor replaces the input.
 pub(super) fn invert(a: &mut [f64], inverse: &mut [f64], n: usize) -> Result<(), SimulateError> {

@@ -21,15 +21,17 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::acting::Acting;
 use super::elastic::Elastic;
+use super::error::SimulateError;
+use super::friction::{DryFriction, refuse_driving_friction};
+use super::history::Since;
+use super::model::Model;
 use super::solve::{invert, invert_any};
-use super::{Model, SimulateError, Since};
-
-mod friction;
 
 /// Passes over velocity-dependent terms. The second makes the step second order.
 const PASSES: usize = 2;
 /// Passes if effects depend on accelerations and hidden states. They converge, but not in one pass.
 const PASSES_WITH_EFFECTS: usize = 5;
+
 /// Steps a model. Owns every buffer, so that a step allocates nothing.
 pub struct Stepper<'a> {
     model: &'a Model,
@@ -45,21 +47,12 @@ pub struct Stepper<'a> {
     next: Vec<f64>,
     /// Viscous friction, n × n.
     damping: Vec<f64>,
-    /// Directions of Coulomb friction, one row each: the coordinates, then the motors of coupled drives.
-    along: Vec<f64>,
-    /// Coulomb friction along them.
-    coulomb: Vec<f64>,
-    /// Bounds of the friction torques.
-    limits: Vec<[f64; 2]>,
+    friction: DryFriction,
     acting: Acting<'a>,
     elastic: Option<Elastic>,
     acceleration: Vec<f64>,
     /// Loads of the links on the gears.
     loads: Vec<f64>,
-    friction: Vec<f64>,
-    /// Response of the velocities to a unit of each friction (n columns a row), and of the speeds along all directions.
-    response: Vec<f64>,
-    coupling: Vec<f64>,
     /// Columns of the motors at zero acceleration.
     columns: Vec<f64>,
 }
@@ -79,60 +72,12 @@ impl<'a> Stepper<'a> {
         let elastic = Elastic::of(model)?;
         // The motor, then the link.
         let n = joints + usize::from(elastic.is_some());
-        let mut smooth = model.parameters.clone();
-        for (joint, row) in smooth.iter_mut().enumerate() {
-            for (place, name) in [(column::VISCOUS, "fv"), (column::COULOMB, "fc")] {
-                // `!(>=)`: NaN is refused as well.
-                if row[place].is_nan() || row[place] < 0.0 {
-                    return Err(SimulateError::NegativeFriction {
-                        parameter: format!("{name}{}", joint + 1),
-                        value: row[place],
-                    });
-                }
-            }
-            row[column::VISCOUS] = 0.0;
-            row[column::COULOMB] = 0.0;
-            row[column::OFFSET] = 0.0;
-            if elastic.is_some() {
-                row[column::DRIVE_INERTIA] = 0.0;
-            }
-        }
-        let mut coulomb: Vec<f64> = model
-            .parameters
-            .iter()
-            .map(|p| p[column::COULOMB])
-            .collect();
-        let mut columns = Vec::new();
-        if let Some(motors) = &model.motors {
-            let names = [
-                (motor_column::VISCOUS, "fvm"),
-                (motor_column::COULOMB, "fcm"),
-            ];
-            for (k, row) in motors.parameters.iter().enumerate() {
-                for (place, name) in names {
-                    // `!(>=)`: NaN is refused as well.
-                    if row[place].is_nan() || row[place] < 0.0 {
-                        return Err(SimulateError::NegativeFriction {
-                            parameter: format!("{name}{}", k + 1),
-                            value: row[place],
-                        });
-                    }
-                }
-                coulomb.push(row[motor_column::COULOMB]);
-            }
-            columns = vec![0.0; n * n * MOTOR_COLUMNS];
-        }
-        if let Some(elastic) = &elastic {
-            let whole = coulomb[0];
-            coulomb[0] = (1.0 - elastic.link_friction) * whole;
-            coulomb.push(elastic.link_friction * whole);
-        }
-        let contacts = coulomb.len();
-        let mut along = vec![0.0; contacts * n];
-        // An elastic gear has two masses, each with its own friction.
-        for i in 0..n {
-            along[i * n + i] = 1.0;
-        }
+        let smooth = without_friction(model, elastic.is_some())?;
+        let coulomb = coulomb(model, elastic.as_ref())?;
+        let columns = match &model.motors {
+            Some(_) => vec![0.0; n * n * MOTOR_COLUMNS],
+            None => Vec::new(),
+        };
         let stepper = Self {
             model,
             smooth,
@@ -145,19 +90,14 @@ impl<'a> Stepper<'a> {
             free: vec![0.0; n],
             next: vec![0.0; n],
             damping: vec![0.0; n * n],
-            along,
-            limits: coulomb.iter().map(|fc| [-fc, *fc]).collect(),
-            coulomb,
+            friction: DryFriction::new(coulomb, n),
             acting: Acting::new(&model.effects, joints, elastic.map(|_| joints)),
             elastic,
             acceleration: vec![0.0; n],
             loads: vec![0.0; joints],
-            friction: vec![0.0; contacts],
-            response: vec![0.0; contacts * n],
-            coupling: vec![0.0; contacts * contacts],
             columns,
         };
-        stepper.refuse_driving_friction()?;
+        refuse_driving_friction(model, joints)?;
         Ok(stepper)
     }
 
@@ -190,7 +130,7 @@ impl<'a> Stepper<'a> {
             let t = &motors.transmission;
             t.add_motor_inertia(&motors.parameters, &self.middle, &mut self.mass)?;
             t.add_motor_viscosity(&motors.parameters, &self.middle, &mut self.damping)?;
-            t.motor_directions(&self.middle, &mut self.along[n * n..])?;
+            t.motor_directions(&self.middle, &mut self.friction.along[n * n..])?;
         }
         Ok(())
     }
@@ -267,9 +207,9 @@ impl<'a> Stepper<'a> {
         ];
         self.acting.evaluate(motion, &self.loads, dt)?;
         for j in 0..self.loads.len() {
-            self.limits[j] = self
-                .acting
-                .bounds(j, self.coulomb[j], self.mean_velocity[j])?;
+            self.friction.limits[j] =
+                self.acting
+                    .bounds(j, self.friction.coulomb[j], self.mean_velocity[j])?;
         }
         Ok(())
     }
@@ -335,7 +275,7 @@ impl<'a> Stepper<'a> {
         } else {
             invert(&mut self.factor, &mut self.inverse, n)?;
         }
-        self.respond();
+        self.friction.respond(&self.inverse, self.free.len());
         self.mean_velocity.copy_from_slice(v);
         let passes = if self.acting.is_empty() {
             PASSES
@@ -362,7 +302,7 @@ impl<'a> Stepper<'a> {
             for i in 0..n {
                 self.free[i] = (0..n).map(|k| self.inverse[i * n + k] * self.next[k]).sum();
             }
-            self.solve_friction(dt);
+            self.friction.solve(&self.free, dt, &mut self.next);
             for i in 0..n {
                 self.mean_velocity[i] = 0.5 * (v[i] + self.next[i]);
                 self.acceleration[i] = (self.next[i] - v[i]) / dt;
@@ -383,4 +323,66 @@ impl<'a> Stepper<'a> {
         }
         Ok(())
     }
+}
+
+/// Returns the parameters without friction and offset, and without the drives' inertia if the gear is elastic.
+///
+/// # Errors
+/// [`SimulateError::NegativeFriction`].
+fn without_friction(model: &Model, elastic: bool) -> Result<Vec<[f64; COLUMNS]>, SimulateError> {
+    let mut smooth = model.parameters.clone();
+    for (joint, row) in smooth.iter_mut().enumerate() {
+        for (place, name) in [(column::VISCOUS, "fv"), (column::COULOMB, "fc")] {
+            refuse_negative(name, joint, row[place])?;
+        }
+        row[column::VISCOUS] = 0.0;
+        row[column::COULOMB] = 0.0;
+        row[column::OFFSET] = 0.0;
+        if elastic {
+            row[column::DRIVE_INERTIA] = 0.0;
+        }
+    }
+    Ok(smooth)
+}
+
+/// Returns the Coulomb friction of the coordinates, then of the motors of coupled drives. An elastic gear divides its
+/// joint's between motor and link.
+///
+/// # Errors
+/// [`SimulateError::NegativeFriction`].
+fn coulomb(model: &Model, elastic: Option<&Elastic>) -> Result<Vec<f64>, SimulateError> {
+    let mut coulomb: Vec<f64> = model
+        .parameters
+        .iter()
+        .map(|p| p[column::COULOMB])
+        .collect();
+    if let Some(motors) = &model.motors {
+        let names = [
+            (motor_column::VISCOUS, "fvm"),
+            (motor_column::COULOMB, "fcm"),
+        ];
+        for (k, row) in motors.parameters.iter().enumerate() {
+            for (place, name) in names {
+                refuse_negative(name, k, row[place])?;
+            }
+            coulomb.push(row[motor_column::COULOMB]);
+        }
+    }
+    if let Some(elastic) = elastic {
+        let whole = coulomb[0];
+        coulomb[0] = (1.0 - elastic.link_friction) * whole;
+        coulomb.push(elastic.link_friction * whole);
+    }
+    Ok(coulomb)
+}
+
+/// Refuses friction below zero of joint or motor `k` (from 0), and NaN.
+fn refuse_negative(name: &str, k: usize, value: f64) -> Result<(), SimulateError> {
+    if value.is_nan() || value < 0.0 {
+        return Err(SimulateError::NegativeFriction {
+            parameter: format!("{name}{}", k + 1),
+            value,
+        });
+    }
+    Ok(())
 }

@@ -3,7 +3,7 @@
 use rig_shared::multibody::{column, kinetic_energy, potential_energy};
 
 use super::*;
-use crate::robot::Robot;
+use crate::robot::{Controller, Robot};
 
 /// A pendulum on a gear; `fc` and `fv` are its friction.
 fn pendulum(fc: f64, fv: f64) -> Robot {

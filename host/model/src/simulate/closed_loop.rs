@@ -1,0 +1,155 @@
+//! The closed loop, sample by sample.
+
+use super::controllers::wish;
+use super::error::SimulateError;
+use super::history::Since;
+use super::model::Model;
+use super::step::Stepper;
+use crate::robot::{Controller, Robot};
+
+/// Inputs of a simulation, sample by sample.
+pub struct Inputs<'a> {
+    /// Sample period, s.
+    pub period: f64,
+    /// Reference positions: one slice a joint, one value a sample.
+    pub reference: &'a [Vec<f64>],
+    /// Torques that the controllers add to their output, within the torque limit, same shape; empty for none.
+    pub feed_forward: &'a [Vec<f64>],
+    /// Torques added after the controllers (disturbances), same shape; empty for none.
+    pub added: &'a [Vec<f64>],
+    /// Initial positions.
+    pub q: &'a [f64],
+    /// Initial velocities.
+    pub v: &'a [f64],
+    /// Steps within one sample.
+    pub substeps: u32,
+    /// True if the controllers run once a sample and hold their torque. Otherwise they run at every step, with a
+    /// reference interpolated between samples, like a drive whose loop is faster than its recorder.
+    pub held: bool,
+}
+
+impl Inputs<'_> {
+    /// Returns reference and feed-forward of joint `i` at `beyond` samples after sample `k`; the last values hold.
+    fn asked(&self, i: usize, k: usize, beyond: f64) -> [f64; 2] {
+        [self.reference, self.feed_forward].map(|series| {
+            let values = series.get(i).and_then(|list| list.get(k..));
+            match values {
+                Some([now, next, ..]) => now + beyond * (next - now),
+                Some([now]) => *now,
+                _ => 0.0,
+            }
+        })
+    }
+}
+
+/// A simulated motion: per joint one value a sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// Positions as the sensors read them; of the motor, if it is a separate mass.
+    pub q: Vec<Vec<f64>>,
+    /// Velocities, from the same sensors.
+    pub qd: Vec<Vec<f64>>,
+    /// Torques of the controllers (without `Inputs::added`), as the sensors read them. If they are not held, the mean
+    /// of the torques before and after the sample.
+    pub tau: Vec<Vec<f64>>,
+    /// Per joint, number of samples in whose period the torque limit cut the controller's output.
+    pub saturated: Vec<usize>,
+}
+
+/// Simulates the closed loop over all samples of the reference. Calls `progress` with the number of finished samples.
+///
+/// # Errors
+/// [`SimulateError`], with the joint at fault.
+pub fn closed_loop(
+    robot: &Robot,
+    model: &Model,
+    controllers: &[Controller],
+    inputs: &Inputs<'_>,
+    progress: impl FnMut(usize),
+) -> Result<Motion, SimulateError> {
+    closed_loop_since(
+        robot,
+        model,
+        controllers,
+        inputs,
+        &Since::default(),
+        progress,
+    )
+}
+
+/// Same as [`closed_loop`], for joints that have been running.
+///
+/// # Errors
+/// Same as [`closed_loop`].
+pub fn closed_loop_since(
+    robot: &Robot,
+    model: &Model,
+    controllers: &[Controller],
+    inputs: &Inputs<'_>,
+    since: &Since,
+    mut progress: impl FnMut(usize),
+) -> Result<Motion, SimulateError> {
+    let n = robot.joints.len();
+    let samples = inputs.reference.iter().map(Vec::len).min().unwrap_or(0);
+    let mut stepper = Stepper::new(model)?;
+    stepper.go_on(since);
+    let mut motion = Motion {
+        q: vec![Vec::with_capacity(samples); n],
+        qd: vec![Vec::with_capacity(samples); n],
+        tau: vec![Vec::with_capacity(samples); n],
+        saturated: vec![0; n],
+    };
+    let (mut q, mut v) = (inputs.q.to_vec(), inputs.v.to_vec());
+    let mut applied = vec![0.0; n];
+    let mut torque = vec![0.0; n];
+    let mut cut = vec![false; n];
+    let mut errors = vec![[0.0; 2]; n];
+    let substeps = inputs.substeps.max(1);
+    let dt = inputs.period / f64::from(substeps);
+    // Controller updates within one sample, and steps for each update.
+    let (answers, steps) = match inputs.held {
+        true => (1, substeps),
+        false => (substeps, 1),
+    };
+    for k in 0..samples {
+        for answer in 0..answers {
+            model.effects.position_errors(&q, &v, &mut errors)?;
+            for i in 0..n {
+                let read = [q[i] + errors[i][0], v[i] + errors[i][1]];
+                let [reference, known] = inputs.asked(i, k, f64::from(answer) / f64::from(answers));
+                let wish = known + wish(&controllers[i], reference, read);
+                let limits = robot.joints[i].limits.as_ref();
+                let limit = limits.and_then(|l| l.torque).unwrap_or(f64::INFINITY);
+                let before = std::mem::replace(&mut applied[i], wish.max(-limit).min(limit));
+                cut[i] |= applied[i] != wish;
+                if answer == 0 {
+                    motion.q[i].push(read[0]);
+                    motion.qd[i].push(read[1]);
+                    motion.tau[i].push(match inputs.held || k == 0 {
+                        true => applied[i],
+                        false => 0.5 * (before + applied[i]),
+                    });
+                }
+                let added = inputs.added.get(i).and_then(|a| a.get(k));
+                torque[i] = applied[i] + added.copied().unwrap_or(0.0);
+                if !(q[i].is_finite() && v[i].is_finite() && applied[i].is_finite()) {
+                    return Err(SimulateError::Diverged {
+                        joint: robot.joints[i].name.clone(),
+                        time: k as f64 * inputs.period,
+                    });
+                }
+            }
+            for _ in 0..steps {
+                stepper.step(&mut q, &mut v, &torque, dt)?;
+            }
+        }
+        for (count, cut) in motion.saturated.iter_mut().zip(&mut cut) {
+            *count += usize::from(std::mem::take(cut));
+        }
+        progress(k + 1);
+    }
+    for (i, torque) in motion.tau.iter_mut().enumerate() {
+        model.effects.read_effort(i, torque, inputs.period);
+    }
+    Ok(motion)
+}
