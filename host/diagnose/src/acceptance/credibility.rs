@@ -7,9 +7,11 @@ use rig_shared::effects::{GAINS, Kind};
 use crate::DiagnoseError;
 use crate::acceptance::judge::Judge;
 use crate::acceptance::plausibility::Asked;
-use crate::fit::refit::{NOTHING, Refit};
-use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
-use crate::search::stepwise::{Search, is_gear};
+use crate::columns::kinds::is_gear;
+use crate::fit::refit::Refit;
+use crate::levels::{NOTHING, SIGNIFICANT};
+use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::stepwise::Search;
 
 /// Number of inertia gains of a coupling. They come first; the last gain is friction.
 const OF_INERTIA: usize = 2;

@@ -1,31 +1,32 @@
 //! Judgement of a search's effects: the noise floor, the unexplained residual, alternative names.
 
 mod doubts;
-mod rank;
-mod unseen;
-
-pub(crate) use crate::acceptance::judge::rank::{equal, rank};
-pub(crate) use crate::acceptance::judge::unseen::{
-    left_of_held, not_carried_over, taken_by_none, too_short_for_names,
-};
+pub(crate) mod rank;
+pub(crate) mod unseen;
 
 use rig_shared::effects::Kind;
 
-use crate::DiagnoseError;
+use crate::acceptance::coordinates::Coordinate;
 use crate::acceptance::lack_of_fit::misfit;
-use crate::acceptance::model_check::of_torque;
-use crate::acceptance::residual_dependence::{Coordinate, Known, Refitted, locate};
-use crate::engine::ObserverModels;
+use crate::acceptance::law_mismatch::besides;
+use crate::acceptance::residual_dependence::refitted::Refitted;
+use crate::acceptance::residual_dependence::{Known, locate};
+use crate::columns::kinds::is_gear;
 use crate::experiment::exact;
 use crate::fit::least_squares::Fit;
+use crate::levels::{BEYOND_FLOOR, SIGNIFICANT};
+use crate::models::observer_models::ObserverModels;
 use crate::outcome::{FloorFrom, Place, Remainder};
 use crate::recordings::noise_floor;
-use crate::recordings::noise_floor::Repeated;
+use crate::recordings::noise_floor::{Repeated, of_torque};
 use crate::recordings::outlier_segment::{Burst, burst};
 use crate::recordings::position_reading::PositionReading;
 use crate::rows::regression::Rows;
-use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
-use crate::search::stepwise::{Search, is_gear, shadow, with};
+use crate::search::chosen::with;
+use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::stepwise::Search;
+use crate::statistics::closed;
+use crate::{DiagnoseError, statistics};
 
 use rig_model::robot::{Joint, Robot};
 
@@ -33,17 +34,11 @@ use rig_model::robot::{Joint, Robot};
 const HALF: f64 = 0.5;
 /// The same if every rival closes less than half as much.
 const QUARTER: f64 = 0.25;
-/// Residual-to-noise RMS ratio above which a joint has an unexplained residual. For motions that were not repeated,
-/// with slightly different noise, and for joints with backlash, where each law has errors at contact. Model mismatch is
-/// extra.
-pub(crate) const BEYOND_FLOOR: f64 = 1.12;
 /// The same within the repeated runs. True models left 1.00 to 1.03 in 25 rigs of seed 3500, and up to 1.05 in 13 rigs
 /// with a fifth of their noise.
 const BEYOND_OWN_FLOOR: f64 = 1.06;
 /// Standard deviations of chance (1/√rows each) in ratio² − 1 that the residual must also exceed.
 const CHANCE: f64 = 4.0;
-/// Share of the torque RMS that the treatment may leave: its filters and differences are not exact derivatives.
-const TREATED: f64 = 3e-3;
 /// Residual-to-noise RMS ratio above which weak effects count as guesses.
 const FAR_BEYOND_FLOOR: f64 = 1.25;
 /// Share of the squares that a coordinate must explain for a remainder. With repeated runs: of the excess over the
@@ -426,7 +421,7 @@ impl Judge<'_, '_> {
             .collect();
         self.repeated(&residual, Some(&counts), joint)
             .is_none_or(|own| {
-                let all = [noise_floor::rms(&residual, &away), own.noise];
+                let all = [statistics::rms(&residual, &away), own.noise];
                 self.beyond_noise(all, Some(own), besides, joint).is_some()
             })
     }
@@ -455,33 +450,6 @@ impl Judge<'_, '_> {
             let chance = (1.0 + CHANCE / rows.sqrt()).sqrt();
             beyond([left, noise.max(steps)], BEYOND_OWN_FLOOR.max(chance))
         })
-    }
-}
-
-/// Returns squares that neither noise nor missing effects cause. They come from the treatment, and from the mismatch of
-/// the effects that reduce the RMS from `before` to `after`.
-pub(crate) fn besides(
-    chosen: &[FittedCandidate],
-    rows: &Rows,
-    joint: usize,
-    [before, after]: [f64; 2],
-) -> f64 {
-    let explained = (before * before - after * after).max(0.0);
-    let names = chosen.iter().filter(|p| p.candidate.joint == joint);
-    let shadow = names.map(shadow).fold(0.0, f64::max) * explained;
-    let torque = noise_floor::rms(&rows.torque[joint], &rows.keep[joint]);
-    (TREATED * torque).powi(2) + shadow
-}
-
-/// Returns the share of the gap that an RMS drop closes, at most 1; 0 without a gap, NaN if the floor is unknown.
-pub(crate) fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
-    if floor.is_nan() {
-        f64::NAN
-    } else if before > floor {
-        // Below the floor there is no gap.
-        ((before - after) / (before - floor)).min(1.0)
-    } else {
-        0.0
     }
 }
 

@@ -10,9 +10,9 @@
 
 use crate::columns::effect_columns::Source;
 use crate::fit::least_squares::Fit;
+use crate::levels::SIGNIFICANT;
 use crate::recordings::noise_floor;
 use crate::rows::regression::{Column, Rows};
-use crate::search::fitted_candidate::SIGNIFICANT;
 use rig_data::runs::JointRun;
 
 /// Degree of the polynomials.

@@ -5,14 +5,15 @@
 //! the residual by [`NEARLY_ALL`] itself is a proof: for any noise, the gap above it is then closed at least as far.
 
 use crate::DiagnoseError;
-use crate::acceptance::judge::{BEYOND_FLOOR, Judged, besides};
+use crate::acceptance::judge::Judged;
+use crate::acceptance::law_mismatch::besides;
 use crate::fit::least_squares::Fit;
+use crate::levels::BEYOND_FLOOR;
 use crate::models::bodies::ModelCache;
 use crate::models::rms_path::RmsPath;
 use crate::outcome::{FloorFrom, Left, Remainder};
 use crate::recordings::context::PreparedData;
-use crate::recordings::noise_floor;
-use crate::search::stepwise::with;
+use crate::search::chosen::with;
 use rig_model::robot::{Joint, Robot};
 use rig_output::{format_significant, format_unit};
 
@@ -195,12 +196,6 @@ pub(crate) fn sizes(left: &[Left]) -> Option<String> {
         data_of(first),
         all.join("; ")
     ))
-}
-
-/// Returns the noise floor of a joint's torque from its own reading, in the residual's rows.
-pub(crate) fn of_torque(runs: &[rig_data::runs::Run], joint: usize, period: f64) -> Option<f64> {
-    noise_floor::sensor_noise(runs, joint, period)
-        .or_else(|| noise_floor::beyond_band(runs, joint, period))
 }
 
 #[cfg(test)]

@@ -5,195 +5,28 @@
 //! the number of coordinates under any dependence (Benjamini & Yekutieli 2001).
 
 mod frequency;
-mod refitted;
+pub(crate) mod process;
+pub(crate) mod refitted;
 
 use rand::{RngExt, SeedableRng};
 
-use crate::acceptance::residual_dependence::frequency::{frequency, is_frequency};
-pub(crate) use crate::acceptance::residual_dependence::refitted::Refitted;
+use crate::acceptance::coordinates::Coordinate;
+use crate::acceptance::residual_dependence::frequency::frequency;
+use crate::acceptance::residual_dependence::process::{BINS, Process, narrowest};
+use crate::acceptance::residual_dependence::refitted::Refitted;
+use crate::levels::SIGNIFICANT;
 use crate::outcome::Place;
-use crate::rows::nominal_torque::Predicted;
 use crate::rows::regression::Rows;
-use crate::search::fitted_candidate::SIGNIFICANT;
-use rig_data::prepare::central_difference;
-use rig_data::runs::Run;
-use rig_model::robot::{JointKind, Robot};
+use crate::statistics::bins;
 use rig_output::{format_significant, format_unit};
 
-/// Number of bins with equal row counts.
-pub(crate) const BINS: usize = 24;
 /// Bootstrap draws …
 const DRAWS: usize = 999;
 /// … and those of a coordinate that no draw reaches, if the correction for the number of coordinates needs more. One
 /// alone among fifteen must reach 0.0002.
 const MOST_DRAWS: usize = 19_999;
-/// Coordinates of most laws.
-const OF_LAWS: [&str; 4] = [VELOCITY, POSITION, ACCELERATION, DRIVE];
-const VELOCITY: &str = "velocity";
-const POSITION: &str = "position";
-const ACCELERATION: &str = "acceleration";
-const DRIVE: &str = "torque of the drive";
-/// The coordinate of friction drift.
-pub(crate) const SINCE_START: &str = "time since the start, by direction";
 /// p-value from which on a dependence counts as chance.
 const BY_CHANCE: f64 = 0.05;
-/// Share of the explained squares within the reported interval.
-const MOST_OF_IT: f64 = 0.75;
-
-/// A coordinate of one joint on the kept rows.
-#[derive(Clone)]
-pub(crate) struct Coordinate {
-    /// Its name in words.
-    pub(crate) name: String,
-    /// Unit, ASCII.
-    pub(crate) unit: &'static str,
-    /// One value per row.
-    pub(crate) values: Vec<f64>,
-}
-
-impl Coordinate {
-    /// Returns true if laws of the library depend on it, so that a mismatch of a law follows it.
-    pub(crate) fn is_of_a_law(&self) -> bool {
-        OF_LAWS.contains(&self.name.as_str())
-    }
-}
-
-/// Returns all coordinates of a joint. `waves` are the orders per motor turn of its effects: bins of a turn would
-/// average a high order out.
-pub(crate) fn coordinates(
-    rows: &Rows,
-    runs: &[Run],
-    predicted: &[Predicted],
-    robot: &Robot,
-    joint: usize,
-    waves: &[f64],
-) -> Vec<Coordinate> {
-    let ratio = robot.joints[joint].gear_ratio();
-    let mut list: Vec<Coordinate> = Vec::new();
-    let mut add = |name: &str, unit: &'static str, of: &dyn Fn(usize, &Run) -> Vec<f64>| {
-        let mut values = Vec::with_capacity(rows.count);
-        for (r, run) in runs.iter().enumerate() {
-            rows.thinning.pick(&of(r, run), &mut values);
-        }
-        list.push(Coordinate {
-            name: name.to_owned(),
-            unit,
-            values,
-        });
-    };
-    let (p, f) = robot.joints[joint].kind.units();
-    let (v, a, rate) = match robot.joints[joint].kind {
-        JointKind::Revolute => ("rad/s", "rad/s^2", "N*m/s"),
-        JointKind::Prismatic => ("m/s", "m/s^2", "N/s"),
-    };
-    add(VELOCITY, v, &|_, run| run.joints[joint].qd.clone());
-    add(POSITION, p, &|_, run| run.joints[joint].q.clone());
-    add(ACCELERATION, a, &|_, run| run.joints[joint].qdd.clone());
-    let angle = |order: f64| {
-        let within = std::f64::consts::TAU;
-        move |_: usize, run: &Run| -> Vec<f64> {
-            (run.joints[joint].q.iter())
-                .map(|q| (order * ratio * q).rem_euclid(within))
-                .collect()
-        }
-    };
-    if ratio.abs() > 1.0 {
-        add("motor angle within a turn", "rad", &angle(1.0));
-    }
-    for order in waves {
-        let name = format!(
-            "motor angle within one wave, {} to a turn",
-            format_significant(*order, 3)
-        );
-        add(&name, "rad", &angle(*order));
-    }
-    add("torque on the gear along the motion", f, &|r, run| {
-        (predicted[r].load[joint].iter().zip(&run.joints[joint].qd))
-            .map(|(l, v)| l * v.signum())
-            .collect()
-    });
-    add(DRIVE, f, &|r, _| predicted[r].torque[joint].clone());
-    // Friction drift has zero mean over both directions.
-    add(SINCE_START, "s", &|_, run| {
-        (run.t.iter().zip(&run.joints[joint].qd))
-            .map(|(t, v)| v.signum() * (t - run.began))
-            .collect()
-    });
-    add("way since the last reversal, by direction", p, &|_, run| {
-        since_reversal(run, joint).0
-    });
-    add(
-        "time since the last reversal, by direction",
-        "s",
-        &|_, run| since_reversal(run, joint).1,
-    );
-    add("change of the drive's torque", rate, &|r, run| {
-        central_difference(&predicted[r].torque[joint], 1.0 / run.rate)
-    });
-    if runs.iter().all(|r| r.joints[joint].temperature.is_some()) {
-        add("temperature", "degC", &|_, run| {
-            run.joints[joint].temperature.clone().unwrap_or_default()
-        });
-    }
-    for other in 0..robot.joints.len() {
-        if other != joint {
-            list.push(Coordinate {
-                name: velocity_of(&robot.joints[other].name),
-                unit: match robot.joints[other].kind {
-                    JointKind::Revolute => "rad/s",
-                    JointKind::Prismatic => "m/s",
-                },
-                values: runs.iter().fold(Vec::new(), |mut values, run| {
-                    rows.thinning.pick(&run.joints[other].qd, &mut values);
-                    values
-                }),
-            });
-        }
-    }
-    list
-}
-
-/// Returns the name of another joint's velocity as a coordinate.
-pub(crate) fn velocity_of(joint: &str) -> String {
-    format!("velocity of joint {joint}")
-}
-
-/// Returns travel and time since reversal, with the sign of the direction.
-fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
-    let j = &run.joints[joint];
-    let (mut from, mut at, mut sign) = (0.0, 0.0, 0.0);
-    let mut lists = (Vec::with_capacity(run.len()), Vec::with_capacity(run.len()));
-    for k in 0..run.len() {
-        if j.qd[k].signum() != sign {
-            (from, at, sign) = (j.q[k], run.t[k], j.qd[k].signum());
-        }
-        lists.0.push(j.q[k] - from);
-        lists.1.push(sign * (run.t[k] - at));
-    }
-    lists
-}
-
-/// Sorts used rows into bins with equal counts. Returns the bin of each row (None if unused) and the edges.
-pub(crate) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<usize>>, Vec<f64>) {
-    let mut sorted: Vec<f64> = (values.iter().zip(keep))
-        .filter(|(_, k)| **k)
-        .map(|(v, _)| *v)
-        .collect();
-    sorted.sort_by(f64::total_cmp);
-    if sorted.is_empty() {
-        return (vec![None; values.len()], vec![0.0, 0.0]);
-    }
-    let edges: Vec<f64> = (0..=bins)
-        .map(|b| sorted[(b * (sorted.len() - 1)) / bins])
-        .collect();
-    let inner = &edges[1..bins];
-    let place = values
-        .iter()
-        .zip(keep)
-        .map(|(v, k)| k.then(|| inner.partition_point(|e| e < v)))
-        .collect();
-    (place, edges)
-}
 
 /// Additional knowledge about a residual.
 pub(crate) struct Known<'a> {
@@ -217,21 +50,71 @@ pub(crate) fn locate(
     floor: f64,
     seed: u64,
 ) -> Vec<Place> {
-    let keep = &rows.keep[joint];
-    let used = rows.used(joint).max(1) as f64;
     let none = Refitted::none();
     let refitted = known.map_or(&none, |known| &known.refitted);
     let residual = &refitted.rest(residual);
-    let squares: f64 = residual.iter().map(|r| r * r).sum();
-    let excess = (squares - used * floor * floor).max(0.0);
     let blocks = block.iter().max().map_or(0, |b| b + 1);
-    let mut places: Vec<Place> = Vec::new();
-    let mut processes = Vec::new();
-    for coordinate in coordinates {
-        let (place, edges) = bins(&coordinate.values, keep, BINS);
+    let of = Residual {
+        values: residual,
+        keep: &rows.keep[joint],
+        block,
+        blocks,
+        excess: excess(residual, rows.used(joint), floor),
+        joint_name,
+    };
+    let (mut places, mut processes): (Vec<Place>, Vec<Process>) = (coordinates.iter())
+        .map(|coordinate| of.along(coordinate, refitted))
+        .unzip();
+    let pairs = known.map_or(&[][..], |known| known.pairs);
+    let repeated = frequency(rows, residual, pairs, joint_name);
+    let by_frequency = repeated.is_some();
+    if let Some((place, process)) = repeated {
+        places.push(place);
+        processes.push(process);
+    }
+    let along = refitted.along(residual, block, blocks);
+    for (place, p) in places
+        .iter_mut()
+        .zip(probabilities(&processes, &along, seed))
+    {
+        place.p_value = p;
+    }
+    // A frequency describes the whole repeated residual, so it comes last.
+    let last = by_frequency.then(|| places.pop()).flatten();
+    places.sort_by(|a, b| b.share.total_cmp(&a.share));
+    places.extend(last);
+    places.retain(|place| place.p_value < BY_CHANCE);
+    places
+}
+
+/// Returns the squares of a residual beyond the noise floor, over the `used` rows.
+fn excess(residual: &[f64], used: usize, floor: f64) -> f64 {
+    let squares: f64 = residual.iter().map(|r| r * r).sum();
+    (squares - used.max(1) as f64 * floor * floor).max(0.0)
+}
+
+/// The residual of a joint.
+struct Residual<'r> {
+    /// One value per row.
+    values: &'r [f64],
+    /// True for used rows.
+    keep: &'r [bool],
+    /// Block of each row.
+    block: &'r [usize],
+    /// Number of blocks.
+    blocks: usize,
+    /// Squares beyond the noise floor.
+    excess: f64,
+    joint_name: &'r str,
+}
+
+impl Residual<'_> {
+    /// Returns where along a coordinate the residual lies, without a p-value, and its sums.
+    fn along(&self, coordinate: &Coordinate, refitted: &Refitted) -> (Place, Process) {
+        let (place, edges) = bins(&coordinate.values, self.keep, BINS);
         let mut count = [0.0; BINS];
-        let mut sums = vec![[0.0; BINS]; blocks];
-        for ((b, r), blk) in place.iter().zip(residual).zip(block) {
+        let mut sums = vec![[0.0; BINS]; self.blocks];
+        for ((b, r), blk) in place.iter().zip(self.values).zip(self.block) {
             if let Some(b) = b {
                 count[*b] += 1.0;
                 sums[*blk][*b] += r;
@@ -248,8 +131,8 @@ pub(crate) fn locate(
             }
         });
         let all: f64 = explained.iter().sum();
-        let share = if excess > 0.0 {
-            (all / excess).min(1.0)
+        let share = if self.excess > 0.0 {
+            (all / self.excess).min(1.0)
         } else {
             0.0
         };
@@ -261,44 +144,18 @@ pub(crate) fn locate(
                 0.0
             }
         });
-        places.push(Place {
-            joint: joint_name.to_owned(),
+        let found = Place {
+            joint: self.joint_name.to_owned(),
             coordinate: coordinate.name.clone(),
             interval: [edges[low], edges[high + 1]],
             unit: coordinate.unit.to_owned(),
             share,
             p_value: 1.0,
             text: sentence(coordinate, share, &edges, low, high, &mean, &count),
-        });
-        processes.push(Process {
-            taken: refitted.in_bins(&place),
-            sums,
-        });
+        };
+        let taken = refitted.in_bins(&place);
+        (found, Process { sums, taken })
     }
-    let pairs = known.map_or(&[][..], |known| known.pairs);
-    if let Some((place, process)) = frequency(rows, residual, pairs, joint_name) {
-        places.push(place);
-        processes.push(process);
-    }
-    let along = refitted.along(residual, block, blocks);
-    for (place, p) in places
-        .iter_mut()
-        .zip(probabilities(&processes, &along, seed))
-    {
-        place.p_value = p;
-    }
-    places.retain(|place| place.p_value < BY_CHANCE);
-    places
-        .sort_by(|a, b| (is_frequency(a).cmp(&is_frequency(b))).then(b.share.total_cmp(&a.share)));
-    places
-}
-
-/// Sums of one coordinate, bin by bin.
-struct Process {
-    /// Of the residual, block by block.
-    sums: Vec<[f64; BINS]>,
-    /// Of the components that a refit removes, direction by direction.
-    taken: Vec<[f64; BINS]>,
 }
 
 /// Returns the p-value of each process, corrected for their number. If the correction makes significance impossible
@@ -367,24 +224,6 @@ fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> 
         .filter(|_| excursion(&mut || if rng.random::<bool>() { 1.0 } else { -1.0 }) >= found)
         .count();
     (beyond + 1) as f64 / (draws + 1) as f64
-}
-
-/// Returns the shortest range of bins with most of the explained squares.
-fn narrowest(explained: &[f64; BINS], all: f64) -> (usize, usize) {
-    let mut best = (0, BINS - 1);
-    for low in 0..BINS {
-        let mut sum = 0.0;
-        for (high, e) in explained.iter().enumerate().skip(low) {
-            sum += e;
-            if sum >= MOST_OF_IT * all {
-                if high - low < best.1 - best.0 {
-                    best = (low, high);
-                }
-                break;
-            }
-        }
-    }
-    best
 }
 
 fn sentence(

@@ -4,26 +4,29 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
-use rig_shared::effects::{
-    Channel, Effect, GAINS, Instant, Kind, Memory, Parameter, SHAPES, Scale,
-};
+use rig_shared::effects::{Channel, Effect, GAINS, Instant, Kind, Parameter, SHAPES, Scale};
 use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 use rig_shared::scalar::Real as _;
 
 use crate::DiagnoseError;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::is_gear;
 use crate::columns::slopes::Slopes;
-use crate::columns::transmission::{ABREAST, Driven, Seen};
+use crate::columns::transmission::Driven;
+use crate::columns::transmission::observer::Seen;
 use crate::recordings::external_load;
+use crate::rows::lanes::ABREAST;
+use crate::rows::nominal::Nominal;
 use crate::rows::nominal_torque::Predicted;
-use crate::rows::regression::{Column, Nominal, Thinning};
-use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::is_gear;
+use crate::rows::regression::Column;
+use crate::rows::thinning::Thinning;
 use rig_data::runs::Run;
 use rig_model::batch::each_by;
-use rig_model::effects::{outruns, over_coulomb};
+use rig_model::effects::outruns;
 use rig_model::robot::{Robot, unit_of};
 
 mod gears;
+mod predictions;
 
 /// Data for the columns.
 pub(crate) struct Source<'a> {
@@ -56,206 +59,13 @@ pub(crate) struct Source<'a> {
     pub(crate) slopes: Mutex<HashMap<(usize, usize), Arc<Slopes>>>,
 }
 
-/// An effect on a joint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Candidate {
-    /// Kind of the effect.
-    pub(crate) kind: Kind,
-    /// Its joint, from 0.
-    pub(crate) joint: usize,
-    /// The other joint of a coupling.
-    pub(crate) other: Option<usize>,
-    /// Bits of a wave's order. None for other effects, and for a wave whose order is not yet known.
-    pub(crate) order: Option<u64>,
-}
-
-impl Candidate {
-    /// Creates a candidate without an order.
-    pub(crate) const fn on(kind: Kind, joint: usize) -> Self {
-        Self {
-            kind,
-            joint,
-            other: None,
-            order: None,
-        }
-    }
-
-    /// Returns the candidate with another joint.
-    pub(crate) fn naming(self, other: Option<usize>) -> Self {
-        Self { other, ..self }
-    }
-
-    /// Returns the candidate with these shapes. Waves of different orders are different effects, and they add up.
-    pub(crate) fn shaped(self, shapes: &[f64; SHAPES]) -> Self {
-        let wave = repeats_by_order(self.kind);
-        Self {
-            order: wave.then(|| shapes[0].to_bits()),
-            ..self
-        }
-    }
-
-    /// Returns the library entry: one for the waves of all orders.
-    pub(crate) fn sort(self) -> Self {
-        Self {
-            order: None,
-            ..self
-        }
-    }
-
-    /// Returns true if both are orders of one wave. A joint may have both.
-    pub(crate) fn is_another_order(&self, other: &Self) -> bool {
-        self.sort() == other.sort() && self.order != other.order
-    }
-}
-
-/// Returns true if a kind is a torque that is periodic in an angle. A joint may have several orders of it.
-pub(crate) fn repeats_by_order(kind: Kind) -> bool {
-    kind.periodic().is_some() && kind.about().channel == Channel::Torque
-}
-
 /// Initial delay for a delay column, s. At 10 ms the first-order expansion would be 2 % off at 3 Hz.
 pub(crate) const DELAY: f64 = 0.002;
-
-/// Effects whose drive torque is predicted with all effects in the model. For a ripple the nominal torque is enough:
-/// products of its wave with those of other effects fit almost anything.
-const OF_THE_DRIVE: [Kind; 2] = [Kind::TorqueSaturation, Kind::MeasurementDelay];
-
-/// Iterations of a saturation with its own torque. Each at least halves the error.
-const OWN_ROUNDS: usize = 6;
-/// Local loss of torque per current, as a share, up to which the predicted torque is used.
-const MOST_LOST: f64 = 0.5;
 
 /// Effects with a torque linear in the filtered motion, or nearly so: it has already passed the position filter.
 const OF_THE_FILTERED_MOTION: [Kind; 2] = [Kind::InertiaCoupling, Kind::JointElasticity];
 
-/// Returns the contact deflection of a presliding effect along a run. `beside` is other friction there.
-fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -> Vec<f64> {
-    let mut memory = Memory::default();
-    let along = |(&velocity, &beside): (&f64, &f64)| {
-        let at = Instant {
-            velocity,
-            period,
-            beside,
-            ..Instant::default()
-        };
-        effect.torque(&mut memory, &at);
-        effect.bent(&memory, beside)
-    };
-    velocities.iter().zip(beside).map(along).collect()
-}
-
 impl Source<'_> {
-    /// Adds the effects of the model to the predicted gear load and drive torque. `gains` are those of their columns,
-    /// one effect after the other.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(crate) fn loaded_by(
-        mut self,
-        chosen: &[FittedCandidate],
-        gains: &[f64],
-    ) -> Result<Self, DiagnoseError> {
-        let mut at = 0;
-        for profile in chosen {
-            let Candidate { kind, joint, .. } = profile.candidate;
-            let own = &gains[at..at + profile.columns.len()];
-            at += own.len();
-            if kind == Kind::MeasurementDelay {
-                self.delays[joint] = own[0].max(DELAY);
-            }
-            if kind.is_presliding() {
-                let effect = Effect::new(kind, own, &profile.shapes);
-                for (r, run) in self.runs.iter().enumerate() {
-                    let beside = self.beside(joint, r, chosen, gains);
-                    let bent = bent(&effect, &run.joints[joint].qd, &beside, 1.0 / run.rate);
-                    self.bent.insert((r, joint), bent);
-                    self.beside.insert((r, joint), beside);
-                }
-            }
-        }
-        let asked = (chosen.iter()).any(|p| OF_THE_DRIVE.contains(&p.candidate.kind));
-        for r in 0..self.runs.len() {
-            let load = self.sum(r, chosen, gains, &Kind::on_the_link)?;
-            add(&mut self.predicted[r].load, &load);
-            if !asked {
-                continue;
-            }
-            // A delay changes the reading, not the torque.
-            let others = self.sum(r, chosen, gains, &|kind| !OF_THE_DRIVE.contains(&kind))?;
-            add(&mut self.predicted[r].torque, &others);
-            self.saturate(r, chosen, gains)?;
-        }
-        Ok(self)
-    }
-
-    /// Iterates the saturation with its predicted torque. Above a local loss of one half, the error of the prediction
-    /// is more than twice that of the model, so the recorded torque replaces it. Elsewhere the recorded torque would
-    /// add noise that the model then explains.
-    fn saturate(
-        &mut self,
-        r: usize,
-        chosen: &[FittedCandidate],
-        gains: &[f64],
-    ) -> Result<(), DiagnoseError> {
-        let mut at = 0;
-        let mut saturated: Vec<(usize, f64)> = Vec::new();
-        for profile in chosen {
-            if profile.candidate.kind == Kind::TorqueSaturation && gains[at] > 0.0 {
-                saturated.push((profile.candidate.joint, gains[at]));
-            }
-            at += profile.columns.len();
-        }
-        if saturated.is_empty() {
-            return Ok(());
-        }
-        let rest = self.predicted[r].torque.clone();
-        for _ in 0..OWN_ROUNDS {
-            let own = self.sum(r, chosen, gains, &|kind| kind == Kind::TorqueSaturation)?;
-            self.predicted[r].torque.clone_from(&rest);
-            add(&mut self.predicted[r].torque, &own);
-        }
-        for (joint, coefficient) in saturated {
-            // d(τ − c·τ³)/dτ is one half here.
-            let most = (MOST_LOST / (3.0 * coefficient)).sqrt();
-            let recorded = (self.thinning).calm(&self.runs[r].joints[joint].recorded());
-            for (to, recorded) in self.predicted[r].torque[joint].iter_mut().zip(recorded) {
-                if recorded.abs() > most {
-                    *to = recorded;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the torque of the effects of some kinds over a run, joint by joint.
-    fn sum(
-        &self,
-        r: usize,
-        chosen: &[FittedCandidate],
-        gains: &[f64],
-        counts: &dyn Fn(Kind) -> bool,
-    ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
-        let mut sum = vec![vec![0.0; self.runs[r].len()]; self.nominal.joints()];
-        let mut at = 0;
-        for profile in chosen {
-            let own = &gains[at..at + profile.columns.len()];
-            at += own.len();
-            if !counts(profile.candidate.kind) {
-                continue;
-            }
-            let shapes = std::slice::from_ref(&profile.shapes);
-            let columns = self.at_full_rate(&profile.candidate, shapes, r)?;
-            for (column, gain) in columns.into_iter().flatten().zip(own) {
-                for (to, signal) in sum.iter_mut().zip(column) {
-                    for (to, x) in to.iter_mut().zip(signal.iter().flatten()) {
-                        *to += gain * x;
-                    }
-                }
-            }
-        }
-        Ok(sum)
-    }
-
     /// Returns one column per gain.
     ///
     /// # Errors
@@ -445,37 +255,6 @@ impl Source<'_> {
         shapes.iter().map(of_one).collect()
     }
 
-    /// Returns the effects' contact friction over the model's Coulomb friction, sample by sample.
-    fn beside(
-        &self,
-        joint: usize,
-        r: usize,
-        chosen: &[FittedCandidate],
-        gains: &[f64],
-    ) -> Vec<f64> {
-        let mut sum = vec![0.0; self.runs[r].len()];
-        let [_, coulomb] = self.friction(joint);
-        let mut at = 0;
-        for profile in chosen {
-            let own = &gains[at..at + profile.columns.len()];
-            at += own.len();
-            let candidate = &profile.candidate;
-            if candidate.joint != joint || !candidate.kind.acts_through_contact() {
-                continue;
-            }
-            let terms = self.along(candidate, &profile.shapes, r, true);
-            for (term, gain) in terms.iter().zip(own) {
-                for (to, term) in sum.iter_mut().zip(term) {
-                    *to += gain * term;
-                }
-            }
-        }
-        for value in &mut sum {
-            *value = over_coulomb(*value, coulomb);
-        }
-        sum
-    }
-
     /// Returns the effect's terms sample by sample.
     fn terms(&self, candidate: &Candidate, shapes: &[f64; SHAPES], r: usize) -> Vec<Vec<f64>> {
         self.along(candidate, shapes, r, false)
@@ -554,29 +333,14 @@ impl Source<'_> {
             return Ok(slopes.clone());
         }
         // No lock here, so that other threads continue.
-        let slopes = Arc::new(Slopes::of(self, joint, &self.runs[r])?);
+        let slopes = Arc::new(Slopes::of(
+            self.nominal,
+            &self.values,
+            joint,
+            &self.runs[r],
+        )?);
         known().insert((r, joint), slopes.clone());
         Ok(slopes)
-    }
-
-    /// Returns the torque of a joint for a motion, without friction and offset.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(crate) fn inertial(
-        &self,
-        joint: usize,
-        motion: [&[Vec<f64>]; 3],
-    ) -> Result<Vec<f64>, DiagnoseError> {
-        let mut torque = vec![0.0; motion[0].first().map_or(0, Vec::len)];
-        self.nominal.columns(motion, &mut |k, j, column| {
-            if j == joint && !self.nominal.is_drive(k) {
-                for (to, y) in torque.iter_mut().zip(column) {
-                    *to += self.values[k] * y;
-                }
-            }
-        })?;
-        Ok(torque)
     }
 
     /// Returns the identified viscous and Coulomb friction of a joint.

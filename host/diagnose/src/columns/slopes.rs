@@ -4,8 +4,9 @@
 //! its slopes along the three. They depend on the motion only, and serve every wave of an error.
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::Source;
-use crate::rows::regression::{Column, motion_of};
+use crate::rows::motion::motion_of;
+use crate::rows::nominal::Nominal;
+use crate::rows::regression::Column;
 use rig_data::prepare::{central_difference, second_difference};
 use rig_data::runs::Run;
 
@@ -21,20 +22,25 @@ pub(crate) struct Slopes {
 }
 
 impl Slopes {
-    /// Computes the slopes along joint `joint` over `run`.
+    /// Computes the slopes along joint `joint` over `run`, from base parameters.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn of(source: &Source, joint: usize, run: &Run) -> Result<Self, DiagnoseError> {
+    pub(crate) fn of(
+        nominal: &Nominal,
+        values: &[f64],
+        joint: usize,
+        run: &Run,
+    ) -> Result<Self, DiagnoseError> {
         let mut motion = motion_of(run);
-        let still = smooth_torque(source, &motion)?;
+        let still = smooth_torque(nominal, values, &motion)?;
         let mut along = [(); 3].map(|()| Vec::new());
         for (derivative, along) in along.iter_mut().enumerate() {
             let measured = motion[derivative][joint].clone();
             for x in &mut motion[derivative][joint] {
                 *x += NUDGE;
             }
-            let mut moved = smooth_torque(source, &motion)?;
+            let mut moved = smooth_torque(nominal, values, &motion)?;
             motion[derivative][joint] = measured;
             for (moved, still) in moved.iter_mut().zip(&still) {
                 for (m, s) in moved.iter_mut().zip(still) {
@@ -70,18 +76,19 @@ impl Slopes {
 /// Returns the torque of the nominal model for a motion without Coulomb friction: a small position error does not
 /// change its direction.
 fn smooth_torque(
-    source: &Source,
+    nominal: &Nominal,
+    values: &[f64],
     motion: &[Vec<Vec<f64>>; 3],
 ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
     let samples = motion[0].first().map_or(0, Vec::len);
-    let mut torque = vec![vec![0.0; samples]; source.nominal.joints()];
+    let mut torque = vec![vec![0.0; samples]; nominal.joints()];
     let motion = [&motion[0][..], &motion[1][..], &motion[2][..]];
-    source.nominal.columns(motion, &mut |k, j, column| {
-        if source.nominal.is_coulomb(k) {
+    nominal.columns(motion, &mut |k, j, column| {
+        if nominal.is_coulomb(k) {
             return;
         }
         for (to, y) in torque[j].iter_mut().zip(column) {
-            *to += source.values[k] * y;
+            *to += values[k] * y;
         }
     })?;
     Ok(torque)

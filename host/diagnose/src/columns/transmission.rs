@@ -13,16 +13,13 @@ use rig_shared::lanes::Lanes;
 use rig_shared::scalar::Real;
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::Source;
-use crate::rows::regression::motion_of;
+use crate::rows::lanes::ABREAST;
+use crate::rows::motion::motion_of;
+use crate::rows::nominal::Nominal;
 use rig_data::runs::Run;
 
-mod observer;
+pub(crate) mod observer;
 
-pub(crate) use observer::{STRETCH, Seen};
-
-/// Sets of shapes that are computed side by side.
-pub(crate) const ABREAST: usize = 4;
 /// Least steps per sample; contact begins and ends within one.
 const FEWEST_STEPS: usize = 4;
 /// Most steps per sample; a stiffer column is not formed.
@@ -43,15 +40,23 @@ pub(crate) struct Driven {
 }
 
 impl Driven {
-    /// Computes them for `joint` over `run`.
+    /// Computes them for `joint` over `run`, from base parameters. `drive` is the drive's inertia that is grouped with
+    /// the link's.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn of(source: &Source, joint: usize, run: &Run) -> Result<Self, DiagnoseError> {
-        let n = source.nominal.joints();
+    pub(crate) fn of(
+        nominal: &Nominal,
+        values: &[f64],
+        joint: usize,
+        drive: f64,
+        run: &Run,
+    ) -> Result<Self, DiagnoseError> {
+        let n = nominal.joints();
         let rest = vec![vec![0.0; run.len()]; n];
         let motion = motion_of(run);
-        let torque = |q: &[Vec<f64>], a: &[Vec<f64>]| source.inertial(joint, [q, &rest, a]);
+        let torque =
+            |q: &[Vec<f64>], a: &[Vec<f64>]| nominal.inertial(values, joint, [q, &rest, a]);
         let still = torque(&motion[0], &rest)?;
         let mut unit = rest.clone();
         unit[joint].fill(1.0);
@@ -59,10 +64,9 @@ impl Driven {
         let mut moved = motion[0].clone();
         moved[joint].iter_mut().for_each(|q| *q += NUDGE);
         let moved = torque(&moved, &rest)?;
-        let own = source.drive_inertia(joint);
         Ok(Self {
             mass: (pushed.iter().zip(&still))
-                .map(|(a, b)| a - b - own)
+                .map(|(a, b)| a - b - drive)
                 .collect(),
             slope: (moved.iter().zip(&still))
                 .map(|(a, b)| (a - b) / NUDGE)

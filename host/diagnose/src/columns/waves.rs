@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 
 use rig_shared::effects::{Kind, Periodic, SHAPES};
 
-use crate::search::fitted_candidate::grid;
+use crate::search::shapes::grid;
 use rig_data::runs::Run;
 use rig_model::robot::{Joint, JointKind};
 

@@ -13,11 +13,13 @@ use rig_shared::effects::{Channel, Effect, Kind};
 use rig_shared::multibody::Chain;
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::Source;
+use crate::columns::kinds::is_gear;
 use crate::fit::least_squares::Fit;
 use crate::outcome::{Described, Fate, Value};
+use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::{is_gear, with};
 use rig_model::effects::{Effects, is_torque};
 use rig_model::robot::{JointKind, Placed, Robot, RobotEffect, title_of, unit_of};
 use rig_output::{format_significant, format_unit};

@@ -9,7 +9,8 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use crate::description::described_effects::DescribedEffects;
-use crate::rows::regression::{Column, Nominal, Rows, combined};
+use crate::rows::nominal::Nominal;
+use crate::rows::regression::{Column, Rows, combined};
 use rig_model::robot::{Quantity, Robot, Worth, worth};
 
 /// A free direction in the space of base parameters: indices and factors.

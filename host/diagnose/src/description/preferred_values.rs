@@ -6,12 +6,14 @@
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
-use crate::acceptance::judge::{BEYOND_FLOOR, Judge, Judged, equal};
+use crate::acceptance::judge::{Judge, Judged};
 use crate::fit::refit::Refit;
+use crate::levels::BEYOND_FLOOR;
 use crate::models::parameter_change::is_loaded;
 use crate::recordings::context::DiagnosisContext;
-use crate::search::fitted_candidate::{FittedCandidate, stiff};
-use crate::search::stepwise::with;
+use crate::search::chosen::with;
+use crate::search::fitted_candidate::{FittedCandidate, equal};
+use crate::search::spring::stiff;
 
 /// Largest ratio of residuals beyond the floor, of a rival to the name, that replaces it (described values).
 const MUCH_LESS: f64 = 0.5;

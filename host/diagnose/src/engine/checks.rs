@@ -5,9 +5,11 @@ use std::sync::Arc;
 use super::naming::Named;
 use super::work::Work;
 use crate::DiagnoseError;
-use crate::acceptance::judge::{
-    Judged, besides, left_of_held, not_carried_over, taken_by_none, too_short_for_names,
+use crate::acceptance::judge::Judged;
+use crate::acceptance::judge::unseen::{
+    left_of_held, not_carried_over, taken_by_none, too_short_for_names,
 };
+use crate::acceptance::law_mismatch::besides;
 use crate::acceptance::model_check::{Proof, unexplained};
 use crate::models::bodies::FittedModel;
 use crate::models::rms_path::RmsPath;

@@ -4,10 +4,11 @@ use super::checks::Checked;
 use super::naming::Named;
 use super::work::Work;
 use crate::DiagnoseError;
+use crate::columns::kinds::is_friction;
 use crate::description::described_effects::Now;
-use crate::fit::refit::Open;
+use crate::fit::open_parameters::Open;
 use crate::link_encoder::{Across, across, names_something, tell as tell_across};
-use crate::models::parameter_change::{Change, change};
+use crate::models::parameter_change::{Change, RefitData, change};
 use crate::models::simulated_motion::Replay;
 use crate::motor_voltage::{contradict, name_something, tell};
 use crate::outcome::{
@@ -18,7 +19,7 @@ use crate::result::finish::{Drawn, Found, finish};
 use crate::result::remarks::{remarks, weight_of_a_spring};
 use crate::result::steps::{change_step, reconcile, steps};
 use crate::result::treatment::treated;
-use crate::search::stepwise::{is_friction, with};
+use crate::search::chosen::with;
 use rig_model::robot::Robot;
 
 /// What earlier stages hand over for the report alone.
@@ -157,16 +158,15 @@ fn by_link_encoders(work: &Work, named: &Named) -> Result<Vec<Across>, DiagnoseE
 /// Returns a change of the nominal parameters against the description, if there is one.
 fn changed(work: &Work, named: &Named, checked: &Checked) -> Option<Change> {
     let (chosen, after) = (&named.judged.chosen, &named.joint.solution);
-    change(
-        work.data.context,
-        work.refit,
-        &work.data.prepared.rows,
-        &work.refit.explained(chosen, after),
-        chosen.iter().any(|p| is_friction(p.candidate.kind)),
-        checked.left,
+    let refitted = RefitData {
+        context: work.data.context,
+        rows: &work.data.prepared.rows,
         after,
-        &work.data.options.without,
-    )
+        beside_friction: chosen.iter().any(|p| is_friction(p.candidate.kind)),
+        left: checked.left,
+    };
+    let known = work.refit.explained(chosen, after);
+    change(work.refit, &refitted, &known, &work.data.options.without)
 }
 
 /// Returns a step for each effect that is not described, and one for changed nominal parameters.

@@ -1,14 +1,17 @@
 //! One search for effects on the training data, repeated with new row weights if it finds gears.
 
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::Source;
+use crate::columns::kinds::is_constant;
 use crate::description::described_effects::candidate;
-use crate::engine::follow::ObserverModels;
 use crate::fit::refit::Refit;
 use crate::link_encoder::{Across, across, gears, refutes};
+use crate::models::observer_models::ObserverModels;
 use crate::outcome::Tried;
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
+use crate::search::chosen::same;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::{Search, is_constant, same};
+use crate::search::stepwise::Search;
 use crate::{DiagnoseError, Options};
 use rig_model::robot::title_of;
 
@@ -27,13 +30,6 @@ pub(crate) struct Pass<'a> {
     pub(crate) tried: Vec<Tried>,
     /// Results of the link encoders.
     pub(crate) across: Vec<Across>,
-}
-
-/// Trials so far, and number of sweeps.
-#[derive(Default)]
-struct Heard {
-    tried: Vec<Tried>,
-    sweeps: i32,
 }
 
 impl<'a> Pass<'a> {
@@ -55,113 +51,159 @@ impl<'a> Pass<'a> {
             None,
             options,
         )?;
-        let mut library = library(context.robot, &prepared.runs, &options.without);
-        library.retain(|c| !refutes(&across, c));
-        // If a joint moves in one direction only, every constant is collinear with its Coulomb friction.
-        let one_way = |c: &Candidate| context.one_way.iter().any(|own| own.joint == c.joint);
-        library.retain(|c| !(is_constant(c.kind) && one_way(c)));
-        let mut described = context.stated.free();
-        described.retain(|placed| !refutes(&across, &candidate(placed)));
-        let mut search = Search::new(
-            source,
-            library,
-            described,
-            rig_data::prepare::threads(options.threads),
-        );
-        search.measured = gears(&across);
-        let mut accepted_by_observer = Heard::default();
-        let mut further = |refit: &Refit, search: &mut Search<'a>, found| {
-            searched(
-                context,
-                prepared,
-                refit,
-                search,
-                found,
-                &mut accepted_by_observer,
-                progress,
-            )
+        let search = begun(context, prepared, source, &across, options);
+        let mut searching = Searching {
+            context,
+            prepared,
+            search,
+            progress,
+            tried: Vec::new(),
+            sweeps: 0,
         };
-        let mut found = further(&refit, &mut search, None)?;
-        if let Some(play) = search.nearly.take() {
-            let candidate = play.candidate;
-            if ObserverModels::new(context, prepared, &refit, &search)
-                .observer_supports(&found, play)?
-            {
-                search.accepted_by_observer.push(candidate);
-                found = further(&refit, &mut search, Some(found))?;
-            }
-        }
-        let mut refit = refit;
-        for _ in 0..BESIDE_GEARS {
-            let loud = search.loud(&found);
-            if loud.is_empty() {
-                break;
-            }
-            search.settle_gears(refit.even(), &mut found)?;
-            refit = refit.reweighted(&found, &loud);
-            let before = found.clone();
-            found = further(&refit, &mut search, Some(found))?;
-            if same(&before, &found) {
-                break;
-            }
-        }
-        if refit.is_quieted() && search.loud(&found).is_empty() {
-            // The gear was dropped: search without row weights.
-            refit = refit.evened();
-            search.settle_gears(refit.even(), &mut found)?;
-            found = further(&refit, &mut search, Some(found))?;
-        }
+        let found = searching.further(&refit, None)?;
+        let found = searching.with_near_miss(&refit, found)?;
+        let (refit, found) = searching.beside_gears(refit, found)?;
         Ok(Self {
             refit,
-            search,
+            search: searching.search,
             found,
-            tried: accepted_by_observer.tried,
+            tried: searching.tried,
             across,
         })
     }
 }
 
-/// Searches for effects, starting with those already `found`.
-fn searched<'a>(
+/// Returns the search with its library, as far as the link encoders do not refute it.
+fn begun<'a>(
     context: &'a DiagnosisContext,
+    prepared: &PreparedData,
+    source: Source<'a>,
+    across: &[Across],
+    options: &Options,
+) -> Search<'a> {
+    let mut library = library(context.robot, &prepared.runs, &options.without);
+    library.retain(|c| !refutes(across, c));
+    // If a joint moves in one direction only, every constant is collinear with its Coulomb friction.
+    let one_way = |c: &Candidate| context.one_way.iter().any(|own| own.joint == c.joint);
+    library.retain(|c| !(is_constant(c.kind) && one_way(c)));
+    let mut described = context.stated.free();
+    described.retain(|placed| !refutes(across, &candidate(placed)));
+    let mut search = Search::new(
+        source,
+        library,
+        described,
+        rig_data::prepare::threads(options.threads),
+    );
+    search.measured = gears(across);
+    search
+}
+
+/// A search on the training data, repeated with other row weights.
+struct Searching<'a, 'p> {
+    context: &'a DiagnosisContext<'a>,
     prepared: &'a PreparedData,
-    refit: &Refit,
-    search: &mut Search<'a>,
-    found: Option<Vec<FittedCandidate>>,
-    accepted_by_observer: &mut Heard,
-    progress: &mut dyn FnMut(f64),
-) -> Result<Vec<FittedCandidate>, DiagnoseError> {
-    let trials = search.trials();
-    // If effect columns are collinear with nominal ones, the nominal values stay.
-    let renew = |chosen: &[FittedCandidate]| {
-        let solution = refit.solution(chosen);
-        let coefficients = solution.as_ref().unwrap_or(&refit.before);
-        let nominal = &coefficients.values[..refit.free.len()];
-        let source = context.source(prepared, &context.anchor.values(nominal))?;
-        match &solution {
-            Ok(solution) => source.loaded_by(chosen, &solution.values[refit.free.len()..]),
-            Err(_) => Ok(source),
+    search: Search<'a>,
+    progress: &'p mut dyn FnMut(f64),
+    /// Trials so far.
+    tried: Vec<Tried>,
+    /// Number of sweeps so far.
+    sweeps: i32,
+}
+
+impl<'a> Searching<'a, '_> {
+    /// Searches again with a backlash that almost passed, if the observer supports it.
+    fn with_near_miss(
+        &mut self,
+        refit: &Refit,
+        found: Vec<FittedCandidate>,
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
+        let Some(play) = self.search.nearly.take() else {
+            return Ok(found);
+        };
+        let candidate = play.candidate;
+        let observers = ObserverModels::new(self.context, self.prepared, refit, &self.search);
+        if !observers.observer_supports(&found, play)? {
+            return Ok(found);
         }
-    };
-    let mut told = |step: usize, profiles: &[FittedCandidate]| {
-        accepted_by_observer.sweeps += 1;
-        progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(accepted_by_observer.sweeps)));
-        let first = profiles.iter().position(|p| p.refused(trials).is_none());
-        for (k, p) in profiles.iter().enumerate() {
-            accepted_by_observer.tried.push(Tried {
-                effect: title_of(p.candidate.kind),
-                joint: context.robot.joints[p.candidate.joint].name.clone(),
-                step,
-                gain: p.evidence.gain,
-                gain_sigmas: p.evidence.gain_sigmas,
-                p_value: p.evidence.corrected(trials),
-                refused: match p.refused(trials) {
-                    Some(why) => why,
-                    None if Some(k) == first => String::new(),
-                    None => "another takes away more".into(),
-                },
-            });
+        self.search.accepted_by_observer.push(candidate);
+        self.further(refit, Some(found))
+    }
+
+    /// Searches again with row weights, as long as there are gears. Returns the model with its weights, and the effects.
+    fn beside_gears(
+        &mut self,
+        mut refit: Refit<'a>,
+        mut found: Vec<FittedCandidate>,
+    ) -> Result<(Refit<'a>, Vec<FittedCandidate>), DiagnoseError> {
+        for _ in 0..BESIDE_GEARS {
+            let loud = self.search.loud(&found);
+            if loud.is_empty() {
+                break;
+            }
+            self.search.settle_gears(refit.even(), &mut found)?;
+            refit = refit.reweighted(&found, &loud);
+            let before = found.clone();
+            found = self.further(&refit, Some(found))?;
+            if same(&before, &found) {
+                break;
+            }
         }
-    };
-    search.run(&refit.base, found, &renew, &mut told)
+        if refit.is_quieted() && self.search.loud(&found).is_empty() {
+            // The gear was dropped: search without row weights.
+            refit = refit.evened();
+            self.search.settle_gears(refit.even(), &mut found)?;
+            found = self.further(&refit, Some(found))?;
+        }
+        Ok((refit, found))
+    }
+
+    /// Searches for effects, starting with those already `found`.
+    fn further(
+        &mut self,
+        refit: &Refit,
+        found: Option<Vec<FittedCandidate>>,
+    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
+        let Self {
+            context,
+            prepared,
+            search,
+            progress,
+            tried,
+            sweeps,
+        } = self;
+        let (context, prepared): (&'a DiagnosisContext, &'a PreparedData) = (context, prepared);
+        let trials = search.trials();
+        // If effect columns are collinear with nominal ones, the nominal values stay.
+        let renew = |chosen: &[FittedCandidate]| {
+            let solution = refit.solution(chosen);
+            let coefficients = solution.as_ref().unwrap_or(&refit.before);
+            let nominal = &coefficients.values[..refit.free.len()];
+            let source = context.source(prepared, &context.anchor.values(nominal))?;
+            match &solution {
+                Ok(solution) => source.loaded_by(chosen, &solution.values[refit.free.len()..]),
+                Err(_) => Ok(source),
+            }
+        };
+        let mut told = |step: usize, profiles: &[FittedCandidate]| {
+            *sweeps += 1;
+            progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(*sweeps)));
+            let first = profiles.iter().position(|p| p.refused(trials).is_none());
+            for (k, p) in profiles.iter().enumerate() {
+                tried.push(Tried {
+                    effect: title_of(p.candidate.kind),
+                    joint: context.robot.joints[p.candidate.joint].name.clone(),
+                    step,
+                    gain: p.evidence.gain,
+                    gain_sigmas: p.evidence.gain_sigmas,
+                    p_value: p.evidence.corrected(trials),
+                    refused: match p.refused(trials) {
+                        Some(why) => why,
+                        None if Some(k) == first => String::new(),
+                        None => "another takes away more".into(),
+                    },
+                });
+            }
+        };
+        search.run(&refit.base, found, &renew, &mut told)
+    }
 }

@@ -4,13 +4,13 @@
 //! friction is part of it too. Such a parameter is held at its described value, or at zero without one. The others take
 //! the combination, which the motion does show. `rig identify` does the same, with the same criterion.
 //!
-//! Leaves out: several joints, where [`crate::fit::refit::open`] holds what the description knows better; effects that are
+//! Leaves out: several joints, where [`crate::fit::open_parameters::open`] holds what the description knows better; effects that are
 //! collinear with a model parameter, which the search rejects one by one.
 
 use rig_shared::multibody::{COLUMNS, column};
 
-use crate::fit::least_squares::dot;
 use crate::fit::refit::weighed;
+use crate::fit::vector::dot;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::Rows;
 

@@ -4,15 +4,14 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::acceptance::residual_dependence::bins;
+use crate::fit::folded::Folded;
+use crate::fit::vector::{axpy, dot, dot_self};
 use crate::rows::regression::{Column, Rows};
+use crate::statistics::bins;
 
 mod evidence;
 mod folds;
 mod jackknife;
-
-pub(crate) use evidence::{Evidence, sigmas};
-use folds::Folded;
 
 /// Length of an evidence block, in correlation times of the residual …
 const MEMORIES: f64 = 5.0;
@@ -433,30 +432,4 @@ fn in_blocks(rows: &Rows, memory: f64, distinct: usize) -> (Vec<usize>, usize) {
 /// Returns true if a column is not collinear, from its squares beside the others and in all.
 fn is_own(left: f64, whole: f64) -> bool {
     whole > 0.0 && left > DISTINCT * DISTINCT * whole
-}
-
-/// Returns the inner product.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Eight partial sums, because the compiler does not reorder a single one.
-    let mut sums = [0.0; 8];
-    let (a8, a_rest) = a.as_chunks::<8>();
-    let (b8, b_rest) = b.as_chunks::<8>();
-    for (x, y) in a8.iter().zip(b8) {
-        for (s, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
-            *s += x * y;
-        }
-    }
-    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum::<f64>()
-}
-
-/// Returns the sum of squares.
-pub(crate) fn dot_self(a: &[f64]) -> f64 {
-    dot(a, a)
-}
-
-/// Adds `factor` times x to y.
-pub(crate) fn axpy(factor: f64, x: &[f64], y: &mut [f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += factor * x;
-    }
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::least_squares::{Fit, dot};
+use crate::fit::least_squares::Fit;
+use crate::fit::vector::dot;
 use crate::rows::regression::Column;
 
 /// Coefficients of columns fitted together.

@@ -4,14 +4,15 @@
 //! The flank in contact follows from x itself, at the recording's rate and unfiltered. So impacts and the times between
 //! them, without torque, keep their place.
 
-use crate::fit::least_squares::{Evidence, Fit};
+use crate::fit::evidence::Evidence;
+use crate::fit::least_squares::Fit;
 use crate::fit::simplex::Simplex;
 use crate::fit::solution::jackknifed;
+use crate::levels::SIGNIFICANT;
 use crate::link_encoder::equation::Equation;
 use crate::link_encoder::law::{LEAST_SHARE, LEAST_SIGMAS, least};
 use crate::recordings::noise_floor;
 use crate::rows::regression::{Column, Rows, combined};
-use crate::search::fitted_candidate::SIGNIFICANT;
 use rig_data::prepare::central_difference;
 
 /// Gaps at which the search starts, from the least resolvable to the whole encoder difference.

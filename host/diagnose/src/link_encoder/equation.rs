@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
-use crate::acceptance::residual_dependence::Coordinate;
+use crate::acceptance::coordinates::Coordinate;
 use crate::columns::effect_columns::Source;
 use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
-use crate::rows::regression::{Column, Rows, links_of};
+use crate::rows::motion::links_of;
+use crate::rows::regression::{Column, Rows};
 use rig_data::prepare::{LowPass, central_difference};
 use rig_data::runs::{JointRun, Run, across_band, resolution};
 use rig_model::robot::JointKind;

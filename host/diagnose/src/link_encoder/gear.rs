@@ -3,13 +3,11 @@
 use rig_shared::effects::{Kind, SHAPES};
 
 use crate::fit::least_squares::Fit;
+use crate::levels::CLOSED_TEETH;
 use crate::link_encoder::contact::Contact;
-use crate::link_encoder::law;
 use crate::link_encoder::law::{Law, Laws};
-use crate::link_encoder::{Solved, Term, TransmissionAnalysis};
+use crate::link_encoder::{Solved, Term, TransmissionAnalysis, law};
 
-/// Least natural frequency of a link on closed contacts, Hz; a lower one shows another elasticity beside them.
-pub(crate) const CLOSED_TEETH: f64 = 16.0;
 /// Standard deviations above which stiffness, damping and link friction are identifiable.
 const TOLD: f64 = 3.0;
 /// Default damping ratio if the motion does not determine one.

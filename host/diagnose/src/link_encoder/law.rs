@@ -2,12 +2,13 @@
 
 use rig_shared::effects::Kind;
 
-use crate::fit::least_squares::{Evidence, Fit};
+use crate::fit::evidence::Evidence;
+use crate::fit::least_squares::Fit;
+use crate::levels::SIGNIFICANT;
 use crate::link_encoder::contact::Contact;
 use crate::link_encoder::equation::Equation;
 use crate::outcome::Tried;
 use crate::rows::regression::Column;
-use crate::search::fitted_candidate::SIGNIFICANT;
 use rig_model::robot::title_of;
 
 /// Least RMS share that a law removes: one of half the noise's size removes as much.

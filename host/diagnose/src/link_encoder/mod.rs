@@ -22,16 +22,18 @@ use std::collections::BTreeMap;
 
 use rig_shared::effects::{Kind, SHAPES};
 
-use crate::acceptance::judge::closed;
 use crate::acceptance::residual_dependence::locate;
-use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::Source;
+use crate::columns::kinds::is_gear;
 use crate::description::parameter_prior::ParameterPrior;
-use crate::fit::least_squares::{Fit, dot};
+use crate::fit::least_squares::Fit;
 use crate::fit::solution::{Solution, jackknifed, solve};
 use crate::fit::systematic_uncertainty::inflated;
+use crate::fit::vector::dot;
+use crate::levels::SIGNIFICANT;
 use crate::link_encoder::contact::contact;
 use crate::link_encoder::equation::{ACROSS, Equation};
-pub(crate) use crate::link_encoder::gear::CLOSED_TEETH;
 use crate::link_encoder::gear::Gear;
 use crate::link_encoder::law::{Found, Law, Laws, beside, laws};
 use crate::outcome::{Detectable, Map, Place, Step, Tried, Value};
@@ -40,8 +42,7 @@ use crate::recordings::noise_floor;
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
 use crate::rows::regression::Column;
-use crate::search::fitted_candidate::SIGNIFICANT;
-use crate::search::stepwise::is_gear;
+use crate::statistics::closed;
 use crate::{DiagnoseError, Options};
 use rig_model::robot::unit_of;
 

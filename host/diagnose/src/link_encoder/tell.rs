@@ -2,13 +2,13 @@
 
 use rig_shared::effects::{Effect, Kind};
 
+use crate::columns::kinds::is_gear;
 use crate::fit::least_squares::Fit;
 use crate::fit::systematic_uncertainty::inflated;
 use crate::link_encoder::{
     Across, Found, Gear, Law, Laws, Named, SCALE_OFF, SURE, Solved, Term, TransmissionAnalysis,
 };
 use crate::outcome::{Described, Diagnosis, Fate, Map};
-use crate::search::stepwise::is_gear;
 use rig_model::robot::{JointKind, Robot, RobotEffect};
 use rig_output::{format_significant, format_unit, format_value};
 

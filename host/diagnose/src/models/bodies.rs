@@ -14,15 +14,16 @@ use nalgebra::DMatrix;
 
 use crate::DiagnoseError;
 use crate::description::parameter_prior::{Direction, ParameterPrior};
-use crate::fit::least_squares::{Fit, dot};
+use crate::fit::least_squares::Fit;
 use crate::fit::refit::Refit;
 use crate::fit::solution::solve;
+use crate::fit::vector::dot;
 use crate::models::description::{completed, gravity_with, redistributed_over, with_gains};
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::rows::regression::{Column, combined};
+use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::with;
 use rig_data::runs::{JointRun, Run};
 use rig_identify::{Combinations, Sizes, as_bodies};
 use rig_model::robot::Robot;

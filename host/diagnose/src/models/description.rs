@@ -6,11 +6,11 @@ use nalgebra::{DVector, Rotation3, Vector3};
 use rig_shared::effects::{Effect, Kind, SHAPES};
 use rig_shared::multibody::{COLUMNS, column};
 
-use crate::columns::effect_columns::Candidate;
-use crate::fit::refit::turn;
-use crate::rows::regression::Nominal;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::is_gear;
+use crate::models::tilt::turn;
+use crate::rows::nominal::Nominal;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::is_gear;
 use rig_identify::{Combinations, described as standard, redistributed};
 use rig_model::robot::{Origin, Robot, RobotEffect, sane};
 use rig_output::{format_significant, format_unit};

@@ -13,15 +13,15 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
-use crate::fit::refit::{Joint, NOTHING, named, wald};
+use crate::columns::kinds::is_gear;
+use crate::fit::refit::{Joint, named, wald};
+use crate::levels::NOTHING;
 use crate::models::bodies::{FittedModel, ModelCache};
-use crate::models::simulated_motion::{Departures, Replay};
+use crate::models::simulated_motion::{Departures, Errors, Replay};
 use crate::outcome::{ByMotion, Twice};
-use crate::recordings::noise_floor;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::is_gear;
+use crate::{DiagnoseError, statistics};
 use rig_model::batch::each_by;
 use rig_output::format_significant;
 
@@ -46,7 +46,39 @@ struct Values {
     shapes: Vec<(usize, usize)>,
 }
 
+/// Fitted values with their standard deviations.
+struct Estimate {
+    values: Vec<f64>,
+    stds: Vec<f64>,
+}
+
 impl Values {
+    /// Returns the fitted values, and their estimate by torque. None if one of them is not identifiable.
+    fn by_torque(joint: &Joint, chosen: &[FittedCandidate]) -> Option<(Self, Estimate)> {
+        let coefficients = joint.solution.values.len();
+        let known = joint.shapes(chosen);
+        let by_torque: Vec<[f64; 2]> = (0..coefficients)
+            .map(|k| [joint.solution.values[k], joint.solution.std(k)])
+            .chain(known.iter().map(|(_, value)| *value))
+            .collect();
+        let stds: Vec<f64> = by_torque.iter().map(|[_, std]| *std).collect();
+        if stds.iter().any(|std| !(std.is_finite() && *std > 0.0)) {
+            return None;
+        }
+        let values = Self {
+            coefficients,
+            shapes: known.iter().map(|(place, _)| *place).collect(),
+        };
+        let start = by_torque.iter().map(|[value, _]| *value).collect();
+        Some((
+            values,
+            Estimate {
+                values: start,
+                stds,
+            },
+        ))
+    }
+
     /// Returns the effects with the shapes among `values`.
     fn effects(&self, chosen: &[FittedCandidate], values: &[f64]) -> Vec<FittedCandidate> {
         let mut effects = chosen.to_vec();
@@ -111,108 +143,127 @@ pub(crate) fn by_motion(
     if context.robot.joints.len() > 1 || chosen.iter().any(|p| is_gear(p.candidate.kind)) {
         return Ok(None);
     }
-    let coefficients = joint.solution.values.len();
-    let known = joint.shapes(chosen);
-    let values = Values {
-        coefficients,
-        shapes: known.iter().map(|(place, _)| *place).collect(),
-    };
-    let by_torque: Vec<[f64; 2]> = (0..coefficients)
-        .map(|k| [joint.solution.values[k], joint.solution.std(k)])
-        .chain(known.iter().map(|(_, value)| *value))
-        .collect();
-    let stds: Vec<f64> = by_torque.iter().map(|[_, std]| *std).collect();
-    if stds.iter().any(|std| !(std.is_finite() && *std > 0.0)) {
+    let Some((values, by_torque)) = Values::by_torque(joint, chosen) else {
         return Ok(None);
-    }
+    };
     let model = |theta: &[f64]| {
         let effects = values.effects(chosen, theta);
-        fitting.alone(&theta[..coefficients], &effects)
+        fitting.alone(&theta[..values.coefficients], &effects)
     };
     let departs = |theta: &[f64]| {
         (values.possible(chosen, free, theta))
             .then(|| replay.departures(&model(theta).model))
             .flatten()
     };
-    let start: Vec<f64> = by_torque.iter().map(|[value, _]| *value).collect();
-    let Some(first) = departs(&start) else {
+    let Some(first) = departs(&by_torque.values) else {
         return Ok(None);
     };
-    let Some((theta, covariance)) = nearest(start.clone(), &stds, first, &departs, threads) else {
+    let start = by_torque.values.clone();
+    let Some((by_motion, covariance)) = nearest(start, &by_torque.stds, first, &departs, threads)
+    else {
         return Ok(None);
     };
-    let std: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
-    let standing = model(&theta);
-    let effects = (values.effects(chosen, &theta).into_iter())
+    let standing = model(&by_motion.values);
+    let effects = (values.effects(chosen, &by_motion.values).into_iter())
         .map(|p| {
             let columns = source.columns_by(threads, &p.candidate, &p.shapes)?;
             let columns = Arc::new(columns);
             Ok(FittedCandidate { columns, ..p })
         })
         .collect::<Result<Vec<_>, DiagnoseError>>()?;
-    let before = model(&start);
+    let before = model(&by_torque.values);
     let (Some(was), Some(is)) = (
         replay.errors_of(&before.model),
         replay.errors_of(&standing.model),
     ) else {
         return Ok(None);
     };
-    let left =
-        |model: &FittedModel, effects: &[FittedCandidate]| -> Result<[f64; 2], DiagnoseError> {
-            let residual = context.remaining(replay.judged, model.fitted(), effects)?;
-            let rows = &replay.judged.rows;
-            let away = rows.away(0);
-            let all = noise_floor::rms(&residual[0], &rows.keep[0]);
-            let clear = match away.contains(&true) {
-                true => noise_floor::rms(&residual[0], &away),
-                false => all,
-            };
-            Ok([all, clear])
-        };
-    let [[all_was, clear_was], [all_is, clear_is]] =
-        [left(&before, chosen)?, left(&standing, &effects)?];
-    let torque_rms = [all_was, all_is];
-    let worse = match is.rms(0) < FAR_BETTER * was.rms(0) {
-        true => BLURRED,
-        false => TORQUE_WORSE,
-    };
-    let adopted = was.worse_than(&is, 0) && clear_is <= (1.0 + worse) * clear_was;
-    let names = named(context, source, chosen, &values.shapes);
-    let parameters: Vec<Twice> = (names.into_iter().enumerate())
-        .map(|(k, (parameter, unit, scale))| Twice {
-            parameter,
-            unit,
-            torque: scale * start[k],
-            torque_std: scale * stds[k],
-            motion: scale * theta[k],
-            motion_std: scale * std[k],
-            sigmas: (theta[k] - start[k]).abs() / stds[k].hypot(std[k]),
-        })
-        .collect();
+    let [all_was, clear_was] = torque_left(fitting, replay, &before, chosen)?;
+    let [all_is, clear_is] = torque_left(fitting, replay, &standing, &effects)?;
+    let adopted = is_better([&was, &is], [clear_was, clear_is]);
     let unit = context.robot.joints[0].kind.units();
     let mut told = ByMotion {
         unit: unit.0.to_owned(),
         motion_rms: [was.rms(0), is.rms(0)],
         torque_unit: unit.1.to_owned(),
-        torque_rms,
+        torque_rms: [all_was, all_is],
         adopted,
-        parameters,
+        parameters: named(context, source, chosen, &values.shapes)
+            .into_iter()
+            .enumerate()
+            .map(|(k, name)| twice(name, [&by_torque, &by_motion], k))
+            .collect(),
         text: String::new(),
     };
     told.text = sentence(&told);
-    let mut at = free;
-    let of_nothing = (chosen.iter())
-        .map(|p| {
-            let own = at..at + p.columns.len();
-            at = own.end;
-            wald(&theta[own.clone()], &covariance, own.start)
-        })
-        .collect();
+    let of_nothing = of_nothing(chosen, free, &by_motion, &covariance);
     Ok(Some(Again {
         told,
         of_nothing,
         adopted: adopted.then_some((standing, effects)),
     }))
+}
+
+/// Returns the RMS of the training torque's residual: over all rows, and away from rests and reversals.
+fn torque_left(
+    fitting: &ModelCache,
+    replay: &Replay,
+    model: &FittedModel,
+    effects: &[FittedCandidate],
+) -> Result<[f64; 2], DiagnoseError> {
+    let residual = (fitting.context).remaining(replay.judged, model.fitted(), effects)?;
+    let rows = &replay.judged.rows;
+    let away = rows.away(0);
+    let all = statistics::rms(&residual[0], &rows.keep[0]);
+    let clear = match away.contains(&true) {
+        true => statistics::rms(&residual[0], &away),
+        false => all,
+    };
+    Ok([all, clear])
+}
+
+/// Returns true if the motion improves significantly and the torque is hardly worse. `clear` is the torque's RMS away
+/// from rests and reversals. Both are before and after.
+fn is_better([was, is]: [&Errors; 2], clear: [f64; 2]) -> bool {
+    let worse = match is.rms(0) < FAR_BETTER * was.rms(0) {
+        true => BLURRED,
+        false => TORQUE_WORSE,
+    };
+    was.worse_than(is, 0) && clear[1] <= (1.0 + worse) * clear[0]
+}
+
+/// Returns the p-value of each effect's gains being zero by the motion. The gains follow the `free` nominal directions.
+fn of_nothing(
+    chosen: &[FittedCandidate],
+    free: usize,
+    by_motion: &Estimate,
+    covariance: &DMatrix<f64>,
+) -> Vec<f64> {
+    let mut at = free;
+    (chosen.iter())
+        .map(|p| {
+            let own = at..at + p.columns.len();
+            at = own.end;
+            wald(&by_motion.values[own.clone()], covariance, own.start)
+        })
+        .collect()
+}
+
+/// Returns the `k`-th parameter by torque and by motion, for the report. `name` is its name, unit and display factor.
+fn twice(
+    (parameter, unit, scale): (String, String, f64),
+    [torque, motion]: [&Estimate; 2],
+    k: usize,
+) -> Twice {
+    Twice {
+        parameter,
+        unit,
+        torque: scale * torque.values[k],
+        torque_std: scale * torque.stds[k],
+        motion: scale * motion.values[k],
+        motion_std: scale * motion.stds[k],
+        sigmas: (motion.values[k] - torque.values[k]).abs() / torque.stds[k].hypot(motion.stds[k]),
+    }
 }
 
 /// Returns the values with the least motion error, and their covariance, robust to correlation within one-second
@@ -223,7 +274,7 @@ fn nearest(
     mut found: Departures,
     departs: &(impl Fn(&[f64]) -> Option<Departures> + Sync),
     threads: usize,
-) -> Option<(Vec<f64>, DMatrix<f64>)> {
+) -> Option<(Estimate, DMatrix<f64>)> {
     let n = theta.len();
     let squares = |d: &Departures| d.of.iter().map(|x| x * x).sum::<f64>();
     for pass in 1.. {
@@ -285,8 +336,13 @@ fn nearest(
             }
             let count = stretches.len() as f64;
             let covariance = &inverse * spread * &inverse * (count / (count - 1.0));
-            let of_values = DMatrix::from_fn(n, n, |a, b| stds[a] * covariance[(a, b)] * stds[b]);
-            return Some((theta, of_values));
+            let covariance = DMatrix::from_fn(n, n, |a, b| stds[a] * covariance[(a, b)] * stds[b]);
+            let own = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
+            let found = Estimate {
+                values: theta,
+                stds: own,
+            };
+            return Some((found, covariance));
         }
     }
     None

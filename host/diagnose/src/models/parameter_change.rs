@@ -4,14 +4,18 @@ use std::collections::BTreeMap;
 
 use rig_shared::effects::Kind;
 
-use crate::fit::least_squares::{Evidence, Fit};
-use crate::fit::refit::{Refit, described_sizes};
+use crate::fit::evidence::Evidence;
+use crate::fit::least_squares::Fit;
+use crate::fit::open_parameters::described_sizes;
+use crate::fit::refit::Refit;
 use crate::fit::solution::Solution;
-use crate::models::payload::{on_last_link, on_single_link};
+use crate::levels::{LEAST_GAIN, SIGNIFICANT};
+use crate::models::payload::{LEAST_SIGMAS, on_last_link, on_single_link};
 use crate::outcome::Value;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
-use crate::search::fitted_candidate::{FittedCandidate, LEAST_GAIN, SIGNIFICANT};
+use crate::search::fitted_candidate::FittedCandidate;
+use rig_output::{format_significant, format_value};
 
 /// Share of the whole change's gain that some parameters must reach to explain it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
@@ -28,8 +32,6 @@ const LEAST_CHANGE: f64 = 0.04;
 const LEAST_OF_BOTH: f64 = 0.02;
 /// … and with an unexplained residual, which moves parameters at random.
 const LEAST_OF_BOTH_BESIDE: f64 = 0.04;
-/// Least ratio of a change to its standard deviation.
-pub(crate) const LEAST_SIGMAS: f64 = 4.0;
 
 /// Maximum number of parameters reported with values.
 const MOST_TOLD: usize = 8;
@@ -49,74 +51,143 @@ pub(crate) struct Change {
     pub(crate) p_value: f64,
 }
 
-/// Compares the refit to `rows` with the description. `known` is the torque of the effects found. `beside_friction` is
-/// true if friction is among them, `left` if a residual remains. Kinds in `without` are not named.
+/// Data for the comparison of a refit with the description.
+pub(crate) struct RefitData<'c> {
+    /// Robot and treatment.
+    pub(crate) context: &'c DiagnosisContext<'c>,
+    /// The rows of the refit.
+    pub(crate) rows: &'c Rows,
+    /// Coefficients of the free nominal directions, beside the effects.
+    pub(crate) after: &'c Solution,
+    /// True if friction is among the effects.
+    pub(crate) beside_friction: bool,
+    /// True if a residual remains.
+    pub(crate) left: bool,
+}
+
+/// Compares the refit with the description. `known` is the torque of the effects found. Kinds in `without` are not
+/// named.
 pub(crate) fn change(
-    context: &DiagnosisContext,
     refit: &Refit,
-    rows: &Rows,
+    refitted: &RefitData,
     known: &Column,
-    beside_friction: bool,
-    left: bool,
-    after: &Solution,
     without: &[Kind],
 ) -> Option<Change> {
-    let (anchor, free) = (&context.anchor, &refit.free);
-    if !anchor.stated {
+    if !refitted.context.anchor.stated {
         return None;
     }
-    let prior = anchor.prior_coefficients();
-    let mut frozen = refit.frozen(context);
-    frozen.subtract(known);
-    // An undescribed parameter cannot change.
-    let (unstated, all): (Vec<usize>, Vec<usize>) =
-        (0..free.len()).partition(|k| anchor.is_unstated(*k));
-    let beside_constants = frozen.clone().taking(unstated.iter().map(|k| &free[*k]));
-    let constants = unstated.iter().map(|k| (&free[*k], after.values[*k]));
-    frozen.subtract(&combined(known.len(), constants));
-    let evidence_in = |fit: &Fit, picked: &[usize]| {
-        let own = |k: &usize| fit.projected(fit.weighted(&free[*k]));
-        let columns: Vec<Vec<f64>> = picked.iter().map(own).collect();
-        let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; picked.len()];
-        fit.evidence(&columns, &open)
-    };
-    let evidence = |picked: &[usize]| evidence_in(&frozen, picked);
-    // All, a payload, all in one ratio, each alone. Every set counts, not only those tried before a success.
-    let tried = 3 + all.len();
-    let corrected = |e: &Evidence| e.corrected(tried);
-    let whole = evidence(&all)?;
-    if whole.gain < LEAST_GAIN || corrected(&whole) > SIGNIFICANT {
+    let comparison = Comparison::of(refit, refitted, known)?;
+    if comparison.moved_most() < LEAST_CHANGE {
         return None;
     }
-    // A value described as 0, or as a rounding of it, is no reference for a relative change.
-    let sizes = described_sizes(context);
-    let moved_most = (all.iter())
-        .map(|&k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(sizes[k]))
-        .fold(0.0, f64::max);
-    if moved_most < LEAST_CHANGE {
-        return None;
+    let payload = match without.contains(&Kind::Payload) {
+        true => None,
+        false => comparison.payload(),
+    };
+    payload
+        .or_else(|| comparison.one_factor(known.len()))
+        .or_else(|| comparison.single())
+        .or_else(|| comparison.several())
+}
+
+/// The description beside a refit, with a significant difference.
+struct Comparison<'c, 'r> {
+    refitted: &'c RefitData<'c>,
+    /// Columns of the free nominal directions.
+    free: &'c [Column],
+    /// Their described coefficients.
+    prior: Vec<f64>,
+    /// Described directions. An undescribed parameter cannot change.
+    all: Vec<usize>,
+    /// Residual of the description, the effects, and the undescribed parameters.
+    frozen: Fit<'r>,
+    /// The same with undescribed parameters as columns.
+    beside_constants: Fit<'r>,
+    /// Evidence for the change of all described directions.
+    whole: Evidence,
+}
+
+impl<'c, 'r> Comparison<'c, 'r> {
+    /// Returns the comparison; None if the whole change is not significant.
+    fn of(refit: &'c Refit<'r>, refitted: &'c RefitData, known: &Column) -> Option<Self> {
+        let (anchor, free) = (&refitted.context.anchor, &refit.free);
+        let mut frozen = refit.frozen(refitted.context);
+        frozen.subtract(known);
+        let (unstated, all): (Vec<usize>, Vec<usize>) =
+            (0..free.len()).partition(|k| anchor.is_unstated(*k));
+        let beside_constants = frozen.clone().taking(unstated.iter().map(|k| &free[*k]));
+        let constants = (unstated.iter()).map(|k| (&free[*k], refitted.after.values[*k]));
+        frozen.subtract(&combined(known.len(), constants));
+        let comparison = Self {
+            refitted,
+            free,
+            prior: anchor.prior_coefficients(),
+            whole: evidence_in(&frozen, free, &all)?,
+            all,
+            frozen,
+            beside_constants,
+        };
+        let whole = &comparison.whole;
+        let by_chance = whole.gain < LEAST_GAIN || comparison.corrected(whole) > SIGNIFICANT;
+        (!by_chance).then_some(comparison)
     }
-    let speaks = |e: &Evidence| e.gain >= SPEAKS_FOR_ALL * whole.gain;
-    // A common factor is a torque constant.
-    let carries = |e: &Evidence, [inertia, moment]: &[usize; 2]| {
-        let [inertia, moment] = [inertia, moment].map(|k| after.values[*k] / prior[*k]);
-        e.gain >= SPEAKS_BESIDE_FRICTION * whole.gain && (inertia / moment - 1.0).abs() > ONE_RATIO
-    };
-    let least = if left {
-        LEAST_OF_BOTH_BESIDE
-    } else {
-        LEAST_OF_BOTH
-    };
-    if !without.contains(&Kind::Payload) {
+
+    /// Returns the p-value, corrected for the sets: all, a payload, all in one ratio, each alone. Every set counts, not
+    /// only those tried before a success.
+    fn corrected(&self, e: &Evidence) -> f64 {
+        e.corrected(3 + self.all.len())
+    }
+
+    /// Returns the largest relative change.
+    fn moved_most(&self) -> f64 {
+        let (after, prior) = (self.refitted.after, &self.prior);
+        // A value described as 0, or as a rounding of it, is no reference for a relative change.
+        let sizes = described_sizes(self.refitted.context);
+        (self.all.iter())
+            .map(|&k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(sizes[k]))
+            .fold(0.0, f64::max)
+    }
+
+    fn evidence(&self, picked: &[usize]) -> Option<Evidence> {
+        evidence_in(&self.frozen, self.free, picked)
+    }
+
+    /// Returns true if some parameters explain nearly all of the change.
+    fn speaks(&self, e: &Evidence) -> bool {
+        e.gain >= SPEAKS_FOR_ALL * self.whole.gain
+    }
+
+    /// Returns true if inertia and moment explain enough beside friction. A common factor is a torque constant.
+    fn carries(&self, e: &Evidence, [inertia, moment]: &[usize; 2]) -> bool {
+        let growth = |k: usize| self.refitted.after.values[k] / self.prior[k];
+        let [inertia, moment] = [inertia, moment].map(|k| growth(*k));
+        e.gain >= SPEAKS_BESIDE_FRICTION * self.whole.gain
+            && (inertia / moment - 1.0).abs() > ONE_RATIO
+    }
+
+    /// Returns a payload as the change.
+    fn payload(&self) -> Option<Change> {
+        let RefitData {
+            context,
+            rows,
+            after,
+            beside_friction,
+            left,
+        } = *self.refitted;
         let told = |words: String, parameters, e: &Evidence| Change {
             words,
             effect: Some(Kind::Payload),
             parameters,
-            p_value: corrected(e),
+            p_value: self.corrected(e),
         };
-        if let Some((parameters, directions)) = on_single_link(context, after, &prior, least)
-            && let Some(e) = evidence(&directions)
-            && (speaks(&e) || beside_friction && carries(&e, &directions))
+        let least = if left {
+            LEAST_OF_BOTH_BESIDE
+        } else {
+            LEAST_OF_BOTH
+        };
+        if let Some((parameters, directions)) = on_single_link(context, after, &self.prior, least)
+            && let Some(e) = self.evidence(&directions)
+            && (self.speaks(&e) || beside_friction && self.carries(&e, &directions))
         {
             let words =
                 "Inertia and gravity have grown in the ratio of a mass at one place: a payload.";
@@ -127,85 +198,114 @@ pub(crate) fn change(
             true => SPEAKS_BESIDE_FRICTION,
             false => SPEAKS_FOR_ALL,
         };
-        if let Some((load, e)) = on_last_link(context, rows, &beside_constants)
+        if let Some((load, e)) = on_last_link(context, rows, &self.beside_constants)
             && load.mass.value > LEAST_SIGMAS * load.mass.std
-            && let Some(whole) = evidence_in(&beside_constants, &all)
+            && let Some(whole) = evidence_in(&self.beside_constants, self.free, &self.all)
             && e.gain >= share * whole.gain
         {
             return Some(told(load.words(context.robot), load.parameters(), &e));
         }
+        None
     }
-    let scale = combined(known.len(), free.iter().zip(prior.iter().copied()));
-    let open = [[f64::NEG_INFINITY, f64::INFINITY]];
-    // If gravity and inertia dominate the torque, they also decide on friction, whatever that does.
-    let of_one_factor = |factor: f64| {
-        all.iter().all(|&k| {
-            let apart = (after.values[k] - factor * prior[k]).abs();
-            apart <= LEAST_SIGMAS * after.std(k) + ONE_FACTOR * (factor * prior[k]).abs()
-        })
-    };
-    if let Some(e) = frozen.evidence(&[frozen.projected(frozen.weighted(&scale))], &open)
-        && speaks(&e)
-        && of_one_factor(1.0 + e.gains[0])
-    {
+
+    /// Returns one factor on all parameters of a robot with `joints` joints as the change.
+    fn one_factor(&self, joints: usize) -> Option<Change> {
+        let (after, prior, frozen) = (self.refitted.after, &self.prior, &self.frozen);
+        let scale = combined(joints, self.free.iter().zip(prior.iter().copied()));
+        let open = [[f64::NEG_INFINITY, f64::INFINITY]];
+        // If gravity and inertia dominate the torque, they also decide on friction, whatever that does.
+        let of_one_factor = |factor: f64| {
+            self.all.iter().all(|&k| {
+                let apart = (after.values[k] - factor * prior[k]).abs();
+                apart <= LEAST_SIGMAS * after.std(k) + ONE_FACTOR * (factor * prior[k]).abs()
+            })
+        };
+        let e = frozen.evidence(&[frozen.projected(frozen.weighted(&scale))], &open)?;
+        if !self.speaks(&e) || !of_one_factor(1.0 + e.gains[0]) {
+            return None;
+        }
         let percent = 100.0 * e.gains[0];
-        return Some(Change {
-            words: format!(
+        Some(self.nameless(
+            format!(
                 "All parameters have changed by {percent:.1} % together: the torque constant (or the scale of the torque) is not what the description says."
             ),
+            &e,
+        ))
+    }
+
+    /// Returns a single parameter that explains the change.
+    fn single(&self) -> Option<Change> {
+        let (after, prior) = (self.refitted.after, &self.prior);
+        self.all.iter().find_map(|&k| {
+            let e = self.evidence(&[k]).filter(|e| self.speaks(e))?;
+            Some(self.nameless(
+                format!(
+                    "{} has changed from {} to {}.",
+                    self.name(k),
+                    format_significant(prior[k], 4),
+                    format_value(after.values[k], after.std(k))
+                ),
+                &e,
+            ))
+        })
+    }
+
+    /// Returns all parameters with a significant change.
+    fn several(&self) -> Option<Change> {
+        let (after, prior) = (self.refitted.after, &self.prior);
+        let moved: Vec<String> = (self.all.iter().copied())
+            .filter(|&k| (after.values[k] - prior[k]).abs() > 4.0 * after.std(k))
+            .map(|k| {
+                format!(
+                    "{} {} where {} is described",
+                    self.name(k),
+                    format_value(after.values[k], after.std(k)),
+                    format_significant(prior[k], 4)
+                )
+            })
+            .collect();
+        if moved.is_empty() {
+            return None;
+        }
+        Some(self.nameless(
+            format!(
+                "Several nominal parameters differ from the description: {}{}.",
+                moved[..moved.len().min(MOST_TOLD)].join("; "),
+                match moved.len().saturating_sub(MOST_TOLD) {
+                    0 => String::new(),
+                    more => format!("; and {more} more"),
+                }
+            ),
+            &self.whole,
+        ))
+    }
+
+    /// Returns a change that is no effect.
+    fn nameless(&self, words: String, e: &Evidence) -> Change {
+        Change {
+            words,
             effect: None,
             parameters: BTreeMap::new(),
-            p_value: corrected(&e),
-        });
-    }
-    let name = |k: usize| match anchor.free[k].as_slice() {
-        [(b, _)] => context.expression(*b),
-        _ => "the first moment (gravity)".into(),
-    };
-    for &k in &all {
-        if let Some(e) = evidence(&[k])
-            && speaks(&e)
-        {
-            return Some(Change {
-                words: format!(
-                    "{} has changed from {} to {}.",
-                    name(k),
-                    rig_output::format_significant(prior[k], 4),
-                    rig_output::format_value(after.values[k], after.std(k))
-                ),
-                effect: None,
-                parameters: BTreeMap::new(),
-                p_value: corrected(&e),
-            });
+            p_value: self.corrected(e),
         }
     }
-    let moved: Vec<String> = (all.iter().copied())
-        .filter(|&k| (after.values[k] - prior[k]).abs() > 4.0 * after.std(k))
-        .map(|k| {
-            format!(
-                "{} {} where {} is described",
-                name(k),
-                rig_output::format_value(after.values[k], after.std(k)),
-                rig_output::format_significant(prior[k], 4)
-            )
-        })
-        .collect();
-    if moved.is_empty() {
-        return None;
+
+    /// Returns the name of a free direction.
+    fn name(&self, k: usize) -> String {
+        let context = self.refitted.context;
+        match context.anchor.free[k].as_slice() {
+            [(b, _)] => context.expression(*b),
+            _ => "the first moment (gravity)".into(),
+        }
     }
-    Some(Change {
-        words: format!(
-            "Several nominal parameters differ from the description: {}{}.",
-            moved[..moved.len().min(MOST_TOLD)].join("; "),
-            match moved.len().saturating_sub(MOST_TOLD) {
-                0 => String::new(),
-                more => format!("; and {more} more"),
-            }
-        ),
-        effect: None,
-        parameters: BTreeMap::new(),
-        p_value: corrected(&whole),
-    })
+}
+
+/// Returns the evidence for the `picked` columns beside a fit.
+fn evidence_in(fit: &Fit, free: &[Column], picked: &[usize]) -> Option<Evidence> {
+    let own = |k: &usize| fit.projected(fit.weighted(&free[*k]));
+    let columns: Vec<Vec<f64>> = picked.iter().map(own).collect();
+    let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; picked.len()];
+    fit.evidence(&columns, &open)
 }
 
 /// Returns true if inertia and gravity beside these effects have grown like a payload on a single link.

@@ -12,10 +12,11 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 use rig_shared::multibody::{COLUMNS, column};
 
-use crate::fit::least_squares::{Evidence, Fit, dot};
+use crate::fit::evidence::Evidence;
+use crate::fit::least_squares::Fit;
 use crate::fit::solution::Solution;
 use crate::fit::systematic_uncertainty::LINK;
-use crate::models::parameter_change::LEAST_SIGMAS;
+use crate::fit::vector::dot;
 use crate::outcome::Value;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
@@ -23,6 +24,8 @@ use rig_identify::independent_columns;
 use rig_model::robot::{Inertial, JointKind, Robot};
 use rig_output::{format_significant, format_value};
 
+/// Least ratio of a change to its standard deviation.
+pub(crate) const LEAST_SIGMAS: f64 = 4.0;
 /// Most rounds of the fit; each starts at the last place, which converges in three or four.
 const ROUNDS: usize = 12;
 /// Change of the place, m, below which it has converged.

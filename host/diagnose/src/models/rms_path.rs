@@ -8,8 +8,8 @@ use crate::outcome::Waterfall;
 use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::recordings::position_reading::PositionReading;
+use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::with;
 use rig_model::robot::{Robot, title_of};
 
 /// RMS on one set of recordings, joint by joint.

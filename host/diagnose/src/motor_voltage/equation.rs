@@ -1,7 +1,7 @@
 //! The voltage equation of one motor as rows of a regression.
 
 use crate::DiagnoseError;
-use crate::acceptance::residual_dependence::Coordinate;
+use crate::acceptance::coordinates::Coordinate;
 use crate::recordings::context::PreparedData;
 use crate::rows::regression::{Column, Rows, combined};
 use rig_data::prepare::central_difference;

@@ -1,6 +1,6 @@
 //! Unexplained remainder of a motor's voltage.
 
-use crate::acceptance::judge::BEYOND_FLOOR;
+use crate::levels::BEYOND_FLOOR;
 use crate::outcome::{Place, Remainder};
 use rig_output::format_significant;
 

@@ -17,12 +17,12 @@ mod tests;
 
 use rig_shared::effects::{Effect, Kind, Parameter, SHAPES};
 
-use crate::acceptance::judge::closed;
 use crate::acceptance::residual_dependence::locate;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::{Solution, jackknifed, solve};
 use crate::fit::systematic_uncertainty::inflated;
+use crate::levels::SIGNIFICANT;
 use crate::motor_voltage::equation::{ACROSS, CONSTANT, CURRENT, Equation, FADES, SPEED};
 use crate::motor_voltage::left::{Rest, of_the_voltage};
 use crate::outcome::{
@@ -32,7 +32,8 @@ use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
-use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
+use crate::search::fitted_candidate::FittedCandidate;
+use crate::statistics::closed;
 use crate::{DiagnoseError, Options};
 use rig_model::robot::{Robot, RobotEffect};
 use rig_output::{format_significant, format_value};

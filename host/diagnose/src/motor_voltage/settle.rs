@@ -3,13 +3,14 @@
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
-use crate::acceptance::judge::equal;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::is_constant;
 use crate::fit::least_squares::Fit;
 use crate::motor_voltage::Winding;
 use crate::outcome::Step;
-use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::{Search, is_constant, with};
+use crate::search::chosen::with;
+use crate::search::fitted_candidate::{FittedCandidate, equal};
+use crate::search::stepwise::Search;
 
 /// Constant torques. Only a recording without external loads separates them.
 const TORQUES: [Kind; 2] = [Kind::TorqueOffset, Kind::AsymmetricCoulomb];

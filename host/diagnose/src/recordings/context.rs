@@ -6,19 +6,19 @@ use std::sync::{Arc, Mutex};
 use rig_shared::effects::{Channel, Instant, Kind, Memory};
 use rig_shared::multibody::Chain;
 
-use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, DELAY, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::{DELAY, Source};
 use crate::description::described_effects::{DescribedEffects, candidate, gains};
 use crate::description::parameter_prior::ParameterPrior;
 use crate::faults::moves;
-use crate::fit::least_squares::Evidence;
-use crate::fit::refit::Refit;
+use crate::fit::evidence::Evidence;
 use crate::recordings::coherence;
-use crate::recordings::noise_floor;
+use crate::rows::nominal::Nominal;
 use crate::rows::nominal_torque::{Predicted, predict};
 use crate::rows::one_way::OneWay;
-use crate::rows::regression::{Column, ILLEGIBLE, Nominal, Rows, combined};
+use crate::rows::regression::{Column, Rows, combined, take_off};
 use crate::search::fitted_candidate::FittedCandidate;
+use crate::{DiagnoseError, statistics};
 use rig_data::Compensated;
 use rig_data::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
 use rig_data::runs::{Run, runs_of};
@@ -27,9 +27,6 @@ use rig_model::robot::{JointKind, Robot};
 
 /// Least pass band before decimation for the waves of effects, Hz.
 const LEAST_BAND: f64 = 30.0;
-
-/// Ratio of the mean squares near standstill to the expected ones above which these rows are used.
-const LOUD: f64 = 1.2;
 
 /// Prepared recordings under one treatment.
 pub(crate) struct PreparedData {
@@ -65,7 +62,7 @@ pub(crate) struct DiagnosisContext<'a> {
     pub(crate) anchor: ParameterPrior,
     treatment: Treatment,
     /// Joints whose rows near standstill are used.
-    rests: Vec<usize>,
+    pub(crate) rests: Vec<usize>,
     /// Joints that move in one direction only. Their constant torques are held.
     pub(crate) one_way: Vec<OneWay>,
 }
@@ -177,32 +174,6 @@ impl<'a> DiagnosisContext<'a> {
             rows,
             treatment: treatment.clone(),
         })
-    }
-
-    /// Selects by the training data the joints whose rows near standstill are used. Their residual there must exceed
-    /// what unknown dry friction at standstill explains. Returns true if there is such a joint.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] of the fit.
-    pub(crate) fn look_about_rests(
-        &mut self,
-        prepared: &PreparedData,
-    ) -> Result<bool, DiagnoseError> {
-        let rows = &prepared.rows;
-        let refit = Refit::of(self, rows)?;
-        let values = &refit.before.values;
-        let source = self.source(prepared, &self.anchor.values(values))?;
-        let known = combined(rows.joints(), refit.free.iter().zip(values.iter().copied()));
-        let mut residual = rows.torque.clone();
-        take_off(&mut residual, &known);
-        let loud = |j: &usize| {
-            let Some([about, elsewhere]) = rows.about_rests(*j, &residual[*j]) else {
-                return true;
-            };
-            about > LOUD * (elsewhere + (ILLEGIBLE * source.coulomb(*j)).powi(2))
-        };
-        self.rests = (0..rows.joints()).filter(loud).collect();
-        Ok(!self.rests.is_empty())
     }
 
     /// Returns the sample rate of the training data, Hz.
@@ -344,22 +315,13 @@ impl<'a> DiagnosisContext<'a> {
 /// Returns the RMS per joint on the used rows.
 fn rms(rows: &Rows, residual: &[Vec<f64>]) -> Vec<f64> {
     (residual.iter().zip(&rows.keep))
-        .map(|(r, keep)| noise_floor::rms(r, keep))
+        .map(|(r, keep)| statistics::rms(r, keep))
         .collect()
 }
 
 fn position_filter(treatment: &Treatment) -> Result<LowPass, DiagnoseError> {
     (treatment.position_filter())
         .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))
-}
-
-/// Subtracts a column from signals, joint by joint.
-fn take_off(signals: &mut [Vec<f64>], column: &Column) {
-    for (signal, column) in signals.iter_mut().zip(column) {
-        for (s, c) in signal.iter_mut().zip(column.iter().flatten()) {
-            *s -= c;
-        }
-    }
 }
 
 /// Decides on the treatment as for an identification, but with a band wider than that of the motion.

@@ -10,10 +10,10 @@ use std::ops::Range;
 
 use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
-use crate::recordings::outlier_segment::burst;
+use crate::recordings::outlier_segment::{Burst, burst};
 use crate::rows::regression::Rows;
 use rig_data::runs::Run;
-use rig_model::robot::Robot;
+use rig_model::robot::{Joint, Robot};
 use rig_output::format_significant;
 
 /// Time that is excluded on either side of a disturbance, s: the reach of a filter.
@@ -48,6 +48,100 @@ fn asked(run: &Run, joint: usize, rows: &Rows, length: usize) -> Vec<bool> {
         .collect()
 }
 
+/// A run, and rows counted from its first.
+type Part = (usize, Range<usize>);
+
+/// Two runs of one motion.
+struct Pair {
+    /// Both runs.
+    runs: [usize; 2],
+    /// First row of each.
+    starts: [usize; 2],
+    /// Number of rows that both have.
+    length: usize,
+}
+
+impl Pair {
+    fn of((a, b): (usize, usize), rows: &Rows) -> Self {
+        let starts = [a, b].map(|run| rows.starts[run]);
+        Self {
+            runs: [a, b],
+            starts,
+            length: (rows.starts[a + 1] - starts[0]).min(rows.starts[b + 1] - starts[1]),
+        }
+    }
+
+    /// Returns the stretches with most of the difference of a joint's residual. Rows that are `out` already are known.
+    fn differs(
+        &self,
+        prepared: &PreparedData,
+        joint: usize,
+        residual: &[f64],
+        out: &[Part],
+    ) -> Option<Burst> {
+        let rows = &prepared.rows;
+        let Self {
+            runs: [a, b],
+            starts,
+            length,
+        } = *self;
+        let mut apart = vec![0.0; rows.count];
+        let mut keep = vec![false; rows.count];
+        let known = |run: usize, row: usize| {
+            let mut rows = (out.iter()).filter(|(known, _)| *known == run);
+            rows.any(|(_, part)| part.contains(&row))
+        };
+        // Runs that come to rest at slightly different times differ without a disturbance.
+        let resting =
+            starts.map(|start| lasting(&rows.keep[joint][start..start + length], rows.period));
+        let asked = asked(&prepared.runs[a], joint, rows, length);
+        let commanded = lasting(&asked, rows.period);
+        let reach = (BESIDE / rows.period).ceil() as usize;
+        let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(length);
+        for k in 0..length {
+            let [x, y] = starts.map(|start| start + k);
+            let rests = resting.iter().all(|rests| rests[near(k)].contains(&true));
+            // In a commanded dwell, each run may stop on another side of its friction.
+            let at_rest = rests || commanded[near(k)].contains(&true);
+            let known = known(a, k) || known(b, k);
+            keep[x] = rows.keep[joint][x] && rows.keep[joint][y] && !at_rest && !known;
+            apart[x] = residual[x] - residual[y];
+        }
+        burst(&apart, &keep, &rows.starts, rows.period, &prepared.runs)
+    }
+
+    /// Returns a sentence on such stretches.
+    fn sentence(&self, runs: &[Run], joint: &Joint, residual: &[f64], burst: &Burst) -> String {
+        let Self {
+            runs: [a, b],
+            starts,
+            ..
+        } = *self;
+        let squares = |start: usize| -> f64 {
+            (burst.rows.iter())
+                .flat_map(|part| part.clone())
+                .map(|x| residual[x - starts[0] + start].powi(2))
+                .sum()
+        };
+        let (own, other) = if squares(starts[0]) > squares(starts[1]) {
+            (a, b)
+        } else {
+            (b, a)
+        };
+        let [own_label, other_label] = [own, other].map(|run| &runs[run].label);
+        let [from, to] = burst.time.map(|t| t - runs[a].t.first().unwrap_or(&0.0));
+        format!(
+            "Joint {}: from {from:.1} to {to:.1} s after its start {own_label} differs from {other_label}, the same motion, {} times as much as elsewhere. Something touched the joint or held it there, or that piece is damaged; {} of half a second left out of both.",
+            joint.name,
+            format_significant(burst.times, 2),
+            match burst.count {
+                1 => "one stretch is".to_owned(),
+                n => format!("{n} stretches are"),
+            }
+        )
+    }
+}
+
 /// Excludes disturbances from runs of one motion and returns sentences on them. `residuals` are those of the refitted
 /// model, joint by joint.
 pub(crate) fn touched(
@@ -55,72 +149,29 @@ pub(crate) fn touched(
     residuals: &[Vec<f64>],
     prepared: &mut PreparedData,
 ) -> Vec<String> {
-    let rows = &prepared.rows;
     let mut told = Vec::new();
-    // Run, and rows counted from its first.
-    let mut out: Vec<(usize, Range<usize>)> = Vec::new();
-    for (a, b) in noise_floor::repeats(&prepared.runs) {
+    let mut out: Vec<Part> = Vec::new();
+    for repeat in noise_floor::repeats(&prepared.runs) {
+        let pair = Pair::of(repeat, &prepared.rows);
         for (j, joint) in robot.joints.iter().enumerate() {
             let residual = &residuals[j];
-            let mut apart = vec![0.0; rows.count];
-            let mut keep = vec![false; rows.count];
-            let starts = [a, b].map(|run| rows.starts[run]);
-            let length = (rows.starts[a + 1] - starts[0]).min(rows.starts[b + 1] - starts[1]);
-            let known = |run: usize, row: usize| {
-                let mut rows = (out.iter()).filter(|(known, _)| *known == run);
-                rows.any(|(_, part)| part.contains(&row))
-            };
-            // Runs that come to rest at slightly different times differ without a disturbance.
-            let resting =
-                starts.map(|start| lasting(&rows.keep[j][start..start + length], rows.period));
-            let asked = asked(&prepared.runs[a], j, rows, length);
-            let commanded = lasting(&asked, rows.period);
-            let reach = (BESIDE / rows.period).ceil() as usize;
-            let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(length);
-            for k in 0..length {
-                let [x, y] = starts.map(|start| start + k);
-                let rests = resting.iter().all(|rests| rests[near(k)].contains(&true));
-                // In a commanded dwell, each run may stop on another side of its friction.
-                let at_rest = rests || commanded[near(k)].contains(&true);
-                let known = known(a, k) || known(b, k);
-                keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;
-                apart[x] = residual[x] - residual[y];
-            }
-            let Some(burst) = burst(&apart, &keep, &rows.starts, rows.period, &prepared.runs)
-            else {
+            let Some(burst) = pair.differs(prepared, j, residual, &out) else {
                 continue;
             };
-            let squares = |run: usize| -> f64 {
-                (burst.rows.iter())
-                    .flat_map(|part| part.clone())
-                    .map(|x| residual[x - starts[0] + rows.starts[run]].powi(2))
-                    .sum()
-            };
-            let (own, other) = if squares(a) > squares(b) {
-                (a, b)
-            } else {
-                (b, a)
-            };
-            let [own_label, other_label] = [own, other].map(|run| &prepared.runs[run].label);
-            let [from, to] = burst
-                .time
-                .map(|t| t - prepared.runs[a].t.first().unwrap_or(&0.0));
-            told.push(format!(
-                "Joint {}: from {from:.1} to {to:.1} s after its start {own_label} differs from {other_label}, the same motion, {} times as much as elsewhere. Something touched the joint or held it there, or that piece is damaged; {} of half a second left out of both.",
-                joint.name,
-                format_significant(burst.times, 2),
-                match burst.count {
-                    1 => "one stretch is".to_owned(),
-                    n => format!("{n} stretches are"),
-                }
-            ));
+            told.push(pair.sentence(&prepared.runs, joint, residual, &burst));
             for part in &burst.rows {
-                let own = part.start - starts[0]..part.end - starts[0];
-                out.extend([(a, own.clone()), (b, own)]);
+                let own = part.start - pair.starts[0]..part.end - pair.starts[0];
+                out.extend(pair.runs.map(|run| (run, own.clone())));
             }
         }
     }
-    let (period, thinning) = (rows.period, &rows.thinning);
+    leave_out(prepared, out);
+    told
+}
+
+/// Leaves these rows out of their runs.
+fn leave_out(prepared: &mut PreparedData, out: Vec<Part>) {
+    let (period, thinning) = (prepared.rows.period, &prepared.rows.thinning);
     for (run, part) in out {
         let run: &mut Run = &mut prepared.runs[run];
         let trimmed = thinning.trimmed(run);
@@ -129,5 +180,4 @@ pub(crate) fn touched(
         let part = sample(from - BESIDE)..sample(to + BESIDE);
         run.left_out.push(part);
     }
-    told
 }

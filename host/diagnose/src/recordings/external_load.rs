@@ -5,7 +5,7 @@
 
 use rig_shared::effects::Kind;
 
-use crate::recordings::noise_floor;
+use crate::statistics;
 use rig_data::runs::Run;
 
 /// Length of stretches whose means give the uncertainty of a mean, s.
@@ -42,7 +42,7 @@ pub(crate) fn step(
             })
             .collect()
     };
-    let of = |unburdened: bool| noise_floor::mean(&means(unburdened));
+    let of = |unburdened: bool| statistics::mean(&means(unburdened));
     let ([free, a], [pulled, b]) = (of(true)?, of(false)?);
     Some([free - pulled, (a + b).sqrt()])
 }

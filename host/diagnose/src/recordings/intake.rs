@@ -4,12 +4,14 @@ use rig_shared::effects::Kind;
 
 use crate::description::described_effects::DescribedEffects;
 use crate::faults::{faults, too_short_to_judge, too_short_to_learn};
-use crate::fit::collinear::alike;
-use crate::fit::refit::{Open, Refit, open};
+use crate::fit::collinear::{Alike, alike};
+use crate::fit::open_parameters::{Open, open};
+use crate::fit::refit::Refit;
 use crate::outcome::DataFault;
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
 use crate::recordings::disturbance::touched;
-use crate::recordings::torque_lead::sampling_jitter;
+use crate::recordings::rest_rows::joints_loud_at_rest;
+use crate::recordings::sampling::sampling_jitter;
 use crate::rows::one_way::{OneWay, one_way};
 use crate::{DiagnoseError, Options};
 use rig_data::past::in_sessions;
@@ -44,6 +46,42 @@ pub(crate) struct Material<'a> {
     pub(crate) faults: Vec<DataFault>,
 }
 
+/// The training data and the hold-out, under one treatment.
+struct Readings {
+    training: PreparedData,
+    held_out: Option<PreparedData>,
+}
+
+impl Readings {
+    /// Reads the recordings and places them in sessions.
+    fn of(
+        context: &DiagnosisContext,
+        training: &[&dyn Recording],
+        holdout: &[&dyn Recording],
+    ) -> Result<Self, DiagnoseError> {
+        let mut training = context.load(training)?;
+        let mut held_out = if holdout.is_empty() {
+            None
+        } else {
+            Some(context.load_held(holdout)?)
+        };
+        in_sessions(&mut training.runs, &[]);
+        if let Some(held_out) = &mut held_out {
+            in_sessions(&mut held_out.runs, &training.runs);
+        }
+        Ok(Self { training, held_out })
+    }
+
+    /// Forms the rows anew, after the context has changed.
+    fn with_new_rows(self, context: &DiagnosisContext) -> Result<Self, DiagnoseError> {
+        let rows = |prepared: PreparedData| context.rows(prepared.runs, &prepared.treatment);
+        Ok(Self {
+            training: rows(self.training)?,
+            held_out: self.held_out.map(rows).transpose()?,
+        })
+    }
+}
+
 /// Reads the recordings.
 ///
 /// # Errors
@@ -55,66 +93,29 @@ pub(crate) fn intake<'a>(
     options: &Options,
 ) -> Result<Intake<'a>, DiagnoseError> {
     let mut context = DiagnosisContext::of(stated, training)?;
-    let mut prepared = context.load(training)?;
-    let mut held_out = if holdout.is_empty() {
-        None
-    } else {
-        Some(context.load_held(holdout)?)
-    };
-    in_sessions(&mut prepared.runs, &[]);
-    if let Some(held_out) = &mut held_out {
-        in_sessions(&mut held_out.runs, &prepared.runs);
-    }
-    let faults = wrong(stated, &prepared, held_out.as_ref(), options)?;
+    let readings = Readings::of(&context, training, holdout)?;
+    let faults = wrong(
+        stated,
+        &readings.training,
+        readings.held_out.as_ref(),
+        options,
+    )?;
     if !options.fits(&faults) {
         return Ok(Intake::Faulty(faults));
     }
     // A short motion allows parameters but no effects: both need blocks outside the fit.
-    let nameless = too_short_to_learn(&prepared.runs).map(|fault| fault.text);
+    let nameless = too_short_to_learn(&readings.training.runs).map(|fault| fault.text);
     let without = without(options, nameless.is_some());
-    let mut more = stated.clone();
-    if more.lift_limits(&prepared.runs)
-        || more.hold_delays(sampling_jitter(&prepared.runs))
-        || more.hold_what_is_not_in(&library(context.robot, &prepared.runs, &without))
-    {
+    if let Some(more) = held_in_addition(&context, &readings.training.runs, &without) {
         return Ok(Intake::Hold(Box::new(more)));
     }
-    let one_way = one_way(&context.nominal, &prepared.rows);
-    if !one_way.is_empty() {
-        let constants: Vec<usize> = one_way.iter().map(OneWay::constant).collect();
-        context.anchor.hold(&constants);
-        context.one_way = one_way;
-        let rows = |prepared: PreparedData| context.rows(prepared.runs, &prepared.treatment);
-        prepared = rows(prepared)?;
-        held_out = held_out.map(rows).transpose()?;
-    }
-    let open = open(&context, &prepared.rows);
-    if !open.held.is_empty() {
-        context.anchor.hold(&open.held);
-        let rows = |prepared: PreparedData| context.rows(prepared.runs, &prepared.treatment);
-        prepared = rows(prepared)?;
-        held_out = held_out.map(rows).transpose()?;
-    }
-    let alike = alike(&context, &prepared.rows);
-    if !alike.is_empty() {
-        let held: Vec<usize> = alike.iter().map(|one| one.parameter).collect();
-        context.anchor.hold(&held);
-        let rows = |prepared: PreparedData| context.rows(prepared.runs, &prepared.treatment);
-        prepared = rows(prepared)?;
-        held_out = held_out.map(rows).transpose()?;
-    }
-    if context.look_about_rests(&prepared)? {
-        let rows = |prepared: PreparedData| context.rows(prepared.runs, &prepared.treatment);
-        prepared = rows(prepared)?;
-        held_out = held_out.map(rows).transpose()?;
-    }
-    let left: Vec<Vec<f64>> = {
-        let refit = Refit::of(&context, &prepared.rows)?;
-        (0..context.robot.joints.len())
-            .map(|j| refit.base.residual(j))
-            .collect()
-    };
-    let mut touches = touched(context.robot, &left, &mut prepared);
+    let readings = one_way_held(&mut context, readings)?;
+    let (readings, open, alike) = undetermined_held(&mut context, readings)?;
+    let Readings {
+        training: mut prepared,
+        held_out,
+    } = rests_used(&mut context, readings)?;
+    let mut touches = without_touches(&context, &mut prepared)?;
     if !touches.is_empty() {
         prepared = context.rows(prepared.runs, &prepared.treatment)?;
     }
@@ -128,6 +129,80 @@ pub(crate) fn intake<'a>(
         touches,
         faults,
     })))
+}
+
+/// Returns the description with more effects held, or with limits ignored; None if it stays as it is.
+fn held_in_addition(
+    context: &DiagnosisContext,
+    training: &[Run],
+    without: &[Kind],
+) -> Option<DescribedEffects> {
+    let mut more = context.stated.clone();
+    let changed = more.lift_limits(training)
+        || more.hold_delays(sampling_jitter(training))
+        || more.hold_what_is_not_in(&library(context.robot, training, without));
+    changed.then_some(more)
+}
+
+/// Holds the constant torques of joints that move in one direction only.
+fn one_way_held(
+    context: &mut DiagnosisContext,
+    readings: Readings,
+) -> Result<Readings, DiagnoseError> {
+    let one_way = one_way(&context.nominal, &readings.training.rows);
+    if one_way.is_empty() {
+        return Ok(readings);
+    }
+    let constants: Vec<usize> = one_way.iter().map(OneWay::constant).collect();
+    context.anchor.hold(&constants);
+    context.one_way = one_way;
+    readings.with_new_rows(context)
+}
+
+/// Holds the parameters that the training data do not improve, then those that are alike along the motion. Returns
+/// both.
+fn undetermined_held(
+    context: &mut DiagnosisContext,
+    mut readings: Readings,
+) -> Result<(Readings, Open, Vec<Alike>), DiagnoseError> {
+    let open = open(context, &readings.training.rows);
+    if !open.held.is_empty() {
+        context.anchor.hold(&open.held);
+        readings = readings.with_new_rows(context)?;
+    }
+    let alike = alike(context, &readings.training.rows);
+    if !alike.is_empty() {
+        let held: Vec<usize> = alike.iter().map(|one| one.parameter).collect();
+        context.anchor.hold(&held);
+        readings = readings.with_new_rows(context)?;
+    }
+    Ok((readings, open, alike))
+}
+
+/// Uses the rows near standstill of the joints that show more there than dry friction.
+fn rests_used(
+    context: &mut DiagnosisContext,
+    readings: Readings,
+) -> Result<Readings, DiagnoseError> {
+    context.rests = joints_loud_at_rest(context, &readings.training)?;
+    if context.rests.is_empty() {
+        return Ok(readings);
+    }
+    readings.with_new_rows(context)
+}
+
+/// Leaves disturbances out of the training runs, and returns sentences on them.
+fn without_touches(
+    context: &DiagnosisContext,
+    prepared: &mut PreparedData,
+) -> Result<Vec<String>, DiagnoseError> {
+    let left: Vec<Vec<f64>> = {
+        let refit = Refit::of(context, &prepared.rows)?;
+        (0..context.robot.joints.len())
+            .map(|j| refit.base.residual(j))
+            .collect()
+    };
+    Ok(touched(context.robot, &left, prepared))
 }
 
 /// Returns the kinds left out of the search: all of them if the recordings are too short (`nameless`).

@@ -12,5 +12,7 @@ pub(crate) mod noise_floor;
 pub(crate) mod outlier_segment;
 pub(crate) mod position_reading;
 pub(crate) mod resampling;
+pub(crate) mod rest_rows;
+pub(crate) mod sampling;
 pub(crate) mod torque_lead;
 pub(crate) mod torque_limits;

@@ -1,6 +1,7 @@
 //! The noise floor: the part of the residual that no model of the motion can explain.
 
 use crate::rows::regression::Rows;
+use crate::statistics;
 use rig_data::prepare::Welch;
 use rig_data::runs::{Differences, Run};
 
@@ -144,23 +145,8 @@ pub(crate) fn between(
             (2 * count > stretch).then(|| sum / count as f64)
         })
         .collect();
-    let [mean, variance] = mean(&means)?;
+    let [mean, variance] = statistics::mean(&means)?;
     Some([mean, variance.sqrt()])
-}
-
-/// Returns the mean of independent values and its variance; None for fewer than three.
-pub(crate) fn mean(values: &[f64]) -> Option<[f64; 2]> {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    (n > 2.0).then(|| [mean, squares / (n * (n - 1.0))])
-}
-
-/// Returns the RMS of a signal over the used rows.
-pub(crate) fn rms(signal: &[f64], keep: &[bool]) -> f64 {
-    let used = || signal.iter().zip(keep).filter(|(_, keep)| **keep);
-    let squares: f64 = used().map(|(x, _)| x * x).sum();
-    (squares / used().count().max(1) as f64).sqrt()
 }
 
 /// Returns the RMS of a joint's sample-to-sample torque noise on rows `period` s apart: a lower limit of the noise.
@@ -283,6 +269,11 @@ pub(crate) fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {
         2.0 * sum * rows.period
     };
     residuals.iter().map(of).fold(rows.period, f64::max)
+}
+
+/// Returns the noise floor of a joint's torque from its own reading, in the residual's rows.
+pub(crate) fn of_torque(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
+    sensor_noise(runs, joint, period).or_else(|| beyond_band(runs, joint, period))
 }
 
 #[cfg(test)]

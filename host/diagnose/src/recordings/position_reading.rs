@@ -8,11 +8,10 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
-use crate::recordings::noise_floor;
 use crate::rows::nominal_torque::predict;
 use crate::rows::regression::Rows;
+use crate::{DiagnoseError, statistics};
 use rig_data::prepare::{LowPass, central_difference, second_difference};
 use rig_data::runs::{Run, resolution};
 
@@ -149,7 +148,7 @@ fn left(
             let apart: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
             let mut thin = Vec::new();
             source.thinning.push(&apart, &mut thin);
-            noise_floor::rms(&thin, keep)
+            statistics::rms(&thin, keep)
         })
         .collect())
 }

@@ -10,9 +10,11 @@
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::Source;
 use crate::fit::least_squares::Fit;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
+use crate::recordings::sampling::sampling_jitter;
 use rig_data::runs::{JointRun, Run};
 
 /// Standard deviations above which a lead is significant.
@@ -21,17 +23,6 @@ const SEEN: f64 = 4.0;
 const LEAST: f64 = 0.05;
 /// Change of a lead, as a share of a sample, that requires another search.
 const WORTH_A_SEARCH: f64 = 0.2;
-/// Share of a sample by which a torque may be late without a delay. A mean over the last sample, such as a summed
-/// current, is half a sample old; a tenth allows for the error of the estimate.
-const LATE: f64 = 0.6;
-/// Upper limit of that time, s: a board reads its sensors within it, even if they are recorded slowly.
-const LATEST: f64 = 0.001;
-
-/// Returns the lateness that sampling alone may cause, s.
-pub(crate) fn sampling_jitter(runs: &[Run]) -> f64 {
-    runs.first()
-        .map_or(0.0, |run| (LATE / run.rate).min(LATEST))
-}
 
 /// Returns the torque lead of each joint (negative: late), s: the `present` lead plus the one that `fit` still shows. 0
 /// if it exceeds what sampling explains: then it is another effect.
@@ -153,20 +144,6 @@ mod tests {
         put_later(&mut run.joints[0], 0.1);
         assert!(before.is_some());
         assert_eq!(sensor_noise(&[run], 0, 0.01), before);
-    }
-
-    #[test]
-    fn no_more_than_half_a_sample_late_is_sampling() {
-        let late = |rate: f64| {
-            sampling_jitter(&[Run {
-                rate,
-                ..Run::default()
-            }])
-        };
-        // Half a sample at 1 kHz is sampling; three quarters with a current filter are not.
-        assert!(late(1000.0) > 0.0005 && late(1000.0) < 0.00075);
-        assert_eq!(late(100.0), LATEST);
-        assert_eq!(sampling_jitter(&[]), 0.0);
     }
 
     #[test]

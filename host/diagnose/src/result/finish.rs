@@ -1,15 +1,16 @@
 //! Pictures, sentences and limits of a finished search.
 
 use crate::DiagnoseError;
-use crate::acceptance::residual_dependence::Coordinate;
+use crate::acceptance::coordinates::Coordinate;
 use crate::description::parameter_prior::ParameterPrior;
 use crate::fit::least_squares::Fit;
 use crate::models::simulated_motion::Positions;
 use crate::outcome::Diagnosis;
 use crate::recordings::noise_floor::repeats;
 use crate::result::{limits, pictures, sentences};
+use crate::rows::nominal::Nominal;
 use crate::rows::one_way::OneWay;
-use crate::rows::regression::{Nominal, Rows};
+use crate::rows::regression::Rows;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::Search;
 use rig_data::runs::Run;

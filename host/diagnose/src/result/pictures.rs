@@ -3,17 +3,18 @@
 use rig_shared::effects::Kind;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::acceptance::residual_dependence::{
-    BINS, Coordinate, SINCE_START, bins, locate, velocity_of,
-};
-use crate::columns::effect_columns::Candidate;
+use crate::acceptance::coordinates::{Coordinate, SINCE_START, velocity_of};
+use crate::acceptance::residual_dependence::locate;
+use crate::acceptance::residual_dependence::process::BINS;
+use crate::columns::candidate::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::models::simulated_motion::Positions;
 use crate::outcome::{Curves, Map};
 use crate::result::finish::Found;
 use crate::rows::regression::Rows;
+use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::with;
+use crate::statistics::bins;
 use rig_model::robot::Joint;
 
 /// Length of the stretch that is drawn over time, s.

@@ -2,7 +2,7 @@
 
 use rig_shared::effects::Kind;
 
-use crate::fit::refit::Open;
+use crate::fit::open_parameters::Open;
 use crate::fit::solution::Solution;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;

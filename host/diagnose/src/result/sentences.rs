@@ -4,7 +4,7 @@ use rig_shared::effects::Kind;
 use rig_shared::multibody::{COLUMNS, column};
 
 use crate::acceptance::model_check::sizes;
-use crate::columns::transmission::STRETCH;
+use crate::columns::transmission::observer::STRETCH;
 use crate::columns::waves::{is_of_the_motor, ratio_is_described};
 use crate::fit::solution::Solution;
 use crate::outcome::{Before, Diagnosis, Remainder, Residual, Step, Verdict, Waterfall};

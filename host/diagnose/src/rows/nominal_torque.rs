@@ -3,7 +3,8 @@
 use rig_shared::multibody::column;
 
 use crate::DiagnoseError;
-use crate::rows::regression::{Nominal, motion_of};
+use crate::rows::motion::motion_of;
+use crate::rows::nominal::Nominal;
 use rig_data::runs::Run;
 use rig_model::robot::Robot;
 

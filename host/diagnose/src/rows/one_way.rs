@@ -6,7 +6,8 @@ use rig_shared::multibody::{COLUMNS, column};
 
 use crate::description::parameter_prior::ParameterPrior;
 use crate::fit::solution::Solution;
-use crate::rows::regression::{Nominal, Rows};
+use crate::rows::nominal::Nominal;
+use crate::rows::regression::Rows;
 use rig_identify::{SLIDES, Slides};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit, format_value};

@@ -6,7 +6,7 @@
 //! residual around them is above the median. The method is that of Carroll (1982, Annals of Statistics 10): weights
 //! from smoothed squares of residuals.
 
-use crate::columns::transmission::STRETCH;
+use crate::columns::transmission::observer::STRETCH;
 
 /// Returns the weight of each row of a joint, up to 1, from its residual. Rows are `period` s apart, `keep` marks used
 /// ones, and runs begin at `starts`.

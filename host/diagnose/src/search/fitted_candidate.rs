@@ -1,39 +1,17 @@
 //! Fit of a candidate's shapes, and the tests for its acceptance.
 
-mod shapes;
-#[cfg(test)]
-mod tests;
-
 use std::sync::Arc;
 
-use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
+use rig_shared::effects::{Kind, SHAPES};
 
-use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, Source};
-use crate::columns::transmission::ABREAST;
-use crate::fit::least_squares::{Evidence, Fit, dot_self};
-use crate::fit::simplex::{MOST_ANSWERS, Simplex};
-use crate::recordings::torque_lead::sampling_jitter;
-use crate::rows::regression::{Column, combined};
-use crate::search::fitted_candidate::shapes::{
-    at_bound, coordinate, is_distance, searched, spacing, value_at,
-};
-pub(crate) use crate::search::fitted_candidate::shapes::{
-    falls_throughout, goes_straight, grid, grid_on, is_straight,
-};
-use crate::search::stepwise::{Search, is_gear};
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::is_gear;
+use crate::fit::evidence::Evidence;
+use crate::levels::{LEAST_GAIN, SIGNIFICANT};
+use crate::rows::regression::Column;
 
-/// Least share of the twist torque of mass and load that a gear must have. True gears of the emulated rig give 0.7 to
-/// 1.1. A wide backlash with a third can replace a tilted base.
-const LEAST_OF_A_TWIST: f64 = 0.5;
-/// The same for an elastic gear: a soft one, whose swing the motor motion predicts only briefly, gave 0.49.
-const LEAST_OF_A_SPRINGS_TWIST: f64 = 0.4;
-/// Family-wise significance level of an effect.
-pub(crate) const SIGNIFICANT: f64 = 0.01;
-/// Least RMS share that an effect must remove on folds outside its fit (its gain).
-pub(crate) const LEAST_GAIN: f64 = 0.02;
 /// Least ratio of the gain to its standard deviation.
-const LEAST_SIGMAS: f64 = 2.0;
+pub(crate) const LEAST_SIGMAS: f64 = 2.0;
 /// Least gain beside a near-collinear effect. Both have one form only, so a model without it leaves less.
 const LEAST_GAIN_BESIDE_ITS_DOUBLE: f64 = 0.0075;
 /// Least ratio of such a small gain to its standard deviation.
@@ -53,24 +31,13 @@ const LEAST_GAIN_OF_GEARS: f64 = 0.1;
 const LEAST_GAIN_OF_HEARD: f64 = 0.05;
 /// Least ratio of the gain to its standard deviation for trying the observer on it.
 const CLEAR_SIGMAS: f64 = 4.0;
-/// A candidate whose explained share of the squares is lower at every grid point cannot reach the least gain.
-const HOPELESS: f64 = 0.5 * LEAST_GAIN;
-/// The same for a gear, whose starting points are farther from the optimum.
-const HOPELESS_GEAR: f64 = 0.02;
-/// Damping ratio above which a gear is no spring: steel shafts and gears have some hundredths. An overdamped one is a
-/// friction lag, easily confused with a spring and all friction on the link.
-const MOST_DAMPED: f64 = 0.5;
-/// Starting points that are refined in parallel.
-const FOLLOWED: usize = ABREAST;
-/// First step of a simplex in a shape's coordinate, and its evaluations: from a grid …
-const FAR: (f64, usize) = (0.4, MOST_ANSWERS);
-/// … and from the best shapes beside a similar model.
-const NEAR: (f64, usize) = (0.2, 50);
-/// Golden-section steps of the refinement.
-const REFINEMENTS: usize = 14;
 
-/// Share explained, shapes, columns.
-type Best = (f64, [f64; SHAPES], Arc<Vec<Column>>);
+/// Share of a step's gain from which on an alternative is equal, if the blocks show no difference.
+const AS_GOOD: f64 = 0.9;
+/// Largest RMS ratio of an equal alternative to the step. A larger one means a missing effect.
+const LEAVES: f64 = 1.2;
+/// Standard deviations of a paired block difference below which alternatives are equal.
+const NO_DIFFERENCE: f64 = 2.5;
 
 /// A candidate with fitted shapes.
 #[derive(Clone, Debug)]
@@ -185,354 +152,13 @@ impl FittedCandidate {
     }
 }
 
-/// Returns the damping ratio of a link with this inertia on an elastic gear with the motor locked.
-fn damping_ratio(shapes: &[f64; SHAPES], mass: f64) -> f64 {
-    let [stiffness, damping, ..] = *shapes;
-    0.5 * damping / (stiffness * mass).sqrt()
+/// Returns true if the data support a rival equally well.
+pub(crate) fn equal(own: &FittedCandidate, rival: &FittedCandidate) -> bool {
+    rival.candidate.joint == own.candidate.joint
+        && rival.evidence.gain >= AS_GOOD * own.evidence.gain
+        && 1.0 - rival.evidence.gain <= LEAVES * (1.0 - own.evidence.gain)
+        && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE
 }
 
-/// Returns true if a spring's stiffness is significant. Preload alone is a constant, with its own names.
-pub(crate) fn stiff(fit: &Fit, columns: &[Column]) -> bool {
-    let (Some(stiffness), Some(preload)) = (about_its_middle(fit, columns), columns.get(1..))
-    else {
-        return false;
-    };
-    let mut beside = fit.clone();
-    for column in preload {
-        beside.push(column);
-    }
-    let evidence = (beside.distinct(std::slice::from_ref(&stiffness)))
-        .and_then(|own| beside.evidence(&own, &[[0.0, f64::INFINITY]]));
-    evidence.is_some_and(|e| e.corrected(1) < SIGNIFICANT && e.gain_sigmas >= LEAST_SIGMAS)
-}
-
-/// Returns the stiffness column orthogonal to the preload, independent of the zero of the coordinate.
-pub(crate) fn about_its_middle(fit: &Fit, columns: &[Column]) -> Option<Column> {
-    let (stiffness, preload) = columns.split_first()?;
-    let mut rest = stiffness.clone();
-    for column in preload {
-        let [along, own] = [&rest, column].map(|c| fit.product(c, column));
-        let own = own.max(f64::MIN_POSITIVE);
-        rest = combined(column.len(), [(&rest, 1.0), (column, -along / own)]);
-    }
-    Some(rest)
-}
-
-impl Search<'_> {
-    /// Returns the share of the residual's squares that a candidate's columns explain.
-    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<f64> {
-        let bounds = self.bounds(&self.library[c]);
-        let (share, _) = fit.explained(&fit.beside(columns)?, &bounds)?;
-        Some(share)
-    }
-
-    /// Fits the shapes of a candidate. The result is at least as good as `start`. None if its columns are collinear,
-    /// its signs are impossible, or the motion does not span its waves.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(crate) fn profile(
-        &self,
-        fit: &Fit,
-        c: usize,
-        start: Option<[f64; SHAPES]>,
-    ) -> Result<Option<FittedCandidate>, DiagnoseError> {
-        self.profile_but(fit, c, start, &[])
-    }
-
-    /// The same for a wave whose order is not in `but`.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(crate) fn profile_but(
-        &self,
-        fit: &Fit,
-        c: usize,
-        start: Option<[f64; SHAPES]>,
-        but: &[Candidate],
-    ) -> Result<Option<FittedCandidate>, DiagnoseError> {
-        let kind = self.library[c].kind;
-        let fixed = self.fixed(&self.library[c]);
-        let start = fixed.or(start);
-        let points = self.grid_within(&self.library[c])?;
-        let mut best: Option<Best> = None;
-        let gear = is_gear(kind);
-        let mut followed: Vec<Best> = Vec::new();
-        if let Some(shapes) = start {
-            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            if let Some(share) = self.explained(fit, c, &columns) {
-                best = Some((share, shapes, columns));
-            }
-        } else if points.iter().any(|s| self.shows(&self.library[c], s)) {
-            for (shapes, columns) in points.iter().zip(self.cached(c, &points)?) {
-                if !self.shows(&self.library[c], shapes)
-                    || but.contains(&self.library[c].shaped(shapes))
-                {
-                    continue;
-                }
-                let Some(share) = self.explained(fit, c, &columns) else {
-                    continue;
-                };
-                if gear {
-                    followed.push((share, *shapes, columns.clone()));
-                    followed.sort_by(|a, b| b.0.total_cmp(&a.0));
-                    followed.truncate(FOLLOWED);
-                }
-                if best.as_ref().is_none_or(|b| share > b.0) {
-                    best = Some((share, *shapes, columns));
-                }
-            }
-        }
-        let Some(mut best) = best else {
-            return Ok(None);
-        };
-        let about = kind.about();
-        // Convert the share of one joint to the squares of all joints.
-        let hopeless = if gear { HOPELESS_GEAR } else { HOPELESS };
-        if best.0 * (self.source.nominal.joints() as f64) < hopeless {
-            return Ok(None);
-        }
-        if gear && fixed.is_none() {
-            if followed.is_empty() {
-                followed.push(best.clone());
-            }
-            let far = if start.is_some() { NEAR } else { FAR };
-            self.descend(fit, c, &followed, far, &mut best)?;
-        }
-        if kind == Kind::PreslidingLugre && fixed.is_none() {
-            self.without_fall(fit, c, &mut best)?;
-        }
-        // The simplex has already moved all shapes together. A single shape needs no second round.
-        let rounds = match about.shapes {
-            _ if gear => 0,
-            [] | [_] => 1,
-            _ => 2,
-        };
-        for _ in 0..rounds {
-            for (place, shape) in about.shapes.iter().enumerate() {
-                if shape.scale != Scale::Whole {
-                    self.refine(fit, c, place, &mut best)?;
-                }
-            }
-        }
-        let Some(projected) = fit.distinct(&best.2) else {
-            return Ok(None);
-        };
-        let Some(evidence) = fit.evidence(&projected, &self.bounds(&self.library[c])) else {
-            return Ok(None);
-        };
-        let joint = self.library[c].joint;
-        let mut at_bound = at_bound(kind, &best.1, self.least_told(kind, joint));
-        if kind == Kind::JointElasticity && fixed.is_none() {
-            let mass = self.source.mass(joint, 0)?;
-            at_bound = at_bound
-                .or_else(|| (damping_ratio(&best.1, mass) > MOST_DAMPED).then_some("swing"));
-        }
-        let least_share = if kind == Kind::JointElasticity {
-            LEAST_OF_A_SPRINGS_TWIST
-        } else {
-            LEAST_OF_A_TWIST
-        };
-        let share = evidence.gains.first();
-        if gear && share.is_some_and(|share| *share < least_share) {
-            at_bound = at_bound.or(Some("torque"));
-        }
-        if kind == Kind::Spring && !stiff(fit, &best.2) {
-            at_bound = Some("stiffness");
-        }
-        Ok(Some(FittedCandidate {
-            candidate: self.library[c].shaped(&best.1),
-            shapes: best.1,
-            columns: best.2,
-            evidence,
-            at_bound,
-            accepted_by_observer: self.accepted_by_observer.contains(&self.library[c]),
-            near_collinear: false,
-            followed: None,
-            otherwise: None,
-        }))
-    }
-
-    /// Tries equally stiff bristles without friction fall, and keeps them if they explain more. No change of a single
-    /// shape reaches them.
-    fn without_fall(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
-        let [stroke, breakaway, velocity, ..] = best.1;
-        let mut shapes = best.1;
-        shapes[..3].copy_from_slice(&[stroke * (1.0 + breakaway), 0.0, velocity]);
-        let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-        if let Some(share) = self.explained(fit, c, &columns) {
-            let mut plain = (share, shapes, columns);
-            self.refine(fit, c, 0, &mut plain)?;
-            if plain.0 > best.0 {
-                *best = plain;
-            }
-        }
-        Ok(())
-    }
-
-    /// Runs simplex searches from all starts in parallel, over all shapes at once: stiffness, damping and gap interact.
-    /// `far` is the first step, `answers` the number of evaluations.
-    fn descend(
-        &self,
-        fit: &Fit,
-        c: usize,
-        starts: &[Best],
-        (far, answers): (f64, usize),
-        best: &mut Best,
-    ) -> Result<(), DiagnoseError> {
-        let scales = self.library[c].kind.about().shapes;
-        let [least, most] = self.ends(&self.library[c])?;
-        let mut simplices: Vec<Simplex> = (starts.iter())
-            .map(|(_, shapes, _)| {
-                // Inside the bounds, so that it can move.
-                let inside = |place: usize| shapes[place].max(2.0 * least[place]).min(most[place]);
-                let at: Vec<f64> = (scales.iter().zip(0..))
-                    .map(|(shape, place)| coordinate(shape, inside(place)))
-                    .collect();
-                // Away from a bound.
-                let away = |shape: &Parameter, x: f64| {
-                    if shape.scale == Scale::Linear && x > 0.5 {
-                        -far
-                    } else {
-                        far
-                    }
-                };
-                let steps: Vec<f64> = (scales.iter().zip(&at)).map(|(s, x)| away(s, *x)).collect();
-                Simplex::new(&at, &steps).of_most(answers)
-            })
-            .collect();
-        loop {
-            let asked: Vec<(usize, [f64; SHAPES])> = (simplices.iter().enumerate())
-                .filter_map(|(k, simplex)| {
-                    let x = simplex.asks()?;
-                    let mut shapes = [0.0; SHAPES];
-                    for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
-                        shapes[place] = value_at(shape, x).max(least[place]).min(most[place]);
-                    }
-                    Some((k, shapes))
-                })
-                .collect();
-            if asked.is_empty() {
-                return Ok(());
-            }
-            let shapes: Vec<[f64; SHAPES]> = asked.iter().map(|(_, shapes)| *shapes).collect();
-            let columns = self
-                .source
-                .columns_of(self.threads, &self.library[c], &shapes)?;
-            for ((k, shapes), columns) in asked.into_iter().zip(columns) {
-                let share = self.explained(fit, c, &columns).unwrap_or(0.0);
-                simplices[k].told(-share);
-                if share > best.0 {
-                    *best = (share, shapes, Arc::new(columns));
-                }
-            }
-        }
-    }
-
-    /// Fits shapes of a known torque (gains fixed) beside the other columns, from a start. Returns shapes and columns.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(crate) fn fitted_as_known(
-        &self,
-        source: &Source,
-        fit: &Fit,
-        candidate: &Candidate,
-        start: &[f64; SHAPES],
-    ) -> Result<([f64; SHAPES], Vec<Column>), DiagnoseError> {
-        let scales = candidate.kind.about().shapes;
-        let [least, most] = self.ends(candidate)?;
-        let at: Vec<f64> = (scales.iter().zip(start))
-            .map(|(shape, value)| coordinate(shape, *value))
-            .collect();
-        let steps: Vec<f64> = (scales.iter())
-            .map(|shape| match shape.scale {
-                Scale::Logarithmic if is_distance(shape) => 0.03,
-                Scale::Logarithmic => 0.2,
-                Scale::Linear | Scale::Whole => 0.05,
-            })
-            .collect();
-        let mut simplex = Simplex::new(&at, &steps);
-        let mut best: Option<(f64, [f64; SHAPES], Vec<Column>)> = None;
-        while let Some(x) = simplex.asks() {
-            let mut shapes = [0.0; SHAPES];
-            for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
-                shapes[place] = value_at(shape, x).max(least[place]).min(most[place]);
-            }
-            let columns = source.columns_by(self.threads, candidate, &shapes)?;
-            let mut left = fit.clone();
-            for column in &columns {
-                left.subtract(column);
-            }
-            let squares = dot_self(left.left());
-            simplex.told(squares);
-            if best.as_ref().is_none_or(|b| squares < b.0) {
-                best = Some((squares, shapes, columns));
-            }
-        }
-        best.map(|(_, shapes, columns)| (shapes, columns))
-            .ok_or_else(|| DiagnoseError::Model("its gear has no shape to begin with.".into()))
-    }
-
-    /// Refines one shape by golden section around the best point.
-    fn refine(
-        &self,
-        fit: &Fit,
-        c: usize,
-        place: usize,
-        best: &mut Best,
-    ) -> Result<(), DiagnoseError> {
-        let scales = self.library[c].kind.about().shapes;
-        let shape = &scales[place];
-        let [step, fine] = spacing(shape, scales.len());
-        let middle = coordinate(shape, best.1[place]);
-        let told = self.least_told(self.library[c].kind, self.library[c].joint);
-        let reached = [
-            self.source.running(),
-            self.source.fastest(self.library[c].joint),
-        ];
-        let [least, most] = searched(shape, told, reached).map(|bound| coordinate(shape, bound));
-        // A described value may lie outside the range that these recordings resolve.
-        let mut high = (middle + step).min(most);
-        let mut low = (middle - step).max(least).min(high);
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
-            let mut shapes = best.1;
-            shapes[place] = value_at(shape, x);
-            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some(share) = self.explained(fit, c, &columns) else {
-                return Ok(f64::NEG_INFINITY);
-            };
-            if share > best.0 {
-                *best = (share, shapes, columns);
-            }
-            Ok(share)
-        };
-        let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-        let (mut fa, mut fb) = (at(a, best)?, at(b, best)?);
-        for _ in 0..REFINEMENTS {
-            if fa > fb {
-                (high, b, fb) = (b, a, fa);
-                a = high - golden * (high - low);
-                fa = at(a, best)?;
-            } else {
-                (low, a, fa) = (a, b, fb);
-                b = low + golden * (high - low);
-                fb = at(b, best)?;
-            }
-            if high - low < fine {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the physical bounds of the gains. A delay within the sampling jitter is no effect.
-    fn bounds(&self, candidate: &Candidate) -> Vec<[f64; 2]> {
-        if candidate.kind == Kind::MeasurementDelay {
-            return vec![[sampling_jitter(self.source.runs), f64::INFINITY]];
-        }
-        let gains = self.source.gains(candidate);
-        gains.iter().map(|g| g.bounds).collect()
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -6,38 +6,33 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rig_shared::effects::{Kind, SHAPES};
 
 use crate::DiagnoseError;
-use crate::acceptance::judge::equal;
-use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::Source;
+use crate::columns::kinds::{depends_on_model, doubles, has_many_orders, is_gear, rivals};
 use crate::columns::wave_orders::Orders;
 use crate::columns::waves;
 use crate::fit::least_squares::Fit;
+use crate::levels::LEAST_GAIN;
 use crate::rows::regression::Column;
-use crate::search::fitted_candidate::{FittedCandidate, LEAST_GAIN, goes_straight, grid, grid_on};
+use crate::search::chosen::with;
+use crate::search::fitted_candidate::{FittedCandidate, equal};
+use crate::search::shapes::{goes_straight, grid, grid_on};
 use rig_data::runs::{blurred, resolution};
 use rig_model::robot::Placed;
 
 mod begin;
-mod kinds;
+mod growth;
 mod pairs;
-mod shadow;
+pub(crate) mod shadow;
 mod side;
 mod simplest;
 mod sweep;
 mod tentative;
 
-use kinds::{depends_on_model, doubles, has_many_orders};
-pub(crate) use kinds::{is_constant, is_first_law, is_friction, is_gear, rivals};
-use shadow::in_the_shadow;
-pub(crate) use shadow::shadow;
-
 /// Encoder steps below which a distance equals zero: the direction of motion is not known more precisely.
 const STEPS_OF_A_DISTANCE: f64 = 2.0;
 /// p-value below which an effect stays in the model.
 const STAYS: f64 = 1e-3;
-/// Rounds in which each law is compared with other laws of its name, beside the updated others.
-const LAWS_ANEW: usize = 2;
-/// Maximum number of effects beside the described ones. The orders of one wave count once.
-const MOST_EFFECTS: usize = 6;
 
 /// The search over a candidate library.
 pub(crate) struct Search<'a> {
@@ -71,6 +66,10 @@ pub(crate) struct Search<'a> {
     pub(crate) accepted_by_observer: Vec<Candidate>,
     cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
+
+/// Returns the source of columns for given effects.
+pub(crate) type Renew<'r, 'a> =
+    dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError> + 'r;
 
 impl<'a> Search<'a> {
     /// Creates a search.
@@ -185,96 +184,6 @@ impl<'a> Search<'a> {
         Ok(columns)
     }
 
-    /// Finds effects one by one, after the described ones or after those `found` with other row weights. `base` holds
-    /// the nominal columns. `told` receives every sweep and the number of effects found. `renew` returns the source for
-    /// given effects.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(crate) fn run(
-        &mut self,
-        base: &Fit,
-        found: Option<Vec<FittedCandidate>>,
-        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
-        told: &mut dyn FnMut(usize, &[FittedCandidate]),
-    ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
-        let mut chosen = match found {
-            None => self.warm_start(base, renew)?,
-            Some(mut found) => {
-                self.renewed(renew(&found)?);
-                self.refine_all(base, &mut found)?;
-                self.prune(base, &mut found)?;
-                found
-            }
-        };
-        let trials = self.trials();
-        let most = sorts(&chosen) + MOST_EFFECTS;
-        let mut impossible: Vec<Candidate> = Vec::new();
-        let mut stood: Vec<Vec<FittedCandidate>> = Vec::new();
-        while sorts(&chosen) < most {
-            let fit = with(base, &chosen, None);
-            let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
-            let profiles = self.sweep(&fit, &present, &impossible)?;
-            let found = |p: &&FittedCandidate| !self.is_described(&p.candidate);
-            told(chosen.iter().filter(found).count(), &profiles);
-            let Some(best) = self.first_to_take(&fit, &profiles, trials) else {
-                let together =
-                    self.tried_together(base, &chosen, &profiles, trials, &impossible)?;
-                if let Some(together) =
-                    together.filter(|list| !stood.iter().any(|before| same(before, list)))
-                {
-                    stood.push(std::mem::replace(&mut chosen, together));
-                    self.refresh_predictions(base, &mut chosen, renew)?;
-                    self.constant_side(base, &mut chosen, renew)?;
-                    continue;
-                }
-                self.nearly = profiles.into_iter().find(|p| p.is_nearly_a_play(trials));
-                break;
-            };
-            let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
-            let best = self.richer_law_first(base, &chosen, best, &profiles, trials)?;
-            let before = chosen.clone();
-            let newcomer = best.candidate;
-            chosen.push(best);
-            let at_bound = self.refine_prune_swap(base, &mut chosen, trials, &impossible)?;
-            if at_bound.contains(&newcomer) && !same(&before, &chosen) {
-                // It removed others that it needs.
-                impossible.push(newcomer);
-                chosen = before;
-                continue;
-            }
-            self.refresh_predictions(base, &mut chosen, renew)?;
-            self.constant_side(base, &mut chosen, renew)?;
-            let place = chosen.iter().position(|p| p.candidate == newcomer);
-            if let Some(i) = place
-                && let Some(smaller) = self.smaller(base, &chosen, i, &profiles, trials)?
-            {
-                chosen[i] = smaller;
-                self.refine_all(base, &mut chosen)?;
-                chosen.retain(|profile| profile.at_bound.is_none());
-            }
-            stood.push(before);
-            if stood.iter().any(|before| same(before, &chosen)) {
-                // It is not stable at its best shapes, or two effects remove each other in turn. A weaker one may stay.
-                if impossible.contains(&newcomer) {
-                    break;
-                }
-                impossible.push(newcomer);
-            }
-        }
-        for _ in 0..LAWS_ANEW {
-            let other = self.other_laws(base, &mut chosen)?;
-            if !self.springs_to_constants(base, &mut chosen, trials)? && !other {
-                break;
-            }
-            self.refresh_predictions(base, &mut chosen, renew)?;
-            self.constant_side(base, &mut chosen, renew)?;
-        }
-        chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
-        self.dropped = impossible;
-        Ok(chosen)
-    }
-
     /// Recomputes predicted load, inertia and contact deflection with the current effects, then refits the effects.
     /// Effects at a bound are removed.
     ///
@@ -284,7 +193,7 @@ impl<'a> Search<'a> {
         &mut self,
         base: &Fit,
         chosen: &mut Vec<FittedCandidate>,
-        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
+        renew: &Renew<'_, 'a>,
     ) -> Result<(), DiagnoseError> {
         let before = chosen.len();
         for _ in 0..2 {
@@ -476,38 +385,6 @@ fn orders_of(source: &Source, library: &[Candidate], joint: usize) -> Orders {
         return Orders::default();
     }
     Orders::of(source.runs, joint, of.gear_ratio(), highest as usize)
-}
-
-/// Returns the number of effects. The orders of one wave count once.
-fn sorts(chosen: &[FittedCandidate]) -> usize {
-    let sort = |p: &FittedCandidate| p.candidate.sort();
-    let first = |k: &usize| !chosen[..*k].iter().any(|p| sort(p) == sort(&chosen[*k]));
-    (0..chosen.len()).filter(first).count()
-}
-
-/// Returns true if both lists have the same effects.
-pub(crate) fn same(a: &[FittedCandidate], b: &[FittedCandidate]) -> bool {
-    a.len() == b.len()
-        && a.iter()
-            .all(|p| b.iter().any(|q| q.candidate == p.candidate))
-}
-
-/// Returns the fit with the columns of all effects except `but`.
-pub(crate) fn with<'f>(base: &Fit<'f>, chosen: &[FittedCandidate], but: Option<usize>) -> Fit<'f> {
-    let mut fit = base.clone();
-    for (k, profile) in chosen.iter().enumerate() {
-        if Some(k) == but {
-            continue;
-        }
-        for column in profile.columns.iter() {
-            if profile.followed.is_some() {
-                fit.subtract(column);
-            } else {
-                fit.push(column);
-            }
-        }
-    }
-    fit
 }
 
 #[cfg(test)]

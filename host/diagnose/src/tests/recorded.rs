@@ -5,7 +5,7 @@
 use crate::tests::made::Diagnosed as _;
 use rand::{RngExt, SeedableRng};
 
-use crate::acceptance::residual_dependence::SINCE_START;
+use crate::acceptance::coordinates::SINCE_START;
 use crate::outcome::{Before, Step, Verdict};
 use crate::{Diagnosis, Options};
 use rig_data::Block;

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::acceptance::judge::closed;
 use crate::description::described_effects::{DescribedEffects, Now};
 use crate::outcome::{
     Absorbed, Before, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value,
     Verdict, Waterfall,
 };
+use crate::statistics::closed;
 use crate::voltage::controllers;
 use crate::voltage::controllers::Shown;
 use crate::voltage::free_run::FreeRun;

@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use crate::Options;
 use crate::acceptance::credibility::*;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
 use crate::description::described_effects::DescribedEffects;
-use crate::engine::ObserverModels;
-use crate::fit::least_squares::Evidence;
+use crate::fit::evidence::Evidence;
+use crate::models::observer_models::ObserverModels;
 use crate::outcome::{Tried, Verdict};
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
 use crate::recordings::position_reading::PositionReading;

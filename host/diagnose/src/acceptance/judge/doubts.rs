@@ -2,13 +2,13 @@
 
 use crate::acceptance::judge::{Judge, QUARTER};
 use crate::acceptance::lack_of_fit::misfit;
+use crate::columns::kinds::is_gear;
 use crate::fit::least_squares::Fit;
 use crate::outcome::{Place, Remainder};
-use crate::recordings::external_load;
-use crate::recordings::noise_floor;
 use crate::recordings::outlier_segment::Burst;
-use crate::search::fitted_candidate::{FittedCandidate, falls_throughout};
-use crate::search::stepwise::is_gear;
+use crate::recordings::{external_load, noise_floor};
+use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::shapes::falls_throughout;
 use rig_model::robot::Joint;
 use rig_output::{format_significant, format_unit, format_value};
 

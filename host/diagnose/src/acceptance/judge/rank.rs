@@ -7,19 +7,13 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::experiment::testable;
 use crate::outcome::Step;
-use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::fitted_candidate::{FittedCandidate, equal};
 use rig_data::runs::Run;
 
-/// Share of a step's gain from which on an alternative is equal, if the blocks show no difference.
-const AS_GOOD: f64 = 0.9;
-/// Largest RMS ratio of an equal alternative to the step. A larger one means a missing effect.
-const LEAVES: f64 = 1.2;
 /// Standard deviations by which a stiffness may exceed its estimate.
 const SURELY: f64 = 2.0;
 /// Largest distance of a spring's rest position from the middle of the motion, in spans of the motion.
 const SPANS_TO_REST: f64 = 2.0;
-/// Standard deviations of a paired block difference below which alternatives are equal.
-const NO_DIFFERENCE: f64 = 2.5;
 
 /// Fills the set and the runner-up of a step. `rivals` would replace it, best first. A rival on another joint is no
 /// runner-up. Kinds that it `is_not` are excluded.
@@ -96,12 +90,4 @@ pub(crate) fn may_stand(rival: &FittedCandidate, runs: &[Run]) -> bool {
     });
     let pull = stiffness * 0.5 * (low + high) + preload;
     pull.abs() <= (stiffness + SURELY * std) * SPANS_TO_REST * (high - low)
-}
-
-/// Returns true if the data support a rival equally well.
-pub(crate) fn equal(own: &FittedCandidate, rival: &FittedCandidate) -> bool {
-    rival.candidate.joint == own.candidate.joint
-        && rival.evidence.gain >= AS_GOOD * own.evidence.gain
-        && 1.0 - rival.evidence.gain <= LEAVES * (1.0 - own.evidence.gain)
-        && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE
 }

@@ -7,11 +7,13 @@ use std::sync::Arc;
 
 use rig_shared::effects::Kind;
 
-use crate::acceptance::judge::rank::may_stand;
+use crate::acceptance::judge::rank::{may_stand, rank};
+use crate::acceptance::judge::unseen::{left_of_held, taken_by_none};
 use crate::acceptance::judge::*;
-use crate::columns::effect_columns::Candidate;
-use crate::fit::least_squares::Evidence;
+use crate::columns::candidate::Candidate;
+use crate::fit::evidence::Evidence;
 use crate::outcome::Step;
+use crate::search::fitted_candidate::equal;
 use rig_data::runs::{JointRun, Run};
 
 fn profile(kind: Kind, joint: usize, gain: f64) -> FittedCandidate {

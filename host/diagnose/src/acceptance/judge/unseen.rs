@@ -1,10 +1,10 @@
 //! Residuals that only the hold-out shows, and those of effects that were dropped.
 
+use crate::columns::kinds::is_gear;
 use crate::fit::least_squares::Fit;
 use crate::outcome::Remainder;
-use crate::recordings::noise_floor;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::is_gear;
+use crate::statistics;
 use rig_model::robot::{Joint, Robot, title_of};
 use rig_output::{format_significant, format_unit};
 
@@ -130,7 +130,7 @@ pub(crate) fn too_short_for_names(
 ) -> Option<Remainder> {
     let share = |j: &usize| {
         let rows = base.rows();
-        base.even_rms(*j) / noise_floor::rms(&rows.torque[*j], &rows.keep[*j])
+        base.even_rms(*j) / statistics::rms(&rows.torque[*j], &rows.keep[*j])
     };
     let joint = (0..known.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
     let rms = base.even_rms(joint);

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use realfft::RealFftPlanner;
 
-use crate::acceptance::residual_dependence::{BINS, Process, narrowest};
+use crate::acceptance::residual_dependence::process::{BINS, Process, narrowest};
 use crate::outcome::Place;
 use crate::rows::regression::Rows;
 use rig_output::format_significant;
@@ -89,11 +89,6 @@ pub(crate) fn frequency(
     };
     let taken = Vec::new();
     Some((place, Process { sums, taken }))
-}
-
-/// Returns true for a frequency dependence. It describes the whole repeated residual, so it comes last.
-pub(crate) fn is_frequency(place: &Place) -> bool {
-    place.coordinate == FREQUENCY
 }
 
 #[cfg(test)]

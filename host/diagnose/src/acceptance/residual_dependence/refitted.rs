@@ -4,7 +4,7 @@
 //!
 //! Limit: each joint counts as refitted separately, also if joints share base parameters.
 
-use crate::acceptance::residual_dependence::BINS;
+use crate::acceptance::residual_dependence::process::BINS;
 use crate::rows::regression::Rows;
 
 /// Smallest part of a column orthogonal to those before it, as a share of its length.

@@ -5,13 +5,16 @@ use std::sync::{Arc, PoisonError};
 use rig_shared::effects::SHAPES;
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, Source, add};
-use crate::columns::transmission::{Driven, Load, Seen};
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::{Source, add};
+use crate::columns::kinds::is_gear;
+use crate::columns::transmission::observer::Seen;
+use crate::columns::transmission::{Driven, Load};
 use crate::recordings::noise_floor;
+use crate::rows::motion::{links_of, motion_of};
 use crate::rows::nominal_torque::predict;
-use crate::rows::regression::{Rows, links_of, motion_of};
+use crate::rows::regression::Rows;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::is_gear;
 
 impl Source<'_> {
     /// Adds observer inputs from the recorded torque, for the profiles with an observer. `gains` are those of the
@@ -98,7 +101,9 @@ impl Source<'_> {
         let Some([_, _, acceleration]) = &own.link else {
             return Ok(None);
         };
-        let inertial = |[q, v, a]: [Vec<Vec<f64>>; 3]| self.inertial(joint, [&q, &v, &a]);
+        let inertial = |[q, v, a]: [Vec<Vec<f64>>; 3]| {
+            self.nominal.inertial(&self.values, joint, [&q, &v, &a])
+        };
         let (rigid, measured) = (inertial(motion_of(run))?, inertial(links_of(run))?);
         let drive = self.drive_inertia(joint);
         let moved = acceleration
@@ -140,7 +145,13 @@ impl Source<'_> {
         if let Some(driven) = known.get(&(r, joint)) {
             return Ok(driven.clone());
         }
-        let driven = Arc::new(Driven::of(self, joint, &self.runs[r])?);
+        let driven = Arc::new(Driven::of(
+            self.nominal,
+            &self.values,
+            joint,
+            self.drive_inertia(joint),
+            &self.runs[r],
+        )?);
         known.insert((r, joint), driven.clone());
         Ok(driven)
     }

@@ -4,30 +4,12 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::least_squares::{Fit, axpy, dot};
+use crate::fit::folded::{Errors, Folded};
+use crate::fit::least_squares::Fit;
+use crate::fit::vector::{axpy, dot};
 
 /// Number of folds.
 const FOLDS: usize = 10;
-
-/// The basis, fold by fold.
-#[derive(Clone)]
-pub(crate) struct Folded {
-    /// Ranges of the weighted rows within one fold, with the fold.
-    stretches: Vec<(Range<usize>, usize)>,
-    /// Inner products of the basis within each fold.
-    own: Vec<DMatrix<f64>>,
-    /// … and of the basis with the residual.
-    right: Vec<DVector<f64>>,
-    /// Squared error of each block and of each joint, with a basis refitted without the block's fold.
-    errors: Errors,
-}
-
-/// Squared errors on folds outside the fit.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Errors {
-    pub(crate) of_block: Vec<f64>,
-    pub(crate) of_joint: Vec<f64>,
-}
 
 impl Fit<'_> {
     /// Returns squared errors without and with the columns. Each fold is predicted by a fit to the others.

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::least_squares::{Fit, dot};
+use crate::fit::least_squares::Fit;
+use crate::fit::vector::dot;
 
 impl Fit<'_> {
     /// Returns the jackknife covariance of the coefficients of weighted columns, one cluster left out at a time

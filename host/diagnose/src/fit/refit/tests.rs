@@ -8,10 +8,10 @@ use std::sync::Arc;
 use rand::{RngExt, SeedableRng};
 use rig_shared::effects::{GAINS, Kind};
 
-use crate::acceptance::residual_dependence::coordinates;
-use crate::columns::effect_columns::Candidate;
+use crate::acceptance::coordinates::coordinates;
+use crate::columns::candidate::Candidate;
 use crate::description::described_effects::DescribedEffects;
-use crate::fit::least_squares::Evidence;
+use crate::fit::evidence::Evidence;
 use crate::fit::refit::*;
 use rig_data::prepare::{InMemory, Recording};
 use rig_data::{Block, JointColumns};

@@ -146,7 +146,11 @@ fn the_nearest_values_are_least_squares_and_their_deviations_count_stretches() {
     };
     let start = vec![0.0, 0.0];
     let first = departs(&start).unwrap();
-    let (theta, std) = nearest(start, &[0.01, 10.0], first, &departs, 1).unwrap();
+    let (by_motion, _) = nearest(start, &[0.01, 10.0], first, &departs, 1).unwrap();
+    let Estimate {
+        values: theta,
+        stds: std,
+    } = by_motion;
     let left = departs(&theta).unwrap();
     let sum: f64 = left.of.iter().sum();
     assert!(sum.abs() < 1e-6 * rows as f64, "{sum}");

@@ -5,11 +5,16 @@ use std::sync::Arc;
 use rig_shared::effects::SHAPES;
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::is_gear;
 use crate::description::described_effects::{candidate, is_one};
-use crate::fit::least_squares::{Evidence, Fit};
-use crate::search::fitted_candidate::LEAST_GAIN;
-use crate::search::stepwise::{FittedCandidate, STAYS, Search, in_the_shadow, is_gear, with};
+use crate::fit::evidence::Evidence;
+use crate::fit::least_squares::Fit;
+use crate::levels::LEAST_GAIN;
+use crate::search::chosen::with;
+use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::stepwise::shadow::in_the_shadow;
+use crate::search::stepwise::{Renew, STAYS, Search};
 
 impl<'a> Search<'a> {
     /// Returns true if the description states an effect.
@@ -107,7 +112,7 @@ impl<'a> Search<'a> {
     pub(crate) fn warm_start(
         &mut self,
         base: &Fit,
-        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
+        renew: &Renew<'_, 'a>,
     ) -> Result<Vec<FittedCandidate>, DiagnoseError> {
         let mut chosen = Vec::new();
         let described = self.described.iter().map(|placed| {

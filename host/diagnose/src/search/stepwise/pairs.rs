@@ -1,11 +1,12 @@
 //! Comparison of two plain effects with one flexible effect: a gear, or a friction law with many shapes.
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::{is_gear, is_searched};
 use crate::fit::least_squares::Fit;
+use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::kinds::is_searched;
-use crate::search::stepwise::{Search, is_gear, with};
+use crate::search::stepwise::Search;
 
 /// Share of the best default law's residual that another law must remove to precede it.
 const FAR_MORE: f64 = 0.5;

@@ -2,10 +2,10 @@
 
 use rig_shared::effects::Kind;
 
-use crate::columns::effect_columns::Candidate;
-use crate::fit::least_squares::sigmas;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::{is_constant, is_gear};
+use crate::fit::evidence::sigmas;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::{is_constant, is_gear};
 use rig_model::robot::Robot;
 
 /// Mismatch as a share of the squares that an effect removes. A law that closes 93 % of the gap leaves this share …

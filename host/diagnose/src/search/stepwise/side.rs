@@ -6,10 +6,12 @@
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::{is_constant, is_gear};
 use crate::fit::least_squares::Fit;
+use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::{Search, is_constant, is_gear, with};
+use crate::search::stepwise::{Renew, Search};
 
 /// One constant for each side.
 const ON_THE_LINK: Kind = Kind::TorqueOffset;
@@ -27,7 +29,7 @@ impl<'a> Search<'a> {
         &mut self,
         base: &Fit,
         chosen: &mut Vec<FittedCandidate>,
-        renew: &dyn Fn(&[FittedCandidate]) -> Result<Source<'a>, DiagnoseError>,
+        renew: &Renew<'_, 'a>,
     ) -> Result<(), DiagnoseError> {
         self.sided.clear();
         for i in 0..chosen.len() {

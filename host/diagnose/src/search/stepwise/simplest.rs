@@ -7,11 +7,14 @@
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
-use crate::acceptance::judge::equal;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::{self, is_gear};
 use crate::fit::least_squares::Fit;
-use crate::search::fitted_candidate::{FittedCandidate, LEAST_GAIN, SIGNIFICANT, about_its_middle};
-use crate::search::stepwise::{Search, is_gear, with};
+use crate::levels::{LEAST_GAIN, SIGNIFICANT};
+use crate::search::chosen::with;
+use crate::search::fitted_candidate::{FittedCandidate, equal};
+use crate::search::spring::about_its_middle;
+use crate::search::stepwise::Search;
 
 impl Search<'_> {
     /// Returns the number of gains and shapes of a candidate.
@@ -62,8 +65,7 @@ impl Search<'_> {
         let own = &chosen[i];
         let fit = with(base, chosen, Some(i));
         let taken = |c: &Candidate| {
-            (chosen.iter().enumerate())
-                .any(|(k, p)| k != i && crate::search::stepwise::rivals(&p.candidate, c))
+            (chosen.iter().enumerate()).any(|(k, p)| k != i && kinds::rivals(&p.candidate, c))
         };
         let mut best: Option<FittedCandidate> = None;
         for rival in rivals {

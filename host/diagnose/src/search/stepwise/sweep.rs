@@ -3,11 +3,11 @@
 use rig_shared::effects::Kind;
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::{doubles, has_many_orders, is_first_law, is_searched, rivals};
 use crate::fit::least_squares::Fit;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::kinds::{doubles, has_many_orders, is_searched};
-use crate::search::stepwise::{Search, is_first_law, rivals};
+use crate::search::stepwise::Search;
 use rig_model::batch::each_by;
 
 impl Search<'_> {

@@ -1,10 +1,13 @@
 //! Trial of effects that are not significant because another effect is missing or wrong.
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
+use crate::columns::kinds::is_gear;
 use crate::fit::least_squares::Fit;
-use crate::search::fitted_candidate::{FittedCandidate, SIGNIFICANT};
-use crate::search::stepwise::{Search, is_gear, same};
+use crate::levels::SIGNIFICANT;
+use crate::search::chosen::same;
+use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::stepwise::Search;
 
 /// RMS share that a candidate must remove for a trial although it is not significant. Other missing effects then
 /// dominate the residual, whose long correlation leaves few independent blocks.

@@ -1,8 +1,8 @@
-//! Properties of kinds and candidates for the search.
+//! Properties of kinds and candidates.
 
 use rig_shared::effects::{Channel, Direction, Kind};
 
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
 
 /// Returns true if the kind acts between motor and link.
 pub(crate) fn is_gear(kind: Kind) -> bool {
@@ -56,12 +56,15 @@ pub(crate) fn is_searched(kind: Kind) -> bool {
 
 /// Returns true if the columns of a kind depend on predictions of the model.
 pub(crate) fn depends_on_model(kind: Kind) -> bool {
-    let about = kind.about();
     matches!(
-        about.channel,
+        kind.about().channel,
         Channel::Position | Channel::Effort | Channel::Transmission
     ) || matches!(
-        about.name,
-        "load_friction" | "torque_ripple" | "torque_saturation" | "gravity_tilt"
-    ) || kind == Kind::ViscousWarmupHeat
+        kind,
+        Kind::LoadFriction
+            | Kind::TorqueRipple
+            | Kind::TorqueSaturation
+            | Kind::GravityTilt
+            | Kind::ViscousWarmupHeat
+    )
 }

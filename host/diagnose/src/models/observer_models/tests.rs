@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::Options;
-use crate::columns::effect_columns::Candidate;
+use crate::columns::candidate::Candidate;
 use crate::description::described_effects::DescribedEffects;
-use crate::engine::follow::*;
-use crate::fit::least_squares::Evidence;
+use crate::fit::evidence::Evidence;
+use crate::models::observer_models::*;
 use crate::outcome::Verdict;
 use crate::recordings::context::library;
 use crate::tests::made::Diagnosed as _;

@@ -11,12 +11,14 @@ use std::sync::Arc;
 use rig_shared::effects::{Kind, SHAPES};
 
 use crate::DiagnoseError;
-use crate::columns::effect_columns::{Candidate, Source};
+use crate::columns::candidate::Candidate;
+use crate::columns::effect_columns::Source;
 use crate::fit::refit::Refit;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
+use crate::search::chosen::with;
 use crate::search::fitted_candidate::{FittedCandidate, Followed};
-use crate::search::stepwise::{Search, with};
+use crate::search::stepwise::Search;
 
 /// Rounds in which the gear shapes and all other parameters are fitted alternately.
 const ROUNDS: usize = 2;
