@@ -1,9 +1,11 @@
 //! The frequency up to which the model explains the torque.
 
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
 use super::linear::{product, weighted_minimum_norm};
-use super::model::{Plan, each_rows};
-use super::{IdentifyError, ModelKind};
+use super::options::ModelKind;
+use super::plan::Plan;
+use super::stream::each_rows;
 use rig_data::prepare::{Recording, Welch};
 
 /// Share of the torque's power that may stay unexplained: one half, at equal power of signal and residual.

@@ -5,22 +5,14 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::IdentifyError;
-use super::consistent::{Quadratic, consistent};
-use super::describe::{Combinations, written};
+use super::combinations::Combinations;
+use super::consistent::consistent;
+use super::error::IdentifyError;
+use super::hints::{Sizes, hints};
 use super::prior::Prior;
-use super::standard::hints;
+use super::quadratic::Quadratic;
+use super::written::written;
 use rig_model::robot::{DESCRIBED, Robot};
-
-/// RMS values of each joint, SI.
-pub struct Sizes {
-    /// Of the torque.
-    pub torque: Vec<f64>,
-    /// Of the speed.
-    pub speed: Vec<f64>,
-    /// Of the acceleration.
-    pub acceleration: Vec<f64>,
-}
 
 /// `robot` with physically consistent links.
 pub struct Bodies {

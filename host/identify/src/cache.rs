@@ -5,11 +5,12 @@ use std::fs::File;
 use std::io::Seek;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::model::{Equation, Rows, Tally};
-use super::{IdentifyError, ModelKind};
-use rig_data::prepare::record;
+use super::equation::{Equation, Rows};
+use super::error::IdentifyError;
+use super::options::ModelKind;
+use super::tally::Tally;
 use rig_data::prepare::record::{Record, begin, put_count, put_numbers, unusable};
-use rig_data::prepare::{PrepareError, Recording};
+use rig_data::prepare::{PrepareError, Recording, record};
 
 /// Recording (by address and name, both fixed while it is borrowed) and model.
 type Key = (usize, String, bool);

@@ -4,13 +4,15 @@ use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, Chain};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS};
 
-use super::consistent::{Quadratic, consistent};
+use super::added_torque::added_torque;
+use super::consistent::consistent;
+use super::error::IdentifyError;
+use super::estimator::Estimator;
 use super::factor::TriangularFactor;
 use super::prior::Prior;
 use super::problem::Problem;
+use super::quadratic::Quadratic;
 use super::twin::Companion;
-use super::{Estimator, IdentifyError};
-use crate::added_torque;
 use rig_data::prepare::{LowPass, PrepareError, first_block};
 use rig_data::{Block, JUDGED_ROWS, strange_references};
 use rig_model::effects::Effects;

@@ -1,137 +1,29 @@
 //! Comparison of estimators by the same criteria, and the recommended result.
 
-use rig_model::robot::Robot;
-use serde::Serialize;
-
+use super::compared::{Compared, Comparison};
 use super::consistent::consistent;
-use super::endogeneity::{Endogeneity, endogeneity};
-use super::evaluate::Planned;
+use super::endogeneity::endogeneity;
+use super::error::IdentifyError;
+use super::estimator::Estimator;
 use super::factor::TriangularFactor;
-use super::instrumental::instrumental;
+use super::fitted::Fitted;
+use super::held::Held;
+use super::jackknife::LeaveOut;
 use super::least::least;
-use super::likelihood::likelihood;
-use super::output_error::output_error;
-use super::parts::{LeaveOut, Parts};
+use super::parts::Parts;
 use super::prior::Prior;
-use super::problem::{Fitted, Problem};
+use super::problem::Problem;
+use super::quadratic::quadratic_about;
 use super::recommend::{Judge, recommend};
-use super::repeat::Path;
-use super::ridge::ridge;
-use super::robust::robust;
-use super::standard::{consistent_fit, quadratic_about};
-use super::total::total;
-use super::{Estimator, IdentifyError};
-use rig_data::prepare::Recording;
+use super::relative_error::{mean, relative_errors};
+use super::run::fit;
+use rig_model::robot::Robot;
 
 /// Distance to the nearest consistent set below which a set counts as consistent, in standard deviations of all
 /// parameters together. Not zero, because the barrier keeps the solution slightly inside.
 const AT_THE_SET: f64 = 1.0;
 /// Factor on the prior's pull when the distance to the consistent set is measured.
 const PULL_OF_DISTANCE: f64 = 1e-4;
-
-/// The result of one estimator.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Compared {
-    /// Estimator.
-    pub estimator: Estimator,
-    /// Per joint, RMS of the residual over RMS of the torque, with every time segment predicted from the others. Null
-    /// for a joint without usable torque, and altogether if the estimator failed.
-    pub cross_validated_relative_error: Option<Vec<f64>>,
-    /// The same on the hold-out, if given.
-    pub holdout_relative_error: Option<Vec<f64>>,
-    /// Distance of the estimate from the nearest physically consistent one, in standard deviations of all parameters
-    /// together.
-    pub distance_to_consistent: Option<f64>,
-    /// True if that distance is negligible.
-    pub physically_consistent: Option<bool>,
-    /// Largest difference from the weighted fit over all parameters, in standard deviations of that fit.
-    pub largest_shift: Option<f64>,
-    /// Values in the order of `base_parameters`.
-    pub values: Option<Vec<f64>>,
-    /// Remarks on the fit, or the reason of its failure.
-    pub said: Vec<String>,
-}
-
-/// Results of all estimators and the recommendation.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Comparison {
-    /// Number of cross-validation segments.
-    pub folds: usize,
-    /// Hold-out recordings that repeat a training motion, so they do not test the prediction of another motion.
-    pub repeated_holdout: Vec<String>,
-    /// One entry per estimator.
-    pub estimators: Vec<Compared>,
-    /// Durbin–Wu–Hausman test; absent if instrumental variables failed.
-    pub endogeneity: Option<Endogeneity>,
-    /// The recommended estimator.
-    pub recommended: Estimator,
-    /// The recommendation and its reason.
-    pub recommendation: String,
-}
-
-/// Runs one estimator.
-pub(super) fn fit(
-    estimator: Estimator,
-    problem: &Problem,
-    parts: &Parts,
-    prior: &Prior,
-) -> Result<Fitted, IdentifyError> {
-    match estimator {
-        Estimator::Ols => least(problem, parts, &vec![1.0; problem.weights.len()]),
-        Estimator::Weighted => least(problem, parts, problem.weights),
-        Estimator::Robust => robust(problem, parts),
-        Estimator::Iv => instrumental(problem, parts, prior),
-        Estimator::OutputError => output_error(problem, parts, prior),
-        Estimator::Tls => total(problem, parts),
-        Estimator::Ml => likelihood(problem, parts),
-        Estimator::Ridge => ridge(problem, parts, prior),
-        Estimator::Consistent => consistent_fit(problem, parts, prior),
-    }
-}
-
-/// Returns, per joint, the RMS residual of `full` on the rows of `factors` over the RMS torque. Uses the torque `whole`
-/// if the rows do not contain all of the torque.
-pub(super) fn relative_errors(
-    factors: &[TriangularFactor],
-    full: &[f64],
-    whole: Option<&[f64]>,
-) -> Vec<f64> {
-    let one = |(j, factor): (usize, &TriangularFactor)| {
-        if factor.rows() == 0 {
-            return f64::NAN;
-        }
-        let rows = factor.rows() as f64;
-        let torque = whole.map_or_else(
-            || (factor.right_side_squares() / rows).sqrt(),
-            |torque| torque[j],
-        );
-        (factor.residual_squares(full) / rows).sqrt() / torque.max(f64::MIN_POSITIVE)
-    };
-    factors.iter().enumerate().map(one).collect()
-}
-
-/// Returns one factor per joint of the hold-out, torque against motion; none for an empty hold-out.
-pub(super) fn judge(
-    problem: &Problem,
-    holdout: &[Planned],
-) -> Result<Option<Vec<TriangularFactor>>, IdentifyError> {
-    if holdout.is_empty() {
-        return Ok(None);
-    }
-    let p = problem.base.len();
-    let mut factors = vec![TriangularFactor::new(p); problem.robot.joints.len()];
-    for recording in holdout {
-        recording.each_rows(&mut |rows| {
-            for (factor, equation) in factors.iter_mut().zip(&rows.equations) {
-                for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
-                    factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
-                }
-            }
-            Ok(())
-        })?;
-    }
-    Ok(Some(factors))
-}
 
 /// Returns the distance of an estimate from the physically consistent set, in standard deviations.
 fn distance(
@@ -154,51 +46,6 @@ fn distance(
     }
 }
 
-/// The hold-out recordings.
-pub(super) struct Held {
-    /// Rows of all of them, one factor per joint.
-    pub all: Vec<TriangularFactor>,
-    /// Rows of those with a motion that is not in the training data; none if every one repeats a training motion.
-    fresh: Option<Vec<TriangularFactor>>,
-    /// Recordings that repeat a training motion.
-    repeated: Vec<String>,
-}
-
-impl Held {
-    /// Compares `holdout` with the training motions; none for an empty hold-out.
-    pub(super) fn of(
-        problem: &Problem,
-        holdout: &[Planned],
-    ) -> Result<Option<Self>, IdentifyError> {
-        let Some(all) = judge(problem, holdout)? else {
-            return Ok(None);
-        };
-        let frequency = problem.plan.treatment.motion_frequency;
-        let path = |recording: &dyn Recording| Path::of(recording, frequency);
-        let learnt: Vec<Path> = (problem.training.iter())
-            .map(|recording| path(*recording))
-            .collect::<Result<_, _>>()?;
-        let (mut fresh, mut repeated) = (Vec::new(), Vec::new());
-        for held in holdout {
-            if path(held.recording)?.repeats(&learnt) {
-                repeated.push(held.recording.label());
-            } else {
-                fresh.push(*held);
-            }
-        }
-        let fresh = if repeated.is_empty() {
-            Some(all.clone())
-        } else {
-            judge(problem, &fresh)?
-        };
-        Ok(Some(Self {
-            all,
-            fresh,
-            repeated,
-        }))
-    }
-}
-
 /// Fits with every estimator of `list` and judges it, on the hold-out if given. `measured` holds the RMS torques of
 /// training data and hold-out per joint, for rows that do not contain all of the torque.
 pub(super) fn compare(
@@ -212,7 +59,7 @@ pub(super) fn compare(
 ) -> Result<Comparison, IdentifyError> {
     let weighted = least(problem, parts, problem.weights)?;
     let weighted_covariance = weighted.kept.covariance();
-    let tempered = LeaveOut::of(&parts.weighted(&problem.tempered(parts))).whole;
+    let tempered = LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights))).whole;
     let torque = measured.map_or_else(|| parts.torque_rms(), |[training, _]| training.clone());
     let fresh = held.and_then(|held| held.fresh.as_deref());
     let mut rows = Vec::new();
@@ -336,13 +183,4 @@ fn beyond_use(robot: &Robot, rows: &[Compared], recommended: Estimator) -> Strin
         " Trust nothing of {}: there it is farther from the torque held back than no model at all.",
         useless.join(", ")
     )
-}
-
-/// Returns the geometric mean of the relative errors over the joints that have one, so that all joints count equally.
-fn mean(errors: &[f64]) -> f64 {
-    let judged = errors.iter().filter(|e| !e.is_nan());
-    let (sum, count) = judged.fold((0.0, 0usize), |(sum, count), e| {
-        (sum + e.max(f64::MIN_POSITIVE).ln(), count + 1)
-    });
-    (sum / count.max(1) as f64).exp()
 }

@@ -16,9 +16,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::IdentifyError;
+use super::error::IdentifyError;
 use super::prior::{Prior, Rule};
 use super::pseudo_inertia::INERTIAL;
+use super::quadratic::Quadratic;
 
 /// Factor on the pulls from one stage of the path to the next.
 const STAGE: f64 = 0.1;
@@ -34,15 +35,6 @@ const MOST_STANDING: usize = 4;
 const ROUNDING: [f64; 5] = [0.0, 1e-14, 1e-12, 1e-10, 1e-8];
 /// Pull of an offset towards its prior; matters only if the data do not identify the offset.
 const OFFSET_PULL: f64 = 1e-6;
-
-/// Data as ½‖matrix·π − right‖², in units of the residual's noise.
-#[derive(Clone, Debug)]
-pub(super) struct Quadratic {
-    /// R·K, with at most as many rows as standard columns.
-    pub matrix: DMatrix<f64>,
-    /// z.
-    pub right: DVector<f64>,
-}
 
 /// The minimum.
 #[derive(Clone, Debug)]

@@ -14,12 +14,16 @@
 use rig_shared::multibody::Chain;
 use rig_shared::transmission::Transmission;
 
-use super::base::{Base, chain_of, transmission_of};
+use super::base::Base;
 use super::cache::RowCache;
+use super::chain::{chain_of, transmission_of};
+use super::equation::Rows;
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
 use super::linear::by_noise;
-use super::model::{Plan, Rows, each_rows};
-use super::{IdentifyError, ModelKind, Options};
+use super::options::{ModelKind, Options};
+use super::plan::Plan;
+use super::stream::each_rows;
 use rig_data::prepare::{
     Beginning, Choice, CutoffTrial, HIGHEST, PrepareOptions, Recording, Survey, Treatment, each_of,
     threads, trimmed_rows,

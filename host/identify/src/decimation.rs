@@ -8,10 +8,10 @@
 //!
 //! Limits: one band for all joints; noise below the narrowest band remains.
 
-use super::IdentifyError;
 use super::cutoff::{beginnings, kept};
+use super::error::IdentifyError;
 use super::left_out::{BETTER, Stretches};
-use super::model::Plan;
+use super::plan::Plan;
 use rig_data::prepare::{PrepareError, Recording, Treatment};
 
 /// Ratio of neighbouring bands.

@@ -7,8 +7,11 @@
 use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::MOTOR_COLUMNS;
 
-use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
+use super::equation::{Equation, Rows};
+use super::error::failed;
+use super::plan::{Belongs, Plan};
 use super::slow::{SlowMotor, slow_motors};
+use super::tally::Tally;
 use rig_data::prepare::{Decimator, JointMotion, Motion, PrepareError};
 use rig_model::batch::{BLOCK, BatchError, ChainBatch, RegressorBlock};
 

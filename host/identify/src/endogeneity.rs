@@ -3,9 +3,11 @@
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::IdentifyError;
-use super::parts::{Parts, Refit};
-use super::problem::{Fitted, Problem};
+use super::error::IdentifyError;
+use super::fitted::Fitted;
+use super::jackknife::Refit;
+use super::parts::Parts;
+use super::problem::Problem;
 use super::total::moved_by_noise;
 use rig_output::{format_p_value, format_significant, format_value};
 

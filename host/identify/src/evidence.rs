@@ -10,11 +10,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::IdentifyError;
-use super::consistent::{Quadratic, scaled_cholesky};
+use super::consistent::scaled_cholesky;
+use super::error::{IdentifyError, singular};
 use super::factor::TriangularFactor;
 use super::prior::{Prior, Rule};
-use super::problem::singular;
+use super::quadratic::Quadratic;
 
 /// Candidates of s, from 0.1 % to 1000 %.
 pub(super) const CANDIDATES: [f64; 2] = [1e-3, 10.0];

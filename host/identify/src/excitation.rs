@@ -3,13 +3,26 @@
 use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::MOTOR_COLUMNS;
+use serde::Serialize;
 
-use super::NotExcited;
-use super::base::{Base, Independent, independent_columns, preference};
+use super::base::Base;
+use super::columns::preference;
 use super::factor::TriangularFactor;
-use super::least::triangle;
+use super::independent::{Independent, independent_columns};
+use super::linear::triangle;
 use super::prior::Prior;
 use rig_model::robot::JointKind;
+
+/// A combination that the data do not determine, or determine less well than the description.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotExcited {
+    /// The base parameter that was not identified on its own or is weakly excited.
+    pub combination: String,
+    /// Reason.
+    pub why: String,
+    /// A motion that would excite it.
+    pub motion: String,
+}
 
 /// Relative distance of a column of unit length from the combinations of the others, below which its base parameter is
 /// not excited. Its value would rest on a thousandth of the torque, about as much as filters and sensors distort.

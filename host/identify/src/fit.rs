@@ -1,14 +1,18 @@
 //! Fit of the base parameters to torques: all rows enter a triangular factor per equation, then the equations are
 //! weighted.
 
-use super::IdentifyError;
-use super::base::{Base, Independent};
+use super::base::Base;
+use super::error::IdentifyError;
+use super::estimator::Estimator;
 use super::excitation::excited;
 use super::factor::TriangularFactor;
+use super::independent::Independent;
 use super::linear::{classical, least_squares, spread};
-use super::model::{Plan, Tally, each_rows};
+use super::options::Options;
+use super::plan::Plan;
 use super::robust::{reweighted, spread_of};
-use super::{Estimator, Options};
+use super::stream::each_rows;
+use super::tally::Tally;
 use rig_data::prepare::{Recording, each_of, threads};
 
 /// Largest change of a parameter at the end of reweighting, as a share of its standard deviation.

@@ -2,7 +2,7 @@
 
 use rig_shared::multibody::Chain;
 
-use super::IdentifyError;
+use super::error::IdentifyError;
 use rig_data::Compensated;
 use rig_data::prepare::{Recording, Treatment};
 use rig_model::effects::Effects;

@@ -3,134 +3,32 @@
 
 use nalgebra::DMatrix;
 
-use super::beyond::{Beyond, Together, beyond, together};
-use super::compare::{Comparison, Held, compare, fit, judge};
+use super::compare::compare;
+use super::compared::Comparison;
 use super::consistent::consistent;
 use super::covariance::Estimate;
+use super::error::IdentifyError;
 use super::essential::{EssentialSet, Known, essential};
-use super::evaluate::Planned;
-use super::excitation::hardly_excited;
+use super::estimator::Estimator;
+use super::excitation::{NotExcited, hardly_excited};
 use super::factor::TriangularFactor;
+use super::fit_prior::prior_beside;
+use super::held::Held;
+use super::identification::BaseParameter;
 use super::linear::{classical, spread};
-use super::parts::{LeaveOut, Parts};
-use super::prior::Prior;
-use super::problem::{Fitted, Problem};
-use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about, standard_set};
-use super::{BaseParameter, Estimator, IdentifyError, ModelKind, NotExcited, Options};
-use rig_model::robot::Robot;
+use super::options::ModelKind;
+use super::own::Own;
+use super::parts::Parts;
+use super::planned::Planned;
+use super::problem::Problem;
+use super::quadratic::{quadratic, quadratic_about};
+use super::relative_error::judge;
+use super::standard::{Judges, StandardSet, standard_set};
 
-/// Allowed weights of recordings; beyond this range the other recordings are lost in rounding errors.
-const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 /// Half width of the interval that holds 95 % of a normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
 /// Ratio of a residual to that of the weighted fit above which a warning is given.
 const MUCH_MORE: f64 = 1.2;
-
-/// Rejects settings that are invalid or have no effect with the others.
-pub(super) fn check(robot: &Robot, options: &Options) -> Result<(), IdentifyError> {
-    if let Some(&weight) = options
-        .recording_weights
-        .iter()
-        .find(|w| !WEIGHTS.contains(w))
-    {
-        return Err(IdentifyError::Weight(weight));
-    }
-    match options.prior_uncertainty {
-        Some(u) if !(u.is_finite() && u > 0.0) => return Err(IdentifyError::PriorUncertainty(u)),
-        // The prior of several joints' standard parameters is the description, for every estimator.
-        Some(uncertainty) if robot.joints.len() == 1 && !options.estimator.has_prior() => {
-            return Err(IdentifyError::UnusedUncertainty {
-                uncertainty,
-                estimator: options.estimator.name(),
-            });
-        }
-        _ => {}
-    }
-    match (options.window, options.model) {
-        (Some(window), ModelKind::Differential) => Err(IdentifyError::UnusedWindow(window)),
-        _ => Ok(()),
-    }
-}
-
-/// The fit of an estimator other than the three least squares.
-pub(super) struct Own {
-    /// Values of all base columns and the other results.
-    pub fitted: Fitted,
-    /// The estimate.
-    pub estimate: Estimate,
-    parts: Parts,
-}
-
-/// Fits with the requested estimator; `None` if it is one of the three least squares. `beside` is the covariance added
-/// by terms beyond the description.
-pub(super) fn own(
-    problem: &Problem,
-    beside: Option<&DMatrix<f64>>,
-) -> Result<Option<Own>, IdentifyError> {
-    let estimator = problem.options.estimator;
-    if matches!(
-        estimator,
-        Estimator::Ols | Estimator::Weighted | Estimator::Robust
-    ) {
-        return Ok(None);
-    }
-    let parts = Parts::collect(problem)?;
-    let all = LeaveOut::of(&parts.weighted(&problem.tempered(&parts)));
-    let fitted = fit(
-        estimator,
-        problem,
-        &parts,
-        &prior_beside(problem, &all.whole),
-    )?;
-    Ok(Some(Own {
-        estimate: fitted.estimate(&parts, problem, beside),
-        fitted,
-        parts,
-    }))
-}
-
-/// Finds effects beyond the description. The prior is always the description, for every estimator: without it,
-/// position-dependent torques are collinear with inertia. `factors` are those of the fitted equations.
-pub(super) fn beyond_description(
-    problem: &Problem,
-    factors: &[TriangularFactor],
-) -> Result<Beyond, IdentifyError> {
-    if problem.options.look_beyond && problem.robot.joints.len() > 1 {
-        beyond(problem, factors, &prior(problem))
-    } else {
-        Ok(Beyond::default())
-    }
-}
-
-/// Refits the found terms together with all parameters; `described` is the described gravity.
-pub(super) fn together_with(
-    problem: &Problem,
-    factors: &[TriangularFactor],
-    known: &Beyond,
-    described: [f64; 3],
-) -> Result<Together, IdentifyError> {
-    together(problem, factors, &prior(problem), known, described)
-}
-
-fn prior(problem: &Problem) -> Prior {
-    prior_of(
-        problem.robot,
-        problem.base,
-        problem.surveys,
-        &problem.start_full(),
-        problem.options.prior_uncertainty,
-    )
-}
-
-/// Returns the prior without values that the data contradict; `factor` has the unit σ·√(correlation time).
-fn prior_beside(problem: &Problem, factor: &TriangularFactor) -> Prior {
-    // A prior uncertainty set by the user is used for all values.
-    if problem.options.prior_uncertainty.is_some() {
-        return prior(problem);
-    }
-    let data = quadratic(factor, problem.base);
-    prior(problem).without_contradicted(&data.matrix, &data.right, problem.robot)
-}
 
 /// Results beside the estimate.
 #[derive(Default)]

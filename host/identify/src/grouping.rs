@@ -29,14 +29,14 @@ use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind, column};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, Transmission, motor_column};
 
-use super::base::chain_of;
-use super::{Base, IdentifyError};
+use super::base::Base;
+use super::chain::chain_of;
+use super::error::IdentifyError;
 use rig_model::robot::Robot;
 
 /// Sine or cosine below which directions are parallel or perpendicular. Real geometries have no values between this and
 /// the tolerance of the numeric method.
 const EXACT: f64 = 1e-9;
-
 const XX: usize = 4;
 const XY: usize = 5;
 const XZ: usize = 6;

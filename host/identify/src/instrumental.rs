@@ -13,16 +13,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::IdentifyError;
-use super::closed::{LoopMotion, ReferenceMotion, Source, model_of, nearest};
+use super::closed::{Source, nearest};
+use super::error::{IdentifyError, singular};
 use super::factor::TriangularFactor;
-use super::least::triangle;
-use super::linear::spread;
-use super::model::Rows;
-use super::parts::{LeaveOut, PARTS, Parts, Refit, joined, part_of};
+use super::fitted::Fitted;
+use super::jackknife::{LeaveOut, PARTS, Refit, joined, part_of};
+use super::linear::{spread, triangle};
+use super::parts::Parts;
 use super::prior::Prior;
-use super::problem::{Fitted, Problem, singular};
-use super::twin::{Companion, Twin, each_pair};
+use super::problem::Problem;
+use super::simulated::{Drift, each_simulated};
 use rig_output::format_significant;
 
 /// Largest change of a parameter at convergence, as a share of its standard deviation.
@@ -36,33 +36,6 @@ const OFF: f64 = 0.02;
 /// Ratio of the residual to the weighted fit's above which the instruments are the cause, not noise that biases least
 /// squares. Noise that removes three quarters of an inertia only doubles the residual.
 const SEVERAL: f64 = 2.0;
-
-/// Passes rows along the simulated motion together with the measured ones, for `source` and the model `standard`.
-pub(super) fn each_simulated(
-    problem: &Problem,
-    source: &Source,
-    standard: &[f64],
-    take: &mut dyn FnMut(usize, &Rows, &Rows),
-) -> Result<(), IdentifyError> {
-    match source {
-        Source::Loop(controllers) => {
-            let model = model_of(problem.robot, problem.plan.chain, standard)?;
-            let make = |r: usize| {
-                let period = 1.0 / problem.surveys[r].sample_rate;
-                Ok(
-                    Box::new(LoopMotion::new(problem.robot, controllers, &model, period)?)
-                        as Box<dyn Companion>,
-                )
-            };
-            each_pair(problem, &Twin::Made(&make), take)
-        }
-        Source::Reference => {
-            let make = |_: usize| Ok(Box::new(ReferenceMotion) as Box<dyn Companion>);
-            each_pair(problem, &Twin::Made(&make), take)
-        }
-        Source::Smoothed(low_pass) => each_pair(problem, &Twin::Smoothed(low_pass.clone()), take),
-    }
-}
 
 /// Returns β from the triangular factor of [Z | X | y]: Zᵀ·Z cancels.
 fn solve(factor: &TriangularFactor, size: usize) -> Result<Vec<f64>, IdentifyError> {
@@ -104,7 +77,7 @@ pub(super) fn instrumental(
     let data = problem.data;
     let (p, size) = (problem.base.len(), data.kept.len());
     let measured = LeaveOut::of(&parts.weighted(problem.weights));
-    let tempered = LeaveOut::of(&parts.weighted(&problem.tempered(parts))).whole;
+    let tempered = LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights))).whole;
     let weights: Vec<f64> = problem.recording_weights().collect();
     let mut values = problem.start.to_vec();
     let mut passes = 0;
@@ -213,60 +186,6 @@ fn much_more<'a>(problem: &'a Problem, parts: &Parts, full: &[f64]) -> Option<(&
         })
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .filter(|(_, times)| *times > SEVERAL)
-}
-
-/// Distance between simulated and measured motion.
-pub(super) struct Drift {
-    sums: Vec<[f64; 4]>,
-}
-
-impl Drift {
-    pub(super) fn new(joints: usize) -> Self {
-        Self {
-            sums: vec![[0.0; 4]; joints],
-        }
-    }
-
-    pub(super) fn push(&mut self, measured: &Rows, simulated: &Rows) {
-        for (sum, (a, b)) in self
-            .sums
-            .iter_mut()
-            .zip(measured.q.iter().zip(&simulated.q))
-        {
-            for (x, y) in a.iter().zip(b) {
-                sum[0] += 1.0;
-                sum[1] += x;
-                sum[2] += x * x;
-                sum[3] += (x - y).powi(2);
-            }
-        }
-    }
-
-    /// Returns the RMS distance of each joint, as a share of the motion's spread.
-    fn shares<'a>(&'a self, problem: &'a Problem) -> impl Iterator<Item = (&'a str, f64)> {
-        let joints = self.sums.iter().zip(&problem.robot.joints);
-        joints.map(|([n, sum, squares, off], joint)| {
-            let n = n.max(1.0);
-            let spread = (squares / n - (sum / n).powi(2)).max(f64::MIN_POSITIVE);
-            (joint.name.as_str(), (off / n / spread).sqrt())
-        })
-    }
-
-    /// Returns the joint with the largest distance.
-    fn farthest<'a>(&'a self, problem: &'a Problem) -> Option<(&'a str, f64)> {
-        self.shares(problem).max_by(|a, b| a.1.total_cmp(&b.1))
-    }
-
-    pub(super) fn words(&self, problem: &Problem) -> String {
-        let shares: Vec<String> = self
-            .shares(problem)
-            .map(|(joint, share)| format!("{joint} {:.2} %", 100.0 * share))
-            .collect();
-        format!(
-            "RMS distance of that motion from the measured one, as a share of the motion's spread: {}.",
-            shares.join(", ")
-        )
-    }
 }
 
 fn fitted(

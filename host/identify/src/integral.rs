@@ -4,8 +4,11 @@ use rig_shared::multibody::{COLUMNS, column, energy_regressor};
 use rig_shared::scalar::Real;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
-use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
+use super::equation::{Equation, Rows};
+use super::error::failed;
 use super::momentum::{as_trapezia_see, momentum_rows};
+use super::plan::{Belongs, Plan};
+use super::tally::Tally;
 use rig_data::prepare::{LowPass, Motion, PrepareError};
 
 /// Computes the rows of one recording.

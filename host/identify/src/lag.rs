@@ -12,9 +12,9 @@
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-use super::IdentifyError;
+use super::equation::Rows;
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
-use super::model::Rows;
 use super::problem::Problem;
 
 /// Number of standard deviations above which a lead is significant.

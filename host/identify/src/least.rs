@@ -1,13 +1,11 @@
 //! Least squares for the comparison of estimators: the same fit with one segment left out at a time.
 
-use nalgebra::DMatrix;
-
-use super::IdentifyError;
-use super::base::Independent;
-use super::factor::TriangularFactor;
-use super::linear::{classical, kept_columns, least_squares, spread};
-use super::parts::{LeaveOut, Parts};
-use super::problem::{Fitted, Problem};
+use super::error::IdentifyError;
+use super::fitted::Fitted;
+use super::jackknife::LeaveOut;
+use super::linear::{classical, least_squares, spread, triangle};
+use super::parts::Parts;
+use super::problem::Problem;
 
 /// Fits by least squares with the equations weighted by `weights`.
 pub(super) fn least(
@@ -34,9 +32,4 @@ pub(super) fn from_factors(problem: &Problem, factors: &LeaveOut) -> Result<Fitt
         warnings: Vec::new(),
         doubtful: None,
     })
-}
-
-/// Returns the triangular factor of the kept columns alone.
-pub(super) fn triangle(factor: &TriangularFactor, data: &Independent) -> DMatrix<f64> {
-    kept_columns(factor, data).0.qr().r()
 }

@@ -1,10 +1,13 @@
 //! Comparison of treatments by how well they predict time segments that were left out of the fit.
 
+use super::equation::Rows;
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
+use super::jackknife::LeaveOut;
 use super::linear::by_noise;
-use super::model::{Plan, Rows, each_rows};
-use super::parts::LeaveOut;
-use super::{IdentifyError, ModelKind};
+use super::options::ModelKind;
+use super::plan::Plan;
+use super::stream::each_rows;
 use rig_data::prepare::Recording;
 
 /// Number of segments that are left out in turn.

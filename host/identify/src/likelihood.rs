@@ -14,13 +14,16 @@ use std::collections::{BTreeMap, VecDeque};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::IdentifyError;
+use super::equation::Rows;
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
+use super::fitted::Fitted;
+use super::jackknife::{LeaveOut, PARTS, joined, part_of};
 use super::least::from_factors;
 use super::linear::{product, spread};
-use super::model::{Rows, each_rows};
-use super::parts::{LeaveOut, PARTS, Parts, joined, part_of};
-use super::problem::{Fitted, Problem};
+use super::parts::Parts;
+use super::problem::Problem;
+use super::stream::each_rows;
 
 /// Highest order of the autoregression.
 const MOST_ORDER: usize = 20;

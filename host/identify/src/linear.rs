@@ -2,9 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::IdentifyError;
-use super::base::{Base, Independent};
+use super::base::Base;
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
+use super::independent::Independent;
+
+/// Returns the triangular factor of the kept columns alone.
+pub(super) fn triangle(factor: &TriangularFactor, data: &Independent) -> DMatrix<f64> {
+    kept_columns(factor, data).0.qr().r()
+}
 
 /// Multiplies a row by the parameters.
 pub(super) fn product(x: &[f64], beta: &[f64]) -> f64 {

@@ -3,11 +3,8 @@
 //! Rows near rest would separate the two only by the smoothed sign of friction there, which measures neither. They are
 //! not used for such a joint, in an identification and in a diagnosis.
 
-use rig_shared::multibody::{COLUMNS, column};
-
-use super::model::{Plan, Rows, Tally, each_rows};
-use super::{IdentifyError, ModelKind};
-use rig_data::prepare::Recording;
+use super::equation::Rows;
+use super::tally::Tally;
 
 /// Smallest smoothed sign of dry friction at which a joint slides; below it the sign is changing near rest.
 pub const SLIDES: f64 = 0.99;
@@ -42,11 +39,11 @@ impl Slides {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneWay {
     /// Index of the joint, from 0.
-    joint: usize,
+    pub(super) joint: usize,
     /// Place of its dry friction among the columns.
-    place: usize,
+    pub(super) place: usize,
     /// 1 or −1.
-    direction: f64,
+    pub(super) direction: f64,
 }
 
 impl OneWay {
@@ -66,46 +63,4 @@ impl OneWay {
             *keep &= slides;
         }
     }
-}
-
-/// Finds the joints that move one way in the training data, if their dry friction and constant torque are both columns.
-///
-/// # Errors
-/// Reading errors.
-pub(super) fn one_way(
-    training: &[&dyn Recording],
-    plan: &Plan,
-) -> Result<Vec<OneWay>, IdentifyError> {
-    let place =
-        |joint: usize, own: usize| (plan.columns.iter()).position(|c| *c == joint * COLUMNS + own);
-    let joints = plan.chain.joint_count();
-    let places: Vec<(usize, usize)> = (0..joints)
-        .filter(|joint| place(*joint, column::OFFSET).is_some())
-        .filter_map(|joint| Some((joint, place(joint, column::COULOMB)?)))
-        .collect();
-    let mut slides = vec![Slides::default(); places.len()];
-    let width = plan.columns.len();
-    for recording in training {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
-            for ((joint, place), slides) in places.iter().zip(&mut slides) {
-                let equation = &rows.equations[*joint];
-                for (row, keep) in equation.x.chunks(width).zip(&equation.keep) {
-                    if *keep {
-                        slides.take(row[*place]);
-                    }
-                }
-            }
-            Ok(())
-        })?;
-    }
-    let period = plan.treatment.decimation.max(1) as f64 / plan.treatment.sample_rate;
-    Ok((places.into_iter().zip(slides))
-        .filter_map(|((joint, place), slides)| {
-            Some(OneWay {
-                joint,
-                place,
-                direction: slides.one_way(period)?,
-            })
-        })
-        .collect())
 }

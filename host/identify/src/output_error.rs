@@ -7,15 +7,17 @@
 //!
 //! Limits: the Jacobian lacks the neglected part; the controller's gains are not identified.
 
-use super::IdentifyError;
 use super::closed::{Source, nearest};
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
-use super::instrumental::{Drift, each_simulated};
+use super::fitted::Fitted;
+use super::jackknife::{LeaveOut, PARTS, joined, part_of};
 use super::least::from_factors;
 use super::linear::spread;
-use super::parts::{LeaveOut, PARTS, Parts, joined, part_of};
+use super::parts::Parts;
 use super::prior::Prior;
-use super::problem::{Fitted, Problem};
+use super::problem::Problem;
+use super::simulated::{Drift, each_simulated};
 
 /// Largest change of a parameter at convergence, as a share of its standard deviation.
 const SETTLED: f64 = 0.02;
@@ -34,7 +36,7 @@ pub(super) fn output_error(
     let (source, words) = Source::closed_loop(problem)?;
     let data = problem.data;
     let p = problem.base.len();
-    let tempered = LeaveOut::of(&parts.weighted(&problem.tempered(parts))).whole;
+    let tempered = LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights))).whole;
     let weights: Vec<f64> = problem.recording_weights().collect();
     let mut values = problem.start.to_vec();
     let mut passes = 0;

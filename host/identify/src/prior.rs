@@ -5,6 +5,7 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, motor_column};
 
 use super::contradicted::contradicted;
+use super::hints::Hints;
 use super::pseudo_inertia::{Divergence, INERTIAL, parameters_of};
 use rig_model::robot::{Quantity, Robot, STAND_IN, Worth, worth};
 use rig_output::format_significant;
@@ -56,18 +57,6 @@ pub(super) struct Prior {
     pub remarks: Vec<String>,
     /// True if the description states inertial values for every link.
     pub stated: bool,
-}
-
-/// Estimates from the data for columns that the description does not state.
-pub(super) struct Hints {
-    /// Least-squares value of each standard column that is identified on its own, else NaN.
-    pub values: Vec<f64>,
-    /// RMS torque of each joint.
-    pub torque: Vec<f64>,
-    /// RMS speed of each joint.
-    pub speed: Vec<f64>,
-    /// RMS acceleration of each joint.
-    pub acceleration: Vec<f64>,
 }
 
 impl Prior {

@@ -1,8 +1,8 @@
 //! Choice of the recommended estimator.
 
-use super::Estimator;
-use super::compare::Compared;
+use super::compared::Compared;
 use super::endogeneity::{Endogeneity, Verdict};
+use super::estimator::Estimator;
 use rig_output::format_significant;
 
 /// Distance to the weighted fit below which an estimate agrees with it, in its standard deviations: the 95 % interval.

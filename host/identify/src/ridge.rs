@@ -8,13 +8,15 @@
 
 use nalgebra::DVector;
 
-use super::IdentifyError;
+use super::error::IdentifyError;
 use super::evidence::{Belief, CANDIDATES, Seen};
 use super::factor::TriangularFactor;
-use super::least::triangle;
-use super::parts::{LeaveOut, Parts, Refit};
+use super::fitted::Fitted;
+use super::jackknife::{LeaveOut, Refit};
+use super::linear::triangle;
+use super::parts::Parts;
 use super::prior::Prior;
-use super::problem::{Fitted, Problem};
+use super::problem::Problem;
 
 /// Number of candidates of the relative uncertainty, evenly spaced in the logarithm.
 const STEPS: usize = 17;
@@ -25,7 +27,7 @@ pub(super) fn ridge(
     parts: &Parts,
     prior: &Prior,
 ) -> Result<Fitted, IdentifyError> {
-    let all = LeaveOut::of(&parts.weighted(&problem.tempered(parts)));
+    let all = LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights)));
     let belief = Belief::of(prior, &problem.base.combination);
     let data = Seen::of(&all.whole);
     let (deviation, s, why) = match problem.options.prior_uncertainty {

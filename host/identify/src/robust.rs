@@ -1,12 +1,16 @@
 //! Iteratively reweighted least squares (Huber 1964; Holland & Welsch 1977), one pass per iteration.
 
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
+use super::fitted::Fitted;
+use super::jackknife::{LeaveOut, PARTS, joined, part_of};
 use super::least::from_factors;
 use super::linear::{product, spread};
-use super::model::{Plan, each_rows};
-use super::parts::{LeaveOut, PARTS, Parts, joined, part_of};
-use super::problem::{Fitted, Problem};
-use super::{IdentifyError, Options};
+use super::options::Options;
+use super::parts::Parts;
+use super::plan::Plan;
+use super::problem::Problem;
+use super::stream::each_rows;
 use rig_data::prepare::Recording;
 
 /// Absolute residuals in logarithmic bins of 1 %: gives the median of any number in constant memory.

@@ -8,7 +8,8 @@ use rig_shared::transmission::{MOTOR_COLUMNS, Transmission};
 
 use super::cache::RowCache;
 use super::differential::Differential;
-use super::model::{Plan, Tally};
+use super::plan::Plan;
+use super::tally::Tally;
 use super::{Base, ModelKind, Options, chain_of, grouped, identify, transmission_of};
 use rig_data::prepare::{Choice, InMemory, Motion, PrepareOptions, Survey, Treatment, each_motion};
 use rig_data::{Block, JointColumns};

@@ -3,8 +3,11 @@
 
 use rig_shared::multibody::{COLUMNS, column};
 
+use super::error::IdentifyError;
+use super::identification::Identification;
+use super::identified_robot::identified_robot;
+use super::options::Options;
 use super::solve::identify_beside;
-use super::{Identification, IdentifyError, Options, identified_robot};
 use rig_data::prepare::Recording;
 use rig_model::robot::Robot;
 

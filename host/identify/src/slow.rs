@@ -1,7 +1,8 @@
 //! Rows in which friction has no known sign: the motor of a coupled drive is slow, although every joint may be fast, or
 //! a shaft dwells instead of passing through zero.
 
-use super::model::{Plan, failed};
+use super::error::failed;
+use super::plan::Plan;
 use rig_data::prepare::{Motion, PrepareError};
 
 /// Share of the speed threshold below which a shaft hardly moves. A shaft that passes through zero spends the same

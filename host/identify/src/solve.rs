@@ -4,29 +4,36 @@ use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::band::explained_band;
-use super::base::{Base, chain_of, expression, transmission_of};
+use super::base::Base;
 use super::beyond::{Beyond, with_beyond};
 use super::cache::RowCache;
+use super::chain::{chain_of, transmission_of};
+use super::check::check;
+use super::columns::expression;
 use super::covariance::memory_of;
 use super::cutoff::{Equations, decided};
 use super::decimation;
-use super::evaluate::{Planned, covariance, torque_residuals};
+use super::directions::one_way;
+use super::error::IdentifyError;
+use super::estimator::Estimator;
 use super::excitation::not_excited;
 use super::fit::Fit;
+use super::fit_covariance::covariance;
 use super::freed::{freed, plain};
-use super::further::{self, Outcome, further};
+use super::further::{Outcome, further};
+use super::identification::{BaseParameter, Details, Identification, JointFigures};
 use super::lag::Lag;
-use super::model::Plan;
-use super::one_way::one_way;
+use super::look_beyond::{beyond_description, together_with};
+use super::options::{ModelKind, Options};
+use super::own::own;
+use super::plan::Plan;
+use super::planned::Planned;
 use super::problem::Problem;
 use super::residual::ResidualReport;
 use super::speed::speed_thresholds;
+use super::torque_residuals::torque_residuals;
 use super::warnings::Heard;
 use super::window::choose_window;
-use super::{
-    BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
-    Options,
-};
 use rig_data::prepare::{
     Choice, PrepareError, Recording, Spooled, Survey, Treatment, as_recordings, surveyed,
 };
@@ -50,7 +57,7 @@ pub(super) fn identify_beside(
     options: &Options,
     beside: &[[f64; COLUMNS]],
 ) -> Result<Identification, IdentifyError> {
-    further::check(robot, options)?;
+    check(robot, options)?;
     let (mut known, mut prepared) = (None, None);
     for _ in 0..=MOST_LOOKS {
         let known_now = known.as_ref();
@@ -233,21 +240,21 @@ fn solve(
     };
     let (known, beside) = match added {
         None => {
-            let found = further::beyond_description(&problem, &fit.factors)?;
+            let found = beyond_description(&problem, &fit.factors)?;
             if !found.is_empty() {
                 return Ok(Solved::Anew(found));
             }
             (found, None)
         }
         Some(known) => {
-            let found = further::together_with(&problem, &fit.factors, known, described.gravity)?;
+            let found = together_with(&problem, &fit.factors, known, described.gravity)?;
             if !found.settled {
                 return Ok(Solved::Anew(found.terms));
             }
             (found.terms, Some(found.beside))
         }
     };
-    let own = further::own(&problem, beside.as_ref())?;
+    let own = own(&problem, beside.as_ref())?;
     let (estimate, full) = match &own {
         Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
         // Second pass: residuals of the fitted equations, for the covariance.

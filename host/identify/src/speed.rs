@@ -2,11 +2,14 @@
 
 use super::covariance::Memory;
 use super::cutoff::{factors_of, kept};
+use super::equation::Rows;
+use super::error::IdentifyError;
 use super::factor::TriangularFactor;
 use super::left_out::{BETTER, Stretches};
 use super::linear::{by_noise, product};
-use super::model::{Plan, Rows, each_rows};
-use super::{IdentifyError, ModelKind};
+use super::options::ModelKind;
+use super::plan::Plan;
+use super::stream::each_rows;
 use rig_data::prepare::Recording;
 
 /// Share of the RMS speed above which rows are always used; no threshold is higher.

@@ -4,20 +4,11 @@ use nalgebra::DVector;
 use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 
-use super::IdentifyError;
-use super::base::Base;
-use super::bodies::Sizes;
-use super::compare::relative_errors;
-use super::consistent::{Consistent, Quadratic, consistent};
 use super::factor::TriangularFactor;
-use super::least::triangle;
-use super::parts::{LeaveOut, Parts};
-use super::prior::{Hints, Prior};
-use super::problem::{Fitted, Problem};
+use super::prior::Prior;
+use super::problem::Problem;
 use super::pseudo_inertia::{INERTIAL, least_eigenvalue};
-use rig_data::prepare::Survey;
-use rig_model::robot::{DESCRIBED, Robot};
-use rig_output::format_significant;
+use super::relative_error::relative_errors;
 
 /// One standard parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -54,85 +45,6 @@ impl StandardSet {
     /// Returns the values in the order of the standard columns.
     pub fn values(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| p.value).collect()
-    }
-}
-
-/// Share of the fastest joint's speed below which a joint hardly moves (rad/s and m/s compared directly).
-const HARDLY: f64 = 1e-4;
-
-/// Builds the prior of `robot`, with hints from a fit of all base columns.
-pub(super) fn prior_of(
-    robot: &Robot,
-    base: &Base,
-    surveys: &[Survey],
-    full: &[f64],
-    uncertainty: Option<f64>,
-) -> Prior {
-    let joints = robot.joints.len();
-    let over = |of: &dyn Fn(&Survey, usize) -> f64| {
-        (0..joints)
-            .map(|j| surveys.iter().map(|s| of(s, j)).fold(0.0, f64::max))
-            .collect::<Vec<f64>>()
-    };
-    let speed = over(&|s, j| s.joints[j].spectrum.velocity_rms());
-    // Only the order of magnitude is needed: a motion of that speed at its highest frequency.
-    let acceleration = over(&|s, j| {
-        let spectrum = &s.joints[j].spectrum;
-        std::f64::consts::TAU * spectrum.motion * spectrum.velocity_rms()
-    });
-    let sizes = Sizes {
-        torque: over(&|s, j| s.joints[j].torque_rms),
-        acceleration,
-        speed,
-    };
-    let columns = base.combination.ncols();
-    Prior::of(
-        robot,
-        columns,
-        &hints(columns, (&base.columns, full), sizes),
-        uncertainty.unwrap_or(DESCRIBED),
-    )
-}
-
-/// Collects hints for the `columns` standard columns: base columns with fitted values, and the joints' motion.
-pub(super) fn hints(columns: usize, (base, full): (&[usize], &[f64]), sizes: Sizes) -> Hints {
-    let mut values = vec![f64::NAN; columns];
-    for (&c, &value) in base.iter().zip(full) {
-        if value != 0.0 {
-            values[c] = value;
-        }
-    }
-    // A joint that hardly moves gives no scale; it is assumed to move like the others.
-    let like_others = |list: Vec<f64>| -> Vec<f64> {
-        let most = list.iter().copied().fold(0.0, f64::max);
-        list.into_iter()
-            .map(|own| if own < HARDLY * most { most } else { own })
-            .collect()
-    };
-    Hints {
-        torque: sizes.torque,
-        acceleration: like_others(sizes.acceleration),
-        values,
-        speed: like_others(sizes.speed),
-    }
-}
-
-/// Builds the problem from a factor whose rows are in units of the residual's noise.
-pub(super) fn quadratic(factor: &TriangularFactor, base: &Base) -> Quadratic {
-    let (r, right) = factor.system();
-    Quadratic {
-        matrix: r * &base.combination,
-        right,
-    }
-}
-
-/// The same for a given estimate of all base columns instead of the data's own optimum.
-pub(super) fn quadratic_about(factor: &TriangularFactor, base: &Base, full: &[f64]) -> Quadratic {
-    let (r, _) = factor.system();
-    let right = &r * DVector::from_column_slice(full);
-    Quadratic {
-        matrix: r * &base.combination,
-        right,
     }
 }
 
@@ -212,45 +124,4 @@ pub(super) fn standard_set(
             .collect(),
         prior: remarks,
     }
-}
-
-/// Fits under the constraint of physical consistency.
-pub(super) fn consistent_fit(
-    problem: &Problem,
-    parts: &Parts,
-    prior: &Prior,
-) -> Result<Fitted, IdentifyError> {
-    let all = LeaveOut::of(&parts.weighted(&problem.tempered(parts)));
-    let fit = |factor: &TriangularFactor| -> Result<Consistent, IdentifyError> {
-        consistent(&quadratic(factor, problem.base), prior)
-    };
-    let whole = fit(&all.whole)?;
-    let standard = all.refit(&|factor| Ok(fit(factor)?.parameters))?;
-    let full = standard.map(&|pi| {
-        (&problem.base.combination * DVector::from_column_slice(pi))
-            .as_slice()
-            .to_vec()
-    });
-    let kept = full.map(&|values| problem.identified(values));
-    let regressor = triangle(&all.whole, problem.data);
-    let along = prior.own(&problem.base.combination) * whole.spread;
-    let covariance = &along * along.transpose();
-    let identified = problem.identified_covariance(&covariance);
-    Ok(Fitted {
-        classical_std: (0..kept.whole.len())
-            .map(|k| identified[(k, k)].max(0.0).sqrt())
-            .collect(),
-        standard: Some(whole.parameters),
-        full,
-        kept,
-        covariance: Some(covariance),
-        regressor,
-        said: vec![format!(
-            "Convex problem solved in {} Newton steps. Intervals are those of the posterior: the description's inertial values count as right to {} times their size.",
-            whole.steps,
-            format_significant(problem.options.prior_uncertainty.unwrap_or(DESCRIBED), 2)
-        )],
-        warnings: Vec::new(),
-        doubtful: None,
-    })
 }

@@ -9,9 +9,10 @@ use rig_shared::multibody::{
 };
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission};
 
-use super::base::{chain_of, transmission_of};
-use super::momentum::MotorMomentum;
-use super::{IdentifyError, ModelKind};
+use super::chain::{chain_of, transmission_of};
+use super::error::IdentifyError;
+use super::motor_momentum::MotorMomentum;
+use super::options::ModelKind;
 use rig_model::robot::Robot;
 
 /// A robot whose regressors are evaluated.

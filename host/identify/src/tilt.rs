@@ -12,6 +12,7 @@ use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 use rig_shared::multibody::{COLUMNS, Chain, gravity_vector};
 use serde::Serialize;
 
+use super::error::failed;
 use rig_data::prepare::PrepareError;
 use rig_output::format_value;
 
@@ -124,8 +125,7 @@ impl TiltColumns {
             *to = of[i];
         }
         for (chain, torque) in self.fields.iter().zip(&mut self.torque) {
-            gravity_vector(chain, &self.parameters, &self.q, torque)
-                .map_err(super::model::failed)?;
+            gravity_vector(chain, &self.parameters, &self.q, torque).map_err(failed)?;
         }
         Ok(&self.torque)
     }

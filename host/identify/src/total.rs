@@ -17,12 +17,13 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::IdentifyError;
+use super::error::{IdentifyError, singular};
 use super::factor::TriangularFactor;
-use super::least::triangle;
-use super::linear::{classical, spread};
-use super::parts::{LeaveOut, Parts, Refit};
-use super::problem::{Fitted, Problem, singular};
+use super::fitted::Fitted;
+use super::jackknife::{LeaveOut, Refit};
+use super::linear::{classical, spread, triangle};
+use super::parts::Parts;
+use super::problem::Problem;
 use super::twin::{Companion, Twin, each_pair};
 use rig_data::Block;
 use rig_data::prepare::PrepareError;

@@ -3,9 +3,12 @@
 //! The companion's positions pass the same filters, differences and decimation as the measured ones. So simulated or
 //! disturbed regressors match the measured ones row by row. Memory is that of one recording.
 
-use super::model::{Rows, Tally, rows_of};
+use super::equation::Rows;
+use super::error::IdentifyError;
+use super::options::ModelKind;
 use super::problem::Problem;
-use super::{IdentifyError, ModelKind};
+use super::stream::rows_of;
+use super::tally::Tally;
 use rig_data::prepare::{
     LowPass, Motion, PrepareError, Recording, Treatment, central_difference, each_motion,
     second_difference,

@@ -1,6 +1,7 @@
 //! Window length of the integral model.
 
-use super::{IdentifyError, ModelKind, Options};
+use super::error::IdentifyError;
+use super::options::{ModelKind, Options};
 use rig_data::prepare::{Survey, Treatment};
 
 /// Frequency times window length at which a mean passes half of the power: sin²(πx)/(πx)² = ½.

@@ -4,8 +4,9 @@
 //! one clock and both recordings have the same scales. Within a pass friction is constant and gravity changes, which
 //! shows the scale. The whole model over all passes and the ramps between them shows the clock.
 
-use super::super::covariance::t_quantile;
-use super::{FrictionFit, FrictionPoint, PARTS, Rows, tenths};
+use super::map::{FrictionFit, FrictionPoint};
+use super::rows::{PARTS, Rows, tenths};
+use crate::covariance::t_quantile;
 use rig_output::{format_significant, format_value};
 
 /// Largest searched shift between torque and position, s.

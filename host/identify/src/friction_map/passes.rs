@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::FrictionMapOptions;
+use super::map::FrictionMapOptions;
 
 /// Half lengths of the windows for the speed, s, longest first.
 ///

@@ -4,7 +4,7 @@
 //! The torque comes from the description: links by Newton and Euler without their drives, motors by their own motion
 //! (Ψ̇, Ψ̈, τ = Jᵀ·τ_motor). No regressor is used for it.
 
-use super::super::base::independent_columns;
+use super::super::independent::independent_columns;
 use super::super::linear::least_squares;
 use super::super::states::States;
 use super::arms::{Chance, body};

@@ -1,9 +1,10 @@
 //! The convex problem on rows without noise, and properties of its solution.
 
-use super::super::consistent::{Quadratic, consistent};
-use super::super::prior::{Hints, Prior};
+use super::super::consistent::consistent;
+use super::super::hints::Hints;
+use super::super::prior::Prior;
 use super::super::pseudo_inertia::least_eigenvalue;
-use super::super::standard::quadratic;
+use super::super::quadratic::{Quadratic, quadratic};
 use super::arms::{Chance, arm};
 use super::*;
 use nalgebra::{DMatrix, DVector};

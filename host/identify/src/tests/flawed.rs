@@ -2,7 +2,7 @@
 
 use super::made::{TRUTH, swing};
 use super::*;
-use rig_data::prepare::{PrepareOptions, Survey, Treatment};
+use rig_data::prepare::{Survey, Treatment};
 
 /// A recorder flaw, applied to the position of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]

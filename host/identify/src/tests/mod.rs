@@ -17,7 +17,7 @@ mod tx40;
 
 use super::*;
 use rand::{RngExt, SeedableRng};
-use rig_data::prepare::{Choice, InMemory};
+use rig_data::prepare::{Choice, InMemory, PrepareOptions};
 use rig_data::{Block, JointColumns};
 use rig_model::robot::{Joint, JointKind, Robot};
 
