@@ -156,12 +156,12 @@ pub enum IdentifyError {
 }
 
 /// Returns the error for a singular matrix.
-pub(super) fn singular(what: &str) -> IdentifyError {
+pub(crate) fn singular(what: &str) -> IdentifyError {
     IdentifyError::Singular {
         column: what.to_owned(),
     }
 }
 
-pub(super) fn failed(e: impl std::fmt::Display) -> PrepareError {
+pub(crate) fn failed(e: impl std::fmt::Display) -> PrepareError {
     PrepareError::Stopped(e.to_string())
 }

@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-use super::compared::Comparison;
-use super::covariance::Estimate;
-use super::essential::EssentialSet;
-use super::estimator::Estimator;
-use super::excitation::NotExcited;
-use super::options::ModelKind;
-use super::position::PositionTorque;
-use super::residual::ResidualReport;
-use super::standard::StandardSet;
-use super::tilt::BaseTilt;
+use crate::bodies::standard::StandardSet;
+use crate::comparison::compared::Comparison;
+use crate::estimator::Estimator;
+use crate::options::ModelKind;
+use crate::structure::essential::EssentialSet;
+use crate::structure::excitation::NotExcited;
+use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::residual::ResidualReport;
+use crate::unmodelled::position::PositionTorque;
+use crate::unmodelled::tilt::BaseTilt;
 use rig_data::prepare::{Masked, Survey, Treatment};
 
 /// An identified base parameter.
@@ -58,7 +58,7 @@ pub struct JointFigures {
 
 impl JointFigures {
     /// Collects the figures of the training residuals and, if given, of the hold-out residuals.
-    pub(super) fn of(name: &str, train: &ResidualReport, held: Option<&ResidualReport>) -> Self {
+    pub(crate) fn of(name: &str, train: &ResidualReport, held: Option<&ResidualReport>) -> Self {
         let share = |r: &ResidualReport| r.rows as f64 / r.all.rows.max(1) as f64;
         Self {
             name: name.to_owned(),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::estimator::{Estimator, Loss};
+use crate::estimator::{Estimator, Loss};
 use rig_data::prepare::PrepareOptions;
 
 /// Which equations are fitted.

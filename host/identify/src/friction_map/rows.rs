@@ -2,7 +2,7 @@
 
 use super::map::{DroppedPass, FrictionMapOptions, FrictionPoint};
 use super::passes::{Signal, Stretch, slope};
-use crate::covariance::Memory;
+use crate::uncertainty::covariance::Memory;
 
 /// All rows of a sweep, moving or not.
 #[derive(Clone, Default)]

@@ -4,10 +4,10 @@ use rig_shared::multibody::{COLUMNS, column, differential_regressor};
 
 use super::passes::Signal;
 use super::rows::Rows;
-use crate::chain::chain_of;
-use crate::cutoff::treatment_for;
 use crate::error::IdentifyError;
 use crate::identification::Identification;
+use crate::structure::chain::chain_of;
+use crate::treatment::cutoff::treatment_for;
 use rig_data::prepare::{PrepareError, PrepareOptions, Recording, Survey, Treatment, each_motion};
 use rig_model::robot::Robot;
 

@@ -4,11 +4,11 @@
 //! The torque comes from the description: links by Newton and Euler without their drives, motors by their own motion
 //! (Ψ̇, Ψ̈, τ = Jᵀ·τ_motor). No regressor is used for it.
 
-use super::super::independent::independent_columns;
-use super::super::linear::least_squares;
-use super::super::states::States;
 use super::arms::{Chance, body};
 use super::*;
+use crate::estimators::linear::least_squares;
+use crate::structure::independent::independent_columns;
+use crate::structure::states::States;
 use nalgebra::{DMatrix, DVector};
 use rig_model::robot::{Drive, Inertial, JointFriction, Screw};
 use rig_shared::multibody::{Chain, inverse_dynamics};

@@ -1,12 +1,12 @@
 //! The convex problem on rows without noise, and properties of its solution.
 
-use super::super::consistent::consistent;
-use super::super::hints::Hints;
-use super::super::prior::Prior;
-use super::super::pseudo_inertia::least_eigenvalue;
-use super::super::quadratic::{Quadratic, quadratic};
 use super::arms::{Chance, arm};
 use super::*;
+use crate::bodies::consistent::consistent;
+use crate::bodies::hints::Hints;
+use crate::bodies::prior::Prior;
+use crate::bodies::pseudo_inertia::least_eigenvalue;
+use crate::bodies::quadratic::{Quadratic, quadratic};
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, differential_regressor};
 

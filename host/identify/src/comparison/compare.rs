@@ -1,0 +1,186 @@
+//! Comparison of estimators by the same criteria, and the recommended result.
+
+use super::compared::{Compared, Comparison};
+use super::endogeneity::endogeneity;
+use super::held::Held;
+use super::recommend::{Judge, recommend};
+use crate::bodies::consistent::consistent;
+use crate::bodies::prior::Prior;
+use crate::bodies::quadratic::quadratic_about;
+use crate::error::IdentifyError;
+use crate::estimator::Estimator;
+use crate::estimators::fitted::Fitted;
+use crate::estimators::least::least;
+use crate::estimators::problem::Problem;
+use crate::estimators::run::fit;
+use crate::rows::factor::TriangularFactor;
+use crate::uncertainty::jackknife::LeaveOut;
+use crate::uncertainty::parts::Parts;
+use crate::uncertainty::relative_error::{mean, relative_errors};
+use rig_model::robot::Robot;
+
+/// Distance to the nearest consistent set below which a set counts as consistent, in standard deviations of all
+/// parameters together. Not zero, because the barrier keeps the solution slightly inside.
+const AT_THE_SET: f64 = 1.0;
+/// Factor on the prior's pull when the distance to the consistent set is measured.
+const PULL_OF_DISTANCE: f64 = 1e-4;
+
+/// Returns the distance of an estimate from the physically consistent set, in standard deviations.
+fn distance(
+    problem: &Problem,
+    tempered: &TriangularFactor,
+    prior: &Prior,
+    full: &[f64],
+) -> Result<f64, IdentifyError> {
+    let mut loose = prior.clone();
+    loose.strength = PULL_OF_DISTANCE;
+    let about = quadratic_about(tempered, problem.base, full);
+    loop {
+        match consistent(&about, &loose) {
+            Ok(found) => return Ok(found.squares.sqrt()),
+            // Far from every consistent set, and with weakly excited combinations, rounding hides the end of the path.
+            // An earlier point gives the same distance or one that is larger by the size of the pull.
+            Err(_) if loose.strength < 1.0 => loose.strength *= 10.0,
+            Err(e) => return Err(e),
+        }
+    }
+}
+
+/// Fits with every estimator of `list` and judges it, on the hold-out if given. `measured` holds the RMS torques of
+/// training data and hold-out per joint, for rows that do not contain all of the torque.
+pub(crate) fn compare(
+    problem: &Problem,
+    parts: &Parts,
+    prior: &Prior,
+    held: Option<&Held>,
+    list: &[Estimator],
+    names: &[String],
+    measured: Option<&[Vec<f64>; 2]>,
+) -> Result<Comparison, IdentifyError> {
+    let weighted = least(problem, parts, problem.weights)?;
+    let weighted_covariance = weighted.kept.covariance();
+    let tempered = LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights))).whole;
+    let torque = measured.map_or_else(|| parts.torque_rms(), |[training, _]| training.clone());
+    let fresh = held.and_then(|held| held.fresh.as_deref());
+    let mut rows = Vec::new();
+    let mut errors = Vec::new();
+    let mut instrumental: Option<Fitted> = None;
+    for &estimator in list {
+        let fitted = match estimator {
+            Estimator::Weighted => Ok(weighted.clone()),
+            other => fit(other, problem, parts, prior),
+        };
+        rows.push(match fitted {
+            Err(e) => Compared {
+                estimator,
+                cross_validated_relative_error: None,
+                holdout_relative_error: None,
+                distance_to_consistent: None,
+                physically_consistent: None,
+                largest_shift: None,
+                values: None,
+                said: vec![e.to_string()],
+            },
+            Ok(fitted) => {
+                let far = distance(problem, &tempered, prior, &fitted.full.whole).ok();
+                let row = Compared {
+                    estimator,
+                    cross_validated_relative_error: Some(
+                        parts
+                            .cross_validated(&fitted.full)
+                            .iter()
+                            .zip(&torque)
+                            .map(|(e, t)| e / t.max(f64::MIN_POSITIVE))
+                            .collect(),
+                    ),
+                    holdout_relative_error: held.map(|held| {
+                        let whole = measured.map(|[_, holdout]| holdout.as_slice());
+                        relative_errors(&held.all, &fitted.full.whole, whole)
+                    }),
+                    distance_to_consistent: far,
+                    physically_consistent: far
+                        .map(|far| far < AT_THE_SET || estimator == Estimator::Consistent),
+                    largest_shift: Some(
+                        (0..fitted.kept.whole.len())
+                            .map(|k| {
+                                (fitted.kept.whole[k] - weighted.kept.whole[k]).abs()
+                                    / weighted_covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE)
+                            })
+                            .fold(0.0, f64::max),
+                    ),
+                    values: Some(fitted.kept.whole.clone()),
+                    said: fitted
+                        .said
+                        .iter()
+                        .chain(&fitted.warnings)
+                        .cloned()
+                        .collect(),
+                };
+                // Only another motion in the hold-out counts. A mean over joints needs no `whole` torque.
+                let judged = match fresh {
+                    Some(factors) => Some(relative_errors(factors, &fitted.full.whole, None)),
+                    None => row.holdout_relative_error.clone(),
+                };
+                errors.extend(
+                    judged
+                        .or_else(|| row.cross_validated_relative_error.clone())
+                        .map(|judged| (estimator, mean(&judged))),
+                );
+                if estimator == Estimator::Iv {
+                    instrumental = Some(fitted);
+                }
+                row
+            }
+        });
+    }
+    let endogeneity = match &instrumental {
+        Some(iv) => endogeneity(problem, parts, &weighted, iv, names)?,
+        None => None,
+    };
+    let judge = if fresh.is_some() {
+        Judge::OtherMotion
+    } else if held.is_some() {
+        Judge::Repeated
+    } else {
+        Judge::Stretches
+    };
+    let written = problem.options.estimator;
+    let (recommended, mut recommendation) =
+        recommend(&rows, &errors, endogeneity.as_ref(), judge, written);
+    if recommended != written {
+        recommendation += &format!(
+            " The values given and written are those of {}; --estimator {} gives its own.",
+            written.name(),
+            recommended.name()
+        );
+    }
+    recommendation += &beyond_use(problem.robot, &rows, recommended);
+    Ok(Comparison {
+        folds: parts.count,
+        repeated_holdout: held.map_or_else(Vec::new, |held| held.repeated.clone()),
+        estimators: rows,
+        endogeneity,
+        recommended,
+        recommendation,
+    })
+}
+
+/// Names the joints whose hold-out torque the `recommended` result predicts worse than no model; empty if none.
+fn beyond_use(robot: &Robot, rows: &[Compared], recommended: Estimator) -> String {
+    let row = rows.iter().find(|row| row.estimator == recommended);
+    let errors = row.and_then(|row| row.holdout_relative_error.as_ref());
+    let useless: Vec<String> = errors
+        .into_iter()
+        .flatten()
+        .zip(&robot.joints)
+        .filter(|(error, _)| **error >= 1.0)
+        .map(|(error, joint)| format!("{} ({:.0} %)", joint.name, 100.0 * error))
+        .collect();
+    if useless.is_empty() {
+        return String::new();
+    }
+    format!(
+        " Trust nothing of {}: there it is farther from the torque held back than no model at all.",
+        useless.join(", ")
+    )
+}

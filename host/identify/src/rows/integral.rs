@@ -1,0 +1,222 @@
+//! Rows of the integral (energy) model; those of several joints are in [`super::momentum`].
+
+use rig_shared::multibody::{COLUMNS, column, energy_regressor};
+use rig_shared::scalar::Real;
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
+
+use super::equation::{Equation, Rows};
+use super::momentum::{as_trapezia_see, momentum_rows};
+use super::plan::{Belongs, Plan};
+use super::tally::Tally;
+use crate::error::failed;
+use rig_data::prepare::{LowPass, Motion, PrepareError};
+
+/// Computes the rows of one recording.
+pub(crate) struct Integral<'a> {
+    plan: &'a Plan<'a>,
+    low_pass: LowPass,
+}
+
+impl<'a> Integral<'a> {
+    pub(crate) fn new(plan: &'a Plan<'a>) -> Result<Self, PrepareError> {
+        let low_pass = plan
+            .treatment
+            .position_filter()
+            .ok_or_else(|| failed("The position filter cannot be built."))?;
+        Ok(Self { plan, low_pass })
+    }
+
+    /// Computes the rows of one piece.
+    pub(crate) fn rows(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
+        if motion.joints.len() > 1 {
+            return momentum_rows(motion, self.plan, &self.low_pass, tally);
+        }
+        integral_rows(motion, self.plan, &self.low_pass, tally)
+    }
+}
+
+/// Computes rows in which work over a window equals change of energy plus the work of friction:
+/// ∫ τᵀq̇ dt = H(end) − H(start) + Σ (fv·∫q̇² + fc·∫|q̇| + off·∫q̇).
+///
+/// Torque and sign of the velocity both pass the position filter, which then affects both sides equally. Each window is
+/// divided by √(W·∫Σ(loudness·q̇)²). This makes the residuals of all windows equally uncertain (torque noise enters the
+/// work multiplied by the velocity) and gives them the unit of a torque. The energy gets the same trapezoidal error as
+/// the work ([`as_trapezia_see`]).
+fn integral_rows(
+    motion: &Motion,
+    plan: &Plan,
+    low_pass: &LowPass,
+    tally: &mut Tally,
+) -> Result<Rows, PrepareError> {
+    let n = motion.joints.len();
+    let (rows, p) = (motion.t.len(), plan.columns.len());
+    let standard = n * COLUMNS;
+    let width = standard + n * MOTOR_COLUMNS;
+    let dt = plan.treatment.dt();
+    let cumulative = |power: &dyn Fn(usize) -> f64| {
+        let mut sum = 0.0;
+        let mut last = power(0);
+        let mut all = Vec::with_capacity(rows);
+        all.push(0.0);
+        for k in 1..rows {
+            let next = power(k);
+            sum += 0.5 * dt * (last + next);
+            last = next;
+            all.push(sum);
+        }
+        all
+    };
+    if rows == 0 {
+        return Ok(Rows::default());
+    }
+    let loudest = plan.loudness.iter().fold(0.0f64, |m, x| m.max(*x));
+    let loudness: Vec<f64> = plan.loudness.iter().map(|l| l / loudest).collect();
+    let mut work = vec![0.0; rows];
+    let mut activity = vec![0.0; rows];
+    let mut least_activity = 0.0;
+    // Per joint: ∫q̇², ∫sgn(q̇)·q̇, ∫q̇.
+    let mut friction = Vec::with_capacity(n);
+    for (j, joint) in motion.joints.iter().enumerate() {
+        let qd = &joint.qd;
+        let torque = low_pass.zero_phase(&joint.tau);
+        let sign: Vec<f64> = qd.iter().map(|v| v.sgn()).collect();
+        let sign = low_pass.zero_phase(&sign);
+        let squares = cumulative(&|k| qd[k] * qd[k]);
+        for (sum, part) in work.iter_mut().zip(cumulative(&|k| torque[k] * qd[k])) {
+            *sum += part;
+        }
+        let share = loudness[j].powi(2);
+        for (sum, part) in activity.iter_mut().zip(&squares) {
+            *sum += share * part;
+        }
+        least_activity +=
+            share * plan.treatment.speed_threshold[j].powi(2) * plan.window as f64 * dt;
+        friction.push([
+            squares,
+            cumulative(&|k| sign[k] * qd[k]),
+            cumulative(&|k| qd[k]),
+        ]);
+    }
+    let motors = motor_friction(motion, plan, low_pass, &cumulative)?;
+    let duration = plan.window as f64 * dt;
+    let mut result = Rows {
+        equations: vec![Equation::default()],
+        q: vec![Vec::new(); n],
+        qd: vec![Vec::new(); n],
+        ..Default::default()
+    };
+    let energy = |k: usize, out: &mut [f64]| -> Result<(), PrepareError> {
+        let q: Vec<f64> = motion.joints.iter().map(|j| j.q[k]).collect();
+        let qd: Vec<f64> = motion.joints.iter().map(|j| j.qd[k]).collect();
+        energy_regressor(plan.chain, &q, &qd, &mut out[..standard]).map_err(failed)?;
+        if !plan.transmission.is_simple() {
+            plan.transmission
+                .motor_energy_columns(&q, &qd, &mut out[standard..])
+                .map_err(failed)?;
+        }
+        Ok(())
+    };
+    let mut around = [(); 3].map(|()| vec![0.0; width]);
+    let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
+    // The row before a window and the row after it are also needed.
+    for start in motion.usable.0.max(1)..motion.usable.1 {
+        let end = start + plan.window;
+        if !(motion.offset + start as u64).is_multiple_of(plan.stride as u64)
+            || end + 1 >= motion.sound.1
+        {
+            continue;
+        }
+        for (k, out) in [(start, &mut before), (end, &mut after)] {
+            for (row, into) in (k - 1..).zip(&mut around) {
+                energy(row, into)?;
+            }
+            for (c, out) in out.iter_mut().enumerate() {
+                *out = as_trapezia_see([around[0][c], around[1][c], around[2][c]]);
+            }
+        }
+        let moved = activity[end] - activity[start];
+        let scale = 1.0
+            / (duration * (moved + least_activity))
+                .sqrt()
+                .max(f64::MIN_POSITIVE);
+        let equation = &mut result.equations[0];
+        for &c in plan.columns.iter().take(p) {
+            let over = |f: &[f64]| f[end] - f[start];
+            let value = match plan.belongs(c) {
+                Belongs::Joint(c) => match c % COLUMNS {
+                    column::VISCOUS => over(&friction[c / COLUMNS][0]),
+                    column::COULOMB => over(&friction[c / COLUMNS][1]),
+                    column::OFFSET => over(&friction[c / COLUMNS][2]),
+                    _ => after[c] - before[c],
+                },
+                Belongs::Motor(k, motor_column::VISCOUS) => over(&motors[k][0]),
+                Belongs::Motor(k, motor_column::COULOMB) => over(&motors[k][1]),
+                Belongs::Motor(..) => after[c] - before[c],
+                Belongs::Nothing => 0.0,
+            };
+            equation.x.push(scale * value);
+        }
+        equation.y.push(scale * (work[end] - work[start]));
+        let still = moved <= least_activity;
+        let saturated = motion
+            .joints
+            .iter()
+            .any(|j| j.saturated[start..=end].iter().any(|s| *s));
+        if saturated {
+            Tally::count(&mut tally.saturated, 0);
+        } else if still {
+            Tally::count(&mut tally.slow, 0);
+        } else {
+            tally.used += 1;
+        }
+        equation.keep.push(!still && !saturated);
+        result.t.push(motion.t[start]);
+        for (j, joint) in motion.joints.iter().enumerate() {
+            result.q[j].push(joint.q[start]);
+            result.qd[j].push(joint.qd[start]);
+        }
+    }
+    Ok(result)
+}
+
+/// Returns per motor the work of its friction from the first row, for unit coefficients: viscous, Coulomb (with the
+/// filtered sign, as for the torque). Empty without coupled drives.
+fn motor_friction(
+    motion: &Motion,
+    plan: &Plan,
+    low_pass: &LowPass,
+    cumulative: &dyn Fn(&dyn Fn(usize) -> f64) -> Vec<f64>,
+) -> Result<Vec<[Vec<f64>; 2]>, PrepareError> {
+    if plan.transmission.is_simple() {
+        return Ok(Vec::new());
+    }
+    let (n, rows) = (motion.joints.len(), motion.t.len());
+    let mut speeds = vec![vec![0.0; rows]; n];
+    let mut powers = vec![vec![0.0; rows]; n];
+    let (mut q, mut qd, mut now) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut power = vec![0.0; n * MOTOR_COLUMNS];
+    for row in 0..rows {
+        for (j, joint) in motion.joints.iter().enumerate() {
+            (q[j], qd[j]) = (joint.q[row], joint.qd[row]);
+        }
+        plan.transmission
+            .motor_speeds(&q, &qd, &mut now)
+            .map_err(failed)?;
+        plan.transmission
+            .motor_power_columns(&q, &qd, &mut power)
+            .map_err(failed)?;
+        for k in 0..n {
+            speeds[k][row] = now[k];
+            powers[k][row] = power[k * MOTOR_COLUMNS + motor_column::VISCOUS];
+        }
+    }
+    let of = |(speed, power): (&Vec<f64>, &Vec<f64>)| {
+        let sign: Vec<f64> = speed.iter().map(|v| v.sgn()).collect();
+        let sign = low_pass.zero_phase(&sign);
+        [
+            cumulative(&|k| power[k]),
+            cumulative(&|k| sign[k] * speed[k]),
+        ]
+    };
+    Ok(speeds.iter().zip(&powers).map(of).collect())
+}

@@ -1,0 +1,381 @@
+//! The cut-off of the position filter, chosen by how well the torque is explained with it.
+//!
+//! The spectrum of a position shows its noise floor only if the noise is white. Jittered time stamps, coarse encoders
+//! and positions filtered by the drive give noise that looks like motion. The torque separates the two: motion needs
+//! torque, noise needs none. The model is fitted once per cut-off, to the same torque in the same band, and the
+//! residuals are compared. A cut-off that is too low distorts the motion; one that is too high lets noise into the
+//! regressor. Both raise the residual. The spectrum's cut-off is replaced only if another one explains the torque
+//! better by [`BETTER`]. A lower one also needs a spectrum that is flat above it, as noise is and motion is not,
+//! because a low cut-off also hides unmodelled friction.
+//!
+//! Limits: one cut-off for all joints, because the regressor couples them. Noise that the controller feeds back into
+//! the torque is explained together with the position noise.
+
+use rig_shared::multibody::Chain;
+use rig_shared::transmission::Transmission;
+
+use crate::error::IdentifyError;
+use crate::estimators::linear::by_noise;
+use crate::options::{ModelKind, Options};
+use crate::rows::cache::RowCache;
+use crate::rows::equation::Rows;
+use crate::rows::factor::TriangularFactor;
+use crate::rows::plan::Plan;
+use crate::rows::stream::each_rows;
+use crate::structure::base::Base;
+use crate::structure::chain::{chain_of, transmission_of};
+use rig_data::prepare::{
+    Beginning, Choice, CutoffTrial, HIGHEST, PrepareOptions, Recording, Survey, Treatment, each_of,
+    threads, trimmed_rows,
+};
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+
+/// Reduction of the mean log residual of the joints from which another cut-off replaces the spectrum's. 0.15: on the
+/// rig of `rig demo` (white position noise, presliding friction unmodelled) a cut-off five times too low left 11 %
+/// less. Positions with noise that is not white left 20 % to 300 % more.
+const BETTER: f64 = 0.15;
+/// Difference of the mean log residual of the joints below which two cut-offs count as equal.
+const EQUAL: f64 = 0.01;
+/// Lowest trial cut-off times the length of the shortest stretch. Each end loses three periods of the cut-off, so at
+/// most a fifth of the recording is lost.
+const LEAST_PERIODS: f64 = 30.0;
+/// Band of the torque comparison, as a multiple of the joints' main motion frequency. Friction at a reversal has
+/// harmonics well above the motion, and a cut-off that blurs them must show in the residual.
+const HEADROOM: f64 = 10.0;
+/// Total length of the recordings in a trial, s: five periods of a usual motion of 10 s. Limits the cost for long
+/// recordings.
+const TRIAL_SECONDS: f64 = 50.0;
+/// Share of the RMS speed below which rows are excluded from the comparison: the sign of their speed is noise.
+const SLOW: f64 = 0.05;
+
+/// The model behind the rows of a trial.
+#[derive(Clone, Copy)]
+pub(crate) struct Equations<'a> {
+    /// Geometry.
+    pub chain: &'a Chain<f64>,
+    /// Drives.
+    pub transmission: &'a Transmission<f64>,
+    /// Columns of the base parameters in the standard regressor.
+    pub columns: &'a [usize],
+    /// True if the description has no effects beside the equations. Such effects would count as residual.
+    pub complete: bool,
+}
+
+/// Decides the treatment of the `recordings` of `robot` without an identification.
+///
+/// # Errors
+/// [`IdentifyError`]: recordings that cannot be prepared; an invalid geometry.
+pub fn treatment_for(
+    robot: &Robot,
+    recordings: &[&dyn Recording],
+    surveys: Vec<Survey>,
+    options: &PrepareOptions,
+) -> Result<(Vec<Survey>, Treatment), IdentifyError> {
+    let (chain, transmission) = (chain_of(robot)?, transmission_of(robot)?);
+    let base = Base::structural(robot, ModelKind::Differential, Options::default().seed)?;
+    let equations = Equations {
+        chain: &chain,
+        transmission: &transmission,
+        columns: &base.columns,
+        complete: robot.effects.is_empty(),
+    };
+    decided(
+        equations,
+        recordings,
+        surveys,
+        options,
+        &robot.torque_limits(),
+    )
+}
+
+/// Decides the treatment of `recordings` as [`Treatment::decide`] does, with the cut-off that explains the torque best.
+/// Returns updated surveys: the signal of each joint ends at the cut-off if the torque shows no motion above it.
+///
+/// # Errors
+/// [`IdentifyError`]: as [`Treatment::decide`]; recordings that cannot be read.
+pub(crate) fn decided(
+    equations: Equations,
+    recordings: &[&dyn Recording],
+    surveys: Vec<Survey>,
+    options: &PrepareOptions,
+    limits: &[Option<f64>],
+) -> Result<(Vec<Survey>, Treatment), IdentifyError> {
+    let first = Treatment::decide(&surveys, options, limits)?;
+    if options.cutoff != Choice::Auto || !equations.complete {
+        return Ok((surveys, first));
+    }
+    let comparison = Comparison {
+        equations,
+        recordings,
+        surveys: &surveys,
+        options,
+        limits,
+        first: &first,
+    };
+    let Some(trials) = comparison.trials()? else {
+        return Ok((surveys, first));
+    };
+    let score = |t: &CutoffTrial| mean_logarithm(&t.relative_error, &trials);
+    let by_spectrum = trials
+        .iter()
+        .find(|t| t.cutoff == first.cutoff)
+        .map_or(f64::INFINITY, score);
+    let least = trials.iter().map(score).fold(f64::INFINITY, f64::min);
+    if by_spectrum <= least + BETTER {
+        return Ok((surveys, Treatment { trials, ..first }));
+    }
+    // Of equal cut-offs the lowest one has the least noise in the speed.
+    let equal = trials.iter().find(|t| score(t) <= least + EQUAL);
+    let cutoff = equal.map_or(first.cutoff, |t| t.cutoff);
+    let noisy = |j: usize| {
+        let error = |cutoff: f64| trials.iter().find(|t| t.cutoff == cutoff);
+        let gain = error(first.cutoff)
+            .zip(error(cutoff))
+            .map(|(a, b)| (a.relative_error[j] / b.relative_error[j]).ln());
+        gain.is_some_and(|g| g > BETTER) && first.spectra[j].flattens(cutoff, first.cutoff)
+    };
+    if cutoff < first.cutoff && !(0..first.spectra.len()).any(noisy) {
+        return Ok((surveys, Treatment { trials, ..first }));
+    }
+    let ends: Vec<f64> = (0..first.spectra.len())
+        .map(|j| own_cutoff(&trials, j).max(cutoff))
+        .collect();
+    let surveys: Vec<Survey> = surveys.iter().map(|s| s.ending_at(&ends)).collect();
+    let fixed = PrepareOptions {
+        cutoff: Choice::Fixed(cutoff),
+        ..options.clone()
+    };
+    let mut treatment = Treatment::decide(&surveys, &fixed, limits)?;
+    treatment.cutoff_reason = format!(
+        "{cutoff:.3} Hz: of {} cut-offs it explains the torque best. The spectrum of the position alone gives {:.3} Hz, which leaves {:.0} % more of the torque.",
+        trials.len(),
+        first.cutoff,
+        100.0 * (by_spectrum - least).exp_m1(),
+    );
+    treatment.spectral_cutoff = Some(first.cutoff);
+    treatment.trials = trials;
+    Ok((surveys, treatment))
+}
+
+/// Returns warnings about the cut-off: the torque gave another one than the spectrum, or some joints are explained
+/// clearly better with a cut-off of their own.
+pub(crate) fn doubts(treatment: &Treatment, robot: &Robot) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let (cutoff, trials) = (treatment.cutoff, &treatment.trials);
+    let error = |cutoff: f64, j: usize| {
+        let trial = trials.iter().find(|t| t.cutoff == cutoff);
+        trial.map_or(f64::NAN, |t| t.relative_error[j])
+    };
+    if let Some(by_spectrum) = treatment.spectral_cutoff {
+        doubts.push(format!(
+            "The cut-off of the position filter, {} Hz, was chosen by the torque. The spectrum of the position alone gives {} Hz: the noise of the position is not white (time stamps with jitter, a coarse encoder, or a position that was filtered before it was recorded). Compare the figure of the torque residual over the cut-off; --cutoff sets another one.",
+            format_significant(cutoff, 3),
+            format_significant(by_spectrum, 3)
+        ));
+    }
+    let mut alone = Vec::new();
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let own = own_cutoff(trials, j);
+        let more = error(cutoff, j) / error(own, j);
+        if more.ln() > BETTER {
+            alone.push(format!(
+                "joint {} with {} Hz ({:.0} % less)",
+                joint.name,
+                format_significant(own, 3),
+                100.0 * (1.0 - 1.0 / more)
+            ));
+        }
+    }
+    if robot.joints.len() > 1 && !alone.is_empty() {
+        doubts.push(format!(
+            "One cut-off serves all joints. Alone, the torque of some would be explained better with another one: {}. Their friction near reversals or the noise of their positions differs; compare the figure of the torque residual over the cut-off.",
+            alone.join(", ")
+        ));
+    }
+    doubts
+}
+
+/// Returns the mean logarithm of the relative errors, over the joints with a valid error in every trial.
+fn mean_logarithm(errors: &[f64], trials: &[CutoffTrial]) -> f64 {
+    let judged = |j: usize| trials.iter().all(|t| t.relative_error[j] > 0.0);
+    let logarithms: Vec<f64> = (errors.iter().enumerate())
+        .filter(|(j, _)| judged(*j))
+        .map(|(_, error)| error.ln())
+        .collect();
+    logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64
+}
+
+/// Returns the cut-off that explains the torque of joint `j` best.
+fn own_cutoff(trials: &[CutoffTrial], j: usize) -> f64 {
+    let judged = trials.iter().filter(|t| t.relative_error[j] > 0.0);
+    judged
+        .min_by(|a, b| a.relative_error[j].total_cmp(&b.relative_error[j]))
+        .map_or(0.0, |t| t.cutoff)
+}
+
+struct Comparison<'a> {
+    equations: Equations<'a>,
+    recordings: &'a [&'a dyn Recording],
+    surveys: &'a [Survey],
+    options: &'a PrepareOptions,
+    limits: &'a [Option<f64>],
+    first: &'a Treatment,
+}
+
+impl Comparison<'_> {
+    /// Runs trials with the spectrum's cut-off, with others an octave apart, and with half-octave neighbours of the
+    /// best. Returns none if the recordings are too short.
+    fn trials(&self) -> Result<Option<Vec<CutoffTrial>>, IdentifyError> {
+        let rate = self.first.sample_rate;
+        let shortest = self.surveys.iter().map(|s| s.longest).min().unwrap_or(0);
+        let most = HIGHEST * rate / 2.0;
+        let swing = (self.first.spectra.iter())
+            .map(|s| s.swing())
+            .fold(0.0, f64::max);
+        // Below the main motion frequency a cut-off distorts the motion itself, whatever the recording's length.
+        let least = (LEAST_PERIODS * rate / shortest.max(1) as f64).max(swing);
+        // Without decimation the torque would pass the position filter, which differs between trials.
+        let decimation = ((0.4 * rate / (HEADROOM * swing)).floor() as usize).max(2);
+        let trimmed = trimmed_rows(least.min(self.first.cutoff), decimation, rate);
+        let fastest = self.fastest(0.4 * rate / decimation as f64);
+        if least >= most || shortest < (50 * decimation + 2 * trimmed) as u64 {
+            return Ok(None);
+        }
+        let trial = |cutoff: f64| self.trial(cutoff, decimation, trimmed, &fastest);
+        let mut trials = vec![trial(self.first.cutoff)?];
+        let mut cutoff = least;
+        while cutoff < most {
+            trials.push(trial(cutoff)?);
+            cutoff *= 2.0;
+        }
+        trials.push(trial(most)?);
+        let best = trials
+            .iter()
+            .min_by(|a, b| {
+                let score = |t: &CutoffTrial| mean_logarithm(&t.relative_error, &trials);
+                score(a).total_cmp(&score(b))
+            })
+            .map_or(most, |t| t.cutoff);
+        for near in [std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::SQRT_2] {
+            if (least..most).contains(&(best * near)) {
+                trials.push(trial(best * near)?);
+            }
+        }
+        trials.sort_by(|a, b| a.cutoff.total_cmp(&b.cutoff));
+        Ok(Some(trials))
+    }
+
+    /// Returns, for each joint, the recording in which its speed below `band` Hz is highest. Slow reversals are
+    /// unsuitable: unmodelled friction near standstill dominates their residual, and a low cut-off hides it.
+    fn fastest(&self, band: f64) -> Vec<&dyn Recording> {
+        let speed = |s: &Survey, j: usize| s.joints[j].spectrum.velocity_rms_below(band);
+        let of = |j: usize| {
+            let numbered = self.surveys.iter().enumerate();
+            let fastest = numbered.max_by(|a, b| speed(a.1, j).total_cmp(&speed(b.1, j)));
+            fastest.map_or(0, |(k, _)| k)
+        };
+        let mut chosen: Vec<usize> = (0..self.first.spectra.len()).map(of).collect();
+        chosen.sort_unstable();
+        chosen.dedup();
+        chosen.iter().map(|&k| self.recordings[k]).collect()
+    }
+
+    fn trial(
+        &self,
+        cutoff: f64,
+        decimation: usize,
+        trimmed: usize,
+        recordings: &[&dyn Recording],
+    ) -> Result<CutoffTrial, IdentifyError> {
+        let options = PrepareOptions {
+            cutoff: Choice::Fixed(cutoff),
+            decimation: Choice::Fixed(decimation),
+            ..self.options.clone()
+        };
+        let mut treatment = Treatment::decide(self.surveys, &options, self.limits)?;
+        treatment.trimmed = trimmed;
+        let band = treatment.parallel_edge;
+        for (slow, spectrum) in (treatment.speed_threshold.iter_mut()).zip(&self.first.spectra) {
+            *slow = slow.min(SLOW * spectrum.velocity_rms_below(band));
+        }
+        let joints = treatment.spectra.len();
+        let plan = Plan {
+            chain: self.equations.chain,
+            transmission: self.equations.transmission,
+            columns: self.equations.columns,
+            treatment: &treatment,
+            window: 1,
+            stride: 1,
+            loudness: vec![1.0; joints],
+            one_way: Vec::new(),
+            cache: RowCache::default(),
+        };
+        let beginnings = beginnings(recordings, &treatment);
+        let beginnings: Vec<&dyn Recording> = beginnings.iter().map(|b| b as _).collect();
+        let factors = factors_of(&beginnings, &plan, &kept)?;
+        Ok(CutoffTrial {
+            cutoff,
+            relative_error: relative_errors(&factors),
+        })
+    }
+}
+
+/// Returns the beginnings of `recordings` that a trial uses.
+pub(crate) fn beginnings<'a>(
+    recordings: &[&'a dyn Recording],
+    treatment: &Treatment,
+) -> Vec<Beginning<'a>> {
+    let rows = (TRIAL_SECONDS * treatment.sample_rate) as usize / recordings.len().max(1);
+    (recordings.iter())
+        .map(|&recording| Beginning { recording, rows })
+        .collect()
+}
+
+/// Factorises the rows of each joint's equation for which `used` (arguments: rows, joint, row) is true.
+///
+/// # Errors
+/// [`IdentifyError`]: recordings that cannot be read.
+pub(crate) fn factors_of(
+    recordings: &[&dyn Recording],
+    plan: &Plan,
+    used: &(dyn Fn(&Rows, usize, usize) -> bool + Sync),
+) -> Result<Vec<TriangularFactor>, IdentifyError> {
+    let p = plan.columns.len();
+    let mut factors = vec![TriangularFactor::new(p); plan.loudness.len()];
+    for recording in recordings {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            each_of(
+                threads(plan.treatment.threads),
+                &mut factors,
+                &|k, factor| {
+                    let Some(equation) = rows.equations.get(k) else {
+                        return;
+                    };
+                    for i in (0..equation.y.len()).filter(|&i| used(rows, k, i)) {
+                        factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
+                    }
+                },
+            );
+            Ok(())
+        })?;
+    }
+    Ok(factors)
+}
+
+/// Returns true if a row is usable.
+pub(crate) fn kept(rows: &Rows, joint: usize, row: usize) -> bool {
+    rows.equations[joint].keep[row]
+}
+
+/// Returns the RMS residual of each joint over its RMS torque. The least-squares fit covers all joints and weights them
+/// by their residuals. Not a number for a joint without rows or torque.
+fn relative_errors(factors: &[TriangularFactor]) -> Vec<f64> {
+    let rms = |squares: f64, factor: &TriangularFactor| (squares / factor.rows() as f64).sqrt();
+    let Some(beta) = by_noise(factors) else {
+        return vec![f64::NAN; factors.len()];
+    };
+    (factors.iter())
+        .map(|f| rms(f.residual_squares(&beta), f) / rms(f.right_side_squares(), f))
+        .collect()
+}

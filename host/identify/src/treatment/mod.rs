@@ -1,0 +1,8 @@
+//! Treatment of the recordings, as decided from their data.
+
+pub(crate) mod band;
+pub(crate) mod cutoff;
+pub(crate) mod decimation;
+pub(crate) mod left_out;
+pub(crate) mod speed;
+pub(crate) mod window;
