@@ -1,9 +1,18 @@
 //! The steps of an identification.
 
 pub(crate) mod check;
+pub(crate) mod estimated;
 pub(crate) mod freed;
 pub(crate) mod further;
+pub(crate) mod judged;
+pub(crate) mod named;
 pub(crate) mod own;
+pub(crate) mod planner;
+pub(crate) mod recordings;
+pub(crate) mod results;
+pub(crate) mod robot_model;
 pub(crate) mod settled;
 pub(crate) mod solve;
+pub(crate) mod task;
+pub(crate) mod treated;
 pub(crate) mod warnings;
