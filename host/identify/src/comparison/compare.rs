@@ -1,5 +1,7 @@
 //! Comparison of estimators by the same criteria, and the recommended result.
 
+use nalgebra::DMatrix;
+
 use super::compared::{Compared, Comparison};
 use super::endogeneity::endogeneity;
 use super::held::Held;
@@ -46,107 +48,181 @@ fn distance(
     }
 }
 
-/// Fits with every estimator of `list` and judges it, on the hold-out if given. `measured` holds the RMS torques of
+/// What estimates are compared with.
+struct Yardstick<'a> {
+    problem: &'a Problem<'a>,
+    parts: &'a Parts,
+    prior: &'a Prior,
+    held: Option<&'a Held>,
+    /// RMS torques of training data and hold-out per joint, for rows that do not contain all of the torque.
+    measured: Option<&'a [Vec<f64>; 2]>,
+    /// The weighted fit and its covariance.
+    weighted: Fitted,
+    covariance: DMatrix<f64>,
+    /// All rows, in units of the noise of independent ones.
+    tempered: TriangularFactor,
+    /// RMS torque of each joint in the training data.
+    torque: Vec<f64>,
+}
+
+impl<'a> Yardstick<'a> {
+    fn new(
+        problem: &'a Problem,
+        parts: &'a Parts,
+        prior: &'a Prior,
+        held: Option<&'a Held>,
+        measured: Option<&'a [Vec<f64>; 2]>,
+    ) -> Result<Self, IdentifyError> {
+        let weighted = least(problem, parts, problem.weights)?;
+        Ok(Self {
+            problem,
+            parts,
+            prior,
+            held,
+            measured,
+            covariance: weighted.kept.covariance(),
+            weighted,
+            tempered: LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights))).whole,
+            torque: measured.map_or_else(|| parts.torque_rms(), |[training, _]| training.clone()),
+        })
+    }
+
+    /// Fits with `estimator`.
+    fn fitted(&self, estimator: Estimator) -> Result<Fitted, IdentifyError> {
+        match estimator {
+            Estimator::Weighted => Ok(self.weighted.clone()),
+            other => fit(other, self.problem, self.parts, self.prior),
+        }
+    }
+
+    /// Returns the row of a fit.
+    fn row(&self, estimator: Estimator, fitted: &Fitted) -> Compared {
+        let far = distance(self.problem, &self.tempered, self.prior, &fitted.full.whole).ok();
+        Compared {
+            estimator,
+            cross_validated_relative_error: Some(
+                self.parts
+                    .cross_validated(&fitted.full)
+                    .iter()
+                    .zip(&self.torque)
+                    .map(|(e, t)| e / t.max(f64::MIN_POSITIVE))
+                    .collect(),
+            ),
+            holdout_relative_error: self.held.map(|held| {
+                let whole = self.measured.map(|[_, holdout]| holdout.as_slice());
+                relative_errors(&held.all, &fitted.full.whole, whole)
+            }),
+            distance_to_consistent: far,
+            physically_consistent: far
+                .map(|far| far < AT_THE_SET || estimator == Estimator::Consistent),
+            largest_shift: Some(self.largest_shift(fitted)),
+            values: Some(fitted.kept.whole.clone()),
+            said: fitted
+                .said
+                .iter()
+                .chain(&fitted.warnings)
+                .cloned()
+                .collect(),
+        }
+    }
+
+    /// Returns the largest difference from the weighted fit, in standard deviations of that fit.
+    fn largest_shift(&self, fitted: &Fitted) -> f64 {
+        (0..fitted.kept.whole.len())
+            .map(|k| {
+                (fitted.kept.whole[k] - self.weighted.kept.whole[k]).abs()
+                    / self.covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Returns the mean prediction error of a fit: on another motion in the hold-out, else on the whole hold-out, else
+    /// by cross-validation.
+    fn error(&self, fitted: &Fitted, row: &Compared) -> Option<f64> {
+        // Only another motion in the hold-out counts. A mean over joints needs no `whole` torque.
+        let judged = match self.fresh() {
+            Some(factors) => Some(relative_errors(factors, &fitted.full.whole, None)),
+            None => row.holdout_relative_error.clone(),
+        };
+        judged
+            .or_else(|| row.cross_validated_relative_error.clone())
+            .map(|judged| mean(&judged))
+    }
+
+    /// Returns the rows of the hold-out with another motion, if there are any.
+    fn fresh(&self) -> Option<&[TriangularFactor]> {
+        self.held.and_then(|held| held.fresh.as_deref())
+    }
+
+    /// Returns the data of the prediction errors.
+    fn judge(&self) -> Judge {
+        if self.fresh().is_some() {
+            Judge::OtherMotion
+        } else if self.held.is_some() {
+            Judge::Repeated
+        } else {
+            Judge::Stretches
+        }
+    }
+}
+
+/// Returns the row of an estimator that failed.
+fn failed(estimator: Estimator, why: &IdentifyError) -> Compared {
+    Compared {
+        estimator,
+        cross_validated_relative_error: None,
+        holdout_relative_error: None,
+        distance_to_consistent: None,
+        physically_consistent: None,
+        largest_shift: None,
+        values: None,
+        said: vec![why.to_string()],
+    }
+}
+
+/// Fits with every estimator to compare and judges it, on the hold-out if given. `measured` holds the RMS torques of
 /// training data and hold-out per joint, for rows that do not contain all of the torque.
+///
+/// # Errors
+/// [`IdentifyError`]: a weighted fit that is singular, reading errors.
 pub(crate) fn compare(
     problem: &Problem,
     parts: &Parts,
     prior: &Prior,
     held: Option<&Held>,
-    list: &[Estimator],
     names: &[String],
     measured: Option<&[Vec<f64>; 2]>,
 ) -> Result<Comparison, IdentifyError> {
-    let weighted = least(problem, parts, problem.weights)?;
-    let weighted_covariance = weighted.kept.covariance();
-    let tempered = LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights))).whole;
-    let torque = measured.map_or_else(|| parts.torque_rms(), |[training, _]| training.clone());
-    let fresh = held.and_then(|held| held.fresh.as_deref());
-    let mut rows = Vec::new();
-    let mut errors = Vec::new();
+    let yardstick = Yardstick::new(problem, parts, prior, held, measured)?;
+    let (mut rows, mut errors) = (Vec::new(), Vec::new());
     let mut instrumental: Option<Fitted> = None;
-    for &estimator in list {
-        let fitted = match estimator {
-            Estimator::Weighted => Ok(weighted.clone()),
-            other => fit(other, problem, parts, prior),
-        };
-        rows.push(match fitted {
-            Err(e) => Compared {
-                estimator,
-                cross_validated_relative_error: None,
-                holdout_relative_error: None,
-                distance_to_consistent: None,
-                physically_consistent: None,
-                largest_shift: None,
-                values: None,
-                said: vec![e.to_string()],
-            },
-            Ok(fitted) => {
-                let far = distance(problem, &tempered, prior, &fitted.full.whole).ok();
-                let row = Compared {
-                    estimator,
-                    cross_validated_relative_error: Some(
-                        parts
-                            .cross_validated(&fitted.full)
-                            .iter()
-                            .zip(&torque)
-                            .map(|(e, t)| e / t.max(f64::MIN_POSITIVE))
-                            .collect(),
-                    ),
-                    holdout_relative_error: held.map(|held| {
-                        let whole = measured.map(|[_, holdout]| holdout.as_slice());
-                        relative_errors(&held.all, &fitted.full.whole, whole)
-                    }),
-                    distance_to_consistent: far,
-                    physically_consistent: far
-                        .map(|far| far < AT_THE_SET || estimator == Estimator::Consistent),
-                    largest_shift: Some(
-                        (0..fitted.kept.whole.len())
-                            .map(|k| {
-                                (fitted.kept.whole[k] - weighted.kept.whole[k]).abs()
-                                    / weighted_covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE)
-                            })
-                            .fold(0.0, f64::max),
-                    ),
-                    values: Some(fitted.kept.whole.clone()),
-                    said: fitted
-                        .said
-                        .iter()
-                        .chain(&fitted.warnings)
-                        .cloned()
-                        .collect(),
-                };
-                // Only another motion in the hold-out counts. A mean over joints needs no `whole` torque.
-                let judged = match fresh {
-                    Some(factors) => Some(relative_errors(factors, &fitted.full.whole, None)),
-                    None => row.holdout_relative_error.clone(),
-                };
-                errors.extend(
-                    judged
-                        .or_else(|| row.cross_validated_relative_error.clone())
-                        .map(|judged| (estimator, mean(&judged))),
-                );
-                if estimator == Estimator::Iv {
-                    instrumental = Some(fitted);
-                }
-                row
+    for &estimator in &problem.options.compare {
+        let fitted = match yardstick.fitted(estimator) {
+            Ok(fitted) => fitted,
+            Err(e) => {
+                rows.push(failed(estimator, &e));
+                continue;
             }
-        });
+        };
+        let row = yardstick.row(estimator, &fitted);
+        errors.extend((yardstick.error(&fitted, &row)).map(|error| (estimator, error)));
+        if estimator == Estimator::Iv {
+            instrumental = Some(fitted);
+        }
+        rows.push(row);
     }
     let endogeneity = match &instrumental {
-        Some(iv) => endogeneity(problem, parts, &weighted, iv, names)?,
+        Some(iv) => endogeneity(problem, parts, &yardstick.weighted, iv, names)?,
         None => None,
     };
-    let judge = if fresh.is_some() {
-        Judge::OtherMotion
-    } else if held.is_some() {
-        Judge::Repeated
-    } else {
-        Judge::Stretches
-    };
     let written = problem.options.estimator;
-    let (recommended, mut recommendation) =
-        recommend(&rows, &errors, endogeneity.as_ref(), judge, written);
+    let (recommended, mut recommendation) = recommend(
+        &rows,
+        &errors,
+        endogeneity.as_ref(),
+        yardstick.judge(),
+        written,
+    );
     if recommended != written {
         recommendation += &format!(
             " The values given and written are those of {}; --estimator {} gives its own.",

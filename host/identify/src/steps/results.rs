@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::further::{Further, Outcome, further};
+use super::further::{Further, further};
 use super::named::Named;
+use super::outcome::Outcome;
 use super::own::Own;
 use super::treated::Treated;
 use super::warnings::Heard;
