@@ -65,19 +65,8 @@ pub(crate) fn endogeneity(
     iv: &Fitted,
     names: &[String],
 ) -> Result<Option<Endogeneity>, IdentifyError> {
-    let size = weighted.kept.whole.len();
-    let difference = Refit {
-        whole: (0..size)
-            .map(|k| iv.kept.whole[k] - weighted.kept.whole[k])
-            .collect(),
-        without: iv
-            .kept
-            .without
-            .iter()
-            .zip(&weighted.kept.without)
-            .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
-            .collect(),
-    };
+    let difference = difference(&iv.kept, &weighted.kept);
+    let size = difference.whole.len();
     let covariance = difference.covariance();
     let own = weighted.kept.covariance();
     let Ok(t) = StudentsT::new(0.0, 1.0, (difference.without.len() - 1) as f64) else {
@@ -106,29 +95,15 @@ pub(crate) fn endogeneity(
     let Some(name) = names.get(k) else {
         return Ok(None);
     };
-    let apart = format_value(difference.whole[k], std(k));
-    let by = format_significant(shift(k).abs(), 2);
-    let noise = format_significant(expected.unwrap_or(f64::NAN), 2);
-    let text = match (verdict, &iv.doubtful) {
-        (Verdict::Undecided, why) => format!(
-            "Whether noise in the motion biases least squares is not known: {}.",
-            why.as_deref()
-                .unwrap_or("the instruments are not good enough")
-        ),
-        (Verdict::NoSign, _) => format!(
-            "Least squares and instrumental variables do not differ by more than chance (smallest p over {size} parameters {:.2}): no sign that noise in the motion biases least squares.",
-            p_value(k)
-        ),
-        (Verdict::Immaterial, _) => format!(
-            "Least squares and instrumental variables differ by more than chance, but by so little that it makes no difference: most in {name}, by {by} of its standard deviation."
-        ),
-        (Verdict::NotNoise, _) => format!(
-            "Least squares and instrumental variables differ by more than chance, most in {name} (by {apart}), but the position's noise, as its spectrum shows it, would move that by some {noise} only: it is not noise in the motion that makes the difference, but something that the model lacks."
-        ),
-        (Verdict::Biased, _) => format!(
-            "Least squares and instrumental variables differ by more than chance, most in {name} (by {apart}, {by} standard deviations of the weighted fit, p = {} over all {size} parameters): noise in the motion or its way through the controller biases least squares. The position's noise, as its spectrum shows it, moves that by some {noise}.",
-            format_p_value(p_value(k))
-        ),
+    let decided = Decided {
+        verdict,
+        name,
+        size,
+        p_value: p_value(k),
+        difference: [difference.whole[k], std(k)],
+        shift: shift(k),
+        expected,
+        doubtful: iv.doubtful.as_deref(),
     };
     Ok(Some(Endogeneity {
         verdict,
@@ -137,8 +112,67 @@ pub(crate) fn endogeneity(
         difference: difference.whole[k],
         std: std(k),
         shift: shift(k),
-        text,
+        text: decided.text(),
     }))
+}
+
+/// Returns the difference a − b of two fits.
+fn difference(a: &Refit, b: &Refit) -> Refit {
+    let minus = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
+    let without = a.without.iter().zip(&b.without);
+    Refit {
+        whole: minus(&a.whole, &b.whole),
+        without: without.map(|(a, b)| minus(a, b)).collect(),
+    }
+}
+
+/// A verdict with the deciding parameter.
+struct Decided<'a> {
+    verdict: Verdict,
+    name: &'a str,
+    /// Number of parameters.
+    size: usize,
+    p_value: f64,
+    /// Difference of the estimates and its standard deviation.
+    difference: [f64; 2],
+    /// In standard deviations of the weighted fit.
+    shift: f64,
+    /// Bias that the position's noise would cause, if it was computed.
+    expected: Option<f64>,
+    /// Reason to doubt the instruments, a clause.
+    doubtful: Option<&'a str>,
+}
+
+impl Decided<'_> {
+    /// Returns one sentence.
+    fn text(&self) -> String {
+        let Self { name, size, .. } = self;
+        let [difference, std] = self.difference;
+        let apart = format_value(difference, std);
+        let by = format_significant(self.shift.abs(), 2);
+        let noise = format_significant(self.expected.unwrap_or(f64::NAN), 2);
+        match self.verdict {
+            Verdict::Undecided => format!(
+                "Whether noise in the motion biases least squares is not known: {}.",
+                self.doubtful
+                    .unwrap_or("the instruments are not good enough")
+            ),
+            Verdict::NoSign => format!(
+                "Least squares and instrumental variables do not differ by more than chance (smallest p over {size} parameters {:.2}): no sign that noise in the motion biases least squares.",
+                self.p_value
+            ),
+            Verdict::Immaterial => format!(
+                "Least squares and instrumental variables differ by more than chance, but by so little that it makes no difference: most in {name}, by {by} of its standard deviation."
+            ),
+            Verdict::NotNoise => format!(
+                "Least squares and instrumental variables differ by more than chance, most in {name} (by {apart}), but the position's noise, as its spectrum shows it, would move that by some {noise} only: it is not noise in the motion that makes the difference, but something that the model lacks."
+            ),
+            Verdict::Biased => format!(
+                "Least squares and instrumental variables differ by more than chance, most in {name} (by {apart}, {by} standard deviations of the weighted fit, p = {} over all {size} parameters): noise in the motion or its way through the controller biases least squares. The position's noise, as its spectrum shows it, moves that by some {noise}.",
+                format_p_value(self.p_value)
+            ),
+        }
+    }
 }
 
 /// Difference of two estimates, per parameter.

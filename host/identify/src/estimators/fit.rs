@@ -57,9 +57,70 @@ impl Fit {
         options: &Options,
         base: &Base,
     ) -> Result<Self, IdentifyError> {
-        let p = base.len();
-        let equations = plan.loudness.len();
-        let mut factors = vec![TriangularFactor::new(p); equations];
+        let (p, equations) = (base.len(), plan.loudness.len());
+        let rows = Collected::of(training, plan, options, p)?;
+        let data = excited(base, &rows.combined(&rows.by_torque()));
+        let mut weights = vec![1.0; equations];
+        let mut beta = least_squares(&rows.combined(&weights), &data, base)?;
+        let by_noise = rows.by_noise(&spread(&beta, &data.kept, p));
+        let weighted = least_squares(&rows.combined(&by_noise), &data, base)?;
+        if options.estimator != Estimator::Ols {
+            weights.clone_from(&by_noise);
+            beta.clone_from(&weighted);
+        }
+        let mut factor = rows.combined(&weights);
+        let mut scales = None;
+        let mut converged = true;
+        if options.estimator == Estimator::Robust {
+            let start = Weighted {
+                base,
+                data: &data,
+                weights: &weights,
+            };
+            let last = start.reweighted(training, plan, options, beta)?;
+            (beta, factor, converged) = (last.beta, last.factor, last.converged);
+            scales = Some(last.scales);
+        }
+        Ok(Self {
+            factors: rows.factors,
+            instants: rows.instants,
+            tally: rows.tally,
+            data,
+            by_noise,
+            weighted,
+            weights,
+            factor,
+            beta,
+            scales,
+            converged,
+        })
+    }
+
+    /// Returns the values of all base columns, zero for columns that are not identifiable on their own.
+    pub(crate) fn full(&self) -> Vec<f64> {
+        spread(&self.beta, &self.data.kept, self.data.combination.ncols())
+    }
+}
+
+/// The rows of all recordings.
+struct Collected {
+    /// Rows of each equation, with the weights of the recordings.
+    factors: Vec<TriangularFactor>,
+    /// Number of base columns.
+    columns: usize,
+    instants: u64,
+    tally: Tally,
+}
+
+impl Collected {
+    /// Passes once over the recordings; the rows have `p` columns.
+    fn of(
+        training: &[&dyn Recording],
+        plan: &Plan,
+        options: &Options,
+        p: usize,
+    ) -> Result<Self, IdentifyError> {
+        let mut factors = vec![TriangularFactor::new(p); plan.loudness.len()];
         let mut instants = 0u64;
         let mut tally = Tally::default();
         for (r, recording) in training.iter().enumerate() {
@@ -92,95 +153,115 @@ impl Fit {
                 saturated: tally.saturated.iter().sum(),
             });
         }
-        let combine = |weights: &[f64]| {
-            let mut all = TriangularFactor::new(p);
-            for (factor, weight) in factors.iter().zip(weights) {
-                all.merge(factor, *weight);
-            }
-            all
-        };
-        // Scaled by torque, so that strong joints do not hide weak ones when excitation is judged.
-        let by_torque: Vec<f64> = factors
+        Ok(Self {
+            factors,
+            columns: p,
+            instants,
+            tally,
+        })
+    }
+
+    /// Returns all rows, with a weight per equation.
+    fn combined(&self, weights: &[f64]) -> TriangularFactor {
+        let mut all = TriangularFactor::new(self.columns);
+        for (factor, weight) in self.factors.iter().zip(weights) {
+            all.merge(factor, *weight);
+        }
+        all
+    }
+
+    /// Returns weights by the torque of each equation, so that strong joints do not hide weak ones when excitation is
+    /// judged.
+    fn by_torque(&self) -> Vec<f64> {
+        self.factors
             .iter()
             .map(|f| {
                 let rms = (f.right_side_squares() / f.rows().max(1) as f64).sqrt();
                 if rms > 0.0 { 1.0 / rms } else { 1.0 }
             })
-            .collect();
-        let data = excited(base, &combine(&by_torque));
+            .collect()
+    }
 
-        let mut weights = vec![1.0; equations];
-        let mut beta = least_squares(&combine(&weights), &data, base)?;
-        let by_noise: Vec<f64> = {
-            let full = spread(&beta, &data.kept, p);
-            factors
-                .iter()
-                .map(|factor| {
-                    let freedom = factor
-                        .rows()
-                        .saturating_sub(p as u64 / equations as u64)
-                        .max(1);
-                    let sigma = (factor.residual_squares(&full) / freedom as f64).sqrt();
-                    if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
-                })
-                .collect()
+    /// Returns weights of one over the residual of each equation, for values of all base columns.
+    fn by_noise(&self, full: &[f64]) -> Vec<f64> {
+        let equations = self.factors.len() as u64;
+        self.factors
+            .iter()
+            .map(|factor| {
+                let freedom = factor
+                    .rows()
+                    .saturating_sub(self.columns as u64 / equations)
+                    .max(1);
+                let sigma = (factor.residual_squares(full) / freedom as f64).sqrt();
+                if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
+            })
+            .collect()
+    }
+}
+
+/// What a robust fit starts from.
+struct Weighted<'a> {
+    base: &'a Base,
+    data: &'a Independent,
+    weights: &'a [f64],
+}
+
+/// The last pass of a robust fit.
+struct Reweighted {
+    beta: Vec<f64>,
+    factor: TriangularFactor,
+    /// Scale of each equation's residual.
+    scales: Vec<f64>,
+    converged: bool,
+}
+
+impl Weighted<'_> {
+    /// Reweights the rows by their residuals until the values settle, starting from `beta`.
+    fn reweighted(
+        &self,
+        training: &[&dyn Recording],
+        plan: &Plan,
+        options: &Options,
+        beta: Vec<f64>,
+    ) -> Result<Reweighted, IdentifyError> {
+        let Self {
+            base,
+            data,
+            weights,
+        } = *self;
+        let full = |beta: &[f64]| spread(beta, &data.kept, base.len());
+        let scales = spread_of(training, plan, options, &full(&beta), weights.len())?;
+        let mut last = Reweighted {
+            factor: TriangularFactor::new(base.len()),
+            beta,
+            scales,
+            converged: false,
         };
-        let weighted = least_squares(&combine(&by_noise), &data, base)?;
-        if options.estimator != Estimator::Ols {
-            weights.clone_from(&by_noise);
-            beta.clone_from(&weighted);
-        }
-        let mut factor = combine(&weights);
-        let mut scales = None;
         let mut passes = 0;
-        let mut converged = true;
-        if options.estimator == Estimator::Robust {
-            let mut scale = spread_of(
+        while passes < MOST_PASSES && !last.converged {
+            let (factor, scales) = reweighted(
                 training,
                 plan,
                 options,
-                &spread(&beta, &data.kept, p),
-                equations,
+                &full(&last.beta),
+                weights,
+                &last.scales,
             )?;
-            converged = false;
-            while passes < MOST_PASSES && !converged {
-                let (next_factor, next_scale) = reweighted(
-                    training,
-                    plan,
-                    options,
-                    &spread(&beta, &data.kept, p),
-                    &weights,
-                    &scale,
-                )?;
-                let next = least_squares(&next_factor, &data, base)?;
-                let (std, _) = classical(&next_factor, &data, &next)?;
-                converged = next
-                    .iter()
-                    .zip(&beta)
-                    .zip(&std)
-                    .all(|((a, b), s)| (a - b).abs() <= SETTLED * s);
-                (beta, factor, scale) = (next, next_factor, next_scale);
-                passes += 1;
-            }
-            scales = Some(scale);
+            let beta = least_squares(&factor, data, base)?;
+            let (std, _) = classical(&factor, data, &beta)?;
+            let converged = beta
+                .iter()
+                .zip(&last.beta)
+                .zip(&std)
+                .all(|((a, b), s)| (a - b).abs() <= SETTLED * s);
+            last = Reweighted {
+                beta,
+                factor,
+                scales,
+                converged,
+            };
+            passes += 1;
         }
-        Ok(Self {
-            factors,
-            instants,
-            tally,
-            data,
-            by_noise,
-            weighted,
-            weights,
-            factor,
-            beta,
-            scales,
-            converged,
-        })
-    }
-
-    /// Returns the values of all base columns, zero for columns that are not identifiable on their own.
-    pub(crate) fn full(&self) -> Vec<f64> {
-        spread(&self.beta, &self.data.kept, self.data.combination.ncols())
+        Ok(last)
     }
 }

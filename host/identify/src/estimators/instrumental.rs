@@ -76,96 +76,161 @@ pub(crate) fn instrumental(
     let (source, words) = Source::of(problem)?;
     let data = problem.data;
     let (p, size) = (problem.base.len(), data.kept.len());
-    let measured = LeaveOut::of(&parts.weighted(problem.weights));
     let tempered = LeaveOut::of(&parts.weighted(&parts.tempered(problem.weights))).whole;
-    let weights: Vec<f64> = problem.recording_weights().collect();
+    // Instruments without a simulation do not change between passes.
+    let fixed = !matches!(source, Source::Loop(_));
     let mut values = problem.start.to_vec();
     let mut passes = 0;
     loop {
         let full = spread(&values, &data.kept, p);
         let standard = nearest(problem, &tempered, prior, &full)?;
-        let mut factors = vec![TriangularFactor::new(2 * size); PARTS];
-        let mut index = 0;
-        let mut row = vec![0.0; 2 * size];
-        // Per joint: squares of simulated minus measured position, and of the measured position about its mean.
-        let mut drift = Drift::new(problem.robot.joints.len());
-        each_simulated(problem, &source, &standard, &mut |r, x, z| {
-            drift.push(x, z);
-            for i in 0..x.t.len() {
-                let factor = &mut factors[part_of(index, problem.instants)];
-                for (k, (own, other)) in x.equations.iter().zip(&z.equations).enumerate() {
-                    if own.keep[i] {
-                        for (to, &c) in data.kept.iter().enumerate() {
-                            row[to] = other.x[i * p + c];
-                            row[size + to] = own.x[i * p + c];
-                        }
-                        factor.push(&row, own.y[i], weights[r] * problem.weights[k]);
-                    }
-                }
-                index += 1;
-            }
-        })?;
-        let all = LeaveOut::of(&joined(factors, parts.count));
+        let (all, drift) = instrumented(problem, parts, &source, &standard)?;
         let kept = all.refit(&|factor| solve(factor, size))?;
         passes += 1;
-        let covariance = kept.covariance();
-        let moved = (0..size)
-            .map(|k| {
-                (kept.whole[k] - values[k]).abs() / covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE)
-            })
-            .fold(0.0, f64::max);
+        let moved = largest_change(&kept, &values);
         values.clone_from(&kept.whole);
-        // Instruments without a simulation do not change between passes.
-        let fixed = !matches!(source, Source::Loop(_));
         if fixed || moved <= SETTLED || passes == MOST_PASSES {
-            let strength = strength(&all.whole, size);
-            let mut warnings = Vec::new();
-            if !fixed && moved > SETTLED {
-                warnings.push(format!(
-                    "Instrumental variables had not settled after {MOST_PASSES} passes: a parameter still moves by {moved:.2} of its standard deviation."
-                ));
+            let last = LastPass {
+                source: &source,
+                words: &words,
+                passes,
+                unsettled: (!fixed && moved > SETTLED).then_some(moved),
+                all,
+                kept,
+                drift,
+            };
+            return last.fitted(problem, parts);
+        }
+    }
+}
+
+/// Accumulates the rows [Z | X | y] with the instruments of the model `standard`, and the distance of their motion from
+/// the measured one.
+fn instrumented(
+    problem: &Problem,
+    parts: &Parts,
+    source: &Source,
+    standard: &[f64],
+) -> Result<(LeaveOut, Drift), IdentifyError> {
+    let data = problem.data;
+    let (p, size) = (problem.base.len(), data.kept.len());
+    let weights: Vec<f64> = problem.recording_weights().collect();
+    let mut factors = vec![TriangularFactor::new(2 * size); PARTS];
+    let mut index = 0;
+    let mut row = vec![0.0; 2 * size];
+    // Per joint: squares of simulated minus measured position, and of the measured position about its mean.
+    let mut drift = Drift::new(problem.robot.joints.len());
+    each_simulated(problem, source, standard, &mut |r, x, z| {
+        drift.push(x, z);
+        for i in 0..x.t.len() {
+            let factor = &mut factors[part_of(index, problem.instants)];
+            for (k, (own, other)) in x.equations.iter().zip(&z.equations).enumerate() {
+                if own.keep[i] {
+                    for (to, &c) in data.kept.iter().enumerate() {
+                        row[to] = other.x[i * p + c];
+                        row[size + to] = own.x[i * p + c];
+                    }
+                    factor.push(&row, own.y[i], weights[r] * problem.weights[k]);
+                }
             }
-            let memory = parts.memory.iter().copied().fold(1.0, f64::max);
-            let statistic = cragg_donald(strength, parts.rows as f64 / memory, size);
-            let mut said = vec![format!(
-                "Instruments from {words}; {passes} pass{}, smallest canonical correlation with the regressor {strength:.3}, Cragg and Donald's statistic {}.",
+            index += 1;
+        }
+    })?;
+    Ok((LeaveOut::of(&joined(factors, parts.count)), drift))
+}
+
+/// Returns the largest change of a parameter from `values`, in its standard deviations.
+fn largest_change(kept: &Refit, values: &[f64]) -> f64 {
+    let covariance = kept.covariance();
+    (0..values.len())
+        .map(|k| {
+            (kept.whole[k] - values[k]).abs() / covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// The last pass of the iteration.
+struct LastPass<'a> {
+    source: &'a Source,
+    /// The source in words.
+    words: &'a str,
+    passes: usize,
+    /// Largest change of a parameter, in its standard deviations, if the iteration did not settle.
+    unsettled: Option<f64>,
+    /// Rows [Z | X | y].
+    all: LeaveOut,
+    /// Values of the identified combinations.
+    kept: Refit,
+    drift: Drift,
+}
+
+impl LastPass<'_> {
+    /// Returns the estimate with remarks and warnings.
+    fn fitted(self, problem: &Problem, parts: &Parts) -> Result<Fitted, IdentifyError> {
+        let size = self.kept.whole.len();
+        let strength = strength(&self.all.whole, size);
+        let memory = parts.memory.iter().copied().fold(1.0, f64::max);
+        let statistic = cragg_donald(strength, parts.rows as f64 / memory, size);
+        let passes = self.passes;
+        let said = vec![
+            format!(
+                "Instruments from {}; {passes} pass{}, smallest canonical correlation with the regressor {strength:.3}, Cragg and Donald's statistic {}.",
+                self.words,
                 if passes == 1 { "" } else { "es" },
                 format_significant(statistic, 3)
-            )];
-            said.push(drift.words(problem));
-            let full = spread(&kept.whole, &data.kept, p);
-            let doubtful = if statistic < WEAK {
+            ),
+            self.drift.words(problem),
+        ];
+        let mut warnings = Vec::new();
+        warnings.extend(self.unsettled.map(|moved| {
+            format!(
+                "Instrumental variables had not settled after {MOST_PASSES} passes: a parameter still moves by {moved:.2} of its standard deviation."
+            )
+        }));
+        let doubtful = self.doubt(problem, parts, statistic);
+        warnings.extend(doubtful.as_ref().map(|why| {
+            format!(
+                "Do not trust the estimate by instrumental variables over the weighted fit: {why}."
+            )
+        }));
+        fitted(
+            problem,
+            &self.all.whole,
+            self.kept,
+            &LeaveOut::of(&parts.weighted(problem.weights)),
+            said,
+            warnings,
+            doubtful,
+        )
+    }
+
+    /// Returns the reason to trust the weighted fit more, a clause; `statistic` is Cragg and Donald's.
+    fn doubt(&self, problem: &Problem, parts: &Parts, statistic: f64) -> Option<String> {
+        let full = spread(&self.kept.whole, &problem.data.kept, problem.base.len());
+        if statistic < WEAK {
+            return Some(format!(
+                "the instruments are weak (Cragg and Donald's statistic is {}, and some {WEAK} are needed), so that the estimate by instrumental variables scatters and is pulled towards least squares",
+                format_significant(statistic, 2)
+            ));
+        }
+        if let Some((joint, times)) = much_more(problem, parts, &full) {
+            return Some(format!(
+                "the estimate by instrumental variables leaves {times:.1} times the residual of the weighted fit at joint {joint}, more than noise in the motion could hide from least squares"
+            ));
+        }
+        match self.source {
+            Source::Loop(_) => None,
+            Source::Reference => {
+                let (joint, off) = self.drift.farthest(problem).filter(|(_, off)| *off > OFF)?;
                 Some(format!(
-                    "the instruments are weak (Cragg and Donald's statistic is {}, and some {WEAK} are needed), so that the estimate by instrumental variables scatters and is pulled towards least squares",
-                    format_significant(statistic, 2)
+                    "the recorded reference, which is the instrument, is {:.1} % of the motion's spread off the motion of joint {joint}",
+                    100.0 * off
                 ))
-            } else if let Some((joint, times)) = much_more(problem, parts, &full) {
-                Some(format!(
-                    "the estimate by instrumental variables leaves {times:.1} times the residual of the weighted fit at joint {joint}, more than noise in the motion could hide from least squares"
-                ))
-            } else {
-                match source {
-                    Source::Loop(_) => None,
-                    Source::Reference => drift.farthest(problem).filter(|(_, off)| *off > OFF).map(
-                        |(joint, off)| {
-                            format!(
-                                "the recorded reference, which is the instrument, is {:.1} % of the motion's spread off the motion of joint {joint}",
-                                100.0 * off
-                            )
-                        },
-                    ),
-                    Source::Smoothed(_) => Some(
-                        "the instruments are the measured motion smoothed, in which noise of low frequency still is"
-                            .to_owned(),
-                    ),
-                }
-            };
-            warnings.extend(doubtful.as_ref().map(|why| {
-                format!("Do not trust the estimate by instrumental variables over the weighted fit: {why}.")
-            }));
-            return fitted(
-                problem, &all.whole, kept, &measured, said, warnings, doubtful,
-            );
+            }
+            Source::Smoothed(_) => Some(
+                "the instruments are the measured motion smoothed, in which noise of low frequency still is"
+                    .to_owned(),
+            ),
         }
     }
 }
@@ -188,6 +253,7 @@ fn much_more<'a>(problem: &'a Problem, parts: &Parts, full: &[f64]) -> Option<(&
         .filter(|(_, times)| *times > SEVERAL)
 }
 
+/// Returns the estimate `kept` with its classical standard deviations.
 fn fitted(
     problem: &Problem,
     factor: &TriangularFactor,

@@ -87,74 +87,21 @@ pub(crate) fn speed_thresholds(
     if joints > 1 {
         return of_several(training, plan);
     }
-    let p = plan.columns.len();
-    let bins: Vec<Vec<f64>> = spectra
-        .iter()
-        .zip(&plan.treatment.speed_threshold)
-        .map(|(s, least)| bounds(BELIEVED * s.velocity_rms(), *least))
-        .collect();
-    let bin_of = |j: usize, speed: f64| bins[j].iter().take_while(|bound| speed < **bound).count();
-    let mut factors: Vec<Vec<TriangularFactor>> = bins
-        .iter()
-        .map(|b| vec![TriangularFactor::new(p + OWN); b.len() + 1])
-        .collect();
-    let mut row = vec![0.0; p + OWN];
-    for recording in training {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
-            for j in 0..joints {
-                let equation = &rows.equations[j];
-                for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
-                    let qd = rows.qd[j][i];
-                    row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
-                    let ahead = rows.qd[j].get(i + 1).copied().unwrap_or(qd);
-                    let behind = rows.qd[j][i.saturating_sub(1)];
-                    let brakes = (ahead - behind) * qd < 0.0;
-                    row[p..].copy_from_slice(&if brakes {
-                        [qd.signum(), 0.0]
-                    } else {
-                        [0.0, qd.signum()]
-                    });
-                    factors[j][bin_of(j, qd.abs())].push(&row, equation.y[i], 1.0);
-                }
-            }
-            Ok(())
-        })?;
-    }
-    // Fits the always-used rows, each joint alone. Pseudo-inverse: one joint may not excite every parameter.
-    let beta: Vec<Vec<f64>> = factors
-        .iter()
-        .map(|list| {
-            let mut believed = TriangularFactor::new(p + OWN);
-            add(&mut believed, &list[0], false);
-            let (r, z) = believed.system();
-            let svd = r.svd(true, true);
-            let smallest = 1e-10 * svd.singular_values.max();
-            svd.solve(&z, smallest)
-                .map_or(vec![0.0; p], |x| x.as_slice()[..p].to_vec())
-        })
-        .collect();
-    let mut memories = vec![Memory::default(); joints];
-    for recording in training {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
-            for j in 0..joints {
-                let equation = &rows.equations[j];
-                for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
-                    if bin_of(j, rows.qd[j][i].abs()) == 0 {
-                        memories[j].push(
-                            equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta[j]),
-                        );
-                    }
-                }
-            }
-            Ok(())
-        })?;
-    }
+    let bins = Bins(
+        spectra
+            .iter()
+            .zip(&plan.treatment.speed_threshold)
+            .map(|(s, least)| bounds(BELIEVED * s.velocity_rms(), *least))
+            .collect(),
+    );
+    let factors = bins.factors(training, plan)?;
+    let memories = bins.believed_memories(training, plan, &factors)?;
     let thresholds: Vec<f64> = (0..joints)
         .map(|j| {
             let refused = first_refused(&factors[j], memories[j].length());
             let least = plan.treatment.speed_threshold[j];
-            match (refused, bins[j].first()) {
-                (Some(bin), Some(top)) => (MARGIN * bins[j][bin - 1]).min(*top).max(least),
+            match (refused, bins.0[j].first()) {
+                (Some(bin), Some(top)) => (MARGIN * bins.0[j][bin - 1]).min(*top).max(least),
                 _ => least,
             }
         })
@@ -164,6 +111,90 @@ pub(crate) fn speed_thresholds(
         fitted: thresholds,
         reason: "Read from the data: below it, within a factor of two, the joint's friction differs from the Coulomb and viscous friction of faster rows by more than chance; never below five standard deviations of the velocity's noise or 1 % of its RMS.".into(),
     })
+}
+
+/// Bounds of the bins of speed, per joint, fastest first.
+struct Bins(Vec<Vec<f64>>);
+
+impl Bins {
+    /// Returns the bin of a speed of joint `j`; 0 for the always-used speeds.
+    fn of(&self, j: usize, speed: f64) -> usize {
+        let slower = self.0[j].iter().take_while(|bound| speed < **bound);
+        slower.count()
+    }
+
+    /// Returns the rows of each joint by bin, with the friction columns of the bin.
+    fn factors(
+        &self,
+        training: &[&dyn Recording],
+        plan: &Plan,
+    ) -> Result<Vec<Vec<TriangularFactor>>, IdentifyError> {
+        let p = plan.columns.len();
+        let mut factors: Vec<Vec<TriangularFactor>> = (self.0.iter())
+            .map(|b| vec![TriangularFactor::new(p + OWN); b.len() + 1])
+            .collect();
+        let mut row = vec![0.0; p + OWN];
+        for recording in training {
+            each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+                for (j, factors) in factors.iter_mut().enumerate() {
+                    let equation = &rows.equations[j];
+                    for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
+                        let qd = rows.qd[j][i];
+                        row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
+                        let ahead = rows.qd[j].get(i + 1).copied().unwrap_or(qd);
+                        let behind = rows.qd[j][i.saturating_sub(1)];
+                        let brakes = (ahead - behind) * qd < 0.0;
+                        row[p..].copy_from_slice(&if brakes {
+                            [qd.signum(), 0.0]
+                        } else {
+                            [0.0, qd.signum()]
+                        });
+                        factors[self.of(j, qd.abs())].push(&row, equation.y[i], 1.0);
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(factors)
+    }
+
+    /// Returns the residuals' memory of each joint over the always-used rows, under a fit of these rows.
+    fn believed_memories(
+        &self,
+        training: &[&dyn Recording],
+        plan: &Plan,
+        factors: &[Vec<TriangularFactor>],
+    ) -> Result<Vec<Memory>, IdentifyError> {
+        let p = plan.columns.len();
+        let beta: Vec<Vec<f64>> = factors.iter().map(|list| believed(&list[0], p)).collect();
+        let mut memories = vec![Memory::default(); beta.len()];
+        for recording in training {
+            each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+                for (j, (memory, beta)) in memories.iter_mut().zip(&beta).enumerate() {
+                    let equation = &rows.equations[j];
+                    for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
+                        if self.of(j, rows.qd[j][i].abs()) == 0 {
+                            let x = &equation.x[i * p..(i + 1) * p];
+                            memory.push(equation.y[i] - product(x, beta));
+                        }
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(memories)
+    }
+}
+
+/// Fits the always-used rows of one joint alone. Pseudo-inverse: one joint may not excite every parameter.
+fn believed(rows: &TriangularFactor, p: usize) -> Vec<f64> {
+    let mut believed = TriangularFactor::new(p + OWN);
+    add(&mut believed, rows, false);
+    let (r, z) = believed.system();
+    let svd = r.svd(true, true);
+    let smallest = 1e-10 * svd.singular_values.max();
+    svd.solve(&z, smallest)
+        .map_or(vec![0.0; p], |x| x.as_slice()[..p].to_vec())
 }
 
 /// Finds the thresholds of several joints. From fast to slow, the first bin that is [`NOISIER`] than all faster rows
