@@ -52,110 +52,174 @@ pub(crate) fn recommend(
     judge: Judge,
     written: Estimator,
 ) -> (Estimator, String) {
-    let of = |e: Estimator| rows.iter().find(|r| r.estimator == e);
-    let error = |e: Estimator| errors.iter().find(|(own, _)| *own == e).map(|(_, e)| *e);
-    let percent = |e: f64| format!("{:.2} %", 100.0 * e);
-    let plain = error(Estimator::Weighted).unwrap_or(f64::INFINITY);
-    let far = of(Estimator::Weighted).and_then(|r| r.distance_to_consistent);
-    let possible = of(Estimator::Weighted)
-        .and_then(|r| r.physically_consistent)
-        .unwrap_or(true);
-    let verdict = endogeneity.map(|e| e.verdict);
-    let (own, silence) = (judge.error(), judge.silence());
-    if let (Some(Verdict::Biased), Some(iv)) = (verdict, error(Estimator::Iv)) {
-        return (
+    let plain = errors.iter().find(|(own, _)| *own == Estimator::Weighted);
+    let weighted = rows.iter().find(|r| r.estimator == Estimator::Weighted);
+    let case = Case {
+        rows,
+        errors,
+        verdict: endogeneity.map(|e| e.verdict),
+        judge,
+        written,
+        plain: plain.map_or(f64::INFINITY, |(_, error)| *error),
+        far: weighted.and_then(|r| r.distance_to_consistent),
+        possible: weighted
+            .and_then(|r| r.physically_consistent)
+            .unwrap_or(true),
+    };
+    (case.unbiased())
+        .or_else(|| case.consistent())
+        .or_else(|| case.agreeing())
+        .unwrap_or_else(|| case.weighted())
+}
+
+/// The evidence for a recommendation.
+struct Case<'a> {
+    rows: &'a [Compared],
+    errors: &'a [(Estimator, f64)],
+    verdict: Option<Verdict>,
+    judge: Judge,
+    /// The requested estimator.
+    written: Estimator,
+    /// Prediction error of the weighted fit.
+    plain: f64,
+    /// Distance of the weighted fit from the physically consistent set, in standard deviations.
+    far: Option<f64>,
+    /// True if the weighted fit is physically consistent.
+    possible: bool,
+}
+
+impl Case<'_> {
+    /// Returns the prediction error of an estimator.
+    fn error(&self, e: Estimator) -> Option<f64> {
+        let own = self.errors.iter().find(|(own, _)| *own == e);
+        own.map(|(_, e)| *e)
+    }
+
+    /// Recommends instrumental variables if noise biases least squares.
+    fn unbiased(&self) -> Option<(Estimator, String)> {
+        let (Some(Verdict::Biased), Some(iv)) = (self.verdict, self.error(Estimator::Iv)) else {
+            return None;
+        };
+        Some((
             Estimator::Iv,
             format!(
-                "Trust iv: least squares is biased by noise that passes into its regressor, instrumental variables are not; that their {own} is {} against {} does not speak against them, because the bias helps to predict rows with the same noise.",
+                "Trust iv: least squares is biased by noise that passes into its regressor, instrumental variables are not; that their {} is {} against {} does not speak against them, because the bias helps to predict rows with the same noise.",
+                self.judge.error(),
                 percent(iv),
-                percent(plain)
+                percent(self.plain)
             ),
-        );
+        ))
     }
-    let impossible = || {
+
+    /// Returns a clause about a weighted fit that no body has.
+    fn impossible(&self) -> String {
         format!(
             "no body has the weighted fit's parameters (they lie {} standard deviations from the nearest that one has)",
-            format_significant(far.unwrap_or(f64::NAN), 2)
+            format_significant(self.far.unwrap_or(f64::NAN), 2)
         )
-    };
-    if let Some(bound) = error(Estimator::Consistent) {
+    }
+
+    /// Decides between the physically consistent and the weighted fit, if the one predicts better or no body has the
+    /// parameters of the other.
+    fn consistent(&self) -> Option<(Estimator, String)> {
+        let bound = self.error(Estimator::Consistent)?;
+        let (plain, possible) = (self.plain, self.possible);
+        let (own, silence) = (self.judge.error(), self.judge.silence());
         if bound <= (1.0 - WORSE) * plain {
-            return (
+            return Some((
                 Estimator::Consistent,
                 format!(
                     "Trust consistent: its {own} is {} against {} of the weighted fit, because what the motion leaves open is decided by what a body can be.{silence}",
                     percent(bound),
                     percent(plain)
                 ),
-            );
+            ));
         }
-        if !possible && bound <= (1.0 + WORSE) * plain {
-            return (
+        if possible {
+            return None;
+        }
+        if bound <= (1.0 + WORSE) * plain {
+            return Some((
                 Estimator::Consistent,
                 format!(
                     "Trust consistent: {}, and being one costs next to nothing in prediction ({} against {}).{silence}",
-                    impossible(),
+                    self.impossible(),
                     percent(bound),
                     percent(plain)
                 ),
-            );
+            ));
         }
-        if !possible && judge == Judge::OtherMotion {
-            return (
+        if self.judge == Judge::OtherMotion {
+            return Some((
                 Estimator::Weighted,
                 format!(
                     "Trust weighted for prediction only: {}, and requiring one raises the {own} from {} to {}, so something is missing in the model.",
-                    impossible(),
+                    self.impossible(),
                     percent(plain),
                     percent(bound)
                 ),
-            );
+            ));
         }
-        if !possible {
-            return (
-                Estimator::Consistent,
-                format!(
-                    "Trust consistent: {}. That the weighted fit's {own} is {} against {} is no evidence for it, because values that no body has can follow one motion and fail on the next; it does show that something is missing in the model.{silence}",
-                    impossible(),
-                    percent(plain),
-                    percent(bound)
-                ),
-            );
-        }
+        Some((
+            Estimator::Consistent,
+            format!(
+                "Trust consistent: {}. That the weighted fit's {own} is {} against {} is no evidence for it, because values that no body has can follow one motion and fail on the next; it does show that something is missing in the model.{silence}",
+                self.impossible(),
+                percent(plain),
+                percent(bound)
+            ),
+        ))
     }
-    let shift = of(written).and_then(|row| row.largest_shift);
-    // Agreement proves nothing if noise may have passed into the instruments.
-    let doubted =
-        written == Estimator::Iv && !matches!(verdict, Some(Verdict::NoSign | Verdict::Immaterial));
-    if let (Some(shift), Some(error)) = (shift.filter(|s| *s < AGREES), error(written))
-        && written != Estimator::Weighted
-        && !doubted
-        && error <= (1.0 + WORSE) * plain
-    {
-        return (
+
+    /// Recommends the requested estimator if it agrees with the weighted fit and predicts as well.
+    fn agreeing(&self) -> Option<(Estimator, String)> {
+        let written = self.written;
+        // Agreement proves nothing if noise may have passed into the instruments.
+        let doubted = written == Estimator::Iv
+            && !matches!(self.verdict, Some(Verdict::NoSign | Verdict::Immaterial));
+        let row = self.rows.iter().find(|r| r.estimator == written);
+        let shift = row.and_then(|row| row.largest_shift);
+        let shift = shift.filter(|s| *s < AGREES)?;
+        let error = self.error(written)?;
+        if written == Estimator::Weighted || doubted || !(error <= (1.0 + WORSE) * self.plain) {
+            return None;
+        }
+        Some((
             written,
             format!(
-                "Trust {}: it agrees with the weighted fit, whose parameters are those of bodies that can exist, to within {} standard deviations, and its {own} is {} against {}.{silence}",
+                "Trust {}: it agrees with the weighted fit, whose parameters are those of bodies that can exist, to within {} standard deviations, and its {} is {} against {}.{}",
                 written.name(),
                 format_significant(shift, 2),
+                self.judge.error(),
                 percent(error),
-                percent(plain)
+                percent(self.plain),
+                self.judge.silence()
             ),
-        );
+        ))
     }
-    (
-        Estimator::Weighted,
-        format!(
-            "Trust weighted: its parameters are those of bodies that can exist, its {own} is {}, and {}.{silence}",
-            percent(plain),
-            match verdict {
-                Some(Verdict::NoSign | Verdict::Immaterial) => {
-                    "instrumental variables agree with it"
-                }
-                _ => "no other fit here is shown to be better",
-            }
-        ),
-    )
+
+    /// Recommends the weighted fit.
+    fn weighted(&self) -> (Estimator, String) {
+        (
+            Estimator::Weighted,
+            format!(
+                "Trust weighted: its parameters are those of bodies that can exist, its {} is {}, and {}.{}",
+                self.judge.error(),
+                percent(self.plain),
+                match self.verdict {
+                    Some(Verdict::NoSign | Verdict::Immaterial) => {
+                        "instrumental variables agree with it"
+                    }
+                    _ => "no other fit here is shown to be better",
+                },
+                self.judge.silence()
+            ),
+        )
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
 }
 
 #[cfg(test)]

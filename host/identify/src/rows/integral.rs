@@ -49,75 +49,18 @@ fn integral_rows(
     tally: &mut Tally,
 ) -> Result<Rows, PrepareError> {
     let n = motion.joints.len();
-    let (rows, p) = (motion.t.len(), plan.columns.len());
-    let standard = n * COLUMNS;
-    let width = standard + n * MOTOR_COLUMNS;
-    let dt = plan.treatment.dt();
-    let cumulative = |power: &dyn Fn(usize) -> f64| {
-        let mut sum = 0.0;
-        let mut last = power(0);
-        let mut all = Vec::with_capacity(rows);
-        all.push(0.0);
-        for k in 1..rows {
-            let next = power(k);
-            sum += 0.5 * dt * (last + next);
-            last = next;
-            all.push(sum);
-        }
-        all
-    };
-    if rows == 0 {
+    if motion.t.is_empty() {
         return Ok(Rows::default());
     }
-    let loudest = plan.loudness.iter().fold(0.0f64, |m, x| m.max(*x));
-    let loudness: Vec<f64> = plan.loudness.iter().map(|l| l / loudest).collect();
-    let mut work = vec![0.0; rows];
-    let mut activity = vec![0.0; rows];
-    let mut least_activity = 0.0;
-    // Per joint: ∫q̇², ∫sgn(q̇)·q̇, ∫q̇.
-    let mut friction = Vec::with_capacity(n);
-    for (j, joint) in motion.joints.iter().enumerate() {
-        let qd = &joint.qd;
-        let torque = low_pass.zero_phase(&joint.tau);
-        let sign: Vec<f64> = qd.iter().map(|v| v.sgn()).collect();
-        let sign = low_pass.zero_phase(&sign);
-        let squares = cumulative(&|k| qd[k] * qd[k]);
-        for (sum, part) in work.iter_mut().zip(cumulative(&|k| torque[k] * qd[k])) {
-            *sum += part;
-        }
-        let share = loudness[j].powi(2);
-        for (sum, part) in activity.iter_mut().zip(&squares) {
-            *sum += share * part;
-        }
-        least_activity +=
-            share * plan.treatment.speed_threshold[j].powi(2) * plan.window as f64 * dt;
-        friction.push([
-            squares,
-            cumulative(&|k| sign[k] * qd[k]),
-            cumulative(&|k| qd[k]),
-        ]);
-    }
-    let motors = motor_friction(motion, plan, low_pass, &cumulative)?;
-    let duration = plan.window as f64 * dt;
+    let integrals = Integrals::of(motion, plan, low_pass)?;
+    let mut energies = Energies::new(motion, plan);
+    let duration = plan.window as f64 * plan.treatment.dt();
     let mut result = Rows {
         equations: vec![Equation::default()],
         q: vec![Vec::new(); n],
         qd: vec![Vec::new(); n],
         ..Default::default()
     };
-    let energy = |k: usize, out: &mut [f64]| -> Result<(), PrepareError> {
-        let q: Vec<f64> = motion.joints.iter().map(|j| j.q[k]).collect();
-        let qd: Vec<f64> = motion.joints.iter().map(|j| j.qd[k]).collect();
-        energy_regressor(plan.chain, &q, &qd, &mut out[..standard]).map_err(failed)?;
-        if !plan.transmission.is_simple() {
-            plan.transmission
-                .motor_energy_columns(&q, &qd, &mut out[standard..])
-                .map_err(failed)?;
-        }
-        Ok(())
-    };
-    let mut around = [(); 3].map(|()| vec![0.0; width]);
-    let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
     // The row before a window and the row after it are also needed.
     for start in motion.usable.0.max(1)..motion.usable.1 {
         let end = start + plan.window;
@@ -126,50 +69,21 @@ fn integral_rows(
         {
             continue;
         }
-        for (k, out) in [(start, &mut before), (end, &mut after)] {
-            for (row, into) in (k - 1..).zip(&mut around) {
-                energy(row, into)?;
-            }
-            for (c, out) in out.iter_mut().enumerate() {
-                *out = as_trapezia_see([around[0][c], around[1][c], around[2][c]]);
-            }
-        }
-        let moved = activity[end] - activity[start];
+        let window = [start, end];
+        energies.look(window)?;
+        let moved = over(&integrals.activity, window);
         let scale = 1.0
-            / (duration * (moved + least_activity))
+            / (duration * (moved + integrals.least_activity))
                 .sqrt()
                 .max(f64::MIN_POSITIVE);
         let equation = &mut result.equations[0];
-        for &c in plan.columns.iter().take(p) {
-            let over = |f: &[f64]| f[end] - f[start];
-            let value = match plan.belongs(c) {
-                Belongs::Joint(c) => match c % COLUMNS {
-                    column::VISCOUS => over(&friction[c / COLUMNS][0]),
-                    column::COULOMB => over(&friction[c / COLUMNS][1]),
-                    column::OFFSET => over(&friction[c / COLUMNS][2]),
-                    _ => after[c] - before[c],
-                },
-                Belongs::Motor(k, motor_column::VISCOUS) => over(&motors[k][0]),
-                Belongs::Motor(k, motor_column::COULOMB) => over(&motors[k][1]),
-                Belongs::Motor(..) => after[c] - before[c],
-                Belongs::Nothing => 0.0,
-            };
+        for &c in plan.columns {
+            let value = integrals.value(plan, c, window, &energies);
             equation.x.push(scale * value);
         }
-        equation.y.push(scale * (work[end] - work[start]));
-        let still = moved <= least_activity;
-        let saturated = motion
-            .joints
-            .iter()
-            .any(|j| j.saturated[start..=end].iter().any(|s| *s));
-        if saturated {
-            Tally::count(&mut tally.saturated, 0);
-        } else if still {
-            Tally::count(&mut tally.slow, 0);
-        } else {
-            tally.used += 1;
-        }
-        equation.keep.push(!still && !saturated);
+        equation.y.push(scale * over(&integrals.work, window));
+        let still = moved <= integrals.least_activity;
+        equation.keep.push(used(motion, window, still, tally));
         result.t.push(motion.t[start]);
         for (j, joint) in motion.joints.iter().enumerate() {
             result.q[j].push(joint.q[start]);
@@ -179,13 +93,175 @@ fn integral_rows(
     Ok(result)
 }
 
+/// Returns the integral over a window, given by its first and last row, from the running integral.
+fn over(integral: &[f64], [start, end]: [usize; 2]) -> f64 {
+    integral[end] - integral[start]
+}
+
+/// Returns the integral of `rate` from the first of `rows` rows to each, by the trapezoidal rule.
+fn cumulative(rows: usize, dt: f64, rate: &dyn Fn(usize) -> f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut last = rate(0);
+    let mut all = Vec::with_capacity(rows);
+    all.push(0.0);
+    for k in 1..rows {
+        let next = rate(k);
+        sum += 0.5 * dt * (last + next);
+        last = next;
+        all.push(sum);
+    }
+    all
+}
+
+/// Decides if a window is used, and counts it.
+fn used(motion: &Motion, [start, end]: [usize; 2], still: bool, tally: &mut Tally) -> bool {
+    let saturated = motion
+        .joints
+        .iter()
+        .any(|j| j.saturated[start..=end].iter().any(|s| *s));
+    if saturated {
+        Tally::count(&mut tally.saturated, 0);
+    } else if still {
+        Tally::count(&mut tally.slow, 0);
+    } else {
+        tally.used += 1;
+    }
+    !still && !saturated
+}
+
+/// Running integrals from the first row of a piece.
+struct Integrals {
+    /// Work of the torques, J.
+    work: Vec<f64>,
+    /// ∫Σ(loudness·q̇)², with the largest loudness as 1.
+    activity: Vec<f64>,
+    /// The same over a window in which every joint moves at its speed threshold.
+    least_activity: f64,
+    /// Per joint: ∫q̇², ∫sgn(q̇)·q̇, ∫q̇.
+    friction: Vec<[Vec<f64>; 3]>,
+    /// Per motor, work of its friction for unit coefficients: viscous, Coulomb. Empty without coupled drives.
+    motors: Vec<[Vec<f64>; 2]>,
+}
+
+impl Integrals {
+    fn of(motion: &Motion, plan: &Plan, low_pass: &LowPass) -> Result<Self, PrepareError> {
+        let (rows, dt) = (motion.t.len(), plan.treatment.dt());
+        let cumulative = |rate: &dyn Fn(usize) -> f64| cumulative(rows, dt, rate);
+        let loudest = plan.loudness.iter().fold(0.0f64, |m, x| m.max(*x));
+        let loudness: Vec<f64> = plan.loudness.iter().map(|l| l / loudest).collect();
+        let mut work = vec![0.0; rows];
+        let mut activity = vec![0.0; rows];
+        let mut least_activity = 0.0;
+        let mut friction = Vec::with_capacity(motion.joints.len());
+        for (j, joint) in motion.joints.iter().enumerate() {
+            let qd = &joint.qd;
+            let torque = low_pass.zero_phase(&joint.tau);
+            let sign: Vec<f64> = qd.iter().map(|v| v.sgn()).collect();
+            let sign = low_pass.zero_phase(&sign);
+            let squares = cumulative(&|k| qd[k] * qd[k]);
+            for (sum, part) in work.iter_mut().zip(cumulative(&|k| torque[k] * qd[k])) {
+                *sum += part;
+            }
+            let share = loudness[j].powi(2);
+            for (sum, part) in activity.iter_mut().zip(&squares) {
+                *sum += share * part;
+            }
+            least_activity +=
+                share * plan.treatment.speed_threshold[j].powi(2) * plan.window as f64 * dt;
+            friction.push([
+                squares,
+                cumulative(&|k| sign[k] * qd[k]),
+                cumulative(&|k| qd[k]),
+            ]);
+        }
+        Ok(Self {
+            work,
+            activity,
+            least_activity,
+            friction,
+            motors: motor_friction(motion, plan, low_pass)?,
+        })
+    }
+
+    /// Returns the entry of column `c` in the row of a window.
+    fn value(&self, plan: &Plan, c: usize, window: [usize; 2], energies: &Energies) -> f64 {
+        let over = |f: &[f64]| over(f, window);
+        match plan.belongs(c) {
+            Belongs::Joint(c) => match c % COLUMNS {
+                column::VISCOUS => over(&self.friction[c / COLUMNS][0]),
+                column::COULOMB => over(&self.friction[c / COLUMNS][1]),
+                column::OFFSET => over(&self.friction[c / COLUMNS][2]),
+                _ => energies.change(c),
+            },
+            Belongs::Motor(k, motor_column::VISCOUS) => over(&self.motors[k][0]),
+            Belongs::Motor(k, motor_column::COULOMB) => over(&self.motors[k][1]),
+            Belongs::Motor(..) => energies.change(c),
+            Belongs::Nothing => 0.0,
+        }
+    }
+}
+
+/// Columns of the energy at the ends of a window, with the trapezoidal error of the work.
+struct Energies<'a> {
+    motion: &'a Motion,
+    plan: &'a Plan<'a>,
+    /// At three rows around an end.
+    around: [Vec<f64>; 3],
+    /// At the first and the last row.
+    ends: [Vec<f64>; 2],
+}
+
+impl<'a> Energies<'a> {
+    fn new(motion: &'a Motion, plan: &'a Plan<'a>) -> Self {
+        let width = motion.joints.len() * (COLUMNS + MOTOR_COLUMNS);
+        Self {
+            motion,
+            plan,
+            around: [(); 3].map(|()| vec![0.0; width]),
+            ends: [(); 2].map(|()| vec![0.0; width]),
+        }
+    }
+
+    /// Computes the columns at both ends of a window.
+    fn look(&mut self, window: [usize; 2]) -> Result<(), PrepareError> {
+        for (k, out) in window.into_iter().zip(&mut self.ends) {
+            for (row, into) in (k - 1..).zip(&mut self.around) {
+                energy(self.motion, self.plan, row, into)?;
+            }
+            for (c, out) in out.iter_mut().enumerate() {
+                let [before, now, after] = &self.around;
+                *out = as_trapezia_see([before[c], now[c], after[c]]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the change of column `c` over the window.
+    fn change(&self, c: usize) -> f64 {
+        self.ends[1][c] - self.ends[0][c]
+    }
+}
+
+/// Computes the columns of the energy at row `k`: those of the links, then those of the motors.
+fn energy(motion: &Motion, plan: &Plan, k: usize, out: &mut [f64]) -> Result<(), PrepareError> {
+    let q: Vec<f64> = motion.joints.iter().map(|j| j.q[k]).collect();
+    let qd: Vec<f64> = motion.joints.iter().map(|j| j.qd[k]).collect();
+    let (links, motors) = out.split_at_mut(motion.joints.len() * COLUMNS);
+    energy_regressor(plan.chain, &q, &qd, links).map_err(failed)?;
+    if !plan.transmission.is_simple() {
+        plan.transmission
+            .motor_energy_columns(&q, &qd, motors)
+            .map_err(failed)?;
+    }
+    Ok(())
+}
+
 /// Returns per motor the work of its friction from the first row, for unit coefficients: viscous, Coulomb (with the
 /// filtered sign, as for the torque). Empty without coupled drives.
 fn motor_friction(
     motion: &Motion,
     plan: &Plan,
     low_pass: &LowPass,
-    cumulative: &dyn Fn(&dyn Fn(usize) -> f64) -> Vec<f64>,
 ) -> Result<Vec<[Vec<f64>; 2]>, PrepareError> {
     if plan.transmission.is_simple() {
         return Ok(Vec::new());
@@ -210,12 +286,13 @@ fn motor_friction(
             powers[k][row] = power[k * MOTOR_COLUMNS + motor_column::VISCOUS];
         }
     }
+    let dt = plan.treatment.dt();
     let of = |(speed, power): (&Vec<f64>, &Vec<f64>)| {
         let sign: Vec<f64> = speed.iter().map(|v| v.sgn()).collect();
         let sign = low_pass.zero_phase(&sign);
         [
-            cumulative(&|k| power[k]),
-            cumulative(&|k| sign[k] * speed[k]),
+            cumulative(rows, dt, &|k| power[k]),
+            cumulative(rows, dt, &|k| sign[k] * speed[k]),
         ]
     };
     Ok(speeds.iter().zip(&powers).map(of).collect())

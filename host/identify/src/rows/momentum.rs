@@ -159,46 +159,13 @@ pub(crate) fn momentum_rows(
     if first >= motion.usable.1.min(last) {
         return Ok(result);
     }
-    let filtered_sign = |speeds: &mut dyn Iterator<Item = f64>| {
-        low_pass.zero_phase(&speeds.map(|v| v.sgn()).collect::<Vec<_>>())
-    };
-    let signs: Vec<Vec<f64>> = motion
-        .joints
-        .iter()
-        .map(|j| filtered_sign(&mut j.qd.iter().copied()))
-        .collect();
-    let motor_signs = motor_signs(motion, plan, low_pass)?;
+    let mut instants = Instants::new(motion, plan, low_pass)?;
     let torque: Vec<Vec<f64>> = motion
         .joints
         .iter()
         .map(|j| running_integral(&low_pass.zero_phase(&j.tau), dt))
         .collect();
-    let count = |flags: &dyn Fn(usize) -> bool| {
-        let mut sum = 0u32;
-        let mut all = vec![0];
-        all.extend((0..motion.t.len()).map(|k| {
-            sum += u32::from(flags(k));
-            sum
-        }));
-        all
-    };
-    // Rows in which a joint or motor is slow, and in which it hardly moves.
-    let slow: Vec<[Vec<u32>; 2]> = (motion.joints.iter().zip(&plan.treatment.speed_threshold))
-        .map(|(j, threshold)| {
-            let hardly = |k: usize| j.qd[k].abs() < HARDLY * threshold;
-            [count(&|k| j.slow[k]), count(&hardly)]
-        })
-        .collect();
-    let slow_motors: Vec<(Vec<bool>, [Vec<u32>; 2])> = slow_motors(motion, plan)?
-        .into_iter()
-        .map(|m| (m.moves, [count(&|k| m.slow[k]), count(&|k| m.hardly[k])]))
-        .collect();
-    let saturated: Vec<Vec<u32>> = motion
-        .joints
-        .iter()
-        .map(|j| count(&|k| j.saturated[k]))
-        .collect();
-    let mut maker = Maker::new(plan, n);
+    let excluded = Excluded::of(motion, plan)?;
     let empty = || Instant {
         momentum: vec![0.0; n * p],
         loss: vec![0.0; n * p],
@@ -206,23 +173,13 @@ pub(crate) fn momentum_rows(
     let (mut before, mut now, mut after) = (empty(), empty(), empty());
     let mut sum = vec![0.0; n * p];
     let mut open: VecDeque<Open> = VecDeque::new();
-    let (mut q, mut qd) = (vec![0.0; n], vec![0.0; n]);
-    let (mut sign, mut motor_sign) = (vec![0.0; n], vec![0.0; n]);
-    let mut look = |k: usize, out: &mut Instant| {
-        for j in 0..n {
-            (q[j], qd[j]) = (motion.joints[j].q[k], motion.joints[j].qd[k]);
-            sign[j] = signs[j][k];
-            motor_sign[j] = motor_signs.get(j).map_or(0.0, |s| s[k]);
-        }
-        maker.at(&q, &qd, &sign, &motor_sign, out)
-    };
-    look(first - 1, &mut now)?;
-    look(first, &mut after)?;
+    instants.look(first - 1, &mut now)?;
+    instants.look(first, &mut after)?;
     let duration = plan.window as f64 * dt;
     for k in first..last {
         std::mem::swap(&mut before, &mut now);
         std::mem::swap(&mut now, &mut after);
-        look(k + 1, &mut after)?;
+        instants.look(k + 1, &mut after)?;
         if k > first {
             for ((sum, a), b) in sum.iter_mut().zip(&before.loss).zip(&now.loss) {
                 *sum += 0.5 * dt * (a + b);
@@ -240,23 +197,8 @@ pub(crate) fn momentum_rows(
                 equation
                     .y
                     .push((torque[j][k] - torque[j][done.start]) / duration);
-                let over = |c: &[u32]| c[k + 1] - c[done.start];
-                // Half a window without a sign of the velocity says little about friction.
-                let most = |[slow, hardly]: &[Vec<u32>; 2]| {
-                    let rows = over(slow) as usize;
-                    2 * rows > plan.window || stays(rows, over(hardly) as usize, plan.window)
-                };
-                let still =
-                    most(&slow[j]) || slow_motors.iter().any(|(moves, c)| moves[j] && most(c));
-                let saturated = over(&saturated[j]) > 0;
-                if saturated {
-                    Tally::count(&mut tally.saturated, j);
-                } else if still {
-                    Tally::count(&mut tally.slow, j);
-                } else {
-                    tally.used += 1;
-                }
-                equation.keep.push(!still && !saturated);
+                let used = excluded.counted(j, [done.start, k], plan.window, tally);
+                equation.keep.push(used);
             }
             result.t.push(motion.t[done.start]);
             for (j, joint) in motion.joints.iter().enumerate() {
@@ -273,6 +215,123 @@ pub(crate) fn momentum_rows(
         }
     }
     Ok(result)
+}
+
+/// The regressors at the rows of a piece.
+struct Instants<'a> {
+    motion: &'a Motion,
+    maker: Maker<'a>,
+    /// Filtered signs of the joints' and motors' speeds, over the rows.
+    signs: Vec<Vec<f64>>,
+    motor_signs: Vec<Vec<f64>>,
+    q: Vec<f64>,
+    qd: Vec<f64>,
+    sign: Vec<f64>,
+    motor_sign: Vec<f64>,
+}
+
+impl<'a> Instants<'a> {
+    fn new(
+        motion: &'a Motion,
+        plan: &'a Plan<'a>,
+        low_pass: &LowPass,
+    ) -> Result<Self, PrepareError> {
+        let n = motion.joints.len();
+        let filtered_sign = |speeds: &[f64]| {
+            low_pass.zero_phase(&speeds.iter().map(|v| v.sgn()).collect::<Vec<_>>())
+        };
+        Ok(Self {
+            motion,
+            maker: Maker::new(plan, n),
+            signs: (motion.joints.iter())
+                .map(|j| filtered_sign(&j.qd))
+                .collect(),
+            motor_signs: motor_signs(motion, plan, low_pass)?,
+            q: vec![0.0; n],
+            qd: vec![0.0; n],
+            sign: vec![0.0; n],
+            motor_sign: vec![0.0; n],
+        })
+    }
+
+    /// Computes the regressors at row `k`.
+    fn look(&mut self, k: usize, out: &mut Instant) -> Result<(), PrepareError> {
+        for (j, joint) in self.motion.joints.iter().enumerate() {
+            (self.q[j], self.qd[j]) = (joint.q[k], joint.qd[k]);
+            self.sign[j] = self.signs[j][k];
+            self.motor_sign[j] = self.motor_signs.get(j).map_or(0.0, |s| s[k]);
+        }
+        self.maker
+            .at(&self.q, &self.qd, &self.sign, &self.motor_sign, out)
+    }
+}
+
+/// Numbers of slow and of saturated rows before each row of a piece.
+struct Excluded {
+    /// Per joint, rows in which it is slow, and in which it hardly moves.
+    slow: Vec<[Vec<u32>; 2]>,
+    /// The same per motor of a coupled drive, with the joints that it moves.
+    motors: Vec<(Vec<bool>, [Vec<u32>; 2])>,
+    /// Per joint, rows at the torque limit.
+    saturated: Vec<Vec<u32>>,
+}
+
+impl Excluded {
+    fn of(motion: &Motion, plan: &Plan) -> Result<Self, PrepareError> {
+        let count = |flags: &dyn Fn(usize) -> bool| {
+            let mut sum = 0u32;
+            let mut all = vec![0];
+            all.extend((0..motion.t.len()).map(|k| {
+                sum += u32::from(flags(k));
+                sum
+            }));
+            all
+        };
+        Ok(Self {
+            slow: (motion.joints.iter().zip(&plan.treatment.speed_threshold))
+                .map(|(j, threshold)| {
+                    let hardly = |k: usize| j.qd[k].abs() < HARDLY * threshold;
+                    [count(&|k| j.slow[k]), count(&hardly)]
+                })
+                .collect(),
+            motors: slow_motors(motion, plan)?
+                .into_iter()
+                .map(|m| (m.moves, [count(&|k| m.slow[k]), count(&|k| m.hardly[k])]))
+                .collect(),
+            saturated: motion
+                .joints
+                .iter()
+                .map(|j| count(&|k| j.saturated[k]))
+                .collect(),
+        })
+    }
+
+    /// Decides if a window of joint `j` is used, from its first and last row, and counts it.
+    fn counted(
+        &self,
+        j: usize,
+        [start, end]: [usize; 2],
+        window: usize,
+        tally: &mut Tally,
+    ) -> bool {
+        let over = |c: &[u32]| c[end + 1] - c[start];
+        // Half a window without a sign of the velocity says little about friction.
+        let most = |[slow, hardly]: &[Vec<u32>; 2]| {
+            let rows = over(slow) as usize;
+            2 * rows > window || stays(rows, over(hardly) as usize, window)
+        };
+        let mut motors = self.motors.iter();
+        let still = most(&self.slow[j]) || motors.any(|(moves, c)| moves[j] && most(c));
+        let saturated = over(&self.saturated[j]) > 0;
+        if saturated {
+            Tally::count(&mut tally.saturated, j);
+        } else if still {
+            Tally::count(&mut tally.slow, j);
+        } else {
+            tally.used += 1;
+        }
+        !still && !saturated
+    }
 }
 
 /// Returns the filtered signs of the motors' speeds, for coupled drives.
