@@ -8,7 +8,7 @@ use crate::estimator::Estimator;
 use crate::options::ModelKind;
 use crate::structure::essential::EssentialSet;
 use crate::structure::excitation::NotExcited;
-use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::position::PositionTorque;
 use crate::unmodelled::tilt::BaseTilt;

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::problem::Problem;
-use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::jackknife::Refit;
 use crate::uncertainty::parts::Parts;
 

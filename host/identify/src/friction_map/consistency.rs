@@ -6,7 +6,7 @@
 
 use super::map::{FrictionFit, FrictionPoint};
 use super::rows::{PARTS, Rows, tenths};
-use crate::uncertainty::covariance::t_quantile;
+use crate::uncertainty::estimate::t_quantile;
 use rig_output::{format_significant, format_value};
 
 /// Largest searched shift between torque and position, s.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::map::{FrictionFit, FrictionPoint};
-use crate::uncertainty::covariance::t_quantile;
+use crate::uncertainty::estimate::t_quantile;
 
 /// p-value below which the Stribeck term is accepted. Its velocity exists only if the term does, so the F distribution
 /// is too optimistic (Davies 1977); a thousandth allows for that.

@@ -2,7 +2,7 @@
 
 use super::map::{DroppedPass, FrictionMapOptions, FrictionPoint};
 use super::passes::{Signal, Stretch, slope};
-use crate::uncertainty::covariance::Memory;
+use crate::uncertainty::memory::Memory;
 
 /// All rows of a sweep, moving or not.
 #[derive(Clone, Default)]

@@ -7,7 +7,7 @@ use super::rows::Rows;
 use crate::error::IdentifyError;
 use crate::identification::Identification;
 use crate::structure::chain::chain_of;
-use crate::treatment::cutoff::treatment_for;
+use crate::treatment::decide::treatment_for;
 use rig_data::prepare::{PrepareError, PrepareOptions, Recording, Survey, Treatment, each_motion};
 use rig_model::robot::Robot;
 

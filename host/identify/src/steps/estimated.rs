@@ -6,7 +6,7 @@ use super::own::{Own, own};
 use crate::error::IdentifyError;
 use crate::estimators::fit::Fit;
 use crate::estimators::problem::Problem;
-use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::fit_covariance::covariance;
 
 /// An estimate with its covariance.

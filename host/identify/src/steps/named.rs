@@ -7,7 +7,7 @@ use crate::estimator::Estimator;
 use crate::estimators::problem::Problem;
 use crate::identification::BaseParameter;
 use crate::structure::columns::expression;
-use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::estimate::Estimate;
 
 /// The identified combinations of standard parameters.
 pub(crate) struct Named {

@@ -2,7 +2,7 @@
 
 use crate::identification::BaseParameter;
 use crate::rows::factor::TriangularFactor;
-use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::estimate::Estimate;
 
 /// The estimate, its values of all base columns and its equations.
 pub(crate) struct Outcome<'a> {

@@ -8,7 +8,7 @@ use crate::estimator::Estimator;
 use crate::estimators::fitted::Fitted;
 use crate::estimators::problem::Problem;
 use crate::estimators::run::fit;
-use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::jackknife::LeaveOut;
 use crate::uncertainty::parts::Parts;
 

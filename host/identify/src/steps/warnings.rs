@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use crate::estimators::fit::MOST_PASSES;
 use crate::options::{ModelKind, Options};
 use crate::treatment::cutoff;
-use crate::uncertainty::covariance::Estimate;
+use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::lag::Lag;
 use rig_data::prepare::{Survey, Treatment};

@@ -14,20 +14,22 @@
 use rig_shared::multibody::Chain;
 use rig_shared::transmission::Transmission;
 
+use super::trial_rows::beginnings;
+use super::trial_rows::factors_of;
+use super::trial_rows::kept;
 use crate::error::IdentifyError;
 use crate::estimators::linear::by_noise;
-use crate::options::{ModelKind, Options};
 use crate::rows::cache::RowCache;
-use crate::rows::equation::Rows;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
-use crate::rows::stream::each_rows;
-use crate::structure::base::Base;
-use crate::structure::chain::{chain_of, transmission_of};
-use rig_data::prepare::{
-    Beginning, Choice, CutoffTrial, HIGHEST, PrepareOptions, Recording, Survey, Treatment, each_of,
-    threads, trimmed_rows,
-};
+use rig_data::prepare::Choice;
+use rig_data::prepare::CutoffTrial;
+use rig_data::prepare::HIGHEST;
+use rig_data::prepare::PrepareOptions;
+use rig_data::prepare::Recording;
+use rig_data::prepare::Survey;
+use rig_data::prepare::Treatment;
+use rig_data::prepare::trimmed_rows;
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 
@@ -43,9 +45,6 @@ const LEAST_PERIODS: f64 = 30.0;
 /// Band of the torque comparison, as a multiple of the joints' main motion frequency. Friction at a reversal has
 /// harmonics well above the motion, and a cut-off that blurs them must show in the residual.
 const HEADROOM: f64 = 10.0;
-/// Total length of the recordings in a trial, s: five periods of a usual motion of 10 s. Limits the cost for long
-/// recordings.
-const TRIAL_SECONDS: f64 = 50.0;
 /// Share of the RMS speed below which rows are excluded from the comparison: the sign of their speed is noise.
 const SLOW: f64 = 0.05;
 
@@ -60,33 +59,6 @@ pub(crate) struct Equations<'a> {
     pub columns: &'a [usize],
     /// True if the description has no effects beside the equations. Such effects would count as residual.
     pub complete: bool,
-}
-
-/// Decides the treatment of the `recordings` of `robot` without an identification.
-///
-/// # Errors
-/// [`IdentifyError`]: recordings that cannot be prepared; an invalid geometry.
-pub fn treatment_for(
-    robot: &Robot,
-    recordings: &[&dyn Recording],
-    surveys: Vec<Survey>,
-    options: &PrepareOptions,
-) -> Result<(Vec<Survey>, Treatment), IdentifyError> {
-    let (chain, transmission) = (chain_of(robot)?, transmission_of(robot)?);
-    let base = Base::structural(robot, ModelKind::Differential, Options::default().seed)?;
-    let equations = Equations {
-        chain: &chain,
-        transmission: &transmission,
-        columns: &base.columns,
-        complete: robot.effects.is_empty(),
-    };
-    decided(
-        equations,
-        recordings,
-        surveys,
-        options,
-        &robot.torque_limits(),
-    )
 }
 
 /// Decides the treatment of `recordings` as [`Treatment::decide`] does, with the cut-off that explains the torque best.
@@ -319,53 +291,6 @@ impl Comparison<'_> {
             relative_error: relative_errors(&factors),
         })
     }
-}
-
-/// Returns the beginnings of `recordings` that a trial uses.
-pub(crate) fn beginnings<'a>(
-    recordings: &[&'a dyn Recording],
-    treatment: &Treatment,
-) -> Vec<Beginning<'a>> {
-    let rows = (TRIAL_SECONDS * treatment.sample_rate) as usize / recordings.len().max(1);
-    (recordings.iter())
-        .map(|&recording| Beginning { recording, rows })
-        .collect()
-}
-
-/// Factorises the rows of each joint's equation for which `used` (arguments: rows, joint, row) is true.
-///
-/// # Errors
-/// [`IdentifyError`]: recordings that cannot be read.
-pub(crate) fn factors_of(
-    recordings: &[&dyn Recording],
-    plan: &Plan,
-    used: &(dyn Fn(&Rows, usize, usize) -> bool + Sync),
-) -> Result<Vec<TriangularFactor>, IdentifyError> {
-    let p = plan.columns.len();
-    let mut factors = vec![TriangularFactor::new(p); plan.loudness.len()];
-    for recording in recordings {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
-            each_of(
-                threads(plan.treatment.threads),
-                &mut factors,
-                &|k, factor| {
-                    let Some(equation) = rows.equations.get(k) else {
-                        return;
-                    };
-                    for i in (0..equation.y.len()).filter(|&i| used(rows, k, i)) {
-                        factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
-                    }
-                },
-            );
-            Ok(())
-        })?;
-    }
-    Ok(factors)
-}
-
-/// Returns true if a row is usable.
-pub(crate) fn kept(rows: &Rows, joint: usize, row: usize) -> bool {
-    rows.equations[joint].keep[row]
 }
 
 /// Returns the RMS residual of each joint over its RMS torque. The least-squares fit covers all joints and weights them

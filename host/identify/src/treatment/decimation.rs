@@ -8,8 +8,9 @@
 //!
 //! Limits: one band for all joints; noise below the narrowest band remains.
 
-use super::cutoff::{beginnings, kept};
 use super::left_out::{BETTER, Stretches};
+use super::trial_rows::beginnings;
+use super::trial_rows::kept;
 use crate::error::IdentifyError;
 use crate::rows::plan::Plan;
 use rig_data::prepare::{PrepareError, Recording, Treatment};

@@ -2,7 +2,9 @@
 
 pub(crate) mod band;
 pub(crate) mod cutoff;
+pub(crate) mod decide;
 pub(crate) mod decimation;
 pub(crate) mod left_out;
 pub(crate) mod speed;
+pub(crate) mod trial_rows;
 pub(crate) mod window;

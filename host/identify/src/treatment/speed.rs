@@ -1,7 +1,8 @@
 //! The speed above which friction is Coulomb and viscous, found from the recordings.
 
-use super::cutoff::{factors_of, kept};
 use super::left_out::{BETTER, Stretches};
+use super::trial_rows::factors_of;
+use super::trial_rows::kept;
 use crate::error::IdentifyError;
 use crate::estimators::linear::{by_noise, product};
 use crate::options::ModelKind;
@@ -9,7 +10,7 @@ use crate::rows::equation::Rows;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
 use crate::rows::stream::each_rows;
-use crate::uncertainty::covariance::Memory;
+use crate::uncertainty::memory::Memory;
 use rig_data::prepare::Recording;
 
 /// Share of the RMS speed above which rows are always used; no threshold is higher.

@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::{Estimate, Groups, Memory};
+use super::estimate::Estimate;
+use super::groups::Groups;
+use super::memory::Memory;
 use crate::error::IdentifyError;
 use crate::estimator::Loss;
 use crate::estimators::linear::{classical, kept_columns, product, spread};

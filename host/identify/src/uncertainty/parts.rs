@@ -3,8 +3,8 @@
 //! The same leave-one-out values give the covariance (delete-group jackknife, Shao & Tu 1995, ch. 2) and the
 //! cross-validated error. Neither needs a model of the residual's correlation.
 
-use super::covariance::Memory;
 use super::jackknife::{PARTS, Refit, joined, part_count, part_of};
+use super::memory::Memory;
 use crate::error::IdentifyError;
 use crate::estimators::linear::product;
 use crate::estimators::problem::Problem;

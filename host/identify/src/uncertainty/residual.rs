@@ -3,7 +3,9 @@
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
-use super::covariance::{FINEST_GROUPS, Memory, group_of};
+use super::groups::FINEST_GROUPS;
+use super::groups::group_of;
+use super::memory::Memory;
 
 /// Number of bins of a dependence plot.
 const BINS: usize = 20;

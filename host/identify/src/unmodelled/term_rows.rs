@@ -12,7 +12,7 @@ use crate::estimators::problem::Problem;
 use crate::options::ModelKind;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::stream::each_rows;
-use crate::uncertainty::covariance::Memory;
+use crate::uncertainty::memory::Memory;
 
 /// Prior standard deviation of the tilt of a base described as level, rad.
 const LEVEL: f64 = 0.1;
