@@ -35,22 +35,8 @@ impl Estimated {
             Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
             // Second pass: residuals of the fitted equations, for the covariance.
             None => {
-                let options = problem.options;
-                let loss = (fit.scales.as_ref()).map(|s| (options.loss, s.as_slice()));
-                let estimate = covariance(
-                    problem.training,
-                    problem.plan,
-                    options,
-                    &fit.factor,
-                    &fit.data,
-                    &fit.beta,
-                    &fit.weights,
-                    loss,
-                    fit.instants,
-                    beside
-                        .map(|full| problem.identified_covariance(full))
-                        .as_ref(),
-                )?;
+                let beside = beside.map(|full| problem.identified_covariance(full));
+                let estimate = covariance(problem, fit, beside.as_ref())?;
                 (estimate, fit.full())
             }
         };

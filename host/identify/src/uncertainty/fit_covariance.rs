@@ -6,33 +6,36 @@ use super::estimate::Estimate;
 use super::groups::Groups;
 use super::memory::Memory;
 use crate::error::IdentifyError;
-use crate::estimator::Loss;
+use crate::estimators::fit::Fit;
 use crate::estimators::linear::{classical, kept_columns, product, spread};
-use crate::options::Options;
-use crate::rows::factor::TriangularFactor;
-use crate::rows::plan::Plan;
+use crate::estimators::problem::Problem;
 use crate::rows::stream::each_rows;
-use crate::structure::independent::Independent;
-use rig_data::prepare::Recording;
 
-/// Returns the estimate with its covariance, from one pass over the fitted rows. `beside` is added to the covariance of
-/// the identified combinations.
+/// Returns the least-squares estimate with its covariance, from one pass over the fitted rows. `beside` is added to the
+/// covariance of the identified combinations.
 pub(crate) fn covariance(
-    training: &[&dyn Recording],
-    plan: &Plan,
-    options: &Options,
-    factor: &TriangularFactor,
-    data: &Independent,
-    beta: &[f64],
-    weights: &[f64],
-    loss: Option<(Loss, &[f64])>,
-    instants: u64,
+    problem: &Problem,
+    fit: &Fit,
     beside: Option<&DMatrix<f64>>,
 ) -> Result<Estimate, IdentifyError> {
+    let Problem {
+        training,
+        plan,
+        options,
+        ..
+    } = *problem;
+    let Fit {
+        factor,
+        data,
+        beta,
+        weights,
+        instants,
+        ..
+    } = fit;
     let (classical_std, inverse) = classical(factor, data, beta)?;
     let full = spread(beta, &data.kept, factor.columns());
     let (p, size) = (full.len(), beta.len());
-    let mut groups = Groups::new(size, instants);
+    let mut groups = Groups::new(size, *instants);
     let mut memories = vec![Memory::default(); weights.len()];
     let mut index = 0u64;
     let whiten = inverse.transpose();
@@ -49,8 +52,11 @@ pub(crate) fn covariance(
                     let e = equation.y[i] - product(x, &full);
                     memories[k].push(e);
                     let mut weight = options.row_weight(r) * weights[k];
-                    if let Some((loss, scale)) = loss {
-                        weight *= loss.weight(e / scale[k].max(f64::MIN_POSITIVE)).sqrt();
+                    if let Some(scale) = &fit.scales {
+                        weight *= options
+                            .loss
+                            .weight(e / scale[k].max(f64::MIN_POSITIVE))
+                            .sqrt();
                     }
                     for (to, &c) in x_kept.iter_mut().zip(&data.kept) {
                         *to = weight * x[c];
@@ -65,17 +71,9 @@ pub(crate) fn covariance(
     }
     let memory = memories.iter().map(Memory::length).fold(1.0, f64::max);
     let rows: u64 = memories.iter().map(Memory::seen).sum();
-    let (white, count) = groups.jackknife(memory).ok_or_else(|| {
-        let seconds = training.len() as f64
-            * instants as f64
-            * plan.treatment.decimation as f64
-            * plan.treatment.dt();
-        IdentifyError::TooShortForIntervals {
-            rows,
-            memory,
-            needed: (2.0 * seconds).ceil() as u64,
-        }
-    })?;
+    let (white, count) = groups
+        .jackknife(memory)
+        .ok_or_else(|| too_short(problem, *instants, rows, memory))?;
     let mut covariance = &inverse * white * inverse.transpose();
     if let Some(beside) = beside {
         covariance += beside;
@@ -90,4 +88,18 @@ pub(crate) fn covariance(
         rows,
         memory,
     ))
+}
+
+/// Returns the error for `instants` instants of `rows` rows whose residuals have a correlation time of `memory` rows.
+fn too_short(problem: &Problem, instants: u64, rows: u64, memory: f64) -> IdentifyError {
+    let treatment = problem.plan.treatment;
+    let seconds = problem.training.len() as f64
+        * instants as f64
+        * treatment.decimation as f64
+        * treatment.dt();
+    IdentifyError::TooShortForIntervals {
+        rows,
+        memory,
+        needed: (2.0 * seconds).ceil() as u64,
+    }
 }
