@@ -340,8 +340,8 @@ impl Remainder {
 /// A physically impossible feature of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataFault {
-    /// `sign`, `magnitude`, `unit`, `ratio`, `clock`, `swap`, `gravity`, `saturation`, `jump`, `too-short`, `not-moving`.
-    pub kind: String,
+    /// What is wrong.
+    pub kind: FaultKind,
     /// The affected columns.
     #[serde(skip)]
     pub about: About,
@@ -359,7 +359,75 @@ impl DataFault {
     /// Returns true if rows remain to fit. False if the recording cannot be prepared, is too short or does not move.
     pub fn leaves_rows(&self) -> bool {
         self.about != About::Preparation
-            && !["too-short", "not-moving"].contains(&self.kind.as_str())
+            && ![FaultKind::TooShort, FaultKind::NotMoving].contains(&self.kind)
+    }
+}
+
+/// Kind of a fault; serialises to [`Self::as_str`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "&'static str")]
+pub enum FaultKind {
+    /// A column or an axis with the wrong sense.
+    Sign,
+    /// A torque without its sign.
+    Magnitude,
+    /// A column in another unit.
+    Unit,
+    /// A column multiplied by a wrong gear ratio, or a wrong one in the description.
+    Ratio,
+    /// A time column that is broken, in another unit, or against which a torque is shifted.
+    Clock,
+    /// Columns in another order than the joints.
+    Swap,
+    /// A position from another zero.
+    Zero,
+    /// Another direction of gravity, or another mounting.
+    Gravity,
+    /// A torque at a limit.
+    Saturation,
+    /// A column with jumps.
+    Jump,
+    /// A column that repeats old values.
+    Held,
+    /// A signed column that was read as unsigned.
+    Unsigned,
+    /// Too few rows.
+    TooShort,
+    /// No motion.
+    NotMoving,
+}
+
+impl FaultKind {
+    /// Returns the name in results.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Sign => "sign",
+            Self::Magnitude => "magnitude",
+            Self::Unit => "unit",
+            Self::Ratio => "ratio",
+            Self::Clock => "clock",
+            Self::Swap => "swap",
+            Self::Zero => "zero",
+            Self::Gravity => "gravity",
+            Self::Saturation => "saturation",
+            Self::Jump => "jump",
+            Self::Held => "held",
+            Self::Unsigned => "unsigned",
+            Self::TooShort => "too-short",
+            Self::NotMoving => "not-moving",
+        }
+    }
+}
+
+impl From<FaultKind> for &'static str {
+    fn from(kind: FaultKind) -> Self {
+        kind.as_str()
+    }
+}
+
+impl std::fmt::Display for FaultKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.as_str())
     }
 }
 

@@ -15,7 +15,8 @@ use crate::outcome::{
     Absorbed, Before, DataFault, Described, Diagnosis, Residual, Step, Tried, Verdict,
 };
 use crate::recordings::encoder_zero::{another_zero, another_zero_held};
-use crate::result::finish::{Drawn, Found, finish};
+use crate::result::finish::finish;
+use crate::result::found::{Drawn, Found};
 use crate::result::remarks::{remarks, weight_of_a_spring};
 use crate::result::steps::{change_step, reconcile, steps};
 use crate::result::treatment::treated;

@@ -6,7 +6,8 @@
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::{Channel, Effect, GAINS, Instant, Kind, MEMORY, SHAPES, Scale};
 
-use crate::experiment::place::{Nominal, Place};
+use crate::experiment::nominal::{Held, Nominal};
+use crate::experiment::place::Place;
 use crate::experiment::primitives::Primitive;
 
 /// Independent torque values per second of a noise floor, as after a low-pass at 40 to 50 Hz.
@@ -15,15 +16,6 @@ pub const FLOOR_RATE: f64 = 100.0;
 const MOST: usize = 4000;
 /// Values tried for each of the rival's shapes.
 const STEPS: usize = 12;
-
-/// Nominal parameters of a joint that a refit keeps as described.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Held {
-    /// The direction of gravity.
-    pub gravity: bool,
-    /// The constant torque.
-    pub constant: bool,
-}
 
 /// A motion as instants, pass after pass.
 pub(crate) struct Course {

@@ -2,13 +2,58 @@
 
 use rig_shared::effects::{Confusion, Kind};
 
-use crate::experiment::primitives::Family;
+use crate::experiment::family::Family;
+
+/// Kind of a remedy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Remedy {
+    /// A log with the drive off.
+    DriveOffLog,
+    /// A motion without external loads.
+    PullsOff,
+    /// Current and voltage together.
+    CurrentAndVoltage,
+    /// Motions of one joint at a time.
+    OneJointAtATime,
+    /// A fast motion against gravity.
+    FastLift,
+    /// A motion over the whole range.
+    WholeRange,
+    /// One motion at two speeds.
+    FastAndSlow,
+    /// One motion with the base as it stands and turned.
+    BaseTurned,
+    /// A motion from cold to warm.
+    WarmUp,
+    /// One motion with two payloads.
+    PayloadSwap,
+    /// A motion alone.
+    Motion(Family),
+}
+
+impl Remedy {
+    /// Returns the name in results.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::DriveOffLog => OFF_LOG,
+            Self::PullsOff => PULLS_OFF,
+            Self::CurrentAndVoltage => "current-and-voltage",
+            Self::OneJointAtATime => "one-joint-at-a-time",
+            Self::FastLift => "fast-lift",
+            Self::WholeRange => "whole-range",
+            Self::FastAndSlow => "fast-and-slow",
+            Self::BaseTurned => "base-turned",
+            Self::WarmUp => "warm-up",
+            Self::PayloadSwap => "payload-swap",
+            Self::Motion(family) => family.name(),
+        }
+    }
+}
 
 /// The remedy for a pair.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Split {
-    /// Name in results.
-    pub(crate) kind: &'static str,
+    pub(crate) kind: Remedy,
     /// Sentences: what to do, to record and to expect; `{k}` is the joint's number.
     pub(crate) text: String,
     /// Motion to run, if any.
@@ -37,6 +82,21 @@ const WIDE: &str = "Run the sine over the whole range; record t, q{k} and tau{k}
 const SPEEDS: &str = "Run the constant speeds; record t, q{k} and tau{k}. What depends on the speed shows at constant speed, what remembers the last reversal has died out there.";
 const LOAD_OR_SPEED: &str = "Run the constant speeds; record t, q{k} and tau{k}. At constant speed no acceleration asks for torque, so that what is left belongs to the speed; what belongs to load or current shows where gravity is lifted slowly.";
 
+/// Laws of friction that falls as the joint starts to slide.
+const STRIBECK: [Kind; 2] = [Kind::Stribeck, Kind::StribeckExponential];
+/// Errors of encoders.
+const ENCODERS: [Kind; 2] = [
+    Kind::EncoderEccentricityMotor,
+    Kind::EncoderEccentricityJoint,
+];
+/// Effects that another load separates.
+const OF_LOAD: [Kind; 4] = [
+    Kind::TorqueRipple,
+    Kind::LoadFriction,
+    Kind::Cogging,
+    Kind::TorqueSaturation,
+];
+
 /// Returns the registry's entry on the pair.
 pub(crate) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
     let of = |x: Kind, y: Kind| {
@@ -46,86 +106,94 @@ pub(crate) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
     of(a, b).or_else(|| of(b, a))
 }
 
-/// Returns the remedy for the pair, by names of the registry.
-pub(crate) fn split([a, b]: [Kind; 2]) -> Split {
-    let [a_name, b_name] = [a.about().name, b.about().name];
-    let is = |x: &str, y: &str| (a_name == x && b_name == y) || (a_name == y && b_name == x);
-    let has = |x: &str| a_name == x || b_name == x;
-    let made = |kind, text: &str, motion| Split {
+/// Returns the remedy for the pair.
+pub(crate) fn split(pair: [Kind; 2]) -> Split {
+    (of_pair(pair).or_else(|| of_one(pair))).unwrap_or_else(|| of_registry(pair))
+}
+
+/// A motion that the rig alone can run.
+fn made(kind: Remedy, text: &str, motion: Family) -> Split {
+    Split {
         kind,
         text: text.to_owned(),
-        motion,
+        motion: Some(motion),
         hands: false,
-    };
-    let by_hand = |kind, text: &str, motion| Split {
+    }
+}
+
+/// A motion that is the remedy by itself.
+fn by_motion(motion: Family, text: &str) -> Split {
+    made(Remedy::Motion(motion), text, motion)
+}
+
+/// A remedy that needs more than the rig alone.
+fn by_hand(kind: Remedy, text: &str, motion: Family) -> Split {
+    Split {
         hands: true,
         ..made(kind, text, motion)
-    };
-    if has("current_offset") {
-        made(OFF_LOG, DRIVE_OFF, None)
-    } else if is("asymmetric_coulomb", "torque_offset") {
-        by_hand(PULLS_OFF, TAKE_OFF, Some(Family::ConstantSpeeds))
-    } else if has("drive_deadzone") {
-        by_hand(
-            "current-and-voltage",
-            CURRENT_TOO,
-            Some(Family::LockedRotor),
-        )
-    } else if has("inertia_coupling") {
-        made("one-joint-at-a-time", ONE_AT_A_TIME, Some(Family::Sine))
-    } else if is("joint_elasticity", "measurement_delay") {
-        made(Family::Chirp.name(), BEYOND_RESONANCE, Some(Family::Chirp))
-    } else if has("backlash") || has("joint_elasticity") {
-        made(
-            Family::ReversalsUnderLoad.name(),
-            GRAVITY_CLOSES,
-            Some(Family::ReversalsUnderLoad),
-        )
-    } else if is("payload", "gravity_tilt") {
-        made("fast-lift", LIFT, Some(Family::Sine))
-    } else if is("spring", "gravity_tilt") || is("spring", "torque_offset") {
-        made("whole-range", WIDE, Some(Family::Sine))
-    } else if has("encoder_eccentricity") && !has("gravity_tilt") {
-        made("fast-and-slow", FAST_AND_SLOW, Some(Family::Sine))
-    } else if has("gravity_tilt") {
-        by_hand("base-turned", TURNED, Some(Family::Sine))
-    } else if has("viscous_warmup") {
-        made("warm-up", COLD_AND_WARM, Some(Family::WarmUp))
-    } else if has("quadratic_drag") {
-        made(
-            Family::ConstantSpeeds.name(),
-            LOAD_OR_SPEED,
-            Some(Family::ConstantSpeeds),
-        )
-    } else if [
-        "torque_ripple",
-        "load_friction",
-        "cogging",
-        "torque_saturation",
-    ]
-    .into_iter()
-    .any(has)
-    {
-        by_hand("payload-swap", TWO_LOADS, Some(Family::ConstantSpeeds))
-    } else if has("stribeck") || has("presliding") {
-        made(
-            Family::ConstantSpeeds.name(),
-            SPEEDS,
-            Some(Family::ConstantSpeeds),
-        )
-    } else {
-        let known = confused([a, b]);
+    }
+}
+
+/// Returns the remedy for pairs with one of their own, and for kinds whose remedy comes before that of any pair.
+fn of_pair([a, b]: [Kind; 2]) -> Option<Split> {
+    let is = |x: Kind, y: Kind| [a, b] == [x, y] || [b, a] == [x, y];
+    let has = |kind: Kind| a == kind || b == kind;
+    let gear = has(Kind::Backlash) || has(Kind::JointElasticity);
+    Some(if has(Kind::CurrentOffset) {
         Split {
-            kind: Family::ConstantSpeeds.name(),
-            text: format!(
-                "Run the constant speeds; record t, q{{k}} and tau{{k}}. What tells them apart: {}.",
-                known.map_or(
-                    "the same motion with another payload and at another speed",
-                    |c| c.separated_by
-                )
-            ),
-            motion: Some(Family::ConstantSpeeds),
+            kind: Remedy::DriveOffLog,
+            text: DRIVE_OFF.to_owned(),
+            motion: None,
             hands: false,
         }
-    }
+    } else if is(Kind::AsymmetricCoulomb, Kind::TorqueOffset) {
+        by_hand(Remedy::PullsOff, TAKE_OFF, Family::ConstantSpeeds)
+    } else if has(Kind::DriveDeadzone) {
+        by_hand(Remedy::CurrentAndVoltage, CURRENT_TOO, Family::LockedRotor)
+    } else if has(Kind::InertiaCoupling) {
+        made(Remedy::OneJointAtATime, ONE_AT_A_TIME, Family::Sine)
+    } else if is(Kind::JointElasticity, Kind::MeasurementDelay) {
+        by_motion(Family::Chirp, BEYOND_RESONANCE)
+    } else if gear {
+        by_motion(Family::ReversalsUnderLoad, GRAVITY_CLOSES)
+    } else if is(Kind::Payload, Kind::GravityTilt) {
+        made(Remedy::FastLift, LIFT, Family::Sine)
+    } else if is(Kind::Spring, Kind::GravityTilt) || is(Kind::Spring, Kind::TorqueOffset) {
+        made(Remedy::WholeRange, WIDE, Family::Sine)
+    } else {
+        return None;
+    })
+}
+
+/// Returns the remedy by one kind of the pair.
+fn of_one([a, b]: [Kind; 2]) -> Option<Split> {
+    let has = |kinds: &[Kind]| kinds.contains(&a) || kinds.contains(&b);
+    let friction = has(&STRIBECK) || a.is_presliding() || b.is_presliding();
+    Some(if has(&ENCODERS) && !has(&[Kind::GravityTilt]) {
+        made(Remedy::FastAndSlow, FAST_AND_SLOW, Family::Sine)
+    } else if has(&[Kind::GravityTilt]) {
+        by_hand(Remedy::BaseTurned, TURNED, Family::Sine)
+    } else if a.is_warming() || b.is_warming() {
+        made(Remedy::WarmUp, COLD_AND_WARM, Family::WarmUp)
+    } else if has(&[Kind::QuadraticDrag]) {
+        by_motion(Family::ConstantSpeeds, LOAD_OR_SPEED)
+    } else if has(&OF_LOAD) {
+        by_hand(Remedy::PayloadSwap, TWO_LOADS, Family::ConstantSpeeds)
+    } else if friction {
+        by_motion(Family::ConstantSpeeds, SPEEDS)
+    } else {
+        return None;
+    })
+}
+
+/// Returns constant speeds, with the registry's words on what separates the pair.
+fn of_registry(pair: [Kind; 2]) -> Split {
+    let text = format!(
+        "Run the constant speeds; record t, q{{k}} and tau{{k}}. What tells them apart: {}.",
+        confused(pair).map_or(
+            "the same motion with another payload and at another speed",
+            |c| c.separated_by
+        )
+    );
+    by_motion(Family::ConstantSpeeds, &text)
 }

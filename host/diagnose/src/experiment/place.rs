@@ -4,26 +4,17 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::trajectory::Trajectory;
 
 use crate::DiagnoseError;
-use crate::experiment::criterion::Held;
-use crate::experiment::primitives::{Hands, Primitive};
-use rig_excite::COASTING;
+use crate::experiment::family::Hands;
+use crate::experiment::nominal::{Held, Nominal};
 use rig_identify::chain_of;
 use rig_model::batch::ModelBatch;
 use rig_model::robot::{JointKind, Robot};
 use rig_plant::emulated::Nameplate;
 
-/// Nominal parameters of one joint while the others stand: inertia, gravity with cos q and with sin q, viscous and
-/// Coulomb friction, offset; SI.
-pub type Nominal = [f64; 6];
-
 /// Usable share of the torque limit.
 const TORQUE: f64 = 0.8;
 /// Integration steps in half a period of a coasting joint.
 const COAST_STEPS: u32 = 10;
-/// Period of a coasting joint's samples, s.
-const COAST_PERIOD: f64 = 0.01;
-/// Share of the friction assumed to keep a joint within its range.
-const SURE_OF_FRICTION: f64 = 0.5;
 /// Instants at which the torque is checked.
 const LOOKS: usize = 2000;
 
@@ -186,18 +177,6 @@ impl Place {
                 middle
             })
             .collect()
-    }
-
-    /// Returns true if a joint with its drive off stays within its range with half its friction.
-    pub(crate) fn stops(&self, primitive: &Primitive) -> bool {
-        let Some(off) = primitive.drive_off else {
-            return true;
-        };
-        let at = primitive.trajectory.at(off);
-        let begin = [primitive.start + at.position, at.velocity];
-        let rows = (COASTING / COAST_PERIOD) as usize;
-        let way = self.coast(begin, SURE_OF_FRICTION, COAST_PERIOD, rows);
-        self.nominal[0] > 0.0 && (way.iter()).all(|[q, ..]| (self.low..=self.high).contains(q))
     }
 
     /// Returns the torque of gravity per first moment along x.

@@ -8,6 +8,7 @@ use rig_shared::trajectory::{
     Chirp, Fourier, FrictionSweep, Reference, SlowReversals, Staircase, Sweep, Trajectory,
 };
 
+use crate::experiment::family::{Family, Hands};
 use crate::experiment::place::Place;
 
 /// Used share of each limit.
@@ -19,6 +20,10 @@ const LONGEST: f64 = 120.0;
 const WARM_UP: f64 = 600.0;
 /// Shortest time at constant speed before and after switching off, s: a host on a slow line is late by less.
 const CRUISE: f64 = 0.25;
+/// Period of a coasting joint's samples, s.
+const COAST_PERIOD: f64 = 0.01;
+/// Share of the friction assumed to keep a joint within its range.
+const SURE_OF_FRICTION: f64 = 0.5;
 /// Share of the amplitude in the second chirp.
 const AGAIN: f64 = 0.3;
 /// Torque levels of a clamped joint, as shares of the usable torque: up and down in both directions, to show what
@@ -30,94 +35,6 @@ const LEVELS: [f64; 13] = [
 const CLAMPED: f64 = 0.4;
 /// Peak velocity and acceleration of the quintic, per distance over time and over time squared.
 const QUINTIC: [f64; 2] = [1.875, 5.773_502_691_896_26];
-
-/// Purpose of a motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Family {
-    /// Forth and back at several constant speeds.
-    ConstantSpeeds,
-    /// Slow triangles of decreasing amplitude.
-    NestedReversals,
-    /// The same at the strongest gravity, which closes a gap.
-    ReversalsUnderLoad,
-    /// Swept sine, and again at a third of its amplitude.
-    Chirp,
-    /// A slow move to each of several levels after a dwell.
-    RampsAfterRest,
-    /// A sine at one frequency.
-    Sine,
-    /// A sine repeated for ten minutes from cold.
-    WarmUp,
-    /// A constant speed; the drive is switched off in the middle.
-    CoastDown,
-    /// Position levels that a clamped joint cannot reach, which become levels of torque and voltage.
-    LockedRotor,
-}
-
-impl Family {
-    /// All families in which the joint moves.
-    pub const MOVING: [Self; 8] = [
-        Self::ConstantSpeeds,
-        Self::NestedReversals,
-        Self::ReversalsUnderLoad,
-        Self::Chirp,
-        Self::RampsAfterRest,
-        Self::Sine,
-        Self::WarmUp,
-        Self::CoastDown,
-    ];
-
-    /// Returns the name in results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ConstantSpeeds => "constant-speed-pairs",
-            Self::NestedReversals => "nested-reversals",
-            Self::ReversalsUnderLoad => "reversals-under-load",
-            Self::Chirp => "two-amplitude-chirp",
-            Self::RampsAfterRest => "ramps-after-rest",
-            Self::Sine => "sine",
-            Self::WarmUp => "warm-up",
-            Self::CoastDown => "coast-down",
-            Self::LockedRotor => "locked-rotor-staircase",
-        }
-    }
-}
-
-/// Manual work between the passes of one motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hands {
-    /// Nothing: one pass.
-    None,
-    /// A second pass with a payload.
-    Payload,
-    /// A second pass with the base turned so that gravity has no effect.
-    BaseOnItsSide,
-}
-
-impl Hands {
-    /// Returns the factors on inertia and gravity of the link in each pass.
-    pub(crate) fn passes(self) -> &'static [[f64; 2]] {
-        match self {
-            Self::None => &[[1.0, 1.0]],
-            // A payload of half the link's mass stays well within the reserve of the limits.
-            Self::Payload => &[[1.0, 1.0], [1.5, 1.5]],
-            Self::BaseOnItsSide => &[[1.0, 1.0], [1.0, 0.0]],
-        }
-    }
-
-    /// Returns sentences: the work, and how to use the recordings.
-    pub(crate) fn text(self) -> &'static str {
-        match self {
-            Self::None => "Give what it records with --data beside the others.",
-            Self::Payload => {
-                "Record it twice: as the robot is, and with a payload of about half the link's mass fixed to it. Diagnose each by itself, the second with the payload in its description."
-            }
-            Self::BaseOnItsSide => {
-                "Record it twice: as the robot stands, and with the base turned on its side so that the joint's axis is vertical. Diagnose each by itself, the second with `gravity` along that axis in its description."
-            }
-        }
-    }
-}
 
 /// A motion of one joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,6 +86,18 @@ impl Primitive {
         }
         way
     }
+
+    /// Returns true if the joint, once its drive is off, stays within its range with half its friction.
+    fn stops(&self, place: &Place) -> bool {
+        let Some(off) = self.drive_off else {
+            return true;
+        };
+        let at = self.trajectory.at(off);
+        let begin = [self.start + at.position, at.velocity];
+        let rows = (COASTING / COAST_PERIOD) as usize;
+        let way = place.coast(begin, SURE_OF_FRICTION, COAST_PERIOD, rows);
+        place.nominal[0] > 0.0 && (way.iter()).all(|[q, ..]| (place.low..=place.high).contains(q))
+    }
 }
 
 fn micros(seconds: f64) -> Option<u32> {
@@ -189,121 +118,129 @@ impl Allowance {
         by_velocity.max((QUINTIC[1] * distance / self.acceleration).sqrt())
     }
 
+    /// Returns a motion of a family within these limits, and its figures in words; `None` if there is none.
     fn build(&self, family: Family, unit: &str) -> Option<(Trajectory<f64>, String)> {
-        let (a, v) = (self.distance, self.velocity);
         match family {
-            Family::ConstantSpeeds => {
-                let slowest = v / 20.0;
-                let speeds: Vec<f64> = (0..8)
-                    .map(|k| slowest * 20f64.powf(f64::from(k) / 7.0))
-                    .collect();
-                let ramp = 1.5 * v / self.acceleration;
-                let travel = (2.0 * a - v * ramp).min(6.0 * slowest);
-                let half = 0.5 * (travel + v * ramp);
-                let sweep = FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half))?;
-                let text = format!(
-                    "eight constant speeds from {slowest:.4} to {v:.4} {unit}/s, both ways, over {:.3} {unit} in all",
-                    2.0 * sweep.half_span
-                );
-                Some((Trajectory::FrictionSweep(sweep), text))
-            }
-            Family::NestedReversals | Family::ReversalsUnderLoad => {
-                let turn = (3.0 * v / self.acceleration).max(0.05);
-                let least = 1.3 * v * turn;
-                let mut amplitudes: Vec<f64> =
-                    [1.0, 0.3, 0.1].iter().map(|s| (s * a).max(least)).collect();
-                amplitudes.dedup();
-                let motion = SlowReversals::new(v, turn, &amplitudes, 3)?;
-                let text = format!(
-                    "three slow triangles each of {} {unit} to either side at {v:.4} {unit}/s",
-                    amplitudes
-                        .iter()
-                        .map(|a| format!("{a:.4}"))
-                        .collect::<Vec<_>>()
-                        .join(", ")
-                );
-                Some((Trajectory::SlowReversals(motion), text))
-            }
-            Family::Chirp => {
-                let start_hz = 0.25 * v / (TAU * a);
-                let end_hz = (4.0 * self.acceleration / (TAU * v)).max(8.0 * start_hz);
-                let duration = (5.0 * (end_hz / start_hz).log2() / start_hz).min(0.5 * LONGEST);
-                let text = format!(
-                    "a swept sine from {start_hz:.3} to {end_hz:.2} Hz of up to {a:.4} {unit}, and again at {AGAIN} of its amplitude"
-                );
-                Some((
-                    Trajectory::Chirp(Chirp {
-                        start_hz,
-                        end_hz,
-                        sweep: Sweep::Logarithmic,
-                        duration_us: micros(duration)?,
-                        ramp_us: micros((0.5 / start_hz).min(0.1 * duration))?,
-                        amplitude: a,
-                        velocity: v,
-                        acceleration: self.acceleration,
-                        again: AGAIN,
-                    }),
-                    text,
-                ))
-            }
-            Family::RampsAfterRest => {
-                let moving = self.move_time(0.5 * a);
-                let levels = [1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0];
-                let text = format!(
-                    "steps of {:.4} {unit} up and down in {moving:.2} s each, after rests of 4 s",
-                    0.5 * a
-                );
-                Some((
-                    Trajectory::Staircase(Staircase {
-                        levels: levels.iter().map(|l| 0.5 * a * l).collect(),
-                        move_us: micros(moving)?,
-                        dwell_us: 4_000_000,
-                    }),
-                    text,
-                ))
-            }
-            Family::CoastDown => {
-                let ramp = 1.5 * v / self.acceleration;
-                let travel = (2.0 * a - v * ramp).min(4.0 * CRUISE * v);
-                if travel < 2.0 * CRUISE * v {
-                    return None;
-                }
-                let half = 0.5 * (travel + v * ramp);
-                let sweep = FrictionSweep::new(&[v], travel, ramp, 0.2, self.move_time(half))?;
-                let text = format!(
-                    "a pass at {v:.4} {unit}/s, in the middle of which the drive is switched off and the joint coasts"
-                );
-                Some((Trajectory::FrictionSweep(sweep), text))
-            }
+            Family::ConstantSpeeds => self.constant_speeds(unit),
+            Family::NestedReversals | Family::ReversalsUnderLoad => self.reversals(unit),
+            Family::Chirp => self.chirp(unit),
+            Family::RampsAfterRest => self.ramps(unit),
+            Family::CoastDown => self.coast_down(unit),
             // A clamped joint has no speed.
             Family::LockedRotor => None,
-            Family::Sine | Family::WarmUp => {
-                let omega = (v / a).min((self.acceleration / a).sqrt());
-                let period = TAU / omega;
-                let long = if family == Family::Sine {
-                    30.0
-                } else {
-                    WARM_UP
-                };
-                let periods = (long / period).clamp(5.0, f64::from(u16::MAX)) as u16;
-                // Leaves room for the envelope at the ends.
-                let amplitude = 0.9 * a;
-                let text = format!(
-                    "{periods} periods of a sine of {amplitude:.4} {unit} at {:.3} Hz",
-                    1.0 / period
-                );
-                Some((
-                    Trajectory::Fourier(Fourier {
-                        period_us: micros(period)?,
-                        periods,
-                        ramp_us: micros(2.0 * period)?,
-                        sine: [amplitude].into_iter().collect(),
-                        cosine: core::iter::empty().collect(),
-                    }),
-                    text,
-                ))
-            }
+            Family::Sine => self.sine(30.0, unit),
+            Family::WarmUp => self.sine(WARM_UP, unit),
         }
+    }
+
+    fn constant_speeds(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+        let (a, v) = (self.distance, self.velocity);
+        let slowest = v / 20.0;
+        let speeds: Vec<f64> = (0..8)
+            .map(|k| slowest * 20f64.powf(f64::from(k) / 7.0))
+            .collect();
+        let ramp = 1.5 * v / self.acceleration;
+        let travel = (2.0 * a - v * ramp).min(6.0 * slowest);
+        let half = 0.5 * (travel + v * ramp);
+        let sweep = FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half))?;
+        let text = format!(
+            "eight constant speeds from {slowest:.4} to {v:.4} {unit}/s, both ways, over {:.3} {unit} in all",
+            2.0 * sweep.half_span
+        );
+        Some((Trajectory::FrictionSweep(sweep), text))
+    }
+
+    fn reversals(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+        let (a, v) = (self.distance, self.velocity);
+        let turn = (3.0 * v / self.acceleration).max(0.05);
+        let least = 1.3 * v * turn;
+        let mut amplitudes: Vec<f64> = [1.0, 0.3, 0.1].iter().map(|s| (s * a).max(least)).collect();
+        amplitudes.dedup();
+        let motion = SlowReversals::new(v, turn, &amplitudes, 3)?;
+        let text = format!(
+            "three slow triangles each of {} {unit} to either side at {v:.4} {unit}/s",
+            amplitudes
+                .iter()
+                .map(|a| format!("{a:.4}"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        );
+        Some((Trajectory::SlowReversals(motion), text))
+    }
+
+    fn chirp(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+        let (a, v) = (self.distance, self.velocity);
+        let start_hz = 0.25 * v / (TAU * a);
+        let end_hz = (4.0 * self.acceleration / (TAU * v)).max(8.0 * start_hz);
+        let duration = (5.0 * (end_hz / start_hz).log2() / start_hz).min(0.5 * LONGEST);
+        let text = format!(
+            "a swept sine from {start_hz:.3} to {end_hz:.2} Hz of up to {a:.4} {unit}, and again at {AGAIN} of its amplitude"
+        );
+        let chirp = Chirp {
+            start_hz,
+            end_hz,
+            sweep: Sweep::Logarithmic,
+            duration_us: micros(duration)?,
+            ramp_us: micros((0.5 / start_hz).min(0.1 * duration))?,
+            amplitude: a,
+            velocity: v,
+            acceleration: self.acceleration,
+            again: AGAIN,
+        };
+        Some((Trajectory::Chirp(chirp), text))
+    }
+
+    fn ramps(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+        let a = self.distance;
+        let moving = self.move_time(0.5 * a);
+        let levels = [1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0];
+        let text = format!(
+            "steps of {:.4} {unit} up and down in {moving:.2} s each, after rests of 4 s",
+            0.5 * a
+        );
+        let staircase = Staircase {
+            levels: levels.iter().map(|l| 0.5 * a * l).collect(),
+            move_us: micros(moving)?,
+            dwell_us: 4_000_000,
+        };
+        Some((Trajectory::Staircase(staircase), text))
+    }
+
+    fn coast_down(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+        let (a, v) = (self.distance, self.velocity);
+        let ramp = 1.5 * v / self.acceleration;
+        let travel = (2.0 * a - v * ramp).min(4.0 * CRUISE * v);
+        if travel < 2.0 * CRUISE * v {
+            return None;
+        }
+        let half = 0.5 * (travel + v * ramp);
+        let sweep = FrictionSweep::new(&[v], travel, ramp, 0.2, self.move_time(half))?;
+        let text = format!(
+            "a pass at {v:.4} {unit}/s, in the middle of which the drive is switched off and the joint coasts"
+        );
+        Some((Trajectory::FrictionSweep(sweep), text))
+    }
+
+    /// Returns a sine of about `long` seconds.
+    fn sine(&self, long: f64, unit: &str) -> Option<(Trajectory<f64>, String)> {
+        let (a, v) = (self.distance, self.velocity);
+        let omega = (v / a).min((self.acceleration / a).sqrt());
+        let period = TAU / omega;
+        let periods = (long / period).clamp(5.0, f64::from(u16::MAX)) as u16;
+        // Leaves room for the envelope at the ends.
+        let amplitude = 0.9 * a;
+        let text = format!(
+            "{periods} periods of a sine of {amplitude:.4} {unit} at {:.3} Hz",
+            1.0 / period
+        );
+        let sine = Fourier {
+            period_us: micros(period)?,
+            periods,
+            ramp_us: micros(2.0 * period)?,
+            sine: [amplitude].into_iter().collect(),
+            cosine: core::iter::empty().collect(),
+        };
+        Some((Trajectory::Fourier(sine), text))
     }
 }
 
@@ -394,10 +331,8 @@ pub(crate) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Prim
                     drive_off,
                     figures,
                 };
-                (fits
-                    && place.bears(&primitive.trajectory, start, hands)
-                    && place.stops(&primitive))
-                .then_some(primitive)
+                (fits && place.bears(&primitive.trajectory, start, hands) && primitive.stops(place))
+                    .then_some(primitive)
             });
             list.extend(found);
         }

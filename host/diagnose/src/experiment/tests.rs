@@ -5,11 +5,18 @@ use std::path::Path;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+use rig_shared::effects::{Effect, Kind};
 use rig_shared::safety::Limits;
+use rig_shared::trajectory::Trajectory;
 
-use crate::experiment::criterion::access;
+use crate::experiment::choice::{DECIDES, best, closest, rate};
+use crate::experiment::criterion::{Course, access};
+use crate::experiment::place::Place;
+use crate::experiment::primitives::of_family;
+use crate::experiment::proposal::file_of;
 use crate::experiment::*;
-use rig_model::robot::{EMPS, ONE_LINK_TEMPLATE, template};
+use rig_excite::{COASTING, TrajectoryFile};
+use rig_model::robot::{EMPS, ONE_LINK_TEMPLATE, Robot, template};
 
 fn robot() -> Robot {
     Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()

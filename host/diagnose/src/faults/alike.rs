@@ -9,12 +9,12 @@
 //! joints, which have no period.
 
 use crate::DiagnoseError;
+use crate::faults::described::{Described, columns};
 use crate::faults::fit::Fit;
-use crate::faults::model::Judge;
+use crate::faults::judge::Judge;
 use crate::faults::rows::Rows;
-use crate::faults::senses::{Described, columns};
-use crate::faults::trial::Suspicion;
-use crate::outcome::About;
+use crate::faults::suspicion::Suspicion;
+use crate::outcome::{About, FaultKind};
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
 
@@ -89,7 +89,7 @@ impl Judge<'_> {
             && three.iter().all(|s| apart(*s, factor) < RIGHT);
         Ok(alike.then(|| {
             let fault = self.say(
-                "ratio",
+                FaultKind::Ratio,
                 About::Torque,
                 j,
                 format!(

@@ -7,13 +7,14 @@
 use nalgebra::DMatrix;
 
 use crate::DiagnoseError;
+use crate::faults::described::{Described, friction};
 use crate::faults::fit::{Fit, about_mean};
-use crate::faults::model::{EXACT, GOOD, Judge, MUCH_BETTER, POOR, TRIAL};
+use crate::faults::judge::Judge;
+use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
 use crate::faults::rows::Rows;
-use crate::faults::senses::{Described, friction};
-use crate::faults::trial::Suspicion;
+use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::{Columns, Undo};
-use crate::outcome::{About, DataFault};
+use crate::outcome::{About, DataFault, FaultKind};
 
 /// Least fall of the log residual variances, summed over joints, to believe a transformation: one joint's falls to a
 /// tenth. A description may be far off, and a transformation may improve it by chance.
@@ -180,7 +181,7 @@ impl Judge<'_> {
             _ => ["q", "tau"],
         };
         let or = match found.twin {
-            _ if column == "q" && self.reference_against(j) => {
+            _ if about != About::Torque && self.reference_against(j) => {
                 format!(", against which ref{n} runs as well,")
             }
             true => format!(" (or {other}{n})"),
@@ -190,7 +191,7 @@ impl Judge<'_> {
             "{column}{n}{or} is counted the other way round: reversed, {}; reverse it.",
             found.compared()
         );
-        self.say("sign", about, j, text)
+        self.say(FaultKind::Sign, about, j, text)
     }
 
     fn axis_said(&self, j: usize, found: &Found) -> DataFault {
@@ -199,7 +200,7 @@ impl Judge<'_> {
             "q{n} and tau{n} are both counted the other way round, so the axis of joint {name} points the other way than the description says: with both reversed {}; reverse the joint's axis in the description, or both columns.",
             found.compared()
         );
-        self.say("sign", About::Motion, j, text)
+        self.say(FaultKind::Sign, About::Motion, j, text)
     }
 
     /// Returns the residual share of each torque's variance: by the description, which has few free numbers, if it

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::DiagnoseError;
 use crate::faults::names;
-use crate::outcome::{About, DataFault};
+use crate::outcome::{About, DataFault, FaultKind};
 use rig_data::prepare::{Recording, first_block};
 use rig_data::runs::Run;
 use rig_data::runs::{JointRun, resolution};
@@ -33,7 +33,7 @@ const STEPS: f64 = 3.0;
 
 /// Returns true if a column has no derivative or no size to compare with a model: every joint would look wrong.
 pub(crate) fn spoils_the_model(fault: &DataFault) -> bool {
-    fault.certain && ["jump", "held", "unsigned"].contains(&fault.kind.as_str())
+    fault.certain && [FaultKind::Jump, FaultKind::Held, FaultKind::Unsigned].contains(&fault.kind)
 }
 
 /// Returns the name of the recording.
@@ -45,13 +45,13 @@ pub(crate) fn label(runs: &[&Run]) -> String {
 /// Returns a fault of the recording.
 pub(crate) fn fault(
     runs: &[&Run],
-    kind: &str,
+    kind: FaultKind,
     about: About,
     joint: &str,
     text: String,
 ) -> DataFault {
     DataFault {
-        kind: kind.to_owned(),
+        kind,
         about,
         recording: label(runs),
         joint: joint.to_owned(),
@@ -92,7 +92,7 @@ pub(crate) fn too_short(runs: &[&Run]) -> Option<DataFault> {
     (rows < FEWEST || time < SHORTEST).then(|| {
         fault(
             runs,
-            "too-short",
+            FaultKind::TooShort,
             About::Recording,
             "",
             format!(
@@ -140,7 +140,7 @@ pub(crate) fn too_short_to_judge(runs: &[Run]) -> Option<DataFault> {
     (moving < LEAST_TO_JUDGE).then(|| {
         fault(
             &all,
-            "too-short",
+            FaultKind::TooShort,
             About::Recording,
             "",
             format!(
@@ -157,9 +157,9 @@ fn too_short_as(what: &str, runs: &[&Run]) -> Option<DataFault> {
     // The sum of an empty list is −0.
     let moving = 0.0 + runs.iter().map(|run| in_motion(run)).sum::<f64>();
     let (kind, held) = match () {
-        () if time < LEAST_TO_LEARN => ("too-short", format!("{time:.2} s in all")),
+        () if time < LEAST_TO_LEARN => (FaultKind::TooShort, format!("{time:.2} s in all")),
         () if moving < LEAST_TO_LEARN => (
-            "not-moving",
+            FaultKind::NotMoving,
             format!(
                 "{moving:.1} s of motion beyond the noise and the steps of its position, in {time:.1} s"
             ),
@@ -190,12 +190,18 @@ pub(crate) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
     };
     plausibility(&block, robot).first().map(|found| {
         let Implausible::NotSeconds { step } = found else {
-            return fault(runs, "clock", About::Recording, "", found.to_string());
+            return fault(
+                runs,
+                FaultKind::Clock,
+                About::Recording,
+                "",
+                found.to_string(),
+            );
         };
         let unit = unit_of_steps(*step);
         fault(
             runs,
-            "clock",
+            FaultKind::Clock,
             About::Recording,
             "",
             format!("t looks like {unit}: its steps are {step:.4}, where seconds would be right."),
@@ -282,13 +288,13 @@ fn of_column(robot: &Robot, problem: &Implausible) -> Option<(usize, DataFault)>
     };
     let joint = joint.saturating_sub(1);
     let kind = match problem {
-        Implausible::Jump { .. } | Implausible::Spike { .. } => "jump",
-        Implausible::HeldPosition { .. } | Implausible::HeldEffort { .. } => "held",
-        Implausible::Unsigned { .. } => "unsigned",
-        _ => "unit",
+        Implausible::Jump { .. } | Implausible::Spike { .. } => FaultKind::Jump,
+        Implausible::HeldPosition { .. } | Implausible::HeldEffort { .. } => FaultKind::Held,
+        Implausible::Unsigned { .. } => FaultKind::Unsigned,
+        _ => FaultKind::Unit,
     };
     let fault = DataFault {
-        kind: kind.to_owned(),
+        kind,
         about,
         recording: String::new(),
         joint: robot.joints.get(joint)?.name.clone(),
@@ -316,7 +322,7 @@ pub(crate) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
     if (-2.0..-0.5).contains(&factor) {
         return Some(fault(
             runs,
-            "sign",
+            FaultKind::Sign,
             About::Motion,
             &joint.name,
             format!(
@@ -326,7 +332,7 @@ pub(crate) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
     }
     let of_velocity = names::of_velocity(joint, factor).map(|name| {
         (
-            "unit",
+            FaultKind::Unit,
             format!("qd{n} looks like {}; give it in {unit}", name.text),
         )
     });
@@ -338,7 +344,7 @@ pub(crate) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
         let unnamed = format!(
             "give it in {unit}, and check the gear ratio, the counts of the encoder and the clock"
         );
-        ("ratio", unnamed)
+        (FaultKind::Ratio, unnamed)
     });
     Some(fault(
         runs,
@@ -372,7 +378,7 @@ pub(crate) fn at_limit(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
     (share > AT_LIMIT).then(|| {
         fault(
             runs,
-            "saturation",
+            FaultKind::Saturation,
             About::Torque,
             &joint.name,
             format!(

@@ -6,12 +6,13 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::DiagnoseError;
 use crate::faults::columns::fault;
+use crate::faults::described::friction;
 use crate::faults::fit::{Fit, about_mean};
-use crate::faults::model::{GOOD, Judge};
+use crate::faults::judge::Judge;
+use crate::faults::levels::GOOD;
 use crate::faults::rows::Rows;
-use crate::faults::senses::friction;
-use crate::faults::trial::Suspicion;
-use crate::outcome::{About, DataFault};
+use crate::faults::suspicion::Suspicion;
+use crate::outcome::{About, DataFault, FaultKind};
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
 
@@ -106,7 +107,7 @@ impl Judge<'_> {
                 hundredths((theta + PI).rem_euclid(TAU) - PI),
             )
         };
-        let fault = self.say("gravity", About::Recording, 0, text);
+        let fault = self.say(FaultKind::Gravity, About::Recording, 0, text);
         // The wave's direction shows it; a trial of masses does not.
         Ok(Some(Suspicion { fault, undo: None }))
     }
@@ -174,7 +175,7 @@ impl Judge<'_> {
         };
         fault(
             self.runs,
-            "gravity",
+            FaultKind::Gravity,
             About::Recording,
             "",
             format!(

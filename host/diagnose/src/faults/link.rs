@@ -1,7 +1,7 @@
 //! Faults of a link encoder.
 
 use crate::faults::{columns, names};
-use crate::outcome::{About, DataFault};
+use crate::outcome::{About, DataFault, FaultKind};
 use rig_data::jumps;
 use rig_data::runs::Run;
 use rig_model::robot::{JointKind, Robot};
@@ -13,7 +13,7 @@ const TOGETHER: [f64; 2] = [0.8, 1.25];
 pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault> {
     let joint = robot.joints.get(k)?;
     let n = k + 1;
-    let named = |kind: &str, text: String| {
+    let named = |kind: FaultKind, text: String| {
         Some(columns::fault(runs, kind, About::Motion, &joint.name, text))
     };
     for run in runs {
@@ -23,7 +23,7 @@ pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
         // Its zero is free, so only a jump is a fault.
         if jumps(&run.t, reading) {
             return named(
-                "jump",
+                FaultKind::Jump,
                 format!(
                     "ql{n} jumps from one row to the next, as where counts are lost or an angle begins again after a turn; give it unwrapped."
                 ),
@@ -37,7 +37,7 @@ pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
     }
     if factor.abs() < 1e-4 {
         return named(
-            "not-moving",
+            FaultKind::NotMoving,
             format!(
                 "ql{n} stands still while q{n} moves; check that the encoder on the link is alive."
             ),
@@ -49,14 +49,14 @@ pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
     };
     if (-most..-least).contains(&factor) {
         return named(
-            "sign",
+            FaultKind::Sign,
             format!("ql{n} moves against q{n}; reverse its sense."),
         );
     }
     let (kind, what) = names::of_position(joint, 1.0 / factor).map_or_else(
         || {
             let unnamed = format!("give it in {unit} of the joint, and check its counts");
-            ("unit", unnamed)
+            (FaultKind::Unit, unnamed)
         },
         |name| (name.kind(), name.text),
     );

@@ -6,12 +6,12 @@
 //!
 //! Leaves out: a sign that is lost only above a level.
 
+use crate::faults::described::Described;
 use crate::faults::fit::Fit;
-use crate::faults::model::Judge;
-use crate::faults::senses::Described;
-use crate::faults::trial::Suspicion;
+use crate::faults::judge::Judge;
+use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::About;
+use crate::outcome::{About, FaultKind};
 
 /// Least share of the moving rows in each direction.
 const BOTH_WAYS: f64 = 0.1;
@@ -53,7 +53,7 @@ impl Judge<'_> {
         let n = j + 1;
         let share = 100.0 * turned as f64 / senses.len() as f64;
         let fault = self.say(
-            "magnitude",
+            FaultKind::Magnitude,
             About::Torque,
             j,
             format!(

@@ -11,8 +11,12 @@
 mod alike;
 mod candidates;
 mod columns;
+mod described;
+mod factors;
 mod fit;
 mod gravity;
+mod judge;
+mod levels;
 mod link;
 mod magnitude;
 mod model;
@@ -24,7 +28,9 @@ mod place;
 pub(crate) mod refusal;
 mod rotor;
 mod rows;
+mod search;
 mod senses;
+mod suspicion;
 mod trial;
 mod undo;
 mod wave;
@@ -35,7 +41,7 @@ mod tests;
 pub(crate) use columns::{moves, spoilt_columns, too_short_to_judge, too_short_to_learn};
 
 use crate::DiagnoseError;
-use crate::outcome::{About, DataFault};
+use crate::outcome::{About, DataFault, FaultKind};
 use rig_data::Source;
 use rig_data::prepare::{Beginning, LowPass, Recording, Resampled};
 use rig_data::runs::Run;
@@ -72,7 +78,7 @@ pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseErr
             if !any {
                 found.push(columns::fault(
                     &own,
-                    "not-moving",
+                    FaultKind::NotMoving,
                     About::Recording,
                     "",
                     "No joint moves by more than the noise of its encoder; record a motion, or check that the position column is alive.".to_owned(),
@@ -109,9 +115,12 @@ pub fn faults_at_start(
         return Ok(Vec::new());
     }
     let mut found = faults(robot, &runs)?;
-    found.retain(|fault| !["not-moving", "too-short"].contains(&fault.kind.as_str()));
+    found.retain(|fault| ![FaultKind::NotMoving, FaultKind::TooShort].contains(&fault.kind));
     // The fit excludes rows at a limit.
-    for fault in found.iter_mut().filter(|fault| fault.kind == "saturation") {
+    for fault in found
+        .iter_mut()
+        .filter(|fault| fault.kind == FaultKind::Saturation)
+    {
         fault.certain = false;
     }
     Ok(found)
@@ -130,7 +139,7 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
         .iter()
         .all(|run| run.joints.len() == n && run.joints.iter().all(|j| j.tau.len() == j.q.len()));
     let mut judged = if torque {
-        model::Judge::new(robot, runs)?.faults()?
+        judge::Judge::new(robot, runs)?.faults()?
     } else {
         Vec::new()
     };

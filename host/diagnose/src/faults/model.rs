@@ -1,35 +1,27 @@
 //! Faults of clocks, torque cuts and position scales, by a refitted simple model.
 
-use nalgebra::DMatrix;
-
 use crate::DiagnoseError;
-use crate::faults::candidates::Found;
-use crate::faults::columns::fault;
 use crate::faults::fit::{Fit, Measured};
+use crate::faults::judge::Judge;
+use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
 use crate::faults::names;
-use crate::faults::rows::{Form, Rows};
-use crate::faults::trial::Suspicion;
+use crate::faults::rows::Rows;
+use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, DataFault};
-use rig_data::runs::Run;
-use rig_identify::preference;
-use rig_model::robot::{JointKind, Robot};
+use crate::outcome::{About, DataFault, FaultKind};
+use rig_model::robot::JointKind;
 use rig_output::format_trimmed;
 
-/// Residual share of the torque's variance above which other units or times are tried.
-pub(crate) const POOR: f64 = 0.1;
-/// The same for a single joint, whose few parameters cannot compensate a wrong unit or time; and for a shift in time of
-/// any robot, as many parameters of a slow arm compensate most of it.
+/// Residual share of the torque's variance above which other units or times are tried for a single joint, whose few
+/// parameters cannot compensate them; and for a shift in time of any robot, as many parameters of a slow arm compensate
+/// most of it.
 const POOR_ALONE: f64 = 0.01;
-/// … and ratio of residuals below which a trial is believed, if its own is below [`GOOD`] too.
+/// Ratio of residuals below which a trial is believed, if its own is below [`GOOD`] too.
 const BETTER: f64 = 0.35;
 /// Ratio of residuals below which a shift is suspected; the trial decides.
 const LESS: f64 = 0.7;
-/// The same for factors that no unit has and for a reversed position, which any model may prefer by chance.
-pub(crate) const MUCH_BETTER: f64 = 0.2;
-/// … and for a small misfit.
+/// The same as [`MUCH_BETTER`] for a small misfit.
 const FAR_BETTER: f64 = 0.1;
-pub(crate) const GOOD: f64 = 0.2;
 /// Largest shift from filters and buses instead of clocks, s: half a row. The second is for several joints, whose many
 /// parameters may prefer a small shift by chance.
 const SHIFT: [f64; 2] = [0.01, 0.03];
@@ -48,140 +40,10 @@ const STIRS: f64 = 0.01;
 const OUTSIDE: f64 = 0.2;
 /// Relative difference below which two factors are the same.
 const SAME: f64 = 0.1;
-/// Rows of one trial.
-pub(crate) const TRIAL: usize = 500;
-/// Share of a torque's variance that rounding leaves, the least scale of data without noise.
-pub(crate) const EXACT: f64 = 1e-6;
 
-/// One recording, compared with models of the robot.
-pub(crate) struct Judge<'a> {
-    pub(crate) robot: &'a Robot,
-    pub(crate) runs: &'a [&'a Run],
-    pub(crate) form: Form,
-    pub(crate) rows: Rows,
-    pub(crate) order: Vec<usize>,
-    pub(crate) matrices: Vec<DMatrix<f64>>,
-    pub(crate) fits: Vec<Option<Fit>>,
-}
-
-pub(crate) fn model_error(error: impl ToString) -> DiagnoseError {
-    DiagnoseError::Model(error.to_string())
-}
-
-impl<'a> Judge<'a> {
-    pub(crate) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
-        Self::of_rows(robot, runs, Rows::of(runs, robot.joints.len()))
-    }
-
-    fn of_rows(robot: &'a Robot, runs: &'a [&'a Run], rows: Rows) -> Result<Self, DiagnoseError> {
-        let form = Form::of(robot)?;
-        let kinds: Vec<JointKind> = robot.joints.iter().map(|j| j.kind).collect();
-        let mut order = preference(&kinds);
-        order.extend(order.len()..form.width());
-        let matrices = rows.regressors(&form)?;
-        let fits = matrices
-            .iter()
-            .zip(&rows.tau)
-            .map(|(x, y)| Fit::of(x, y, &order))
-            .collect();
-        Ok(Self {
-            robot,
-            runs,
-            form,
-            rows,
-            order,
-            matrices,
-            fits,
-        })
-    }
-
-    /// Returns the faults in the torque that no other explanation fits better. A certain fault is undone and the search
-    /// repeats without its consequences.
-    pub(crate) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
-        let n = self.robot.joints.len();
-        let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
-        let (mut found, mut undo) = self.tried(self.suspicions()?)?;
-        let lost = found
-            .iter()
-            .any(|fault| fault.kind == "magnitude" && fault.certain);
-        if !clipped.is_empty() && !lost {
-            return Ok(clipped);
-        }
-        let mut rows = self.rows.clone();
-        for _ in 0..n {
-            // Undoing a fault of the description gives another robot.
-            let Some(one) = undo.filter(|undo| !undo.is_of_robot()) else {
-                break;
-            };
-            rows = one.applied(self.robot, &rows);
-            let without = Judge::of_rows(self.robot, self.runs, rows.clone())?;
-            let (more, next) = without.tried(without.suspicions()?)?;
-            let new = |fault: &DataFault| fault.certain && !found.contains(fault);
-            let more: Vec<DataFault> = more.into_iter().filter(|fault| new(fault)).collect();
-            found.extend(more);
-            undo = next;
-        }
-        Ok(found)
-    }
-
-    /// Returns the faults that the torque suggests.
-    fn suspicions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
-        let n = self.robot.joints.len();
-        // The last joint's torque needs the fewest described links.
-        let described = self.stated(&self.rows, n.saturating_sub(1))?;
-        let described = described.as_ref();
-        let mut all: Vec<Suspicion> = (0..n)
-            .filter_map(|j| self.magnitude(j, described))
-            .collect();
-        // Factors that the torques show without a description.
-        let free = self.positions()?;
-        let known = |found: &Found| {
-            let of_free = |own: &Suspicion| own.undo.as_ref().is_some_and(|undo| found.is_of(undo));
-            free.iter().any(of_free)
-        };
-        let mut transformed = self.transformed()?;
-        transformed.retain(|found| !known(found));
-        all.extend(free);
-        let (turned, others): (Vec<_>, Vec<_>) =
-            transformed.into_iter().partition(|found| found.is_sense());
-        let (zeros, others): (Vec<_>, Vec<_>) =
-            others.into_iter().partition(|found| found.is_zero());
-        all.extend(others.iter().filter_map(|found| self.said(found)));
-        all.extend((0..n).filter_map(|j| self.shifted(j)));
-        all.extend(self.thousandfold(described));
-        all.extend(self.single_zero()?);
-        for j in (0..n).filter(|j| self.stirs(*j)) {
-            let before = all.len();
-            all.extend(self.against_description(j, described)?);
-            all.extend(self.sign(j, described)?);
-            if all.len() == before {
-                all.extend(self.alike(j, described)?);
-            }
-            all.extend(self.heavy_rotor(j)?);
-        }
-        // Senses and zeros come last: other explanations of a recording are likelier.
-        let last = turned.iter().chain(&zeros);
-        all.extend(last.filter_map(|found| self.said(found)));
-        // A suspicion with two reasons is tried once.
-        let mut once: Vec<Suspicion> = Vec::new();
-        for own in all {
-            if once.iter().all(|other| !other.is_like(&own)) {
-                once.push(own);
-            }
-        }
-        Ok(once)
-    }
-
-    pub(crate) fn name(&self, joint: usize) -> &str {
-        &self.robot.joints[joint].name
-    }
-
-    pub(crate) fn say(&self, kind: &str, about: About, joint: usize, text: String) -> DataFault {
-        fault(self.runs, kind, about, self.name(joint), text)
-    }
-
+impl Judge<'_> {
     /// Returns a fault if a torque was cut where the motion needs more: a fit to the other rows exceeds the cut.
-    fn clipped(&self, j: usize) -> Option<DataFault> {
+    pub(crate) fn clipped(&self, j: usize) -> Option<DataFault> {
         let cut = &self.rows.cut[j];
         let (at, free): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
         if at.len() < 10 || 50 * at.len() < cut.len() {
@@ -205,7 +67,7 @@ impl<'a> Judge<'a> {
         (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level)).then(
             || {
                 self.say(
-                    "saturation",
+                    FaultKind::Saturation,
                     About::Torque,
                     j,
                     format!(
@@ -219,7 +81,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Suspects a torque that is shifted in time against the motion.
-    fn shifted(&self, j: usize) -> Option<Suspicion> {
+    pub(crate) fn shifted(&self, j: usize) -> Option<Suspicion> {
         let fit = self.fits[j].as_ref()?;
         if fit.unexplained() < POOR_ALONE {
             return None;
@@ -246,7 +108,7 @@ impl<'a> Judge<'a> {
         (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
             let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
             let fault = self.say(
-                "clock",
+                FaultKind::Clock,
                 About::Torque,
                 j,
                 format!(
@@ -263,7 +125,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Suspects positions that gravity and coupling show as multiples of the joint's.
-    fn positions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
+    pub(crate) fn positions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
         let n = self.robot.joints.len();
         let left: Vec<f64> = self
             .fits
@@ -352,7 +214,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Returns true if a joint moves enough to show the sense of friction and inertia; a held joint gives way a little.
-    fn stirs(&self, j: usize) -> bool {
+    pub(crate) fn stirs(&self, j: usize) -> bool {
         let q = &self.rows.q[j];
         extreme(q, f64::max) - extreme(q, f64::min) > STIRS
     }
@@ -386,14 +248,14 @@ impl<'a> Judge<'a> {
             .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));
         let best = factors.first().copied().unwrap_or(1.0);
         let (kind, factor, what) = match named {
-            Some((_, name)) if best < 0.0 => ("sign", best, format!("reverse it; {}", name.text)),
-            None if (best + 1.0).abs() < SAME => ("sign", best, "reverse it".to_owned()),
+            Some((_, name)) if best < 0.0 => (FaultKind::Sign, best, format!("reverse it; {}", name.text)),
+            None if (best + 1.0).abs() < SAME => (FaultKind::Sign, best, "reverse it".to_owned()),
             None if best < 0.0 => {
-                ("sign", best, "reverse it, and check its factor".to_owned())
+                (FaultKind::Sign, best, "reverse it, and check its factor".to_owned())
             }
             Some((factor, name)) => (name.kind(), factor, name.text),
             None => (
-                "ratio",
+                FaultKind::Ratio,
                 best,
                 "check the gear ratio, the counts of the encoder and the unit (turns for rad ask for 6.28)".to_owned(),
             ),

@@ -1,5 +1,6 @@
 //! Names of the factors between a column and its right value.
 
+use crate::outcome::FaultKind;
 use rig_model::robot::{Joint, JointKind};
 use rig_output::format_trimmed;
 
@@ -50,8 +51,12 @@ pub(crate) struct Name {
 
 impl Name {
     /// Returns the kind of the fault.
-    pub(crate) fn kind(&self) -> &'static str {
-        if self.ratio { "ratio" } else { "unit" }
+    pub(crate) fn kind(&self) -> FaultKind {
+        if self.ratio {
+            FaultKind::Ratio
+        } else {
+            FaultKind::Unit
+        }
     }
 }
 

@@ -2,9 +2,9 @@
 
 use crate::DiagnoseError;
 use crate::faults::candidates::{Before, Found};
-use crate::faults::model::Judge;
+use crate::faults::judge::Judge;
 use crate::faults::undo::{Columns, Undo};
-use crate::outcome::{About, DataFault};
+use crate::outcome::{About, DataFault, FaultKind};
 use rig_output::listed;
 
 impl Judge<'_> {
@@ -97,7 +97,7 @@ impl Judge<'_> {
                 found.compared()
             ),
         };
-        self.say("swap", about, first, text)
+        self.say(FaultKind::Swap, about, first, text)
     }
 }
 

@@ -11,10 +11,10 @@ use core::f64::consts::{PI, TAU};
 use crate::DiagnoseError;
 use crate::faults::candidates::Before;
 use crate::faults::columns::fault;
-use crate::faults::model::Judge;
+use crate::faults::judge::Judge;
 use crate::faults::names;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, DataFault};
+use crate::outcome::{About, DataFault, FaultKind};
 use rig_model::robot::JointKind;
 use rig_output::{format_significant, format_trimmed};
 
@@ -110,7 +110,7 @@ impl Judge<'_> {
             if angle < 0.0 { "−" } else { "+" },
             format_significant(angle.abs(), 3)
         );
-        self.say("zero", About::Motion, j, text)
+        self.say(FaultKind::Zero, About::Motion, j, text)
     }
 
     /// Returns one factor of all positions as a fault of the recording.
@@ -123,7 +123,7 @@ impl Judge<'_> {
         };
         fault(
             self.runs,
-            "unit",
+            FaultKind::Unit,
             About::Motion,
             "",
             format!(

@@ -1,6 +1,6 @@
 //! Diagnosis of recordings with a certain fault.
 
-use crate::outcome::{About, Before, DataFault, Diagnosis, Residual, Verdict};
+use crate::outcome::{About, Before, DataFault, Diagnosis, FaultKind, Residual, Verdict};
 use crate::result::sentences;
 use rig_data::prepare::PrepareError;
 use rig_model::robot::Robot;
@@ -8,15 +8,15 @@ use rig_model::robot::Robot;
 /// Returns the fault of a recording that prevents its preparation.
 pub(crate) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
     let (kind, label) = match error {
-        PrepareError::TooShort { label, .. } => ("too-short", label),
-        PrepareError::NotMoving { label, .. } => ("not-moving", label),
+        PrepareError::TooShort { label, .. } => (FaultKind::TooShort, label),
+        PrepareError::NotMoving { label, .. } => (FaultKind::NotMoving, label),
         PrepareError::Broken { label, .. } | PrepareError::Irregular { label, .. } => {
-            ("clock", label)
+            (FaultKind::Clock, label)
         }
         _ => return None,
     };
     Some(DataFault {
-        kind: kind.into(),
+        kind,
         about: About::Preparation,
         recording: label.clone(),
         joint: String::new(),

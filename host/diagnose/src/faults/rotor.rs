@@ -7,10 +7,10 @@
 //! Leaves out: motors that move several joints; ratios that are too small, which make the rotor lighter.
 
 use crate::DiagnoseError;
-use crate::faults::model::Judge;
-use crate::faults::trial::Suspicion;
+use crate::faults::judge::Judge;
+use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::About;
+use crate::outcome::{About, FaultKind};
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
 
@@ -46,7 +46,7 @@ impl Judge<'_> {
             JointKind::Prismatic => "kg",
         };
         let fault = self.say(
-            "ratio",
+            FaultKind::Ratio,
             About::Torque,
             j,
             format!(

@@ -5,7 +5,6 @@ use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission};
 
 use crate::DiagnoseError;
-use crate::faults::model::model_error;
 use rig_data::runs::Run;
 use rig_identify::{chain_of, transmission_of};
 use rig_model::batch::ChainBatch;
@@ -15,6 +14,11 @@ use rig_model::robot::Robot;
 const RATE: f64 = 50.0;
 /// Most rows; a column's fault is the same in all of them.
 const MOST: usize = 6000;
+
+/// Returns an error of the model.
+pub(crate) fn model_error(error: impl ToString) -> DiagnoseError {
+    DiagnoseError::Model(error.to_string())
+}
 
 /// Structure of the regressors: links, and drives that move more than their own joint.
 pub(crate) struct Form {

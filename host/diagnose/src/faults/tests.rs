@@ -162,7 +162,7 @@ fn named(robot: &Robot, runs: &[Run], kind: &str, joint: usize, words: &str, cer
     }
     assert!(!found.is_empty(), "nothing found: {kind} {words}");
     for fault in &found {
-        assert_eq!(fault.kind, kind, "{}", fault.text);
+        assert_eq!(fault.kind.as_str(), kind, "{}", fault.text);
         assert_eq!(fault.joint, robot.joints[joint].name);
         assert!(fault.text.contains(words), "{words}: {}", fault.text);
     }
@@ -324,7 +324,7 @@ fn says(robot: &Robot, runs: &[Run], kind: &str, words: &str) -> bool {
     let right = !found.is_empty()
         && found
             .iter()
-            .all(|f| f.kind == kind && f.text.contains(words));
+            .all(|f| f.kind.as_str() == kind && f.text.contains(words));
     if !right {
         println!("{words}: {found:?}");
     }
@@ -462,7 +462,7 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
         assert!(
             found
                 .iter()
-                .any(|f| f.kind == "clock" || f.text.contains("units of q1 and t"))
+                .any(|f| f.kind.as_str() == "clock" || f.text.contains("units of q1 and t"))
         );
     }
     let mut run = runs[0].clone();
@@ -470,9 +470,12 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
     run.rate /= 1000.0;
     let found = faults(&robot, std::slice::from_ref(&run)).unwrap();
     assert_eq!(found.len(), 1);
-    assert!(found[0].kind == "clock" && found[0].text.contains("milliseconds"));
+    assert!(found[0].kind.as_str() == "clock" && found[0].text.contains("milliseconds"));
     let still = injured(&runs[..1], |r| r.joints[0].q_raw.fill(0.3));
-    assert_eq!(faults(&robot, &still).unwrap()[0].kind, "not-moving");
+    assert_eq!(
+        faults(&robot, &still).unwrap()[0].kind.as_str(),
+        "not-moving"
+    );
     let mut two = runs.clone();
     two[1].joints[0] = still[0].joints[0].clone();
     two[1].t = still[0].t.clone();
@@ -527,5 +530,5 @@ fn an_encoder_on_the_link_is_checked_like_the_joint_s_own() {
     both[1].recording = 1;
     let found = faults(&robot, &both).unwrap();
     assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!(found[0].kind, "sign");
+    assert_eq!(found[0].kind.as_str(), "sign");
 }

@@ -13,9 +13,11 @@
 
 use crate::DiagnoseError;
 use crate::faults::fit::Measured;
-use crate::faults::model::{GOOD, Judge};
+use crate::faults::judge::Judge;
+use crate::faults::levels::GOOD;
 use crate::faults::physical::{Belief, INDEPENDENT, Load, Physical, Score};
 use crate::faults::rows::{Form, Rows};
+use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
 use crate::outcome::DataFault;
 use rig_model::robot::Robot;
@@ -33,29 +35,6 @@ const ODDS: f64 = 6.9;
 const EXACT: f64 = 1e-4;
 /// Heaviest payload as a multiple of the links' mass: a tool may weigh many times a light link.
 const CARRIED: f64 = 30.0;
-
-/// A suspected fault.
-#[derive(Clone, Debug)]
-pub(crate) struct Suspicion {
-    pub(crate) fault: DataFault,
-    /// How it is undone; `None` if columns alone show it, without a model.
-    pub(crate) undo: Option<Undo>,
-}
-
-impl Suspicion {
-    pub(crate) fn new(fault: DataFault, undo: Undo) -> Self {
-        Self {
-            fault,
-            undo: Some(undo),
-        }
-    }
-
-    /// Returns true if both are undone alike.
-    pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let both = self.undo.as_ref().zip(other.undo.as_ref());
-        both.is_some_and(|(own, other)| own.is_like(other))
-    }
-}
 
 /// Scores of a recording under each belief.
 struct Reading {

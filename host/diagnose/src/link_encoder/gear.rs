@@ -4,9 +4,10 @@ use rig_shared::effects::{Kind, SHAPES};
 
 use crate::fit::least_squares::Fit;
 use crate::levels::CLOSED_TEETH;
+use crate::link_encoder::analysis::{Solved, Term, TransmissionAnalysis};
 use crate::link_encoder::contact::Contact;
 use crate::link_encoder::law::{Law, Laws};
-use crate::link_encoder::{Solved, Term, TransmissionAnalysis, law};
+use crate::link_encoder::sizes::spread;
 
 /// Standard deviations above which stiffness, damping and link friction are identifiable.
 const TOLD: f64 = 3.0;
@@ -81,7 +82,7 @@ impl TransmissionAnalysis<'_, '_> {
             // Too stiff to identify: takes the least detectable stiffness.
             None => {
                 let [a, std] = of(&|t| *t == Term::Load).unwrap_or([0.0, 0.0]);
-                let least = equation.resolution / law::spread(equation, &equation.load);
+                let least = equation.resolution / spread(equation, &equation.load);
                 [(a + TOLD * std).max(least), f64::INFINITY]
             }
         };

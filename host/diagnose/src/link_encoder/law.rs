@@ -7,24 +7,17 @@ use crate::fit::least_squares::Fit;
 use crate::levels::SIGNIFICANT;
 use crate::link_encoder::contact::Contact;
 use crate::link_encoder::equation::Equation;
+use crate::link_encoder::sizes::{
+    LEAST_SHARE, LEAST_SHARE_OF_THE_JOINT, LEAST_SIGMAS, least, swing,
+};
 use crate::outcome::Tried;
 use crate::rows::regression::Column;
 use rig_model::robot::title_of;
 
-/// Least RMS share that a law removes: one of half the noise's size removes as much.
-pub(crate) const LEAST_SHARE: f64 = 0.1;
-/// … for a wave over the joint's turn.
-const LEAST_SHARE_OF_THE_JOINT: f64 = 0.3;
-/// … and in standard deviations.
-pub(crate) const LEAST_SIGMAS: f64 = 2.0;
-/// Least size of backlash or twist, in steps of the coarser encoder.
-const LEAST_STEPS: f64 = 2.0;
 /// Share of a law's reduction below which another law beside it only corrects its error.
 const SHADOW: f64 = 0.05;
 /// Most accepted laws, including those removed again.
 const MOST: usize = 6;
-/// Approximate ratio of peak-to-peak to RMS, for any form of signal.
-const SWING: f64 = 3.0;
 
 /// A law of q − ql.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -240,24 +233,6 @@ fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) 
     let least = least(equation);
     (size < least)
         .then(|| format!("its {size:.1e} are less than two steps of the encoders, {least:.1e}"))
-}
-
-/// Returns the least peak-to-peak backlash or twist.
-pub(crate) fn least(equation: &Equation) -> f64 {
-    LEAST_STEPS * equation.resolution
-}
-
-/// Returns the peak-to-peak gear torque, N·m or N.
-pub(crate) fn swing(equation: &Equation) -> f64 {
-    SWING * spread(equation, &equation.load)
-}
-
-/// Returns the RMS of a column about its mean.
-pub(crate) fn spread(equation: &Equation, column: &Column) -> f64 {
-    let n = equation.rows.count.max(1) as f64;
-    let of = || column[0].iter().flatten();
-    let mean = of().sum::<f64>() / n;
-    (of().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
 impl Laws {

@@ -4,9 +4,10 @@ use crate::DiagnoseError;
 use crate::acceptance::coordinates::Coordinate;
 use crate::recordings::context::PreparedData;
 use crate::rows::regression::{Column, Rows, combined};
+use crate::rows::thinning::Thinning;
 use rig_data::prepare::central_difference;
-use rig_data::runs::Run;
-use rig_model::robot::Robot;
+use rig_data::runs::{JointRun, Run};
+use rig_model::robot::{Drive, Robot};
 
 /// Index of the resistance among the nominal columns.
 pub(crate) const CURRENT: usize = 0;
@@ -71,12 +72,7 @@ impl Equation {
         if torque_per_ampere == 0.0 || !alone || !recorded {
             return Ok(None);
         }
-        let thinning = &prepared.rows.thinning;
-        let mut columns = vec![Vec::new(); COLUMNS];
-        let [mut voltage, mut current, mut speed] = [const { Vec::new() }; 3];
-        let mut dead = vec![Vec::new(); FADES.len()];
-        let mut keep = Vec::new();
-        let mut starts = vec![0];
+        let mut collected = Collected::default();
         let rate = prepared.runs[0].rate;
         for run in prepared.runs.iter().chain(clamped) {
             if (run.rate / rate - 1.0).abs() > SAME_RATE {
@@ -88,63 +84,25 @@ impl Equation {
                     ),
                 });
             }
-            let joint = &run.joints[joint];
-            let Some(u) = &joint.voltage else { continue };
-            let i: Vec<f64> = (joint.recorded().iter())
-                .map(|t| t / torque_per_ampere)
-                .collect();
-            let scaled = |signal: &[f64]| -> Vec<f64> {
-                signal.iter().map(|x| drive.gear_ratio * x).collect()
-            };
-            let omega = scaled(&joint.qd);
-            thinning.push_raw(u, &mut voltage);
-            thinning.push_raw(&i, &mut columns[CURRENT]);
-            thinning.push_raw(
-                &central_difference(&i, 1.0 / run.rate),
-                &mut columns[CHANGE],
-            );
-            thinning.push(&omega, &mut columns[SPEED]);
-            thinning.push(&scaled(&joint.qdd), &mut columns[ACCELERATION]);
-            thinning.push(&vec![1.0; i.len()], &mut columns[CONSTANT]);
-            // Sign of the current without its noise.
-            let smooth = thinning.smooth(&i);
-            let saturated: Vec<f64> = (smooth.iter().zip(&omega))
-                .map(|(i, omega)| i * i * omega)
-                .collect();
-            thinning.push_raw(&saturated, &mut columns[SATURATION]);
-            for (dead, fade) in dead.iter_mut().zip(FADES) {
-                let lost: Vec<f64> = smooth.iter().map(|i| lost(*i, fade)).collect();
-                thinning.push_raw(&lost, dead);
-            }
-            let mut coasts = vec![0.0; i.len()];
-            for own in &run.coasting {
-                coasts[own.clone()].fill(1.0);
-            }
-            let mut share = Vec::new();
-            thinning.push_raw(&coasts, &mut share);
-            keep.extend(share.iter().map(|s| s.abs() < COASTS));
-            thinning.pick(&smooth, &mut current);
-            thinning.pick(&omega, &mut speed);
-            starts.push(speed.len());
+            collected.push(&prepared.rows.thinning, run, &run.joints[joint], drive);
         }
-        let count = voltage.len();
         let one = |values: Vec<f64>| -> Column { vec![Some(values)] };
         Ok(Some(Self {
             rows: Rows {
-                thinning: thinning.clone(),
-                count,
-                starts,
+                thinning: prepared.rows.thinning.clone(),
+                count: collected.voltage.len(),
+                starts: collected.starts,
                 period: prepared.rows.period,
-                torque: vec![voltage],
-                keep: vec![keep],
+                torque: vec![collected.voltage],
+                keep: vec![collected.keep],
                 legible: Vec::new(),
                 clear: Vec::new(),
-                nominal: columns.into_iter().map(one).collect(),
+                nominal: collected.columns.map(one).into(),
             },
-            dead_zones: dead.into_iter().map(one).collect(),
+            dead_zones: collected.dead_zones.map(one).into(),
             torque_per_ampere,
-            current,
-            speed,
+            current: collected.current,
+            speed: collected.speed,
         }))
     }
 
@@ -186,6 +144,76 @@ impl Equation {
             })
             .sum();
         (squares / self.rows.used(0).max(1) as f64).sqrt()
+    }
+}
+
+/// Columns of the equation so far, in the order of the runs; see [`Equation`].
+struct Collected {
+    voltage: Vec<f64>,
+    columns: [Vec<f64>; COLUMNS],
+    dead_zones: [Vec<f64>; FADES.len()],
+    /// True for rows with the drive on.
+    keep: Vec<bool>,
+    starts: Vec<usize>,
+    current: Vec<f64>,
+    speed: Vec<f64>,
+}
+
+impl Default for Collected {
+    fn default() -> Self {
+        Self {
+            voltage: Vec::new(),
+            columns: [const { Vec::new() }; COLUMNS],
+            dead_zones: [const { Vec::new() }; FADES.len()],
+            keep: Vec::new(),
+            starts: vec![0],
+            current: Vec::new(),
+            speed: Vec::new(),
+        }
+    }
+}
+
+impl Collected {
+    /// Appends the rows of a run of `joint`, if its voltage was recorded.
+    fn push(&mut self, thinning: &Thinning, run: &Run, joint: &JointRun, drive: &Drive) {
+        let Some(u) = &joint.voltage else { return };
+        let torque_per_ampere = drive.gear_ratio * drive.torque_constant;
+        let i: Vec<f64> = (joint.recorded().iter())
+            .map(|t| t / torque_per_ampere)
+            .collect();
+        let scaled =
+            |signal: &[f64]| -> Vec<f64> { signal.iter().map(|x| drive.gear_ratio * x).collect() };
+        let omega = scaled(&joint.qd);
+        let columns = &mut self.columns;
+        thinning.push_raw(u, &mut self.voltage);
+        thinning.push_raw(&i, &mut columns[CURRENT]);
+        thinning.push_raw(
+            &central_difference(&i, 1.0 / run.rate),
+            &mut columns[CHANGE],
+        );
+        thinning.push(&omega, &mut columns[SPEED]);
+        thinning.push(&scaled(&joint.qdd), &mut columns[ACCELERATION]);
+        thinning.push(&vec![1.0; i.len()], &mut columns[CONSTANT]);
+        // Sign of the current without its noise.
+        let smooth = thinning.smooth(&i);
+        let saturated: Vec<f64> = (smooth.iter().zip(&omega))
+            .map(|(i, omega)| i * i * omega)
+            .collect();
+        thinning.push_raw(&saturated, &mut columns[SATURATION]);
+        for (dead, fade) in self.dead_zones.iter_mut().zip(FADES) {
+            let lost: Vec<f64> = smooth.iter().map(|i| lost(*i, fade)).collect();
+            thinning.push_raw(&lost, dead);
+        }
+        let mut coasts = vec![0.0; i.len()];
+        for own in &run.coasting {
+            coasts[own.clone()].fill(1.0);
+        }
+        let mut share = Vec::new();
+        thinning.push_raw(&coasts, &mut share);
+        self.keep.extend(share.iter().map(|s| s.abs() < COASTS));
+        thinning.pick(&smooth, &mut self.current);
+        thinning.pick(&omega, &mut self.speed);
+        self.starts.push(self.speed.len());
     }
 }
 

@@ -6,7 +6,7 @@ use crate::DiagnoseError;
 use crate::columns::candidate::Candidate;
 use crate::columns::kinds::is_constant;
 use crate::fit::least_squares::Fit;
-use crate::motor_voltage::Winding;
+use crate::motor_voltage::winding::Winding;
 use crate::outcome::Step;
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::{FittedCandidate, equal};

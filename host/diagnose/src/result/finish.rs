@@ -1,75 +1,12 @@
 //! Pictures, sentences and limits of a finished search.
 
+use rig_shared::effects::Kind;
+
 use crate::DiagnoseError;
-use crate::acceptance::coordinates::Coordinate;
-use crate::description::parameter_prior::ParameterPrior;
-use crate::fit::least_squares::Fit;
-use crate::models::simulated_motion::Positions;
 use crate::outcome::Diagnosis;
 use crate::recordings::noise_floor::repeats;
+use crate::result::found::Found;
 use crate::result::{limits, pictures, sentences};
-use crate::rows::nominal::Nominal;
-use crate::rows::one_way::OneWay;
-use crate::rows::regression::Rows;
-use crate::search::fitted_candidate::FittedCandidate;
-use crate::search::stepwise::Search;
-use rig_data::runs::Run;
-use rig_model::robot::Robot;
-
-/// Results of the search.
-pub(crate) struct Found<'a, 'r> {
-    /// Robot as given.
-    pub(crate) robot: &'a Robot,
-    /// Base parameters of the robot.
-    pub(crate) nominal: &'a Nominal,
-    /// Free base parameters.
-    pub(crate) anchor: &'a ParameterPrior,
-    /// Candidate library with the training data.
-    pub(crate) search: &'a Search<'r>,
-    /// Training data minus the torque of held parameters.
-    pub(crate) rows: &'a Rows,
-    /// Nominal model fitted to them.
-    pub(crate) base: &'a Fit<'r>,
-    /// Description with the found effects.
-    pub(crate) model: &'a Robot,
-    /// All effects, those of the description first.
-    pub(crate) chosen: &'a [FittedCandidate],
-    /// Number of effects from the description.
-    pub(crate) described: usize,
-    /// Coordinates of the training data, joint by joint.
-    pub(crate) coordinates: &'a [Vec<Coordinate>],
-    /// Noise floor, joint by joint.
-    pub(crate) floors: &'a [f64],
-    /// … obtained without a model; NaN if unknown.
-    pub(crate) known: &'a [f64],
-    /// Seed of the bootstrap.
-    pub(crate) seed: u64,
-    /// Sensor readings with the drive off, if recorded.
-    pub(crate) sensor_zeros: &'a [[f64; 2]],
-    /// Joints that move in one direction only.
-    pub(crate) one_way: &'a [OneWay],
-    /// Recordings to draw.
-    pub(crate) drawn: Drawn<'a>,
-}
-
-impl<'a> Found<'a, '_> {
-    /// Returns the effects that the description does not state.
-    pub(crate) fn found(&self) -> &'a [FittedCandidate] {
-        &self.chosen[self.described..]
-    }
-}
-
-/// Recordings and the models' torque residuals, joint by joint over the rows.
-pub(crate) struct Drawn<'a> {
-    /// In the order of the rows.
-    pub(crate) runs: &'a [Run],
-    /// Rows of the recordings.
-    pub(crate) rows: &'a Rows,
-    /// Residuals of the refitted description and of the model with all effects.
-    pub(crate) left: [Vec<Vec<f64>>; 2],
-    /// Simulated positions of the same models, run by run; empty if not simulated.
-    pub(crate) motion: [Vec<Positions>; 2],
-}
 
 /// Fills in the results that the search does not produce.
 ///
@@ -98,21 +35,20 @@ pub(crate) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<(), Dia
 /// Friction near standstill is untested if, for some shape, a law as large as the dry friction would not have been
 /// detected. Presliding turns all dry friction into such a law.
 fn untested(found: &Found, diagnosis: &Diagnosis, repeated: bool) -> Option<String> {
-    let near_rest = ["presliding", "stribeck"];
     let friction = |name: &str| {
         let own = found.model.joints.iter().find(|joint| joint.name == name)?;
         Some(own.friction.as_ref()?.coulomb.abs())
     };
     let named = |joint: &str| {
-        let own = |effect: &str, at: &str| at == joint && near_rest.contains(&effect);
+        let own = |effect: &str, at: &str| at == joint && is_near_rest(effect);
         (diagnosis.steps.iter()).any(|step| own(&step.effect, &step.joint))
             || (diagnosis.described.iter()).any(|stated| own(&stated.effect, &stated.joint))
     };
     let lacking = (diagnosis.not_testable.iter())
-        .filter(|lacking| near_rest.contains(&lacking.effect.as_str()))
+        .filter(|lacking| is_near_rest(&lacking.effect))
         .map(|lacking| lacking.joint.as_str());
     let small = (diagnosis.detectable.iter())
-        .filter(|size| near_rest.contains(&size.effect.as_str()))
+        .filter(|size| is_near_rest(&size.effect))
         .filter(|size| {
             let worst = size.size_at_worst.unwrap_or(size.size);
             friction(&size.joint).is_some_and(|coulomb| coulomb > 0.0 && worst > coulomb)
@@ -141,4 +77,10 @@ fn untested(found: &Found, diagnosis: &Diagnosis, repeated: bool) -> Option<Stri
         parts.push("what is noise (no motion was recorded twice)".into());
     }
     (!parts.is_empty()).then(|| format!("Not tested: {}.", parts.join("; ")))
+}
+
+/// Returns true if an effect of this name is friction near standstill.
+fn is_near_rest(effect: &str) -> bool {
+    let stribeck = |kind: Kind| matches!(kind, Kind::Stribeck | Kind::StribeckExponential);
+    Kind::named(effect, None).is_some_and(|kind| kind.is_presliding() || stribeck(kind))
 }

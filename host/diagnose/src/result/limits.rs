@@ -14,7 +14,7 @@ use crate::fit::vector::dot_self;
 use crate::levels::{LEAST_GAIN, SIGNIFICANT};
 use crate::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
 use crate::recordings::external_load::told_apart;
-use crate::result::finish::Found;
+use crate::result::found::Found;
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::shapes::grid;

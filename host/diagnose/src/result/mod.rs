@@ -1,6 +1,7 @@
 //! Steps, limits, pictures and sentences of a result.
 
 pub(crate) mod finish;
+pub(crate) mod found;
 pub(crate) mod limits;
 pub(crate) mod pictures;
 pub(crate) mod remarks;

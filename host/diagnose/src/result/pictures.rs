@@ -10,7 +10,7 @@ use crate::columns::candidate::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::models::simulated_motion::Positions;
 use crate::outcome::{Curves, Map};
-use crate::result::finish::Found;
+use crate::result::found::Found;
 use crate::rows::regression::Rows;
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
@@ -231,10 +231,20 @@ pub(crate) fn curves(found: &Found) -> Vec<Curves> {
         .collect()
 }
 
-fn stretch(found: &Found, joint: usize) -> Option<Curves> {
-    let drawn = &found.drawn;
-    let rows = drawn.rows;
-    let [without, with] = [0, 1].map(|k| &drawn.left[k][joint]);
+/// A stretch of a recording.
+struct Stretch {
+    /// Index of the run.
+    run: usize,
+    /// First row.
+    from: usize,
+    /// One past the last row.
+    to: usize,
+}
+
+/// Returns the stretch where effects change the prediction of a joint most; `None` without rows.
+fn busiest(found: &Found, joint: usize) -> Option<Stretch> {
+    let rows = found.drawn.rows;
+    let [without, with] = [0, 1].map(|k| &found.drawn.left[k][joint]);
     let length = ((STRETCH / rows.period).ceil() as usize).max(2);
     let keep = &rows.keep[joint];
     // Without effects both are the same: the largest residual counts.
@@ -247,8 +257,8 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
             (without[k] - with[k]).powi(2)
         }
     };
-    let mut best: Option<(f64, usize, usize, usize)> = None;
-    for (r, pair) in rows.starts.windows(2).enumerate() {
+    let mut best: Option<(f64, Stretch)> = None;
+    for (run, pair) in rows.starts.windows(2).enumerate() {
         let end = |from: usize| (from + length).min(pair[1]);
         if end(pair[0]) <= pair[0] {
             continue;
@@ -256,8 +266,9 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
         let mut sum: f64 = (pair[0]..end(pair[0])).map(weight).sum();
         let mut from = pair[0];
         loop {
-            if best.is_none_or(|b| sum > b.0) {
-                best = Some((sum, r, from, end(from)));
+            if best.as_ref().is_none_or(|(most, _)| sum > *most) {
+                let to = end(from);
+                best = Some((sum, Stretch { run, from, to }));
             }
             if from + length >= pair[1] {
                 break;
@@ -266,7 +277,16 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
             from += 1;
         }
     }
-    let (_, r, from, to) = best?;
+    best.map(|(_, stretch)| stretch)
+}
+
+/// Returns the curves of a joint over its busiest stretch.
+fn stretch(found: &Found, joint: usize) -> Option<Curves> {
+    let drawn = &found.drawn;
+    let rows = drawn.rows;
+    let [without, with] = [0, 1].map(|k| &drawn.left[k][joint]);
+    let keep = &rows.keep[joint];
+    let Stretch { run: r, from, to } = busiest(found, joint)?;
     let run = &drawn.runs[r];
     let (mut torque, mut time) = (Vec::new(), Vec::new());
     rows.thinning.push_raw(&run.joints[joint].tau, &mut torque);

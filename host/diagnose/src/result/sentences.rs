@@ -10,7 +10,7 @@ use crate::fit::solution::Solution;
 use crate::outcome::{Before, Diagnosis, Remainder, Residual, Step, Verdict, Waterfall};
 use crate::recordings::context::DiagnosisContext;
 use crate::recordings::external_load;
-use crate::result::finish::Found;
+use crate::result::found::Found;
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_model::robot::Joint;
 use rig_output::{format_significant, format_unit, format_value, listed};
@@ -51,16 +51,35 @@ fn percent(share: f64) -> String {
 
 /// Returns the verdict with its figures.
 pub(crate) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
+    if d.verdict == Verdict::DataFault {
+        let n = d.data_faults.len();
+        return vec![format!(
+            "{n} thing{} about the recordings cannot be, so nothing was fitted.",
+            if n == 1 { "" } else { "s" }
+        )];
+    }
+    let mut words = structure(d, repeated);
+    if !d.steps.is_empty() {
+        words.push(effects(d));
+    }
+    words.extend(d.steps.iter().filter_map(contradicted));
+    words.extend(constant(d));
+    words.extend(tilt_alike(d).map(str::to_owned));
+    words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
+    words.extend(sizes(&d.left));
+    words.extend(what_falls(d).map(str::to_owned));
+    words.extend(worse_refitted(d));
+    words.extend(motion(d));
+    words.extend(d.remainder.as_ref().map(left));
+    words.extend(leads(d));
+    words.extend(bent(d));
+    words
+}
+
+/// Says whether the description's structure holds, if no effect was added.
+fn structure(d: &Diagnosis, repeated: bool) -> Vec<String> {
     let mut words = Vec::new();
     match d.verdict {
-        Verdict::DataFault => {
-            let n = d.data_faults.len();
-            words.push(format!(
-                "{n} thing{} about the recordings cannot be, so nothing was fitted.",
-                if n == 1 { "" } else { "s" }
-            ));
-            return words;
-        }
         Verdict::NothingMissing => {
             words.push(
                 "With its parameters fitted again the description explains the torque; no effect had to be added."
@@ -87,52 +106,51 @@ pub(crate) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
                     .to_owned(),
             );
         }
-        Verdict::Explained | Verdict::Remainder => {}
-    }
-    if !d.steps.is_empty() {
-        words.push(effects(d));
-    }
-    words.extend(d.steps.iter().filter_map(contradicted));
-    words.extend(constant(d));
-    words.extend(tilt_alike(d).map(str::to_owned));
-    words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
-    words.extend(sizes(&d.left));
-    words.extend(what_falls(d).map(str::to_owned));
-    words.extend(worse_refitted(d));
-    words.extend(motion(d));
-    if let Some(doubted) = d.remainder.as_ref().filter(|r| r.doubt) {
-        words.push(doubted.text.clone());
-    } else if let Some(remainder) = &d.remainder {
-        words.push(format!(
-            "At joint {} {} {} RMS stay without a name; with noise, what is left is {} times the floor.",
-            remainder.joint,
-            number(remainder.rms),
-            format_unit(&remainder.unit),
-            format_significant(remainder.ratio, 3)
-        ));
-    }
-    for (lead, w) in d.torque_lead.iter().zip(&d.waterfall) {
-        if *lead != 0.0 {
-            words.push(format!(
-                "The torque of joint {} was recorded {} ms {} it acts, less than a sample, as where a controller holds it until its next one; this was taken out first.",
-                w.joint,
-                number(1e3 * lead.abs()),
-                if *lead > 0.0 { "before" } else { "after" },
-            ));
-        }
-    }
-    let moved = d.absorbed.iter().find(|a| a.sigmas >= MOVED);
-    let bent = !d.steps.is_empty() && d.absorbed_before == Before::WithoutEffects;
-    if let Some(a) = moved.filter(|_| bent) {
-        let [before, after] = apart(a.before, a.after);
-        words.push(format!(
-            "Without {} the fit had bent its parameters: {} came out as {before} instead of {after} {}.",
-            if d.steps.len() == 1 { "it" } else { "them" },
-            a.parameter,
-            format_unit(&a.unit)
-        ));
+        Verdict::Explained | Verdict::Remainder | Verdict::DataFault => {}
     }
     words
+}
+
+/// Describes the remainder.
+fn left(remainder: &Remainder) -> String {
+    if remainder.doubt {
+        return remainder.text.clone();
+    }
+    format!(
+        "At joint {} {} {} RMS stay without a name; with noise, what is left is {} times the floor.",
+        remainder.joint,
+        number(remainder.rms),
+        format_unit(&remainder.unit),
+        format_significant(remainder.ratio, 3)
+    )
+}
+
+/// Lists the torques that were recorded before or after they act.
+fn leads(d: &Diagnosis) -> impl Iterator<Item = String> {
+    let pairs = d.torque_lead.iter().zip(&d.waterfall);
+    pairs.filter(|(lead, _)| **lead != 0.0).map(|(lead, w)| {
+        format!(
+            "The torque of joint {} was recorded {} ms {} it acts, less than a sample, as where a controller holds it until its next one; this was taken out first.",
+            w.joint,
+            number(1e3 * lead.abs()),
+            if *lead > 0.0 { "before" } else { "after" },
+        )
+    })
+}
+
+/// Names a parameter that the missing effects had biased.
+fn bent(d: &Diagnosis) -> Option<String> {
+    if d.steps.is_empty() || d.absorbed_before != Before::WithoutEffects {
+        return None;
+    }
+    let a = d.absorbed.iter().find(|a| a.sigmas >= MOVED)?;
+    let [before, after] = apart(a.before, a.after);
+    Some(format!(
+        "Without {} the fit had bent its parameters: {} came out as {before} instead of {after} {}.",
+        if d.steps.len() == 1 { "it" } else { "them" },
+        a.parameter,
+        format_unit(&a.unit)
+    ))
 }
 
 /// Formats two numbers with enough digits to distinguish them.

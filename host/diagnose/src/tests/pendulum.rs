@@ -247,7 +247,7 @@ fn a_zero_that_is_a_quarter_turn_off_is_said_and_a_smaller_one_is_the_tilt_it_is
         assert_eq!(found.verdict, Verdict::DataFault, "{:?}", found.words);
         for fault in &found.data_faults {
             println!("{}", fault.text);
-            assert_eq!(fault.kind, "gravity");
+            assert_eq!(fault.kind.as_str(), "gravity");
             assert!(
                 words.iter().all(|word| fault.text.contains(word)),
                 "{}",

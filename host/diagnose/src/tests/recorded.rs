@@ -474,6 +474,6 @@ fn a_recording_with_another_zero_is_named() {
         panic!("{:?}", found.data_faults)
     };
     println!("{}", fault.text);
-    assert_eq!(fault.kind, "gravity");
+    assert_eq!(fault.kind.as_str(), "gravity");
     assert!(fault.recording == "holdout" && fault.text.contains("turned by about"));
 }

@@ -3,12 +3,16 @@
 
 use std::path::Path;
 
+use crate::voltage::driven::{VoltageModel, reference_of};
+use crate::voltage::plant::Plant;
+use crate::voltage::reading::logs;
 use crate::voltage::servo::Servo;
 use crate::voltage::tests::{found, list, robot};
 use crate::voltage::validation::validate_voltage;
 use crate::voltage::*;
+use crate::{Diagnosis, Options};
 use rig_data::prepare::InMemory;
-use rig_model::robot::{AntiWindup, VoltageController};
+use rig_model::robot::{AntiWindup, Robot, VoltageController};
 
 fn law(servo: &Servo, number: usize) -> VoltageController {
     let run = servo.recorded(number, 0.0);
@@ -248,7 +252,7 @@ fn a_start_on_short_pieces_stands_a_coarse_encoder() {
         ..Servo::default()
     };
     let runs = [0, 1, 2, 3].map(|k| servo.recorded(k, 0.0));
-    let plant = plant(&robot()).unwrap();
+    let plant = Plant::of(&robot()).unwrap();
     let found = start::start(&plant, &logs(&list(&runs)).unwrap(), false).unwrap();
     println!("{found:?}");
     let truth = [

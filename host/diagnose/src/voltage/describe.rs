@@ -103,38 +103,13 @@ impl Told<'_> {
             (false, true) => Verdict::NothingMissing,
             (false, false) => Verdict::Explained,
         };
-        let on = if self.holdout.is_empty() {
-            "the recordings it was fitted to"
-        } else {
-            "the recordings held back"
-        };
-        let mut words = vec![format!(
-            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. {}",
-            self.driven,
-            self.on_the_whole(on)
-        )];
-        words.extend(controllers::sentences(
-            &self.controllers,
-            self.stated.robot.joints[0].kind.units().0,
-        ));
-        if self
-            .models
-            .iter()
-            .flat_map(|m| &m.effects)
-            .any(|k| on_the_voltage(*k))
-        {
-            words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
-        }
-        words.extend(self.rotor_remark());
         let described = self.told();
-        words.extend(described.iter().map(|d| d.text.clone()));
-        let numbers = |runs: &[FreeRun]| runs.iter().map(FreeRun::number).collect::<Vec<f64>>();
         Diagnosis {
             schema: "rig-diagnosis/1".into(),
             robot: self.stated.robot.name.clone(),
             verdict,
             residual: Residual::Position,
-            words,
+            words: self.words(&described),
             noise_floor_rms: vec![self.floor],
             noise_floor_from: Vec::new(),
             left: Vec::new(),
@@ -158,20 +133,53 @@ impl Told<'_> {
             next_experiment: None,
             remainder: left.then(|| self.remainder()),
             data_faults: Vec::new(),
-            waterfall: vec![Waterfall {
-                joint: self.joint(),
-                unit: self.stated.robot.joints[0].kind.units().0.into(),
-                models: std::iter::once("refitted".to_owned())
-                    .chain(self.models.last().into_iter().flat_map(|m| m.effects[self.described()..].iter().map(|k| title_of(*k))))
-                    .collect(),
-                train: numbers(&self.train),
-                holdout: numbers(&self.holdout),
-                floor: self.floor,
-                holdout_floor: self.floor,
-            }],
+            waterfall: vec![self.waterfall()],
             tried: self.tried(),
             maps: Vec::new(),
             curves: self.curves.clone(),
+        }
+    }
+
+    /// Returns the sentences of the result.
+    fn words(&self, described: &[Described]) -> Vec<String> {
+        let on = if self.holdout.is_empty() {
+            "the recordings it was fitted to"
+        } else {
+            "the recordings held back"
+        };
+        let mut words = vec![format!(
+            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. {}",
+            self.driven,
+            self.on_the_whole(on)
+        )];
+        words.extend(controllers::sentences(
+            &self.controllers,
+            self.stated.robot.joints[0].kind.units().0,
+        ));
+        let mut effects = self.models.iter().flat_map(|m| &m.effects);
+        if effects.any(|k| on_the_voltage(*k)) {
+            words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
+        }
+        words.extend(self.rotor_remark());
+        words.extend(described.iter().map(|d| d.text.clone()));
+        words
+    }
+
+    /// Returns the RMS of the position error from model to model.
+    fn waterfall(&self) -> Waterfall {
+        let numbers = |runs: &[FreeRun]| runs.iter().map(FreeRun::number).collect::<Vec<f64>>();
+        let last = self.models.last().into_iter();
+        let effects = last.flat_map(|m| m.effects[self.described()..].iter().map(|k| title_of(*k)));
+        Waterfall {
+            joint: self.joint(),
+            unit: self.stated.robot.joints[0].kind.units().0.into(),
+            models: std::iter::once("refitted".to_owned())
+                .chain(effects)
+                .collect(),
+            train: numbers(&self.train),
+            holdout: numbers(&self.holdout),
+            floor: self.floor,
+            holdout_floor: self.floor,
         }
     }
 

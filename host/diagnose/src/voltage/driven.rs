@@ -5,11 +5,12 @@ use crate::description::described_effects::DescribedEffects;
 use crate::voltage::free_run::{FreeRun, travel};
 use crate::voltage::halt::{Cause, Halt};
 use crate::voltage::law::Supply;
-use crate::voltage::log::{Log, Segment, logs};
+use crate::voltage::log::{Log, Segment};
 use crate::voltage::plant::Plant;
+use crate::voltage::reading::logs;
 use crate::voltage::search::{in_fine_steps, library};
+use crate::voltage::simulation::LONGEST;
 use crate::voltage::stepper::State;
-use crate::voltage::{LONGEST, plant};
 use rig_data::prepare::Recording;
 use rig_model::robot::{Robot, VoltageController};
 use rig_shared::effects::Kind;
@@ -95,7 +96,7 @@ impl VoltageModel {
     /// [`DrivenError`] if the description is not sufficient.
     pub(crate) fn of(robot: &Robot) -> Result<Self, DrivenError> {
         let mut stated = DescribedEffects::of(robot);
-        let plant = plant(&stated.robot)?;
+        let plant = Plant::of(&stated.robot)?;
         let parts = stated.driven(&library(&[], false));
         let joint = &robot.joints[0];
         let nominal = plant.described(&stated.robot);

@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::voltage::log::Log;
-use crate::voltage::search::{LEAST_GAIN, LEVEL, signed_rank};
+use crate::voltage::significance::{LEAST_GAIN, LEVEL, signed_rank};
 use rig_model::robot::{AntiWindup, VoltageController};
 
 /// Least share of the voltage's power that a law explains.

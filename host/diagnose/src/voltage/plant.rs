@@ -1,28 +1,10 @@
-//! Free simulation of a voltage-driven joint from a recorded start.
-//!
-//! J·q̈ + g(q) + viscous·q̇ + friction + offset = gain·(u − emf·q̇). The current has no delay (L neglected) and is zero
-//! with the drive off. The voltage is the recorded one, or in the closed loop that of the recording's controller. Steps
-//! after Moreau (1988), as in [`rig_model::simulate`]: within its bounds, dry friction takes the value that stops the
-//! joint, so it really sticks. Terms proportional to the velocity use its mean over the step, voltages the velocity in
-//! the middle. So the error falls with the square of the step between reversals.
-//!
-//! Leaves out: inductance, sag of the supply between rows, heating, backlash and elasticity of the gear.
+//! Known values of a voltage-driven joint, and its nominal parameters.
 
-use rig_shared::effects::Kind;
+use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector};
 
-use crate::voltage::halt::Halt;
-use crate::voltage::log::{Log, Segment};
-use crate::voltage::stepper::{State, Stepper};
-use rig_model::robot::Robot;
+use crate::DiagnoseError;
+use rig_model::robot::{JointKind, Robot};
 
-/// Longest initial step, s; halved until steps do not matter beside the residual. At 6 ms the XL330 recordings'
-/// positions are off by 0.4 mrad (with friction under load by 2.7 mrad). Their residuals are 85 mrad (35 mrad),
-/// November 2026.
-const STEP: f64 = 6.0e-3;
-/// Longest step as an angle of the closed loop's own oscillation, rad: explicit steps are stable up to 2.
-const ANGLE: f64 = 0.2;
-/// Position and velocity beyond which a simulation has no bounds, rad and rad/s (m and m/s).
-const UNBOUNDED: f64 = 1.0e6;
 /// Nominal parameters, in the order of [`NAMES`].
 pub(crate) const NOMINAL: usize = 6;
 /// Drive inertia seen at the joint; torque per volt; back-EMF; Coulomb and viscous friction; constant torque.
@@ -51,6 +33,56 @@ pub(crate) struct Plant {
 }
 
 impl Plant {
+    /// Returns the described values of the only joint.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`]: more than one joint, a link without inertia, a geometry that is no chain.
+    pub(crate) fn of(robot: &Robot) -> Result<Self, DiagnoseError> {
+        let [joint] = robot.joints.as_slice() else {
+            return Err(DiagnoseError::Model(format!(
+                "without torque or current only a robot of one joint is diagnosed, and this one has {}; record the current as well.",
+                robot.joints.len()
+            )));
+        };
+        let wrong = |error: &dyn std::fmt::Display| DiagnoseError::Model(error.to_string());
+        let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+        let mut row = [0.0; COLUMNS];
+        if let Some(inertial) = &joint.inertial {
+            row[column::MASS] = inertial.mass;
+            row[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&inertial.first_moment);
+            row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&inertial.inertia);
+        }
+        let inertia = match joint.kind {
+            JointKind::Revolute => row[column::INERTIA + 5],
+            JointKind::Prismatic => row[column::MASS],
+        };
+        if !(inertia > 0.0) {
+            return Err(DiagnoseError::Model(
+                "without torque or current the link's own inertia is the scale of everything else; state it in [joint.inertial].".into(),
+            ));
+        }
+        let weight = |row: [f64; COLUMNS]| -> Result<[f64; 3], DiagnoseError> {
+            let mut at = [0.0; 3];
+            let angles = [0.0, std::f64::consts::FRAC_PI_2, std::f64::consts::PI];
+            for (to, q) in at.iter_mut().zip(angles) {
+                let mut torque = [0.0];
+                gravity_vector(&chain, &[row], &[q], &mut torque).map_err(|e| wrong(&e))?;
+                *to = torque[0];
+            }
+            let constant = 0.5 * (at[0] + at[2]);
+            Ok([at[0] - constant, at[1] - constant, constant])
+        };
+        let mut unit = [0.0; COLUMNS];
+        unit[column::FIRST_MOMENT] = 1.0;
+        Ok(Self {
+            inertia,
+            gravity: weight(row)?,
+            per_moment: weight(unit)?,
+            ratio: joint.drive.as_ref().map_or(1.0, |drive| drive.gear_ratio),
+            halvings: 0,
+        })
+    }
+
     /// Returns the nominal parameters of a description; `None` if any is missing.
     pub(crate) fn described(&self, robot: &Robot) -> Option<[f64; NOMINAL]> {
         let joint = robot.joints.first()?;
@@ -79,57 +111,5 @@ impl Plant {
             halvings: self.halvings + 1,
             ..*self
         }
-    }
-
-    /// Appends the simulated positions at the rows of `segment` to `out`.
-    ///
-    /// # Errors
-    /// [`Halt`]: friction that would drive the joint, or an unbounded motion, and its time.
-    pub(crate) fn simulate(
-        &self,
-        effects: &[Kind],
-        theta: &[f64],
-        log: &Log,
-        segment: &Segment,
-        out: &mut Vec<f64>,
-    ) -> Result<(), Halt> {
-        self.run(effects, theta, log, segment, &mut |at| {
-            out.push(at.position)
-        })
-    }
-
-    /// Simulates the rows of `segment` and passes the state at each row to `visit`.
-    ///
-    /// # Errors
-    /// As [`Self::simulate`].
-    pub(crate) fn run(
-        &self,
-        effects: &[Kind],
-        theta: &[f64],
-        log: &Log,
-        segment: &Segment,
-        visit: &mut dyn FnMut(&State),
-    ) -> Result<(), Halt> {
-        let from = segment.from;
-        let mut stepper = Stepper::new(self, effects, theta).ok_or(Halt::driving(log.t[from]))?;
-        stepper.start(log, segment);
-        let longest = STEP.min(ANGLE / stepper.fastest(log)) * 0.5_f64.powi(self.halvings);
-        for k in from..segment.to {
-            let next = (k + 1).min(segment.to - 1);
-            let interval = log.t[next] - log.t[k];
-            let steps = (interval / longest).ceil().max(1.0);
-            let dt = interval / steps;
-            visit(&stepper.state(log, k));
-            if next == k {
-                break;
-            }
-            for s in 0..steps as usize {
-                stepper.step(log, k, log.t[k] + (s as f64 + 0.5) * dt, dt)?;
-            }
-            if !stepper.is_within(UNBOUNDED) {
-                return Err(Halt::unbounded(log.t[next]));
-            }
-        }
-        Ok(())
     }
 }

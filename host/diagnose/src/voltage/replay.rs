@@ -6,7 +6,7 @@ use std::path::Path;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-use crate::voltage::{DrivenError, Reference, VoltageModel, reference_of};
+use crate::voltage::driven::{DrivenError, Reference, VoltageModel, reference_of};
 use rig_data::DataError;
 use rig_data::{Column, EffortNeed, RecordingWriter, Source};
 use rig_excite::{ExciteError, Noise, SETTLING, drawn, load_reference};

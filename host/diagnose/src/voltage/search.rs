@@ -1,13 +1,14 @@
 //! Search for the effects of a voltage-driven joint: one at a time, by the free-running motion of left-out recordings.
 
-use rig_shared::effects::{Channel, Effect, Kind, Parameter, Scale};
+use rig_shared::effects::{Channel, Effect, Kind, Scale};
 
-use crate::voltage::LONGEST;
 use crate::voltage::fit::{Problem, WINDOW, segments};
 use crate::voltage::free_run::{FreeRun, travel};
 use crate::voltage::halt::Cause;
 use crate::voltage::log::{Log, Segment};
 use crate::voltage::plant::{NOMINAL, Plant};
+use crate::voltage::significance::{LEAST_GAIN, LEVEL, signed_rank};
+use crate::voltage::simulation::LONGEST;
 use crate::voltage::start::start;
 use rig_data::prepare::each_of;
 use rig_model::robot::Robot;
@@ -18,10 +19,6 @@ const FOLDS: usize = 8;
 const BLOCKS: usize = 8;
 /// Length of the pieces whose errors are compared, s.
 const PIECE: f64 = 2.0;
-/// Least relative error reduction by an effect on left-out recordings.
-pub(crate) const LEAST_GAIN: f64 = 0.03;
-/// Level of the signed-rank test over the pieces.
-pub(crate) const LEVEL: f64 = 0.05;
 /// Relative difference of left-out errors within which candidates are equal.
 pub(crate) const EQUAL: f64 = 0.03;
 /// Candidates per round in the cross-validation, those of least training error.
@@ -318,7 +315,7 @@ impl Search<'_> {
             more.effects.push(kind);
             let about = kind.about();
             for gain in about.gains {
-                more.theta.push(self.first_gain(gain, model));
+                more.theta.push(self.first_gain(kind, model));
                 more.bounds.push(gain.bounds);
             }
             more.free.extend(model.theta.len()..more.theta.len());
@@ -348,17 +345,17 @@ impl Search<'_> {
         Some(self.settled(&starts)).filter(|found| self.rms(found).is_finite())
     }
 
-    /// Returns a small gain for this joint, by its unit.
-    fn first_gain(&self, gain: &Parameter, model: &Model) -> f64 {
+    /// Returns a small gain of an effect for this joint.
+    fn first_gain(&self, kind: Kind, model: &Model) -> f64 {
         let weight = self.plant.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let torque = weight.max(model.theta[3]);
-        match gain.unit {
-            "1" => 0.1,
-            "s" => 1.0e-3,
-            "V" => 0.02 * self.largest_voltage(),
-            "1/(N*m)^2" => 0.1 / (torque * torque),
-            "N*m*s^2/rad^2" => 0.01 * model.theta[1] * model.theta[2],
-            _ if gain.name == "coulomb" => 0.5 * model.theta[3],
+        match kind {
+            Kind::LoadFriction => 0.1,
+            Kind::MeasurementDelay => 1.0e-3,
+            Kind::DriveDeadzone => 0.02 * self.largest_voltage(),
+            Kind::TorqueSaturation => 0.1 / (torque * torque),
+            Kind::QuadraticDrag => 0.01 * model.theta[1] * model.theta[2],
+            Kind::PreslidingDahl => 0.5 * model.theta[3],
             _ => 0.02 * torque,
         }
     }
@@ -515,26 +512,6 @@ pub(crate) fn taken(trials: &[Trial]) -> Option<usize> {
 fn pooled(pieces: &[[f64; 2]]) -> f64 {
     let [sum, rows] = (pieces.iter()).fold([0.0; 2], |a, p| [a[0] + p[0], a[1] + p[1]]);
     (sum / f64::max(rows, 1.0)).sqrt()
-}
-
-/// Returns the probability of such gains if losses are equally likely: Wilcoxon's signed-rank test (1945), one-sided,
-/// exact. `gains` are logarithms of error before over after; zeros and NaN do not count.
-pub(crate) fn signed_rank(gains: &[f64]) -> f64 {
-    let mut gains: Vec<f64> = gains.iter().copied().filter(|g| g.abs() > 0.0).collect();
-    gains.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    let largest = gains.len() * (gains.len() + 1) / 2;
-    // Probability of each sum of the ranks of gains.
-    let mut chance = vec![0.0; largest + 1];
-    chance[0] = 1.0;
-    for rank in 1..=gains.len() {
-        for sum in (0..=largest).rev() {
-            let with = if sum >= rank { chance[sum - rank] } else { 0.0 };
-            chance[sum] = 0.5 * (chance[sum] + with);
-        }
-    }
-    let ranks = gains.iter().enumerate().filter(|(_, g)| **g > 0.0);
-    let observed: usize = ranks.map(|(k, _)| k + 1).sum();
-    chance[observed..].iter().sum::<f64>().min(1.0)
 }
 
 /// Returns true if the effect acts on the voltage.

@@ -4,10 +4,13 @@ use std::path::Path;
 use rig_shared::effects::Kind;
 
 use crate::outcome::Fate;
+use crate::voltage::log::Log;
+use crate::voltage::reading::logs;
 use crate::voltage::*;
-use rig_data::prepare::InMemory;
+use crate::{Diagnosis, Options};
+use rig_data::prepare::{InMemory, Recording};
 use rig_data::{Block, JointColumns};
-use rig_model::robot::XL330;
+use rig_model::robot::{Robot, XL330};
 
 pub(crate) fn robot() -> Robot {
     Robot::from_toml(XL330, Path::new("xl330.toml")).unwrap()
@@ -165,7 +168,7 @@ fn candidates_pass_until_the_first_that_may_be_chance_and_the_best_fitting_of_eq
 #[test]
 fn signed_ranks_have_their_exact_chances() {
     // All gains: one of 2^5 patterns. All except the smallest: two of them. None: all.
-    let p = |gains: &[f64]| search::signed_rank(gains);
+    let p = |gains: &[f64]| significance::signed_rank(gains);
     assert!((p(&[1.0, 2.0, 3.0, 4.0, 5.0]) - 1.0 / 32.0).abs() < 1e-15);
     assert!((p(&[-1.0, 2.0, 3.0, 4.0, 5.0]) - 2.0 / 32.0).abs() < 1e-15);
     assert_eq!(p(&[-0.1, -0.2, 0.0]), 1.0);

@@ -6,7 +6,8 @@
 
 use serde::Serialize;
 
-use crate::voltage::{DrivenError, Followed, FreeRun, VoltageModel};
+use crate::voltage::driven::{DrivenError, Followed, VoltageModel};
+use crate::voltage::free_run::FreeRun;
 use rig_data::prepare::Recording;
 use rig_model::robot::{Robot, VoltageController};
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::outcome::{
-    About, Absorbed, Before, ByMotion, Curves, DataFault, Detectable, Diagnosis, Map,
+    About, Absorbed, Before, ByMotion, Curves, DataFault, Detectable, Diagnosis, FaultKind, Map,
     NextExperiment, NotTestable, Place, Remainder, Residual, Step, Tried, Twice, Value, Verdict,
     Waterfall,
 };
@@ -379,7 +379,7 @@ pub(super) fn remainder() -> Diagnosis {
 pub(super) fn data_fault() -> Diagnosis {
     Diagnosis {
         data_faults: vec![DataFault {
-            kind: "sign".into(),
+            kind: FaultKind::Sign,
             about: About::Torque,
             recording: "train.csv".into(),
             joint: "link".into(),

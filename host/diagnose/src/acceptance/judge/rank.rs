@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rig_shared::effects::Kind;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::experiment::testable;
+use crate::experiment::testable::confounded;
 use crate::outcome::Step;
 use crate::search::fitted_candidate::{FittedCandidate, equal};
 use rig_data::runs::Run;
@@ -26,7 +26,7 @@ pub(crate) fn rank(
 ) {
     let mut names = vec![step.effect.clone()];
     let mut exact = |kind: Kind| {
-        for confusion in testable::confounded(kind, own.candidate.joint, runs) {
+        for confusion in confounded(kind, own.candidate.joint, runs) {
             if Kind::named(confusion.with, None).is_some_and(is_not) {
                 continue;
             }

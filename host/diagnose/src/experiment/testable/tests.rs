@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
+use rig_shared::effects::Kind;
+
 use crate::experiment::testable::*;
-use rig_data::runs::JointRun;
-use rig_model::robot::ONE_LINK_TEMPLATE;
+use rig_data::runs::{JointRun, Run};
+use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 
 const RATE: f64 = 200.0;
 

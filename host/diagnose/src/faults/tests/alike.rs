@@ -75,7 +75,7 @@ fn a_start_and_then_rest_is_no_motion_to_learn_from() {
     });
     let fault = too_short_to_learn(&stopped).unwrap();
     println!("{}", fault.text);
-    assert_eq!(fault.kind, "not-moving");
+    assert_eq!(fault.kind.as_str(), "not-moving");
     // Beside long recordings, a short one without external loads does not show their torque.
     let mut both = sound.clone();
     let mut free = sound[0].clone();
@@ -92,6 +92,6 @@ fn a_start_and_then_rest_is_no_motion_to_learn_from() {
     free.unburdened = true;
     both.push(free);
     let fault = too_short_to_learn(&both).unwrap();
-    assert_eq!(fault.kind, "too-short");
+    assert_eq!(fault.kind.as_str(), "too-short");
     assert!(fault.text.contains("taken off"), "{}", fault.text);
 }

@@ -7,7 +7,7 @@ use crate::faults::tests::*;
 use crate::tests::planar;
 
 /// Returns kind and text of the only certain fault.
-fn certain(robot: &Robot, runs: &[Run]) -> (String, String) {
+fn certain(robot: &Robot, runs: &[Run]) -> (&'static str, String) {
     let found = faults(robot, runs).unwrap();
     let mut certain = found.into_iter().filter(|fault| fault.certain);
     let Some(fault) = certain.next() else {
@@ -15,7 +15,7 @@ fn certain(robot: &Robot, runs: &[Run]) -> (String, String) {
     };
     println!("{}", fault.text);
     assert_eq!(certain.next(), None);
-    (fault.kind, fault.text)
+    (fault.kind.as_str(), fault.text)
 }
 
 /// Rotates columns of the first three joints: positions, torques, or both.

@@ -113,7 +113,7 @@ fn no_window_of_a_real_recording_is_accused() {
                     count += 1;
                     for fault in faults(&set.robot, &[window]).unwrap() {
                         // A window without motion holds no information.
-                        if fault.certain && fault.kind != "not-moving" {
+                        if fault.certain && fault.kind.as_str() != "not-moving" {
                             accused.push(format!(
                                 "{} {start} {seconds}: {} {}",
                                 run.label, fault.kind, fault.text

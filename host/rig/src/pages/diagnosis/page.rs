@@ -193,7 +193,7 @@ fn faults(found: &Diagnosis) -> Option<Section> {
                 .iter()
                 .map(|fault| {
                     vec![
-                        fault.kind.clone(),
+                        fault.kind.to_string(),
                         words::or_dash(&fault.recording),
                         words::or_dash(&fault.joint),
                         if fault.certain { "yes" } else { "open" }.into(),

@@ -1,0 +1,179 @@
+//! Factors between recording and description that no change of the robot causes.
+
+use crate::DiagnoseError;
+use crate::faults::columns::fault;
+use crate::faults::described::Described;
+use crate::faults::judge::Judge;
+use crate::faults::names;
+use crate::faults::suspicion::Suspicion;
+use crate::faults::undo::Undo;
+use crate::outcome::{About, FaultKind};
+use rig_output::{format_significant, format_unit};
+
+/// Largest factor of a parameter change; units and ratios change more.
+const CHANGE: f64 = 5.0;
+/// Factors within this ratio of a thousand, or a thousandth, count as that: stand-in masses are wrong by as much.
+const THOUSAND_APART: f64 = 2.5;
+
+impl Judge<'_> {
+    /// Suspects torques of several joints that are all a thousand times too large or small: no description is that
+    /// wrong everywhere.
+    pub(crate) fn thousandfold(&self, described: Option<&Described>) -> Option<Suspicion> {
+        let mut shown = Vec::new();
+        let mut weighed = false;
+        for j in 0..self.robot.joints.len() {
+            let (gravity, inertia) = self.scales(&self.rows, j, described);
+            weighed |= gravity.is_some();
+            shown.extend(gravity.or(inertia).map(|m| (j, m.value)));
+        }
+        let near = |unit: f64| {
+            let apart = |f: f64| (f / unit).abs().ln().abs() < THOUSAND_APART.ln();
+            (shown.iter()).all(|(j, f)| apart(*f) && !names::is_ratio(&self.robot.joints[*j], *f))
+        };
+        // A rotor that is not described makes inertia look larger, never weight.
+        if shown.len() < 2 || !weighed {
+            return None;
+        }
+        let (_, unit) = self.robot.joints[shown[0].0].kind.units();
+        let unit = format_unit(unit);
+        let what = match (near(1000.0), near(1e-3)) {
+            (true, _) => format!("as m{unit} for {unit} or mA for A would be"),
+            (_, true) => format!(
+                "as k{unit} for {unit}, A for mA, or masses of the description in g would make it"
+            ),
+            _ => return None,
+        };
+        let least = shown
+            .iter()
+            .map(|(_, f)| f.abs())
+            .fold(f64::INFINITY, f64::min);
+        let most = shown.iter().map(|(_, f)| f.abs()).fold(0.0, f64::max);
+        let columns: Vec<String> = shown.iter().map(|(j, _)| format!("tau{}", j + 1)).collect();
+        let (last, others) = columns.split_last()?;
+        let factor = if near(1000.0) { 1e-3 } else { 1000.0 };
+        let fault = fault(
+            self.runs,
+            FaultKind::Unit,
+            About::Torque,
+            "",
+            format!(
+                "{} and {last} are {} to {} times what the description's gravity and inertia need, {what}; give torques in {unit}, at the joints.",
+                others.join(", "),
+                format_significant(least, 4),
+                format_significant(most, 4)
+            ),
+        );
+        Some(Suspicion::new(fault, Undo::Torque(None, factor)))
+    }
+
+    /// Suspects factors between recording and description that no change of the robot causes.
+    pub(crate) fn against_description(
+        &self,
+        j: usize,
+        described: Option<&Described>,
+    ) -> Result<Option<Suspicion>, DiagnoseError> {
+        let joint = &self.robot.joints[j];
+        let (gravity, inertia) = self.scales(&self.rows, j, described);
+        // Drive parts that are not described make the inertia larger, never smaller.
+        let complete = joint
+            .drive
+            .as_ref()
+            .is_none_or(|d| d.rotor_inertia > 0.0 || d.joint_inertia > 0.0);
+        let inertia = inertia
+            .map(|m| m.value)
+            .filter(|s| complete || s.abs() < 1.0);
+        let large = |s: f64| !(1.0 / CHANGE..CHANGE).contains(&s.abs());
+        let apart = |a: f64, b: f64| (a / b).abs().ln().abs() > f64::ln(2.5);
+        Ok(match (gravity.map(|m| m.value), inertia) {
+            (Some(g), Some(i)) if large(g) && !apart(g, i) => {
+                self.torque_times(j, g, "gravity and inertia need")
+            }
+            (Some(g), None) if large(g) => self.torque_times(j, g, "gravity needs"),
+            (None, Some(i)) if large(i) => self.torque_times(j, i, "inertia needs"),
+            (Some(g), Some(i)) if !large(g) && !(0.05..20.0).contains(&(i / g).abs()) => {
+                Some(self.clock_times(j, i / g))
+            }
+            (Some(g), _) if (-2.0..-0.5).contains(&g) && self.sign(j, described)?.is_none() => {
+                Some(self.gravity_reversed(j, g)?)
+            }
+            _ => None,
+        })
+    }
+
+    /// Suspects a torque that is `factor` times the described, which `needs` less; `None` if an unusual robot may be the
+    /// reason.
+    fn torque_times(&self, j: usize, factor: f64, needs: &str) -> Option<Suspicion> {
+        let name = names::of_torque(&self.robot.joints[j], factor);
+        // Between a parameter change and a named factor an unusual robot is possible.
+        if name.is_none() && (0.125..8.0).contains(&factor.abs()) {
+            return None;
+        }
+        // On a light last link a tool may weigh many times the link.
+        let tool = match factor {
+            1.0..100.0 => {
+                ", or as a tool or payload that the description does not state would make it"
+            }
+            _ => "",
+        };
+        let (kind, what) = name.map_or_else(
+            || (FaultKind::Unit, "more than a change of the robot makes; check the torque constant, the ratio and the unit (mA for A, or mN·m for N·m, make it a thousand times as large)".to_owned()),
+            |name| (name.kind(), name.text),
+        );
+        let fault = self.say(
+            kind,
+            About::Torque,
+            j,
+            format!(
+                "tau{} is {} times what the description's {needs}, {what}{tool}.",
+                j + 1,
+                format_significant(factor, 4)
+            ),
+        );
+        Some(Suspicion::new(fault, Undo::Torque(Some(j), 1.0 / factor)))
+    }
+
+    /// Suspects a clock that makes the inertia `times` the described, where gravity is as described.
+    fn clock_times(&self, j: usize, times: f64) -> Suspicion {
+        let clock = times.abs().sqrt();
+        let fault = self.say(
+            FaultKind::Clock,
+            About::Recording,
+            j,
+            format!(
+                "Gravity fits the description, but the inertia seen in the motion is {times:.4} times what it states: t looks like {}, {clock:.4} of them a second, unless the inertia described is wrong, the rotor's by the square of the gear ratio among it.",
+                names::of_clock(clock)
+            ),
+        );
+        Suspicion::new(fault, Undo::Clock(1.0 / clock))
+    }
+
+    /// Suspects a wrong sense or zero of a joint on which gravity acts `times` as described, below zero.
+    fn gravity_reversed(&self, j: usize, times: f64) -> Result<Suspicion, DiagnoseError> {
+        let n = j + 1;
+        let held = match self.fits[j].as_ref() {
+            Some(fit) => {
+                let (loss, _, own) = self.senses(j, fit)?;
+                loss.sigmas() > 3.0 || own.sigmas() > 3.0
+            }
+            None => false,
+        };
+        let which = if held {
+            format!(
+                "friction and inertia have the right sense: q{n} and tau{n} are both counted the other way round, or the zero of q{n} is half a turn off"
+            )
+        } else {
+            format!("reverse tau{n} or q{n}, unless the zero of q{n} is half a turn off")
+        };
+        let undo = match held {
+            true => Undo::Both(j),
+            false => Undo::Torque(Some(j), -1.0),
+        };
+        let fault = self.say(
+            FaultKind::Sign,
+            About::Motion,
+            j,
+            format!("Gravity acts on joint {n} {times:.2} times as the description says; {which}."),
+        );
+        Ok(Suspicion::new(fault, undo))
+    }
+}

@@ -1,0 +1,73 @@
+//! One recording, compared with a simple model of each torque.
+
+use nalgebra::DMatrix;
+
+use crate::DiagnoseError;
+use crate::faults::columns::fault;
+use crate::faults::fit::Fit;
+use crate::faults::rows::{Form, Rows};
+use crate::outcome::{About, DataFault, FaultKind};
+use rig_data::runs::Run;
+use rig_identify::preference;
+use rig_model::robot::{JointKind, Robot};
+
+/// One recording, compared with models of the robot.
+pub(crate) struct Judge<'a> {
+    pub(crate) robot: &'a Robot,
+    pub(crate) runs: &'a [&'a Run],
+    pub(crate) form: Form,
+    pub(crate) rows: Rows,
+    pub(crate) order: Vec<usize>,
+    pub(crate) matrices: Vec<DMatrix<f64>>,
+    pub(crate) fits: Vec<Option<Fit>>,
+}
+
+impl<'a> Judge<'a> {
+    /// Compares the rows of one recording.
+    pub(crate) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
+        Self::of_rows(robot, runs, Rows::of(runs, robot.joints.len()))
+    }
+
+    /// Compares other rows of the same recording.
+    pub(crate) fn of_rows(
+        robot: &'a Robot,
+        runs: &'a [&'a Run],
+        rows: Rows,
+    ) -> Result<Self, DiagnoseError> {
+        let form = Form::of(robot)?;
+        let kinds: Vec<JointKind> = robot.joints.iter().map(|j| j.kind).collect();
+        let mut order = preference(&kinds);
+        order.extend(order.len()..form.width());
+        let matrices = rows.regressors(&form)?;
+        let fits = matrices
+            .iter()
+            .zip(&rows.tau)
+            .map(|(x, y)| Fit::of(x, y, &order))
+            .collect();
+        Ok(Self {
+            robot,
+            runs,
+            form,
+            rows,
+            order,
+            matrices,
+            fits,
+        })
+    }
+
+    /// Returns the name of a joint.
+    pub(crate) fn name(&self, joint: usize) -> &str {
+        &self.robot.joints[joint].name
+    }
+
+    /// Returns a certain fault of a joint.
+    pub(crate) fn say(
+        &self,
+        kind: FaultKind,
+        about: About,
+        joint: usize,
+        text: String,
+    ) -> DataFault {
+        fault(self.runs, kind, about, self.name(joint), text)
+    }
+}

@@ -1,0 +1,86 @@
+//! Search for the faults of one recording by models: suspicions, their trial, and the recording without what is found.
+
+use crate::DiagnoseError;
+use crate::faults::candidates::Found;
+use crate::faults::judge::Judge;
+use crate::faults::suspicion::Suspicion;
+use crate::outcome::{DataFault, FaultKind};
+
+impl Judge<'_> {
+    /// Returns the faults in the torque that no other explanation fits better. A certain fault is undone and the search
+    /// repeats without its consequences.
+    pub(crate) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
+        let (mut found, mut undo) = self.tried(self.suspicions()?)?;
+        let lost = found
+            .iter()
+            .any(|fault| fault.kind == FaultKind::Magnitude && fault.certain);
+        if !clipped.is_empty() && !lost {
+            return Ok(clipped);
+        }
+        let mut rows = self.rows.clone();
+        for _ in 0..n {
+            // Undoing a fault of the description gives another robot.
+            let Some(one) = undo.filter(|undo| !undo.is_of_robot()) else {
+                break;
+            };
+            rows = one.applied(self.robot, &rows);
+            let without = Judge::of_rows(self.robot, self.runs, rows.clone())?;
+            let (more, next) = without.tried(without.suspicions()?)?;
+            let new = |fault: &DataFault| fault.certain && !found.contains(fault);
+            let more: Vec<DataFault> = more.into_iter().filter(|fault| new(fault)).collect();
+            found.extend(more);
+            undo = next;
+        }
+        Ok(found)
+    }
+
+    /// Returns the faults that the torque suggests.
+    fn suspicions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        // The last joint's torque needs the fewest described links.
+        let described = self.stated(&self.rows, n.saturating_sub(1))?;
+        let described = described.as_ref();
+        let mut all: Vec<Suspicion> = (0..n)
+            .filter_map(|j| self.magnitude(j, described))
+            .collect();
+        // Factors that the torques show without a description.
+        let free = self.positions()?;
+        let known = |found: &Found| {
+            let of_free = |own: &Suspicion| own.undo.as_ref().is_some_and(|undo| found.is_of(undo));
+            free.iter().any(of_free)
+        };
+        let mut transformed = self.transformed()?;
+        transformed.retain(|found| !known(found));
+        all.extend(free);
+        let (turned, others): (Vec<_>, Vec<_>) =
+            transformed.into_iter().partition(|found| found.is_sense());
+        let (zeros, others): (Vec<_>, Vec<_>) =
+            others.into_iter().partition(|found| found.is_zero());
+        all.extend(others.iter().filter_map(|found| self.said(found)));
+        all.extend((0..n).filter_map(|j| self.shifted(j)));
+        all.extend(self.thousandfold(described));
+        all.extend(self.single_zero()?);
+        for j in (0..n).filter(|j| self.stirs(*j)) {
+            let before = all.len();
+            all.extend(self.against_description(j, described)?);
+            all.extend(self.sign(j, described)?);
+            if all.len() == before {
+                all.extend(self.alike(j, described)?);
+            }
+            all.extend(self.heavy_rotor(j)?);
+        }
+        // Senses and zeros come last: other explanations of a recording are likelier.
+        let last = turned.iter().chain(&zeros);
+        all.extend(last.filter_map(|found| self.said(found)));
+        // A suspicion with two reasons is tried once.
+        let mut once: Vec<Suspicion> = Vec::new();
+        for own in all {
+            if once.iter().all(|other| !other.is_like(&own)) {
+                once.push(own);
+            }
+        }
+        Ok(once)
+    }
+}

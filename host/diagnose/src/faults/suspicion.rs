@@ -1,0 +1,27 @@
+//! Suspected faults.
+
+use crate::faults::undo::Undo;
+use crate::outcome::DataFault;
+
+/// A suspected fault.
+#[derive(Clone, Debug)]
+pub(crate) struct Suspicion {
+    pub(crate) fault: DataFault,
+    /// How it is undone; `None` if columns alone show it, without a model.
+    pub(crate) undo: Option<Undo>,
+}
+
+impl Suspicion {
+    pub(crate) fn new(fault: DataFault, undo: Undo) -> Self {
+        Self {
+            fault,
+            undo: Some(undo),
+        }
+    }
+
+    /// Returns true if both are undone alike.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let both = self.undo.as_ref().zip(other.undo.as_ref());
+        both.is_some_and(|(own, other)| own.is_like(other))
+    }
+}
