@@ -1,4 +1,5 @@
-//! No circle of imports between files: who reads a file need not read one that reads it.
+//! No circle of imports between files: who reads a file need not read one that reads it. No function that does not fit
+//! on a page.
 //!
 //! A file imports another where a path in it names something that the other defines; re-exports are followed to the
 //! definition. Test modules are left out.
@@ -8,8 +9,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use proc_macro2::Span;
 use syn::visit::Visit;
-use syn::{Attribute, Item, UseTree};
+use syn::{Attribute, Block, Ident, ImplItemFn, Item, ItemFn, UseTree};
+
+/// Most lines of a function, from its name to its last brace.
+const MOST_LINES: usize = 80;
 
 /// Path of a module within its crate; empty for the root.
 type Module = Vec<String>;
@@ -25,6 +30,8 @@ struct File {
     globs: Vec<Vec<String>>,
     /// All paths in it.
     paths: Vec<Vec<String>>,
+    /// Functions of more than [`MOST_LINES`], with their lines.
+    long: Vec<(String, usize)>,
 }
 
 fn is_test(attributes: &[Attribute]) -> bool {
@@ -35,6 +42,14 @@ fn is_test(attributes: &[Attribute]) -> bool {
 }
 
 impl File {
+    fn measure(&mut self, name: &Ident, block: &Block) {
+        let line = |span: Span| span.start().line;
+        let lines = line(block.brace_token.span.close()) + 1 - line(name.span());
+        if lines > MOST_LINES {
+            self.long.push((name.to_string(), lines));
+        }
+    }
+
     fn take_use(&mut self, tree: &UseTree, before: &[String]) {
         let join = |name: &syn::Ident| [before, &[name.to_string()]].concat();
         match tree {
@@ -62,6 +77,18 @@ impl File {
 }
 
 impl<'ast> Visit<'ast> for File {
+    fn visit_item_fn(&mut self, item: &'ast ItemFn) {
+        self.measure(&item.sig.ident, &item.block);
+        syn::visit::visit_item_fn(self, item);
+    }
+
+    fn visit_impl_item_fn(&mut self, item: &'ast ImplItemFn) {
+        if !is_test(&item.attrs) {
+            self.measure(&item.sig.ident, &item.block);
+            syn::visit::visit_impl_item_fn(self, item);
+        }
+    }
+
     /// `pub(crate)` imports nothing.
     fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
 
@@ -249,34 +276,53 @@ fn roots() -> Vec<PathBuf> {
     libraries.filter(|p| p.is_file()).collect()
 }
 
-/// Files in circles that are still to be untied, by crate. A number may only fall.
-const KNOWN: &[(&str, usize)] = &[("host/diagnose", 78), ("host/identify", 54)];
-
-#[test]
-fn files_import_one_another_in_no_new_circle() {
+/// All files of the workspace's libraries, with the folder of their crate.
+fn crates() -> Vec<(String, BTreeMap<Module, File>)> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let roots = roots();
     assert!(roots.len() > 15, "{roots:?}");
-    let mut wrong = Vec::new();
-    for root in roots {
-        let folder = root.parent().and_then(Path::parent).unwrap();
-        let name = folder
-            .strip_prefix(workspace)
-            .unwrap()
-            .display()
-            .to_string();
-        let files = files_of(&root);
-        let circle: Vec<String> = circle(&files).iter().map(|m| m.join("/")).collect();
-        let known = KNOWN.iter().find(|(n, _)| *n == name).map_or(0, |k| k.1);
-        if circle.len() != known {
-            let count = circle.len();
-            wrong.push(format!(
-                "{name}: {count} files in circles, {known} known; lower the number in KNOWN, or untie the new circle: {}",
-                circle.join(", ")
-            ));
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    (roots.iter())
+        .map(|root| {
+            let folder = root.parent().and_then(Path::parent).unwrap();
+            let name = folder.strip_prefix(workspace).unwrap();
+            (name.display().to_string(), files_of(root))
+        })
+        .collect()
+}
+
+#[test]
+fn files_import_one_another_in_no_circle() {
+    let wrong: Vec<String> = (crates().iter())
+        .filter_map(|(name, files)| {
+            let circle: Vec<String> = circle(files).iter().map(|m| m.join("/")).collect();
+            (!circle.is_empty()).then(|| format!("{name}: {}", circle.join(", ")))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "files in circles:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn functions_fit_on_a_page() {
+    let wrong: Vec<String> = (crates().iter())
+        .flat_map(|(name, files)| {
+            files.iter().flat_map(move |(module, file)| {
+                let of = move |(function, lines): &(String, usize)| {
+                    format!("{name}: {}::{function}, {lines} lines", module.join("::"))
+                };
+                file.long.iter().map(of)
+            })
+        })
+        .collect();
+    assert!(
+        wrong.is_empty(),
+        "more than {MOST_LINES} lines:\n{}",
+        wrong.join("\n")
+    );
+    let long: String = (0..MOST_LINES).map(|_| "    f();\n").collect();
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join("lib.rs");
+    std::fs::write(&root, format!("fn f() {{\n{long}}}")).unwrap();
+    assert_eq!(files_of(&root)[&Module::new()].long.len(), 1);
 }
 
 #[test]
