@@ -1,19 +1,12 @@
 //! Minimisation with exact gradients: BFGS inside an augmented Lagrangian.
 //!
 //! The constraints c ≤ 0 enter as μ/2·max(0, c + λ/μ)² with multipliers λ that are updated between the rounds
-//! (Rockafellar 1973; Nocedal & Wright 2006, ch. 17). The line search finds the weak Wolfe conditions by bisection.
-//! With them BFGS also descends at kinks of the criterion, such as a double smallest singular value (Lewis & Overton
-//! 2013).
+//! (Rockafellar 1973; Nocedal & Wright 2006, ch. 17).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
+use rig_numerics::optimise::bfgs::bfgs;
 
 use super::criterion::Smoothing;
-
-/// Constants of sufficient decrease and of sufficient slope increase (Nocedal & Wright 2006, sec. 3.1).
-const ARMIJO: f64 = 1e-4;
-const WOLFE: f64 = 0.9;
-/// Largest number of halvings and doublings of a step before the direction is abandoned.
-const BISECTIONS: usize = 30;
 
 /// Settings between two updates of the multipliers.
 #[derive(Clone, Copy, Debug)]
@@ -44,87 +37,12 @@ pub(super) fn minimise(
 ) -> DVector<f64> {
     for round in rounds {
         objective.update(&x, round);
-        x = bfgs(objective, x, round.steps);
+        x = bfgs(
+            &mut |x, gradient| objective.value(x, gradient),
+            x,
+            round.steps,
+        );
         done();
-    }
-    x
-}
-
-fn bfgs(objective: &mut impl Objective, mut x: DVector<f64>, iterations: usize) -> DVector<f64> {
-    let size = x.len();
-    let mut gradient = DVector::zeros(size);
-    let mut value = objective.value(&x, &mut gradient);
-    let mut inverse = DMatrix::identity(size, size);
-    let mut fresh = true;
-    let mut trial_gradient = DVector::zeros(size);
-    for _ in 0..iterations {
-        if !value.is_finite() || gradient.amax() < 1e-7 {
-            break;
-        }
-        let mut direction = -(&inverse * &gradient);
-        let mut slope = direction.dot(&gradient);
-        if slope >= 0.0 || !slope.is_finite() {
-            inverse.fill_with_identity();
-            fresh = true;
-            direction = -&gradient;
-            slope = direction.dot(&gradient);
-        }
-        // Without curvature information, a step of a tenth of a variable's range is suitable.
-        let mut step = if fresh {
-            (0.1 / direction.amax()).min(1.0)
-        } else {
-            1.0
-        };
-        let (mut low, mut high) = (0.0, f64::INFINITY);
-        let mut found = None;
-        for _ in 0..BISECTIONS {
-            let trial = &x + step * &direction;
-            let trial_value = objective.value(&trial, &mut trial_gradient);
-            let enough = value + ARMIJO * step * slope;
-            if trial_value.is_nan() || trial_value > enough {
-                high = step;
-            } else if trial_gradient.dot(&direction) < WOLFE * slope {
-                low = step;
-                found = Some((trial, trial_value, trial_gradient.clone()));
-            } else {
-                found = Some((trial, trial_value, trial_gradient.clone()));
-                break;
-            }
-            step = if high.is_finite() {
-                0.5 * (low + high)
-            } else {
-                2.0 * low
-            };
-        }
-        let Some((next, next_value, next_gradient)) = found else {
-            if fresh {
-                break;
-            }
-            // A kink invalidates the curvature: restart with the steepest descent.
-            inverse.fill_with_identity();
-            fresh = true;
-            continue;
-        };
-        let s = &next - &x;
-        let y = &next_gradient - &gradient;
-        let curvature = s.dot(&y);
-        if curvature > 1e-12 * s.norm() * y.norm() {
-            if fresh {
-                inverse.fill_with_identity();
-                inverse *= curvature / y.norm_squared();
-                fresh = false;
-            }
-            let hy = &inverse * &y;
-            let factor = (1.0 + y.dot(&hy) / curvature) / curvature;
-            inverse.ger(factor, &s, &s, 1.0);
-            inverse.ger(-1.0 / curvature, &hy, &s, 1.0);
-            inverse.ger(-1.0 / curvature, &s, &hy, 1.0);
-        }
-        let still = (value - next_value).abs() < 1e-10 * (1.0 + value.abs());
-        (x, value, gradient) = (next, next_value, next_gradient);
-        if still {
-            break;
-        }
     }
     x
 }

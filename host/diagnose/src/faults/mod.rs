@@ -21,7 +21,6 @@ mod link;
 mod magnitude;
 mod model;
 pub(crate) mod names;
-pub(crate) mod nnls;
 mod order;
 mod physical;
 mod place;

@@ -14,11 +14,11 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use crate::DiagnoseError;
 use crate::faults::fit::{Fit, about_mean};
-use crate::faults::nnls::nnls;
 use crate::faults::rows::{Form, Rows};
 use crate::faults::wave;
 use rig_model::robot;
 use rig_model::robot::{Inertial, Robot};
+use rig_numerics::optimise::non_negative::nnls;
 
 /// Number of stretches that are left out in turn.
 pub(crate) const BLOCKS: usize = 8;

@@ -10,9 +10,9 @@
 use rig_shared::multibody::{COLUMNS, column};
 
 use crate::fit::refit::weighed;
-use crate::fit::vector::dot;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::Rows;
+use rig_numerics::vector::dot;
 
 /// Length share below which a column is collinear with the others. As in `rig identify`: its value would rest on a
 /// thousandth of the torque.

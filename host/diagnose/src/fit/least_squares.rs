@@ -5,9 +5,9 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::folded::Folded;
-use crate::fit::vector::{axpy, dot, dot_self};
 use crate::rows::regression::{Column, Rows};
 use crate::statistics::bins;
+use rig_numerics::vector::{axpy, dot, norm_squared};
 
 mod evidence;
 mod folds;
@@ -212,7 +212,7 @@ impl<'a> Fit<'a> {
     /// Returns the weighted RMS of a joint's residual over the used rows, in its own unit.
     pub(crate) fn rms(&self, joint: usize) -> f64 {
         let n = self.rows.count;
-        let squares = dot_self(&self.residual[joint * n..(joint + 1) * n]);
+        let squares = norm_squared(&self.residual[joint * n..(joint + 1) * n]);
         let used = match &self.counts[joint] {
             None => self.rows.used(joint) as f64,
             Some(counts) => (counts.iter().zip(&self.rows.keep[joint]))
@@ -225,7 +225,7 @@ impl<'a> Fit<'a> {
 
     /// Returns the RMS of a joint's residual over the used rows without row weights, in its own unit.
     pub(crate) fn even_rms(&self, joint: usize) -> f64 {
-        let squares = dot_self(&self.residual(joint));
+        let squares = norm_squared(&self.residual(joint));
         (squares / self.rows.used(joint).max(1) as f64).sqrt()
     }
 
@@ -251,7 +251,7 @@ impl<'a> Fit<'a> {
         }
         let n = self.rows.count;
         let own = &self.residual[joint * n..(joint + 1) * n];
-        let now = (dot_self(own) / self.rows.used(joint).max(1) as f64).sqrt();
+        let now = (norm_squared(own) / self.rows.used(joint).max(1) as f64).sqrt();
         let by = self.rms(joint) / now.max(f64::MIN_POSITIVE);
         own.iter().map(|r| by * r).collect()
     }
@@ -339,7 +339,7 @@ impl<'a> Fit<'a> {
         if !within {
             return None;
         }
-        let share = beta.dot(right) / dot_self(&self.residual);
+        let share = beta.dot(right) / norm_squared(&self.residual);
         share
             .is_finite()
             .then(|| (share, beta.iter().copied().collect()))
@@ -355,9 +355,9 @@ impl<'a> Fit<'a> {
         let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
         for column in columns {
             let weighted = self.weighted(column);
-            let whole = dot_self(&weighted);
+            let whole = norm_squared(&weighted);
             let rest = self.projected(weighted);
-            if !is_own(dot_self(&rest), whole) {
+            if !is_own(norm_squared(&rest), whole) {
                 return None;
             }
             own.push(rest);
@@ -370,7 +370,7 @@ impl<'a> Fit<'a> {
         let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
         for column in columns {
             let weighted = self.weighted(column);
-            let whole = dot_self(&weighted);
+            let whole = norm_squared(&weighted);
             let mut rest = self.projected(weighted);
             for _ in 0..2 {
                 for other in &own {
@@ -378,7 +378,7 @@ impl<'a> Fit<'a> {
                     axpy(-along, other, &mut rest);
                 }
             }
-            let left = dot_self(&rest);
+            let left = norm_squared(&rest);
             if is_own(left, whole) {
                 rest.iter_mut().for_each(|x| *x /= left.sqrt());
                 own.push(rest);

@@ -6,7 +6,5 @@ pub(crate) mod folded;
 pub(crate) mod least_squares;
 pub(crate) mod open_parameters;
 pub(crate) mod refit;
-pub(crate) mod simplex;
 pub(crate) mod solution;
 pub(crate) mod systematic_uncertainty;
-pub(crate) mod vector;

@@ -4,12 +4,12 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::description::parameter_prior::{Direction, is_friction};
 use crate::fit::refit::weighed;
-use crate::fit::vector::{axpy, dot};
 use crate::models::description::weights;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::Rows;
 use rig_identify::contradicted;
 use rig_model::robot::DESCRIBED;
+use rig_numerics::vector::{axpy, dot};
 
 /// Standard deviation that means "unknown", SI.
 const WIDE: f64 = 1e6;

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::least_squares::Fit;
-use crate::fit::vector::dot;
 use crate::rows::regression::Column;
+use rig_numerics::vector::dot;
 
 /// Coefficients of columns fitted together.
 #[derive(Clone, Debug)]

@@ -7,10 +7,10 @@ use crate::columns::effect_columns::Source;
 use crate::description::parameter_prior::ParameterPrior;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::{Solution, jackknifed, solve};
-use crate::fit::vector::dot;
 use crate::link_encoder::equation::Equation;
 use crate::link_encoder::law::{Law, Laws};
 use crate::rows::regression::{Column, combined};
+use rig_numerics::vector::dot;
 
 /// Analysis of one joint's transmission.
 pub(crate) struct TransmissionAnalysis<'a, 's> {

@@ -6,7 +6,6 @@
 
 use crate::fit::evidence::Evidence;
 use crate::fit::least_squares::Fit;
-use crate::fit::simplex::Simplex;
 use crate::fit::solution::{Solution, jackknifed};
 use crate::levels::SIGNIFICANT;
 use crate::link_encoder::equation::Equation;
@@ -14,6 +13,7 @@ use crate::link_encoder::sizes::{LEAST_SHARE, LEAST_SIGMAS, least};
 use crate::recordings::noise_floor;
 use crate::rows::regression::{Column, Rows, combined};
 use rig_data::prepare::central_difference;
+use rig_numerics::optimise::simplex::Simplex;
 
 /// Gaps at which the search starts, from the least resolvable to the whole encoder difference.
 const STARTS: usize = 12;
@@ -167,13 +167,13 @@ impl<'e> Transmitted<'e> {
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
         let mut simplex = Simplex::new(&[start.0.ln(), 0.0], &[0.2, 0.1]);
         let mut best = (start.1, start.0, 0.0);
-        while let Some(at) = simplex.asks() {
+        while let Some(at) = simplex.next_point() {
             let (gap, zero) = (at[0].exp(), at[1] * start.0);
             let explained = share(gap, zero);
             if explained > best.0 {
                 best = (explained, gap, zero);
             }
-            simplex.told(-explained);
+            simplex.report(-explained);
         }
         let (_, gap, zero) = best;
         Some([gap, zero])

@@ -17,7 +17,6 @@ use crate::description::parameter_prior::{Direction, ParameterPrior};
 use crate::fit::least_squares::Fit;
 use crate::fit::refit::Refit;
 use crate::fit::solution::solve;
-use crate::fit::vector::dot;
 use crate::models::description::{completed, gravity_with, redistributed_over, with_gains};
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
@@ -27,6 +26,7 @@ use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::runs::{JointRun, Run};
 use rig_identify::{Combinations, Sizes, as_bodies};
 use rig_model::robot::Robot;
+use rig_numerics::vector::dot;
 use rig_output::format_significant;
 
 /// Relative increase of the residual above which the cost of consistent bodies is reported.

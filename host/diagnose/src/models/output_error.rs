@@ -8,29 +8,29 @@
 //!
 //! Leaves out: robots of several joints; gears, whose link is observed from the torque; whole numbers.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::columns::effect_columns::Source;
 use crate::columns::kinds::is_gear;
 use crate::fit::refit::{Joint, named, wald};
 use crate::levels::NOTHING;
 use crate::models::bodies::{FittedModel, ModelCache};
-use crate::models::simulated_motion::{Departures, Errors, Replay};
+use crate::models::simulated_motion::{Errors, Replay};
 use crate::outcome::{ByMotion, Twice};
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::{DiagnoseError, statistics};
 use rig_model::batch::each_by;
+use rig_numerics::optimise::gauss_newton::{Settings, gauss_newton};
 use rig_output::format_significant;
 
-/// Most Gauss-Newton passes.
-const PASSES: usize = 4;
-/// Largest parameter change of the last pass, in standard deviations; the derivatives are then kept.
-const SETTLED: f64 = 0.5;
-/// Most increases of the damping in a pass.
-const DAMPED: usize = 5;
+/// Settings of the refit.
+const SETTINGS: Settings = Settings {
+    passes: 4,
+    settled: 0.5,
+    damped: 5,
+};
 /// Relative increase of the torque RMS up to which the motion's values are adopted …
 const TORQUE_WORSE: f64 = 0.005;
 /// … and share of the motion's RMS below which `BLURRED` replaces it, to allow for the filters' blur.
@@ -158,10 +158,16 @@ pub(crate) fn by_motion(
     let Some(first) = departs(&by_torque.values) else {
         return Ok(None);
     };
-    let start = by_torque.values.clone();
-    let Some((by_motion, covariance)) = nearest(start, &by_torque.stds, first, &departs, threads)
+    let (start, stds) = (by_torque.values.clone(), &by_torque.stds);
+    let each =
+        |n: usize, slope: &(dyn Fn(usize) -> Option<Vec<f64>> + Sync)| each_by(n, threads, slope);
+    let Some((nearest, covariance)) = gauss_newton(start, stds, first, &departs, each, SETTINGS)
     else {
         return Ok(None);
+    };
+    let by_motion = Estimate {
+        stds: covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
+        values: nearest,
     };
     let standing = model(&by_motion.values);
     let effects = (values.effects(chosen, &by_motion.values).into_iter())
@@ -264,88 +270,6 @@ fn twice(
         motion_std: scale * motion.stds[k],
         sigmas: (motion.values[k] - torque.values[k]).abs() / torque.stds[k].hypot(motion.stds[k]),
     }
-}
-
-/// Returns the values with the least motion error, and their covariance, robust to correlation within one-second
-/// blocks. `None` if the values are not identifiable.
-fn nearest(
-    mut theta: Vec<f64>,
-    stds: &[f64],
-    mut found: Departures,
-    departs: &(impl Fn(&[f64]) -> Option<Departures> + Sync),
-    threads: usize,
-) -> Option<(Estimate, DMatrix<f64>)> {
-    let n = theta.len();
-    let squares = |d: &Departures| d.of.iter().map(|x| x * x).sum::<f64>();
-    for pass in 1.. {
-        let columns: Option<Vec<Vec<f64>>> = each_by(n, threads, |k| {
-            let at = |by: f64| {
-                let mut theta = theta.clone();
-                theta[k] += by;
-                departs(&theta)
-            };
-            let difference = |up: &Departures, down: &Departures, step: f64| -> Vec<f64> {
-                (up.of.iter().zip(&down.of))
-                    .map(|(a, b)| (a - b) / step)
-                    .collect()
-            };
-            // At a bound only one side exists.
-            match [at(stds[k]), at(-stds[k])] {
-                [Some(up), Some(down)] => Some(difference(&up, &down, 2.0 * stds[k])),
-                [Some(up), None] => Some(difference(&up, &found, stds[k])),
-                [None, Some(down)] => Some(difference(&found, &down, stds[k])),
-                [None, None] => None,
-            }
-        })
-        .into_iter()
-        .collect();
-        let columns = columns?;
-        // In units of the standard deviations, which differ by orders of magnitude.
-        let slopes = DMatrix::from_fn(found.of.len(), n, |row, k| stds[k] * columns[k][row]);
-        let information = slopes.tr_mul(&slopes);
-        let pull = slopes.tr_mul(&DVector::from_column_slice(&found.of));
-        let mut damping = 0.0;
-        let mut moved = 0.0_f64;
-        for _ in 0..DAMPED {
-            let mut damped = information.clone();
-            for k in 0..n {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky()?.solve(&pull);
-            let next: Vec<f64> = (0..n).map(|k| theta[k] - stds[k] * step[k]).collect();
-            match departs(&next).filter(|next| squares(next) < squares(&found)) {
-                Some(better) => {
-                    (theta, found) = (next, better);
-                    moved = step.amax();
-                    break;
-                }
-                None => damping = f64::max(10.0 * damping, 1e-2),
-            }
-        }
-        if moved <= SETTLED || pass == PASSES {
-            let inverse = information.cholesky()?.inverse();
-            let mut stretches: BTreeMap<(usize, usize), DVector<f64>> = BTreeMap::new();
-            for (row, (residual, stretch)) in found.of.iter().zip(&found.stretch).enumerate() {
-                let own = stretches.entry(*stretch);
-                *own.or_insert_with(|| DVector::zeros(n)) +=
-                    slopes.row(row).transpose() * *residual;
-            }
-            let mut spread = DMatrix::zeros(n, n);
-            for pull in stretches.values() {
-                spread += pull * pull.transpose();
-            }
-            let count = stretches.len() as f64;
-            let covariance = &inverse * spread * &inverse * (count / (count - 1.0));
-            let covariance = DMatrix::from_fn(n, n, |a, b| stds[a] * covariance[(a, b)] * stds[b]);
-            let own = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
-            let found = Estimate {
-                values: theta,
-                stds: own,
-            };
-            return Some((found, covariance));
-        }
-    }
-    None
 }
 
 fn sentence(told: &ByMotion) -> String {

@@ -16,12 +16,12 @@ use crate::fit::evidence::Evidence;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::Solution;
 use crate::fit::systematic_uncertainty::LINK;
-use crate::fit::vector::dot;
 use crate::outcome::Value;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
 use rig_identify::independent_columns;
 use rig_model::robot::{Inertial, JointKind, Robot};
+use rig_numerics::vector::dot;
 use rig_output::{format_significant, format_value};
 
 /// Least ratio of a change to its standard deviation.

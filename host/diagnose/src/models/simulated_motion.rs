@@ -8,6 +8,7 @@ use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::runs::Run;
 use rig_model::robot::{Controller, Robot, title_of};
 use rig_model::simulate::{Model, SimulateError};
+use rig_numerics::optimise::gauss_newton::BlockedResidual;
 use rig_validate::replay::{of_joints, replayed};
 
 /// Longest integration step, s.
@@ -45,13 +46,6 @@ impl Errors {
         let std = (spread / (n * (n - 1.0))).sqrt();
         self.rms(joint) > (1.0 + WORSE) * before.rms(joint) && mean > SIGMAS * std
     }
-}
-
-/// Simulated minus recorded position of a robot's only joint, rad or m, 100 times a second.
-pub(crate) struct Departures {
-    pub(crate) of: Vec<f64>,
-    /// Motion and one-second block of each error; runs of one motion share their blocks.
-    pub(crate) stretch: Vec<(usize, usize)>,
 }
 
 /// Recordings to be simulated.
@@ -155,14 +149,12 @@ impl<'a> Replay<'a> {
         Some(Errors(joints.map(of_joint).collect()))
     }
 
-    /// Returns the position errors of a one-joint description over time; `None` if it cannot be simulated.
-    pub(crate) fn departures(&self, robot: &Robot) -> Option<Departures> {
+    /// Returns simulated minus recorded position of a one-joint description, rad or m, 100 times a second; `None` if it
+    /// cannot be simulated. Blocks are motion and second; runs of one motion share them.
+    pub(crate) fn departures(&self, robot: &Robot) -> Option<BlockedResidual> {
         let simulated = self.simulated(robot).ok()?;
         let repeats = noise_floor::repeats(self.runs);
-        let mut found = Departures {
-            of: Vec::new(),
-            stretch: Vec::new(),
-        };
+        let mut found = BlockedResidual::default();
         for (r, (run, q)) in self.runs.iter().zip(&simulated).enumerate() {
             let first = (repeats.iter().filter(|(_, b)| *b == r))
                 .map(|(a, _)| *a)
@@ -170,9 +162,9 @@ impl<'a> Replay<'a> {
             let step = ((run.rate / DEPARTURES).round() as usize).max(1);
             let errors = q[0].iter().zip(&run.joints[0].q).map(|(a, b)| a - b);
             for (k, error) in errors.enumerate().step_by(step) {
-                found.of.push(error);
+                found.values.push(error);
                 let stretch = (k as f64 / run.rate / BLOCK) as usize;
-                found.stretch.push((first.unwrap_or(r), stretch));
+                found.blocks.push((first.unwrap_or(r), stretch));
             }
         }
         Some(found)

@@ -4,6 +4,7 @@ use crate::rows::regression::Rows;
 use crate::statistics;
 use rig_data::prepare::Welch;
 use rig_data::runs::{Differences, Run};
+use rig_numerics::autocorrelation::correlation_time_to_zero;
 
 /// Share of the rows' band that the low-pass before decimation passes.
 const PASSED: f64 = 0.8;
@@ -250,24 +251,8 @@ pub(crate) fn of_a_sample(noise: f64, samples: f64) -> f64 {
 /// longest of all joints.
 pub(crate) fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {
     let lags = ((LONGEST_MEMORY / rows.period).ceil() as usize).min(rows.count / 4);
-    let of = |residual: &Vec<f64>| {
-        let squares: f64 = residual.iter().map(|r| r * r).sum();
-        let mut sum = 0.5;
-        for lag in 1..=lags {
-            let mut product = 0.0;
-            for pair in rows.starts.windows(2) {
-                let stretch = &residual[pair[0]..pair[1]];
-                if let Some(ahead) = stretch.get(lag..) {
-                    product += ahead.iter().zip(stretch).map(|(a, b)| a * b).sum::<f64>();
-                }
-            }
-            if product <= 0.0 || squares == 0.0 {
-                break;
-            }
-            sum += product / squares;
-        }
-        2.0 * sum * rows.period
-    };
+    let of =
+        |residual: &Vec<f64>| correlation_time_to_zero(residual, &rows.starts, lags) * rows.period;
     residuals.iter().map(of).fold(rows.period, f64::max)
 }
 

@@ -10,7 +10,6 @@ use crate::columns::candidate::Candidate;
 use crate::columns::kinds::{is_first_law, is_gear, rivals};
 use crate::experiment::{Held, Nominal, OFF_LOG, PULLS_OFF, testable};
 use crate::fit::least_squares::Fit;
-use crate::fit::vector::dot_self;
 use crate::levels::{LEAST_GAIN, SIGNIFICANT};
 use crate::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
 use crate::recordings::external_load::told_apart;
@@ -21,6 +20,7 @@ use crate::search::shapes::grid;
 use crate::{DiagnoseError, experiment};
 use rig_model::robot::Robot;
 use rig_model::simulate::Model;
+use rig_numerics::vector::norm_squared;
 use rig_output::{format_unit, format_value};
 
 /// Most grid points that are evaluated.
@@ -174,10 +174,10 @@ pub(crate) fn detectable(
 /// Returns the smallest accepted gain of a projected column; `count` columns are tested together.
 pub(crate) fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -> Option<f64> {
     let left = fit.left();
-    let length = dot_self(column);
+    let length = norm_squared(column);
     // The minimum reduction refers to the RMS with the effect in the residual.
     let kept = (1.0 - LEAST_GAIN).powi(2);
-    let visible = (dot_self(left) * (1.0 - kept) / kept / length).sqrt();
+    let visible = (norm_squared(left) * (1.0 - kept) / kept / length).sqrt();
     let inverse = DMatrix::from_element(1, 1, 1.0 / length);
     let std = fit.sandwich(&[column], &inverse, left)[(0, 0)].sqrt();
     let (g, k) = (fit.blocks() as f64, count as f64);

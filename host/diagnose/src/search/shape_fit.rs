@@ -10,8 +10,6 @@ use crate::columns::effect_columns::Source;
 use crate::columns::kinds::is_gear;
 use crate::fit::evidence::Evidence;
 use crate::fit::least_squares::Fit;
-use crate::fit::simplex::{MOST_ANSWERS, Simplex};
-use crate::fit::vector::dot_self;
 use crate::levels::LEAST_GAIN;
 use crate::recordings::sampling::sampling_jitter;
 use crate::rows::lanes::ABREAST;
@@ -20,6 +18,9 @@ use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::shapes::{at_bound, coordinate, is_distance, searched, spacing, value_at};
 use crate::search::spring::stiff;
 use crate::search::stepwise::Search;
+use rig_numerics::optimise::golden_section::golden_section;
+use rig_numerics::optimise::simplex::{DEFAULT_EVALUATIONS, Simplex};
+use rig_numerics::vector::norm_squared;
 
 /// Least share of the twist torque of mass and load that a gear must have. True gears of the emulated rig give 0.7 to
 /// 1.1. A wide backlash with a third can replace a tilted base.
@@ -36,7 +37,7 @@ const MOST_DAMPED: f64 = 0.5;
 /// Starting points that are refined in parallel.
 const FOLLOWED: usize = ABREAST;
 /// First step of a simplex in a shape's coordinate, and its evaluations: from a grid …
-const FAR: (f64, usize) = (0.4, MOST_ANSWERS);
+const FAR: (f64, usize) = (0.4, DEFAULT_EVALUATIONS);
 /// … and from the best shapes beside a similar model.
 const NEAR: (f64, usize) = (0.2, 50);
 /// Golden-section steps of the refinement.
@@ -280,13 +281,13 @@ impl Search<'_> {
                     }
                 };
                 let steps: Vec<f64> = (scales.iter().zip(&at)).map(|(s, x)| away(s, *x)).collect();
-                Simplex::new(&at, &steps).of_most(answers)
+                Simplex::new(&at, &steps).with_evaluations(answers)
             })
             .collect();
         loop {
             let asked: Vec<(usize, [f64; SHAPES])> = (simplices.iter().enumerate())
                 .filter_map(|(k, simplex)| {
-                    let x = simplex.asks()?;
+                    let x = simplex.next_point()?;
                     let mut shapes = [0.0; SHAPES];
                     for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
                         shapes[place] = value_at(shape, x).max(least[place]).min(most[place]);
@@ -303,7 +304,7 @@ impl Search<'_> {
                 .columns_of(self.threads, &self.library[c], &shapes)?;
             for ((k, shapes), columns) in asked.into_iter().zip(columns) {
                 let share = self.explained(fit, c, &columns).unwrap_or(0.0);
-                simplices[k].told(-share);
+                simplices[k].report(-share);
                 if share > best.0 {
                     *best = (share, shapes, Arc::new(columns));
                 }
@@ -336,7 +337,7 @@ impl Search<'_> {
             .collect();
         let mut simplex = Simplex::new(&at, &steps);
         let mut best: Option<(f64, [f64; SHAPES], Vec<Column>)> = None;
-        while let Some(x) = simplex.asks() {
+        while let Some(x) = simplex.next_point() {
             let mut shapes = [0.0; SHAPES];
             for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
                 shapes[place] = value_at(shape, x).max(least[place]).min(most[place]);
@@ -346,8 +347,8 @@ impl Search<'_> {
             for column in &columns {
                 left.subtract(column);
             }
-            let squares = dot_self(left.left());
-            simplex.told(squares);
+            let squares = norm_squared(left.left());
+            simplex.report(squares);
             if best.as_ref().is_none_or(|b| squares < b.0) {
                 best = Some((squares, shapes, columns));
             }
@@ -375,10 +376,9 @@ impl Search<'_> {
         ];
         let [least, most] = searched(shape, told, reached).map(|bound| coordinate(shape, bound));
         // A described value may lie outside the range that these recordings resolve.
-        let mut high = (middle + step).min(most);
-        let mut low = (middle - step).max(least).min(high);
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
+        let high = (middle + step).min(most);
+        let low = (middle - step).max(least).min(high);
+        golden_section([low, high], REFINEMENTS, fine, |x| {
             let mut shapes = best.1;
             shapes[place] = value_at(shape, x);
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
@@ -389,24 +389,7 @@ impl Search<'_> {
                 *best = (share, shapes, columns);
             }
             Ok(share)
-        };
-        let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-        let (mut fa, mut fb) = (at(a, best)?, at(b, best)?);
-        for _ in 0..REFINEMENTS {
-            if fa > fb {
-                (high, b, fb) = (b, a, fa);
-                a = high - golden * (high - low);
-                fa = at(a, best)?;
-            } else {
-                (low, a, fa) = (a, b, fb);
-                b = low + golden * (high - low);
-                fb = at(b, best)?;
-            }
-            if high - low < fine {
-                break;
-            }
-        }
-        Ok(())
+        })
     }
 
     /// Returns the physical bounds of the gains. A delay within the sampling jitter is no effect.

@@ -6,9 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::faults::nnls::nnls;
 use crate::voltage::log::Log;
 use crate::voltage::plant::{NOMINAL, Plant};
+use rig_numerics::optimise::non_negative::nnls;
 
 /// Length of a piece, s: a few steps of a coarse encoder, short beside an oscillation.
 const PIECE: f64 = 0.3;

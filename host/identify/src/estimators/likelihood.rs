@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::fitted::Fitted;
 use super::least::from_factors;
-use super::linear::{product, spread};
+use super::linear::spread;
 use super::problem::Problem;
 use crate::error::IdentifyError;
 use crate::rows::equation::Rows;
@@ -24,6 +24,7 @@ use crate::rows::factor::TriangularFactor;
 use crate::rows::stream::each_rows;
 use crate::uncertainty::jackknife::{LeaveOut, PARTS, joined, part_of};
 use crate::uncertainty::parts::Parts;
+use rig_numerics::vector::dot_in_order;
 
 /// Highest order of the autoregression.
 const MOST_ORDER: usize = 20;
@@ -149,7 +150,7 @@ fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, I
                 past[k].clear();
             }
             if equation.keep[i] {
-                let e = equation.y[i] - product(&equation.x[i * p..(i + 1) * p], full);
+                let e = equation.y[i] - dot_in_order(&equation.x[i * p..(i + 1) * p], full);
                 past[k].push_front(e);
                 past[k].truncate(MOST_ORDER + 1);
                 counts[k] += 1;
@@ -250,7 +251,7 @@ fn whitened(
         }
         let errors: Vec<f64> = innovations
             .iter()
-            .map(|row| row[p] - product(&row[..p], full))
+            .map(|row| row[p] - dot_in_order(&row[..p], full))
             .collect();
         for (a, ea) in present.iter().zip(&errors) {
             for (b, eb) in present.iter().zip(&errors) {

@@ -12,11 +12,6 @@ pub(crate) fn triangle(factor: &TriangularFactor, data: &Independent) -> DMatrix
     kept_columns(factor, data).0.qr().r()
 }
 
-/// Multiplies a row by the parameters.
-pub(crate) fn product(x: &[f64], beta: &[f64]) -> f64 {
-    x.iter().zip(beta).map(|(x, b)| x * b).sum()
-}
-
 /// Spreads the values of the kept columns over all columns, zero elsewhere.
 pub(crate) fn spread(beta: &[f64], kept: &[usize], p: usize) -> Vec<f64> {
     let mut full = vec![0.0; p];

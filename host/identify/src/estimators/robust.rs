@@ -2,7 +2,7 @@
 
 use super::fitted::Fitted;
 use super::least::from_factors;
-use super::linear::{product, spread};
+use super::linear::spread;
 use super::problem::Problem;
 use crate::error::IdentifyError;
 use crate::options::Options;
@@ -12,6 +12,7 @@ use crate::rows::stream::each_rows;
 use crate::uncertainty::jackknife::{LeaveOut, PARTS, joined, part_of};
 use crate::uncertainty::parts::Parts;
 use rig_data::prepare::Recording;
+use rig_numerics::vector::dot_in_order;
 
 /// Absolute residuals in logarithmic bins of 1 %: gives the median of any number in constant memory.
 #[derive(Clone)]
@@ -61,7 +62,8 @@ pub(crate) fn spread_of(
         each_rows(*recording, plan, options.model, &mut |rows| {
             for (median, equation) in medians.iter_mut().zip(&rows.equations) {
                 for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
-                    median.push(equation.y[i] - product(&equation.x[i * p..(i + 1) * p], full));
+                    median
+                        .push(equation.y[i] - dot_in_order(&equation.x[i * p..(i + 1) * p], full));
                 }
             }
             Ok(())
@@ -87,7 +89,7 @@ pub(crate) fn reweighted(
             for (k, equation) in rows.equations.iter().enumerate() {
                 for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
                     let x = &equation.x[i * p..(i + 1) * p];
-                    let e = equation.y[i] - product(x, full);
+                    let e = equation.y[i] - dot_in_order(x, full);
                     medians[k].push(e);
                     let weight = options.loss.weight(e / scale[k].max(f64::MIN_POSITIVE));
                     factor.push(
@@ -123,7 +125,7 @@ pub(crate) fn robust(problem: &Problem, parts: &Parts) -> Result<Fitted, Identif
                     for (k, equation) in rows.equations.iter().enumerate() {
                         if equation.keep[i] {
                             let x = &equation.x[i * p..(i + 1) * p];
-                            let e = equation.y[i] - product(x, &full);
+                            let e = equation.y[i] - dot_in_order(x, &full);
                             medians[k].push(e);
                             let loss = options.loss.weight(e / scale[k].max(f64::MIN_POSITIVE));
                             let weight = options.row_weight(r) * problem.weights[k] * loss.sqrt();

@@ -2,7 +2,7 @@
 
 use super::map::{DroppedPass, FrictionMapOptions, FrictionPoint};
 use super::passes::{Signal, Stretch, slope};
-use crate::uncertainty::memory::Memory;
+use rig_numerics::autocorrelation::Autocorrelation;
 
 /// All rows of a sweep, moving or not.
 #[derive(Clone, Default)]
@@ -124,13 +124,13 @@ pub(super) fn tenths(values: &[f64]) -> [f64; PARTS] {
 fn mean_of(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
-    let mut memory = Memory::default();
+    let mut memory = Autocorrelation::default();
     let mut squares = 0.0;
     for value in values {
         memory.push(value - mean);
         squares += (value - mean).powi(2);
     }
-    let by_rows = (squares / n * memory.length() / n).sqrt();
+    let by_rows = (squares / n * memory.correlation_time() / n).sqrt();
     let tenths = tenths(values);
     let about = tenths.iter().sum::<f64>() / PARTS as f64;
     let spread: f64 = tenths.iter().map(|m| (m - about).powi(2)).sum();

@@ -1,5 +1,7 @@
 //! Accumulation of a triangular factor: least squares over any number of rows in constant memory.
 
+use rig_numerics::vector::{axpy, dot};
+
 /// Number of rows reduced together: with a few dozen columns they fit in the second-level cache.
 const BLOCK_ROWS: usize = 128;
 
@@ -17,28 +19,6 @@ pub struct TriangularFactor {
     block: Vec<f64>,
     filled: usize,
     rows: u64,
-}
-
-/// Computes the scalar product in independent strands, which the compiler vectorises.
-#[inline]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0f64; 8];
-    let (a8, a_rest) = a.as_chunks::<8>();
-    let (b8, b_rest) = b.as_chunks::<8>();
-    for (x, y) in a8.iter().zip(b8) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-    sums.iter().sum::<f64>() + rest
-}
-
-#[inline]
-fn add_scaled(target: &mut [f64], factor: f64, source: &[f64]) {
-    for (t, s) in target.iter_mut().zip(source) {
-        *t += factor * s;
-    }
 }
 
 impl TriangularFactor {
@@ -116,7 +96,7 @@ impl TriangularFactor {
                 let top = &mut self.r[(j + 1 + k) * width + j];
                 let projection = tau * (*top + dot(v, column));
                 *top -= projection;
-                add_scaled(column, -projection, v);
+                axpy(-projection, v, column);
             }
         }
         self.filled = 0;

@@ -16,13 +16,13 @@ use crate::options::ModelKind;
 use crate::rows::planned::Planned;
 use crate::structure::excitation::not_excited;
 use crate::uncertainty::estimate::Estimate;
-use crate::uncertainty::memory::memory_of;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::beyond::Beyond;
 use crate::unmodelled::lag::Lag;
 use rig_data::prepare::{Survey, Treatment};
 use rig_model::effects::Effects;
 use rig_model::robot::Robot;
+use rig_numerics::autocorrelation::correlation_time;
 
 /// A fit with its residuals.
 pub(crate) struct Results<'a> {
@@ -66,7 +66,7 @@ impl Results<'_> {
         let problem = self.problem;
         let (robot, options, data) = (problem.robot, problem.options, problem.data);
         let remembered: Vec<f64> = (self.train.iter())
-            .map(|r| memory_of(&r.autocorrelation, r.rows))
+            .map(|r| correlation_time(&r.autocorrelation, r.rows))
             .collect();
         let lag = Lag::of(problem, &remembered)?;
         let named = Named::of(problem, &estimate);

@@ -1,12 +1,13 @@
 //! The frequency up to which the model explains the torque.
 
 use crate::error::IdentifyError;
-use crate::estimators::linear::{product, weighted_minimum_norm};
+use crate::estimators::linear::weighted_minimum_norm;
 use crate::options::ModelKind;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
 use crate::rows::stream::each_rows;
 use rig_data::prepare::{Recording, Welch};
+use rig_numerics::vector::dot_in_order;
 
 /// Share of the torque's power that may stay unexplained: one half, at equal power of signal and residual.
 const UNEXPLAINED: f64 = 0.5;
@@ -52,7 +53,7 @@ pub(crate) fn explained_band(
         each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
             for (equation, [torque, rest]) in rows.equations.iter().zip(&mut spectra) {
                 for (i, y) in equation.y.iter().enumerate() {
-                    let e = y - product(&equation.x[i * p..(i + 1) * p], beta.as_slice());
+                    let e = y - dot_in_order(&equation.x[i * p..(i + 1) * p], beta.as_slice());
                     torque.push(*y);
                     rest.push(e);
                 }

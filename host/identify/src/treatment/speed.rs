@@ -4,14 +4,15 @@ use super::left_out::{BETTER, Stretches};
 use super::trial_rows::factors_of;
 use super::trial_rows::kept;
 use crate::error::IdentifyError;
-use crate::estimators::linear::{by_noise, product};
+use crate::estimators::linear::by_noise;
 use crate::options::ModelKind;
 use crate::rows::equation::Rows;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
 use crate::rows::stream::each_rows;
-use crate::uncertainty::memory::Memory;
 use rig_data::prepare::Recording;
+use rig_numerics::autocorrelation::Autocorrelation;
+use rig_numerics::vector::dot_in_order;
 
 /// Share of the RMS speed above which rows are always used; no threshold is higher.
 const BELIEVED: f64 = 0.5;
@@ -99,7 +100,7 @@ pub(crate) fn speed_thresholds(
     let memories = bins.believed_memories(training, plan, &factors)?;
     let thresholds: Vec<f64> = (0..joints)
         .map(|j| {
-            let refused = first_refused(&factors[j], memories[j].length());
+            let refused = first_refused(&factors[j], memories[j].correlation_time());
             let least = plan.treatment.speed_threshold[j];
             match (refused, bins.0[j].first()) {
                 (Some(bin), Some(top)) => (MARGIN * bins.0[j][bin - 1]).min(*top).max(least),
@@ -165,10 +166,10 @@ impl Bins {
         training: &[&dyn Recording],
         plan: &Plan,
         factors: &[Vec<TriangularFactor>],
-    ) -> Result<Vec<Memory>, IdentifyError> {
+    ) -> Result<Vec<Autocorrelation>, IdentifyError> {
         let p = plan.columns.len();
         let beta: Vec<Vec<f64>> = factors.iter().map(|list| believed(&list[0], p)).collect();
-        let mut memories = vec![Memory::default(); beta.len()];
+        let mut memories = vec![Autocorrelation::default(); beta.len()];
         for recording in training {
             each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
                 for (j, (memory, beta)) in memories.iter_mut().zip(&beta).enumerate() {
@@ -176,7 +177,7 @@ impl Bins {
                     for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
                         if self.of(j, rows.qd[j][i].abs()) == 0 {
                             let x = &equation.x[i * p..(i + 1) * p];
-                            memory.push(equation.y[i] - product(x, beta));
+                            memory.push(equation.y[i] - dot_in_order(x, beta));
                         }
                     }
                 }
@@ -324,15 +325,20 @@ fn squares_by_speed(
     let Some(beta) = by_noise(&factors) else {
         return Ok(Vec::new());
     };
-    let mut found: Vec<(Vec<Bin>, Memory)> = (bins.iter())
-        .map(|b| (vec![Bin::default(); b.len() + 1], Memory::default()))
+    let mut found: Vec<(Vec<Bin>, Autocorrelation)> = (bins.iter())
+        .map(|b| {
+            (
+                vec![Bin::default(); b.len() + 1],
+                Autocorrelation::default(),
+            )
+        })
         .collect();
     for recording in training {
         each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
             for (j, ((list, memory), equation)) in found.iter_mut().zip(&rows.equations).enumerate()
             {
                 for i in (0..equation.y.len()).filter(|&i| used(rows, j, i)) {
-                    let e = equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta);
+                    let e = equation.y[i] - dot_in_order(&equation.x[i * p..(i + 1) * p], &beta);
                     let speed = rows.qd[j][i].abs();
                     let bin = &mut list[bins[j].iter().take_while(|b| speed < **b).count()];
                     (bin.rows, bin.squares) = (bin.rows + 1, bin.squares + e * e);
@@ -344,7 +350,7 @@ fn squares_by_speed(
         })?;
     }
     Ok((found.into_iter())
-        .map(|(bins, memory)| (bins, memory.length()))
+        .map(|(bins, memory)| (bins, memory.correlation_time()))
         .collect())
 }
 

@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::estimate::Estimate;
 use super::groups::Groups;
-use super::memory::Memory;
 use crate::error::IdentifyError;
 use crate::estimators::fit::Fit;
-use crate::estimators::linear::{classical, kept_columns, product, spread};
+use crate::estimators::linear::{classical, kept_columns, spread};
 use crate::estimators::problem::Problem;
 use crate::rows::stream::each_rows;
+use rig_numerics::autocorrelation::Autocorrelation;
+use rig_numerics::vector::dot_in_order;
 
 /// Returns the least-squares estimate with its covariance, from one pass over the fitted rows. `beside` is added to the
 /// covariance of the identified combinations.
@@ -36,7 +37,7 @@ pub(crate) fn covariance(
     let full = spread(beta, &data.kept, factor.columns());
     let (p, size) = (full.len(), beta.len());
     let mut groups = Groups::new(size, *instants);
-    let mut memories = vec![Memory::default(); weights.len()];
+    let mut memories = vec![Autocorrelation::default(); weights.len()];
     let mut index = 0u64;
     let whiten = inverse.transpose();
     let mut x_kept = DVector::zeros(size);
@@ -49,7 +50,7 @@ pub(crate) fn covariance(
                         continue;
                     }
                     let x = &equation.x[i * p..(i + 1) * p];
-                    let e = equation.y[i] - product(x, &full);
+                    let e = equation.y[i] - dot_in_order(x, &full);
                     memories[k].push(e);
                     let mut weight = options.row_weight(r) * weights[k];
                     if let Some(scale) = &fit.scales {
@@ -69,8 +70,11 @@ pub(crate) fn covariance(
             Ok(())
         })?;
     }
-    let memory = memories.iter().map(Memory::length).fold(1.0, f64::max);
-    let rows: u64 = memories.iter().map(Memory::seen).sum();
+    let memory = memories
+        .iter()
+        .map(Autocorrelation::correlation_time)
+        .fold(1.0, f64::max);
+    let rows: u64 = memories.iter().map(Autocorrelation::seen).sum();
     let (white, count) = groups
         .jackknife(memory)
         .ok_or_else(|| too_short(problem, *instants, rows, memory))?;

@@ -4,7 +4,6 @@ pub(crate) mod estimate;
 pub(crate) mod fit_covariance;
 pub(crate) mod groups;
 pub(crate) mod jackknife;
-pub(crate) mod memory;
 pub(crate) mod parts;
 pub(crate) mod relative_error;
 pub(crate) mod residual;

@@ -4,13 +4,13 @@
 //! cross-validated error. Neither needs a model of the residual's correlation.
 
 use super::jackknife::{PARTS, Refit, joined, part_count, part_of};
-use super::memory::Memory;
 use crate::error::IdentifyError;
-use crate::estimators::linear::product;
 use crate::estimators::problem::Problem;
 use crate::options::ModelKind;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::stream::each_rows;
+use rig_numerics::autocorrelation::Autocorrelation;
+use rig_numerics::vector::dot_in_order;
 
 /// Every segment's factor per equation, and the correlation times of the weighted fit's residuals.
 pub(crate) struct Parts {
@@ -49,7 +49,10 @@ impl Parts {
                 sorted(problem, ModelKind::Differential, &full, instants)?.0
             }
         };
-        let memory: Vec<f64> = memories.iter().map(Memory::length).collect();
+        let memory: Vec<f64> = memories
+            .iter()
+            .map(Autocorrelation::correlation_time)
+            .collect();
         let longest = memory.iter().copied().fold(1.0, f64::max);
         let count = part_count(problem.instants, longest);
         let join = |parts: Vec<Vec<TriangularFactor>>| {
@@ -64,7 +67,7 @@ impl Parts {
         Ok(Self {
             fitted: join(fitted),
             judged: join(judged),
-            rows: memories.iter().map(Memory::seen).sum(),
+            rows: memories.iter().map(Autocorrelation::seen).sum(),
             memory,
             count,
         })
@@ -129,11 +132,11 @@ fn sorted(
     model: ModelKind,
     full: &[f64],
     total: u64,
-) -> Result<(Vec<Vec<TriangularFactor>>, Vec<Memory>), IdentifyError> {
+) -> Result<(Vec<Vec<TriangularFactor>>, Vec<Autocorrelation>), IdentifyError> {
     let p = problem.base.len();
     let equations = problem.robot.joints.len();
     let mut parts = vec![vec![TriangularFactor::new(p); equations]; PARTS];
-    let mut memories = vec![Memory::default(); equations];
+    let mut memories = vec![Autocorrelation::default(); equations];
     let mut index = 0;
     for (recording, weight) in problem.training.iter().zip(problem.recording_weights()) {
         each_rows(*recording, problem.plan, model, &mut |rows| {
@@ -143,7 +146,7 @@ fn sorted(
                     if equation.keep[i] {
                         let x = &equation.x[i * p..(i + 1) * p];
                         part[k].push(x, equation.y[i], weight);
-                        memories[k].push(equation.y[i] - product(x, full));
+                        memories[k].push(equation.y[i] - dot_in_order(x, full));
                     }
                 }
                 index += 1;

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::groups::FINEST_GROUPS;
 use super::groups::group_of;
-use super::memory::Memory;
+use rig_numerics::autocorrelation::Autocorrelation;
 
 /// Number of bins of a dependence plot.
 const BINS: usize = 20;
@@ -206,7 +206,7 @@ pub(crate) struct ResidualStream {
     every: u64,
     moments: [f64; 5],
     torque_squares: f64,
-    memory: Memory,
+    memory: Autocorrelation,
     /// Over all rows: their number, squares of the residual and of the torque.
     all: (u64, f64, f64),
     binned: Vec<Binned>,
@@ -221,7 +221,7 @@ impl ResidualStream {
             every: total.div_ceil(SERIES_POINTS as u64).max(1),
             moments: [0.0; 5],
             torque_squares: 0.0,
-            memory: Memory::default(),
+            memory: Autocorrelation::default(),
             all: (0, 0.0, 0.0),
             binned: vec![
                 Binned::new("position", ranges.position, BINS),
@@ -299,7 +299,7 @@ impl ResidualStream {
                 .map(|k| correlation[k].powi(2) / (n - k as f64).max(1.0))
                 .sum::<f64>();
         let whiteness_p = chi(ljung, TEST_LAGS as f64);
-        let length = self.memory.length();
+        let length = self.memory.correlation_time();
         let effective = n / length;
         let normality_p = chi(
             effective / 6.0 * (skewness.powi(2) + kurtosis.powi(2) / 4.0),

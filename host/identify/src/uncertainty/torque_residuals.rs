@@ -2,9 +2,9 @@
 
 use super::residual::{Ranges, ResidualReport, ResidualStream};
 use crate::error::IdentifyError;
-use crate::estimators::linear::product;
 use crate::rows::planned::Planned;
 use rig_data::prepare::Survey;
+use rig_numerics::vector::dot_in_order;
 
 /// Returns the torque residuals per joint, in the differential form for every model, so that models can be compared.
 /// `by_position` is the torque (of a joint at a position) that was subtracted before the fit and is not in the
@@ -60,7 +60,7 @@ pub fn torque_residuals(
             for i in 0..rows.t.len() {
                 for (j, (stream, equation)) in streams.iter_mut().zip(&rows.equations).enumerate() {
                     let known = by_position(j, rows.q[j][i]);
-                    let predicted = product(&equation.x[i * p..(i + 1) * p], full);
+                    let predicted = dot_in_order(&equation.x[i * p..(i + 1) * p], full);
                     stream.push(
                         index,
                         rows.t[i],

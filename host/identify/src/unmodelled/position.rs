@@ -14,8 +14,8 @@ use rig_shared::effects::{Effect, GAINS, Kind, SHAPES};
 use serde::Serialize;
 
 use super::terms::terms_of;
-use crate::estimators::linear::product;
 use rig_model::robot::{Robot, RobotEffect};
+use rig_numerics::vector::dot_in_order;
 use rig_output::format_value;
 
 /// A torque that depends on a joint's position.
@@ -40,7 +40,7 @@ impl PositionTorque {
     pub fn torque(&self, q: f64) -> f64 {
         let mut terms = [0.0; 2];
         terms_of(self.periods, q, &mut terms);
-        product(&terms, &self.values)
+        dot_in_order(&terms, &self.values)
     }
 
     /// Returns one sentence.

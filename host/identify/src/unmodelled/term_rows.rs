@@ -7,12 +7,12 @@ use super::tilt::{Axes, TiltColumns};
 use crate::bodies::evidence::{Belief, Seen};
 use crate::bodies::prior::Prior;
 use crate::error::IdentifyError;
-use crate::estimators::linear::product;
 use crate::estimators::problem::Problem;
 use crate::options::ModelKind;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::stream::each_rows;
-use crate::uncertainty::memory::Memory;
+use rig_numerics::autocorrelation::Autocorrelation;
+use rig_numerics::vector::dot_in_order;
 
 /// Prior standard deviation of the tilt of a base described as level, rad.
 const LEVEL: f64 = 0.1;
@@ -192,7 +192,7 @@ impl Noise {
         let joints = problem.robot.joints.len();
         let beta = problem.start_full();
         let p = beta.len();
-        let mut memories = vec![Memory::default(); joints];
+        let mut memories = vec![Autocorrelation::default(); joints];
         let mut left = vec![0.0; joints];
         let mut instants = 0;
         for recording in problem.training {
@@ -201,7 +201,8 @@ impl Noise {
                 instants += rows.t.len() as u64;
                 for (j, equation) in rows.equations.iter().enumerate() {
                     for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
-                        let e = equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta);
+                        let e =
+                            equation.y[i] - dot_in_order(&equation.x[i * p..(i + 1) * p], &beta);
                         memories[j].push(e);
                         left[j] += e * e;
                     }
@@ -213,7 +214,10 @@ impl Noise {
             deviation: (left.iter().zip(&memories))
                 .map(|(squares, memory)| 1.0 / unit(*squares, memory.seen()))
                 .collect(),
-            memory: memories.iter().map(Memory::length).collect(),
+            memory: memories
+                .iter()
+                .map(Autocorrelation::correlation_time)
+                .collect(),
             instants,
         })
     }

@@ -6,6 +6,7 @@
 
 use crate::acceptance::residual_dependence::process::BINS;
 use crate::rows::regression::Rows;
+use rig_numerics::vector::dot_in_order;
 
 /// Smallest part of a column orthogonal to those before it, as a share of its length.
 const OWN: f64 = 1e-6;
@@ -26,14 +27,14 @@ impl Refitted {
                     (true, None) => *x,
                 })
                 .collect();
-            let whole = dot(&own, &own);
+            let whole = dot_in_order(&own, &own);
             // Two passes are enough (Kahan).
             for _ in 0..2 {
                 for b in &basis {
                     take(&mut own, b);
                 }
             }
-            let rest = dot(&own, &own);
+            let rest = dot_in_order(&own, &own);
             if rest > OWN * OWN * whole {
                 let length = rest.sqrt();
                 own.iter_mut().for_each(|x| *x /= length);
@@ -83,12 +84,8 @@ impl Refitted {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 fn take(from: &mut [f64], direction: &[f64]) {
-    let along = dot(from, direction);
+    let along = dot_in_order(from, direction);
     for (x, d) in from.iter_mut().zip(direction) {
         *x -= along * d;
     }

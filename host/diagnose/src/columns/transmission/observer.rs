@@ -23,7 +23,7 @@ use rig_shared::effects::{Kind, SHAPES};
 use statrs::function::erf::erf;
 
 use crate::columns::transmission::{Driven, Gear, Load, Twist};
-use crate::fit::simplex::Simplex;
+use rig_numerics::optimise::simplex::Simplex;
 
 /// Least time between two restarts of the prediction, s: the duration of a torque on the link.
 pub(crate) const STRETCH: f64 = 0.05;
@@ -239,9 +239,9 @@ impl Driven {
             }
             cost
         };
-        let mut simplex = Simplex::new(&[0.0, 0.0], &[1.0, 1.0]).of_most(ANSWERS);
-        while let Some(z) = simplex.asks() {
-            simplex.told(unlikely(&z));
+        let mut simplex = Simplex::new(&[0.0, 0.0], &[1.0, 1.0]).with_evaluations(ANSWERS);
+        while let Some(z) = simplex.next_point() {
+            simplex.report(unlikely(&z));
         }
         belief.at(simplex.best())
     }

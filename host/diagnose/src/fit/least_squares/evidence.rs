@@ -5,7 +5,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::fit::evidence::Evidence;
 use crate::fit::least_squares::{Beside, Fit};
-use crate::fit::vector::{axpy, dot};
+use rig_numerics::vector::{axpy, dot};
 
 impl Fit<'_> {
     /// Returns the evidence for projected columns.

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fit::folded::{Errors, Folded};
 use crate::fit::least_squares::Fit;
-use crate::fit::vector::{axpy, dot};
+use rig_numerics::vector::{axpy, dot};
 
 /// Number of folds.
 const FOLDS: usize = 10;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::least_squares::Fit;
-use crate::fit::vector::dot;
+use rig_numerics::vector::dot;
 
 impl Fit<'_> {
     /// Returns the jackknife covariance of the coefficients of weighted columns, one cluster left out at a time

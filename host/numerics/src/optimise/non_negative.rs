@@ -1,4 +1,6 @@
 //! Least squares with non-negative coefficients, from normal equations.
+//!
+//! By hand: some coefficients have no bound and a start is known, which the crates for it do not take.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,7 +15,7 @@ const FLAT: f64 = 1e-9;
 /// Block principal pivoting (Portugal, Júdice & Vicente 1994; Kim & Park 2011): all violations change sides at once. If
 /// that does not reduce them for some rounds, only the last changes. After `rounds`, negative values become zero. H is
 /// positive definite by its priors; `None` if it is not.
-pub(crate) fn nnls(
+pub fn nnls(
     h: &DMatrix<f64>,
     g: &DVector<f64>,
     bounded: &[bool],

@@ -1,7 +1,10 @@
 //! The simplex of Nelder and Mead (1965), one evaluation at a time, so that several simplices can run in parallel.
+//!
+//! By hand: the caller evaluates the points of all simplices side by side, which no solver that calls the function
+//! itself allows.
 
 /// Default number of evaluations beyond the corners.
-pub(crate) const MOST_ANSWERS: usize = 120;
+pub const DEFAULT_EVALUATIONS: usize = 120;
 /// Relative spread of the corner values at which it ends.
 const FLAT: f64 = 1e-4;
 
@@ -21,17 +24,17 @@ enum Stage {
 }
 
 /// A simplex that minimises a function.
-pub(crate) struct Simplex {
+pub struct Simplex {
     /// Value and place; best first once all are known.
     corners: Vec<(f64, Vec<f64>)>,
     stage: Stage,
-    answers: usize,
-    most_answers: usize,
+    evaluations: usize,
+    most_evaluations: usize,
 }
 
 impl Simplex {
     /// Creates a simplex at `start`, with each other corner moved along one coordinate by its `step`.
-    pub(crate) fn new(start: &[f64], steps: &[f64]) -> Self {
+    pub fn new(start: &[f64], steps: &[f64]) -> Self {
         let moved = (steps.iter().enumerate()).map(|(k, step)| {
             let mut x = start.to_vec();
             x[k] += step;
@@ -41,21 +44,21 @@ impl Simplex {
         Self {
             corners: places.map(|x| (f64::INFINITY, x)).collect(),
             stage: Stage::Corner(0),
-            answers: 0,
-            most_answers: MOST_ANSWERS,
+            evaluations: 0,
+            most_evaluations: DEFAULT_EVALUATIONS,
         }
     }
 
     /// Sets the number of evaluations, after which the present move is the last.
-    pub(crate) fn of_most(self, answers: usize) -> Self {
+    pub fn with_evaluations(self, evaluations: usize) -> Self {
         Self {
-            most_answers: answers,
+            most_evaluations: evaluations,
             ..self
         }
     }
 
     /// Returns the place of the next evaluation; None at the end.
-    pub(crate) fn asks(&self) -> Option<Vec<f64>> {
+    pub fn next_point(&self) -> Option<Vec<f64>> {
         match self.stage {
             Stage::Corner(k) | Stage::Shrink(k) => Some(self.corners[k].1.clone()),
             Stage::Reflect => Some(self.along(-1.0)),
@@ -66,8 +69,8 @@ impl Simplex {
     }
 
     /// Receives the value at that place.
-    pub(crate) fn told(&mut self, value: f64) {
-        self.answers += 1;
+    pub fn report(&mut self, value: f64) {
+        self.evaluations += 1;
         let last = self.corners.len() - 1;
         self.stage = match self.stage {
             Stage::Corner(k) | Stage::Shrink(k) => {
@@ -114,14 +117,14 @@ impl Simplex {
     }
 
     /// Returns the best place after the last move.
-    pub(crate) fn best(&self) -> &[f64] {
+    pub fn best(&self) -> &[f64] {
         &self.corners[0].1
     }
 
     fn sorted(&mut self) -> Stage {
         self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (best, worst) = (self.corners[0].0, self.corners[self.corners.len() - 1].0);
-        if self.answers >= self.most_answers || worst - best < FLAT * best.abs() {
+        if self.evaluations >= self.most_evaluations || worst - best < FLAT * best.abs() {
             Stage::Done
         } else {
             Stage::Reflect
@@ -157,12 +160,12 @@ mod tests {
         let f = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2) + 1.0;
         let mut simplex = Simplex::new(&[-0.2, 0.5], &[0.4, 0.4]);
         let mut best = (f64::INFINITY, Vec::new());
-        while let Some(x) = simplex.asks() {
+        while let Some(x) = simplex.next_point() {
             let value = f(&x);
             if value < best.0 {
                 best = (value, x);
             }
-            simplex.told(value);
+            simplex.report(value);
         }
         assert!(best.0 < 1.0 + 1e-3, "{best:?}");
         assert!((best.1[0] - 1.0).abs() < 0.05, "{best:?}");
