@@ -6,12 +6,12 @@ use serde::Serialize;
 use super::answer::is_right;
 use super::counted::counted;
 use super::error::BenchError;
-use super::score::median;
 use super::table::{Rows, percent};
 use super::wilson::Proportion;
 use rig_data::prepare::Recording;
 use rig_diagnose::outcome::{Diagnosis, Verdict};
 use rig_diagnose::{Options, diagnose};
+use rig_numerics::statistics::median_of_finite;
 use rig_scenario::{ABOVE_FLOOR, Arm, ArmScenario, CallsFor, Fault};
 
 /// One case with an arm.
@@ -267,7 +267,7 @@ fn improvement(rows: &mut Rows<Own>) {
     let middle = |of: fn(&ArmOutcome) -> Option<f64>| {
         move |own: &Own| {
             let right = own.iter().filter(|o| named(o) && o.right_first());
-            percent(median(right.filter_map(|o| of(o)).collect()))
+            percent(median_of_finite(right.filter_map(|o| of(o)).collect()))
         }
     };
     rows.row(

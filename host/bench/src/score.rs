@@ -11,6 +11,7 @@ use super::cases::Group;
 use super::outcome::Outcome;
 use super::parameters::Compared;
 use super::wilson::Proportion;
+use rig_numerics::statistics::{mean, median_of_finite};
 use rig_scenario::Effect;
 
 /// Figures of one method.
@@ -100,15 +101,6 @@ impl GapClass {
     }
 }
 
-/// Returns the median of the finite values; none if there are none.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.retain(|v| v.is_finite());
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    let (low, high) = (values.get(n.saturating_sub(1) / 2)?, values.get(n / 2)?);
-    Some(0.5 * (low + high))
-}
-
 impl Score {
     /// Computes the figures of a method.
     pub fn of(method: &str, outcomes: &[Outcome]) -> Self {
@@ -161,7 +153,7 @@ impl Score {
                 (single().filter_map(Outcome::experiment)).map(|f| f.answer.is_some()),
             ),
             set_separated: Proportion::of(single().filter_map(Outcome::separated)),
-            parameter_error: median(compared().map(Compared::error).collect()),
+            parameter_error: median_of_finite(compared().map(Compared::error).collect()),
             coverage: Proportion::of(compared().filter(|c| c.same_form).map(Compared::covered)),
             controls: controls
                 .into_iter()
@@ -184,7 +176,7 @@ fn false_discovery(outcomes: &[Outcome]) -> Option<f64> {
         .filter(|o| matches!(o.group, Group::Single | Group::Combination) && o.answer.is_some())
         .map(Outcome::false_discoveries)
         .collect();
-    (!something.is_empty()).then(|| something.iter().sum::<f64>() / something.len() as f64)
+    (!something.is_empty()).then(|| mean(&something))
 }
 
 /// Returns the median share of the gap that answers with a right first name close, by class of the hidden effect.
@@ -199,7 +191,7 @@ fn gap_closed<'a>(single: impl Iterator<Item = &'a Outcome>) -> BTreeMap<GapClas
     }
     let medians = classes.into_iter();
     medians
-        .filter_map(|(class, shares)| Some((class, median(shares)?)))
+        .filter_map(|(class, shares)| Some((class, median_of_finite(shares)?)))
         .collect()
 }
 
@@ -224,8 +216,8 @@ impl EffectScore {
             right_first: Proportion::of(above.iter().map(|o| o.right_first())),
             exact: Proportion::of(above.iter().map(|o| o.exact())),
             invented_below: Proportion::of(below.iter().map(|o| o.invented())),
-            gap_closed: median(closed.collect()),
-            parameter_error: median(errors.map(Compared::error).collect()),
+            gap_closed: median_of_finite(closed.collect()),
+            parameter_error: median_of_finite(errors.map(Compared::error).collect()),
             taken_for,
         }
     }

@@ -3,6 +3,8 @@
 //! No row is missing. The stamps of a burst are close together. A long interval follows that lasts as long as the rows
 //! of the burst took.
 
+use rig_numerics::statistics::median;
+
 /// Minimum ratio of the long intervals to the short ones.
 const APART: f64 = 5.0;
 /// Minimum share of the bursts with the median number of rows, or one more or less.
@@ -54,11 +56,6 @@ pub(super) fn bursts(times: &[f64]) -> Option<Bursts> {
             rows: rows as usize,
             rate: 1.0 / mean,
         })
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

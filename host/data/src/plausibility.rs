@@ -10,6 +10,7 @@ use super::rate_spike::rate_spike;
 use super::spike::spike;
 use super::unsigned::{Unsigned, unsigned};
 use rig_model::robot::{Joint, JointKind, Robot, is_placeholder};
+use rig_numerics::statistics::median;
 use rig_output::{format_significant, format_time, format_trimmed, listed};
 
 /// Number of rows at the start by which the columns are checked: a wrong unit or direction shows from the start.
@@ -325,15 +326,14 @@ fn nth(rows: usize) -> String {
 /// Returns all columns in `block` that cannot be in SI units for `robot`; empty if there are none.
 pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     let mut found = Vec::new();
-    let mut steps: Vec<f64> = block
+    let steps: Vec<f64> = block
         .t
         .iter()
         .zip(block.t.iter().skip(1))
         .map(|(a, b)| b - a)
         .collect();
-    steps.sort_by(f64::total_cmp);
     // Motion sampled at 5 Hz or less cannot be identified; 0.2 is also a step of 0.2 ms in milliseconds.
-    if let Some(&step) = steps.get(steps.len() / 2)
+    if let Some(step) = median(steps)
         && step >= 0.2
     {
         found.push(Implausible::NotSeconds { step });

@@ -8,6 +8,7 @@ use core::f64::consts::TAU;
 use super::block::{Block, JointColumns};
 use super::plausibility::{Implausible, range};
 use rig_model::robot::{Joint, JointKind, Robot};
+use rig_numerics::statistics::{correlation, mean, moments_about_means};
 use rig_output::format_significant;
 
 /// Travel above which a joint counts as moving, rad or m.
@@ -277,26 +278,6 @@ fn other_joint(j: usize, joints: &[JointColumns], reference: &[f64]) -> Option<S
         })
 }
 
-/// Returns the correlation of two columns; NaN if one of them is constant.
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let [xx, xy, yy] = about_means(a, b);
-    xy / (xx * yy).sqrt()
-}
-
-/// Returns the sums xx, xy and yy of the two columns about their means.
-fn about_means(a: &[f64], b: &[f64]) -> [f64; 3] {
-    let count = a.len().min(b.len()).max(1) as f64;
-    let (ma, mb) = (a.iter().sum::<f64>() / count, b.iter().sum::<f64>() / count);
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for (x, y) in a.iter().zip(b) {
-        let (x, y) = (x - ma, y - mb);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-    }
-    [xx, xy, yy]
-}
-
 /// Finds a reference that has another unit or direction than its position.
 fn reference_unit(k: usize, columns: &JointColumns, joint: &Joint) -> Option<Implausible> {
     let ratio = reference_scale(&columns.q, columns.reference.as_ref()?)?;
@@ -326,7 +307,7 @@ pub fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
     if stands(q) || stands(reference) {
         return None;
     }
-    let [xx, xy, yy] = about_means(q, reference);
+    let [xx, xy, yy] = moments_about_means(q, reference);
     let alike = xy / (xx * yy).sqrt();
     // A position far behind its reference is still correlated (KUKA LWR4+: 0.77). Opposite directions need a
     // correlation below −0.9.
@@ -340,11 +321,8 @@ fn clock(j: usize, t: &[f64], q: &[f64], reference: &[f64]) -> Option<StrangeRef
     }
     let rows = t.len().min(q.len()).min(reference.len());
     let thin = rows.div_ceil(MOST).max(1);
-    let means = |column: &[f64]| -> Vec<f64> {
-        (column[..rows].chunks_exact(thin))
-            .map(|part| part.iter().sum::<f64>() / thin as f64)
-            .collect()
-    };
+    let means =
+        |column: &[f64]| -> Vec<f64> { (column[..rows].chunks_exact(thin)).map(mean).collect() };
     let (q, reference) = (means(q), means(reference));
     let time = t.get(rows.checked_sub(1)?)? - t.first()?;
     let step = time / rows as f64 * thin as f64;

@@ -37,10 +37,10 @@ mod search;
 pub mod voltage;
 
 mod error;
+mod gap;
 mod levels;
 mod options;
 pub mod outcome;
-mod statistics;
 #[cfg(test)]
 mod tests;
 

@@ -11,6 +11,7 @@ use super::{ExciteError, SampledReference};
 use rig_data::{Column, RecordingWriter};
 use rig_model::robot::Robot;
 use rig_model::simulate::{Inputs, Model, Motion, STAND_IN_BANDWIDTH, closed_loop, controllers};
+use rig_numerics::statistics;
 
 /// Time that the controlled model stands before the recording begins, so that gravity is balanced, s.
 pub const SETTLING: f64 = 1.0;
@@ -218,7 +219,7 @@ pub fn drawn(random: &mut Pcg64, deviation: f64) -> f64 {
 /// Returns the RMS deviation of a joint, and the RMS of its reference about the mean.
 fn followed(q: &[f64], asked: &[f64]) -> (f64, f64) {
     let count = asked.len() as f64;
-    let mean = asked.iter().sum::<f64>() / count;
+    let mean = statistics::mean(asked);
     let (mut off, mut moved) = (0.0, 0.0);
     for (q, asked) in q.iter().zip(asked) {
         off += (q - asked).powi(2);

@@ -1,5 +1,7 @@
 //! Autocorrelation of residuals, and their correlation time: how many rows count as one independent row.
 
+use crate::statistics::sum_of_squares;
+
 /// Largest lag, in rows, of the autocorrelation of a stream.
 pub const LAGS: usize = 200;
 
@@ -75,7 +77,7 @@ pub fn correlation_time(correlation: &[f64], seen: u64) -> f64 {
 /// Returns the correlation time 1 + 2·Σρ of a whole residual, in rows. The sum ends at the first lag without a positive
 /// ρ, or after `lags`. Run k has the rows from `starts[k]` to `starts[k + 1]`; no product joins two runs.
 pub fn correlation_time_to_zero(residual: &[f64], starts: &[usize], lags: usize) -> f64 {
-    let squares: f64 = residual.iter().map(|r| r * r).sum();
+    let squares = sum_of_squares(residual);
     let mut sum = 0.5;
     for lag in 1..=lags {
         let mut product = 0.0;

@@ -37,6 +37,11 @@ pub fn squares_about(values: &[f64], middle: f64) -> f64 {
     values.iter().map(|v| (v - middle).powi(2)).sum()
 }
 
+/// Returns the sum of the squares about the mean, in the unit squared.
+pub fn squares_about_mean(values: &[f64]) -> f64 {
+    squares_about(values, mean_or_zero(values))
+}
+
 /// Returns the mean of independent values and its variance; None for fewer than three.
 pub fn mean_and_variance(values: &[f64]) -> Option<[f64; 2]> {
     let n = values.len() as f64;

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use realfft::RealFftPlanner;
+use rig_numerics::statistics;
 use serde::Serialize;
 
 /// Welch's estimate, accumulated sample by sample (Welch 1967; Hann window, half overlapping).
@@ -75,7 +76,7 @@ impl Welch {
         if self.count == 0 {
             return None;
         }
-        let power: f64 = self.window.iter().map(|w| w * w).sum();
+        let power = statistics::sum_of_squares(&self.window);
         let scale = 2.0 / (sample_rate * power * self.count as f64);
         let pairs = (1..self.sum.len()).map(|k| {
             let w = 2.0 * PI * k as f64 / self.segment as f64;
@@ -133,7 +134,7 @@ impl PositionSpectrum {
             .map(|k| {
                 let reach = (k as f64 * 0.12) as usize;
                 let part = &density[k.saturating_sub(reach)..(k + reach + 1).min(n)];
-                part.iter().sum::<f64>() / part.len() as f64
+                statistics::mean(part)
             })
             .collect();
         let sunk = (0..n).find(|&k| {
@@ -187,7 +188,7 @@ impl PositionSpectrum {
         let near = |f: &f64| (end / 1.12..=end * 1.12).contains(f);
         let bins = || self.frequency.iter().zip(&self.density);
         let level: Vec<f64> = bins().filter(|(f, _)| near(f)).map(|(_, d)| *d).collect();
-        let level = level.iter().sum::<f64>() / level.len().max(1) as f64;
+        let level = statistics::mean_or_zero(&level);
         let (frequency, density) = (self.frequency.clone(), self.density.clone());
         Self::with(frequency, density, self.floor.max(level), end)
     }
@@ -201,7 +202,7 @@ impl PositionSpectrum {
                 .filter(|(f, _)| (low..high).contains(*f))
                 .map(|(_, d)| *d)
                 .collect();
-            own.iter().sum::<f64>() / own.len() as f64
+            statistics::mean(&own)
         };
         let mut low = from;
         while 4.0 * low <= to {

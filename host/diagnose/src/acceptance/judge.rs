@@ -6,6 +6,7 @@ pub(crate) mod unseen;
 
 use rig_shared::effects::Kind;
 
+use crate::DiagnoseError;
 use crate::acceptance::coordinates::Coordinate;
 use crate::acceptance::lack_of_fit::misfit;
 use crate::acceptance::law_mismatch::besides;
@@ -14,6 +15,7 @@ use crate::acceptance::residual_dependence::{Known, locate};
 use crate::columns::kinds::is_gear;
 use crate::experiment::exact;
 use crate::fit::least_squares::Fit;
+use crate::gap::closed;
 use crate::levels::{BEYOND_FLOOR, SIGNIFICANT};
 use crate::models::observer_models::ObserverModels;
 use crate::outcome::{FloorFrom, Place, Remainder};
@@ -25,10 +27,9 @@ use crate::rows::regression::Rows;
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::Search;
-use crate::statistics::closed;
-use crate::{DiagnoseError, statistics};
 
 use rig_model::robot::{Joint, Robot};
+use rig_numerics::statistics;
 
 /// Share of its gap that an effect must close to be accepted beside a remainder.
 const HALF: f64 = 0.5;
@@ -421,7 +422,7 @@ impl Judge<'_, '_> {
             .collect();
         self.repeated(&residual, Some(&counts), joint)
             .is_none_or(|own| {
-                let all = [statistics::rms(&residual, &away), own.noise];
+                let all = [statistics::rms_of_kept(&residual, &away), own.noise];
                 self.beyond_noise(all, Some(own), besides, joint).is_some()
             })
     }

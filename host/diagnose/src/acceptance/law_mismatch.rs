@@ -3,7 +3,7 @@
 use crate::rows::regression::Rows;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::shadow::shadow;
-use crate::statistics;
+use rig_numerics::statistics;
 
 /// Share of the torque RMS that the treatment may leave: its filters and differences are not exact derivatives.
 const TREATED: f64 = 3e-3;
@@ -19,6 +19,6 @@ pub(crate) fn besides(
     let explained = (before * before - after * after).max(0.0);
     let names = chosen.iter().filter(|p| p.candidate.joint == joint);
     let shadow = names.map(shadow).fold(0.0, f64::max) * explained;
-    let torque = statistics::rms(&rows.torque[joint], &rows.keep[joint]);
+    let torque = statistics::rms_of_kept(&rows.torque[joint], &rows.keep[joint]);
     (TREATED * torque).powi(2) + shadow
 }

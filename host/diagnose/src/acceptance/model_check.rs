@@ -15,6 +15,7 @@ use crate::outcome::{FloorFrom, Left, Remainder};
 use crate::recordings::context::PreparedData;
 use crate::search::chosen::with;
 use rig_model::robot::{Joint, Robot};
+use rig_numerics::statistics::sum_of_squares;
 use rig_output::{format_significant, format_unit};
 
 /// Least share of the gap between refitted description and noise floor, in RMS, that effects must close to explain a
@@ -111,7 +112,7 @@ fn torque_of(data: &PreparedData, joint: usize) -> f64 {
     let (mut squares, mut count) = (0.0, 0_usize);
     for run in &data.runs {
         let recorded = run.joints[joint].recorded();
-        squares += recorded.iter().map(|tau| tau * tau).sum::<f64>();
+        squares += sum_of_squares(&recorded);
         count += recorded.len();
     }
     (squares / count.max(1) as f64).sqrt()

@@ -17,7 +17,7 @@ use crate::acceptance::residual_dependence::refitted::Refitted;
 use crate::levels::SIGNIFICANT;
 use crate::outcome::Place;
 use crate::rows::regression::Rows;
-use crate::statistics::bins;
+use rig_numerics::statistics::{bins, sum_of_squares};
 use rig_output::{format_significant, format_unit};
 
 /// Bootstrap draws …
@@ -89,7 +89,7 @@ pub(crate) fn locate(
 
 /// Returns the squares of a residual beyond the noise floor, over the `used` rows.
 fn excess(residual: &[f64], used: usize, floor: f64) -> f64 {
-    let squares: f64 = residual.iter().map(|r| r * r).sum();
+    let squares = sum_of_squares(residual);
     (squares - used.max(1) as f64 * floor * floor).max(0.0)
 }
 

@@ -17,6 +17,7 @@ use crate::rows::lanes::ABREAST;
 use crate::rows::motion::motion_of;
 use crate::rows::nominal::Nominal;
 use rig_data::runs::Run;
+use rig_numerics::statistics;
 
 pub(crate) mod observer;
 
@@ -76,7 +77,7 @@ impl Driven {
 
     /// Returns the link's own mean inertia over the run.
     pub(crate) fn mean_mass(&self) -> f64 {
-        self.mass.iter().sum::<f64>() / self.mass.len().max(1) as f64
+        statistics::mean_or_zero(&self.mass)
     }
 
     /// Returns the drive torque minus that of a rigid gear, one signal per set of shapes. `None` if the link has no own

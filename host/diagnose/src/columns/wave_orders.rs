@@ -9,6 +9,7 @@
 use std::f64::consts::{LN_2, PI, TAU};
 
 use rig_data::runs::Run;
+use rig_numerics::statistics;
 
 /// Most samples in the spectrum; it then takes a tenth of a second.
 const MOST_SAMPLES: usize = 20_000;
@@ -71,15 +72,13 @@ impl Orders {
 /// Returns the median speed of a joint; `None` if it stands.
 fn median_speed(runs: &[Run], joint: usize) -> Option<f64> {
     let speeds = (runs.iter()).flat_map(|run| run.joints[joint].qd.iter().map(|v| v.abs()));
-    median(speeds.collect())
+    positive_median(speeds.collect())
 }
 
-/// Returns the median; `None` if it is not positive.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (values.len() > 1)
-        .then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-        .filter(|value| *value > 0.0)
+/// Returns the median; `None` if it is not positive, and for fewer than two values.
+pub(crate) fn positive_median(values: Vec<f64>) -> Option<f64> {
+    let several = (values.len() > 1).then_some(values)?;
+    statistics::median(several).filter(|value| *value > 0.0)
 }
 
 /// Returns samples of a run above a speed, with the torque minus its mean over a window.
@@ -120,10 +119,8 @@ pub(crate) fn spectrum(samples: &[Sample], first: usize, last: usize) -> Vec<f64
 
 /// Returns the places of maxima above white noise, largest first, at least `apart` from each other.
 fn peaks(power: &[f64], apart: usize) -> Vec<usize> {
-    let mut sorted = power.to_vec();
-    sorted.sort_by(f64::total_cmp);
     // Powers of white noise are exponentially distributed.
-    let mean = sorted.get(sorted.len() / 2).map_or(0.0, |m| m / LN_2);
+    let mean = statistics::median(power.to_vec()).map_or(0.0, |m| m / LN_2);
     let least = mean * ((power.len() as f64).ln() + BEYOND_CHANCE);
     let mut order: Vec<usize> = (0..power.len()).filter(|k| power[*k] > least).collect();
     order.sort_by(|a, b| power[*b].total_cmp(&power[*a]));

@@ -8,13 +8,14 @@ use nalgebra::DMatrix;
 
 use crate::DiagnoseError;
 use crate::faults::described::{Described, friction};
-use crate::faults::fit::{Fit, about_mean};
+use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
 use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::{Columns, Undo};
 use crate::outcome::{About, DataFault, FaultKind};
+use rig_numerics::statistics::squares_about_mean;
 
 /// Least fall of the log residual variances, summed over joints, to believe a transformation: one joint's falls to a
 /// tenth. A description may be far off, and a transformation may improve it by chance.
@@ -218,11 +219,7 @@ impl Judge<'_> {
         let matrices = rows.regressors(&self.form)?;
         // A still torque has no variance to explain.
         let size: Vec<f64> = (rows.tau.iter())
-            .map(|tau| {
-                about_mean(tau.iter().copied())
-                    .sqrt()
-                    .max(f64::MIN_POSITIVE)
-            })
+            .map(|tau| squares_about_mean(tau).sqrt().max(f64::MIN_POSITIVE))
             .collect();
         let width = matrices.first().map_or(0, DMatrix::ncols);
         let whole = DMatrix::from_fn(n * count, width, |k, c| {
@@ -251,9 +248,9 @@ impl Judge<'_> {
             let rest: Vec<f64> = (rows.tau[j].iter().zip(&all[j]))
                 .map(|(tau, own)| tau - own)
                 .collect();
-            let total = about_mean(rows.tau[j].iter().copied()).max(f64::MIN_POSITIVE);
+            let total = squares_about_mean(&rows.tau[j]).max(f64::MIN_POSITIVE);
             let squares = Fit::of(&friction, &rest, &order).map_or_else(
-                || about_mean(rest.iter().copied()),
+                || squares_about_mean(&rest),
                 |fit| fit.residual.norm_squared(),
             );
             squares / total

@@ -12,6 +12,7 @@ use rig_data::{
     Block, Implausible, JUDGED_ROWS, JointColumns, plausibility, unit_of_steps, velocity_scale,
 };
 use rig_model::robot::{JointKind, Robot};
+use rig_numerics::statistics;
 
 /// Shortest recording, s, with a reversal and its repetition.
 const SHORTEST: f64 = 1.0;
@@ -179,13 +180,12 @@ fn too_short_as(what: &str, runs: &[&Run]) -> Option<DataFault> {
 
 /// Returns a fault of the time unit by its steps.
 pub(crate) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
-    let mut steps: Vec<f64> = runs
+    let steps: Vec<f64> = runs
         .iter()
         .flat_map(|run| run.t.windows(2).map(|w| w[1] - w[0]))
         .collect();
-    steps.sort_by(f64::total_cmp);
     let block = Block {
-        t: vec![0.0, *steps.get(steps.len() / 2)?],
+        t: vec![0.0, statistics::median(steps)?],
         ..Block::default()
     };
     plausibility(&block, robot).first().map(|found| {

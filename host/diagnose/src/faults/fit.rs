@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use rig_identify::independent_columns;
+use rig_numerics::statistics::squares_about_mean;
 
 /// Share of a column that must be independent of the others to be excited.
 const EXCITED: f64 = 1e-5;
@@ -54,13 +55,6 @@ impl Measured {
         let normal = (8.0 * f + 1.0) / (8.0 * f + 3.0) * (f * (t * t / f).ln_1p()).sqrt();
         normal.copysign(t)
     }
-}
-
-/// Sum of squares about the mean.
-pub(crate) fn about_mean(x: impl Iterator<Item = f64> + Clone) -> f64 {
-    let count = x.clone().count().max(1) as f64;
-    let mean = x.clone().sum::<f64>() / count;
-    x.map(|v| (v - mean) * (v - mean)).sum()
 }
 
 /// Returns the covariance of the coordinates in an orthonormal `basis`, by leaving out one stretch at a time, and the
@@ -118,7 +112,7 @@ impl Fit {
             covariance,
             freedom: stretches.saturating_sub(1).max(1) as f64,
             residual,
-            total: about_mean(torque.iter().copied()),
+            total: squares_about_mean(torque),
         })
     }
 
@@ -165,7 +159,7 @@ impl Fit {
             let y = DVector::from_column_slice(window);
             let along = part.transpose() * &y;
             let left = y.norm_squared() - along.dot(&inner.solve(&along));
-            left.max(0.0) / about_mean(window.iter().copied()).max(f64::MIN_POSITIVE)
+            left.max(0.0) / squares_about_mean(window).max(f64::MIN_POSITIVE)
         });
         Some(moved.collect())
     }

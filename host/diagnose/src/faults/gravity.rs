@@ -7,13 +7,14 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use crate::DiagnoseError;
 use crate::faults::columns::fault;
 use crate::faults::described::friction;
-use crate::faults::fit::{Fit, about_mean};
+use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
 use crate::faults::levels::GOOD;
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
 use crate::outcome::{About, DataFault, FaultKind};
 use rig_model::robot::JointKind;
+use rig_numerics::statistics::squares_about_mean;
 use rig_output::format_significant;
 
 /// Least angle to the described gravity, degrees; less is left to the search for a tilted base.
@@ -126,7 +127,7 @@ impl Judge<'_> {
         let mut normal = Matrix3::<f64>::zeros();
         let mut right = Vector3::<f64>::zeros();
         for (j, tau) in rows.tau.iter().enumerate() {
-            let total = about_mean(tau.iter().copied());
+            let total = squares_about_mean(tau);
             if total <= 0.0 {
                 continue;
             }

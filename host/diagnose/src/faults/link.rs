@@ -5,6 +5,7 @@ use crate::outcome::{About, DataFault, FaultKind};
 use rig_data::jumps;
 use rig_data::runs::Run;
 use rig_model::robot::{JointKind, Robot};
+use rig_numerics::statistics::mean_or_zero;
 
 /// Range of link motion per joint encoder motion; backlash and twist take at most a part of a small motion.
 const TOGETHER: [f64; 2] = [0.8, 1.25];
@@ -74,8 +75,7 @@ fn moves_by(runs: &[&Run], k: usize) -> Option<f64> {
         let Some(reading) = &own.link_raw else {
             continue;
         };
-        let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len().max(1) as f64;
-        let (q, link) = (mean(&own.q_raw), mean(reading));
+        let (q, link) = (mean_or_zero(&own.q_raw), mean_or_zero(reading));
         for (a, b) in own.q_raw.iter().zip(reading) {
             along += (a - q) * (b - link);
             squares += (a - q).powi(2);

@@ -13,12 +13,13 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use crate::DiagnoseError;
-use crate::faults::fit::{Fit, about_mean};
+use crate::faults::fit::Fit;
 use crate::faults::rows::{Form, Rows};
 use crate::faults::wave;
 use rig_model::robot;
 use rig_model::robot::{Inertial, Robot};
 use rig_numerics::optimise::non_negative::nnls;
+use rig_numerics::statistics;
 
 /// Number of stretches that are left out in turn.
 pub(crate) const BLOCKS: usize = 8;
@@ -220,7 +221,7 @@ impl Physical {
             })
             .collect();
         let count = rows.len().max(1) as f64;
-        let size = |tau: &Vec<f64>| (about_mean(tau.iter().copied()) / count).sqrt();
+        let size = |tau: &Vec<f64>| (statistics::squares_about_mean(tau) / count).sqrt();
         Ok(Self {
             matrices,
             size: rows.tau.iter().map(size).collect(),
@@ -291,7 +292,7 @@ impl Physical {
     /// Returns the weighted squares of a joint's torque.
     fn squares(&self, j: usize) -> f64 {
         let inner = self.edge..self.tau[j].len().saturating_sub(self.edge);
-        self.weight(j) * self.tau[j][inner].iter().map(|tau| tau * tau).sum::<f64>()
+        self.weight(j) * statistics::sum_of_squares(&self.tau[j][inner])
     }
 
     /// Returns the normal equations of a stretch.
@@ -396,8 +397,7 @@ fn bodies(parameters: &[[f64; COLUMNS]], points: &Points) -> DMatrix<f64> {
 /// Returns the columns of one joint's drive: constant, difference between directions, spring, space for a wave;
 /// inertia, viscous, dry, then other friction of the library, each with a dissipative sign.
 fn own(q: &[f64], qd: &[f64], qdd: &[f64], weight: &[f64]) -> DMatrix<f64> {
-    let count = qd.len().max(1) as f64;
-    let rms = (qd.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
+    let rms = statistics::rms(qd);
     DMatrix::from_fn(qd.len(), OWN, |k, c| {
         let (v, sense) = (qd[k], if qd[k] == 0.0 { 0.0 } else { qd[k].signum() });
         let fallen = |share: f64| sense * (-v.abs() / (share * rms).max(f64::MIN_POSITIVE)).exp();

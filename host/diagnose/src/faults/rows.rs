@@ -9,6 +9,7 @@ use rig_data::runs::Run;
 use rig_identify::{chain_of, transmission_of};
 use rig_model::batch::ChainBatch;
 use rig_model::robot::Robot;
+use rig_numerics::statistics;
 
 /// Rows per second: slow against the noise, fast against the motion of drives.
 const RATE: f64 = 50.0;
@@ -86,9 +87,7 @@ impl Rows {
                 let Some(joint) = run.joints.get(j) else {
                     continue;
                 };
-                let mean = |x: &[f64], from: usize| {
-                    x[from..from + stride].iter().sum::<f64>() / stride as f64
-                };
+                let mean = |x: &[f64], from: usize| statistics::mean(&x[from..from + stride]);
                 let columns = [&joint.q, &joint.qd, &joint.qdd, &joint.tau];
                 let whole = columns.iter().map(|x| x.len()).min().unwrap_or(0) / stride;
                 for k in (0..whole.min(MOST.saturating_sub(rows.q[j].len()))).map(|k| k * stride) {

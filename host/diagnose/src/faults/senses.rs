@@ -6,12 +6,13 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use crate::DiagnoseError;
 use crate::faults::described::Described;
-use crate::faults::fit::{Fit, Measured, about_mean};
+use crate::faults::fit::{Fit, Measured};
 use crate::faults::judge::Judge;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
 use crate::outcome::{About, FaultKind};
 use rig_data::reference_scale;
+use rig_numerics::statistics;
 use rig_output::format_significant;
 
 /// Least distance of a sign from zero, standard deviations.
@@ -41,7 +42,7 @@ impl Judge<'_> {
     ) -> Result<(Measured, f64, Measured), DiagnoseError> {
         let qd = &self.rows.qd[j];
         let count = qd.len().max(1) as f64;
-        let squares = qd.iter().map(|v| v * v).sum::<f64>() / count;
+        let squares = statistics::mean_square(qd);
         let mut friction = DVector::zeros(self.form.width());
         friction[j * COLUMNS + column::VISCOUS] = squares;
         friction[j * COLUMNS + column::COULOMB] = qd.iter().map(|v| v.abs()).sum::<f64>() / count;
@@ -55,7 +56,7 @@ impl Judge<'_> {
             friction[c] = power / count;
         }
         let loss = fit.functional(&friction);
-        let varied = (about_mean(self.rows.tau[j].iter().copied()) / count).sqrt();
+        let varied = (statistics::squares_about_mean(&self.rows.tau[j]) / count).sqrt();
         let share = loss.value / (varied * squares.sqrt()).max(f64::MIN_POSITIVE);
         Ok((loss, share, fit.functional(&self.inertia(j)?)))
     }

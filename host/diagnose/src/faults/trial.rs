@@ -21,6 +21,7 @@ use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
 use crate::outcome::DataFault;
 use rig_model::robot::Robot;
+use rig_numerics::statistics;
 use rig_output::format_significant;
 
 /// Rows in the test: over all joints, and least of each.
@@ -82,8 +83,8 @@ fn gain(a: &Score, b: &Score) -> Measured {
         })
         .collect();
     let count = gains.len() as f64;
-    let mean = gains.iter().sum::<f64>() / count;
-    let squares: f64 = gains.iter().map(|g| (g - mean).powi(2)).sum();
+    let mean = statistics::mean(&gains);
+    let squares = statistics::squares_about(&gains, mean);
     Measured::new(
         mean,
         (squares / (count * (count - 1.0))).sqrt(),

@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::columns::wave_orders::{median, spectrum};
+use crate::columns::wave_orders::{positive_median, spectrum};
 
 /// Least number of waves in the whole range of the motion.
 const LEAST: f64 = 2.0;
@@ -18,7 +18,7 @@ const MOST: usize = 4000;
 /// the rows can show none.
 pub(crate) fn loudest(angle: &[f64], residual: &[f64]) -> Option<f64> {
     let steps = angle.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let step = median(steps.collect())?;
+    let step = positive_median(steps.collect())?;
     let ends = |[low, high]: [f64; 2], angle: &f64| [low.min(*angle), high.max(*angle)];
     let [low, high] = angle.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
     let turns = (high - low) / TAU;

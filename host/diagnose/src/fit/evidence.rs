@@ -1,5 +1,7 @@
 //! Evidence for candidate columns: gain, significance, errors block by block.
 
+use rig_numerics::statistics::squares_about;
+
 /// Evidence for candidate columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Evidence {
@@ -59,7 +61,7 @@ impl Evidence {
 pub(crate) fn sigmas(blocks: &[f64]) -> f64 {
     let n = blocks.len().max(2) as f64;
     let mean = blocks.iter().sum::<f64>() / n;
-    let spread = blocks.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let spread = squares_about(blocks, mean) / (n - 1.0);
     mean / (spread / n).sqrt().max(f64::MIN_POSITIVE)
 }
 

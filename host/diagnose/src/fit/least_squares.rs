@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fit::folded::Folded;
 use crate::rows::regression::{Column, Rows};
-use crate::statistics::bins;
+use rig_numerics::statistics::bins;
 use rig_numerics::vector::{axpy, dot, norm_squared};
 
 mod evidence;

@@ -4,6 +4,7 @@ use rig_shared::effects::Kind;
 
 use crate::columns::kinds::is_gear;
 use crate::fit::systematic_uncertainty::inflated;
+use crate::gap::closed;
 use crate::link_encoder::analysis::{Fitted, Solved, Term, TransmissionAnalysis, term_of};
 use crate::link_encoder::equation::{ACROSS, MOTOR_ANGLE};
 use crate::link_encoder::gear::Gear;
@@ -14,8 +15,8 @@ use crate::outcome::{Detectable, Map, Step, Value};
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
 use crate::rows::regression::Column;
-use crate::statistics::closed;
 use rig_model::robot::unit_of;
+use rig_numerics::statistics;
 
 impl TransmissionAnalysis<'_, '_> {
     /// Returns the laws that have a name of their own, with their entries in the result.
@@ -136,9 +137,7 @@ impl TransmissionAnalysis<'_, '_> {
         };
         let has = |kind: Kind| laws.found.iter().any(|f| f.law.kind(equation) == kind);
         if !has(Kind::Backlash) {
-            let mut sizes: Vec<f64> = equation.levels.iter().filter_map(size).collect();
-            sizes.sort_by(f64::total_cmp);
-            let gap = sizes.get(sizes.len() / 2);
+            let gap = statistics::median(equation.levels.iter().filter_map(size).collect());
             list.extend(gap.and_then(|gap| of(Kind::Backlash, "gap", gap.max(least))));
         }
         if !has(Kind::JointElasticity) && !has(Kind::Backlash) {

@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
 use crate::columns::kinds::is_gear;
 use crate::fit::refit::{Joint, named, wald};
@@ -20,9 +21,9 @@ use crate::models::bodies::{FittedModel, ModelCache};
 use crate::models::simulated_motion::{Errors, Replay};
 use crate::outcome::{ByMotion, Twice};
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::{DiagnoseError, statistics};
 use rig_model::batch::each_by;
 use rig_numerics::optimise::gauss_newton::{Settings, gauss_newton};
+use rig_numerics::statistics;
 use rig_output::format_significant;
 
 /// Settings of the refit.
@@ -220,9 +221,9 @@ fn torque_left(
     let residual = (fitting.context).remaining(replay.judged, model.fitted(), effects)?;
     let rows = &replay.judged.rows;
     let away = rows.away(0);
-    let all = statistics::rms(&residual[0], &rows.keep[0]);
+    let all = statistics::rms_of_kept(&residual[0], &rows.keep[0]);
     let clear = match away.contains(&true) {
-        true => statistics::rms(&residual[0], &away),
+        true => statistics::rms_of_kept(&residual[0], &away),
         false => all,
     };
     Ok([all, clear])

@@ -21,6 +21,7 @@ use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
 use rig_identify::independent_columns;
 use rig_model::robot::{Inertial, JointKind, Robot};
+use rig_numerics::statistics;
 use rig_numerics::vector::dot;
 use rig_output::{format_significant, format_value};
 
@@ -179,11 +180,7 @@ pub(crate) fn on_last_link(
             for (k, axis) in told.iter().enumerate().skip(1) {
                 at[axis - 1] = Some(value(place[axis - 1], std(k) / mass, "m"));
             }
-            let rms = |c: &Option<Vec<f64>>| {
-                let square =
-                    |c: &Vec<f64>| c.iter().map(|x| x * x).sum::<f64>() / c.len().max(1) as f64;
-                mass * c.as_ref().map_or(0.0, |c| square(c).sqrt())
-            };
+            let rms = |c: &Option<Vec<f64>>| mass * c.as_ref().map_or(0.0, |c| statistics::rms(c));
             let load = Load {
                 mass: value(mass, std(0), "kg"),
                 place: at,

@@ -9,6 +9,7 @@ use rig_data::runs::Run;
 use rig_model::robot::{Controller, Robot, title_of};
 use rig_model::simulate::{Model, SimulateError};
 use rig_numerics::optimise::gauss_newton::BlockedResidual;
+use rig_numerics::statistics;
 use rig_validate::replay::{of_joints, replayed};
 
 /// Longest integration step, s.
@@ -41,8 +42,8 @@ impl Errors {
             .map(|(a, b)| a[0] - b[0])
             .collect();
         let n = changes.len() as f64;
-        let mean = changes.iter().sum::<f64>() / n;
-        let spread: f64 = changes.iter().map(|c| (c - mean).powi(2)).sum();
+        let mean = statistics::mean(&changes);
+        let spread = statistics::squares_about(&changes, mean);
         let std = (spread / (n * (n - 1.0))).sqrt();
         self.rms(joint) > (1.0 + WORSE) * before.rms(joint) && mean > SIGMAS * std
     }

@@ -8,6 +8,7 @@ use crate::columns::candidate::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::{Solution, jackknifed, solve};
 use crate::fit::systematic_uncertainty::inflated;
+use crate::gap::closed;
 use crate::levels::SIGNIFICANT;
 use crate::motor_voltage::equation::{ACROSS, CONSTANT, CURRENT, Equation, FADES, SPEED};
 use crate::motor_voltage::left::{Rest, of_the_voltage};
@@ -20,7 +21,6 @@ use crate::result::limits::smallest;
 use crate::result::pictures::map;
 use crate::rows::regression::Column;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::statistics::closed;
 use crate::{DiagnoseError, Options};
 use rig_output::{format_significant, format_value};
 

@@ -11,6 +11,7 @@ use crate::outcome::Step;
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::{FittedCandidate, equal};
 use crate::search::stepwise::Search;
+use rig_numerics::statistics;
 
 /// Constant torques. Only a recording without external loads separates them.
 const TORQUES: [Kind; 2] = [Kind::TorqueOffset, Kind::AsymmetricCoulomb];
@@ -119,7 +120,7 @@ pub(crate) fn settled(
 /// Returns the mean torque of a constant effect and its standard deviation.
 fn constant(profile: &FittedCandidate) -> Option<[f64; 2]> {
     let column = profile.columns.first()?[profile.candidate.joint].as_ref()?;
-    let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+    let mean = statistics::mean_or_zero(column);
     let [gain] = profile.evidence.gains.first_chunk()?;
     let [std] = profile.evidence.stds.first_chunk()?;
     Some([gain * mean, std * mean.abs()])

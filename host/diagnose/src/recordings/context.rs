@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use rig_shared::effects::{Channel, Instant, Kind, Memory};
 use rig_shared::multibody::Chain;
 
+use crate::DiagnoseError;
 use crate::columns::candidate::Candidate;
 use crate::columns::effect_columns::{DELAY, Source};
 use crate::description::described_effects::{DescribedEffects, candidate, gains};
@@ -18,12 +19,12 @@ use crate::rows::nominal_torque::{Predicted, predict};
 use crate::rows::one_way::OneWay;
 use crate::rows::regression::{Column, Rows, combined, take_off};
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::{DiagnoseError, statistics};
 use rig_data::Compensated;
 use rig_data::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
 use rig_data::runs::{Run, runs_of};
 use rig_model::effects::Effects;
 use rig_model::robot::{JointKind, Robot};
+use rig_numerics::statistics;
 
 /// Least pass band before decimation for the waves of effects, Hz.
 const LEAST_BAND: f64 = 30.0;
@@ -315,7 +316,7 @@ impl<'a> DiagnosisContext<'a> {
 /// Returns the RMS per joint on the used rows.
 fn rms(rows: &Rows, residual: &[Vec<f64>]) -> Vec<f64> {
     (residual.iter().zip(&rows.keep))
-        .map(|(r, keep)| statistics::rms(r, keep))
+        .map(|(r, keep)| statistics::rms_of_kept(r, keep))
         .collect()
 }
 

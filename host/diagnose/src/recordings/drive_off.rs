@@ -6,6 +6,7 @@ use rig_shared::safety::Mode;
 
 use crate::DiagnoseError;
 use rig_data::prepare::Recording;
+use rig_numerics::statistics;
 
 /// Shortest recording, s: slow changes need time to appear.
 const SHORTEST: f64 = 0.5;
@@ -72,18 +73,20 @@ pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, Diagnose
             PIECES * LEAST
         )));
     }
-    Ok(efforts.iter().map(|all| mean(all)).collect())
+    Ok(efforts.iter().map(|all| mean_with_std(all)).collect())
 }
 
-fn mean(all: &[f64]) -> [f64; 2] {
-    let of = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+/// Returns the mean and its standard deviation between pieces of equal length.
+fn mean_with_std(all: &[f64]) -> [f64; 2] {
     let means: Vec<f64> = (all.chunks_exact(all.len() / PIECES).take(PIECES))
-        .map(of)
+        .map(statistics::mean)
         .collect();
-    let middle = of(&means);
-    let squares: f64 = means.iter().map(|m| (m - middle).powi(2)).sum();
+    let squares = statistics::squares_about(&means, statistics::mean(&means));
     let pieces = PIECES as f64;
-    [of(all), (squares / (pieces * (pieces - 1.0))).sqrt()]
+    [
+        statistics::mean(all),
+        (squares / (pieces * (pieces - 1.0))).sqrt(),
+    ]
 }
 
 #[cfg(test)]

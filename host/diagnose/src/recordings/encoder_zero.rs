@@ -7,14 +7,15 @@
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
+use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
 use crate::fit::least_squares::Fit;
 use crate::levels::SIGNIFICANT;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::rows::nominal_torque::predict;
-use crate::{DiagnoseError, statistics};
 use rig_data::runs::Run;
 use rig_model::robot::{Joint, JointKind};
+use rig_numerics::statistics;
 use rig_output::format_value;
 
 /// Least RMS reduction by another zero for a report …
@@ -117,7 +118,7 @@ pub(crate) fn another_zero_held(
     if xx > 0.0 {
         let by = xy / xx;
         let left: Vec<f64> = own.iter().zip(residual).map(|(x, r)| r - by * x).collect();
-        let [before, after] = [residual, &left].map(|r| statistics::rms(r, keep));
+        let [before, after] = [residual, &left].map(|r| statistics::rms_of_kept(r, keep));
         // Counts one row in ten as independent.
         let std = after * (10.0 / xx).sqrt();
         let gain = 1.0 - after / before;
@@ -152,7 +153,7 @@ fn turned(
         Ok(thin)
     };
     let here = torque(0.0)?;
-    let before = statistics::rms(residual, &rows.keep[0]);
+    let before = statistics::rms_of_kept(residual, &rows.keep[0]);
     let mut most: Option<Shift> = None;
     for k in 1..TURNS {
         let by = f64::from(k) * TAU / f64::from(TURNS);
@@ -160,7 +161,7 @@ fn turned(
         let left: Vec<f64> = (residual.iter().zip(here.iter().zip(&there)))
             .map(|(r, (here, there))| r + here - there)
             .collect();
-        let gain = 1.0 - statistics::rms(&left, &rows.keep[0]) / before;
+        let gain = 1.0 - statistics::rms_of_kept(&left, &rows.keep[0]) / before;
         if gain > MOST_OF_IT {
             let by = if by > PI { by - TAU } else { by };
             let std = PI / f64::from(TURNS);

@@ -5,8 +5,8 @@
 
 use rig_shared::effects::Kind;
 
-use crate::statistics;
 use rig_data::runs::Run;
+use rig_numerics::statistics;
 
 /// Length of stretches whose means give the uncertainty of a mean, s.
 const STRETCH: f64 = 1.0;
@@ -42,7 +42,7 @@ pub(crate) fn step(
             })
             .collect()
     };
-    let of = |unburdened: bool| statistics::mean(&means(unburdened));
+    let of = |unburdened: bool| statistics::mean_and_variance(&means(unburdened));
     let ([free, a], [pulled, b]) = (of(true)?, of(false)?);
     Some([free - pulled, (a + b).sqrt()])
 }

@@ -1,10 +1,10 @@
 //! The noise floor: the part of the residual that no model of the motion can explain.
 
 use crate::rows::regression::Rows;
-use crate::statistics;
 use rig_data::prepare::Welch;
 use rig_data::runs::{Differences, Run};
 use rig_numerics::autocorrelation::correlation_time_to_zero;
+use rig_numerics::statistics;
 
 /// Share of the rows' band that the low-pass before decimation passes.
 const PASSED: f64 = 0.8;
@@ -73,8 +73,7 @@ fn alike(a: &Run, b: &Run) -> bool {
             (Some(x), Some(y)) => (x, y),
             _ => (&a.q, &b.q),
         };
-        let mean = x[..rows].iter().sum::<f64>() / rows as f64;
-        let spread: f64 = x[..rows].iter().map(|x| (x - mean).powi(2)).sum();
+        let spread = statistics::squares_about_mean(&x[..rows]);
         let apart: f64 = x[..rows]
             .iter()
             .zip(&y[..rows])
@@ -146,7 +145,7 @@ pub(crate) fn between(
             (2 * count > stretch).then(|| sum / count as f64)
         })
         .collect();
-    let [mean, variance] = statistics::mean(&means)?;
+    let [mean, variance] = statistics::mean_and_variance(&means)?;
     Some([mean, variance.sqrt()])
 }
 
@@ -193,12 +192,11 @@ pub(crate) fn beyond_band(runs: &[Run], joint: usize, period: f64) -> Option<f64
     let bands: Vec<[f64; 2]> = (0..BANDS)
         .filter_map(|k| {
             let inside = |f: f64| edge(k) <= f && f < edge(k + 1);
-            let mut own: Vec<f64> = (frequency.iter().zip(&density))
+            let own: Vec<f64> = (frequency.iter().zip(&density))
                 .filter(|(f, _)| inside(**f))
                 .map(|(_, density)| *density)
                 .collect();
-            own.sort_by(f64::total_cmp);
-            let middle = *own.get(own.len() / 2)?;
+            let middle = statistics::median(own)?;
             Some([(edge(k) * edge(k + 1)).sqrt(), middle])
         })
         .collect();

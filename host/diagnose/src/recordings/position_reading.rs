@@ -8,12 +8,13 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::DiagnoseError;
 use crate::columns::effect_columns::Source;
 use crate::rows::nominal_torque::predict;
 use crate::rows::regression::Rows;
-use crate::{DiagnoseError, statistics};
 use rig_data::prepare::{LowPass, central_difference, second_difference};
 use rig_data::runs::{Run, resolution};
+use rig_numerics::statistics;
 
 /// Seed of the noise that is added to a position.
 const SEED: u64 = 1;
@@ -46,12 +47,11 @@ impl Reading {
 /// fourth- and fifth-order differences than to lower ones.
 fn white(position: &[f64]) -> Option<f64> {
     let differences = |x: &[f64]| -> Vec<f64> { x.windows(2).map(|w| w[1] - w[0]).collect() };
-    let square = |x: &[f64]| x.iter().map(|d| d * d).sum::<f64>() / x.len().max(1) as f64;
     let fourth = (0..4).fold(position.to_vec(), |x, _| differences(&x));
     // Squares of the binomial coefficients of either order.
     let variances = [
-        square(&fourth) / 70.0,
-        square(&differences(&fourth)) / 252.0,
+        statistics::mean_square(&fourth) / 70.0,
+        statistics::mean_square(&differences(&fourth)) / 252.0,
     ];
     WHITE
         .contains(&(variances[1] / variances[0]))
@@ -148,7 +148,7 @@ fn left(
             let apart: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
             let mut thin = Vec::new();
             source.thinning.push(&apart, &mut thin);
-            statistics::rms(&thin, keep)
+            statistics::rms_of_kept(&thin, keep)
         })
         .collect())
 }

@@ -14,8 +14,8 @@ use crate::result::found::Found;
 use crate::rows::regression::Rows;
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::statistics::bins;
 use rig_model::robot::Joint;
+use rig_numerics::statistics::{bins, grouped_mean};
 
 /// Length of the stretch that is drawn over time, s.
 const STRETCH: f64 = 4.0;
@@ -203,12 +203,7 @@ fn means(place: &[Option<usize>], residual: &[f64], block: &[usize]) -> Vec<Opti
                 .filter(|s| s[1] > 0.0)
                 .collect();
             let g = list.len() as f64;
-            let [sum, count] = list
-                .iter()
-                .fold([0.0; 2], |a, s| [a[0] + s[0], a[1] + s[1]]);
-            let mean = sum / count;
-            let squares: f64 = list.iter().map(|s| (s[0] - s[1] * mean).powi(2)).sum();
-            let std = (squares * g / (g - 1.0)).sqrt() / count;
+            let [mean, std] = grouped_mean(&list);
             let wide = StudentsT::new(0.0, 1.0, g - 1.0).ok()?.inverse_cdf(0.975);
             (g > 1.0).then_some([mean, wide * std])
         })

@@ -7,13 +7,13 @@ use crate::acceptance::judge::Judged;
 use crate::acceptance::judge::rank::rank;
 use crate::columns::waves::{is_of_the_motor, ratio_is_described};
 use crate::fit::refit::{Joint, Refit};
+use crate::gap::closed;
 use crate::models::parameter_change::Change;
 use crate::models::rms_path::RmsPath;
 use crate::models::simulated_motion::Errors;
 use crate::outcome::{Step, Tried};
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::Search;
-use crate::statistics::closed;
 use rig_model::robot::{Robot, title_of};
 
 /// Returns one step for each effect that is not described, with its alternative names.

@@ -7,6 +7,7 @@
 //! from smoothed squares of residuals.
 
 use crate::columns::transmission::observer::STRETCH;
+use rig_numerics::statistics;
 
 /// Returns the weight of each row of a joint, up to 1, from its residual. Rows are `period` s apart, `keep` marks used
 /// ones, and runs begin at `starts`.
@@ -31,11 +32,10 @@ pub(crate) fn counts(residual: &[f64], keep: &[bool], starts: &[usize], period: 
             loud[k] = ((to.0 - from.0).max(0.0) / f64::max(to.1 - from.1, 1.0)).sqrt();
         }
     }
-    let mut all: Vec<f64> = (loud.iter().zip(keep))
+    let all: Vec<f64> = (loud.iter().zip(keep))
         .filter_map(|(loud, keep)| keep.then_some(*loud))
         .collect();
-    all.sort_by(f64::total_cmp);
-    let usual = all.get(all.len() / 2).copied().unwrap_or(0.0);
+    let usual = statistics::median(all).unwrap_or(0.0);
     loud.into_iter()
         .map(|loud| if loud > usual { usual / loud } else { 1.0 })
         .map(|count| count.max(f64::EPSILON))

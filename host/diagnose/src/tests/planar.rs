@@ -265,7 +265,12 @@ fn the_exact_description_leaves_the_noise_whatever_filter_the_position_needs() {
         let prepared = context.load(&[&quiet as &dyn Recording]).unwrap();
         let left = context.frozen(&prepared).unwrap();
         let whole: Vec<f64> = (0..2)
-            .map(|j| crate::statistics::rms(&prepared.rows.torque[j], &prepared.rows.keep[j]))
+            .map(|j| {
+                rig_numerics::statistics::rms_of_kept(
+                    &prepared.rows.torque[j],
+                    &prepared.rows.keep[j],
+                )
+            })
             .collect();
         println!(
             "{apart:e}: cut-off {:.1} Hz, band {:.1} Hz, motion {:.2} Hz: left {left:?} of {whole:?}",

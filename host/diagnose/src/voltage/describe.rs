@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use crate::description::described_effects::{DescribedEffects, Now};
+use crate::gap::closed;
 use crate::outcome::{
     Absorbed, Before, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value,
     Verdict, Waterfall,
 };
-use crate::statistics::closed;
 use crate::voltage::controllers;
 use crate::voltage::controllers::Shown;
 use crate::voltage::free_run::FreeRun;

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::voltage::halt::Cause;
 use crate::voltage::log::Log;
+use rig_numerics::statistics;
 
 /// Result of a model's free runs over recordings, each from the recorded start without using the measured motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -34,7 +35,7 @@ impl FreeRun {
     pub(crate) fn followed(errors: &[f64]) -> Self {
         let rows = errors.len().max(1) as f64;
         Self::Followed {
-            rms: (errors.iter().map(|e| e * e).sum::<f64>() / rows).sqrt(),
+            rms: statistics::rms(errors),
             mean_absolute: errors.iter().map(|e| e.abs()).sum::<f64>() / rows,
             max: errors.iter().fold(0.0, |m, e| m.max(e.abs())),
         }

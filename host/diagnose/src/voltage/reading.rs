@@ -4,6 +4,7 @@ use crate::DiagnoseError;
 use crate::voltage::law::Law;
 use crate::voltage::log::{Log, SIDE};
 use rig_data::prepare::Recording;
+use rig_numerics::statistics;
 
 /// Row distance, in periods, above which there is a gap; a closer voltage is known well enough.
 const GAP: f64 = 5.0;
@@ -64,7 +65,7 @@ pub(crate) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseEr
         log.read_controller();
     }
     // The result must not depend on the order of the files. In this order, folds have weak and strong motions each.
-    let strength = |log: &Log| log.u.iter().map(|u| u * u).sum::<f64>() / log.u.len() as f64;
+    let strength = |log: &Log| statistics::mean_square(&log.u);
     list.sort_by(|a, b| (strength(a).total_cmp(&strength(b))).then_with(|| a.label.cmp(&b.label)));
     Ok(list)
 }

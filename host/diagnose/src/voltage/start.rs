@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::voltage::log::Log;
 use crate::voltage::plant::{NOMINAL, Plant};
 use rig_numerics::optimise::non_negative::nnls;
+use rig_numerics::statistics::sum_of_squares;
 
 /// Length of a piece, s: a few steps of a coarse encoder, short beside an oscillation.
 const PIECE: f64 = 0.3;
@@ -109,7 +110,7 @@ pub(crate) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
             right.push(volts);
         }
     }
-    let squares: f64 = right.iter().map(|v| v * v).sum();
+    let squares = sum_of_squares(&right);
     let x = DMatrix::from_row_slice(right.len(), OF_GRAVITY, &rows);
     let y = DVector::from_vec(right);
     let fit = x.clone().svd(true, true).solve(&y, TINY).ok()?;

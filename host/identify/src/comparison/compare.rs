@@ -18,7 +18,7 @@ use crate::estimators::run::fit;
 use crate::rows::factor::TriangularFactor;
 use crate::uncertainty::jackknife::LeaveOut;
 use crate::uncertainty::parts::Parts;
-use crate::uncertainty::relative_error::{mean, relative_errors};
+use crate::uncertainty::relative_error::{geometric_mean, relative_errors};
 use rig_model::robot::Robot;
 
 /// Distance to the nearest consistent set below which a set counts as consistent, in standard deviations of all
@@ -146,7 +146,7 @@ impl<'a> Yardstick<'a> {
         };
         judged
             .or_else(|| row.cross_validated_relative_error.clone())
-            .map(|judged| mean(&judged))
+            .map(|judged| geometric_mean(&judged))
     }
 
     /// Returns the rows of the hold-out with another motion, if there are any.

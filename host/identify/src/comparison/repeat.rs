@@ -5,6 +5,7 @@
 //! every joint stays near. The recording repeats the motion if most windows are found.
 
 use rig_data::prepare::{PrepareError, Recording};
+use rig_numerics::statistics::squares_about_mean;
 
 /// Largest number of windows.
 const WINDOWS: usize = 10;
@@ -70,8 +71,7 @@ impl Path {
     fn spread(&self) -> Vec<f64> {
         let of = |path: &Vec<f64>| {
             let count = path.len().max(1) as f64;
-            let mean = path.iter().sum::<f64>() / count;
-            (path.iter().map(|q| (q - mean).powi(2)).sum::<f64>() / count).sqrt()
+            (squares_about_mean(path) / count).sqrt()
         };
         self.joints.iter().map(of).collect()
     }

@@ -7,6 +7,8 @@
 use super::map::{FrictionFit, FrictionPoint};
 use super::rows::{PARTS, Rows, tenths};
 use crate::uncertainty::estimate::t_quantile;
+use rig_numerics::statistics::mean;
+use rig_numerics::vector::dot_in_order;
 use rig_output::{format_significant, format_value};
 
 /// Largest searched shift between torque and position, s.
@@ -130,13 +132,16 @@ impl Rows {
             let rows = point.rows.0..point.rows.1;
             let about = |of: &[f64]| {
                 let parts = tenths(of);
-                let mean = parts.iter().sum::<f64>() / parts.len() as f64;
+                let mean = mean(&parts);
                 parts.map(|v| v - mean)
             };
             // Every pass has the same weight, whatever its duration.
             let (x, y) = (about(&self.weight[rows.clone()]), about(&self.tau[rows]));
-            let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-            let own = [sum(&x, &x), sum(&x, &y), sum(&y, &y)];
+            let own = [
+                dot_in_order(&x, &x),
+                dot_in_order(&x, &y),
+                dot_in_order(&y, &y),
+            ];
             xx += own[0];
             xy += own[1];
             yy += own[2];

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::map::FrictionMapOptions;
+use rig_numerics::statistics::mean;
 
 /// Half lengths of the windows for the speed, s, longest first.
 ///
@@ -166,11 +167,10 @@ impl Signal {
     /// of an oscillation shows no change of speed; the line does.
     fn straight(&self, run: Range<usize>, tolerance: f64) -> Option<Line> {
         let speed = slope(&self.t[run.clone()], &self.x[run.clone()])?;
-        let n = run.len() as f64;
         let mut line = Line {
             speed,
-            t: self.t[run.clone()].iter().sum::<f64>() / n,
-            x: self.x[run.clone()].iter().sum::<f64>() / n,
+            t: mean(&self.t[run.clone()]),
+            x: mean(&self.x[run.clone()]),
             off: 0.0,
         };
         let way = (self.x[run.end - 1] - self.x[run.start]).abs();

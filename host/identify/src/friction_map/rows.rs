@@ -3,6 +3,7 @@
 use super::map::{DroppedPass, FrictionMapOptions, FrictionPoint};
 use super::passes::{Signal, Stretch, slope};
 use rig_numerics::autocorrelation::Autocorrelation;
+use rig_numerics::statistics;
 
 /// All rows of a sweep, moving or not.
 #[derive(Clone, Default)]
@@ -98,7 +99,7 @@ impl Rows {
             .zip(&self.model[rows.clone()])
             .map(|(tau, model)| tau - model)
             .collect();
-        let (mean, std) = mean_of(&friction);
+        let (mean, std) = mean_with_std(&friction);
         Ok(FrictionPoint {
             speed,
             friction: mean,
@@ -115,15 +116,15 @@ pub(super) fn tenths(values: &[f64]) -> [f64; PARTS] {
     std::array::from_fn(|part| {
         let edge = |part: usize| part * values.len() / PARTS;
         let own = &values[edge(part)..edge(part + 1)];
-        own.iter().sum::<f64>() / own.len().max(1) as f64
+        statistics::mean_or_zero(own)
     })
 }
 
 /// Returns the mean and its standard deviation: the larger of the one from the correlation of rows and the one from the
 /// means of the tenths. The second detects slow changes over the pass.
-fn mean_of(values: &[f64]) -> (f64, f64) {
+fn mean_with_std(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
+    let mean = statistics::mean(values);
     let mut memory = Autocorrelation::default();
     let mut squares = 0.0;
     for value in values {
@@ -132,8 +133,7 @@ fn mean_of(values: &[f64]) -> (f64, f64) {
     }
     let by_rows = (squares / n * memory.correlation_time() / n).sqrt();
     let tenths = tenths(values);
-    let about = tenths.iter().sum::<f64>() / PARTS as f64;
-    let spread: f64 = tenths.iter().map(|m| (m - about).powi(2)).sum();
+    let spread = statistics::squares_about_mean(&tenths);
     let by_tenths = (spread / (PARTS * (PARTS - 1)) as f64).sqrt();
     (mean, by_rows.max(by_tenths))
 }

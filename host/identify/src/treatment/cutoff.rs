@@ -31,6 +31,7 @@ use rig_data::prepare::Survey;
 use rig_data::prepare::Treatment;
 use rig_data::prepare::trimmed_rows;
 use rig_model::robot::Robot;
+use rig_numerics::statistics::mean_or_zero;
 use rig_output::format_significant;
 
 /// Reduction of the mean log residual of the joints from which another cut-off replaces the spectrum's. 0.15: on the
@@ -175,7 +176,7 @@ fn mean_logarithm(errors: &[f64], trials: &[CutoffTrial]) -> f64 {
         .filter(|(j, _)| judged(*j))
         .map(|(_, error)| error.ln())
         .collect();
-    logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64
+    mean_or_zero(&logarithms)
 }
 
 /// Returns the cut-off that explains the torque of joint `j` best.

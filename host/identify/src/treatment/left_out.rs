@@ -9,6 +9,7 @@ use crate::rows::plan::Plan;
 use crate::rows::stream::each_rows;
 use crate::uncertainty::jackknife::LeaveOut;
 use rig_data::prepare::Recording;
+use rig_numerics::statistics::mean_or_zero;
 
 /// Number of segments that are left out in turn.
 const STRETCHES: usize = 8;
@@ -78,6 +79,6 @@ impl Stretches {
             .filter(|(s, rows)| **rows > 0 && **s > 0.0)
             .map(|(s, rows)| 0.5 * (s / *rows as f64).ln())
             .collect();
-        moving.iter().sum::<f64>() / moving.len().max(1) as f64
+        mean_or_zero(&moving)
     }
 }

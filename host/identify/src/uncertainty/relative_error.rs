@@ -50,7 +50,7 @@ pub(crate) fn judge(
 }
 
 /// Returns the geometric mean of the relative errors over the joints that have one, so that all joints count equally.
-pub(crate) fn mean(errors: &[f64]) -> f64 {
+pub(crate) fn geometric_mean(errors: &[f64]) -> f64 {
     let judged = errors.iter().filter(|e| !e.is_nan());
     let (sum, count) = judged.fold((0.0, 0usize), |(sum, count), e| {
         (sum + e.max(f64::MIN_POSITIVE).ln(), count + 1)

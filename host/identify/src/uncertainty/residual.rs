@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use super::groups::FINEST_GROUPS;
 use super::groups::group_of;
 use rig_numerics::autocorrelation::Autocorrelation;
+use rig_numerics::statistics::grouped_mean;
 
 /// Number of bins of a dependence plot.
 const BINS: usize = 20;
@@ -119,25 +120,16 @@ impl Binned {
         let (mut middle, mut mean, mut std) = (Vec::new(), Vec::new(), Vec::new());
         let mut best = (1.0f64, 0.0, 0.0);
         for b in 0..self.bins {
-            let of = |list: &[f64]| {
-                (0..FINEST_GROUPS)
-                    .map(|g| list[g * self.bins + b])
-                    .collect::<Vec<_>>()
-            };
-            let (sums, counts) = (of(&self.sums), of(&self.counts));
-            let total: f64 = counts.iter().sum();
-            let groups = counts.iter().filter(|c| **c > 0.0).count();
-            if groups < 4 {
+            let groups: Vec<[f64; 2]> = (0..FINEST_GROUPS)
+                .map(|g| g * self.bins + b)
+                .map(|k| [self.sums[k], self.counts[k]])
+                .filter(|[_, rows]| *rows > 0.0)
+                .collect();
+            if groups.len() < 4 {
                 continue;
             }
-            let m = sums.iter().sum::<f64>() / total;
-            let squares: f64 = sums
-                .iter()
-                .zip(&counts)
-                .map(|(s, c)| (s - m * c).powi(2))
-                .sum();
-            let g = groups as f64;
-            let s = (squares * g / (g - 1.0)).sqrt() / total;
+            let [m, s] = grouped_mean(&groups);
+            let g = groups.len() as f64;
             let at = low + (b as f64 + 0.5) * step;
             middle.push(at);
             mean.push(m);

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::statistics::sum_of_squares;
+
 /// Factor of the damping after a step that does not reduce the squares, and its first value.
 const DAMPING: (f64, f64) = (10.0, 1e-2);
 
@@ -33,7 +35,7 @@ pub struct BlockedResidual {
 
 impl BlockedResidual {
     fn squares(&self) -> f64 {
-        self.values.iter().map(|x| x * x).sum::<f64>()
+        sum_of_squares(&self.values)
     }
 }
 

@@ -5,6 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::statistics::sum_of_squares;
+
 /// Smallest damping.
 const LEAST_DAMPING: f64 = 1.0e-9;
 /// Damping at the start.
@@ -88,7 +90,9 @@ impl<F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquares<'_, F> {
         Descent {
             typical: sizes(start),
             theta,
-            cost: residual.as_ref().map_or(f64::INFINITY, |r| square(r)),
+            cost: residual
+                .as_ref()
+                .map_or(f64::INFINITY, |r| sum_of_squares(r)),
             settled: residual.is_none(),
             residual: residual.unwrap_or_default(),
             damping: FIRST_DAMPING,
@@ -116,7 +120,7 @@ impl<F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquares<'_, F> {
                 let Some(trial) = self.step(&at.theta, &normal, &gradient, at.damping) else {
                     break;
                 };
-                let found = (self.residual)(&trial).map(|r| (square(&r), r));
+                let found = (self.residual)(&trial).map(|r| (sum_of_squares(&r), r));
                 if let Some((less, r)) = found.filter(|(less, _)| *less < at.cost) {
                     won = 1.0 - less / at.cost;
                     (at.theta, at.residual, at.cost) = (trial, r, less);
@@ -211,10 +215,6 @@ struct Descent {
 
 fn sizes(theta: &[f64]) -> Vec<f64> {
     theta.iter().map(|x| x.abs().max(LEAST_SIZE)).collect()
-}
-
-fn square(list: &[f64]) -> f64 {
-    list.iter().map(|x| x * x).sum()
 }
 
 #[cfg(test)]

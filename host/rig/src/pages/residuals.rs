@@ -3,15 +3,14 @@
 use super::parts;
 use rig_identify::{Dependence, ResidualReport, Series as Curves};
 use rig_model::robot::Joint;
+use rig_numerics::statistics::median;
 use rig_output::format_significant;
 use rig_report::{Axis, Block, Marker, Plot, Role, Series, Style};
 
 /// Inserts a gap at each jump of time, so that no line joins two recordings.
 fn with_gaps(curves: &Curves) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let steps: Vec<f64> = curves.t.windows(2).map(|w| w[1] - w[0]).collect();
-    let mut sorted = steps.clone();
-    sorted.sort_by(f64::total_cmp);
-    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let usual = median(steps.clone()).unwrap_or(0.0);
     let (mut t, mut a, mut b) = (Vec::new(), Vec::new(), Vec::new());
     for (i, time) in curves.t.iter().enumerate() {
         let step = i.checked_sub(1).and_then(|k| steps.get(k));

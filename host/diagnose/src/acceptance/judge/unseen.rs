@@ -4,8 +4,8 @@ use crate::columns::kinds::is_gear;
 use crate::fit::least_squares::Fit;
 use crate::outcome::Remainder;
 use crate::search::fitted_candidate::FittedCandidate;
-use crate::statistics;
 use rig_model::robot::{Joint, Robot, title_of};
+use rig_numerics::statistics;
 use rig_output::{format_significant, format_unit};
 
 /// Residual-to-noise RMS ratio on the hold-out above which a residual is unexplained. For the floor of the training
@@ -130,7 +130,7 @@ pub(crate) fn too_short_for_names(
 ) -> Option<Remainder> {
     let share = |j: &usize| {
         let rows = base.rows();
-        base.even_rms(*j) / statistics::rms(&rows.torque[*j], &rows.keep[*j])
+        base.even_rms(*j) / statistics::rms_of_kept(&rows.torque[*j], &rows.keep[*j])
     };
     let joint = (0..known.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
     let rms = base.even_rms(joint);

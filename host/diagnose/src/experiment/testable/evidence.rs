@@ -1,6 +1,7 @@
 //! Content of recordings, in figures.
 
 use rig_data::runs::{JointRun, Run};
+use rig_numerics::statistics;
 
 /// Length of the windows for speeds, s: a low-pass of 20 Hz resolves it well.
 const WINDOW: f64 = 0.1;
@@ -130,7 +131,7 @@ impl Evidence {
                     |k: usize| (j.q[from + (k + 1) * length] - j.q[from + k * length]) / time;
                 let velocity = (j.q[from + whole] - j.q[from]) / (time * PARTS as f64);
                 let load = if torque {
-                    let mean = j.tau[from..from + whole].iter().sum::<f64>() / whole as f64;
+                    let mean = statistics::mean(&j.tau[from..from + whole]);
                     mean - viscous * velocity - coulomb * velocity.signum()
                 } else {
                     0.0
@@ -180,9 +181,9 @@ impl Evidence {
     pub(crate) fn speeds(&self) -> [f64; 2] {
         let mut all: Vec<f64> = self.windows.iter().map(|w| w.velocity.abs()).collect();
         all.sort_by(f64::total_cmp);
-        let top = percentile(&all, 0.99);
+        let top = statistics::percentile(&all, 0.99);
         all.retain(|v| *v > 0.01 * top);
-        [percentile(&all, 0.5), top]
+        [statistics::percentile(&all, 0.5), top]
     }
 
     /// Returns the travel below `speed`, rad or m.
@@ -196,19 +197,14 @@ impl Evidence {
         let mut all: Vec<f64> = self.windows.iter().map(|w| w.load).collect();
         let mean = all.iter().map(|v| v.abs()).sum::<f64>() / all.len().max(1) as f64;
         all.sort_by(f64::total_cmp);
-        [percentile(&all, 0.95) - percentile(&all, 0.05), mean]
+        [
+            statistics::percentile(&all, 0.95) - statistics::percentile(&all, 0.05),
+            mean,
+        ]
     }
 
     /// Returns true if the joint moves.
     pub(crate) fn moves(&self) -> bool {
         self.range[1] - self.range[0] > 1e-3
     }
-}
-
-fn percentile(sorted: &[f64], share: f64) -> f64 {
-    let at = (share * sorted.len() as f64) as usize;
-    sorted
-        .get(at.min(sorted.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(0.0)
 }

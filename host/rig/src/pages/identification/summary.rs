@@ -3,6 +3,7 @@
 use crate::pages::context::Context;
 use crate::pages::parts;
 use rig_identify::{Identification, JointFigures};
+use rig_numerics::statistics::median;
 use rig_output::{format_significant, format_value};
 use rig_report::{Fact, Tone};
 
@@ -85,16 +86,12 @@ fn parameters(found: &Identification) -> Vec<Fact> {
             })
             .collect();
     }
-    let mut relative: Vec<f64> = found
+    let relative: Vec<f64> = found
         .base_parameters
         .iter()
         .map(|b| b.relative_std_percent)
         .collect();
-    relative.sort_by(f64::total_cmp);
-    let median = relative
-        .get(relative.len() / 2)
-        .copied()
-        .unwrap_or(f64::NAN);
+    let median = median(relative).unwrap_or(f64::NAN);
     vec![
         Fact::new("Base parameters", found.base_parameters.len().to_string()).note(format!(
             "median relative standard deviation {} %",
