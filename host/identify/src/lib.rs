@@ -105,5 +105,6 @@ pub use uncertainty::estimate::Estimate;
 pub use uncertainty::estimate::t_quantile;
 pub use uncertainty::residual::{Dependence, ResidualReport, Series};
 pub use uncertainty::torque_residuals::torque_residuals;
+pub use unmodelled::field_torque::FieldTorque;
 pub use unmodelled::position::PositionTorque;
 pub use unmodelled::tilt::BaseTilt;

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
 use rig_shared::effects::{Channel, Effect, GAINS, Instant, Kind, Parameter, SHAPES, Scale};
-use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
+use rig_shared::multibody::{COLUMNS, Chain, column};
 use rig_shared::scalar::Real as _;
 
 use crate::DiagnoseError;
@@ -21,6 +21,7 @@ use crate::rows::nominal_torque::Predicted;
 use crate::rows::regression::Column;
 use crate::rows::thinning::Thinning;
 use rig_data::runs::Run;
+use rig_identify::FieldTorque;
 use rig_model::batch::each_by;
 use rig_model::effects::outruns;
 use rig_model::robot::{Robot, unit_of};
@@ -376,29 +377,21 @@ impl Source<'_> {
                 parameters[c / COLUMNS][c % COLUMNS] += value - prior;
             }
         }
-        for row in &mut parameters {
-            row[column::DRIVE_INERTIA..].fill(0.0);
-        }
         let gravity = Vector3::from(self.robot.gravity);
-        let rest = vec![0.0; n];
-        let (mut q, mut torque) = (vec![0.0; n], vec![0.0; n]);
-        let mut columns = Vec::new();
-        for axis in self.nominal.tilt_axes() {
-            // Gravity turns opposite to the base, and the torque is linear in gravity.
-            let change = gravity.cross(&Vector3::from(axis));
-            let chain =
-                Chain::new(&self.robot.geometry(), change.into()).map_err(|e| failed(&e))?;
-            let mut signals = vec![Vec::with_capacity(run.len()); n];
-            for k in 0..run.len() {
-                for (q, joint) in q.iter_mut().zip(&run.joints) {
-                    *q = joint.q[k];
-                }
-                bias_torque(&chain, &parameters, &q, &rest, &mut torque).map_err(|e| failed(&e))?;
-                for (signal, torque) in signals.iter_mut().zip(&torque) {
+        let axes = self.nominal.tilt_axes();
+        // Gravity turns opposite to the base, and the torque is linear in gravity.
+        let fields = (axes.iter()).map(|axis| gravity.cross(&Vector3::from(*axis)).into());
+        let chain = Chain::new(&self.robot.geometry(), gravity.into()).map_err(|e| failed(&e))?;
+        let mut tilted = FieldTorque::new(&chain, fields, parameters);
+        let mut columns: Vec<Column> = vec![vec![Some(Vec::new()); n]; axes.len()];
+        for k in 0..run.len() {
+            let q = run.joints.iter().map(|joint| joint.q[k]);
+            let torque = tilted.at(q).map_err(|e| failed(&e))?;
+            for (column, torque) in columns.iter_mut().zip(torque) {
+                for (signal, torque) in column.iter_mut().flatten().zip(torque) {
                     signal.push(*torque);
                 }
             }
-            columns.push(signals.into_iter().map(Some).collect());
         }
         Ok(columns)
     }

@@ -10,7 +10,7 @@ use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
 use crate::outcome::{About, DataFault, FaultKind};
 use rig_model::robot::JointKind;
-use rig_numerics::statistics::mean_or_zero;
+use rig_numerics::statistics;
 use rig_output::format_trimmed;
 
 /// Residual share of the torque's variance above which other units or times are tried for a single joint, whose few
@@ -133,6 +133,7 @@ impl Judge<'_> {
             .iter()
             .map(|f| f.as_ref().map_or(0.0, Fit::unexplained))
             .collect();
+        let mean = statistics::mean_or_zero;
         // For a single joint, whose gravity has a period, any residual may show a factor.
         let poor = if n == 1 { EXACT } else { POOR };
         if left.iter().all(|u| *u < poor) {
@@ -147,12 +148,12 @@ impl Judge<'_> {
                 .map(|(x, y)| Fit::of(x, y, &self.order).map_or(1.0, |f| f.unexplained()))
                 .collect())
         };
-        if n > 1 && mean_or_zero(&left) > POOR {
+        if n > 1 && mean(&left) > POOR {
             let factor = 1.0 / 57.296;
-            let all = mean_or_zero(&try_out(None, factor)?);
-            if all < BETTER * mean_or_zero(&left) && all < GOOD {
+            let all = mean(&try_out(None, factor)?);
+            if all < BETTER * mean(&left) && all < GOOD {
                 return Ok((0..n)
-                    .map(|j| self.scaled(j, &[factor], mean_or_zero(&left), all))
+                    .map(|j| self.scaled(j, &[factor], mean(&left), all))
                     .collect());
             }
         }
@@ -173,11 +174,7 @@ impl Judge<'_> {
                     false if left[j] < POOR => FAR_BETTER,
                     false => MUCH_BETTER,
                 };
-                if far
-                    && own < GOOD
-                    && own < least * left[j]
-                    && mean_or_zero(&all) < mean_or_zero(&left)
-                {
+                if far && own < GOOD && own < least * left[j] && mean(&all) < mean(&left) {
                     tried.push((factor, own));
                 }
             }

@@ -1,7 +1,6 @@
 //! Pictures of a diagnosis: residuals over the coordinate that shows an effect, and curves over time.
 
 use rig_shared::effects::Kind;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::acceptance::coordinates::{Coordinate, SINCE_START, velocity_of};
 use crate::acceptance::residual_dependence::locate;
@@ -14,6 +13,7 @@ use crate::result::found::Found;
 use crate::rows::regression::Rows;
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
+use rig_identify::t_quantile;
 use rig_model::robot::Joint;
 use rig_numerics::statistics::{bins, grouped_mean};
 
@@ -202,10 +202,8 @@ fn means(place: &[Option<usize>], residual: &[f64], block: &[usize]) -> Vec<Opti
             let list: Vec<[f64; 2]> = (sums.iter().map(|s| s[bin]))
                 .filter(|s| s[1] > 0.0)
                 .collect();
-            let g = list.len() as f64;
             let [mean, std] = grouped_mean(&list);
-            let wide = StudentsT::new(0.0, 1.0, g - 1.0).ok()?.inverse_cdf(0.975);
-            (g > 1.0).then_some([mean, wide * std])
+            (list.len() > 1).then(|| [mean, t_quantile(list.len() - 1) * std])
         })
         .collect()
 }

@@ -1,6 +1,7 @@
 //! Effects that the description does not state.
 
 pub(crate) mod beyond;
+pub(crate) mod field_torque;
 pub(crate) mod lag;
 pub(crate) mod look_beyond;
 pub(crate) mod position;

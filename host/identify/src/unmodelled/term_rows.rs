@@ -3,10 +3,10 @@
 use nalgebra::DVector;
 
 use super::terms::{PERIODS, TERMS, Term, terms_of};
-use super::tilt::{Axes, TiltColumns};
+use super::tilt::{Axes, tilt_torque};
 use crate::bodies::evidence::{Belief, Seen};
 use crate::bodies::prior::Prior;
-use crate::error::IdentifyError;
+use crate::error::{IdentifyError, failed};
 use crate::estimators::problem::Problem;
 use crate::options::ModelKind;
 use crate::rows::factor::TriangularFactor;
@@ -62,7 +62,7 @@ impl Evidence {
                 let belief = Belief::of(prior, &problem.base.combination);
                 let found = belief.posterior(&Seen::of(&all), &belief.even(1.0))?;
                 let standard = prior.standard(&found.standard);
-                Some(TiltColumns::new(problem.plan.chain, &axes, &standard))
+                Some(tilt_torque(problem.plan.chain, &axes, &standard))
             }
             None => None,
         };
@@ -74,7 +74,7 @@ impl Evidence {
                 return Ok(());
             }
             let turned = match &mut tilt {
-                Some(tilt) => Some(tilt.at(&rows.q, i)?),
+                Some(tilt) => Some(tilt.at(rows.q.iter().map(|q| q[i])).map_err(failed)?),
                 None => None,
             };
             for (j, equation) in rows.equations.iter().enumerate() {

@@ -9,11 +9,10 @@
 //! horizontal, a tilt about it is collinear with an error of its zero.
 
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
-use rig_shared::multibody::{COLUMNS, Chain, gravity_vector};
+use rig_shared::multibody::{COLUMNS, Chain};
 use serde::Serialize;
 
-use crate::error::failed;
-use rig_data::prepare::PrepareError;
+use super::field_torque::FieldTorque;
 use rig_output::format_value;
 
 /// Gravity identified from the data.
@@ -92,43 +91,16 @@ impl Axes {
     }
 }
 
-/// Torque of a tilt of one radian about each axis, for given inertial values.
-pub(crate) struct TiltColumns {
-    fields: [Chain<f64>; 2],
-    parameters: Vec<[f64; COLUMNS]>,
-    q: Vec<f64>,
-    torque: [Vec<f64>; 2],
-}
-
-impl TiltColumns {
-    /// Builds the columns; `standard` holds the parameters of all joints, [`COLUMNS`] each.
-    pub(crate) fn new(chain: &Chain<f64>, axes: &Axes, standard: &[f64]) -> Self {
-        let n = chain.joint_count();
-        let parameters = standard
-            .chunks_exact(COLUMNS)
-            .take(n)
-            .map(|link| std::array::from_fn(|k| link[k]))
-            .collect();
-        Self {
-            fields: axes
-                .level
-                .map(|e| chain.with_gravity((e * axes.size).into())),
-            parameters,
-            q: vec![0.0; n],
-            torque: [vec![0.0; n], vec![0.0; n]],
-        }
-    }
-
-    /// Returns both angles' torques at all joints at the position of row `i`.
-    pub(crate) fn at(&mut self, q: &[Vec<f64>], i: usize) -> Result<&[Vec<f64>; 2], PrepareError> {
-        for (to, of) in self.q.iter_mut().zip(q) {
-            *to = of[i];
-        }
-        for (chain, torque) in self.fields.iter().zip(&mut self.torque) {
-            gravity_vector(chain, &self.parameters, &self.q, torque).map_err(failed)?;
-        }
-        Ok(&self.torque)
-    }
+/// Builds the torque of a tilt of one radian about each axis; `standard` holds the parameters of all joints, [`COLUMNS`]
+/// each.
+pub(crate) fn tilt_torque(chain: &Chain<f64>, axes: &Axes, standard: &[f64]) -> FieldTorque {
+    let parameters = standard
+        .chunks_exact(COLUMNS)
+        .take(chain.joint_count())
+        .map(|link| std::array::from_fn(|k| link[k]))
+        .collect();
+    let fields = axes.level.map(|e| (e * axes.size).into());
+    FieldTorque::new(chain, fields, parameters)
 }
 
 #[cfg(test)]

@@ -39,32 +39,18 @@ pub fn bfgs(
             slope = direction.dot(&gradient);
         }
         // Without curvature information, a step of a tenth of a variable's range is suitable.
-        let mut step = if fresh {
+        let step = if fresh {
             (0.1 / direction.amax()).min(1.0)
         } else {
             1.0
         };
-        let (mut low, mut high) = (0.0, f64::INFINITY);
-        let mut found = None;
-        for _ in 0..BISECTIONS {
-            let trial = &x + step * &direction;
-            let trial_value = function(&trial, &mut trial_gradient);
-            let enough = value + ARMIJO * step * slope;
-            if trial_value.is_nan() || trial_value > enough {
-                high = step;
-            } else if trial_gradient.dot(&direction) < WOLFE * slope {
-                low = step;
-                found = Some((trial, trial_value, trial_gradient.clone()));
-            } else {
-                found = Some((trial, trial_value, trial_gradient.clone()));
-                break;
-            }
-            step = if high.is_finite() {
-                0.5 * (low + high)
-            } else {
-                2.0 * low
-            };
-        }
+        let line = Line {
+            x: &x,
+            value,
+            direction: &direction,
+            slope,
+        };
+        let found = line.search(function, step, &mut trial_gradient);
         let Some((next, next_value, next_gradient)) = found else {
             if fresh {
                 break;
@@ -96,6 +82,50 @@ pub fn bfgs(
         }
     }
     x
+}
+
+/// A line from the present point, along which the function falls.
+struct Line<'a> {
+    x: &'a DVector<f64>,
+    /// Value at `x`.
+    value: f64,
+    direction: &'a DVector<f64>,
+    /// Derivative along the direction at `x`.
+    slope: f64,
+}
+
+impl Line<'_> {
+    /// Returns a point with the weak Wolfe conditions, its value and its gradient, from a first `step` on; else the
+    /// farthest one with a sufficient decrease, if any. `gradient` is work space.
+    fn search(
+        &self,
+        function: &mut impl FnMut(&DVector<f64>, &mut DVector<f64>) -> f64,
+        mut step: f64,
+        gradient: &mut DVector<f64>,
+    ) -> Option<(DVector<f64>, f64, DVector<f64>)> {
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut found = None;
+        for _ in 0..BISECTIONS {
+            let trial = self.x + step * self.direction;
+            let value = function(&trial, gradient);
+            let enough = self.value + ARMIJO * step * self.slope;
+            if value.is_nan() || value > enough {
+                high = step;
+            } else if gradient.dot(self.direction) < WOLFE * self.slope {
+                low = step;
+                found = Some((trial, value, gradient.clone()));
+            } else {
+                found = Some((trial, value, gradient.clone()));
+                break;
+            }
+            step = if high.is_finite() {
+                0.5 * (low + high)
+            } else {
+                2.0 * low
+            };
+        }
+        found
+    }
 }
 
 #[cfg(test)]
