@@ -24,7 +24,7 @@ use crate::link_encoder::refutes;
 use crate::models::bodies::ModelCache;
 use crate::models::observer_models::ObserverModels;
 use crate::models::simulated_motion::Replay;
-use crate::outcome::Diagnosis;
+use crate::outcome::{DataFault, Diagnosis};
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::intake::{Intake, Material, intake, without};
 use crate::recordings::noise_floor;
@@ -124,6 +124,7 @@ fn attempt(
         open,
         nameless,
         touches,
+        alike,
         faults,
     } = material;
     let options = &Options {
@@ -163,6 +164,7 @@ fn attempt(
     let notes = Notes {
         faults,
         touches,
+        alike,
         open,
         lead,
         tried: pass.tried,
@@ -224,7 +226,7 @@ fn judged(
     refit: &Refit,
     search: &Search,
     found: Vec<FittedCandidate>,
-    nameless: Option<String>,
+    nameless: Option<DataFault>,
     mut notes: Notes,
 ) -> Result<(Diagnosis, Robot), DiagnoseError> {
     let (context, prepared) = (data.context, data.prepared);

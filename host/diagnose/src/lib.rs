@@ -45,9 +45,10 @@ pub mod outcome;
 mod tests;
 
 pub use engine::diagnose;
-pub use error::DiagnoseError;
+pub use error::{DiagnoseError, NotDriveOff};
 pub use options::Options;
 pub use outcome::Diagnosis;
 pub use recordings::clamped::clamped;
 pub use recordings::drive_off::sensor_zeros;
-pub use result::sentences::{values_alike, what_falls};
+pub use result::sentences::effect::values_alike;
+pub use result::sentences::residual::what_falls;

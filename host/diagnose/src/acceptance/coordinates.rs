@@ -9,10 +9,22 @@ use rig_output::format_significant;
 
 /// Coordinates of most laws.
 const OF_LAWS: [&str; 4] = [VELOCITY, POSITION, ACCELERATION, DRIVE];
-const VELOCITY: &str = "velocity";
-const POSITION: &str = "position";
-const ACCELERATION: &str = "acceleration";
-const DRIVE: &str = "torque of the drive";
+/// Velocity of the joint.
+pub(crate) const VELOCITY: &str = "velocity";
+/// Position of the joint.
+pub(crate) const POSITION: &str = "position";
+/// Acceleration of the joint.
+pub(crate) const ACCELERATION: &str = "acceleration";
+/// Torque of the drive.
+pub(crate) const DRIVE: &str = "torque of the drive";
+/// Torque on the gear, positive along the motion.
+pub(crate) const LOAD: &str = "torque on the gear along the motion";
+/// Derivative of the drive's torque.
+pub(crate) const DRIVE_CHANGE: &str = "change of the drive's torque";
+/// Way since the last reversal, with the sign of the velocity.
+pub(crate) const WAY: &str = "way since the last reversal, by direction";
+/// Temperature.
+pub(crate) const TEMPERATURE: &str = "temperature";
 
 /// The coordinate of friction drift.
 pub(crate) const SINCE_START: &str = "time since the start, by direction";
@@ -115,7 +127,7 @@ impl Motion<'_> {
             JointKind::Prismatic => "N/s",
         };
         let mut list = vec![
-            self.coordinate("torque on the gear along the motion", f, &|r, run| {
+            self.coordinate(LOAD, f, &|r, run| {
                 (predicted[r].load[joint].iter().zip(&run.joints[joint].qd))
                     .map(|(l, v)| l * v.signum())
                     .collect()
@@ -127,20 +139,18 @@ impl Motion<'_> {
                     .map(|(t, v)| v.signum() * (t - run.began))
                     .collect()
             }),
-            self.coordinate("way since the last reversal, by direction", p, &|_, run| {
-                since_reversal(run, joint).0
-            }),
+            self.coordinate(WAY, p, &|_, run| since_reversal(run, joint).0),
             self.coordinate(
                 "time since the last reversal, by direction",
                 "s",
                 &|_, run| since_reversal(run, joint).1,
             ),
-            self.coordinate("change of the drive's torque", rate, &|r, run| {
+            self.coordinate(DRIVE_CHANGE, rate, &|r, run| {
                 central_difference(&predicted[r].torque[joint], 1.0 / run.rate)
             }),
         ];
         if (self.runs.iter()).all(|r| r.joints[joint].temperature.is_some()) {
-            list.push(self.coordinate("temperature", "degC", &|_, run| {
+            list.push(self.coordinate(TEMPERATURE, "degC", &|_, run| {
                 run.joints[joint].temperature.clone().unwrap_or_default()
             }));
         }

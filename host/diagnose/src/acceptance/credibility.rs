@@ -11,6 +11,7 @@ use crate::columns::kinds::is_gear;
 use crate::fit::refit::Refit;
 use crate::levels::{NOTHING, SIGNIFICANT};
 use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::refusal::Refusal;
 use crate::search::stepwise::Search;
 
 /// Number of inertia gains of a coupling. They come first; the last gain is friction.
@@ -30,7 +31,7 @@ pub(crate) fn unbelieved(
     search: &Search,
     judge: &Judge,
     chosen: &[FittedCandidate],
-) -> Result<Option<(usize, &'static str)>, DiagnoseError> {
+) -> Result<Option<(usize, Refusal)>, DiagnoseError> {
     let found = search.count_given(chosen)..chosen.len();
     if found.is_empty() {
         return Ok(None);
@@ -52,16 +53,12 @@ pub(crate) fn unbelieved(
         .filter(|(_, p)| *p > NOTHING)
         .max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((k, _)) = nothing {
-        return Ok(Some((
-            k,
-            "by its own deviation it could as well be nothing",
-        )));
+        return Ok(Some((k, Refusal::Nothing)));
     }
     let couples = |k: &usize| chosen[*k].candidate.kind == Kind::InertiaCoupling;
     for k in found.clone().filter(couples) {
         if joint.of_nothing(chosen, free, k, OF_INERTIA) > SIGNIFICANT {
-            let why = "what it takes away goes with the other joint's speed alone, and no inertia is shown";
-            return Ok(Some((k, why)));
+            return Ok(Some((k, Refusal::NoInertia)));
         }
     }
     let reads = |k: &usize| chosen[*k].candidate.kind == Kind::EncoderEccentricityJoint;
@@ -71,19 +68,16 @@ pub(crate) fn unbelieved(
             .iter()
             .fold(0.0, |a: f64, g| a.hypot(*g));
         if amplitude > MOST_OF_AN_ENCODER {
-            let why = "its encoder would have to be farther off its centre than any is";
-            return Ok(Some((k, why)));
+            return Ok(Some((k, Refusal::FarOffCentre)));
         }
     }
     for k in found.filter(|k| is_gear(chosen[*k].candidate.kind)) {
         let shares = joint.gains(chosen, free, k);
         if shares.iter().any(|share| *share > MOST_OF_A_TWIST) {
-            let why = "it would change more torque than mass and load of the link have";
-            return Ok(Some((k, why)));
+            return Ok(Some((k, Refusal::MoreThanTheLink)));
         }
         if resonance(search, &chosen[k])? > 0.5 / judge.rows.period {
-            let why = "it would resonate beyond the band of the data, where other laws of fast motion look alike";
-            return Ok(Some((k, why)));
+            return Ok(Some((k, Refusal::BeyondBand)));
         }
     }
     Ok(None)

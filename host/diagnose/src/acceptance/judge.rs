@@ -10,15 +10,17 @@ use crate::DiagnoseError;
 use crate::acceptance::coordinates::Coordinate;
 use crate::acceptance::lack_of_fit::misfit;
 use crate::acceptance::law_mismatch::besides;
+use crate::acceptance::residual_dependence::dependence::Dependence;
 use crate::acceptance::residual_dependence::refitted::Refitted;
 use crate::acceptance::residual_dependence::{Known, locate};
+use crate::acceptance::unexplained::{RemainderCause, Unexplained};
 use crate::columns::kinds::is_gear;
 use crate::experiment::exact;
 use crate::fit::least_squares::Fit;
 use crate::gap::closed;
 use crate::levels::{BEYOND_FLOOR, SIGNIFICANT};
 use crate::models::observer_models::ObserverModels;
-use crate::outcome::{FloorFrom, Place, Remainder};
+use crate::outcome::FloorFrom;
 use crate::recordings::noise_floor;
 use crate::recordings::noise_floor::{Repeated, of_torque};
 use crate::recordings::outlier_segment::{Burst, burst};
@@ -81,7 +83,7 @@ pub(crate) struct Judged {
     /// Sources of the known noise floors.
     pub(crate) from: Vec<FloorFrom>,
     /// The unexplained residual.
-    pub(crate) left: Option<Remainder>,
+    pub(crate) left: Option<Unexplained>,
     /// Effects that only approximated it.
     pub(crate) guesses: Vec<FittedCandidate>,
     /// True if it is so large that effects may be guesses.
@@ -293,7 +295,7 @@ impl Judge<'_, '_> {
         base: &Fit,
         floors: &[f64],
         described: &[FittedCandidate],
-    ) -> Vec<Place> {
+    ) -> Vec<Dependence> {
         let fit = with(base, described, None);
         (0..self.rows.joints())
             .flat_map(|j| self.refitted_places(&fit, j, floors[j]))
@@ -302,7 +304,7 @@ impl Judge<'_, '_> {
 
     /// Locates a joint's residual with a refitted bootstrap. The decision on a remainder uses the plain bootstrap,
     /// which is stricter.
-    fn refitted_places(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
+    fn refitted_places(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Dependence> {
         let known = Known {
             refitted: Refitted::of(self.rows, fit.counts(joint), joint),
             pairs: &self.pairs,
@@ -310,11 +312,17 @@ impl Judge<'_, '_> {
         self.located(fit, Some(&known), joint, floor)
     }
 
-    fn places_of(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
+    fn places_of(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Dependence> {
         self.located(fit, None, joint, floor)
     }
 
-    fn located(&self, fit: &Fit, known: Option<&Known>, joint: usize, floor: f64) -> Vec<Place> {
+    fn located(
+        &self,
+        fit: &Fit,
+        known: Option<&Known>,
+        joint: usize,
+        floor: f64,
+    ) -> Vec<Dependence> {
         locate(
             self.rows,
             &self.coordinates[joint],
@@ -354,7 +362,7 @@ impl Judge<'_, '_> {
         joint: usize,
         (floor, own): (f64, Option<Repeated>),
         burst: Option<&Burst>,
-    ) -> Option<Remainder> {
+    ) -> Option<Unexplained> {
         let repeated = !self.pairs.is_empty();
         let rms = fit.rms(joint);
         let places = self.places_of(fit, joint, if repeated { floor } else { 0.0 });
@@ -378,28 +386,18 @@ impl Judge<'_, '_> {
             false => places,
         };
         let shown = (places.iter().find(|p| p.p_value < SIGNIFICANT)).or(places.first());
-        let shown = shown.map_or(
-            "It goes with no coordinate of the motion beyond chance.",
-            |p| &p.text,
-        );
+        let cause = RemainderCause::BeyondFloor {
+            beside_effects: chosen.iter().any(|p| p.candidate.joint == joint),
+            shown: shown.cloned(),
+        };
         let Joint { name, kind, .. } = &self.robot.joints[joint];
-        let text = format!(
-            "{:.0} % more than the noise floor is left in joint {name} and no {}effect of the library explains it. {shown}",
-            100.0 * (rms / noise - 1.0),
-            if chosen.iter().any(|p| p.candidate.joint == joint) {
-                "further "
-            } else {
-                ""
-            },
-        );
-        Some(Remainder {
+        Some(Unexplained {
             joint: name.clone(),
             unit: kind.units().1.to_owned(),
             rms: (rms * rms - noise * noise).max(0.0).sqrt(),
             ratio: rms / noise,
-            text,
             places,
-            doubt: false,
+            cause,
         })
     }
 

@@ -91,17 +91,6 @@ pub(crate) enum Times {
     Acceleration,
 }
 
-impl Times {
-    /// Returns the phrase behind "a free function of the speed …".
-    pub(crate) fn said(self) -> &'static str {
-        match self {
-            Self::One => "",
-            Self::Direction => ", turned with the direction,",
-            Self::Acceleration => ", times the acceleration,",
-        }
-    }
-}
-
 /// Free functions of one coordinate.
 struct Family {
     coordinate: &'static str,

@@ -9,3 +9,4 @@ pub(crate) mod model_check;
 pub(crate) mod plausibility;
 pub(crate) mod residual_dependence;
 pub(crate) mod trial;
+pub(crate) mod unexplained;

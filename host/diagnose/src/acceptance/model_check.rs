@@ -7,16 +7,16 @@
 use crate::DiagnoseError;
 use crate::acceptance::judge::Judged;
 use crate::acceptance::law_mismatch::besides;
+use crate::acceptance::unexplained::{RemainderCause, Unexplained};
 use crate::fit::least_squares::Fit;
 use crate::levels::BEYOND_FLOOR;
 use crate::models::bodies::ModelCache;
 use crate::models::rms_path::RmsPath;
-use crate::outcome::{FloorFrom, Left, Remainder};
+use crate::outcome::{FloorFrom, Left};
 use crate::recordings::context::PreparedData;
 use crate::search::chosen::with;
 use rig_model::robot::{Joint, Robot};
 use rig_numerics::statistics::sum_of_squares;
-use rig_output::{format_significant, format_unit};
 
 /// Least share of the gap between refitted description and noise floor, in RMS, that effects must close to explain a
 /// joint. 0.9: on 15 emulated rigs with one effect each (`rig benchmark --seeds 1 --first-seed 4300`, 26 November 2026)
@@ -118,9 +118,8 @@ fn torque_of(data: &PreparedData, joint: usize) -> f64 {
     (squares / count.max(1) as f64).sqrt()
 }
 
-/// Returns the remainder of the unexplained joint with the largest residual relative to its torque; `None` if all are
-/// explained.
-pub(crate) fn unexplained(left: &[Left], named: &dyn Fn(&str) -> bool) -> Option<Remainder> {
+/// Returns the residual of the unexplained joint that is largest relative to its torque; `None` if all are explained.
+pub(crate) fn unexplained(left: &[Left], named: &dyn Fn(&str) -> bool) -> Option<Unexplained> {
     let worst = (left.iter().filter(|left| !left.explained))
         .max_by(|a, b| a.percent_of_torque.total_cmp(&b.percent_of_torque))?;
     let least = if worst.floor.is_nan() {
@@ -128,75 +127,17 @@ pub(crate) fn unexplained(left: &[Left], named: &dyn Fn(&str) -> bool) -> Option
     } else {
         worst.floor
     };
-    let more = (worst.after.powi(2) - least * least).max(0.0).sqrt();
-    let number = |x: f64| format_significant(x, 3);
-    let unit = format_unit(&worst.unit);
-    let names = match named(&worst.joint) {
-        true => format!(
-            "The effects found reduce the residual of joint {} from {} to {} {unit} RMS",
-            worst.joint,
-            number(worst.before),
-            number(worst.after),
-        ),
-        false => format!(
-            "The residual of joint {} is {} {unit} RMS, and no effect of the library reduces it",
-            worst.joint,
-            number(worst.after)
-        ),
-    };
-    let why = match worst.floor_from {
-        FloorFrom::Unknown => "No noise floor is known that no model made: the motion was not recorded twice, and the noise of the torque is not told from its signal. How much of the residual is noise stays open. Record the training motion again and give both".to_owned(),
-        from => format!(
-            "That is {} times the noise floor of {} {unit}{}, and less than {:.0} % of the gap is closed: {} {unit} RMS stay unexplained",
-            number(worst.after / worst.floor),
-            number(worst.floor),
-            match from {
-                FloorFrom::TorqueReading => " (the noise of the torque reading alone, as no motion was recorded twice)",
-                _ => "",
-            },
-            100.0 * NEARLY_ALL,
-            number(more),
-        ),
-    };
-    Some(Remainder {
+    Some(Unexplained {
         joint: worst.joint.clone(),
-        rms: more,
+        rms: (worst.after.powi(2) - least * least).max(0.0).sqrt(),
         unit: worst.unit.clone(),
         ratio: worst.after / worst.floor,
         places: Vec::new(),
-        text: format!("{names}, on {}. {why}.", data_of(worst)),
-        doubt: true,
+        cause: RemainderCause::GapOpen {
+            left: worst.clone(),
+            named: named(&worst.joint),
+        },
     })
-}
-
-/// Returns the data that a joint was judged on.
-pub(crate) fn data_of(left: &Left) -> &'static str {
-    match left.on_holdout {
-        true => "the hold-out",
-        false => "blocks of the training data left out of the fit in turn",
-    }
-}
-
-/// Returns a sentence on the residual of each joint's torque.
-pub(crate) fn sizes(left: &[Left]) -> Option<String> {
-    let first = left.first()?;
-    let of = |l: &Left| {
-        format!(
-            "joint {} {} {} RMS ({} % of {} {} RMS)",
-            l.joint,
-            format_significant(l.after, 3),
-            format_unit(&l.unit),
-            format_significant(l.percent_of_torque, 2),
-            format_significant(l.torque, 3),
-            format_unit(&l.unit)
-        )
-    };
-    let all: Vec<String> = left.iter().map(of).collect();
-    Some(format!(
-        "Residual of the written model and its share of the recorded torque, on {}: {}.",
-        data_of(first),
-        all.join("; ")
-    ))
 }
 
 #[cfg(test)]

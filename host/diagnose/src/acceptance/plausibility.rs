@@ -7,6 +7,7 @@ use rig_shared::effects::Kind;
 
 use crate::fit::refit::Joint;
 use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::refusal::Refusal;
 use crate::search::stepwise::Search;
 
 /// One physical limit.
@@ -15,8 +16,8 @@ struct Belief {
     kinds: &'static [Kind],
     /// Returns true if a machine cannot have the effect.
     fails: fn(&Asked, usize) -> bool,
-    /// Reason for the refusal, a clause.
-    why: &'static str,
+    /// Reason for the refusal.
+    why: Refusal,
 }
 
 /// The effects and the results to judge them by.
@@ -44,28 +45,28 @@ const TABLE: [Belief; 5] = [
     Belief {
         kinds: &[Kind::JointElasticity],
         fails: sags,
-        why: "the arm would sag on it by more than 20 mrad under its own load, and no arm that is not described so is as soft",
+        why: Refusal::Sags,
     },
     Belief {
         kinds: &[Kind::Backlash],
         fails: |asked, k| may_be_none(asked, k, "gap"),
-        why: "its gap is less than two of its standard deviations",
+        why: Refusal::NoGap,
     },
     // Without a stroke it is the Coulomb friction that the description has.
     Belief {
         kinds: &[Kind::PreslidingDahl],
         fails: |asked, k| may_be_none(asked, k, "stroke"),
-        why: "its stroke is less than two of its standard deviations",
+        why: Refusal::NoStroke,
     },
     Belief {
         kinds: &[Kind::MeasurementDelay],
         fails: another_clock,
-        why: "other joints of the same recorder do not have that delay, and one recorder has one clock",
+        why: Refusal::AnotherClock,
     },
     Belief {
         kinds: &[Kind::InertiaCoupling],
         fails: not_neighbours,
-        why: "the two joints are not neighbours, and drives are coupled between neighbours only (wrists, parallelograms)",
+        why: Refusal::NotNeighbours,
     },
 ];
 
@@ -74,7 +75,7 @@ impl Asked<'_, '_> {
     pub(crate) fn implausible(
         &self,
         mut found: std::ops::Range<usize>,
-    ) -> Option<(usize, &'static str)> {
+    ) -> Option<(usize, Refusal)> {
         let of = |k: usize| {
             let kind = self.chosen[k].candidate.kind;
             let own = TABLE.iter().filter(|belief| belief.kinds.contains(&kind));

@@ -1,9 +1,10 @@
-//! Dependence of the residual on each coordinate of the motion: tests and sentences.
+//! Dependence of the residual on each coordinate of the motion: the tests.
 //!
 //! Per coordinate, the cumulated residual (a marked empirical process: Stute 1997, Ann. Statist. 25) is compared with
 //! its wild block bootstrap (random signs per block: Cameron, Gelbach & Miller 2008). The p-values are corrected for
 //! the number of coordinates under any dependence (Benjamini & Yekutieli 2001).
 
+pub(crate) mod dependence;
 mod frequency;
 pub(crate) mod process;
 pub(crate) mod refitted;
@@ -11,14 +12,13 @@ pub(crate) mod refitted;
 use rand::{RngExt, SeedableRng};
 
 use crate::acceptance::coordinates::Coordinate;
+use crate::acceptance::residual_dependence::dependence::{Dependence, Form, Parity};
 use crate::acceptance::residual_dependence::frequency::frequency;
 use crate::acceptance::residual_dependence::process::{BINS, Process, narrowest};
 use crate::acceptance::residual_dependence::refitted::Refitted;
 use crate::levels::SIGNIFICANT;
-use crate::outcome::Place;
 use crate::rows::regression::Rows;
 use rig_numerics::statistics::{bins, sum_of_squares};
-use rig_output::{format_significant, format_unit};
 
 /// Bootstrap draws …
 const DRAWS: usize = 999;
@@ -49,7 +49,7 @@ pub(crate) fn locate(
     joint_name: &str,
     floor: f64,
     seed: u64,
-) -> Vec<Place> {
+) -> Vec<Dependence> {
     let none = Refitted::none();
     let refitted = known.map_or(&none, |known| &known.refitted);
     let residual = &refitted.rest(residual);
@@ -62,7 +62,7 @@ pub(crate) fn locate(
         excess: excess(residual, rows.used(joint), floor),
         joint_name,
     };
-    let (mut places, mut processes): (Vec<Place>, Vec<Process>) = (coordinates.iter())
+    let (mut places, mut processes): (Vec<Dependence>, Vec<Process>) = (coordinates.iter())
         .map(|coordinate| of.along(coordinate, refitted))
         .unzip();
     let pairs = known.map_or(&[][..], |known| known.pairs);
@@ -110,7 +110,7 @@ struct Residual<'r> {
 
 impl Residual<'_> {
     /// Returns where along a coordinate the residual lies, without a p-value, and its sums.
-    fn along(&self, coordinate: &Coordinate, refitted: &Refitted) -> (Place, Process) {
+    fn along(&self, coordinate: &Coordinate, refitted: &Refitted) -> (Dependence, Process) {
         let (place, edges) = bins(&coordinate.values, self.keep, BINS);
         let mut count = [0.0; BINS];
         let mut sums = vec![[0.0; BINS]; self.blocks];
@@ -144,14 +144,17 @@ impl Residual<'_> {
                 0.0
             }
         });
-        let found = Place {
+        let found = Dependence {
             joint: self.joint_name.to_owned(),
             coordinate: coordinate.name.clone(),
             interval: [edges[low], edges[high + 1]],
             unit: coordinate.unit.to_owned(),
             share,
             p_value: 1.0,
-            text: sentence(coordinate, share, &edges, low, high, &mean, &count),
+            form: Form::Along {
+                whole_range: low == 0 && high == BINS - 1,
+                parity: parity(coordinate, &mean, &count),
+            },
         };
         let taken = refitted.in_bins(&place);
         (found, Process { sums, taken })
@@ -226,53 +229,28 @@ fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> 
     (beyond + 1) as f64 / (draws + 1) as f64
 }
 
-fn sentence(
-    coordinate: &Coordinate,
-    share: f64,
-    edges: &[f64],
-    low: usize,
-    high: usize,
-    mean: &[f64; BINS],
-    count: &[f64; BINS],
-) -> String {
-    let digits = format_significant;
-    let unit = format_unit(coordinate.unit);
-    let whole = low == 0 && high == BINS - 1;
-    let place = if whole {
-        "over its whole range".to_owned()
-    } else {
-        format!(
-            "mostly between {} and {} {unit}",
-            digits(edges[low], 3),
-            digits(edges[high + 1], 3)
-        )
-    };
+/// Returns the symmetry of bin means about zero, if the coordinate has both signs.
+fn parity(coordinate: &Coordinate, mean: &[f64; BINS], count: &[f64; BINS]) -> Option<Parity> {
     let signed =
         coordinate.values.iter().any(|v| *v < 0.0) && coordinate.values.iter().any(|v| *v > 0.0);
-    let parity = if signed {
-        // Bins of equal count are symmetric if the motion is.
-        let (mut odd, mut even) = (0.0, 0.0);
-        for b in 0..BINS / 2 {
-            let (x, y) = (mean[b], mean[BINS - 1 - b]);
-            let weight = count[b].min(count[BINS - 1 - b]);
-            odd += weight * (y - x) * (y - x);
-            even += weight * (y + x) * (y + x);
-        }
-        if odd > 4.0 * even {
-            ", odd in it"
-        } else if even > 4.0 * odd {
-            ", even in it"
-        } else {
-            ""
-        }
+    if !signed {
+        return None;
+    }
+    // Bins of equal count are symmetric if the motion is.
+    let (mut odd, mut even) = (0.0, 0.0);
+    for b in 0..BINS / 2 {
+        let (x, y) = (mean[b], mean[BINS - 1 - b]);
+        let weight = count[b].min(count[BINS - 1 - b]);
+        odd += weight * (y - x) * (y - x);
+        even += weight * (y + x) * (y + x);
+    }
+    if odd > 4.0 * even {
+        Some(Parity::Odd)
+    } else if even > 4.0 * odd {
+        Some(Parity::Even)
     } else {
-        ""
-    };
-    format!(
-        "{:.0} % of the excess goes with the {}, {place}{parity}.",
-        100.0 * share,
-        coordinate.name
-    )
+        None
+    }
 }
 
 #[cfg(test)]

@@ -7,9 +7,9 @@ use crate::description::preferred_values::by_description;
 use crate::fit::refit::Refit;
 use crate::models::bodies::ModelCache;
 use crate::models::simulated_motion::Replay;
-use crate::outcome::Tried;
-use crate::result::steps::{refuse, refuse_guesses};
 use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::refusal::Refusal;
+use crate::search::tried_candidate::{TriedCandidate, refuse, refuse_guesses};
 
 /// Data for the acceptance tests.
 pub(crate) struct Trial<'a, 'r> {
@@ -39,21 +39,20 @@ impl Trial<'_, '_> {
     pub(crate) fn stand(
         &self,
         found: Vec<FittedCandidate>,
-        tried: &mut [Tried],
+        tried: &mut [TriedCandidate],
     ) -> Result<Accepted, DiagnoseError> {
         let Self { judge, refit, .. } = self;
-        let (robot, search) = (judge.robot, judge.search);
+        let search = judge.search;
         let judged = judge.judged(found)?;
-        refuse_guesses(robot, tried, &judged);
+        refuse_guesses(tried, &judged.guesses);
         let judged = by_description(judge, refit, self.fitting.context, judged)?;
-        refuse_guesses(robot, tried, &judged);
+        refuse_guesses(tried, &judged.guesses);
         let mut left = Accepted {
             judged,
             fallen: Vec::new(),
         };
         // An effect that increases the simulated error replaces another one.
-        let why = "explains torque, but the simulated motion gets worse with it";
-        left = self.unspoilt(left, why, tried)?;
+        left = self.unspoilt(left, tried)?;
         while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
             left = self.without(left, k, why, tried)?;
         }
@@ -64,15 +63,14 @@ impl Trial<'_, '_> {
     fn unspoilt(
         &self,
         mut left: Accepted,
-        why: &str,
-        tried: &mut [Tried],
+        tried: &mut [TriedCandidate],
     ) -> Result<Accepted, DiagnoseError> {
         let given = |chosen: &[FittedCandidate]| self.judge.search.count_given(chosen);
         while let Some(k) = {
             let chosen = &left.judged.chosen;
             self.replay.spoiling(chosen, given(chosen))?
         } {
-            left = self.without(left, k, why, tried)?;
+            left = self.without(left, k, Refusal::WorseMotion, tried)?;
         }
         Ok(left)
     }
@@ -85,19 +83,19 @@ impl Trial<'_, '_> {
         &self,
         Accepted { judged, mut fallen }: Accepted,
         k: usize,
-        why: &str,
-        tried: &mut [Tried],
+        why: Refusal,
+        tried: &mut [TriedCandidate],
     ) -> Result<Accepted, DiagnoseError> {
-        let (robot, search) = (self.judge.robot, self.judge.search);
+        let search = self.judge.search;
         let mut stand = judged.chosen;
         let gone = stand.remove(k);
-        refuse(robot, tried, &gone, why);
+        refuse(tried, &gone, why);
         if gone.takes_much(search.trials()) {
             fallen.push(gone);
         }
         let stand = search.possible(&self.refit.base, stand)?;
         let judged = self.judge.judged(stand)?;
-        refuse_guesses(robot, tried, &judged);
+        refuse_guesses(tried, &judged.guesses);
         Ok(Accepted { judged, fallen })
     }
 }

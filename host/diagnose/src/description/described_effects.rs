@@ -16,13 +16,14 @@ use crate::DiagnoseError;
 use crate::columns::candidate::Candidate;
 use crate::columns::effect_columns::Source;
 use crate::columns::kinds::is_gear;
+use crate::description::fate::{DescribedFate, FateCause, HeldBecause, StatedParameter};
+use crate::description::lifted_limit::LiftedLimit;
 use crate::fit::least_squares::Fit;
 use crate::outcome::{Described, Fate, Value};
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_model::effects::{Effects, is_torque};
-use rig_model::robot::{JointKind, Placed, Robot, RobotEffect, title_of, unit_of};
-use rig_output::{format_significant, format_unit};
+use rig_model::robot::{JointKind, Placed, Robot, RobotEffect, unit_of};
 
 /// Standard deviations within which a fitted gain agrees with the described one.
 const AGREES: f64 = 3.0;
@@ -39,20 +40,20 @@ enum Way {
     /// Fitted: the search begins with it.
     Free,
     /// Held as described, with the reason, and whether its torque is subtracted.
-    Held { why: String, taken_off: bool },
+    Held { why: HeldBecause, taken_off: bool },
     /// Removed: the recordings show another effect of its kind.
     GivenUp,
 }
 
 impl Way {
     /// Returns the treatment of an effect held in a search by torque.
-    fn held(kind: Kind, why: &str) -> Self {
+    fn held(kind: Kind, why: HeldBecause) -> Self {
         let seen = !matches!(
             kind.about().channel,
             Channel::Voltage | Channel::Transmission
         );
         Self::Held {
-            why: why.to_owned(),
+            why,
             taken_off: seen && kind != Kind::ViscousWarmupTemperature,
         }
     }
@@ -67,8 +68,8 @@ pub(crate) struct DescribedEffects {
     pub(crate) no_offsets: bool,
     /// True if the recordings tell which part of a described constant torque is external.
     pub(crate) pulls_told: bool,
-    /// Sentences about ignored torque limits.
-    pub(crate) lifted: Vec<String>,
+    /// The ignored torque limits.
+    pub(crate) lifted: Vec<LiftedLimit>,
     effects: Vec<(RobotEffect, Placed, Way)>,
 }
 
@@ -85,9 +86,9 @@ impl DescribedEffects {
                         carried(&mut plain, &placed);
                         Way::Link
                     }
-                    kind @ Kind::GravityTilt => Way::held(kind, "what is fitted of a tilt is the direction of gravity, which the description states beside it"),
+                    kind @ Kind::GravityTilt => Way::held(kind, HeldBecause::DirectionOfGravity),
                     kind if kind.about().channel == Channel::Voltage => {
-                        Way::held(kind, "it shows in the motor's voltage alone")
+                        Way::held(kind, HeldBecause::VoltageAlone)
                     }
                     _ => Way::Free,
                 };
@@ -187,8 +188,8 @@ impl DescribedEffects {
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
             if !library.contains(&candidate(placed).sort()) {
                 let why = match placed.effect.kind {
-                    Kind::ViscousWarmupTemperature => "the temperature was not recorded throughout",
-                    _ => "it was left out of the search",
+                    Kind::ViscousWarmupTemperature => HeldBecause::NoTemperature,
+                    _ => HeldBecause::LeftOut,
                 };
                 *way = Way::held(placed.effect.kind, why);
                 changed = true;
@@ -204,8 +205,7 @@ impl DescribedEffects {
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
             let kind = placed.effect.kind;
             if kind == Kind::MeasurementDelay && placed.effect.gains[0] <= sampling_jitter {
-                let why = "it is no longer than what the instants of sampling may make of it";
-                *way = Way::held(kind, why);
+                *way = Way::held(kind, HeldBecause::WithinSampling);
                 changed = true;
             }
         }
@@ -251,14 +251,12 @@ impl DescribedEffects {
             let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; columns.len()];
             let shown = (fit.distinct(&columns)).and_then(|own| fit.evidence(&own, &open));
             let why = match shown {
-                None => {
-                    "along this motion its torque is a combination of what other parameters give"
-                }
+                None => HeldBecause::Collinear,
                 Some(e)
                     if (gains(placed).iter().zip(e.gains.iter().zip(&e.stds)))
                         .all(|(stated, (gain, std))| (gain - stated).abs() <= AGREES * std) =>
                 {
-                    "these recordings neither show nor contradict it"
+                    HeldBecause::NotShown
                 }
                 Some(_) => continue,
             };
@@ -284,58 +282,36 @@ impl DescribedEffects {
             .collect()
     }
 
-    /// Returns the fate of each described effect, in order. `now` are law and parameters of those in the model.
-    pub(crate) fn told(&self, now: Vec<Option<Now>>) -> Vec<Described> {
+    /// Returns the fate of each described effect, in order. `now` are law and parameters of those in the last model.
+    pub(crate) fn fates(&self, now: Vec<Option<Now>>) -> Vec<DescribedFate> {
         (self.effects.iter().zip(now))
             .map(|((effect, placed, way), now)| {
-                let kind = now.as_ref().map_or(placed.effect.kind, |now| now.kind);
-                let joint = &self.robot.joints[placed.joint];
-                let what = format!("{} of joint {}", title_of(kind), joint.name);
-                let (fate, text) = match (way, &now) {
-                    (Way::Link, _) => (
-                        Fate::InTheLink,
-                        format!("The description's payload on joint {} counts as part of its link, where model.toml has it.", joint.name),
-                    ),
-                    (Way::Held { why, taken_off }, _) => (
-                        Fate::Held,
-                        format!(
-                            "The description's {what} is held as stated{}: {why}.",
-                            if *taken_off { ", and was taken off the recordings" } else { "" }
-                        ),
-                    ),
-                    (Way::Free, Some(now)) => (
-                        Fate::FittedAgain,
-                        format!(
-                            "The description's {what} stays, fitted again together with everything else.{}",
-                            what_changed(effect, now, joint.kind)
-                        ),
-                    ),
-                    (Way::Free | Way::GivenUp, _) => {
-                        let values = effect.values().map(|(p, value)| {
-                            let unit = unit_of(p, joint.kind);
-                            format!("{} {} {unit}", p.name, format_significant(value, 3))
-                        });
-                        let values: Vec<String> = values.collect();
-                        (
-                            Fate::Dropped,
-                            format!(
-                                "The description's {what} ({}) is not in model.toml: beside everything else that these recordings show it does not stand as stated.{}",
-                                values.join(", "),
-                                match way {
-                                    Way::GivenUp => " What they show of a tilt is in the direction of gravity.",
-                                    _ => "",
-                                }
-                            ),
-                        )
-                    }
+                let joint = self.robot.joints[placed.joint].kind;
+                let cause = match (way, &now) {
+                    (Way::Link, _) => FateCause::InTheLink,
+                    (Way::Held { why, taken_off }, _) => FateCause::Held {
+                        why: *why,
+                        taken_off: *taken_off,
+                    },
+                    (Way::Free, Some(now)) => FateCause::FittedAgain {
+                        changed: changed_values(effect, now, joint),
+                    },
+                    (Way::Free | Way::GivenUp, _) => FateCause::Dropped {
+                        stated: (effect.values())
+                            .map(|(p, stated)| StatedParameter {
+                                name: p.name,
+                                stated,
+                                unit: unit_of(p, joint),
+                            })
+                            .collect(),
+                        replaced_tilt: *way == Way::GivenUp,
+                    },
                 };
-                Described {
-                    effect: kind.about().name.to_owned(),
-                    law: kind.about().law.map(str::to_owned),
-                    joint: joint.name.clone(),
-                    fate,
+                DescribedFate {
+                    kind: now.as_ref().map_or(placed.effect.kind, |now| now.kind),
+                    joint: placed.joint,
+                    cause,
                     parameters: now.map(|now| now.parameters).unwrap_or_default(),
-                    text,
                 }
             })
             .collect()
@@ -356,12 +332,12 @@ impl DescribedEffects {
                 Way::Free
             } else {
                 let why = if torque {
-                    "it takes part in the simulation, and is not fitted to a voltage"
+                    HeldBecause::NotFittedToVoltage
                 } else {
-                    "the simulation of a joint that its voltage drives does not have it"
+                    HeldBecause::NotSimulated
                 };
                 Way::Held {
-                    why: why.into(),
+                    why,
                     taken_off: false,
                 }
             };
@@ -401,23 +377,19 @@ fn is_another(value: &Value, stated: f64) -> bool {
     off > CHANGED * stated.abs() && off > SURE * value.std
 }
 
-/// Returns a sentence on the changed values of a described effect; empty if none changed.
-fn what_changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
-    let changed: Vec<String> = (effect.values())
+/// Returns the changed parameters of a described effect, with their new values.
+fn changed_values(effect: &RobotEffect, now: &Now, kind: JointKind) -> Vec<(StatedParameter, f64)> {
+    (effect.values())
         .filter_map(|(p, stated)| {
             let value = now.parameters.get(p.name)?;
-            let unit = match unit_of(p, kind) {
-                unit if unit == "1" => String::new(),
-                unit => format!(" {}", format_unit(&unit)),
+            let parameter = StatedParameter {
+                name: p.name,
+                stated,
+                unit: unit_of(p, kind),
             };
-            let [from, to] = [stated, value.value].map(|x| format_significant(x, 4));
-            is_another(value, stated).then(|| format!("{} from {from} to {to}{unit}", p.name))
+            is_another(value, stated).then_some((parameter, value.value))
         })
-        .collect();
-    match changed.as_slice() {
-        [] => String::new(),
-        list => format!(" Changed: {}.", list.join(", ")),
-    }
+        .collect()
 }
 
 /// Returns the candidate of a described effect.

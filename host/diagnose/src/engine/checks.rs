@@ -11,11 +11,12 @@ use crate::acceptance::judge::unseen::{
 };
 use crate::acceptance::law_mismatch::besides;
 use crate::acceptance::model_check::{Proof, unexplained};
+use crate::acceptance::unexplained::Unexplained;
 use crate::models::bodies::FittedModel;
 use crate::models::rms_path::RmsPath;
 use crate::models::simulated_motion::{Errors, Replay};
 use crate::motor_voltage::left_of_voltage;
-use crate::outcome::Left;
+use crate::outcome::{DataFault, Left, Remainder};
 use crate::search::fitted_candidate::FittedCandidate;
 
 /// Results of the checks.
@@ -26,6 +27,8 @@ pub(super) struct Checked {
     pub(super) sizes: Vec<Left>,
     /// Returns true if the torque has an unexplained residual.
     pub(super) left: bool,
+    /// The unexplained residual of the motor voltages, if that of the torque is explained.
+    pub(super) of_voltage: Option<Remainder>,
     /// The model with the described effects alone.
     pub(super) before: Arc<FittedModel>,
     /// The model with all effects.
@@ -35,8 +38,8 @@ pub(super) struct Checked {
 }
 
 impl Checked {
-    /// Compares the models with the hold-out and the noise floors. `found` are the effects of the search, `nameless` the reason
-    /// why none was searched for, `replay` simulates the hold-out, or else the training motion.
+    /// Compares the models with the hold-out and the noise floors. `found` are the effects of the search, `nameless` the
+    /// fault because of which none was searched for. `replay` simulates the hold-out, or else the training motion.
     ///
     /// # Errors
     /// [`DiagnoseError`].
@@ -44,7 +47,7 @@ impl Checked {
         work: &Work,
         named: &mut Named,
         found: &[FittedCandidate],
-        nameless: Option<String>,
+        nameless: Option<DataFault>,
         replay: &Replay,
     ) -> Result<Self, DiagnoseError> {
         let (robot, base) = (work.data.context.robot, &work.refit.base);
@@ -84,20 +87,17 @@ impl Checked {
             };
             judged.left = unexplained(&sizes, &named);
         }
-        if let Some(why) = nameless {
+        if let Some(fault) = nameless {
             // No effect was tried, so do not claim that none explains the residual.
-            judged.left = too_short_for_names(robot, base, &judged.known, why);
+            judged.left = too_short_for_names(robot, base, &judged.known, fault);
         }
         let left = judged.left.is_some();
-        judged.left = judged
-            .left
-            .take()
-            .or_else(|| left_of_voltage(&named.windings));
         let chosen = &judged.chosen;
         Ok(Self {
             descent,
             sizes,
             left,
+            of_voltage: (!left).then(|| left_of_voltage(&named.windings)).flatten(),
             before: work.fitting.of(&chosen[..described])?,
             after: work.fitting.of(chosen)?,
             motion: (described..=chosen.len())
@@ -113,7 +113,7 @@ fn left_on_holdout(
     descent: &RmsPath,
     judged: &Judged,
     described: usize,
-) -> Option<crate::outcome::Remainder> {
+) -> Option<Unexplained> {
     let held = descent.holdout.as_ref()?;
     let robot = work.data.context.robot;
     let mut named: Vec<(usize, [f64; 2])> = (judged.chosen[described..].iter())

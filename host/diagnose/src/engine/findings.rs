@@ -6,35 +6,42 @@ use super::work::Work;
 use crate::DiagnoseError;
 use crate::columns::kinds::is_friction;
 use crate::description::described_effects::Now;
+use crate::fit::collinear::Alike;
 use crate::fit::open_parameters::Open;
 use crate::link_encoder::{Across, across, names_something, tell as tell_across};
 use crate::models::parameter_change::{Change, RefitData, change};
 use crate::models::simulated_motion::Replay;
 use crate::motor_voltage::{contradict, name_something, tell};
-use crate::outcome::{
-    Absorbed, Before, DataFault, Described, Diagnosis, Residual, Step, Tried, Verdict,
-};
+use crate::outcome::{Absorbed, Before, DataFault, Described, Diagnosis, Residual, Step, Verdict};
+use crate::recordings::disturbance::Touch;
 use crate::recordings::encoder_zero::{another_zero, another_zero_held};
 use crate::result::finish::finish;
 use crate::result::found::{Drawn, Found};
-use crate::result::remarks::{remarks, weight_of_a_spring};
-use crate::result::steps::{change_step, reconcile, steps};
+use crate::result::motion::{by_motion, motion_how};
+use crate::result::places::place;
+use crate::result::remainder::remainder;
+use crate::result::remarks::{Remarked, of_intake, of_model, remarks};
+use crate::result::steps::{change_step, steps};
 use crate::result::treatment::treated;
+use crate::result::tried::tried;
 use crate::search::chosen::with;
+use crate::search::tried_candidate::{TriedCandidate, reconcile};
 use rig_model::robot::Robot;
 
 /// What earlier stages hand over for the report alone.
 pub(super) struct Notes {
     /// Possible data faults.
     pub(super) faults: Vec<DataFault>,
-    /// Sentences on segments left out as disturbances and on collinear parameters.
-    pub(super) touches: Vec<String>,
+    /// Segments left out as disturbances.
+    pub(super) touches: Vec<Touch>,
+    /// Collinear parameters, which are held.
+    pub(super) alike: Vec<Alike>,
     /// Described parameters that the training data do not improve, and those that they contradict.
     pub(super) open: Open,
     /// Torque lead of each joint, s.
     pub(super) lead: Vec<f64>,
     /// All trials of the search.
-    pub(super) tried: Vec<Tried>,
+    pub(super) tried: Vec<TriedCandidate>,
 }
 
 /// Composes the result and the description with the effects. `replay` simulates the hold-out, or else the training motion.
@@ -54,13 +61,7 @@ pub(super) fn findings(
     let steps = all_steps(work, &mut named, &checked, replay, change.as_ref())?;
     let described = described(work, &named);
     let (absorbed_before, absorbed) = absorbed(work, &named, &checked);
-    let tried = &mut notes.tried;
-    reconcile(
-        work.data.context.robot,
-        tried,
-        named.found(),
-        work.search.trials(),
-    );
+    reconcile(&mut notes.tried, named.found(), work.search.trials());
     let changed =
         change.is_some() || contradict(&named.windings) || work.data.stated.changed(&described);
     let judged = &named.judged;
@@ -68,23 +69,25 @@ pub(super) fn findings(
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: work.data.context.robot.name.clone(),
-        verdict: verdict(work, &named, &across, changed),
+        verdict: verdict(work, &named, &checked, &across, changed),
         residual: Residual::Torque,
         words: Vec::new(),
         noise_floor_rms: judged.known.clone(),
         noise_floor_from: judged.from.clone(),
         left: checked.sizes.clone(),
         noise_floor_how: String::new(),
-        motion_how: replay.told(&judged.chosen, named.described)?,
+        motion_how: motion_how(&replay.told(&judged.chosen, named.described)?),
         treatment: Some(treated(
             work.data.context.robot,
             work.data.prepared,
             work.data.held_out,
         )),
         torque_lead: notes.lead.clone(),
-        places: work
-            .judge
-            .places(work.refit.footing(first)[1], &judged.floors, first),
+        places: (work.judge)
+            .places(work.refit.footing(first)[1], &judged.floors, first)
+            .iter()
+            .map(place)
+            .collect(),
         gap_closed: (!steps.is_empty())
             .then(|| checked.descent.gap_closed(&judged.known, change.is_some()))
             .flatten(),
@@ -92,18 +95,18 @@ pub(super) fn findings(
         steps,
         absorbed,
         absorbed_before,
-        by_motion: named.by_motion.take(),
+        by_motion: named.by_motion.take().map(by_motion),
         not_testable: Vec::new(),
         detectable: Vec::new(),
         next_experiment: None,
-        remainder: judged.left.clone(),
+        remainder: (judged.left.as_ref().map(remainder)).or_else(|| checked.of_voltage.clone()),
         data_faults: std::mem::take(&mut notes.faults),
         waterfall: (checked.descent).waterfall(
             work.data.context.robot,
             named.found(),
             &judged.known,
         ),
-        tried: std::mem::take(&mut notes.tried),
+        tried: tried(work.data.context.robot, &notes.tried),
         maps: Vec::new(),
         curves: Vec::new(),
     };
@@ -122,8 +125,14 @@ pub(super) fn findings(
 }
 
 /// Returns the verdict; `changed` is true if a nominal parameter differs from the description.
-fn verdict(work: &Work, named: &Named, across: &[Across], changed: bool) -> Verdict {
-    if named.judged.left.is_some() {
+fn verdict(
+    work: &Work,
+    named: &Named,
+    checked: &Checked,
+    across: &[Across],
+    changed: bool,
+) -> Verdict {
+    if named.judged.left.is_some() || checked.of_voltage.is_some() {
         Verdict::Remainder
     } else if !named.found().is_empty()
         || name_something(&named.windings)
@@ -295,14 +304,16 @@ fn told(
 ) -> Result<(), DiagnoseError> {
     let chosen = &named.judged.chosen;
     let after = &named.joint.solution;
-    (diagnosis.words).extend(checked.after.remarks.iter().cloned());
+    let remarked = of_model(work.data.context.robot, &checked.after.remarks);
+    diagnosis.words.extend(remarked);
     model.effects.extend(work.data.stated.held().cloned());
     tell(named.windings, diagnosis, model);
     tell_across(across, diagnosis, model);
     let described = diagnosis.described.iter().map(|d| d.text.clone());
     diagnosis.words.extend(described);
     diagnosis.words.extend(named.silent);
-    diagnosis.words.extend(notes.touches.iter().cloned());
+    let intake = of_intake(work.data.context, &notes.touches, &notes.alike);
+    diagnosis.words.extend(intake);
     let by_motion = diagnosis.by_motion.as_ref().map(|m| m.text.clone());
     diagnosis.words.extend(by_motion);
     let base = &work.refit.base;
@@ -321,19 +332,17 @@ fn told(
         }
         (told, _) => told,
     };
-    diagnosis
-        .words
-        .extend(work.data.stated.lifted.iter().cloned());
-    diagnosis.words.extend(zero);
-    diagnosis.words.extend(remarks(
-        work.data.context,
-        work.data.prepared,
-        work.data.held_out,
-        &notes.open,
-        &work.data.options.sensor_zeros,
-        after,
-    ));
-    diagnosis.words.extend(change.map(|c| c.words));
-    (diagnosis.words).extend(weight_of_a_spring(work.data.context, chosen, after));
+    diagnosis.words.extend(remarks(&Remarked {
+        context: work.data.context,
+        prepared: work.data.prepared,
+        held_out: work.data.held_out,
+        limits: &work.data.stated.lifted,
+        zero,
+        sensor_zeros: &work.data.options.sensor_zeros,
+        open: &notes.open,
+        change,
+        chosen,
+        last: after,
+    }));
     Ok(())
 }

@@ -8,8 +8,10 @@ use crate::fit::refit::Joint;
 use crate::models::output_error::{Again, by_motion};
 use crate::models::simulated_motion::Replay;
 use crate::motor_voltage::{Winding, Word, settled, windings, zeros};
-use crate::outcome::{ByMotion, Tried};
+use crate::outcome::ByMotion;
 use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::refusal::Refusal;
+use crate::search::tried_candidate::TriedCandidate;
 
 /// Accepted effects with their parameters.
 pub(super) struct Named {
@@ -40,7 +42,7 @@ impl Named {
         work: &Work,
         learnt: &Replay,
         found: Vec<FittedCandidate>,
-        tried: &mut [Tried],
+        tried: &mut [TriedCandidate],
     ) -> Result<Self, DiagnoseError> {
         let Work {
             search,
@@ -67,8 +69,7 @@ impl Named {
             // The fit to the motion sees the motion itself: what it takes for nothing stands in for another effect.
             match again.as_ref().and_then(Again::first_of_nothing) {
                 Some(k) if k >= search.count_given(&accepted.judged.chosen) => {
-                    let why = "fitted to the simulated motion as well, it could as well be nothing";
-                    accepted = trial.without(accepted, k, why, tried)?;
+                    accepted = trial.without(accepted, k, Refusal::NothingByMotion, tried)?;
                 }
                 _ => break (said, joint, again),
             }

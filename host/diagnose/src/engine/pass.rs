@@ -7,13 +7,13 @@ use crate::description::described_effects::candidate;
 use crate::fit::refit::Refit;
 use crate::link_encoder::{Across, across, gears, refutes};
 use crate::models::observer_models::ObserverModels;
-use crate::outcome::Tried;
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
 use crate::search::chosen::same;
 use crate::search::fitted_candidate::FittedCandidate;
+use crate::search::refusal::Refusal;
 use crate::search::stepwise::Search;
+use crate::search::tried_candidate::TriedCandidate;
 use crate::{DiagnoseError, Options};
-use rig_model::robot::title_of;
 
 /// Maximum number of searches with row weights. Each may change the gear shapes.
 const BESIDE_GEARS: usize = 2;
@@ -27,7 +27,7 @@ pub(crate) struct Pass<'a> {
     /// The effects.
     pub(crate) found: Vec<FittedCandidate>,
     /// All trials.
-    pub(crate) tried: Vec<Tried>,
+    pub(crate) tried: Vec<TriedCandidate>,
     /// Results of the link encoders.
     pub(crate) across: Vec<Across>,
 }
@@ -105,7 +105,7 @@ struct Searching<'a, 'p> {
     search: Search<'a>,
     progress: &'p mut dyn FnMut(f64),
     /// Trials so far.
-    tried: Vec<Tried>,
+    tried: Vec<TriedCandidate>,
     /// Number of sweeps so far.
     sweeps: i32,
 }
@@ -189,19 +189,11 @@ impl<'a> Searching<'a, '_> {
             progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(*sweeps)));
             let first = profiles.iter().position(|p| p.refused(trials).is_none());
             for (k, p) in profiles.iter().enumerate() {
-                tried.push(Tried {
-                    effect: title_of(p.candidate.kind),
-                    joint: context.robot.joints[p.candidate.joint].name.clone(),
-                    step,
-                    gain: p.evidence.gain,
-                    gain_sigmas: p.evidence.gain_sigmas,
-                    p_value: p.evidence.corrected(trials),
-                    refused: match p.refused(trials) {
-                        Some(why) => why,
-                        None if Some(k) == first => String::new(),
-                        None => "another takes away more".into(),
-                    },
-                });
+                let refused = match p.refused(trials) {
+                    None if Some(k) != first => Some(Refusal::SmallerThanAnother),
+                    refused => refused,
+                };
+                tried.push(TriedCandidate::of(p, step, trials, refused));
             }
         };
         search.run(&refit.base, found, &renew, &mut told)

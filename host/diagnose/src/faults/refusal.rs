@@ -1,7 +1,7 @@
 //! Diagnosis of recordings with a certain fault.
 
 use crate::outcome::{About, Before, DataFault, Diagnosis, FaultKind, Residual, Verdict};
-use crate::result::sentences;
+use crate::result::sentences::verdict;
 use rig_data::prepare::PrepareError;
 use rig_model::robot::Robot;
 
@@ -57,6 +57,6 @@ pub(crate) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         maps: Vec::new(),
         curves: Vec::new(),
     };
-    diagnosis.words = sentences::verdict(&diagnosis, false);
+    diagnosis.words = verdict::verdict(&diagnosis, false);
     diagnosis
 }

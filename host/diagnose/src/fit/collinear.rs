@@ -24,7 +24,7 @@ pub(crate) struct Alike {
     /// The held parameter.
     pub(crate) parameter: usize,
     /// Parameters whose values include it.
-    with: Vec<usize>,
+    pub(crate) with: Vec<usize>,
 }
 
 /// A column that is not collinear with others.
@@ -106,29 +106,5 @@ fn rank(column: usize) -> usize {
         column::VISCOUS => 2,
         column::COULOMB => 1,
         _ => 0,
-    }
-}
-
-impl Alike {
-    /// Returns a sentence.
-    pub(crate) fn said(&self, context: &DiagnosisContext) -> String {
-        let name = |k: usize| context.nominal.base.expression(k);
-        let own = name(self.parameter);
-        let value = context.anchor.prior[self.parameter];
-        if self.with.is_empty() {
-            return format!(
-                "The training motion does not show {own}: it stays at {value}, as described or as none is stated."
-            );
-        }
-        let others: Vec<String> = self.with.iter().map(|k| name(*k)).collect();
-        format!(
-            "The training motion does not tell {own} from {}: {own} stays at {value}, as described or as none is stated, and {} the combination with it. A motion in both directions, at several speeds, would tell them apart.",
-            others.join(", "),
-            if others.len() == 1 {
-                "that has"
-            } else {
-                "those have"
-            }
-        )
     }
 }

@@ -2,7 +2,6 @@
 
 use rig_shared::effects::Kind;
 
-use crate::acceptance::residual_dependence::locate;
 use crate::columns::effect_columns::Source;
 use crate::columns::kinds::is_gear;
 use crate::description::parameter_prior::ParameterPrior;
@@ -17,6 +16,7 @@ use crate::link_encoder::result::Across;
 use crate::outcome::Place;
 use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
+use crate::result::places::locate;
 use crate::rows::regression::Column;
 use crate::{DiagnoseError, Options};
 

@@ -17,7 +17,10 @@ use crate::description::parameter_prior::{Direction, ParameterPrior};
 use crate::fit::least_squares::Fit;
 use crate::fit::refit::Refit;
 use crate::fit::solution::solve;
-use crate::models::description::{completed, gravity_with, redistributed_over, with_gains};
+use crate::models::description::{
+    completed, gravity_with, of_identification, redistributed_over, with_gains,
+};
+use crate::models::remark::ModelRemark;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::rows::regression::{Column, combined};
@@ -27,7 +30,6 @@ use rig_data::runs::{JointRun, Run};
 use rig_identify::{Combinations, Sizes, as_bodies};
 use rig_model::robot::Robot;
 use rig_numerics::vector::dot;
-use rig_output::format_significant;
 
 /// Relative increase of the residual above which the cost of consistent bodies is reported.
 const SAID: f64 = 1e-3;
@@ -42,8 +44,8 @@ pub(crate) struct FittedModel {
     gains: Vec<f64>,
     /// Description with base parameters and effects.
     pub(crate) model: Robot,
-    /// Remarks on the model, sentences.
-    pub(crate) remarks: Vec<String>,
+    /// Remarks on the model.
+    pub(crate) remarks: Vec<ModelRemark>,
 }
 
 impl FittedModel {
@@ -75,7 +77,7 @@ pub(crate) struct ModelCache<'a, 'r> {
 }
 
 /// Base parameters in the form of columns and of a description, gains, and the description with its remarks.
-type Linked = ([Vec<f64>; 2], Vec<f64>, (Robot, Vec<String>));
+type Linked = ([Vec<f64>; 2], Vec<f64>, (Robot, Vec<ModelRemark>));
 
 impl<'a, 'r> ModelCache<'a, 'r> {
     /// Prepares fits to `runs`.
@@ -222,9 +224,9 @@ impl<'a, 'r> ModelCache<'a, 'r> {
             Ok(bodies) => bodies,
             Err(error) => {
                 let (model, mut remarks) = redistributed_over(robot, nominal, &upright);
-                remarks.push(format!(
-                    "The links of model.toml are not made bodies that can exist ({error}); it may not be fit for simulation."
-                ));
+                remarks.push(ModelRemark::NoBodies {
+                    error: error.to_string(),
+                });
                 return ([values, upright], gains, (model, remarks));
             }
         };
@@ -249,15 +251,14 @@ impl<'a, 'r> ModelCache<'a, 'r> {
             own.zip(made_up.values)
                 .for_each(|((gain, _), change)| *gain += change);
         }
-        let mut remarks = bodies.remarks;
+        let mut remarks = of_identification(bodies.remarks);
         let more = (0..n).map(|j| (j, rest.rms(j) / before[j].max(f64::MIN_POSITIVE) - 1.0));
         let most = more.max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((j, share)) = most.filter(|(_, share)| *share > SAID) {
-            remarks.push(format!(
-                "Links are taken as bodies that can exist; of the training data that leaves up to {} % more than a fit that is free of it (joint {}).",
-                format_significant(100.0 * share, 2),
-                robot.joints[j].name
-            ));
+            remarks.push(ModelRemark::CostOfBodies {
+                joint: j,
+                percent: 100.0 * share,
+            });
         }
         ([near, bodies.values], gains, (bodies.robot, remarks))
     }

@@ -8,12 +8,12 @@ use rig_shared::multibody::{COLUMNS, column};
 
 use crate::columns::candidate::Candidate;
 use crate::columns::kinds::is_gear;
+use crate::models::remark::ModelRemark;
 use crate::models::tilt::turn;
 use crate::rows::nominal::Nominal;
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_identify::{Combinations, described as standard, redistributed};
 use rig_model::robot::{Origin, Robot, RobotEffect, sane};
-use rig_output::{format_significant, format_unit};
 
 /// Least weight of a standard parameter, as a share of the largest value of its kind.
 const LEAST_WEIGHT: f64 = 0.1;
@@ -35,14 +35,22 @@ pub(crate) fn redistributed_over(
     robot: &Robot,
     nominal: &Nominal,
     values: &[f64],
-) -> (Robot, Vec<String>) {
+) -> (Robot, Vec<ModelRemark>) {
     let base = Combinations {
         combination: &nominal.base.combination,
         columns: &nominal.base.columns,
         values,
     };
     let weights = weights(robot, base.combination.ncols());
-    redistributed(robot, &base, Some(&weights))
+    let (model, said) = redistributed(robot, &base, Some(&weights));
+    (model, of_identification(said))
+}
+
+/// Returns sentences of an identification as remarks.
+pub(crate) fn of_identification(said: Vec<String>) -> Vec<ModelRemark> {
+    said.into_iter()
+        .map(ModelRemark::OfIdentification)
+        .collect()
 }
 
 /// Returns gravity turned by a tilt among the effects, and adapts `values` to it.
@@ -62,11 +70,11 @@ pub(crate) fn gravity_with(
 
 /// Adds gravity and effects to a description with new base parameters and its remarks. `robot` is the one given.
 pub(crate) fn completed(
-    (mut model, mut remarks): (Robot, Vec<String>),
+    (mut model, mut remarks): (Robot, Vec<ModelRemark>),
     robot: &Robot,
     gravity: [f64; 3],
     effects: &[Fitted],
-) -> (Robot, Vec<String>) {
+) -> (Robot, Vec<ModelRemark>) {
     model.gravity = gravity;
     // The identification record describes the old values.
     model.identified = None;
@@ -80,10 +88,11 @@ pub(crate) fn completed(
         if let ([share], true) = (fitted.gains, transmission)
             && (share - 1.0).abs() > UNEVEN
         {
-            remarks.push(format!(
-                "The data show {share:.2} times the torque that the {} of joint {} gives with the description's inertia and load; the description holds it once.",
-                kind.about().title, robot.joints[fitted.candidate.joint].name
-            ));
+            remarks.push(ModelRemark::UnevenGear {
+                kind,
+                joint: fitted.candidate.joint,
+                times: *share,
+            });
         }
         let gains = if transmission { &[][..] } else { fitted.gains };
         model
@@ -148,7 +157,12 @@ fn turned(
 }
 
 /// Returns the effect as a table of the description, with values limited to its permitted range.
-fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<String>) -> RobotEffect {
+fn within(
+    robot: &Robot,
+    fitted: &Fitted,
+    gains: &[f64],
+    remarks: &mut Vec<ModelRemark>,
+) -> RobotEffect {
     let Candidate {
         kind, joint, other, ..
     } = fitted.candidate;
@@ -160,15 +174,14 @@ fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<Strin
         let [low, high] = sane(p);
         let kept = value.clamp(low, high);
         if kept != *value {
-            remarks.push(format!(
-                "{} of {} at joint {} came out as {} {}, which cannot be; {} stands in the description.",
-                p.name,
-                about.name,
-                name(joint),
-                format_significant(*value, 3),
-                format_unit(p.unit),
-                format_significant(kept, 3),
-            ));
+            remarks.push(ModelRemark::OutOfRange {
+                parameter: p.name,
+                effect: about.name,
+                joint,
+                value: *value,
+                kept,
+                unit: p.unit,
+            });
             *value = kept;
         }
     }

@@ -6,6 +6,7 @@ pub(crate) mod observer_models;
 pub(crate) mod output_error;
 pub(crate) mod parameter_change;
 pub(crate) mod payload;
+pub(crate) mod remark;
 pub(crate) mod rms_path;
 pub(crate) mod simulated_motion;
 pub(crate) mod tilt;

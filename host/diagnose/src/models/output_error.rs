@@ -24,7 +24,6 @@ use crate::search::fitted_candidate::FittedCandidate;
 use rig_model::batch::each_by;
 use rig_numerics::optimise::gauss_newton::{Settings, gauss_newton};
 use rig_numerics::statistics;
-use rig_output::format_significant;
 
 /// Settings of the refit.
 const SETTINGS: Settings = Settings {
@@ -38,7 +37,7 @@ const TORQUE_WORSE: f64 = 0.005;
 const FAR_BETTER: f64 = 0.5;
 const BLURRED: f64 = 0.05;
 /// Standard deviations above which two values of a parameter are reported as different.
-const APART: f64 = 4.0;
+pub(crate) const APART: f64 = 4.0;
 
 /// Fitted values: coefficients of nominal directions and effects' columns, then shapes.
 struct Values {
@@ -111,7 +110,7 @@ impl Values {
 
 /// Result of the refit.
 pub(crate) struct Again {
-    /// Report for the user.
+    /// Entry of the result, still without its text.
     pub(crate) told: ByMotion,
     /// Model and effects to adopt, if any.
     pub(crate) adopted: Option<(FittedModel, Vec<FittedCandidate>)>,
@@ -189,7 +188,7 @@ pub(crate) fn by_motion(
     let [all_is, clear_is] = torque_left(fitting, replay, &standing, &effects)?;
     let adopted = is_better([&was, &is], [clear_was, clear_is]);
     let unit = context.robot.joints[0].kind.units();
-    let mut told = ByMotion {
+    let told = ByMotion {
         unit: unit.0.to_owned(),
         motion_rms: [was.rms(0), is.rms(0)],
         torque_unit: unit.1.to_owned(),
@@ -202,7 +201,6 @@ pub(crate) fn by_motion(
             .collect(),
         text: String::new(),
     };
-    told.text = sentence(&told);
     let of_nothing = of_nothing(chosen, free, &by_motion, &covariance);
     Ok(Some(Again {
         told,
@@ -271,33 +269,6 @@ fn twice(
         motion_std: scale * motion.stds[k],
         sigmas: (motion.values[k] - torque.values[k]).abs() / torque.stds[k].hypot(motion.stds[k]),
     }
-}
-
-fn sentence(told: &ByMotion) -> String {
-    let [was, is] = told.motion_rms.map(|rms| format_significant(1e3 * rms, 3));
-    let stands = if told.adopted {
-        "; away from rests and reversals, about which filters blur it, the torque is left hardly worse: those values stand."
-    } else {
-        "; the torque's values stand."
-    };
-    let furthest = (told.parameters.iter()).max_by(|a, b| a.sigmas.total_cmp(&b.sigmas));
-    let agree = match furthest {
-        Some(p) if p.sigmas > APART => format!(
-            "The two differ by {} standard deviations in {}: trust no more digits than they share.",
-            format_significant(p.sigmas, 2),
-            p.parameter
-        ),
-        Some(p) => format!(
-            "The two agree within {} of their standard deviations.",
-            format_significant(p.sigmas, 2)
-        ),
-        None => String::new(),
-    };
-    format!(
-        "Fitted once more, all {} parameters together, to the simulated motion of the training data, the model departs from it by {is} m{} RMS instead of {was}{stands} {agree}",
-        told.parameters.len(),
-        told.unit,
-    )
 }
 
 #[cfg(test)]

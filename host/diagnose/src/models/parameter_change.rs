@@ -10,12 +10,11 @@ use crate::fit::open_parameters::described_sizes;
 use crate::fit::refit::Refit;
 use crate::fit::solution::Solution;
 use crate::levels::{LEAST_GAIN, SIGNIFICANT};
-use crate::models::payload::{LEAST_SIGMAS, on_last_link, on_single_link};
+use crate::models::payload::{LEAST_SIGMAS, Load, on_last_link, on_single_link};
 use crate::outcome::Value;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
 use crate::search::fitted_candidate::FittedCandidate;
-use rig_output::{format_significant, format_value};
 
 /// Share of the whole change's gain that some parameters must reach to explain it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
@@ -33,16 +32,45 @@ const LEAST_OF_BOTH: f64 = 0.02;
 /// … and with an unexplained residual, which moves parameters at random.
 const LEAST_OF_BOTH_BESIDE: f64 = 0.04;
 
-/// Maximum number of parameters reported with values.
-const MOST_TOLD: usize = 8;
 /// Largest departure of parameters from one common factor. The mismatch of effects moves them as much.
 const ONE_FACTOR: f64 = 0.15;
+
+/// A changed value of a nominal parameter, SI.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ChangedValue {
+    /// Name of the parameter.
+    pub(crate) name: String,
+    /// Described value.
+    pub(crate) described: f64,
+    /// Fitted value.
+    pub(crate) value: f64,
+    /// Its standard deviation.
+    pub(crate) std: f64,
+}
+
+/// What has changed.
+#[derive(Clone, Debug)]
+pub(crate) enum ChangeCause {
+    /// A payload on a single link.
+    Payload,
+    /// A payload on the last of several links.
+    PayloadOnLast(Load),
+    /// All parameters by one factor.
+    OneFactor {
+        /// The change, per cent.
+        percent: f64,
+    },
+    /// One parameter.
+    Single(ChangedValue),
+    /// Several parameters.
+    Several(Vec<ChangedValue>),
+}
 
 /// A change of nominal parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Change {
-    /// Description of the change.
-    pub(crate) words: String,
+    /// What has changed.
+    pub(crate) cause: ChangeCause,
     /// Name of the effect, if it is one.
     pub(crate) effect: Option<Kind>,
     /// Its parameters.
@@ -174,8 +202,8 @@ impl<'c, 'r> Comparison<'c, 'r> {
             beside_friction,
             left,
         } = *self.refitted;
-        let told = |words: String, parameters, e: &Evidence| Change {
-            words,
+        let told = |cause, parameters, e: &Evidence| Change {
+            cause,
             effect: Some(Kind::Payload),
             parameters,
             p_value: self.corrected(e),
@@ -189,9 +217,7 @@ impl<'c, 'r> Comparison<'c, 'r> {
             && let Some(e) = self.evidence(&directions)
             && (self.speaks(&e) || beside_friction && self.carries(&e, &directions))
         {
-            let words =
-                "Inertia and gravity have grown in the ratio of a mass at one place: a payload.";
-            return Some(told(words.into(), parameters, &e));
+            return Some(told(ChangeCause::Payload, parameters, &e));
         }
         // Undescribed constants are fitted with it: gravity's part of them is not known before.
         let share = match beside_friction {
@@ -203,7 +229,8 @@ impl<'c, 'r> Comparison<'c, 'r> {
             && let Some(whole) = evidence_in(&self.beside_constants, self.free, &self.all)
             && e.gain >= share * whole.gain
         {
-            return Some(told(load.words(context.robot), load.parameters(), &e));
+            let parameters = load.parameters();
+            return Some(told(ChangeCause::PayloadOnLast(load), parameters, &e));
         }
         None
     }
@@ -225,68 +252,45 @@ impl<'c, 'r> Comparison<'c, 'r> {
             return None;
         }
         let percent = 100.0 * e.gains[0];
-        Some(self.nameless(
-            format!(
-                "All parameters have changed by {percent:.1} % together: the torque constant (or the scale of the torque) is not what the description says."
-            ),
-            &e,
-        ))
+        Some(self.nameless(ChangeCause::OneFactor { percent }, &e))
     }
 
     /// Returns a single parameter that explains the change.
     fn single(&self) -> Option<Change> {
-        let (after, prior) = (self.refitted.after, &self.prior);
         self.all.iter().find_map(|&k| {
             let e = self.evidence(&[k]).filter(|e| self.speaks(e))?;
-            Some(self.nameless(
-                format!(
-                    "{} has changed from {} to {}.",
-                    self.name(k),
-                    format_significant(prior[k], 4),
-                    format_value(after.values[k], after.std(k))
-                ),
-                &e,
-            ))
+            Some(self.nameless(ChangeCause::Single(self.value(k)), &e))
         })
     }
 
     /// Returns all parameters with a significant change.
     fn several(&self) -> Option<Change> {
         let (after, prior) = (self.refitted.after, &self.prior);
-        let moved: Vec<String> = (self.all.iter().copied())
+        let moved: Vec<ChangedValue> = (self.all.iter().copied())
             .filter(|&k| (after.values[k] - prior[k]).abs() > 4.0 * after.std(k))
-            .map(|k| {
-                format!(
-                    "{} {} where {} is described",
-                    self.name(k),
-                    format_value(after.values[k], after.std(k)),
-                    format_significant(prior[k], 4)
-                )
-            })
+            .map(|k| self.value(k))
             .collect();
-        if moved.is_empty() {
-            return None;
-        }
-        Some(self.nameless(
-            format!(
-                "Several nominal parameters differ from the description: {}{}.",
-                moved[..moved.len().min(MOST_TOLD)].join("; "),
-                match moved.len().saturating_sub(MOST_TOLD) {
-                    0 => String::new(),
-                    more => format!("; and {more} more"),
-                }
-            ),
-            &self.whole,
-        ))
+        (!moved.is_empty()).then(|| self.nameless(ChangeCause::Several(moved), &self.whole))
     }
 
     /// Returns a change that is no effect.
-    fn nameless(&self, words: String, e: &Evidence) -> Change {
+    fn nameless(&self, cause: ChangeCause, e: &Evidence) -> Change {
         Change {
-            words,
+            cause,
             effect: None,
             parameters: BTreeMap::new(),
             p_value: self.corrected(e),
+        }
+    }
+
+    /// Returns the values of a free direction.
+    fn value(&self, k: usize) -> ChangedValue {
+        let after = self.refitted.after;
+        ChangedValue {
+            name: self.name(k),
+            described: self.prior[k],
+            value: after.values[k],
+            std: after.std(k),
         }
     }
 

@@ -20,10 +20,9 @@ use crate::outcome::Value;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
 use rig_identify::independent_columns;
-use rig_model::robot::{Inertial, JointKind, Robot};
+use rig_model::robot::{Inertial, JointKind};
 use rig_numerics::statistics;
 use rig_numerics::vector::dot;
-use rig_output::{format_significant, format_value};
 
 /// Least ratio of a change to its standard deviation.
 pub(crate) const LEAST_SIGMAS: f64 = 4.0;
@@ -36,19 +35,18 @@ const TOLD: f64 = 1e-3;
 /// Range of a payload's distance, m: a link's mass is within some metres of its axis, and adds no inertia on it.
 const NEAREST: f64 = 0.01;
 const FARTHEST: f64 = 3.0;
-/// Torque at a joint, as a share of the payload's largest, above which the report names the joint.
-const SHOWN: f64 = 0.02;
 /// Names of a place's coordinates.
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A point mass on the last link.
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Load {
     /// kg
     pub(crate) mass: Value,
     /// m, in the last link's frame as in its file; `None` for a coordinate that is not identifiable.
-    place: [Option<Value>; 3],
+    pub(crate) place: [Option<Value>; 3],
     /// RMS torque of the load, by joint.
-    torque: Vec<f64>,
+    pub(crate) torque: Vec<f64>,
 }
 
 impl Load {
@@ -58,35 +56,6 @@ impl Load {
         told.filter_map(|(axis, value)| Some(((*axis).to_owned(), value.clone()?)))
             .chain([("mass".to_owned(), self.mass.clone())])
             .collect()
-    }
-
-    /// Returns a sentence: mass, place and the joints that show them.
-    pub(crate) fn words(&self, robot: &Robot) -> String {
-        let last = robot.joints.last().map_or("", |joint| joint.name.as_str());
-        let at: Vec<String> = (AXES.iter().zip(&self.place))
-            .map(|(axis, value)| match value {
-                Some(v) => format!("{axis} = {} m", format_value(v.value, v.std)),
-                None => format!("{axis} not told by this motion"),
-            })
-            .collect();
-        let most = self.torque.iter().copied().fold(0.0, f64::max);
-        let shown: Vec<String> = (robot.joints.iter().zip(&self.torque))
-            .filter(|(_, rms)| **rms > SHOWN * most)
-            .map(|(joint, rms)| {
-                let unit = rig_output::format_unit(joint.kind.units().1);
-                format!(
-                    "{} {unit} RMS at joint {}",
-                    format_significant(*rms, 3),
-                    joint.name
-                )
-            })
-            .collect();
-        format!(
-            "The description fits but for a payload on the last link: {} kg, its centre of mass at {} in the frame of joint {last}. It makes {}.",
-            format_value(self.mass.value, self.mass.std),
-            at.join(", "),
-            shown.join(", "),
-        )
     }
 }
 

@@ -1,12 +1,14 @@
 //! Position errors of simulated motions ([`rig_validate::replay`]), model by model.
 
+use rig_shared::effects::Kind;
+
 use crate::DiagnoseError;
 use crate::models::bodies::ModelCache;
 use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::runs::Run;
-use rig_model::robot::{Controller, Robot, title_of};
+use rig_model::robot::{Controller, Robot};
 use rig_model::simulate::{Model, SimulateError};
 use rig_numerics::optimise::gauss_newton::BlockedResidual;
 use rig_numerics::statistics;
@@ -47,6 +49,24 @@ impl Errors {
         let std = (spread / (n * (n - 1.0))).sqrt();
         self.rms(joint) > (1.0 + WORSE) * before.rms(joint) && mean > SIGMAS * std
     }
+}
+
+/// How motions were simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Simulation {
+    /// Which controllers are simulated, or why none is; a sentence of the replay.
+    pub(crate) how: String,
+    /// The first model that could not be simulated.
+    pub(crate) failed: Option<Failed>,
+}
+
+/// A model that could not be simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Failed {
+    /// The last of its effects; None without effects.
+    pub(crate) last: Option<Kind>,
+    /// Message of the simulation.
+    pub(crate) why: String,
 }
 
 /// Recordings to be simulated.
@@ -105,8 +125,8 @@ impl<'a> Replay<'a> {
         all.map_err(|e| e.to_string())
     }
 
-    /// Returns sentences: how the motion was simulated, and why the first failed model could not be. The first
-    /// `described` effects are from the description.
+    /// Returns how the motion was simulated, and the first model that could not be. The first `described` effects are from
+    /// the description.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -114,20 +134,22 @@ impl<'a> Replay<'a> {
         &self,
         chosen: &[FittedCandidate],
         described: usize,
-    ) -> Result<String, DiagnoseError> {
+    ) -> Result<Simulation, DiagnoseError> {
+        let mut simulation = Simulation {
+            how: self.how.clone(),
+            failed: None,
+        };
         if self.controllers.is_none() {
-            return Ok(self.how.clone());
+            return Ok(simulation);
         }
         for count in described..=chosen.len() {
             if let Err(why) = self.simulated(&self.fitting.of(&chosen[..count])?.model) {
-                let whose = match count.checked_sub(1).map(|k| chosen[k].candidate.kind) {
-                    Some(kind) => format!("The model with {} among its effects", title_of(kind)),
-                    None => "The model without effects".to_owned(),
-                };
-                return Ok(format!("{} {whose} was not simulated: {why}", self.how));
+                let last = count.checked_sub(1).map(|k| chosen[k].candidate.kind);
+                simulation.failed = Some(Failed { last, why });
+                break;
             }
         }
-        Ok(self.how.clone())
+        Ok(simulation)
     }
 
     /// Returns the position errors of a description; `None` if it cannot be simulated.

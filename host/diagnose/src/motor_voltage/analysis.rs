@@ -3,7 +3,6 @@
 use rig_shared::effects::{Kind, Parameter, SHAPES};
 
 use crate::acceptance::coordinates::Coordinate;
-use crate::acceptance::residual_dependence::locate;
 use crate::columns::candidate::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::{Solution, jackknifed, solve};
@@ -19,6 +18,8 @@ use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
+use crate::result::places::locate;
+use crate::result::sentences::refusal::refusal;
 use crate::rows::regression::Column;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::{DiagnoseError, Options};
@@ -231,7 +232,9 @@ impl<'a> Analysis<'a> {
     fn refused(&self, likeliest: Option<&FittedCandidate>) -> Option<String> {
         match likeliest {
             _ if self.left_out() => Some("it was left out".to_owned()),
-            Some(profile) => profile.refused(self.trials).or_else(|| too_small(profile)),
+            Some(profile) => {
+                (profile.refused(self.trials).as_ref().map(refusal)).or_else(|| too_small(profile))
+            }
             None => Some("it takes no voltage along the current".to_owned()),
         }
     }

@@ -4,6 +4,7 @@
 //! Leaves out: motion of the joint within its clamp.
 
 use crate::DiagnoseError;
+use crate::error::NotClamped;
 use rig_data::prepare::Recording;
 use rig_data::runs::{Run, at_rest};
 
@@ -16,9 +17,9 @@ const GIVES: f64 = 5e-3;
 /// # Errors
 /// [`DiagnoseError::Clamped`] if a joint moves or no voltage was recorded; errors of reading.
 pub fn clamped(recording: &dyn Recording) -> Result<Vec<Run>, DiagnoseError> {
-    let wrong = |what: String| DiagnoseError::Clamped {
+    let wrong = |what: NotClamped| DiagnoseError::Clamped {
         label: recording.label(),
-        what,
+        what: what.to_string(),
     };
     let runs = at_rest(recording)?;
     for run in &runs {
@@ -28,17 +29,16 @@ pub fn clamped(recording: &dyn Recording) -> Result<Vec<Run>, DiagnoseError> {
                     (low.min(*q), high.max(*q))
                 });
             if high - low > GIVES {
-                return Err(wrong(format!(
-                    "joint {} goes from {low:.4} to {high:.4} in it; clamp it",
-                    j + 1
-                )));
+                return Err(wrong(NotClamped::Moves {
+                    joint: j + 1,
+                    low,
+                    high,
+                }));
             }
         }
     }
     if !(runs.iter().flat_map(|run| &run.joints)).any(|joint| joint.voltage.is_some()) {
-        return Err(wrong(
-            "it has no motor voltage; record u1, or duty1 with supply".into(),
-        ));
+        return Err(wrong(NotClamped::NoVoltage));
     }
     Ok(runs)
 }

@@ -352,10 +352,6 @@ pub(crate) fn treatment_of(
                 ..options
             };
             let mut treatment = Treatment::decide(&surveys, &options, &limits)?;
-            treatment.cutoff_reason = format!(
-                "{end:.3} Hz: up to there the torque goes with the acceleration. The spectrum of the position alone gives {:.3} Hz; its noise is not white (time stamps with jitter, a coarse encoder, or a position that was filtered before it was recorded).",
-                first.cutoff
-            );
             treatment.spectral_cutoff = Some(first.cutoff);
             (surveys, options, treatment)
         }

@@ -13,14 +13,27 @@ use crate::recordings::noise_floor;
 use crate::recordings::outlier_segment::{Burst, burst};
 use crate::rows::regression::Rows;
 use rig_data::runs::Run;
-use rig_model::robot::{Joint, Robot};
-use rig_output::format_significant;
 
 /// Time that is excluded on either side of a disturbance, s: the reach of a filter.
 const BESIDE: f64 = 0.25;
 
 /// Least duration of a standstill, s; a reversal is shorter.
 const LASTING: f64 = 0.3;
+
+/// A disturbance in one of two runs of a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Touch {
+    /// Its joint, from 0.
+    pub(crate) joint: usize,
+    /// Start and end of its largest stretch, s after the start of the first run.
+    pub(crate) time: [f64; 2],
+    /// Labels of the disturbed and of the other run.
+    pub(crate) labels: [String; 2],
+    /// RMS of its largest stretch over that elsewhere.
+    pub(crate) times: f64,
+    /// Number of its stretches of half a second.
+    pub(crate) count: usize,
+}
 
 /// Marks rows in which a joint stands: unused for at least [`LASTING`].
 fn lasting(keep: &[bool], period: f64) -> Vec<bool> {
@@ -110,8 +123,8 @@ impl Pair {
         burst(&apart, &keep, &rows.starts, rows.period, &prepared.runs)
     }
 
-    /// Returns a sentence on such stretches.
-    fn sentence(&self, runs: &[Run], joint: &Joint, residual: &[f64], burst: &Burst) -> String {
+    /// Returns such stretches as a disturbance of the run with the larger residual there.
+    fn touch(&self, runs: &[Run], joint: usize, residual: &[f64], burst: &Burst) -> Touch {
         let Self {
             runs: [a, b],
             starts,
@@ -128,37 +141,28 @@ impl Pair {
         } else {
             (b, a)
         };
-        let [own_label, other_label] = [own, other].map(|run| &runs[run].label);
-        let [from, to] = burst.time.map(|t| t - runs[a].t.first().unwrap_or(&0.0));
-        format!(
-            "Joint {}: from {from:.1} to {to:.1} s after its start {own_label} differs from {other_label}, the same motion, {} times as much as elsewhere. Something touched the joint or held it there, or that piece is damaged; {} of half a second left out of both.",
-            joint.name,
-            format_significant(burst.times, 2),
-            match burst.count {
-                1 => "one stretch is".to_owned(),
-                n => format!("{n} stretches are"),
-            }
-        )
+        Touch {
+            joint,
+            time: burst.time.map(|t| t - runs[a].t.first().unwrap_or(&0.0)),
+            labels: [own, other].map(|run| runs[run].label.clone()),
+            times: burst.times,
+            count: burst.count,
+        }
     }
 }
 
-/// Excludes disturbances from runs of one motion and returns sentences on them. `residuals` are those of the refitted
+/// Excludes disturbances from runs of one motion and returns them. `residuals` are those of the refitted
 /// model, joint by joint.
-pub(crate) fn touched(
-    robot: &Robot,
-    residuals: &[Vec<f64>],
-    prepared: &mut PreparedData,
-) -> Vec<String> {
-    let mut told = Vec::new();
+pub(crate) fn touched(residuals: &[Vec<f64>], prepared: &mut PreparedData) -> Vec<Touch> {
+    let mut found = Vec::new();
     let mut out: Vec<Part> = Vec::new();
     for repeat in noise_floor::repeats(&prepared.runs) {
         let pair = Pair::of(repeat, &prepared.rows);
-        for (j, joint) in robot.joints.iter().enumerate() {
-            let residual = &residuals[j];
+        for (j, residual) in residuals.iter().enumerate() {
             let Some(burst) = pair.differs(prepared, j, residual, &out) else {
                 continue;
             };
-            told.push(pair.sentence(&prepared.runs, joint, residual, &burst));
+            found.push(pair.touch(&prepared.runs, j, residual, &burst));
             for part in &burst.rows {
                 let own = part.start - pair.starts[0]..part.end - pair.starts[0];
                 out.extend(pair.runs.map(|run| (run, own.clone())));
@@ -166,7 +170,7 @@ pub(crate) fn touched(
         }
     }
     leave_out(prepared, out);
-    told
+    found
 }
 
 /// Leaves these rows out of their runs.

@@ -5,6 +5,7 @@
 use rig_shared::safety::Mode;
 
 use crate::DiagnoseError;
+use crate::error::NotDriveOff;
 use rig_data::prepare::Recording;
 use rig_numerics::statistics;
 
@@ -23,7 +24,7 @@ const LEAST: usize = 10;
 /// [`DiagnoseError::DriveOff`] if it is too short, was driven or moves without a column `mode`; errors of reading.
 pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, DiagnoseError> {
     let label = recording.label();
-    let wrong = |what: String| DiagnoseError::DriveOff {
+    let wrong = |what: NotDriveOff| DiagnoseError::DriveOff {
         label: label.clone(),
         what,
     };
@@ -53,25 +54,28 @@ pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, Diagnose
         Ok(())
     })?;
     if let Some(mode) = driven {
-        return Err(wrong(format!(
-            "its column mode holds {mode}, in which the rig drives; disarmed is {}",
-            Mode::Disarmed as u8
-        )));
+        return Err(wrong(NotDriveOff::Driven {
+            mode,
+            disarmed: Mode::Disarmed as u8,
+        }));
     }
     let moves = (ways.iter()).position(|[low, high]| high - low > SWINGS);
     if let (Some(joint), false) = (moves, told) {
         let [low, high] = ways[joint];
-        return Err(wrong(format!(
-            "joint {} goes from {low:.3} to {high:.3} in it, and no column mode says that the drive was off",
-            joint + 1
-        )));
+        return Err(wrong(NotDriveOff::Moves {
+            joint: joint + 1,
+            low,
+            high,
+        }));
     }
     let samples = efforts.iter().map(Vec::len).min().unwrap_or(0);
     if seconds < SHORTEST || samples < PIECES * LEAST {
-        return Err(wrong(format!(
-            "it lasts {seconds:.2} s and has {samples} samples; {SHORTEST} s and {} samples are needed",
-            PIECES * LEAST
-        )));
+        return Err(wrong(NotDriveOff::TooShort {
+            seconds,
+            samples,
+            least_seconds: SHORTEST,
+            least_samples: PIECES * LEAST,
+        }));
     }
     Ok(efforts.iter().map(|all| mean_with_std(all)).collect())
 }

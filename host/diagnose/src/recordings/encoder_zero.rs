@@ -14,9 +14,8 @@ use crate::levels::SIGNIFICANT;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::rows::nominal_torque::predict;
 use rig_data::runs::Run;
-use rig_model::robot::{Joint, JointKind};
+use rig_model::robot::JointKind;
 use rig_numerics::statistics;
-use rig_output::format_value;
 
 /// Least RMS reduction by another zero for a report …
 const LEAST: f64 = 0.2;
@@ -32,18 +31,36 @@ const TURNS: u32 = 24;
 /// … and least RMS reduction by one of them.
 const MOST_OF_IT: f64 = 0.5;
 
+/// Recordings with which a zero is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Against {
+    /// The other training recordings.
+    OtherRecordings,
+    /// All training recordings.
+    Training,
+}
+
 /// Estimated zero shift of a recording.
-struct Shift {
-    label: String,
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Shift {
+    /// The recording.
+    pub(crate) label: String,
+    /// Recordings with another zero.
+    pub(crate) against: Against,
     /// Shift and its standard deviation, rad or m.
-    by: [f64; 2],
-    gain: f64,
+    pub(crate) by: [f64; 2],
+    /// Share of the RMS that the shift removes.
+    pub(crate) gain: f64,
 }
 
 impl Shift {
-    fn of(run: Option<&Run>, by: [f64; 2], gain: f64) -> Self {
-        let label = run.map_or_else(String::new, |run| run.label.clone());
-        Self { label, by, gain }
+    fn of(run: Option<&Run>, against: Against, by: [f64; 2], gain: f64) -> Self {
+        Self {
+            label: run.map_or_else(String::new, |run| run.label.clone()),
+            against,
+            by,
+            gain,
+        }
     }
 
     /// Returns the shift with the larger RMS reduction.
@@ -53,20 +70,9 @@ impl Shift {
             _ => self,
         }
     }
-
-    fn told(&self, joint: &Joint, others: &str) -> String {
-        format!(
-            "In {} joint {} seems to stand {} {} off against {others}: with a zero of its own {:.0} % less is left. Give all recordings one zero (--home), or look whether something else has changed.",
-            self.label,
-            joint.name,
-            format_value(-self.by[0], self.by[1]),
-            joint.kind.units().0,
-            100.0 * self.gain
-        )
-    }
 }
 
-/// Returns a sentence if another zero of one recording would do most of what the found effects do. `base` is the
+/// Returns the shift if another zero of one recording would do most of what the found effects do. `base` is the
 /// refitted model; the effects reduce its RMS by the share `taken`.
 ///
 /// # Errors
@@ -75,10 +81,10 @@ pub(crate) fn another_zero(
     source: &Source,
     base: &Fit,
     taken: f64,
-) -> Result<Option<String>, DiagnoseError> {
-    let [joint] = &source.robot.joints[..] else {
+) -> Result<Option<Shift>, DiagnoseError> {
+    if source.robot.joints.len() != 1 {
         return Ok(None);
-    };
+    }
     let recordings: BTreeSet<usize> = source.runs.iter().map(|run| run.recording).collect();
     let mut most: Option<Shift> = None;
     for &recording in recordings.iter().filter(|_| recordings.len() > 1) {
@@ -91,10 +97,10 @@ pub(crate) fn another_zero(
             by[0].abs() > SHIFT.max(SURE * by[1]) && e.corrected(recordings.len()) < SIGNIFICANT;
         if sure && e.gain > LEAST.max(IN_THEIR_PLACE * taken) {
             let run = source.runs.iter().find(|run| run.recording == recording);
-            most = Some(Shift::of(run, by, e.gain).or(most));
+            most = Some(Shift::of(run, Against::OtherRecordings, by, e.gain).or(most));
         }
     }
-    Ok(most.map(|shift| shift.told(joint, "the other recordings")))
+    Ok(most)
 }
 
 /// The same for a hold-out with the model's `residual`.
@@ -106,7 +112,7 @@ pub(crate) fn another_zero_held(
     held_out: &PreparedData,
     values: &[f64],
     residual: &[Vec<f64>],
-) -> Result<Option<String>, DiagnoseError> {
+) -> Result<Option<Shift>, DiagnoseError> {
     let [joint] = &context.robot.joints[..] else {
         return Ok(None);
     };
@@ -123,13 +129,18 @@ pub(crate) fn another_zero_held(
         let std = after * (10.0 / xx).sqrt();
         let gain = 1.0 - after / before;
         if by.abs() > SHIFT.max(SURE * std) && gain > LEAST {
-            most = Some(Shift::of(held_out.runs.first(), [by, std], gain));
+            most = Some(Shift::of(
+                held_out.runs.first(),
+                Against::Training,
+                [by, std],
+                gain,
+            ));
         }
     }
     if most.is_none() && joint.kind == JointKind::Revolute {
         most = turned(context, held_out, values, residual)?;
     }
-    Ok(most.map(|shift| shift.told(joint, "those to learn from")))
+    Ok(most)
 }
 
 /// The same for a large shift of a single revolute joint.
@@ -165,7 +176,8 @@ fn turned(
         if gain > MOST_OF_IT {
             let by = if by > PI { by - TAU } else { by };
             let std = PI / f64::from(TURNS);
-            most = Some(Shift::of(held_out.runs.first(), [by, std], gain).or(most));
+            most =
+                Some(Shift::of(held_out.runs.first(), Against::Training, [by, std], gain).or(most));
         }
     }
     Ok(most)

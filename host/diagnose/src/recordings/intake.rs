@@ -9,7 +9,7 @@ use crate::fit::open_parameters::{Open, open};
 use crate::fit::refit::Refit;
 use crate::outcome::DataFault;
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
-use crate::recordings::disturbance::touched;
+use crate::recordings::disturbance::{Touch, touched};
 use crate::recordings::rest_rows::joints_loud_at_rest;
 use crate::recordings::sampling::sampling_jitter;
 use crate::rows::one_way::{OneWay, one_way};
@@ -38,10 +38,12 @@ pub(crate) struct Material<'a> {
     pub(crate) held_out: Option<PreparedData>,
     /// Described parameters that the training data do not improve, and those that they contradict.
     pub(crate) open: Open,
-    /// Reason why no effect is searched for (the recordings are too short), a sentence; None otherwise.
-    pub(crate) nameless: Option<String>,
-    /// Sentences on segments left out as disturbances and on collinear parameters.
-    pub(crate) touches: Vec<String>,
+    /// Set if the recordings are too short to search for effects.
+    pub(crate) nameless: Option<DataFault>,
+    /// Segments left out as disturbances.
+    pub(crate) touches: Vec<Touch>,
+    /// Collinear parameters, which are held.
+    pub(crate) alike: Vec<Alike>,
     /// Possible data faults; real ones only if the fit was requested in spite of them.
     pub(crate) faults: Vec<DataFault>,
 }
@@ -104,7 +106,7 @@ pub(crate) fn intake<'a>(
         return Ok(Intake::Faulty(faults));
     }
     // A short motion allows parameters but no effects: both need blocks outside the fit.
-    let nameless = too_short_to_learn(&readings.training.runs).map(|fault| fault.text);
+    let nameless = too_short_to_learn(&readings.training.runs);
     let without = without(options, nameless.is_some());
     if let Some(more) = held_in_addition(&context, &readings.training.runs, &without) {
         return Ok(Intake::Hold(Box::new(more)));
@@ -115,11 +117,10 @@ pub(crate) fn intake<'a>(
         training: mut prepared,
         held_out,
     } = rests_used(&mut context, readings)?;
-    let mut touches = without_touches(&context, &mut prepared)?;
+    let touches = without_touches(&context, &mut prepared)?;
     if !touches.is_empty() {
         prepared = context.rows(prepared.runs, &prepared.treatment)?;
     }
-    touches.extend(alike.iter().map(|one| one.said(&context)));
     Ok(Intake::Fit(Box::new(Material {
         context,
         prepared,
@@ -127,6 +128,7 @@ pub(crate) fn intake<'a>(
         open,
         nameless,
         touches,
+        alike,
         faults,
     })))
 }
@@ -191,18 +193,18 @@ fn rests_used(
     readings.with_new_rows(context)
 }
 
-/// Leaves disturbances out of the training runs, and returns sentences on them.
+/// Leaves disturbances out of the training runs, and returns them.
 fn without_touches(
     context: &DiagnosisContext,
     prepared: &mut PreparedData,
-) -> Result<Vec<String>, DiagnoseError> {
+) -> Result<Vec<Touch>, DiagnoseError> {
     let left: Vec<Vec<f64>> = {
         let refit = Refit::of(context, &prepared.rows)?;
         (0..context.robot.joints.len())
             .map(|j| refit.base.residual(j))
             .collect()
     };
-    Ok(touched(context.robot, &left, prepared))
+    Ok(touched(&left, prepared))
 }
 
 /// Returns the kinds left out of the search: all of them if the recordings are too short (`nameless`).

@@ -4,8 +4,8 @@
 //! exclude the most informative rows and restrict the simulated motion.
 
 use crate::description::described_effects::DescribedEffects;
+use crate::description::lifted_limit::LiftedLimit;
 use rig_data::runs::Run;
-use rig_output::{format_significant, format_unit};
 
 /// Factor by which a torque must exceed the limit …
 const BEYOND: f64 = 1.05;
@@ -40,14 +40,13 @@ impl DescribedEffects {
             }
             limits.torque = None;
             lifted = true;
-            let unit = format_unit(joint.kind.units().1);
-            self.lifted.push(format!(
-                "The torque of joint {} goes up to {} {unit}, beyond the {} {unit} that the description gives as its limit, for {} % of the time: that limit was left out, here and in the description that comes out. Correct it, or check the unit, the gear ratio and the torque constant.",
-                joint.name,
-                format_significant(most, 3),
-                format_significant(limit, 3),
-                format_significant(100.0 * beyond as f64 / count as f64, 2),
-            ));
+            self.lifted.push(LiftedLimit {
+                joint: joint.name.clone(),
+                unit: joint.kind.units().1,
+                most,
+                limit,
+                percent: 100.0 * beyond as f64 / count as f64,
+            });
         }
         lifted
     }

@@ -6,7 +6,11 @@ use crate::DiagnoseError;
 use crate::outcome::Diagnosis;
 use crate::recordings::noise_floor::repeats;
 use crate::result::found::Found;
-use crate::result::{limits, pictures, sentences};
+use crate::result::sentences::effect::why;
+use crate::result::sentences::recordings::{self, Untested};
+use crate::result::sentences::residual::floor_how;
+use crate::result::sentences::verdict::verdict;
+use crate::result::{limits, pictures};
 
 /// Fills in the results that the search does not produce.
 ///
@@ -16,25 +20,25 @@ pub(crate) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<(), Dia
     diagnosis.maps = pictures::maps(found);
     diagnosis.curves = pictures::curves(found);
     for (step, profile) in diagnosis.steps.iter_mut().zip(found.found()) {
-        step.why = sentences::why(found, step, profile);
+        step.why = why(found, step, profile);
     }
     let pairs = repeats(found.search.source.runs);
-    diagnosis.noise_floor_how = sentences::floor_how(found, &pairs);
+    diagnosis.noise_floor_how = floor_how(found, &pairs);
     diagnosis.not_testable = limits::not_testable(found)?;
     diagnosis.detectable = limits::detectable(found, &diagnosis.not_testable)?;
     diagnosis.next_experiment = limits::next(found, diagnosis, found.model)?;
-    diagnosis.words = untested(found, diagnosis, !pairs.is_empty())
-        .into_iter()
-        .chain(sentences::verdict(diagnosis, !pairs.is_empty()))
+    let not_tested = recordings::untested(&untested(found, diagnosis, !pairs.is_empty()));
+    diagnosis.words = (not_tested.into_iter())
+        .chain(verdict(diagnosis, !pairs.is_empty()))
         .collect();
     Ok(())
 }
 
-/// Returns a sentence on what the recordings did not test although a verdict depends on it; `None` if they tested all.
+/// Returns what the recordings did not test although a verdict depends on it.
 ///
 /// Friction near standstill is untested if, for some shape, a law as large as the dry friction would not have been
 /// detected. Presliding turns all dry friction into such a law.
-fn untested(found: &Found, diagnosis: &Diagnosis, repeated: bool) -> Option<String> {
+fn untested<'a>(found: &'a Found, diagnosis: &'a Diagnosis, repeated: bool) -> Untested<'a> {
     let friction = |name: &str| {
         let own = found.model.joints.iter().find(|joint| joint.name == name)?;
         Some(own.friction.as_ref()?.coulomb.abs())
@@ -57,26 +61,14 @@ fn untested(found: &Found, diagnosis: &Diagnosis, repeated: bool) -> Option<Stri
     let mut joints: Vec<&str> = lacking.chain(small).filter(|joint| !named(joint)).collect();
     joints.sort_unstable();
     joints.dedup();
-    let mut parts = Vec::new();
-    if !joints.is_empty() {
-        parts.push(format!(
-            "friction near standstill at joint {} (no slow reversals among these recordings, or too few; `rig excite --kind reversals`)",
-            joints.join(", ")
-        ));
-    }
-    if !found.one_way.is_empty() {
-        let names: Vec<&str> = (found.one_way.iter())
+    Untested {
+        near_standstill: joints,
+        one_way: (found.one_way.iter())
             .map(|own| found.robot.joints[own.joint].name.as_str())
-            .collect();
-        parts.push(format!("the other direction of joint {}", names.join(", ")));
+            .collect(),
+        other_motion: diagnosis.waterfall.iter().all(|w| w.holdout.is_empty()),
+        noise: !repeated,
     }
-    if diagnosis.waterfall.iter().all(|w| w.holdout.is_empty()) {
-        parts.push("another motion (no hold-out)".into());
-    }
-    if !repeated {
-        parts.push("what is noise (no motion was recorded twice)".into());
-    }
-    (!parts.is_empty()).then(|| format!("Not tested: {}.", parts.join("; ")))
 }
 
 /// Returns true if an effect of this name is friction near standstill.

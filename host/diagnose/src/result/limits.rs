@@ -14,6 +14,9 @@ use crate::levels::{LEAST_GAIN, SIGNIFICANT};
 use crate::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
 use crate::recordings::external_load::told_apart;
 use crate::result::found::Found;
+use crate::result::sentences::limits::{
+    COLLINEAR, GivenAlready, NOT_TESTABLE_YET, RICHER_MOTION, given_already, to_test,
+};
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::shapes::grid;
@@ -21,7 +24,6 @@ use crate::{DiagnoseError, experiment};
 use rig_model::robot::Robot;
 use rig_model::simulate::Model;
 use rig_numerics::vector::norm_squared;
-use rig_output::{format_unit, format_value};
 
 /// Most grid points that are evaluated.
 const POINTS: usize = 12;
@@ -97,12 +99,10 @@ fn disguised(found: &Found, kind: Kind, joint: usize) -> NotTestable {
     NotTestable {
         effect: about.name.to_owned(),
         joint: found.robot.joints[joint].name.clone(),
-        why: "along this motion its torque is a combination of what the model's other parameters give"
+        why: COLLINEAR.to_owned(),
+        experiment: (exact.first())
+            .map_or(RICHER_MOTION, |c| c.separated_by)
             .to_owned(),
-        experiment: exact.first().map_or_else(
-            || "state the friction, mass and first moments in the description, or record a motion with more positions, speeds and loads".to_owned(),
-            |c| c.separated_by.to_owned(),
-        ),
     }
 }
 
@@ -226,8 +226,8 @@ pub(crate) fn next(
         let floor = found.floors[joint];
         if let Some(proposal) = experiment::next(found.robot, joint, &list, held, floor)? {
             let mut experiment = proposal.experiment;
-            if let Some(again) = given_already(found, joint, &experiment.kind) {
-                experiment.text.insert_str(0, &again);
+            if let Some(given) = given(found, joint, &experiment.kind) {
+                experiment.text.insert_str(0, &given_already(given));
             }
             return Ok(Some(NextExperiment {
                 trajectory: proposal.trajectory.map(|t| t.to_toml(found.robot)),
@@ -239,12 +239,9 @@ pub(crate) fn next(
         .not_testable
         .first()
         .map(|lacking| NextExperiment {
-            kind: "what is not testable yet".to_owned(),
+            kind: NOT_TESTABLE_YET.to_owned(),
             separates: vec![lacking.effect.clone()],
-            text: format!(
-                "For {} at joint {}: {}.",
-                lacking.effect, lacking.joint, lacking.experiment
-            ),
+            text: to_test(lacking),
             file: None,
             separation: None,
             duration: None,
@@ -253,19 +250,15 @@ pub(crate) fn next(
         }))
 }
 
-/// Returns a sentence, with a space after it, if the requested data were given and were not sufficient.
-fn given_already(found: &Found, joint: usize, kind: &str) -> Option<String> {
+/// Returns the data of an experiment of this kind, if they were given and were not sufficient.
+fn given(found: &Found, joint: usize, kind: &str) -> Option<GivenAlready> {
     if kind == OFF_LOG {
-        let [zero, std] = *found.sensor_zeros.get(joint)?;
-        let unit = format_unit(found.robot.joints[joint].kind.units().1);
-        return Some(format!(
-            "The log given with --drive-off reads {} {unit}, which does not decide it: record a longer one, of ten times that length for a third of its uncertainty. ",
-            format_value(zero, std)
-        ));
+        return Some(GivenAlready::DriveOff {
+            zero: *found.sensor_zeros.get(joint)?,
+            unit: found.robot.joints[joint].kind.units().1,
+        });
     }
-    (kind == PULLS_OFF && told_apart(found.search.source.runs)).then(|| {
-        "The recording given with --pulls-off does not decide it: it has to hold the same motion, for as long as the others. ".to_owned()
-    })
+    (kind == PULLS_OFF && told_apart(found.search.source.runs)).then_some(GivenAlready::PullsOff)
 }
 
 /// Returns an effect with its estimate. A tilt is fitted as an angle, which turns gravity's torque.

@@ -2,7 +2,10 @@
 
 use rig_shared::effects::Kind;
 
-use crate::acceptance::coordinates::{Coordinate, SINCE_START, velocity_of};
+use crate::acceptance::coordinates::{
+    ACCELERATION, Coordinate, DRIVE, DRIVE_CHANGE, LOAD, POSITION, SINCE_START, TEMPERATURE,
+    VELOCITY, WAY, velocity_of,
+};
 use crate::acceptance::residual_dependence::locate;
 use crate::acceptance::residual_dependence::process::BINS;
 use crate::columns::candidate::Candidate;
@@ -85,7 +88,7 @@ fn telling(profile: &FittedCandidate, all: &[Coordinate], joints: &[Joint]) -> O
     } = profile.candidate;
     let wave = |order: f64| {
         let ratio = joints[joint].gear_ratio();
-        let position = all.iter().find(|c| c.name == "position")?;
+        let position = all.iter().find(|c| c.name == POSITION)?;
         let turn = std::f64::consts::TAU;
         Some(Coordinate {
             name: "motor angle within one wave".to_owned(),
@@ -104,16 +107,16 @@ fn telling(profile: &FittedCandidate, all: &[Coordinate], joints: &[Joint]) -> O
         | Kind::Spring
         | Kind::GravityTilt
         | Kind::Payload
-        | Kind::EncoderEccentricityJoint => "position",
+        | Kind::EncoderEccentricityJoint => POSITION,
         Kind::PreslidingDahl | Kind::PreslidingLugre | Kind::PreslidingMaxwell | Kind::Backlash => {
-            "way since the last reversal, by direction"
+            WAY
         }
-        Kind::JointElasticity => "acceleration",
+        Kind::JointElasticity => ACCELERATION,
         Kind::ViscousWarmupTime | Kind::ViscousWarmupHeat => SINCE_START,
-        Kind::ViscousWarmupTemperature => "temperature",
-        Kind::LoadFriction => "torque on the gear along the motion",
-        Kind::TorqueSaturation => "torque of the drive",
-        Kind::MeasurementDelay => "change of the drive's torque",
+        Kind::ViscousWarmupTemperature => TEMPERATURE,
+        Kind::LoadFriction => LOAD,
+        Kind::TorqueSaturation => DRIVE,
+        Kind::MeasurementDelay => DRIVE_CHANGE,
         Kind::InertiaCoupling => {
             let name = velocity_of(&joints[other?].name);
             return all.iter().find(|c| c.name == name).cloned();
@@ -124,7 +127,7 @@ fn telling(profile: &FittedCandidate, all: &[Coordinate], joints: &[Joint]) -> O
         | Kind::QuadraticDrag
         | Kind::CurrentOffset
         | Kind::DriveDeadzone
-        | Kind::TorqueOffset => "velocity",
+        | Kind::TorqueOffset => VELOCITY,
     };
     all.iter().find(|c| c.name == name).cloned()
 }

@@ -2,23 +2,93 @@
 
 use rig_shared::effects::Kind;
 
+use crate::description::lifted_limit::LiftedLimit;
+use crate::fit::collinear::Alike;
 use crate::fit::open_parameters::Open;
 use crate::fit::solution::Solution;
+use crate::models::parameter_change::Change;
+use crate::models::remark::ModelRemark;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
-use crate::recordings::noise_floor;
-use crate::result::sentences::offsets;
-use crate::rows::one_way::told;
+use crate::recordings::disturbance::Touch;
+use crate::recordings::encoder_zero::Shift;
+use crate::result::sentences::model::{change, remark};
+use crate::result::sentences::parameters::{
+    alike, contradicted, held, light_link, offsets, one_way,
+};
+use crate::result::sentences::recordings::{
+    another_zero, lifted, no_other_motion, own_rate, read_off, touch,
+};
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_model::robot::Robot;
-use rig_output::{format_significant, format_unit, format_value};
 
 /// Ratio of the fitted to the described first moment below which a link is too light beside a spring.
 const LIGHT: f64 = 0.5;
 /// Standard deviations by which the fitted first moment must differ from the described one for that remark.
 const CLEAR: f64 = 5.0;
 
-/// Warns that a spring took part of a link's weight: a stiffening spring is like a linear one with less weight.
-pub(crate) fn weight_of_a_spring(
+/// Returns sentences on segments left out as disturbances, then on collinear parameters.
+pub(crate) fn of_intake(
+    context: &DiagnosisContext,
+    touches: &[Touch],
+    collinear: &[Alike],
+) -> Vec<String> {
+    let touches = touches.iter().map(|own| touch(context.robot, own));
+    let collinear = collinear.iter().map(|own| alike(context, own));
+    touches.chain(collinear).collect()
+}
+
+/// Returns remarks on the written model.
+pub(crate) fn of_model(robot: &Robot, remarks: &[ModelRemark]) -> Vec<String> {
+    remarks.iter().map(|own| remark(robot, own)).collect()
+}
+
+/// What the last remarks of a result are about.
+pub(crate) struct Remarked<'a> {
+    /// Robot and treatment.
+    pub(crate) context: &'a DiagnosisContext<'a>,
+    /// The training data.
+    pub(crate) prepared: &'a PreparedData,
+    /// The hold-out.
+    pub(crate) held_out: Option<&'a PreparedData>,
+    /// The ignored torque limits.
+    pub(crate) limits: &'a [LiftedLimit],
+    /// A recording with another zero.
+    pub(crate) zero: Option<Shift>,
+    /// Sensor readings with the drive off, with their standard deviations.
+    pub(crate) sensor_zeros: &'a [[f64; 2]],
+    /// Described parameters that are held or contradicted.
+    pub(crate) open: &'a Open,
+    /// A change of the nominal parameters.
+    pub(crate) change: Option<Change>,
+    /// All effects.
+    pub(crate) chosen: &'a [FittedCandidate],
+    /// Coefficients of the last model.
+    pub(crate) last: &'a Solution,
+}
+
+/// Returns sentences on the recordings, the described parameters that are held, contradicted or changed, the sensor
+/// readings with the drive off, and the constants of the last model.
+pub(crate) fn remarks(on: &Remarked) -> Vec<String> {
+    let Remarked { context, last, .. } = *on;
+    let robot = context.robot;
+    let mut words: Vec<String> = on.limits.iter().map(lifted).collect();
+    // Zeros are compared on robots of one joint only.
+    let zero = on.zero.as_ref().zip(robot.joints.first());
+    words.extend(zero.map(|(shift, joint)| another_zero(joint, shift)));
+    words.extend(on.held_out.and_then(|held_out| own_rate(context, held_out)));
+    words.extend(read_off(robot, on.sensor_zeros));
+    words.extend(offsets(context, last));
+    words.extend(contradicted(context, &on.open.contradicted));
+    words.extend(held(context, &on.open.held));
+    words.extend(one_way(&context.one_way, robot, &context.anchor, last));
+    words.extend((on.held_out).and_then(|held_out| no_other_motion(on.prepared, held_out)));
+    words.extend((on.change.as_ref()).map(|own| change(robot, &own.cause)));
+    words.extend(weight_of_a_spring(context, on.chosen, last));
+    words
+}
+
+/// Warns if a spring took part of a link's weight: a stiffening spring is like a linear one with less weight.
+fn weight_of_a_spring(
     context: &DiagnosisContext,
     chosen: &[FittedCandidate],
     last: &Solution,
@@ -32,106 +102,5 @@ pub(crate) fn weight_of_a_spring(
     let [now, described] = [last.values[weight], prior[weight]];
     let light =
         now.abs() < LIGHT * described.abs() && (described - now).abs() > CLEAR * last.std(weight);
-    light.then(|| {
-        format!(
-            "Beside the spring the first moment (gravity) comes out as {}, where {} is described: a spring that stiffens looks like a straight one and a lighter link. Weigh the link, or record without the spring, before you believe either.",
-            format_value(now, last.std(weight)),
-            format_significant(described, 3)
-        )
-    })
-}
-
-/// Returns sentences on the recordings, the described parameters that are held or contradicted (`open`), the sensor
-/// readings with the drive off, and the constants of the last model.
-pub(crate) fn remarks(
-    context: &DiagnosisContext,
-    prepared: &PreparedData,
-    held_out: Option<&PreparedData>,
-    open: &Open,
-    sensor_zeros: &[[f64; 2]],
-    last: &Solution,
-) -> Vec<String> {
-    let mut words = Vec::new();
-    words.extend(held_out.and_then(|held_out| own_rate(context, held_out)));
-    words.extend(read_off(context.robot, sensor_zeros));
-    words.extend(offsets(context, last));
-    words.extend(contradicted(context, &open.contradicted));
-    words.extend(held(context, &open.held));
-    words.extend(told(&context.one_way, context.robot, &context.anchor, last));
-    words.extend(held_out.and_then(|held_out| no_other_motion(prepared, held_out)));
-    words
-}
-
-/// Says that the hold-out has another sample rate than the training data.
-fn own_rate(context: &DiagnosisContext, held_out: &PreparedData) -> Option<String> {
-    let [learnt, held] = [context.rate(), held_out.treatment.sample_rate];
-    let label = &held_out.runs.first()?.label;
-    (learnt != held).then(|| {
-        format!(
-            "{label} is judged at its own rate, {held:.1} Hz where {learnt:.1} Hz were learnt from{}.",
-            match learnt > held {
-                true => format!("; its noise floor is taken as {:.2} times that of the others", (learnt / held).sqrt()),
-                false => String::new(),
-            }
-        )
-    })
-}
-
-/// Returns the sensor readings with the drive off.
-fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
-    (robot.joints.iter().zip(zeros))
-        .map(|(joint, [value, std])| {
-            format!(
-                "With the drive off the sensor of joint {} reads {} {}.",
-                joint.name,
-                format_value(*value, *std),
-                format_unit(joint.kind.units().1)
-            )
-        })
-        .collect()
-}
-
-/// Says that the hold-out repeats the training motion.
-fn no_other_motion(prepared: &PreparedData, held_out: &PreparedData) -> Option<String> {
-    let (own, same) = noise_floor::repeated(&prepared.runs, &held_out.runs)?;
-    Some(format!(
-        "The hold-out {} repeats the motion of {}: it shows what noise a model has learnt, and not whether it holds for another motion; hold back another one.",
-        own.label, same.label
-    ))
-}
-
-/// Lists described friction that the recordings contradict.
-fn contradicted(context: &DiagnosisContext, list: &[(usize, f64)]) -> Vec<String> {
-    (list.iter())
-        .map(|&(k, times)| {
-            format!(
-                "The recordings contradict the described {} = {} {} by {} standard deviations of the description's worth and theirs: it is not held to that.",
-                context.nominal.base.expression(k),
-                format_significant(context.anchor.prior[k], 3),
-                format_unit(context.nominal.base.unit(k)),
-                format_significant(times, 2)
-            )
-        })
-        .collect()
-}
-
-/// Lists parameters that stay as described.
-fn held(context: &DiagnosisContext, open: &[usize]) -> Option<String> {
-    let names: Vec<String> = (open.iter().map(|&k| context.nominal.base.expression(k))).collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "The training motion tells less of {} than the description, so {} as described as far as bodies can be so: {}.",
-            if names.len() == 1 {
-                "one base parameter"
-            } else {
-                "some base parameters"
-            },
-            if names.len() == 1 {
-                "it stays"
-            } else {
-                "they stay"
-            },
-            names.join(", ")
-        )
-    })
+    light.then(|| light_link(now, last.std(weight), described))
 }

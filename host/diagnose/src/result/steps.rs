@@ -1,7 +1,5 @@
 //! Steps of a result: the gain of each effect, and alternative names.
 
-use rig_shared::effects::Kind;
-
 use crate::DiagnoseError;
 use crate::acceptance::judge::Judged;
 use crate::acceptance::judge::rank::rank;
@@ -11,10 +9,10 @@ use crate::gap::closed;
 use crate::models::parameter_change::Change;
 use crate::models::rms_path::RmsPath;
 use crate::models::simulated_motion::Errors;
-use crate::outcome::{Step, Tried};
-use crate::search::fitted_candidate::FittedCandidate;
+use crate::outcome::Step;
+use crate::result::sentences::model::change as change_words;
 use crate::search::stepwise::Search;
-use rig_model::robot::{Robot, title_of};
+use rig_model::robot::Robot;
 
 /// Returns one step for each effect that is not described, with its alternative names.
 pub(crate) fn steps(
@@ -79,91 +77,6 @@ fn share(rms: [f64; 2], floor: f64) -> f64 {
     if share < 0.0 { f64::NAN } else { share }
 }
 
-/// Notes in `tried` why an accepted effect was dropped.
-pub(crate) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &FittedCandidate, why: &str) {
-    let title = title_of(fallen.candidate.kind);
-    let joint = &robot.joints[fallen.candidate.joint].name;
-    let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
-    if let Some(taken) = tried.iter_mut().find(own) {
-        taken.refused = why.into();
-    }
-}
-
-/// Replaces the entry of a law by that of another law with the same name that took over.
-fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &FittedCandidate, trials: usize) {
-    let (kind, joint) = (
-        profile.candidate.kind,
-        &robot.joints[profile.candidate.joint].name,
-    );
-    let of_name: Vec<String> = (Kind::ALL.iter())
-        .filter(|other| other.about().name == kind.about().name)
-        .map(|other| title_of(*other))
-        .collect();
-    let first = (tried.iter().enumerate())
-        .filter(|(_, t)| t.joint == *joint && of_name.contains(&t.effect))
-        .max_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
-    let Some((at, first)) = first else { return };
-    let step = first.step;
-    tried[at].refused = "another law of that name does better".into();
-    let taken = Tried {
-        effect: title_of(kind),
-        joint: joint.clone(),
-        step,
-        gain: profile.evidence.gain,
-        gain_sigmas: profile.evidence.gain_sigmas,
-        p_value: profile.evidence.corrected(trials),
-        refused: String::new(),
-    };
-    tried.insert(at, taken);
-}
-
-/// Makes the list of trials consistent with the final effects. Effects without a sweep of their own are marked as
-/// accepted, absent ones as dropped.
-pub(crate) fn reconcile(
-    robot: &Robot,
-    tried: &mut Vec<Tried>,
-    found: &[FittedCandidate],
-    trials: usize,
-) {
-    let is = |t: &Tried, p: &FittedCandidate| {
-        t.effect == title_of(p.candidate.kind) && t.joint == robot.joints[p.candidate.joint].name
-    };
-    for profile in found {
-        if tried.iter().any(|t| t.refused.is_empty() && is(t, profile)) {
-            continue;
-        }
-        let own = tried.iter_mut().filter(|t| is(t, profile));
-        match own.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
-            Some(best) => best.refused.clear(),
-            None => took_over(robot, tried, profile, trials),
-        }
-    }
-    let mut rounds = vec![0; found.len()];
-    for fallen in tried.iter_mut().filter(|t| t.refused.is_empty()) {
-        let own: Vec<usize> = (0..found.len())
-            .filter(|k| is(fallen, &found[*k]))
-            .collect();
-        // Each order of a wave was accepted in a sweep of its own.
-        let stands = own.first().is_some_and(|first| {
-            rounds[*first] += 1;
-            found[*first].candidate.order.is_none() || rounds[*first] <= own.len()
-        });
-        if !stands {
-            fallen.refused =
-                "fell again: beside all others it takes too little away, or another name takes as much"
-                    .into();
-        }
-    }
-}
-
-/// Marks effects as refused that only approximated an unknown residual.
-pub(crate) fn refuse_guesses(robot: &Robot, tried: &mut [Tried], judged: &Judged) {
-    for guess in &judged.guesses {
-        let why = "closes less of the gap than stays open beside it, and may be a guess at what has no name";
-        refuse(robot, tried, guess, why);
-    }
-}
-
 /// Returns the step of a parameter change that has the name of an effect.
 pub(crate) fn change_step(
     robot: &Robot,
@@ -192,6 +105,6 @@ pub(crate) fn change_step(
         holdout_rms: unseen,
         motion_rms: None,
         gap_closed: share(unseen.unwrap_or(train), held_floors[j]),
-        why: change.words.clone(),
+        why: change_words(robot, &change.cause),
     })
 }

@@ -2,6 +2,7 @@
 
 use crate::outcome::{Rows, Treated};
 use crate::recordings::context::PreparedData;
+use crate::result::sentences::treatment::cutoff;
 use crate::rows::regression::Rows as Regression;
 use rig_data::prepare::Treatment;
 use rig_model::robot::Robot;
@@ -17,7 +18,7 @@ pub(crate) fn treated(
     Treated {
         sample_rate: treatment.sample_rate,
         position_cutoff: treatment.cutoff,
-        position_cutoff_why: treatment.cutoff_reason.clone(),
+        position_cutoff_why: cutoff(treatment),
         links_cutoff: rows.thinning.links_cutoff(),
         band: band(treatment),
         motion_frequency: treatment.motion_frequency,

@@ -4,13 +4,10 @@
 
 use rig_shared::multibody::{COLUMNS, column};
 
-use crate::description::parameter_prior::ParameterPrior;
-use crate::fit::solution::Solution;
 use crate::rows::nominal::Nominal;
 use crate::rows::regression::Rows;
 use rig_identify::{SLIDES, Slides};
-use rig_model::robot::Robot;
-use rig_output::{format_significant, format_unit, format_value};
+use rig_output::format_significant;
 
 /// A joint that moves in one direction only.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +29,11 @@ impl OneWay {
     /// Returns the base parameter of its dry friction, which includes the constant.
     pub(crate) fn friction(&self) -> usize {
         self.parameters[0]
+    }
+
+    /// Returns the direction of motion, 1 or −1.
+    pub(crate) fn direction(&self) -> f64 {
+        self.direction
     }
 
     /// Returns the name of the dry friction, with the constant `held` in it or beside it.
@@ -81,37 +83,6 @@ pub(crate) fn one_way(nominal: &Nominal, rows: &Rows) -> Vec<OneWay> {
                 parameters: [friction, constant],
                 direction: slides.one_way(rows.period)?,
             })
-        })
-        .collect()
-}
-
-/// Returns sentences on the joints that move in one direction only.
-pub(crate) fn told(
-    list: &[OneWay],
-    robot: &Robot,
-    anchor: &ParameterPrior,
-    last: &Solution,
-) -> Vec<String> {
-    (list.iter())
-        .map(|own| {
-            let joint = &robot.joints[own.joint];
-            let held = anchor.prior[own.constant()];
-            let number = own.joint + 1;
-            let sign = if own.direction < 0.0 { '-' } else { '+' };
-            let value = (anchor.free.iter())
-                .position(|d| matches!(d.as_slice(), [(k, _)] if *k == own.friction()))
-                .map_or(String::new(), |k| {
-                    format!(
-                        " = {} {}",
-                        format_value(last.values[k] + own.direction * held, last.std(k)),
-                        format_unit(joint.kind.units().1)
-                    )
-                });
-            format!(
-                "Joint {} moves in one direction only. These data tell dry friction and a constant torque as one number, fc{number} {sign} off{number}{value}. model.toml has the constant as described, {}, and the rest as coulomb. Rows about rests are left out. Move the joint in both directions to tell them apart.",
-                joint.name,
-                format_significant(held, 4)
-            )
         })
         .collect()
 }

@@ -9,6 +9,7 @@ use crate::columns::kinds::is_gear;
 use crate::fit::evidence::Evidence;
 use crate::levels::{LEAST_GAIN, SIGNIFICANT};
 use crate::rows::regression::Column;
+use crate::search::refusal::Refusal;
 
 /// Least ratio of the gain to its standard deviation.
 pub(crate) const LEAST_SIGMAS: f64 = 2.0;
@@ -72,26 +73,22 @@ pub(crate) struct Followed {
 
 impl FittedCandidate {
     /// Returns the reason for refusal at a p-value corrected for `tried` trials; None if the candidate passes.
-    pub(crate) fn refused(&self, tried: usize) -> Option<String> {
+    pub(crate) fn refused(&self, tried: usize) -> Option<Refusal> {
         let e = &self.evidence;
         let p = self.corrected(tried);
-        if let Some(shape) = self.at_bound {
-            Some(format!(
-                "its {shape} goes to the least that can be told from none"
-            ))
+        if let Some(part) = self.at_bound {
+            Some(Refusal::AtBound(part))
         } else if p > SIGNIFICANT {
-            Some(format!("p = {p:.2}, corrected for {tried} trials"))
+            Some(Refusal::Significance { p, trials: tried })
         } else if e.joint_gain < self.least_gain() {
-            Some(format!(
-                "takes away {:.1} % of the residual, less than {:.0} %",
-                100.0 * e.joint_gain,
-                100.0 * self.least_gain()
-            ))
+            Some(Refusal::Gain {
+                gain: e.joint_gain,
+                least: self.least_gain(),
+            })
         } else if self.in_too_few_blocks() {
-            Some(format!(
-                "its gain is only {:.1} of its standard deviations",
-                e.gain_sigmas
-            ))
+            Some(Refusal::Variation {
+                sigmas: e.gain_sigmas,
+            })
         } else {
             None
         }

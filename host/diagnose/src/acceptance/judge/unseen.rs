@@ -1,12 +1,12 @@
 //! Residuals that only the hold-out shows, and those of effects that were dropped.
 
+use crate::acceptance::unexplained::{RemainderCause, Unexplained};
 use crate::columns::kinds::is_gear;
 use crate::fit::least_squares::Fit;
-use crate::outcome::Remainder;
+use crate::outcome::DataFault;
 use crate::search::fitted_candidate::FittedCandidate;
-use rig_model::robot::{Joint, Robot, title_of};
+use rig_model::robot::{Joint, Robot};
 use rig_numerics::statistics;
-use rig_output::{format_significant, format_unit};
 
 /// Residual-to-noise RMS ratio on the hold-out above which a residual is unexplained. For the floor of the training
 /// data, whose motion is another, and for gears, where each law has errors at contact.
@@ -26,7 +26,7 @@ pub(crate) fn left_of_held(
     floors: [&[f64]; 2],
     chosen: &[FittedCandidate],
     twice: &dyn Fn(usize) -> Option<f64>,
-) -> Option<Remainder> {
+) -> Option<Unexplained> {
     let [own, floors] = floors;
     let ratio = |j: usize| held[j] / floors[j];
     let gear = |j: usize| {
@@ -43,29 +43,17 @@ pub(crate) fn left_of_held(
     let j = (0..held.len())
         .filter(beyond)
         .max_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
+    let here = learnt[j] / own[j];
     let Joint { name, kind, .. } = &robot.joints[j];
-    Some(Remainder {
+    Some(Unexplained {
         joint: name.clone(),
         unit: kind.units().1.to_owned(),
         rms: (held[j].powi(2) - floors[j].powi(2)).sqrt(),
         ratio: ratio(j),
-        text: {
-            let here = learnt[j] / own[j];
-            let why = if here > LIKE_THE_FLOOR {
-                format!(
-                    "the training data at {here:.2} times, where it goes with nothing: what the model is wrong in shows more in the motion held back"
-                )
-            } else {
-                "the training data are not: they show something that the training data hardly do"
-                    .to_owned()
-            };
-            format!(
-                "The data held back are left at {} times the noise floor in joint {name}, {why}. Give a recording like them with --data.",
-                format_significant(ratio(j), 3)
-            )
-        },
         places: Vec::new(),
-        doubt: false,
+        cause: RemainderCause::OnHoldOut {
+            training_ratio: (here > LIKE_THE_FLOOR).then_some(here),
+        },
     })
 }
 
@@ -75,21 +63,18 @@ pub(crate) fn not_carried_over(
     robot: &Robot,
     steps: &[(usize, [f64; 2])],
     floors: &[f64],
-) -> Option<Remainder> {
+) -> Option<Unexplained> {
     let grown = |(_, [before, after]): &&(usize, [f64; 2])| after / before;
     let worst = steps.iter().max_by(|a, b| grown(a).total_cmp(&grown(b)))?;
     let (joint, [before, after]) = *worst;
     let Joint { name, kind, .. } = &robot.joints[joint];
-    (after >= before).then(|| Remainder {
+    (after >= before).then(|| Unexplained {
         joint: name.clone(),
         unit: kind.units().1.to_owned(),
         rms: (after.powi(2) - floors[joint].powi(2)).max(0.0).sqrt(),
         ratio: after / floors[joint],
-        text: format!(
-            "Of the data held back the names take nothing off in joint {name}: they explain the training data alone, and are no more than guesses. Record more to learn from.",
-        ),
         places: Vec::new(),
-        doubt: true,
+        cause: RemainderCause::NotCarriedOver,
     })
 }
 
@@ -99,35 +84,33 @@ pub(crate) fn taken_by_none(
     fallen: &[FittedCandidate],
     chosen: &[FittedCandidate],
     floors: &[f64],
-) -> Option<Remainder> {
+) -> Option<Unexplained> {
     let bare =
         |p: &&FittedCandidate| (chosen.iter()).all(|c| c.candidate.joint != p.candidate.joint);
     let gain = |p: &&FittedCandidate| p.evidence.joint_gain;
     let most = (fallen.iter().filter(bare)).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
     let (joint, left) = (most.candidate.joint, 1.0 - gain(&most));
     let Joint { name, kind, .. } = &robot.joints[joint];
-    Some(Remainder {
+    Some(Unexplained {
         joint: name.clone(),
         unit: kind.units().1.to_owned(),
         rms: floors[joint] * (1.0 - left * left).max(0.0).sqrt(),
         ratio: 1.0 / left,
-        text: format!(
-            "The law of {} takes {:.0} % off what is left of joint {name}, on stretches that it was not fitted to, but not with values that such a rig has: something is missing that has no name here.",
-            title_of(most.candidate.kind),
-            100.0 * gain(&most)
-        ),
         places: Vec::new(),
-        doubt: true,
+        cause: RemainderCause::TakenByNone {
+            kind: most.candidate.kind,
+            gain: gain(&most),
+        },
     })
 }
 
-/// Returns the residual of the joint with the largest share, if recordings are too short for effects. `why`: how short.
+/// Returns the residual of the joint with the largest share, if recordings are too short for effects, as `fault` says.
 pub(crate) fn too_short_for_names(
     robot: &Robot,
     base: &Fit,
     known: &[f64],
-    why: String,
-) -> Option<Remainder> {
+    fault: DataFault,
+) -> Option<Unexplained> {
     let share = |j: &usize| {
         let rows = base.rows();
         base.even_rms(*j) / statistics::rms_of_kept(&rows.torque[*j], &rows.keep[*j])
@@ -139,19 +122,16 @@ pub(crate) fn too_short_for_names(
         _ => (0.0, f64::NAN),
     };
     let Joint { name, kind, .. } = &robot.joints[joint];
-    let unit = kind.units().1;
-    Some(Remainder {
+    Some(Unexplained {
         joint: name.clone(),
-        unit: unit.to_owned(),
+        unit: kind.units().1.to_owned(),
         rms: (rms * rms - floor * floor).max(0.0).sqrt(),
         ratio,
-        text: format!(
-            "{why} The parameters are fitted; of joint {name} {} {} RMS are left, {} % of its torque, and nobody knows whether an effect is missing.",
-            format_significant(rms, 3),
-            format_unit(unit),
-            format_significant(100.0 * share(&joint), 2)
-        ),
         places: Vec::new(),
-        doubt: true,
+        cause: RemainderCause::TooShort {
+            fault,
+            residual: rms,
+            share: share(&joint),
+        },
     })
 }

@@ -7,10 +7,9 @@ use std::f64::consts::PI;
 
 use realfft::RealFftPlanner;
 
+use crate::acceptance::residual_dependence::dependence::{Dependence, Form};
 use crate::acceptance::residual_dependence::process::{BINS, Process, narrowest};
-use crate::outcome::Place;
 use crate::rows::regression::Rows;
-use rig_output::format_significant;
 
 /// Name of the coordinate.
 const FREQUENCY: &str = "frequency";
@@ -27,7 +26,7 @@ pub(crate) fn frequency(
     residual: &[f64],
     pairs: &[(usize, usize)],
     joint_name: &str,
-) -> Option<(Place, Process)> {
+) -> Option<(Dependence, Process)> {
     let length = (WINDOW / rows.period).round() as usize;
     let highest = (PASSED * length as f64) as usize;
     if highest < 2 * BINS {
@@ -73,19 +72,14 @@ pub(crate) fn frequency(
     let (low, high) = narrowest(&common, all);
     let share = common[low..=high].iter().sum::<f64>() / all.max(f64::MIN_POSITIVE);
     let interval = [low, high + 1].map(|b| edge(b) / WINDOW);
-    let place = Place {
+    let place = Dependence {
         joint: joint_name.to_owned(),
         coordinate: FREQUENCY.to_owned(),
         interval,
         unit: "Hz".to_owned(),
         share,
         p_value: 1.0,
-        text: format!(
-            "{:.0} % of what comes back in each run of the motion has frequencies between {} and {} Hz.",
-            100.0 * share,
-            format_significant(interval[0], 2),
-            format_significant(interval[1], 2)
-        ),
+        form: Form::Repeated,
     };
     let taken = Vec::new();
     Some((place, Process { sums, taken }))
@@ -100,7 +94,7 @@ mod tests {
     use crate::acceptance::residual_dependence::probabilities;
 
     /// Two runs of a minute at 100 rows/s, with a resonance at 7 Hz in both and independent noise.
-    fn found(size: f64) -> (Place, f64) {
+    fn found(size: f64) -> (Dependence, f64) {
         const ROWS: usize = 12_000;
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
         let mut rows = Rows::of_columns(Vec::new(), ROWS);
@@ -121,7 +115,7 @@ mod tests {
     #[test]
     fn a_resonance_in_both_runs_is_found_at_its_frequency() {
         let (place, p) = found(0.1);
-        println!("{} p = {p}", place.text);
+        println!("{place:?} p = {p}");
         assert!(p < 0.01 && place.interval[0] < 7.0 && place.interval[1] > 7.0);
         assert!(
             place.interval[1] / place.interval[0] < 1.6,

@@ -63,7 +63,7 @@ fn described(robot: &Robot, effect: RobotEffect) -> Robot {
 }
 
 #[test]
-fn what_changed_of_an_effect_is_said_with_both_values() {
+fn what_changed_of_an_effect_is_told_with_both_values() {
     let value = |value: f64, std: f64, unit: &str| Value {
         value,
         std,
@@ -78,11 +78,19 @@ fn what_changed_of_an_effect_is_said_with_both_values() {
         .map(|(name, value)| (name.to_owned(), value))
         .into(),
     };
-    let said = |now: &Now| what_changed(&wave(0.2), now, JointKind::Revolute);
-    assert_eq!(said(&now(9.0, 0.21)), "");
+    let told = |now: &Now| changed_values(&wave(0.2), now, JointKind::Revolute);
+    assert_eq!(told(&now(9.0, 0.21)), []);
+    let parameter = |name, stated, unit: &str| StatedParameter {
+        name,
+        stated,
+        unit: unit.into(),
+    };
     assert_eq!(
-        said(&now(12.0, 0.3)),
-        " Changed: cosine from 0.2000 to 0.3000 N·m, order from 9.000 to 12.00."
+        told(&now(12.0, 0.3)),
+        [
+            (parameter("cosine", 0.2, "N*m"), 0.3),
+            (parameter("order", 9.0, "1"), 12.0)
+        ]
     );
 }
 

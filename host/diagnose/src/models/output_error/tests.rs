@@ -110,7 +110,7 @@ fn values_that_are_off_are_mended_by_the_motion() {
         .unwrap();
     println!("{:#?}", again.told);
     let (standing, _) = again.adopted.unwrap();
-    assert!(again.told.adopted && again.told.text.contains("those values stand."));
+    assert!(again.told.adopted);
     assert!(again.told.torque_rms[1] < again.told.torque_rms[0]);
     let mended = standing.coefficients(&context.anchor);
     for (k, (mended, right)) in mended.iter().zip(&right.solution.values).enumerate() {
