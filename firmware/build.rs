@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The linker's section of the code that `board/accelerated.rs` copies to the CCM SRAM, from the list of its functions.
+/// The linker's section of the code that `board/ccm_code.rs` copies to the CCM SRAM, from the list of its functions.
 fn tick_section(list: &str) -> Result<String, String> {
     let mut text = String::from("SECTIONS\n{\n  .tick : ALIGN(8)\n  {\n    __tick_start = .;\n");
     for (line, number) in list.lines().zip(1..) {

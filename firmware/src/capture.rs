@@ -22,22 +22,22 @@ struct Packed {
 }
 
 /// Steps of the duty from 0 to 1, and the code of 0.
-const DUTY: f32 = 32_767.0;
-const ZERO: f32 = 32_768.0;
+const DUTY_STEPS: f32 = 32_767.0;
+const DUTY_ZERO: f32 = 32_768.0;
 /// Steps of the supply per volt.
-const SUPPLY: f32 = 1024.0;
+const SUPPLY_STEPS: f32 = 1024.0;
 
 /// Rounds to the nearest; values out of range saturate. Via 32 bits, which the chip converts in one instruction.
 #[inline(always)]
-fn packed(x: f32) -> u16 {
+fn quantise(x: f32) -> u16 {
     ((x + 0.5) as u32).min(0xFFFF) as u16
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    Turning,
+    Running,
     /// Ticks still to be kept.
-    Awaited(u16),
+    Triggered(u16),
     Complete,
 }
 
@@ -74,7 +74,7 @@ impl Capture {
             }; CAPTURE_TICKS],
             next: 0,
             filled: 0,
-            phase: Phase::Turning,
+            phase: Phase::Running,
             last: SnapshotSample {
                 tick: 0,
                 position: 0,
@@ -90,12 +90,12 @@ impl Capture {
     pub fn push(&mut self, sample: &SnapshotSample) {
         match &mut self.phase {
             Phase::Complete => return,
-            Phase::Awaited(0) => {
+            Phase::Triggered(0) => {
                 self.phase = Phase::Complete;
                 return;
             }
-            Phase::Awaited(remaining) => *remaining -= 1,
-            Phase::Turning => {}
+            Phase::Triggered(remaining) => *remaining -= 1,
+            Phase::Running => {}
         }
         if let Some(slot) = self.ring.get_mut(self.next) {
             *slot = Packed {
@@ -103,8 +103,8 @@ impl Capture {
                 counts: sample.position as i32,
                 current: sample.current,
                 reference: sample.reference,
-                duty: packed(DUTY * sample.duty + ZERO),
-                supply: packed(SUPPLY * sample.supply),
+                duty: quantise(DUTY_STEPS * sample.duty + DUTY_ZERO),
+                supply: quantise(SUPPLY_STEPS * sample.supply),
             };
         }
         self.last = *sample;
@@ -122,12 +122,12 @@ impl Capture {
             self.next = 0;
             self.filled = 0;
         }
-        self.phase = Phase::Awaited(after.min(CAPTURE_TICKS as u16));
+        self.phase = Phase::Triggered(after.min(CAPTURE_TICKS as u16));
     }
 
     /// Triggers by a fault, unless a capture is being taken or waits to be fetched.
     pub fn trigger_by_fault(&mut self) {
-        if self.phase == Phase::Turning {
+        if self.phase == Phase::Running {
             self.trigger(Self::AFTER_FAULT);
         }
     }
@@ -136,12 +136,12 @@ impl Capture {
     pub fn release(&mut self) {
         self.next = 0;
         self.filled = 0;
-        self.phase = Phase::Turning;
+        self.phase = Phase::Running;
     }
 
     /// Returns true if a trigger has come and more ticks are to follow.
-    pub fn is_awaited(&self) -> bool {
-        matches!(self.phase, Phase::Awaited(_))
+    pub fn is_triggered(&self) -> bool {
+        matches!(self.phase, Phase::Triggered(_))
     }
 
     /// Returns true if the ring has stopped.
@@ -169,11 +169,11 @@ impl Capture {
         } else {
             self.next
         };
-        let place = oldest + index;
-        let packed = self.ring.get(if place < CAPTURE_TICKS {
-            place
+        let slot = oldest + index;
+        let packed = self.ring.get(if slot < CAPTURE_TICKS {
+            slot
         } else {
-            place - CAPTURE_TICKS
+            slot - CAPTURE_TICKS
         })?;
         let age = (self.filled - 1 - index) as u64;
         let back = (self.last.position as i32).wrapping_sub(packed.counts);
@@ -181,8 +181,8 @@ impl Capture {
             tick: self.last.tick.saturating_sub(age),
             position: self.last.position - i64::from(back),
             current: packed.current,
-            duty: (f32::from(packed.duty) - ZERO) / DUTY,
-            supply: f32::from(packed.supply) / SUPPLY,
+            duty: (f32::from(packed.duty) - DUTY_ZERO) / DUTY_STEPS,
+            supply: f32::from(packed.supply) / SUPPLY_STEPS,
             reference: packed.reference,
         })
     }
@@ -210,7 +210,7 @@ mod tests {
             capture.push(&at(tick));
         }
         capture.trigger(100);
-        assert!(capture.is_awaited());
+        assert!(capture.is_triggered());
         for tick in 5000..9000 {
             capture.push(&at(tick));
             capture.trigger_by_fault();
@@ -233,9 +233,9 @@ mod tests {
                 supply,
                 ..at(0)
             });
-            let kept = capture.get(capture.len() - 1).unwrap();
-            assert!((kept.duty - duty).abs() < 0.1 / 4250.0, "{kept:?}");
-            assert!((kept.supply - supply).abs() < 1e-3, "{kept:?}");
+            let stored = capture.get(capture.len() - 1).unwrap();
+            assert!((stored.duty - duty).abs() < 0.1 / 4250.0, "{stored:?}");
+            assert!((stored.supply - supply).abs() < 1e-3, "{stored:?}");
         }
     }
 

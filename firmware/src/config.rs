@@ -133,8 +133,8 @@ impl Config {
     /// Returns the lower and upper current codes at which comparators switch the bridge off: the over-current threshold
     /// of the checks at the highest rated limit.
     pub fn current_thresholds(&self) -> [u16; 2] {
-        let most = self.monitor.current_margin * self.ratings.peak_current;
-        let codes = most / self.scaling.current_per_code.abs();
+        let max_current = self.monitor.current_margin * self.ratings.peak_current;
+        let codes = max_current / self.scaling.current_per_code.abs();
         // Casts saturate at 0. A threshold at the converter's own end does not act, and only the checks remain.
         [-codes, codes].map(|codes| ((self.scaling.current_zero + codes) as u16).min(4095))
     }
@@ -150,11 +150,11 @@ pub const fn wake_ticks(control_hz: u32) -> u32 {
 /// is detected at one and a half times the peak current and the listed bridge bears 6 A. Speed: twice, acceleration:
 /// four times, which the encoder checks still follow. Positions: the range in which an `f32` holds every count exactly.
 pub fn ratings(limits: &Limits<f32>, radians_per_count: f32) -> Limits<f32> {
-    const FARTHEST: f32 = 16_777_216.0;
-    let farthest = FARTHEST * radians_per_count.abs();
+    const EXACT_COUNTS: f32 = 16_777_216.0;
+    let max_position = EXACT_COUNTS * radians_per_count.abs();
     Limits {
-        position_low: -farthest,
-        position_high: farthest,
+        position_low: -max_position,
+        position_high: max_position,
         velocity: 2.0 * limits.velocity,
         acceleration: 4.0 * limits.acceleration,
         torque: 1.25 * limits.torque,

@@ -52,7 +52,7 @@ impl Derived {
             config.encoder.counts_per_motor_turn as f32 * config.drive.gear_ratio;
         let limits = &settings.limits;
         let current = current::Config::design(&config.drive, &settings.gains, period, DUTY_LIMIT);
-        // `usable` refuses bandwidths whose lag exceeds the remembered ticks.
+        // `validation` refuses bandwidths whose lag exceeds the remembered ticks.
         let lag = current.lag * rate;
         let whole = lag as u8;
         Self {

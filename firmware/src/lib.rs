@@ -2,7 +2,7 @@
 //!
 //! One pure function, [`step`](step::step), is the whole control tick. It takes the raw [`Sample`](sample::Sample) of
 //! one trigger and returns the [`Command`](sample::Command) that acts from the next trigger on. A board calls it from
-//! its converter interrupt; the emulated rig and the tests call it in a loop. [`speaker::Speaker`] turns bytes from the
+//! its converter interrupt; the emulated rig and the tests call it in a loop. [`session::Session`] turns bytes from the
 //! host into changes of [`State`](state::State), and the output of a tick into bytes for the host.
 //!
 //! No code here depends on a pin, a clock or a buffer. It never allocates, blocks or panics.
@@ -11,21 +11,21 @@
 
 mod calibration;
 pub mod capture;
-pub mod clerk;
 pub mod config;
 pub mod derived;
-pub mod desk;
-pub mod examined;
+pub mod event;
 pub mod nameplate;
-pub mod note;
+pub mod prechecked_request;
 pub mod reference;
+pub mod report_sender;
 pub mod request;
 pub mod sample;
-pub mod speaker;
+pub mod session;
+pub mod settings_storage;
 pub mod state;
 pub mod step;
-pub mod stored;
-pub mod usable;
+pub mod tick_session;
+pub mod validation;
 pub mod window;
 
 /// Version of the firmware, as the greeting reports it.

@@ -2,9 +2,9 @@
 //!
 //! ```text
 //!  TIM1 ──update──► TIM4 ──► ADC1 ──end of sequence──► interrupt: step, duty ──► TIM1 (board::tick)
-//!                     TIM2 (encoder) ────────────┘  ▲ requests      │ notes
+//!                     TIM2 (encoder) ────────────┘  ▲ requests      │ events
 //!                                                   │               ▼
-//!  LPUART1 ──DMA──► command task: decode, examine ──┘    telemetry task: frames ──DMA──► LPUART1
+//!  LPUART1 ──DMA──► command task: decode, precheck ─┘    telemetry task: frames ──DMA──► LPUART1
 //! ```
 //!
 //! The interrupt and the tasks share only queues without locks and a few atomic words.

@@ -3,26 +3,30 @@
 use micromath::F32Ext;
 use rig_shared::control::{adaptive, current};
 use rig_shared::safety::{Fault, Limits, Mode};
-use rig_shared::trajectory::{Course, Extremes};
+use rig_shared::trajectory::{Extremes, PreparedTrajectory};
 use rig_shared::wire::message::{Refusal, RequestBody};
 
 use crate::config::Config;
-use crate::examined::{Examined, Finding};
+use crate::prechecked_request::{PrecheckedRequest, Prepared};
 use crate::state::{Calibration, Run, State};
 use crate::step::brake;
 
-/// Carries out a request, or refuses it without any change.
+/// Executes a request, or refuses it without any change.
 ///
-/// Requests about the conversation itself (`Hello`, streams, snapshot, capture) belong to the
-/// [`Clerk`](crate::clerk::Clerk) and are accepted here without effect.
+/// Requests about the session itself (`Hello`, streams, snapshot, capture) belong to the
+/// [`TickSession`](crate::tick_session::TickSession) and are accepted here without effect.
 ///
 /// Not inlined because it is rare; the chip's fast memory is for code that runs in every tick.
 ///
 /// # Errors
 /// The [`Refusal`] that is sent to the host.
 #[inline(never)]
-pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Result<(), Refusal> {
-    let body = &examined.request.body;
+pub fn execute(
+    config: &Config,
+    state: &mut State,
+    prechecked: &PrecheckedRequest,
+) -> Result<(), Refusal> {
+    let body = &prechecked.request.body;
     match body {
         RequestBody::Hello
         | RequestBody::KeepAlive
@@ -48,7 +52,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
                 Ok(())
             }
             Mode::Holding | Mode::Stopping => Ok(()),
-            _ => Err(wrong_mode(state)),
+            _ => Err(mode_refusal(state)),
         },
         RequestBody::ClearFault => clear_fault(config, state),
         RequestBody::SetPosition(position) => set_position(state, *position),
@@ -59,25 +63,28 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
             replace(
                 state,
                 body,
-                examined.finding.as_ref().map_err(|refusal| *refusal)?,
+                prechecked.prepared.as_ref().map_err(|refusal| *refusal)?,
             )
         }
     }
 }
 
-/// Replaces settings by examined ones.
-fn replace(state: &mut State, body: &RequestBody, finding: &Finding) -> Result<(), Refusal> {
-    match (body, finding) {
-        (RequestBody::SetTrajectory(trajectory), Finding::Motion(extremes, prepared)) => {
-            fits(extremes, &state.settings.limits, None)?;
-            state.trajectory = Some((Course::new(trajectory.clone(), *prepared), *extremes));
+/// Replaces settings by prechecked ones.
+fn replace(state: &mut State, body: &RequestBody, prepared: &Prepared) -> Result<(), Refusal> {
+    match (body, prepared) {
+        (RequestBody::SetTrajectory(trajectory), Prepared::Trajectory(extremes, prepared)) => {
+            check_limits(extremes, &state.settings.limits, None)?;
+            state.trajectory = Some((
+                PreparedTrajectory::new(trajectory.clone(), *prepared),
+                *extremes,
+            ));
             return Ok(());
         }
-        (RequestBody::SetEffects(_), Finding::Effects(compensation)) => {
+        (RequestBody::SetEffects(_), Prepared::Effects(compensation)) => {
             state.replace_effects(compensation);
             return Ok(());
         }
-        (RequestBody::SetEstimator(settings), Finding::Estimator(estimator)) => {
+        (RequestBody::SetEstimator(settings), Prepared::Estimator(estimator)) => {
             state.settings.estimator = *settings;
             state.replace_estimator(estimator);
         }
@@ -92,7 +99,7 @@ fn replace(state: &mut State, body: &RequestBody, finding: &Finding) -> Result<(
         // The result belongs to another request.
         _ => return Err(Refusal::BadValue),
     }
-    state.stale = true;
+    state.derived_outdated = true;
     Ok(())
 }
 
@@ -105,7 +112,7 @@ fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
 }
 
 /// Returns why the present mode refuses the request: a latched fault has its own refusal.
-fn wrong_mode(state: &State) -> Refusal {
+fn mode_refusal(state: &State) -> Refusal {
     match state.mode {
         Mode::Fault => Refusal::FaultLatched,
         _ => Refusal::WrongMode,
@@ -115,7 +122,7 @@ fn wrong_mode(state: &State) -> Refusal {
 /// Stores the settings, only while the bridge is off and nothing moves.
 fn store(state: &mut State) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
-        return Err(wrong_mode(state));
+        return Err(mode_refusal(state));
     }
     state.storing = true;
     Ok(())
@@ -126,7 +133,7 @@ fn arm(config: &Config, state: &mut State) -> Result<(), Refusal> {
         Mode::Disarmed => {
             state.run = Run {
                 base: state.position,
-                awake: state.tick + u64::from(config.wake_ticks),
+                bridge_ready_tick: state.tick + u64::from(config.wake_ticks),
                 ..Run::default()
             };
             state.current_loop = current::State::default();
@@ -135,20 +142,20 @@ fn arm(config: &Config, state: &mut State) -> Result<(), Refusal> {
             state.mode = Mode::Holding;
             Ok(())
         }
-        _ => Err(wrong_mode(state)),
+        _ => Err(mode_refusal(state)),
     }
 }
 
 fn start(config: &Config, state: &mut State) -> Result<(), Refusal> {
     if state.mode != Mode::Holding {
-        return Err(wrong_mode(state));
+        return Err(mode_refusal(state));
     }
     let (trajectory, extremes) = state.trajectory.as_ref().ok_or(Refusal::NoTrajectory)?;
-    fits(extremes, &state.settings.limits, Some(state.run.base))?;
+    check_limits(extremes, &state.settings.limits, Some(state.run.base))?;
     let rate = u64::from(config.rates.control_hz);
     state.run.length = (trajectory.duration_micros().saturating_mul(rate)).div_ceil(1_000_000);
-    // Waits for a bridge that is not yet awake.
-    state.run.start = state.tick.max(state.run.awake);
+    // Waits for a bridge that is not yet ready.
+    state.run.start = state.tick.max(state.run.bridge_ready_tick);
     state.mode = Mode::Running;
     Ok(())
 }
@@ -156,7 +163,7 @@ fn start(config: &Config, state: &mut State) -> Result<(), Refusal> {
 /// Shifts the origin of the counts so that the link is at `position` now, to the nearest count.
 fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
-        return Err(wrong_mode(state));
+        return Err(mode_refusal(state));
     }
     let counts = position / state.derived.radians_per_count;
     // From 2²³ counts on, x ± ½, which rounding needs, is not an f32.
@@ -168,11 +175,11 @@ fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     state.counts += shift;
     state.position = state.counts as f32 * state.derived.radians_per_count;
     state.reference.position = state.position;
-    state.placed = true;
+    state.position_known = true;
     // Open windows hold counts from the old origin.
     state.telemetry.position += shift * i64::from(state.telemetry.ticks);
     state.estimation.position += shift * i64::from(state.estimation.ticks);
-    state.previous = None;
+    state.previous_window = None;
     if shift != 0 {
         // gc and gs belong to the old angle.
         state.restart_estimator();
@@ -184,7 +191,7 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
     if state.mode != Mode::Fault {
         return Ok(());
     }
-    if state.cause_acting {
+    if state.fault_cause_active {
         return Err(Refusal::CauseActing);
     }
     // An implausible offset is measured again: the cause may have been a motor turned by hand.
@@ -210,11 +217,15 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
 
 /// Checks a trajectory against the limits: speed and acceleration always, position only if the base point is known.
 /// Written so that NaN is refused.
-fn fits(extremes: &Extremes<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
+fn check_limits(
+    extremes: &Extremes<f32>,
+    limits: &Limits<f32>,
+    base: Option<f32>,
+) -> Result<(), Refusal> {
     // Rounding of the peak must not refuse a motion designed to touch its limit.
-    const SLACK: f32 = 1.0 + 1e-6;
-    let moves = extremes.velocity <= limits.velocity * SLACK
-        && extremes.acceleration <= limits.acceleration * SLACK;
+    const TOLERANCE: f32 = 1.0 + 1e-6;
+    let moves = extremes.velocity <= limits.velocity * TOLERANCE
+        && extremes.acceleration <= limits.acceleration * TOLERANCE;
     let stays = base.is_none_or(|base| {
         limits.position_low <= base + extremes.lowest
             && base + extremes.highest <= limits.position_high

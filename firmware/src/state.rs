@@ -6,7 +6,7 @@ use rig_shared::encoder;
 use rig_shared::estimation::{OneLinkEstimator, SettingsFault, one_link};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
-use rig_shared::trajectory::{Course, Extremes, Reference};
+use rig_shared::trajectory::{Extremes, PreparedTrajectory, Reference};
 
 use crate::config::{Config, Settings};
 use crate::derived::Derived;
@@ -24,37 +24,37 @@ pub struct State {
     /// Mode.
     pub mode: Mode,
     /// The loaded trajectory and its extremes.
-    pub trajectory: Option<(Course<f32>, Extremes<f32>)>,
-    /// True while settings are being stored: then only `Disarm` and the conversation are carried out.
+    pub trajectory: Option<(PreparedTrajectory<f32>, Extremes<f32>)>,
+    /// True while settings are being stored: then only `Disarm` and requests about the session are carried out.
     pub storing: bool,
     /// The first fault since the last clearing.
     pub latch: FaultLatch,
     /// The ticks around that fault.
     pub snapshot: Snapshot<SNAPSHOT_TICKS>,
     /// Tick of the last message from the host.
-    pub heard: u64,
+    pub last_contact_tick: u64,
     /// Measured joint position, rad; 0 is the position at power on until the host sets it.
     pub position: f32,
     /// Estimated joint velocity, rad/s.
     pub velocity: f32,
     /// True if the host has set the position of the link since power on.
-    pub placed: bool,
+    pub position_known: bool,
     /// Reference of the last tick.
     pub reference: Reference<f32>,
     /// Limits that acted in the last tick.
     pub limits: LimitSet,
     /// True if the cause of a fault acts now, latched or not.
-    pub cause_acting: bool,
+    pub fault_cause_active: bool,
     /// The on-line estimator.
     pub estimator: OneLinkEstimator<f32>,
     pub(crate) settings: Settings,
     pub(crate) derived: Derived,
     /// The settings have changed since `derived` was computed.
-    pub(crate) stale: bool,
+    pub(crate) derived_outdated: bool,
     /// The effects have changed since `settings` was updated.
-    pub(crate) renewed: bool,
+    pub(crate) effects_changed: bool,
     /// This tick has time for a request.
-    serves: bool,
+    accepts_request: bool,
     /// The effects of the settings, checked.
     pub(crate) compensation: Compensation<f32>,
     pub(crate) effects: compensation::State<f32>,
@@ -63,7 +63,7 @@ pub struct State {
     /// Voltage loss of the bridge according to the effects, V.
     pub(crate) lost_voltage: f32,
     /// Part of this loss compensated in the last tick, V.
-    pub(crate) regained: f32,
+    pub(crate) compensated_voltage: f32,
     /// Correction of the position by the effects in this tick, rad.
     pub(crate) position_error: f32,
     /// Torque ordered in the last tick, N·m.
@@ -71,7 +71,7 @@ pub struct State {
     /// Temperature at the end of the calibration, °C.
     pub(crate) start_temperature: f32,
     /// Temperature rise above that one, K.
-    pub(crate) warming: f32,
+    pub(crate) temperature_rise: f32,
     pub(crate) calibration: Calibration,
     pub(crate) encoder: encoder::State<f32>,
     /// Unwrapped counts at power on.
@@ -84,9 +84,9 @@ pub struct State {
     pub(crate) telemetry: Window,
     pub(crate) estimation: Window,
     /// The estimator's previous window: its regressor belongs to the instant between two.
-    pub(crate) previous: Option<Window>,
+    pub(crate) previous_window: Option<Window>,
     /// The estimator must restart.
-    pub(crate) forget: bool,
+    pub(crate) restart_due: bool,
     pub(crate) updates_since_report: u16,
     /// The estimate must be reported with the next tick.
     pub(crate) report_due: bool,
@@ -103,7 +103,7 @@ pub(crate) struct Run {
     /// Ticks that it takes.
     pub(crate) length: u64,
     /// Tick from which the bridge, just enabled, follows commands.
-    pub(crate) awake: u64,
+    pub(crate) bridge_ready_tick: u64,
     /// Base position of trajectory or hold, rad.
     pub(crate) base: f32,
     /// The stop in progress.
@@ -144,12 +144,16 @@ impl State {
     /// The fault of the estimator's settings.
     pub fn new(config: &Config, settings: Settings) -> Result<Self, SettingsFault> {
         let estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
-        Ok(Self::with(config, settings, estimator))
+        Ok(Self::with_estimator(config, settings, estimator))
     }
 
     /// Returns the state at power on with an estimator of these settings. Separate from [`State::new`] so that it can
     /// be built in place: it is too large to be passed on a chip's stack.
-    pub fn with(config: &Config, settings: Settings, estimator: OneLinkEstimator<f32>) -> Self {
+    pub fn with_estimator(
+        config: &Config,
+        settings: Settings,
+        estimator: OneLinkEstimator<f32>,
+    ) -> Self {
         let derived = Derived::new(config, &settings);
         // The firmware's own settings have no effects; stored settings were checked when they were read.
         let compensation = Compensation::new(&settings.effects).unwrap_or_default();
@@ -160,28 +164,28 @@ impl State {
             storing: false,
             latch: FaultLatch::default(),
             snapshot: Snapshot::default(),
-            heard: 0,
+            last_contact_tick: 0,
             position: 0.0,
             velocity: 0.0,
-            placed: false,
+            position_known: false,
             reference: Reference::default(),
             limits: LimitSet::default(),
-            cause_acting: false,
+            fault_cause_active: false,
             estimator,
             settings,
             compensation,
             effects: compensation::State::default(),
             current_error: compensation.current_error(derived.torque_per_ampere),
             lost_voltage: compensation.lost_voltage(),
-            regained: 0.0,
+            compensated_voltage: 0.0,
             position_error: 0.0,
             drive_torque: 0.0,
             start_temperature: 0.0,
-            warming: 0.0,
+            temperature_rise: 0.0,
             derived,
-            stale: false,
-            renewed: false,
-            serves: false,
+            derived_outdated: false,
+            effects_changed: false,
+            accepts_request: false,
             calibration: Calibration {
                 zero_code: config.scaling.current_zero,
                 ..Calibration::default()
@@ -194,8 +198,8 @@ impl State {
             current_loop: current::State::default(),
             telemetry: Window::default(),
             estimation: Window::default(),
-            previous: None,
-            forget: false,
+            previous_window: None,
+            restart_due: false,
             updates_since_report: 0,
             report_due: false,
             duty: 0.0,
@@ -210,7 +214,7 @@ impl State {
 
     /// Continues with the heat of the winding ([`State::heat`]); an invalid number counts as zero. The overload state
     /// is unknown, so an overload is assumed until the winding is cool.
-    pub fn warm_up(&mut self, heat: f32) {
+    pub fn restore_heat(&mut self, heat: f32) {
         self.monitor.heat = if heat > 0.0 { heat } else { 0.0 };
         self.monitor.overloaded = true;
     }
@@ -236,38 +240,38 @@ impl State {
     /// Applies changed settings or effects in a tick that has time, and decides if a request may be served in this
     /// tick.
     #[inline(always)]
-    pub(crate) fn follow(&mut self, config: &Config) {
-        self.serves = false;
+    pub(crate) fn apply_changes(&mut self, config: &Config) {
+        self.accepts_request = false;
         if !self.is_idle(config) {
             return;
         }
-        if self.stale {
-            self.stale = false;
+        if self.derived_outdated {
+            self.derived_outdated = false;
             self.derived = Derived::new(config, &self.settings);
-        } else if self.renewed {
-            self.renewed = false;
-            self.renew();
+        } else if self.effects_changed {
+            self.effects_changed = false;
+            self.apply_effects();
         } else {
-            self.serves = true;
+            self.accepts_request = true;
         }
     }
 
     /// Returns true if the finished tick also has time for a request. It is false while changes of the last request are
     /// pending, so each request is in force before the next is served.
-    pub fn has_time(&self) -> bool {
-        self.serves
+    pub fn accepts_request(&self) -> bool {
+        self.accepts_request
     }
 
     /// Replaces the effects and restarts the estimator: its old estimate includes torque that the effects now explain.
     pub(crate) fn replace_effects(&mut self, compensation: &Compensation<f32>) {
         self.compensation = *compensation;
-        self.renewed = true;
+        self.effects_changed = true;
         self.restart_estimator();
     }
 
     /// Updates values after the effects were replaced. Not inlined: rare code must not use the tick's fast memory.
     #[inline(never)]
-    fn renew(&mut self) {
+    fn apply_effects(&mut self) {
         self.settings.effects = self.compensation.effects();
         self.effects = compensation::State::default();
         self.current_error = self
@@ -280,7 +284,7 @@ impl State {
     ///
     /// It restarts in a later tick, because the tick that serves a request has a high load.
     pub(crate) fn restart_estimator(&mut self) {
-        self.forget = true;
+        self.restart_due = true;
     }
 
     /// Replaces the estimator's constants. It restarts later, as with [`State::restart_estimator`].

@@ -1,7 +1,7 @@
 //! The control tick: one function for board, emulated rig and tests.
 
 mod compensate;
-mod learning;
+mod estimation;
 
 use rig_shared::control::{Measured, current, law};
 use rig_shared::encoder;
@@ -38,37 +38,37 @@ pub struct Output {
 /// Not inlined: `firmware/fast_code.list` names it.
 #[inline(never)]
 pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
-    state.follow(config);
-    let readings = read(config, state, sample);
+    state.apply_changes(config);
+    let readings = convert(config, state, sample);
     let mut output = Output::default();
-    let found = monitor::step(
+    let fault = monitor::step(
         &config.monitor,
         &state.settings.limits,
         &mut state.monitor,
         &readings,
     )
     .or_else(|| board_fault(&sample));
-    state.cause_acting = found.is_some();
-    let found = found
+    state.fault_cause_active = fault.is_some();
+    let fault = fault
         .or_else(|| {
             let calibrating = state.mode == Mode::Calibrating;
             calibrating.then(|| calibrate(config, state, sample.current, readings.temperature))?
         })
-        .or_else(|| listen(config, state));
-    if let Some((fault, value)) = found {
-        output.fault = fall(state, fault, value);
+        .or_else(|| check_host(config, state));
+    if let Some((fault, value)) = fault {
+        output.fault = latch_fault(state, fault, value);
     }
 
     let mut limits = LimitSet::default();
     state.reference = reference(config, state, &mut limits);
-    let Driven {
+    let DriveOutput {
         duty,
         torque,
         explained,
-    } = if state.mode.drives() && state.tick >= state.run.awake {
+    } = if state.mode.drives() && state.tick >= state.run.bridge_ready_tick {
         drive(config, state, &readings, &mut limits)
     } else {
-        Driven::default()
+        DriveOutput::default()
     };
     state.drive_torque = torque;
     state.limits = limits;
@@ -94,7 +94,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     };
     state.snapshot.push(output.tick);
     output.state = telemetry(config, state, &tick);
-    output.estimate = learning::estimate(config, state, &tick);
+    output.estimate = estimation::feed_estimator(config, state, &tick);
     output.command = Command {
         duty: Duty(duty),
         bridge: state.mode.drives(),
@@ -105,7 +105,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
 }
 
 /// Converts raw codes to quantities. Units begin only here.
-fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
+fn convert(config: &Config, state: &mut State, sample: Sample) -> Readings {
     let scaling = &config.scaling;
     let age = sample
         .edge_age
@@ -129,7 +129,7 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     compensate::correct(config, state);
     let temperature = scaling.temperature_at_zero
         + f32::from(sample.temperature.0) * scaling.temperature_per_code;
-    state.warming = temperature - state.start_temperature;
+    state.temperature_rise = temperature - state.start_temperature;
     // The checks use the sensor readings, the laws the corrected values.
     Readings {
         driver_fault: sample.driver_fault,
@@ -146,8 +146,8 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
         position,
         velocity,
         duty: state.duty,
-        lost_voltage: state.regained,
-        driving: state.mode.drives() && state.tick > state.run.awake,
+        lost_voltage: state.compensated_voltage,
+        driving: state.mode.drives() && state.tick > state.run.bridge_ready_tick,
     }
 }
 
@@ -160,21 +160,21 @@ fn board_fault(sample: &Sample) -> Option<(Fault, f32)> {
 }
 
 /// Handles a silent host: first a controlled stop, then the fault.
-fn listen(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
+fn check_host(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
     if !state.mode.drives() {
         return None;
     }
-    let silent = state.tick.saturating_sub(state.heard);
-    let patience = u64::from(config.host_silent_ticks);
-    if silent > patience && state.mode == Mode::Running {
+    let silent = state.tick.saturating_sub(state.last_contact_tick);
+    let silent_limit = u64::from(config.host_silent_ticks);
+    if silent > silent_limit && state.mode == Mode::Running {
         brake(state);
     }
-    (silent > patience + u64::from(config.host_lost_ticks))
+    (silent > silent_limit + u64::from(config.host_lost_ticks))
         .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
 }
 
 /// Switches the bridge off, latches the fault and keeps the snapshot.
-fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
+fn latch_fault(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
     let record = FaultRecord {
         fault,
         tick: state.tick,
@@ -186,7 +186,7 @@ fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
         Fault::EncoderJump | Fault::EncoderLost | Fault::EncoderSignal
     ) {
         // After this fault the encoder no longer gives the position of the link.
-        state.placed = false;
+        state.position_known = false;
     }
     let first = state.latch.latch(record);
     if first {
@@ -209,13 +209,13 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
         base,
         ..
     } = state.run;
-    let standing = |position| Reference {
+    let at_rest = |position| Reference {
         position,
         ..Reference::default()
     };
-    let wish = match state.mode {
-        Mode::Calibrating | Mode::Disarmed | Mode::Fault => return standing(state.position),
-        Mode::Holding => standing(base),
+    let desired = match state.mode {
+        Mode::Calibrating | Mode::Disarmed | Mode::Fault => return at_rest(state.position),
+        Mode::Holding => at_rest(base),
         Mode::Running => {
             let elapsed = state.tick.saturating_sub(start);
             match &state.trajectory {
@@ -229,7 +229,7 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
                 _ => {
                     state.run.base = state.reference.position;
                     state.mode = Mode::Holding;
-                    standing(state.reference.position)
+                    at_rest(state.reference.position)
                 }
             }
         }
@@ -245,22 +245,23 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
             next
         }
     };
-    let silent = state.tick.saturating_sub(state.heard) > u64::from(config.host_silent_ticks);
+    let silent =
+        state.tick.saturating_sub(state.last_contact_tick) > u64::from(config.host_silent_ticks);
     limits.set(Limit::HostSilent, silent);
-    within_range(&state.settings.limits, wish, limits)
+    within_range(&state.settings.limits, desired, limits)
 }
 
 /// Holds a reference at the edge of the position range.
 fn within_range(
     range: &rig_shared::safety::Limits<f32>,
-    wish: Reference<f32>,
+    desired: Reference<f32>,
     limits: &mut LimitSet,
 ) -> Reference<f32> {
-    let position = wish
+    let position = desired
         .position
         .max(range.position_low)
         .min(range.position_high);
-    let outside = position != wish.position;
+    let outside = position != desired.position;
     limits.set(Limit::Position, outside);
     if outside {
         Reference {
@@ -268,13 +269,13 @@ fn within_range(
             ..Reference::default()
         }
     } else {
-        wish
+        desired
     }
 }
 
 /// Result of driving in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Driven {
+struct DriveOutput {
     duty: f32,
     /// Commanded joint torque, N·m.
     torque: f32,
@@ -283,7 +284,7 @@ struct Driven {
 }
 
 /// Computes effects and position law, then the current loop.
-fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitSet) -> Driven {
+fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitSet) -> DriveOutput {
     let measured = Measured {
         position: state.position,
         velocity: state.velocity,
@@ -294,30 +295,30 @@ fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitS
         &mut state.law,
         measured,
         state.reference,
-        effects.feed,
+        effects.feedforward,
     );
     limits.set(Limit::Torque, torque.limited);
-    let wish = config.drive.current(torque.value);
+    let desired = config.drive.current(torque.value);
     let peak = state.settings.limits.peak_current;
-    let wanted = wish.max(-peak).min(peak);
-    limits.set(Limit::Current, wanted != wish);
-    // The direction is that of the expected current, not of the noisy or the wanted one. It fades where the ripple
+    let target = desired.max(-peak).min(peak);
+    limits.set(Limit::Current, target != desired);
+    // The direction is that of the expected current, not of the noisy or the target current. It fades where the ripple
     // crosses zero.
-    let expected = current::expect(&state.derived.current, &mut state.current_loop, wanted);
+    let expected = current::predict(&state.derived.current, &mut state.current_loop, target);
     let fade = (expected * state.derived.fade_per_ampere).clamp(-1.0, 1.0);
-    state.regained = state.lost_voltage * fade;
+    state.compensated_voltage = state.lost_voltage * fade;
     let output = current::step(
         &state.derived.current,
         &mut state.current_loop,
         current::Input {
-            reference: wanted,
+            reference: target,
             current: now.current - state.current_error,
-            back_emf: config.drive.back_emf(state.velocity) + state.regained,
+            back_emf: config.drive.back_emf(state.velocity) + state.compensated_voltage,
             supply: now.supply,
         },
     );
     limits.set(Limit::Voltage, output.limited);
-    Driven {
+    DriveOutput {
         duty: output.duty,
         torque: torque.value,
         explained: effects.explained,
@@ -347,9 +348,9 @@ fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, St
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::examined::examine;
     use crate::nameplate::one_link;
-    use crate::request::carry_out;
+    use crate::prechecked_request::precheck;
+    use crate::request::execute;
     use rig_shared::effects::{Effect, Kind};
     use rig_shared::units::AdcCode;
     use rig_shared::wire::message::{Request, RequestBody};
@@ -382,19 +383,19 @@ mod tests {
             RequestBody::Arm,
         ] {
             let request = Request { id: 1, body };
-            carry_out(&config, &mut state, &examine(&config, request)).unwrap();
+            execute(&config, &mut state, &precheck(&config, request)).unwrap();
             for _ in 0..20 {
                 step(&config, &mut state, sample(0.0));
             }
         }
         assert!((state.current_error - 0.4).abs() < 1e-6 && state.mode == Mode::Holding);
-        let mut found = None;
+        let mut fault = None;
         for _ in 0..3 {
             let output = step(&config, &mut state, sample(5.0));
             assert!((output.tick.current - 5.0).abs() < 0.01);
-            found = found.or(output.fault);
+            fault = fault.or(output.fault);
         }
-        assert_eq!(found.map(|record| record.fault), Some(Fault::OverCurrent));
+        assert_eq!(fault.map(|record| record.fault), Some(Fault::OverCurrent));
     }
 
     /// New effects start from zero: the state of a cogging in N·m is never used as radians of an encoder's error, in
@@ -402,9 +403,9 @@ mod tests {
     #[test]
     fn effects_that_are_replaced_leave_nothing_behind() {
         let (config, settings) = one_link();
-        let ask = |state: &mut State, body| {
+        let send = |state: &mut State, body| {
             let request = Request { id: 1, body };
-            carry_out(&config, state, &examine(&config, request)).unwrap();
+            execute(&config, state, &precheck(&config, request)).unwrap();
         };
         let set = |effect| RequestBody::SetEffects([effect].into_iter().collect());
         let sample = Sample {
@@ -418,17 +419,17 @@ mod tests {
             while state.mode == Mode::Calibrating {
                 step(&config, &mut state, sample);
             }
-            ask(&mut state, RequestBody::SetPosition(0.2));
-            ask(
+            send(&mut state, RequestBody::SetPosition(0.2));
+            send(
                 &mut state,
                 set(Effect::new(Kind::Cogging, &[0.3, 0.2], &[12.0])),
             );
-            ask(&mut state, RequestBody::Arm);
+            send(&mut state, RequestBody::Arm);
             for _ in 0..40 + phase {
                 step(&config, &mut state, sample);
             }
             let small = Effect::new(Kind::EncoderEccentricityMotor, &[1e-5, 1e-5], &[1.0]);
-            ask(&mut state, set(small));
+            send(&mut state, set(small));
             for _ in 0..40 {
                 step(&config, &mut state, sample);
                 assert!(

@@ -12,10 +12,11 @@
 //! * **Effects that also exist at rest** (cogging, eccentricity, springs, tilt) are given in full at the measured
 //!   position. Such an effect is a known torque like gravity, and its only error comes from the position error. Its
 //!   speed is the reference's, for the reason above. Effects that are periodic in the motor's angle are updated at
-//!   every tick, for the angle at which the torque will act ([`Now::lead`]).
+//!   every tick, for the angle at which the torque will act ([`Inputs::torque_delay`]).
 //! * **Presliding friction** builds up over the reference's travel, as dry friction does at once. With the measured
 //!   travel it would close a loop of positive sign. Friction through the same contact builds up with it. A tick
-//!   has no time for the extra deflection of the contact ([`Instant::beside`](crate::effects::Instant::beside)).
+//!   has no time for the extra deflection of the contact
+//!   ([`Instant::extra_friction_ratio`](crate::effects::Instant::extra_friction_ratio)).
 //! * **An eccentric encoder** is corrected in the measured position, and its slope in the velocity. **A constant
 //!   current error** is subtracted from the measured current.
 //! * **A voltage loss of the bridge** is added to the current loop's voltage, in the direction of the coming current.
@@ -30,40 +31,40 @@
 //! Leaves out: the attenuation of fast torques by the current loop; effects that name another joint.
 
 mod compensated;
+mod effect_fault;
+mod inputs;
 mod list;
-mod now;
-mod refusal;
 mod role;
 mod wave;
 
+pub use effect_fault::EffectFault;
+pub use inputs::Inputs;
 pub use list::{EFFECTS, Effects};
-pub use now::Now;
-pub use refusal::EffectFault;
 pub use role::Role;
 
 use crate::effects::{Instant, Kind, Memory};
 use crate::precompensation::{PrecompensationSettings, finite, share};
 use crate::scalar::{Real, Scalar};
 use compensated::{Compensated, evaluate};
-use wave::{Stand, Waves};
+use wave::{WaveState, Waves};
 
-/// Number of ticks for which the given periodic torques are stored. [`Now::lead_ticks`] is at most this less 2.
-pub const GIVEN: usize = 64;
+/// Number of ticks for which the given periodic torques are stored. [`Inputs::delay_ticks`] is at most this less 2.
+pub const HISTORY_TICKS: usize = 64;
 // A slot is the tick number modulo the number of slots, and the tick number wraps at 256.
-const _: () = assert!(GIVEN.is_power_of_two() && GIVEN <= 256);
+const _: () = assert!(HISTORY_TICKS.is_power_of_two() && HISTORY_TICKS <= 256);
 
 /// Result of the compensation in a control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output<T> {
     /// Torque to add to the control law's, N·m.
-    pub feed: T,
+    pub feedforward: T,
     /// Drive torque that the effects explain at the measured motion, N·m. An estimator must not see it.
     pub explained: T,
 }
 
 /// Errors of the measured position due to effects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reading<T> {
+pub struct PositionError<T> {
     /// Error of the position, rad: reading minus true value.
     pub error: T,
     /// Error of the velocity, as a share of it.
@@ -75,7 +76,7 @@ pub struct Reading<T> {
 pub struct State<T: Real> {
     /// Hidden states of each law: for the planned motion, and for the measured motion.
     memories: [[Memory<T>; 2]; EFFECTS],
-    stand: Stand<T>,
+    wave_state: WaveState<T>,
     /// Value of each law at the planned motion: dry laws from the front, standing laws from the end.
     planned: [T; EFFECTS],
     /// Value of each dry law at the measured motion.
@@ -84,36 +85,36 @@ pub struct State<T: Real> {
     /// recomputed once a round, so that rounding errors do not accumulate.
     sums: [T; 3],
     turn: u8,
-    given: Given<T>,
+    history: TorqueHistory<T>,
 }
 
 /// Periodic torques given in the last ticks. They are given ahead, and explained when the motor gets there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Given<T> {
-    torques: [T; GIVEN],
+struct TorqueHistory<T> {
+    torques: [T; HISTORY_TICKS],
     next: u8,
 }
 
-impl<T: Real> Default for Given<T> {
+impl<T: Real> Default for TorqueHistory<T> {
     fn default() -> Self {
         Self {
-            torques: [T::ZERO; GIVEN],
+            torques: [T::ZERO; HISTORY_TICKS],
             next: 0,
         }
     }
 }
 
-impl<T: Real> Given<T> {
+impl<T: Real> TorqueHistory<T> {
     /// Stores the torque given now. Returns the torque given `ticks` + `share` ticks ago, interpolated.
     #[inline(always)]
-    fn put(&mut self, torque: T, ticks: u8, share: T) -> T {
-        const LAST: usize = GIVEN - 1;
+    fn push(&mut self, torque: T, ticks: u8, share: T) -> T {
+        const LAST: usize = HISTORY_TICKS - 1;
         let next = usize::from(self.next);
         self.torques[next & LAST] = torque;
         self.next = self.next.wrapping_add(1);
         let at = |ago: usize| self.torques[next.wrapping_sub(ago) & LAST];
-        let (later, earlier) = (at(usize::from(ticks)), at(usize::from(ticks) + 1));
-        later + share * (earlier - later)
+        let (future_motor_angle, earlier) = (at(usize::from(ticks)), at(usize::from(ticks) + 1));
+        future_motor_angle + share * (earlier - future_motor_angle)
     }
 }
 
@@ -125,14 +126,14 @@ impl<T: Real> State<T> {
         self.sums = [T::ZERO; 3];
         self.memories = [[Memory::default(); 2]; EFFECTS];
         self.turn = 0;
-        self.given = Given::default();
+        self.history = TorqueHistory::default();
     }
 
     /// Discards the periodic state, because the position is unknown. Not inlined: it is seldom called.
     #[cold]
     #[inline(never)]
     fn forget(&mut self) {
-        self.stand = Stand::default();
+        self.wave_state = WaveState::default();
     }
 }
 
@@ -169,8 +170,8 @@ pub struct Compensation<T> {
     jobs: [Job; 2 * EFFECTS],
     count: u8,
     /// Number of dry and of standing effects.
-    dry: u8,
-    standing: u8,
+    dry_count: u8,
+    static_count: u8,
     /// Number of standing effects on the link (they come first); 0 if no effect depends on the transmitted torque.
     on_link: u8,
     /// Number of evaluated ticks between two turns of a law.
@@ -200,12 +201,12 @@ impl<T: Scalar> Compensation<T> {
         for on_link in [true, false] {
             for (k, one) in all.effects.into_iter().enumerate() {
                 let Some(one) = one else { continue };
-                if one.effect.kind.on_the_link() == on_link {
+                if one.effect.kind.acts_on_link() == on_link {
                     all.place(k, &one, contact);
                 }
             }
             if on_link && all.needs_load {
-                all.on_link = all.standing;
+                all.on_link = all.static_count;
             }
         }
         all.waves = Waves::new(&all.effects);
@@ -222,16 +223,16 @@ impl<T: Scalar> Compensation<T> {
             contact: contact.filter(|_| kind.acts_through_contact()),
         };
         match one.role {
-            Role::Dry => {
-                self.add(job(self.dry, false));
-                self.add(job(self.dry, true));
-                self.dry += 1;
+            Role::DryFriction => {
+                self.add(job(self.dry_count, false));
+                self.add(job(self.dry_count, true));
+                self.dry_count += 1;
             }
-            Role::Standing if kind.periodic().is_none() => {
-                self.standing += 1;
-                self.add(job(EFFECTS as u8 - self.standing, false));
+            Role::StaticTorque if kind.periodic().is_none() => {
+                self.static_count += 1;
+                self.add(job(EFFECTS as u8 - self.static_count, false));
             }
-            Role::Standing | Role::Position | Role::Current | Role::Voltage => {}
+            Role::StaticTorque | Role::Position | Role::Current | Role::Voltage => {}
         }
     }
 
@@ -251,12 +252,12 @@ impl<T: Scalar> Compensation<T> {
     /// Returns true if any effect gives a torque.
     #[inline(always)]
     pub fn has_torque(&self) -> bool {
-        self.count > 0 || self.waves.of_torque()
+        self.count > 0 || self.waves.has_torque_waves()
     }
 
     /// Returns true if any effect is periodic and must get the angle at every tick.
     #[inline(always)]
-    pub fn turns(&self) -> bool {
+    pub fn has_waves(&self) -> bool {
         self.waves.any()
     }
 
@@ -300,21 +301,21 @@ impl<T: Scalar> Compensation<T> {
     /// Moves periodic effects to the current angle. Returns the encoder's error there, evaluated at the reading
     /// instead of the true position; this is wrong by the square of the error.
     #[inline(always)]
-    pub fn turn(&self, state: &mut State<T>, now: &Now<T>) -> Reading<T> {
-        if !now.placed {
+    pub fn turn(&self, state: &mut State<T>, inputs: &Inputs<T>) -> PositionError<T> {
+        if !inputs.position_known {
             state.forget();
-            return Reading::default();
+            return PositionError::default();
         }
-        if now.turns {
-            self.waves.turn(&mut state.stand, now);
+        if inputs.rotates_waves {
+            self.waves.turn(&mut state.wave_state, inputs);
         }
-        if !self.waves.of_position() {
-            return Reading::default();
+        if !self.waves.has_position_waves() {
+            return PositionError::default();
         }
-        let [motor, joint] = self.waves.position(&state.stand, now);
-        Reading {
+        let [motor, joint] = self.waves.position(&state.wave_state, inputs);
+        PositionError {
             error: motor.value + joint.value,
-            slope: motor.slope * now.gear_ratio + joint.slope,
+            slope: motor.slope * inputs.gear_ratio + joint.slope,
         }
     }
 
@@ -327,31 +328,34 @@ impl<T: Scalar> Compensation<T> {
         &self,
         settings: &PrecompensationSettings<T>,
         state: &mut State<T>,
-        now: &Now<T>,
+        inputs: &Inputs<T>,
     ) -> Output<T> {
-        if !now.busy {
-            self.evaluate_next(settings, state, now);
+        if !inputs.busy {
+            self.evaluate_next(settings, state, inputs);
         }
-        let [dry, standing, sliding] = state.sums;
-        let share = if settings.enabled && self.dry > 0 {
+        let [dry, static_torque, sliding] = state.sums;
+        let share = if settings.enabled && self.dry_count > 0 {
             share(
                 settings,
-                finite(now.reference.velocity),
-                finite(now.velocity),
+                finite(inputs.reference.velocity),
+                finite(inputs.velocity),
             )
         } else {
             T::ZERO
         };
         let mut output = Output {
-            feed: share * dry + standing,
-            explained: sliding + standing,
+            feedforward: share * dry + static_torque,
+            explained: sliding + static_torque,
         };
-        if self.waves.of_torque() {
-            let [torque, of_drive] = self.waves.torque(&state.stand, now);
-            let drive = finite(now.drive_torque);
-            let given = torque.value + drive * of_drive.value;
-            output.feed += given;
-            output.explained += state.given.put(given, now.lead_ticks, now.lead_share);
+        if self.waves.has_torque_waves() {
+            let [torque, per_drive_torque] = self.waves.torque(&state.wave_state, inputs);
+            let drive = finite(inputs.drive_torque);
+            let periodic = torque.value + drive * per_drive_torque.value;
+            output.feedforward += periodic;
+            output.explained +=
+                state
+                    .history
+                    .push(periodic, inputs.delay_ticks, inputs.delay_fraction);
         }
         output
     }
@@ -359,22 +363,22 @@ impl<T: Scalar> Compensation<T> {
     /// Recomputes the sums.
     #[inline(never)]
     fn add_up(&self, state: &mut State<T>) {
-        let dry = usize::from(self.dry);
+        let dry = usize::from(self.dry_count);
         state.sums = [
             total(state.planned.get(..dry).unwrap_or_default()),
-            total(last(&state.planned, self.standing)),
+            total(last(&state.planned, self.static_count)),
             total(state.sliding.get(..dry).unwrap_or_default()),
         ];
     }
 
     /// Returns the deflection of the contact through which a law acts; none if it acts through no contact.
     #[inline(always)]
-    fn bent(&self, state: &State<T>, job: &Job) -> Option<T> {
+    fn contact_deflection(&self, state: &State<T>, job: &Job) -> Option<T> {
         let contact = usize::from(job.contact?);
         let [planned, sliding] = state.memories.get(contact)?;
         let one = self.effects.get(contact)?.as_ref()?;
         let memory = if job.sliding { sliding } else { planned };
-        Some(one.effect.bent(memory, T::ZERO))
+        Some(one.effect.contact_deflection(memory, T::ZERO))
     }
 
     #[inline(always)]
@@ -382,7 +386,7 @@ impl<T: Scalar> Compensation<T> {
         &self,
         settings: &PrecompensationSettings<T>,
         state: &mut State<T>,
-        now: &Now<T>,
+        inputs: &Inputs<T>,
     ) {
         if self.count == 0 {
             return;
@@ -396,46 +400,52 @@ impl<T: Scalar> Compensation<T> {
             0
         };
         let k = usize::from(job.effect);
-        let bent = self.bent(state, job);
+        let contact_deflection = self.contact_deflection(state, job);
         let (Some(Some(one)), Some([planned, sliding])) =
             (self.effects.get(k), state.memories.get_mut(k))
         else {
             return;
         };
-        let (wanted, measured) = (finite(now.reference.velocity), finite(now.velocity));
-        let mut instant = now.instant(one.whole);
+        let (planned_velocity, measured_velocity) =
+            (finite(inputs.reference.velocity), finite(inputs.velocity));
+        let mut instant = inputs.instant(one.whole);
         if self.on_link > 0 {
             instant.load += total(last(&state.planned, self.on_link));
         }
-        instant.period = now.period * self.round;
+        instant.period = inputs.period * self.round;
         // To the middle of the time for which the value is held.
-        let way = T::from_f64(0.5) * (instant.period - now.period) * measured;
-        instant.position += way;
-        instant.motor_angle += way * now.gear_ratio;
+        let travel = T::from_f64(0.5) * (instant.period - inputs.period) * measured_velocity;
+        instant.position += travel;
+        instant.motor_angle += travel * inputs.gear_ratio;
         let (place, memory) = if job.sliding {
-            instant.velocity = measured;
-            instant.direction = measured.sgn();
+            instant.velocity = measured_velocity;
+            instant.direction = measured_velocity.sgn();
             (&mut state.sliding, sliding)
         } else {
-            one.plan(&mut instant, settings.velocity_threshold, wanted, measured);
+            one.plan(
+                &mut instant,
+                settings.velocity_threshold,
+                planned_velocity,
+                measured_velocity,
+            );
             (&mut state.planned, planned)
         };
         // Dry friction gives no torque where the direction is 0, for any hidden state.
-        let rests = one.role == Role::Dry && instant.direction.abs().le(T::ZERO);
-        if let Some(bent) = bent {
-            instant.direction = bent;
+        let at_rest = one.role == Role::DryFriction && instant.direction.abs().le(T::ZERO);
+        if let Some(contact_deflection) = contact_deflection {
+            instant.direction = contact_deflection;
         }
-        instant.friction = now.friction(instant.velocity, instant.direction);
-        let nowhere = one.role == Role::Standing && !now.placed;
-        let torque = if nowhere {
+        instant.friction = inputs.friction(instant.velocity, instant.direction);
+        let position_unknown = one.role == Role::StaticTorque && !inputs.position_known;
+        let torque = if position_unknown {
             T::ZERO
         } else {
             evaluate(&one.effect, memory, &instant)
         };
-        let torque = if rests { T::ZERO } else { torque };
+        let torque = if at_rest { T::ZERO } else { torque };
         let sum = match (one.role, job.sliding) {
             (_, true) => 2,
-            (Role::Standing, _) => 1,
+            (Role::StaticTorque, _) => 1,
             _ => 0,
         };
         if let Some(place) = place.get_mut(usize::from(job.place)) {

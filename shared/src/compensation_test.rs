@@ -53,17 +53,17 @@ fn typical(kind: Kind) -> Effect<f64> {
     }
 }
 
-fn at(reference: f64, measured: f64) -> Now<f64> {
-    Now {
+fn at(reference: f64, measured: f64) -> Inputs<f64> {
+    Inputs {
         reference: Reference {
             velocity: reference,
             ..Reference::default()
         },
         velocity: measured,
-        placed: true,
-        turns: true,
+        position_known: true,
+        rotates_waves: true,
         period: 1e-4,
-        ..Now::default()
+        ..Inputs::default()
     }
 }
 
@@ -71,25 +71,25 @@ fn at(reference: f64, measured: f64) -> Now<f64> {
 fn settled<T: Scalar>(
     effects: &Effects<T>,
     settings: &PrecompensationSettings<T>,
-    now: &Now<T>,
+    inputs: &Inputs<T>,
 ) -> Output<T> {
     let compensation = Compensation::new(effects).unwrap();
     let mut state = State::default();
     let mut output = Output::default();
     // With a period of 0, presliding travels no distance.
-    let now = Now {
+    let inputs = Inputs {
         period: T::ZERO,
-        ..*now
+        ..*inputs
     };
     for _ in 0..2 * EFFECTS {
-        compensation.turn(&mut state, &now);
-        output = compensation.torque(settings, &mut state, &now);
+        compensation.turn(&mut state, &inputs);
+        output = compensation.torque(settings, &mut state, &inputs);
     }
     output
 }
 
-fn torque(effects: &Effects<f64>, now: &Now<f64>) -> Output<f64> {
-    settled(effects, &SETTINGS, now)
+fn torque(effects: &Effects<f64>, inputs: &Inputs<f64>) -> Output<f64> {
+    settled(effects, &SETTINGS, inputs)
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn stribeck_as_an_effect_is_stribeck_in_the_friction_law() {
         for k in -100..=100 {
             let measured = f64::from(k) * 5e-3;
             let by_law = precompensation::torque(&SETTINGS, &law, reference, measured, 0.0);
-            let by_effect = torque(&effects, &at(reference, measured)).feed;
+            let by_effect = torque(&effects, &at(reference, measured)).feedforward;
             assert!(
                 (by_law - by_effect).abs() < 1e-12,
                 "{reference} {measured}: {by_law} {by_effect}"
@@ -124,73 +124,82 @@ fn what_is_explained_is_the_whole_law_at_the_measured_motion() {
         ..SETTINGS
     };
     let silent = settled(&effects, &off, &at(0.3, -0.06));
-    assert_eq!((silent.feed, silent.explained), (0.0, output.explained));
+    assert_eq!(
+        (silent.feedforward, silent.explained),
+        (0.0, output.explained)
+    );
 }
 
 #[test]
 fn cogging_is_given_in_full_at_rest_and_only_where_the_link_stands() {
     let effects = only(cogging(0.2, -0.1, 24.0));
     for angle in [0.0, 0.013, 1.0, 6.0] {
-        let mut now = Now {
+        let mut inputs = Inputs {
             motor_angle: angle,
             angle_in_turn: angle,
             ..at(0.0, 0.0)
         };
         let (s, c) = libm::sincos(24.0 * angle);
         let wanted = 0.2 * c - 0.1 * s;
-        let output = torque(&effects, &now);
-        assert!((output.feed - wanted).abs() < 1e-12);
-        assert_eq!(output.feed, output.explained);
+        let output = torque(&effects, &inputs);
+        assert!((output.feedforward - wanted).abs() < 1e-12);
+        assert_eq!(output.feedforward, output.explained);
         // If the position is unknown, no angle is valid.
-        now.placed = false;
-        assert_eq!(torque(&effects, &now), Output::default());
+        inputs.position_known = false;
+        assert_eq!(torque(&effects, &inputs), Output::default());
     }
 }
 
 #[test]
 fn a_whole_order_takes_the_angle_within_a_turn_and_a_broken_one_does_not() {
-    let now = Now {
+    let inputs = Inputs {
         motor_angle: 100.0 * core::f64::consts::TAU + 0.4,
         angle_in_turn: 0.4,
         ..at(0.0, 0.0)
     };
-    let whole = torque(&only(cogging(1.0, 0.0, 24.0)), &now).feed;
+    let whole = torque(&only(cogging(1.0, 0.0, 24.0)), &inputs).feedforward;
     assert_eq!(whole, libm::cos(24.0 * 0.4));
-    let broken = torque(&only(cogging(1.0, 0.0, 24.5)), &now).feed;
-    assert_eq!(broken, libm::cos(24.5 * now.motor_angle));
+    let broken = torque(&only(cogging(1.0, 0.0, 24.5)), &inputs).feedforward;
+    assert_eq!(broken, libm::cos(24.5 * inputs.motor_angle));
 }
 
 #[test]
 fn effects_add_up() {
     let (a, b) = (stribeck(0.25, 0.1), cogging(0.2, -0.1, 24.0));
-    let now = Now {
+    let inputs = Inputs {
         angle_in_turn: 0.3,
         ..at(0.1, 0.08)
     };
     let mut both = [None; EFFECTS];
     (both[0], both[2]) = (Some(a), Some(b));
-    let sum = torque(&only(a), &now).feed + torque(&only(b), &now).feed;
-    assert!((torque(&both, &now).feed - sum).abs() < 1e-15);
+    let sum = torque(&only(a), &inputs).feedforward + torque(&only(b), &inputs).feedforward;
+    assert!((torque(&both, &inputs).feedforward - sum).abs() < 1e-15);
 }
 
 #[test]
 fn no_effect_drives_a_link_that_runs_ahead_and_dry_ones_stop_with_the_reference() {
     for kind in Kind::ALL {
-        if Role::of(*kind) != Some(Role::Dry) {
+        if Role::of(*kind) != Some(Role::DryFriction) {
             continue;
         }
         let effects = only(typical(*kind));
-        assert_eq!(torque(&effects, &at(0.0, 0.02)).feed, 0.0, "{kind:?}");
+        assert_eq!(
+            torque(&effects, &at(0.0, 0.02)).feedforward,
+            0.0,
+            "{kind:?}"
+        );
         for reference in [0.06, 0.3] {
-            let mut last = torque(&effects, &at(reference, reference)).feed.abs();
+            let mut last = torque(&effects, &at(reference, reference))
+                .feedforward
+                .abs();
             for k in 1..=400 {
                 let measured = reference + f64::from(k) * 5e-3;
                 // The same position for any velocity of the link.
-                let now = Now {
+                let inputs = Inputs {
                     period: 0.0,
                     ..at(reference, measured)
                 };
-                let next = torque(&effects, &now).feed.abs();
+                let next = torque(&effects, &inputs).feedforward.abs();
                 // The share may still rise from a slow to a fast link.
                 let share_left = SETTINGS.gain / share(&SETTINGS, reference, reference);
                 assert!(next <= share_left * last + 1e-12, "{kind:?} {measured}");
@@ -210,7 +219,7 @@ fn every_kind_is_either_refused_by_name_or_finite_whatever_comes() {
             (Some(_), Ok(compensation)) => {
                 used += 1;
                 for value in [f64::NAN, f64::INFINITY, -1e300, 0.0, 1.0] {
-                    let now = Now {
+                    let inputs = Inputs {
                         position: value,
                         velocity: value,
                         motor_angle: value,
@@ -220,26 +229,26 @@ fn every_kind_is_either_refused_by_name_or_finite_whatever_comes() {
                         coulomb: value,
                         viscous: value,
                         time: value,
-                        warming: value,
+                        temperature_rise: value,
                         reference: Reference {
                             position: value,
                             velocity: value,
                             acceleration: value,
                         },
-                        placed: true,
+                        position_known: true,
                         busy: false,
-                        turns: true,
+                        rotates_waves: true,
                         gear_ratio: 50.0,
                         period: 1e-4,
-                        lead: 3e-4,
-                        lead_ticks: 3,
-                        lead_share: 0.5,
+                        torque_delay: 3e-4,
+                        delay_ticks: 3,
+                        delay_fraction: 0.5,
                     };
                     let mut state = State::default();
                     for _ in 0..9 {
-                        let reading = compensation.turn(&mut state, &now);
-                        let output = compensation.torque(&SETTINGS, &mut state, &now);
-                        assert!(output.feed.is_finite(), "{kind:?} {value}");
+                        let reading = compensation.turn(&mut state, &inputs);
+                        let output = compensation.torque(&SETTINGS, &mut state, &inputs);
+                        assert!(output.feedforward.is_finite(), "{kind:?} {value}");
                         assert!(output.explained.is_finite(), "{kind:?} {value}");
                         assert!(reading.error.is_finite() && reading.slope.is_finite());
                     }
@@ -304,11 +313,13 @@ fn friction_with_memory_is_given_over_the_way_of_the_reference() {
     let mut go = |reference: f64, measured: f64, ticks: u32| {
         let mut last = 0.0;
         for _ in 0..ticks {
-            let now = Now {
+            let inputs = Inputs {
                 period: 1e-4,
                 ..at(reference, measured)
             };
-            last = compensation.torque(&SETTINGS, &mut state, &now).feed;
+            last = compensation
+                .torque(&SETTINGS, &mut state, &inputs)
+                .feedforward;
         }
         last / share(&SETTINGS, reference, measured)
     };
@@ -334,20 +345,20 @@ fn two_errors_of_the_encoder_are_taken_off_in_turn() {
     let mut worst = 0.0_f64;
     for tick in 0..20_000 {
         let position = 6.0 * 1e-4 * f64::from(tick);
-        let now = Now {
+        let inputs = Inputs {
             position,
             motor_angle: 50.0 * position,
             angle_in_turn: (50.0 * position).rem_euclid(core::f64::consts::TAU),
-            placed: true,
-            turns: true,
+            position_known: true,
+            rotates_waves: true,
             gear_ratio: 50.0,
-            ..Now::default()
+            ..Inputs::default()
         };
-        let reading = compensation.turn(&mut state, &now);
+        let reading = compensation.turn(&mut state, &inputs);
         let truth: f64 = effects
             .iter()
             .flatten()
-            .map(|effect| effect.torque(&mut Memory::default(), &now.instant(true)))
+            .map(|effect| effect.torque(&mut Memory::default(), &inputs.instant(true)))
             .sum();
         if tick > 2 {
             worst = worst.max((reading.error - truth).abs());
@@ -360,7 +371,7 @@ fn two_errors_of_the_encoder_are_taken_off_in_turn() {
 fn what_the_bridge_loses_is_a_voltage() {
     let lost = Compensation::new(&only(Effect::new(Kind::DriveDeadzone, &[0.4], &[]))).unwrap();
     assert_eq!(lost.lost_voltage(), 0.4);
-    assert!(!lost.has_torque() && !lost.turns());
+    assert!(!lost.has_torque() && !lost.has_waves());
 }
 
 proptest! {
@@ -382,23 +393,23 @@ proptest! {
             gain_at_rest: 0.7,
             velocity_threshold: 0.05,
         };
-        let now = Now::<f32> {
+        let inputs = Inputs::<f32> {
             reference: Reference { velocity: reference, ..Reference::default() },
             velocity: measured,
             angle_in_turn: angle,
-            placed: true,
-            turns: true,
-            ..Now::default()
+            position_known: true,
+            rotates_waves: true,
+            ..Inputs::default()
         };
         let effects = both(given.map(single));
-        let f32s = settled(&effects, &settings, &now);
-        let wide = Now::<f64> {
+        let f32s = settled(&effects, &settings, &inputs);
+        let wide = Inputs::<f64> {
             angle_in_turn: angle.into(),
             ..at(reference.into(), measured.into())
         };
         let f64s = torque(&both(given), &wide);
         // The rounding error of the angle is multiplied by the order, 24.
-        prop_assert!((f64::from(f32s.feed) - f64s.feed).abs() < 1e-5);
+        prop_assert!((f64::from(f32s.feedforward) - f64s.feedforward).abs() < 1e-5);
         prop_assert!((f64::from(f32s.explained) - f64s.explained).abs() < 1e-5);
     }
 }

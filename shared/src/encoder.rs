@@ -38,9 +38,9 @@ use crate::units::EncoderCount;
 const VELOCITY_CORNER_OVER_POLE: f64 = 1.643_4;
 /// Smallest θ. For any interval the filter remembers some edges, so that a single edge, whose time is only known to a
 /// sample, does not set the velocity alone.
-const SMALLEST_MEMORY: f64 = 0.5;
+const MIN_THETA: f64 = 0.5;
 /// Longest interval that is counted, samples. Beyond it the velocity bound no longer shrinks.
-const LONGEST_INTERVAL: u32 = 1 << 24;
+const MAX_INTERVAL: u32 = 1 << 24;
 
 /// Returns the signed movement between two readings of the wrapping 16-bit counter.
 ///
@@ -86,7 +86,7 @@ pub struct State<T> {
     code: EncoderCount,
     counts: i64,
     /// Estimated position above `counts`, counts.
-    lead: T,
+    fraction: T,
     /// Counts per sample.
     velocity: T,
     /// Counts per sample².
@@ -139,7 +139,7 @@ pub fn step<T: Real<Mask = bool>>(
             started: true,
             code,
             counts: i64::from(code.0),
-            lead: half,
+            fraction: half,
             theta: T::ONE,
             ..State::default()
         };
@@ -147,19 +147,19 @@ pub fn step<T: Real<Mask = bool>>(
     let delta = difference(code, state.code);
     state.code = code;
     state.counts = state.counts.wrapping_add(i64::from(delta));
-    state.lead += state.velocity + half * state.acceleration - T::from_f64(f64::from(delta));
+    state.fraction += state.velocity + half * state.acceleration - T::from_f64(f64::from(delta));
     state.velocity += state.acceleration;
-    state.since_edge = (state.since_edge + 1).min(LONGEST_INTERVAL);
+    state.since_edge = (state.since_edge + 1).min(MAX_INTERVAL);
     state.theta *= config.decay;
     let interval = T::from_f64(f64::from(state.since_edge));
     if delta == 0 {
-        wait(config, state, T::ONE / interval);
+        hold_in_count(config, state, T::ONE / interval);
     } else {
         correct(state, delta, interval, age);
     }
     Motion {
         counts: state.counts,
-        fraction: state.lead,
+        fraction: state.fraction,
         velocity: state.velocity * config.rate,
         acceleration: state.acceleration * config.rate * config.rate,
     }
@@ -167,8 +167,8 @@ pub fn step<T: Real<Mask = bool>>(
 
 /// Processes a sample without an edge: the position has stayed in its count, and |v| ≤ `bound` counts a sample.
 #[inline(always)]
-fn wait<T: Real<Mask = bool>>(config: &Config<T>, state: &mut State<T>, bound: T) {
-    state.lead = state.lead.clamp_to(T::ZERO, T::ONE);
+fn hold_in_count<T: Real<Mask = bool>>(config: &Config<T>, state: &mut State<T>, bound: T) {
+    state.fraction = state.fraction.clamp_to(T::ZERO, T::ONE);
     let bounded = state.velocity.clamp_to(-bound, bound);
     if bounded.abs().lt(state.velocity.abs()) {
         state.velocity = bounded;
@@ -182,20 +182,21 @@ fn correct<T: Real<Mask = bool>>(state: &mut State<T>, delta: i16, interval: T, 
     let half = T::from_f64(0.5);
     // Without a captured time, the edge is anywhere in the sample: on average half a sample's movement ago, at most
     // half a count. In either case the next edge was not reached.
-    let (age, farthest) = match age {
+    let (age, max_past) = match age {
         Some(age) => (age, T::ONE),
         None => (half, half),
     };
-    let past = (age * state.velocity.abs()).min(farthest);
+    let past = (age * state.velocity.abs()).min(max_past);
     let measured = if delta > 0 { past } else { T::ONE - past };
-    let error = measured - state.lead;
-    let theta = state.theta.max(T::from_f64(SMALLEST_MEMORY));
-    let forgot = T::ONE - theta;
+    let error = measured - state.fraction;
+    let theta = state.theta.max(T::from_f64(MIN_THETA));
+    let innovation_share = T::ONE - theta;
     let per_interval = T::ONE / interval;
-    let forgot_rate = forgot * per_interval;
-    state.lead += (T::ONE - theta * theta * theta) * error;
-    state.velocity += T::from_f64(1.5) * forgot * forgot_rate * (T::ONE + theta) * error;
-    state.acceleration += forgot * forgot_rate * forgot_rate * error;
+    let innovation_rate = innovation_share * per_interval;
+    state.fraction += (T::ONE - theta * theta * theta) * error;
+    state.velocity +=
+        T::from_f64(1.5) * innovation_share * innovation_rate * (T::ONE + theta) * error;
+    state.acceleration += innovation_share * innovation_rate * innovation_rate * error;
     state.since_edge = 0;
     state.theta = T::ONE;
 }

@@ -96,8 +96,8 @@ pub(crate) fn finite<T: Real>(x: T) -> T {
 pub fn direction<T: Real>(reference: T, measured: T, velocity_threshold: T) -> T {
     let threshold = velocity_threshold.max(T::from_f64(1.0e-6));
     let weight = smooth_step(measured.abs(), threshold, threshold + threshold);
-    let wanted = (reference / (T::from_f64(REFERENCE_SHARE) * threshold)).tanh();
-    weight * measured.sgn() * wanted.abs() + (T::ONE - weight) * wanted
+    let reference_direction = (reference / (T::from_f64(REFERENCE_SHARE) * threshold)).tanh();
+    weight * measured.sgn() * reference_direction.abs() + (T::ONE - weight) * reference_direction
 }
 
 /// Returns the share of dry friction that is given: `gain_at_rest` at rest, `gain` from the threshold on, by the faster
@@ -148,11 +148,11 @@ impl<T: Real<Mask = bool>> PrecompensationSettings<T> {
         if !self.enabled {
             return Ok(());
         }
-        let within = |x: T, high: T| T::ZERO.le(x) && x.le(high);
-        if !within(self.gain, T::ONE) {
+        let in_range = |x: T, high: T| T::ZERO.le(x) && x.le(high);
+        if !in_range(self.gain, T::ONE) {
             return Err(PrecompensationError::Gain);
         }
-        if !within(self.gain_at_rest, self.gain) || !self.gain_at_rest.lt(T::ONE) {
+        if !in_range(self.gain_at_rest, self.gain) || !self.gain_at_rest.lt(T::ONE) {
             return Err(PrecompensationError::GainAtRest);
         }
         let threshold = self.velocity_threshold;

@@ -14,7 +14,7 @@ use rig_link::{
 use rig_shared::safety::{LimitSet, Mode};
 use rig_shared::wire::message::{Greeting, Refusal, Report, Request, RequestBody, StateSample};
 use rig_shared::wire::{
-    Batcher, DecodeError, Ledger, MAX_FRAME, MessageDecoder, PROTOCOL_VERSION, encode, schema,
+    AnswerLog, Batcher, DecodeError, MAX_FRAME, MessageDecoder, PROTOCOL_VERSION, encode, schema,
 };
 
 const DECIMATION: u16 = 10;
@@ -38,7 +38,7 @@ fn sample_at(tick: u64) -> StateSample {
 struct Responder {
     decoder: MessageDecoder<Request>,
     batcher: Batcher,
-    ledger: Ledger,
+    answer_log: AnswerLog,
     tick: u64,
     windows_per_slice: u64,
     /// Every so many batches finds the transmit queue full; 0: never.
@@ -54,7 +54,7 @@ impl Responder {
         Self {
             decoder: MessageDecoder::default(),
             batcher: Batcher::new(),
-            ledger: Ledger::new(),
+            answer_log: AnswerLog::new(),
             tick: 123_450,
             windows_per_slice: 64,
             queue_full_every: 0,
@@ -81,8 +81,8 @@ impl Responder {
 
     fn answer(&mut self, request: &Request, out: &mut Vec<u8>) {
         if request.body == RequestBody::Hello {
-            self.ledger.clear();
-        } else if let Some(again) = self.ledger.answered(request.id) {
+            self.answer_log.clear();
+        } else if let Some(again) = self.answer_log.stored_answer(request.id) {
             return say(&Report::Acknowledge(again), out);
         }
         let mut result = Ok(());
@@ -101,7 +101,7 @@ impl Responder {
             RequestBody::Start => result = Err(Refusal::NoTrajectory),
             _ => {}
         }
-        let acknowledge = self.ledger.answer(request.id, result);
+        let acknowledge = self.answer_log.record(request.id, result);
         say(&Report::Acknowledge(acknowledge), out);
         for report in &after {
             say(report, out);

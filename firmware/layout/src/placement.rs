@@ -31,8 +31,8 @@ impl Placement {
             let inside = |address: u32| (code.origin..code.origin + code.length).contains(&address);
             if entry.speed == Speed::Fast {
                 let outside = functions.iter().filter(|(address, _)| !inside(*address));
-                let told = outside.map(|(_, f)| (f.name().to_owned(), f.size));
-                found.spilled.extend(told);
+                let named_size = outside.map(|(_, f)| (f.name().to_owned(), f.size));
+                found.spilled.extend(named_size);
             }
         }
         let listed = |names: &[String]| {
@@ -50,8 +50,8 @@ impl Placement {
                 Some(Speed::Fast) => {}
                 None if function.is_jump() => {}
                 None => {
-                    let told = (function.name().to_owned(), function.size);
-                    found.unlisted.push(told);
+                    let named_size = (function.name().to_owned(), function.size);
+                    found.unlisted.push(named_size);
                     continue;
                 }
             }

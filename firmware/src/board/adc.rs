@@ -2,8 +2,9 @@
 //!
 //! An injected sequence of three. Each conversion is the mean of four (RM0440, ADC, "Oversampler"), taken within 3.5
 //! µs: with 12-bit codes as before, this halves white noise. The current comes first. It is held at 0.62, 1.49, 2.37
-//! and 3.24 µs after the trigger, 1.93 µs ([`LEAD`]) in the mean. The trigger comes this time before the middle of a
-//! braking interval. Otherwise the current would read low by (R·i + Kₑ·ω)/L times the delay, like a smaller friction.
+//! and 3.24 µs after the trigger, 1.93 µs ([`SAMPLING_LEAD`]) in the mean. The trigger comes this time before the
+//! middle of a braking interval. Otherwise the current would read low by (R·i + Kₑ·ω)/L times the delay, like a smaller
+//! friction.
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::adc::vals::{Adcaldif, Difsel, Exten, SampleTime};
@@ -27,7 +28,7 @@ const SAMPLING: u16 = 2 * 24 + 1;
 const APPROXIMATION: u16 = 2 * 12 + 1;
 /// Core cycles from the trigger to the mean instant at which the current's samples are held, each at the end of its
 /// sampling time.
-pub(crate) const LEAD: u16 =
+pub(crate) const SAMPLING_LEAD: u16 =
     (2 * (LATENCY + SAMPLING) + (CONVERSIONS - 1) * (SAMPLING + APPROXIMATION)) * PRESCALER / 4;
 /// Start-up time of the voltage regulator, µs (DS12288, t_ADCVREG_STUP).
 const REGULATOR_US: u32 = 20;
@@ -82,7 +83,7 @@ impl Converter {
                 w.set_difsel(channel, Difsel::SINGLE_ENDED);
             }
         });
-        let supply = supply();
+        let supply_ratio = measure_supply_ratio();
         adc.smpr().write(|w| {
             for channel in [CURRENT_CHANNEL, SUPPLY_CHANNEL, TEMPERATURE_CHANNEL] {
                 w.set_smp(usize::from(channel), SampleTime::CYCLES24_5);
@@ -106,11 +107,11 @@ impl Converter {
         });
         adc.ier().write(|w| w.set_jeosie(true));
         adc.cr().modify(|w| w.set_jadstart(true));
-        (Self, supply)
+        (Self, supply_ratio)
     }
 
     /// Enables the interrupt, with the highest priority.
-    pub(crate) fn listen(&mut self) {
+    pub(crate) fn enable_interrupt(&mut self) {
         interrupt::ADC1_2.set_priority(TICK_PRIORITY);
         // Everything that the handler owns was initialised before.
         #[allow(unsafe_code)]
@@ -121,7 +122,7 @@ impl Converter {
 
     /// Reads the sequence that has just ended.
     #[inline(always)]
-    pub(crate) fn take(&mut self) -> Codes {
+    pub(crate) fn read(&mut self) -> Codes {
         let adc = ADC1;
         // Writing one clears a flag.
         adc.isr().write(|w| {
@@ -143,7 +144,7 @@ impl Converter {
 }
 
 /// Returns the ratio of the chip's supply to 3.3 V, from its own reference.
-fn supply() -> f32 {
+fn measure_supply_ratio() -> f32 {
     let adc = ADC1;
     cortex_m::asm::delay(REFERENCE_US * (CORE_HZ / 1_000_000));
     // At least 4 µs of sampling (DS12288, t_S_vrefint): 247.5 cycles are 5.8.

@@ -24,7 +24,7 @@ const CRYSTAL_WAIT_MS: u32 = 20;
 const RESET_KHZ: u32 = 16_000;
 
 /// Returns true if the crystal starts. A rig with a clock error of 1 % identifies inertia with an error of 2 %.
-pub(crate) fn crystal() -> bool {
+pub(crate) fn start_crystal() -> bool {
     RCC.cr().modify(|w| w.set_hseon(true));
     for _ in 0..10 * CRYSTAL_WAIT_MS {
         if RCC.cr().read().hserdy() {
@@ -46,7 +46,7 @@ pub(crate) fn boost() {
 
 /// Watches a crystal that started. If it stops, the chip continues on its own oscillator, a break switches the outputs
 /// off, and the non-maskable interrupt restarts the program (RM0440, RCC, "Clock security system").
-pub(crate) fn watch(crystal: bool) {
+pub(crate) fn enable_clock_security(crystal: bool) {
     if crystal {
         RCC.cr().modify(|w| w.set_csson(true));
     }

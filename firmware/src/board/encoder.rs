@@ -33,7 +33,7 @@ const _: () = assert!(EDGE_CLOCK_HZ == CORE_HZ);
 
 /// Allowed change of step between two ticks, in addition to half of the last step, counts: four times the hardest
 /// allowed acceleration (60 rad/s² at the joint are 0.04 counts per tick squared).
-const SLACK: u32 = 4;
+const STEP_TOLERANCE: u32 = 4;
 
 /// Reading of the counter in one tick.
 pub(crate) struct Reading {
@@ -41,11 +41,11 @@ pub(crate) struct Reading {
     /// Time since the last edge, periods of [`EDGE_CLOCK_HZ`].
     pub(crate) edge_age: u32,
     /// Counts by which the index disagrees, or 0 if both channels changed at once.
-    pub(crate) wrong: Option<i32>,
+    pub(crate) error: Option<i32>,
 }
 
 /// Returns the shortest step that is equal to `step` modulo a turn.
-fn within_half_a_turn(step: i32, turn: NonZeroU32) -> i32 {
+fn wrap_to_half_turn(step: i32, turn: NonZeroU32) -> i32 {
     let rest = step.unsigned_abs() % turn;
     let shortest = if rest > turn.get() / 2 {
         (rest as i32).wrapping_sub(turn.get() as i32)
@@ -121,7 +121,7 @@ impl EncoderTimer {
         let now = TIM5.cnt().read();
         let mut raw = timer.cnt().read();
         let flags = timer.sr().read();
-        let mut wrong = None;
+        let mut error = None;
         if flags.idxif() || flags.terrif() {
             // Writing zero clears a flag, writing one keeps it (rc_w0): a flag that rises after the reading stays for
             // the next tick.
@@ -129,36 +129,37 @@ impl EncoderTimer {
             others.0 = !flags.0;
             timer.sr().write_value(others);
             if flags.terrif() {
-                wrong = Some(0);
+                error = Some(0);
             }
             // Read again, because the index may have come between counter and flags.
             raw = timer.cnt().read();
         }
         let mut step = raw.wrapping_sub(self.last) as i32;
         if flags.idxif() {
-            let within = within_half_a_turn(step, self.counts_per_turn);
-            let beside = within.wrapping_sub(self.step);
+            let wrapped = wrap_to_half_turn(step, self.counts_per_turn);
+            let difference = wrapped.wrapping_sub(self.step);
             if !self.indexed {
                 // The first index only gives the start of a turn: the motion continues unchanged.
                 self.indexed = true;
                 step = self.step;
             } else {
-                if beside.unsigned_abs() > SLACK + self.step.unsigned_abs() / 2 {
+                if difference.unsigned_abs() > STEP_TOLERANCE + self.step.unsigned_abs() / 2 {
                     // Lost counts or a false index: the cause is unknown, so the motion continues unchanged.
-                    wrong = Some(beside);
+                    error = Some(difference);
                     step = self.step;
                 } else {
-                    step = within;
+                    step = wrapped;
                 }
             }
         }
         let turn = self.counts_per_turn.get() as i32;
-        let place = raw as i32;
-        let beyond = place >= turn + SLACK as i32 || place < -turn - SLACK as i32;
-        if self.indexed && beyond {
+        let position = raw as i32;
+        let out_of_turn =
+            position >= turn + STEP_TOLERANCE as i32 || position < -turn - STEP_TOLERANCE as i32;
+        if self.indexed && out_of_turn {
             // Reported once: without index the counter is still valid.
             self.indexed = false;
-            wrong = Some(if place < 0 { -turn } else { turn });
+            error = Some(if position < 0 { -turn } else { turn });
         }
         let age = now.wrapping_sub(TIM5.ccr(0).read());
         self.last = raw;
@@ -168,7 +169,7 @@ impl EncoderTimer {
             count: EncoderCount(self.count),
             // An edge after `now` would have a negative age.
             edge_age: if age > u32::MAX / 2 { 0 } else { age },
-            wrong,
+            error,
         }
     }
 }

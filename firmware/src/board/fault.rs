@@ -58,6 +58,6 @@ unsafe fn DefaultHandler(_number: i16) {
 extern "C" fn fault() -> ! {
     // This comes before the bridge is switched off: a control tick in between would switch it on again.
     cortex_m::interrupt::disable();
-    pwm::off();
+    pwm::switch_off();
     cortex_m::peripheral::SCB::sys_reset()
 }

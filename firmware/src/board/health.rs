@@ -12,9 +12,9 @@ use super::stack;
 pub(crate) static BAD_REQUESTS: AtomicU32 = AtomicU32::new(0);
 
 /// Cycles of the ticks since the last report, and constant values.
-pub(crate) struct Checkup {
-    start: Start,
-    every: u32,
+pub(crate) struct HealthMonitor {
+    start_info: StartInfo,
+    report_ticks: u32,
     ticks: u32,
     sum: u32,
     max: u32,
@@ -22,18 +22,18 @@ pub(crate) struct Checkup {
 
 /// Findings at the start.
 #[derive(Clone, Copy)]
-pub(crate) struct Start {
+pub(crate) struct StartInfo {
     pub(crate) reset: ResetCause,
     pub(crate) settings: SettingsOrigin,
     pub(crate) crystal: bool,
 }
 
-impl Checkup {
-    /// Makes a report after every `every` ticks.
-    pub(crate) fn new(start: Start, every: u32) -> Self {
+impl HealthMonitor {
+    /// Makes a report after every `report_ticks` ticks.
+    pub(crate) fn new(start_info: StartInfo, report_ticks: u32) -> Self {
         Self {
-            start,
-            every,
+            start_info,
+            report_ticks,
             ticks: 0,
             sum: 0,
             max: 0,
@@ -42,19 +42,19 @@ impl Checkup {
 
     /// Counts a tick; returns the report if it is due. `tick` is its number, `dropped` the windows lost so far.
     #[inline(always)]
-    pub(crate) fn count(&mut self, cycles: u32, tick: u64, dropped: u32) -> Option<Health> {
+    pub(crate) fn record_tick(&mut self, cycles: u32, tick: u64, dropped: u32) -> Option<Health> {
         self.ticks += 1;
         self.sum = self.sum.saturating_add(cycles);
         self.max = self.max.max(cycles);
-        if self.ticks < self.every {
+        if self.ticks < self.report_ticks {
             return None;
         }
         let health = Health {
             tick,
-            reset: self.start.reset,
-            settings: self.start.settings,
+            reset: self.start_info.reset,
+            settings: self.start_info.settings,
             clock_hz: CORE_HZ,
-            crystal: self.start.crystal,
+            crystal: self.start_info.crystal,
             tick_cycles_max: self.max,
             // At 10 kHz the sum of a second is far below 2³²: every tick is shorter than its period.
             tick_cycles_mean: self.sum / self.ticks.max(1),
@@ -62,7 +62,7 @@ impl Checkup {
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
             dropped,
         };
-        *self = Self::new(self.start, self.every);
+        *self = Self::new(self.start_info, self.report_ticks);
         Some(health)
     }
 }

@@ -12,9 +12,9 @@ use embassy_time::{Duration, Ticker, Timer, with_timeout};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer};
 use rig_firmware::config::Config;
-use rig_firmware::desk::Desk;
-use rig_firmware::examined::{Examined, examine};
-use rig_firmware::note::Note;
+use rig_firmware::event::Event;
+use rig_firmware::prechecked_request::{PrecheckedRequest, precheck};
+use rig_firmware::report_sender::ReportSender;
 use rig_shared::wire::message::Request;
 use rig_shared::wire::{DecodeError, MAX_FRAME, MessageDecoder};
 use static_cell::ConstStaticCell;
@@ -23,19 +23,19 @@ use super::clock::LINK_PRIORITY;
 use super::health::BAD_REQUESTS;
 use super::pins::LinkPins;
 use super::probe;
-use super::watchdog::{Part, report};
+use super::watchdog::{Task, check_in};
 
 /// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
 const BAUD: u32 = 921_600;
 /// Input buffer while the command task is busy, bytes: 11 ms of data.
-const RING: usize = 1024;
+const RECEIVE_BYTES: usize = 1024;
 /// Output buffer, bytes: two of the longest frames.
-const SEND: usize = 2 * MAX_FRAME;
+const SEND_BYTES: usize = 2 * MAX_FRAME;
 /// Longest wait for bytes, so that the command task reports to the watchdog while no data arrive.
-const SILENCE: Duration = Duration::from_millis(20);
+const READ_TIMEOUT: Duration = Duration::from_millis(20);
 
-static RING_BUFFER: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
-static SEND_BUFFER: ConstStaticCell<Vec<u8, SEND>> = ConstStaticCell::new(Vec::new());
+static RING_BUFFER: ConstStaticCell<[u8; RECEIVE_BYTES]> = ConstStaticCell::new([0; RECEIVE_BYTES]);
+static SEND_BUFFER: ConstStaticCell<Vec<u8, SEND_BYTES>> = ConstStaticCell::new(Vec::new());
 
 bind_interrupts!(struct Interrupts {
     LPUART1 => InterruptHandler<LPUART1>;
@@ -66,25 +66,25 @@ pub(crate) fn open(pins: LinkPins) -> Result<(Sender, Receiver), ConfigError> {
     Ok((sender, receiver.into_ring_buffered(RING_BUFFER.take())))
 }
 
-/// Takes notes from the tick a thousand times a second, makes frames of them and sends these.
+/// Takes events from the tick a thousand times a second, encodes them as frames and sends these.
 #[embassy_executor::task]
 pub(crate) async fn telemetry(
     config: &'static Config,
     mut line: Sender,
     mut probe: probe::Outgoing,
-    mut notes: Consumer<'static, Note>,
+    mut events: Consumer<'static, Event>,
 ) -> ! {
-    let mut desk = Desk::new();
+    let mut report_sender = ReportSender::new();
     let bytes = SEND_BUFFER.take();
     let mut ticker = Ticker::every(Duration::from_millis(1));
     loop {
         ticker.next().await;
-        report(Part::Telemetry);
+        check_in(Task::Telemetry);
         bytes.clear();
-        while bytes.len() + MAX_FRAME <= SEND
-            && let Some(note) = notes.dequeue()
+        while bytes.len() + MAX_FRAME <= SEND_BYTES
+            && let Some(event) = events.dequeue()
         {
-            desk.tell(config, &note, &mut |frame: &[u8]| {
+            report_sender.send_event(config, &event, &mut |frame: &[u8]| {
                 bytes.extend_from_slice(frame).is_ok()
             });
         }
@@ -99,26 +99,26 @@ pub(crate) async fn telemetry(
     }
 }
 
-/// Passes a request to the tick, then yields to other tasks. Examining a request may take a fifth of a second, and
+/// Passes a request to the tick, then yields to other tasks. Prechecking a request may take a fifth of a second, and
 /// reading does not yield while bytes wait.
-async fn hand_over(
+async fn forward_request(
     config: &Config,
     decoded: Option<Result<Request, DecodeError>>,
-    requests: &mut Producer<'static, Examined>,
+    requests: &mut Producer<'static, PrecheckedRequest>,
 ) {
-    let taken = match decoded {
+    let accepted = match decoded {
         None => return,
         // The host gets no answer and repeats its request.
         Some(Err(_)) => {
             BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
             true
         }
-        Some(Ok(request)) => requests.enqueue(examine(config, request)).is_ok(),
+        Some(Ok(request)) => requests.enqueue(precheck(config, request)).is_ok(),
     };
-    if !taken {
+    if !accepted {
         defmt::warn!("more requests than can be served");
     }
-    report(Part::Commands);
+    check_in(Task::Commands);
     Timer::after_ticks(0).await;
 }
 
@@ -128,14 +128,14 @@ pub(crate) async fn commands(
     config: &'static Config,
     mut line: Receiver,
     mut probe: probe::Incoming,
-    mut requests: Producer<'static, Examined>,
+    mut requests: Producer<'static, PrecheckedRequest>,
 ) -> ! {
-    let mut from_line = MessageDecoder::<Request>::default();
-    let mut from_probe = MessageDecoder::<Request>::default();
+    let mut line_decoder = MessageDecoder::<Request>::default();
+    let mut probe_decoder = MessageDecoder::<Request>::default();
     let mut bytes = [0; 64];
     loop {
-        report(Part::Commands);
-        let count = match with_timeout(SILENCE, line.read(&mut bytes)).await {
+        check_in(Task::Commands);
+        let count = match with_timeout(READ_TIMEOUT, line.read(&mut bytes)).await {
             Ok(Ok(count)) => count,
             // A damaged or additional byte: the check sum of the frame detects it, and the host repeats its request.
             Ok(Err(_)) => {
@@ -145,11 +145,11 @@ pub(crate) async fn commands(
             Err(_) => 0,
         };
         for &byte in bytes.iter().take(count) {
-            hand_over(config, from_line.push(byte), &mut requests).await;
+            forward_request(config, line_decoder.push(byte), &mut requests).await;
         }
         let count = probe.read(&mut bytes);
         for &byte in bytes.iter().take(count) {
-            hand_over(config, from_probe.push(byte), &mut requests).await;
+            forward_request(config, probe_decoder.push(byte), &mut requests).await;
         }
     }
 }

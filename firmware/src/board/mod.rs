@@ -1,7 +1,7 @@
 //! All code that depends on the chip. `unsafe` is used only where hardware needs it, with the reason beside it.
 
-mod accelerated;
 mod adc;
+mod ccm_code;
 mod clock;
 mod comparator;
 mod cycles;
@@ -19,4 +19,4 @@ pub(crate) mod start;
 mod storage;
 mod tick;
 mod watchdog;
-mod wires;
+mod wire_check;

@@ -127,7 +127,7 @@ pub(crate) fn is_high(channel: usize) -> bool {
 
 /// Returns true if the bridge holds its fault line low.
 #[inline(always)]
-pub(crate) fn driver_faults() -> bool {
+pub(crate) fn is_fault_line_low() -> bool {
     GPIOB.idr().read().idr(12) == Idr::LOW
 }
 
@@ -137,9 +137,9 @@ impl BridgePins {
         let output = AfType::output(OutputType::PushPull, Speed::Medium);
         // The driver's fault output is an open drain.
         let fault = AfType::input(Pull::Up);
-        keep(Flex::new(self.in1), AF_TIM1, output);
-        keep(Flex::new(self.in2), AF_TIM1, output);
-        keep(Flex::new(self.fault), AF_TIM1, fault);
+        set_alternate_function(Flex::new(self.in1), AF_TIM1, output);
+        set_alternate_function(Flex::new(self.in2), AF_TIM1, output);
+        set_alternate_function(Flex::new(self.fault), AF_TIM1, fault);
         self.enable
     }
 }
@@ -148,9 +148,9 @@ impl EncoderPins {
     /// Connects the encoder to TIM2.
     pub(crate) fn connect(self) {
         // A disconnected wire stays at a level instead of counting noise.
-        keep(Flex::new(self.a), AF_TIM2, AfType::input(Pull::Up));
-        keep(Flex::new(self.b), AF_TIM2, AfType::input(Pull::Up));
-        keep(
+        set_alternate_function(Flex::new(self.a), AF_TIM2, AfType::input(Pull::Up));
+        set_alternate_function(Flex::new(self.b), AF_TIM2, AfType::input(Pull::Up));
+        set_alternate_function(
             Flex::new(self.index),
             AF_TIM2_ETR,
             AfType::input(Pull::Down),
@@ -174,7 +174,7 @@ impl AnalogPins {
 }
 
 /// Sets a pin to an alternate function permanently: a dropped `Flex` disconnects its pin.
-fn keep(mut pin: Flex<'static>, function: u8, kind: AfType) {
+fn set_alternate_function(mut pin: Flex<'static>, function: u8, kind: AfType) {
     pin.set_as_af_unchecked(function, kind);
     core::mem::forget(pin);
 }

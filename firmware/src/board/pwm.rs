@@ -6,9 +6,9 @@
 //!
 //! The repetition counter makes every fourth overflow or underflow an update, 10 000 a second, always at the underflow.
 //! There the new duty takes effect. It is the middle of a braking interval, where the current equals its mean over the
-//! period. Samples must be centred on it, so their trigger comes [`LEAD`] before it. TIM4 counts the same clock with
-//! the period of the updates. It starts with TIM1's counter (trigger mode, TIM1's enable as TRGO, ITR0; RM0440,
-//! TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"), ahead by this lead, and never loses or gains a count.
+//! period. Samples must be centred on it, so their trigger comes [`SAMPLING_LEAD`] before it. TIM4 counts the same
+//! clock with the period of the updates. It starts with TIM1's counter (trigger mode, TIM1's enable as TRGO, ITR0;
+//! RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"), ahead by this lead, and never loses or gains a count.
 
 use embassy_stm32::gpio::Output;
 use embassy_stm32::pac::timer::vals::{
@@ -18,10 +18,10 @@ use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1, TIM4};
 use rig_firmware::nameplate;
 use rig_firmware::sample::Command;
 
-use super::adc::LEAD;
+use super::adc::SAMPLING_LEAD;
 use super::clock::CORE_HZ;
 use super::comparator;
-use super::pins::{BridgePins, driver_faults};
+use super::pins::{BridgePins, is_fault_line_low};
 
 /// Pulses a second.
 pub(crate) const PWM_HZ: u32 = 20_000;
@@ -120,7 +120,7 @@ impl Bridge {
         // Loads the preloaded registers.
         timer.egr().write(|w| w.set_ug(true));
         timer.sr().write_value(Default::default());
-        follow(control_hz);
+        start_sample_trigger(control_hz);
         Self {
             enable: pins.connect(),
         }
@@ -134,10 +134,10 @@ impl Bridge {
 
     /// Returns the cause that has switched the outputs off since the bridge was last switched on, or acts now.
     #[inline(always)]
-    pub(crate) fn broken(&self) -> Option<Break> {
+    pub(crate) fn break_cause(&self) -> Option<Break> {
         let flags = TIM1.sr().read();
         // A fault inside the chip has its own flag, which also keeps the outputs off (RM0440, TIM1_SR.SBIF).
-        if flags.sbif() || flags.bif(0) && driver_faults() {
+        if flags.sbif() || flags.bif(0) && is_fault_line_low() {
             Some(Break::Driver)
         } else if flags.bif(0) {
             // The line is up, so the bridge is not the cause: a bridge fault holds it low for a millisecond or more.
@@ -152,7 +152,7 @@ impl Bridge {
     pub(crate) fn apply(&mut self, command: Command) {
         let timer = TIM1;
         if !command.bridge {
-            off();
+            switch_off();
             // The update before the next command loads this: the bridge starts with duty 0, not with its last duty.
             brake();
             // A fault that has ended may be cleared: a fault that still acts sets its flag again at once.
@@ -192,14 +192,14 @@ fn brake() {
     compare(HIGH, HIGH);
 }
 
-/// Sets TIM4 up to start with TIM1 and to trigger the converter [`LEAD`] before each of TIM1's updates.
-fn follow(control_hz: u32) {
+/// Sets TIM4 up to start with TIM1 and to trigger the converter [`SAMPLING_LEAD`] before each of TIM1's updates.
+fn start_sample_trigger(control_hz: u32) {
     RCC.apb1enr1().modify(|w| w.set_tim4en(true));
     let timer = TIM4;
     timer
         .arr()
         .write(|w| w.set_arr((CORE_HZ / control_hz - 1) as u16));
-    timer.cnt().write(|w| w.set_cnt(LEAD));
+    timer.cnt().write(|w| w.set_cnt(SAMPLING_LEAD));
     timer.smcr().write(|w| {
         w.set_ts(Ts::ITR0);
         w.set_sms(Sms::TRIGGER_MODE);
@@ -210,7 +210,7 @@ fn follow(control_hz: u32) {
 
 /// Switches the bridge off from anywhere, with only two stores.
 #[inline(always)]
-pub(crate) fn off() {
+pub(crate) fn switch_off() {
     TIM1.bdtr().modify(|w| w.set_moe(false));
     embassy_stm32::pac::GPIOB
         .bsrr()

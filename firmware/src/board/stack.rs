@@ -18,7 +18,7 @@ static FREE: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// Returns true if a word, counted from the stack's end, was never used. Only the stack lies in this region.
 #[inline(always)]
-fn untouched(word: usize) -> bool {
+fn is_painted(word: usize) -> bool {
     let end = &raw const _stack_end;
     // Within the stack's own region; volatile, because the compiler does not see the use of the stack.
     #[allow(unsafe_code)]
@@ -32,15 +32,15 @@ fn untouched(word: usize) -> bool {
 pub(crate) fn near_end() -> Option<u32> {
     let word = GUARD / 4;
     // Four words: a frame may skip one that it does not write.
-    let clean =
-        untouched(word) && untouched(word + 1) && untouched(word + 2) && untouched(word + 3);
-    (!clean).then_some(GUARD as u32)
+    let intact =
+        is_painted(word) && is_painted(word + 1) && is_painted(word + 2) && is_painted(word + 3);
+    (!intact).then_some(GUARD as u32)
 }
 
 /// Counts the bytes that were never used; slow.
-pub(crate) fn survey() {
+pub(crate) fn measure_free() {
     let words = (&raw const _stack_start as usize - &raw const _stack_end as usize) / 4;
-    let free = (0..words).take_while(|&word| untouched(word)).count();
+    let free = (0..words).take_while(|&word| is_painted(word)).count();
     FREE.store(4 * free as u32, Ordering::Relaxed);
 }
 

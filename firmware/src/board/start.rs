@@ -6,26 +6,26 @@ use embassy_stm32::interrupt::InterruptExt;
 use embassy_time::{Duration, Ticker};
 use heapless::spsc;
 use rig_firmware::capture::Capture;
-use rig_firmware::clerk::Clerk;
 use rig_firmware::config::{Config, Settings};
-use rig_firmware::examined::Examined;
+use rig_firmware::event::Event;
 use rig_firmware::nameplate;
-use rig_firmware::note::Note;
+use rig_firmware::prechecked_request::PrecheckedRequest;
 use rig_firmware::state::State;
+use rig_firmware::tick_session::TickSession;
 use rig_shared::estimation::OneLinkEstimator;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
 use super::clock::{self, LINK_PRIORITY, TASK_PRIORITY};
 use super::encoder::EncoderTimer;
-use super::health::{Checkup, Start};
+use super::health::{HealthMonitor, StartInfo};
 use super::pins::Pins;
 use super::pwm::Bridge;
-use super::queue::{Inlet, Outlet};
+use super::queue::{QueueReceiver, QueueSender};
 use super::storage::Storage;
-use super::tick::{NOTES, REQUESTS, Tick};
-use super::watchdog::{Part, Watchdog, report};
-use super::wires::Wires;
+use super::tick::{EVENTS, REQUESTS, Tick};
+use super::watchdog::{Task, Watchdog, check_in};
+use super::wire_check::WireCheck;
 use super::{cycles, health, heat, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
@@ -33,43 +33,44 @@ static CONFIG: StaticCell<Config> = StaticCell::new();
 static STATE: StaticCell<State> = StaticCell::new();
 static CAPTURE: ConstStaticCell<Capture> = ConstStaticCell::new(Capture::new());
 // A ring of n places holds n − 1.
-static NOTE_QUEUE: StaticCell<spsc::Queue<Note, { NOTES + 1 }>> = StaticCell::new();
-static REQUEST_QUEUE: StaticCell<spsc::Queue<Examined, { REQUESTS + 1 }>> = StaticCell::new();
+static EVENT_QUEUE: StaticCell<spsc::Queue<Event, { EVENTS + 1 }>> = StaticCell::new();
+static REQUEST_QUEUE: StaticCell<spsc::Queue<PrecheckedRequest, { REQUESTS + 1 }>> =
+    StaticCell::new();
 static STORE_QUEUE: StaticCell<spsc::Queue<Settings, 2>> = StaticCell::new();
-/// Tasks that must not wait while a trajectory is examined, which takes about 0.1 s.
-static PUNCTUAL: InterruptExecutor = InterruptExecutor::new();
-static EXECUTOR: StaticCell<Executor> = StaticCell::new();
+/// Tasks that must not wait while a trajectory is prechecked, which takes about 0.1 s.
+static HIGH_PRIORITY_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
 /// Initialises the board and runs it.
 pub(crate) fn run() -> ! {
     let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
-    let crystal = clock::crystal();
+    let crystal = clock::start_crystal();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
     clock::boost();
     let peripherals = embassy_stm32::init(clock::config(crystal));
-    clock::watch(crystal);
+    clock::enable_clock_security(crystal);
     cycles::start(&mut core.DCB, &mut core.DWT);
     interrupt::TIM3.set_priority(LINK_PRIORITY);
     let pins = Pins::new(peripherals);
 
-    let (mut config, own) = nameplate::one_link();
-    let (converter, supply) = Converter::new(pins.analog);
-    if !config.scaling.correct(supply) {
+    let (mut config, default_settings) = nameplate::one_link();
+    let (converter, supply_ratio) = Converter::new(pins.analog);
+    if !config.scaling.correct(supply_ratio) {
         defmt::warn!(
             "a supply of {=f32} times 3.3 V cannot be: codes are taken as at 3.3 V",
-            supply
+            supply_ratio
         );
     }
     let config: &'static Config = CONFIG.init(config);
-    let (storage, found) = Storage::open(config);
-    let settings = found.settings.unwrap_or(own);
+    let (storage, selection) = Storage::open(config);
+    let settings = selection.settings.unwrap_or(default_settings);
     let thresholds = config.current_thresholds();
     let bridge = Bridge::new(pins.bridge, config.rates.control_hz, thresholds);
     let state = state(config, settings);
-    state.warm_up(heat::kept().unwrap_or_default());
-    let (note_in, note_out) = NOTE_QUEUE.init(spsc::Queue::new()).split();
-    let (to_store, from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
+    state.restore_heat(heat::load().unwrap_or_default());
+    let (event_in, event_out) = EVENT_QUEUE.init(spsc::Queue::new()).split();
+    let (to_store, settings_from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
     let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
     let encoder = EncoderTimer::new(pins.encoder, &config.encoder);
     let Ok((sender, receiver)) = link::open(pins.link) else {
@@ -80,54 +81,54 @@ pub(crate) fn run() -> ! {
         config,
         state,
         capture: CAPTURE.take(),
-        clerk: Clerk::new(),
-        requests: Outlet(request_out),
-        notes: Inlet(note_in),
+        tick_session: TickSession::new(),
+        requests: QueueReceiver(request_out),
+        events: QueueSender(event_in),
         bridge,
         converter,
         encoder,
-        wires: Wires::new(),
+        wire_check: WireCheck::new(),
         period_cycles: Tick::period(config.rates.control_hz),
         entered: 0,
-        late: false,
-        checkup: Checkup::new(
-            Start {
+        next_waiting: false,
+        health_monitor: HealthMonitor::new(
+            StartInfo {
                 reset,
-                settings: found.origin,
+                settings: selection.origin,
                 crystal,
             },
             config.rates.control_hz,
         ),
-        to_store: Inlet(to_store),
+        to_store: QueueSender(to_store),
     });
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
     // Each task is spawned once. Its memory is reserved at compile time.
-    let placed = (
-        link::telemetry(config, sender, probe_out, note_out),
+    let tasks = (
+        link::telemetry(config, sender, probe_out, event_out),
         indicator(watchdog, pins.led),
         link::commands(config, receiver, probe_in, request_in),
-        keeper(storage, from_tick),
+        storage_task(storage, settings_from_tick),
     );
-    let (Ok(telemetry), Ok(indicator), Ok(commands), Ok(keeper)) = placed else {
+    let (Ok(telemetry), Ok(indicator), Ok(commands), Ok(storage_task)) = tasks else {
         unreachable!()
     };
     interrupt::CORDIC.set_priority(TASK_PRIORITY);
-    let punctual = PUNCTUAL.start(interrupt::CORDIC);
-    punctual.spawn(telemetry);
-    punctual.spawn(indicator);
-    EXECUTOR.init(Executor::new()).run(|spawner| {
+    let high_priority = HIGH_PRIORITY_EXECUTOR.start(interrupt::CORDIC);
+    high_priority.spawn(telemetry);
+    high_priority.spawn(indicator);
+    THREAD_EXECUTOR.init(Executor::new()).run(|spawner| {
         spawner.spawn(commands);
-        spawner.spawn(keeper);
+        spawner.spawn(storage_task);
     })
 }
 
-/// Runs the punctual tasks: the interrupt of an unused peripheral, raised by software.
+/// Runs the high-priority tasks: the interrupt of an unused peripheral, raised by software.
 #[interrupt]
 fn CORDIC() {
     // The executor was started with this interrupt.
     #[allow(unsafe_code)]
     unsafe {
-        PUNCTUAL.on_interrupt();
+        HIGH_PRIORITY_EXECUTOR.on_interrupt();
     }
 }
 
@@ -135,7 +136,7 @@ fn CORDIC() {
 #[inline(never)]
 fn state(config: &Config, settings: Settings) -> &'static mut State {
     match OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()) {
-        Ok(estimator) => STATE.init_with(|| State::with(config, settings, estimator)),
+        Ok(estimator) => STATE.init_with(|| State::with_estimator(config, settings, estimator)),
         // Tests on the desktop check the firmware's own settings; stored settings were checked when they were read.
         Err(_) => unreachable!(),
     }
@@ -155,24 +156,27 @@ async fn indicator(mut watchdog: Watchdog, mut led: Output<'static>) -> ! {
         }
         // Also in the first pass: the first health report comes after one second.
         if count % 100 == 1 {
-            stack::survey();
+            stack::measure_free();
         }
     }
 }
 
 /// Writes settings to flash when the tick passes some on.
 #[embassy_executor::task]
-async fn keeper(mut storage: Storage, mut from_tick: spsc::Consumer<'static, Settings>) -> ! {
+async fn storage_task(
+    mut storage: Storage,
+    mut settings_from_tick: spsc::Consumer<'static, Settings>,
+) -> ! {
     let mut ticker = Ticker::every(Duration::from_millis(5));
     loop {
         ticker.next().await;
-        report(Part::Keeper);
-        if let Some(settings) = from_tick.dequeue() {
-            let done = storage.store(&settings).await.is_ok();
-            if !done {
+        check_in(Task::Storage);
+        if let Some(settings) = settings_from_tick.dequeue() {
+            let success = storage.store(&settings).await.is_ok();
+            if !success {
                 defmt::warn!("the flash did not take the settings");
             }
-            tick::stored(done);
+            tick::report_store(success);
         }
     }
 }

@@ -7,7 +7,7 @@ use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::regs::Sr;
 use embassy_time::{Duration, Instant, Timer};
 use rig_firmware::config::{Config, Settings};
-use rig_firmware::stored::{self, Copy, Found, IMAGE};
+use rig_firmware::settings_storage::{self, MAX_COPY_BYTES, Selection, StoredCopy};
 
 /// Page size with two banks, bytes.
 const PAGE: usize = 2048;
@@ -15,7 +15,7 @@ const PAGE: usize = 2048;
 const PAGES: u8 = 128;
 /// Longest wait for the flash. Erasing a page takes at most 25 ms, a word 0.13 ms (DS12288, "Flash memory
 /// characteristics").
-const PATIENCE: Duration = Duration::from_millis(100);
+const TIMEOUT: Duration = Duration::from_millis(100);
 
 // Symbols of memory.x; only their addresses are used.
 #[allow(unsafe_code)]
@@ -25,84 +25,84 @@ unsafe extern "C" {
 
 /// The flash as storage.
 pub(crate) struct Storage {
-    /// The place to write next, and its number.
-    place: usize,
+    /// The slot to write next, and its number.
+    slot: usize,
     number: u32,
 }
 
 /// The flash did not carry out an operation.
-pub(crate) struct Refused;
+pub(crate) struct FlashError;
 
-/// Address of a place.
-fn address(place: usize) -> *mut u32 {
+/// Address of a slot.
+fn address(slot: usize) -> *mut u32 {
     let start = (&raw const _store_start).cast_mut();
-    start.wrapping_byte_add(place * PAGE)
+    start.wrapping_byte_add(slot * PAGE)
 }
 
-fn look(place: usize) -> Copy {
-    let mut bytes = [0; IMAGE];
+fn read_copy(slot: usize) -> StoredCopy {
+    let mut bytes = [0; MAX_COPY_BYTES];
     for (word, chunk) in bytes.chunks_exact_mut(4).enumerate() {
         // Inside the page, aligned; volatile, because the compiler does not see changes of the flash. A word that
         // cannot be corrected ends in `fault::non_maskable`, which allows it to be read unchanged.
         #[allow(unsafe_code)]
-        let value = unsafe { address(place).wrapping_add(word).read_volatile() };
+        let value = unsafe { address(slot).wrapping_add(word).read_volatile() };
         chunk.copy_from_slice(&value.to_le_bytes());
     }
-    stored::read(&bytes)
+    settings_storage::decode(&bytes)
 }
 
 impl Storage {
     /// Reads the stored settings.
-    pub(crate) fn open(config: &Config) -> (Self, Found) {
-        let found = stored::choose(config, [look(0), look(1)]);
+    pub(crate) fn open(config: &Config) -> (Self, Selection) {
+        let selection = settings_storage::select(config, [read_copy(0), read_copy(1)]);
         let storage = Self {
-            place: found.place,
-            number: found.number,
+            slot: selection.slot,
+            number: selection.number,
         };
-        (storage, found)
+        (storage, selection)
     }
 
     /// Stores settings over the older copy, and reads them back.
-    pub(crate) async fn store(&mut self, settings: &Settings) -> Result<(), Refused> {
+    pub(crate) async fn store(&mut self, settings: &Settings) -> Result<(), FlashError> {
         // With one bank, pages are twice as large, and writing would stall the control tick.
         if !FLASH.optr().read().dbank() {
-            return Err(Refused);
+            return Err(FlashError);
         }
         // Unchanged settings are skipped: a page endures ten thousand erasures (DS12288, "Flash memory endurance").
-        // They are written if the other place is damaged, because there would be no second copy.
-        if matches!(look(1 - self.place), Copy::Whole { number, settings: held }
-            if number.wrapping_add(1) == self.number && held == *settings)
-            && look(self.place) != Copy::Damaged
+        // They are written if the other slot is damaged, because there would be no second copy.
+        if matches!(read_copy(1 - self.slot), StoredCopy::Valid { number, settings: stored }
+            if number.wrapping_add(1) == self.number && stored == *settings)
+            && read_copy(self.slot) != StoredCopy::Damaged
         {
             return Ok(());
         }
-        let bytes = stored::write(settings, self.number).ok_or(Refused)?;
+        let bytes = settings_storage::encode(settings, self.number).ok_or(FlashError)?;
         unlock();
-        let done = self.write(&bytes).await;
+        let result = self.write(&bytes).await;
         FLASH.cr().modify(|w| w.set_lock(true));
-        done?;
-        let wanted = Copy::Whole {
+        result?;
+        let expected = StoredCopy::Valid {
             number: self.number,
             settings: *settings,
         };
-        if look(self.place) != wanted {
-            return Err(Refused);
+        if read_copy(self.slot) != expected {
+            return Err(FlashError);
         }
-        self.place = 1 - self.place;
+        self.slot = 1 - self.slot;
         self.number = self.number.wrapping_add(1);
         Ok(())
     }
 
-    async fn write(&self, bytes: &[u8]) -> Result<(), Refused> {
-        ready().await?;
+    async fn write(&self, bytes: &[u8]) -> Result<(), FlashError> {
+        wait_ready().await?;
         clear_errors();
         FLASH.cr().modify(|w| {
             w.set_per(true);
             w.set_bker(true);
-            w.set_pnb(PAGES - 2 + self.place as u8);
+            w.set_pnb(PAGES - 2 + self.slot as u8);
         });
         FLASH.cr().modify(|w| w.set_strt(true));
-        let erased = ready().await;
+        let erased = wait_ready().await;
         FLASH.cr().modify(|w| {
             w.set_per(false);
             w.set_bker(false);
@@ -123,12 +123,12 @@ impl Storage {
                 // Inside the page just erased: an image is shorter than a page.
                 #[allow(unsafe_code)]
                 unsafe {
-                    address(self.place)
+                    address(self.slot)
                         .wrapping_add(2 * index + half)
                         .write_volatile(value);
                 }
             }
-            let written = ready().await;
+            let written = wait_ready().await;
             FLASH.cr().modify(|w| w.set_pg(false));
             written?;
         }
@@ -152,17 +152,17 @@ fn clear_errors() {
 const ERRORS: u32 = 0x3fa;
 
 /// Waits for the flash without blocking other tasks.
-async fn ready() -> Result<(), Refused> {
+async fn wait_ready() -> Result<(), FlashError> {
     let start = Instant::now();
     while FLASH.sr().read().bsy() {
-        if start.elapsed() > PATIENCE {
-            return Err(Refused);
+        if start.elapsed() > TIMEOUT {
+            return Err(FlashError);
         }
         Timer::after_micros(200).await;
     }
     if FLASH.sr().read().0 & ERRORS == 0 {
         Ok(())
     } else {
-        Err(Refused)
+        Err(FlashError)
     }
 }

@@ -6,29 +6,29 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use embassy_stm32::interrupt;
 use rig_firmware::capture::Capture;
-use rig_firmware::clerk::{Clerk, Notes as _};
 use rig_firmware::config::{Config, Settings};
-use rig_firmware::examined::Examined;
-use rig_firmware::note::Note;
+use rig_firmware::event::Event;
+use rig_firmware::prechecked_request::PrecheckedRequest;
 use rig_firmware::sample::Sample;
 use rig_firmware::state::State;
 use rig_firmware::step::step;
+use rig_firmware::tick_session::{EventSink as _, TickSession};
 use rig_shared::wire::message::Refusal;
 
 use super::adc::Converter;
 use super::clock::CORE_HZ;
 use super::cycles;
 use super::encoder::EncoderTimer;
-use super::health::Checkup;
+use super::health::HealthMonitor;
 use super::heat;
 use super::pwm::{Break, Bridge};
-use super::queue::{Inlet, Outlet};
+use super::queue::{QueueReceiver, QueueSender};
 use super::stack;
-use super::watchdog::{Part, report};
-use super::wires::Wires;
+use super::watchdog::{Task, check_in};
+use super::wire_check::WireCheck;
 
 /// Notes that the queue to the telemetry task holds.
-pub(crate) const NOTES: usize = 64;
+pub(crate) const EVENTS: usize = 64;
 /// Requests that the queue from the command task holds.
 pub(crate) const REQUESTS: usize = 4;
 
@@ -37,18 +37,18 @@ pub(crate) struct Tick {
     pub(crate) config: &'static Config,
     pub(crate) state: &'static mut State,
     pub(crate) capture: &'static mut Capture,
-    pub(crate) clerk: Clerk,
-    pub(crate) requests: Outlet<Examined>,
-    pub(crate) notes: Inlet<Note>,
+    pub(crate) tick_session: TickSession,
+    pub(crate) requests: QueueReceiver<PrecheckedRequest>,
+    pub(crate) events: QueueSender<Event>,
     pub(crate) bridge: Bridge,
     pub(crate) converter: Converter,
     pub(crate) encoder: EncoderTimer,
-    pub(crate) wires: Wires,
+    pub(crate) wire_check: WireCheck,
     pub(crate) period_cycles: u32,
     pub(crate) entered: u32,
-    pub(crate) late: bool,
-    pub(crate) checkup: Checkup,
-    pub(crate) to_store: Inlet<Settings>,
+    pub(crate) next_waiting: bool,
+    pub(crate) health_monitor: HealthMonitor,
+    pub(crate) to_store: QueueSender<Settings>,
 }
 
 impl Tick {
@@ -61,40 +61,40 @@ impl Tick {
     #[inline(always)]
     fn run(&mut self) {
         let entered = cycles::now();
-        let codes = self.converter.take();
+        let codes = self.converter.read();
         let motion = self.encoder.read();
         // A tick and a half since the last one: an interrupt was late or missing.
-        let apart = entered.wrapping_sub(self.entered);
-        let overrun = self.late || apart > self.period_cycles + self.period_cycles / 2;
+        let elapsed = entered.wrapping_sub(self.entered);
+        let overrun = self.next_waiting || elapsed > self.period_cycles + self.period_cycles / 2;
         self.entered = entered;
-        let broken = self.bridge.broken();
+        let break_cause = self.bridge.break_cause();
         let sample = Sample {
             encoder: motion.count,
             edge_age: Some(motion.edge_age),
             current: codes.current,
             supply: codes.supply,
             temperature: codes.temperature,
-            driver_fault: broken == Some(Break::Driver),
+            driver_fault: break_cause == Some(Break::Driver),
             overrun,
-            comparator: broken == Some(Break::Comparator),
-            encoder_wrong: motion.wrong,
+            comparator: break_cause == Some(Break::Comparator),
+            encoder_wrong: motion.error,
             // Not in the tick of the estimator's update, an even one with a high load.
-            encoder_open: self.wires.look(self.state.tick & 1 != 0),
+            encoder_open: self.wire_check.check(self.state.tick & 1 != 0),
             stack_left: stack::near_end(),
         };
         let output = step(self.config, self.state, sample);
         self.bridge.apply(output.command);
-        heat::keep(self.state.tick, self.state.heat());
-        self.clerk
-            .report(self.state, self.capture, &output, &mut self.notes);
+        heat::store(self.state.tick, self.state.heat());
+        self.tick_session
+            .report(self.state, self.capture, &output, &mut self.events);
         self.serve();
-        report(Part::Tick);
+        check_in(Task::Tick);
         let cycles = cycles::now().wrapping_sub(entered);
-        let (tick, dropped) = (self.state.tick, self.clerk.dropped());
-        if let Some(health) = self.checkup.count(cycles, tick, dropped) {
-            self.notes.put(Note::Health(health));
+        let (tick, dropped) = (self.state.tick, self.tick_session.dropped_windows());
+        if let Some(health) = self.health_monitor.record_tick(cycles, tick, dropped) {
+            self.events.push(Event::Health(health));
         }
-        self.late = self.converter.is_waiting();
+        self.next_waiting = self.converter.is_waiting();
     }
 }
 
@@ -102,57 +102,62 @@ impl Tick {
     /// Serves at most one request, in a tick that has time.
     #[inline(always)]
     fn serve(&mut self) {
-        let outcome = match STORED.load(Ordering::Acquire) {
-            NOT_YET => None,
-            DONE => Some(Ok(())),
+        let result = match STORE_RESULT.load(Ordering::Acquire) {
+            STORE_PENDING => None,
+            STORED_OK => Some(Ok(())),
             _ => Some(Err(Refusal::StorageFailed)),
         };
-        if let Some(outcome) = outcome {
-            STORED.store(NOT_YET, Ordering::Relaxed);
-            self.clerk.stored(self.state, outcome, &mut self.notes);
+        if let Some(result) = result {
+            STORE_RESULT.store(STORE_PENDING, Ordering::Relaxed);
+            self.tick_session
+                .finish_store(self.state, result, &mut self.events);
         }
-        if !self.state.has_time() || !self.notes.roomy() {
+        if !self.state.accepts_request() || !self.events.has_room() {
             return;
         }
-        let Some(examined) = self.requests.oldest() else {
+        let Some(prechecked) = self.requests.oldest() else {
             return;
         };
-        let to_store = self.clerk.serve(
+        let to_store = self.tick_session.serve(
             self.config,
             self.state,
             self.capture,
-            examined,
-            &mut self.notes,
+            prechecked,
+            &mut self.events,
         );
         self.requests.release();
         if let Some(settings) = to_store
-            && !self.to_store.put(settings)
+            && !self.to_store.push(settings)
         {
-            let outcome = Err(Refusal::StorageFailed);
-            self.clerk.stored(self.state, outcome, &mut self.notes);
+            let result = Err(Refusal::StorageFailed);
+            self.tick_session
+                .finish_store(self.state, result, &mut self.events);
         }
     }
 }
 
 /// Result of storing, from the storage task to the tick.
-static STORED: AtomicU8 = AtomicU8::new(NOT_YET);
-const NOT_YET: u8 = 0;
-const DONE: u8 = 1;
-const FAILED: u8 = 2;
+static STORE_RESULT: AtomicU8 = AtomicU8::new(STORE_PENDING);
+const STORE_PENDING: u8 = 0;
+const STORED_OK: u8 = 1;
+const STORE_FAILED: u8 = 2;
 
 /// Reports the result of storing.
-pub(crate) fn stored(done: bool) {
-    STORED.store(if done { DONE } else { FAILED }, Ordering::Release);
+pub(crate) fn report_store(success: bool) {
+    STORE_RESULT.store(
+        if success { STORED_OK } else { STORE_FAILED },
+        Ordering::Release,
+    );
 }
 
 /// The one [`Tick`], passed to the interrupt before it is enabled.
-struct Owned(UnsafeCell<MaybeUninit<Tick>>);
+struct TickCell(UnsafeCell<MaybeUninit<Tick>>);
 
 // Only the interrupt uses it once it is enabled, and it does not interrupt itself.
 #[allow(unsafe_code)]
-unsafe impl Sync for Owned {}
+unsafe impl Sync for TickCell {}
 
-static TICK: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
+static TICK: TickCell = TickCell(UnsafeCell::new(MaybeUninit::uninit()));
 
 /// Passes everything to the interrupt and starts the sampling.
 pub(crate) fn start(mut tick: Tick) {
@@ -160,7 +165,7 @@ pub(crate) fn start(mut tick: Tick) {
     // The interrupt is still disabled, so nothing else uses it.
     #[allow(unsafe_code)]
     let tick = unsafe { (*TICK.0.get()).write(tick) };
-    tick.converter.listen();
+    tick.converter.enable_interrupt();
     tick.bridge.run();
 }
 

@@ -7,15 +7,15 @@ use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 
 /// Longest silence of the tick or the telemetry, µs: a thousand control ticks.
-const PATIENCE_US: u32 = 100_000;
-/// Feedings in a row that tasks without a deadline may miss. One examines a trajectory in up to 0.2 s, and the other
+const TIMEOUT_US: u32 = 100_000;
+/// Feedings in a row that tasks without a deadline may miss. One prechecks a trajectory in up to 0.2 s, and the other
 /// does not run meanwhile. At 100 feedings a second this is half a second.
-const MAY_MISS: u32 = 50;
+const MAX_MISSED: u32 = 50;
 
 /// Parts that report, one bit each.
 #[derive(Clone, Copy)]
 #[repr(u8)]
-pub(crate) enum Part {
+pub(crate) enum Task {
     /// The control interrupt.
     Tick = 1,
     /// The task that sends.
@@ -23,18 +23,18 @@ pub(crate) enum Part {
     /// The task that listens.
     Commands = 4,
     /// The task that stores.
-    Keeper = 8,
+    Storage = 8,
 }
 
-const PUNCTUAL: u8 = Part::Tick as u8 | Part::Telemetry as u8;
-const ALL: u8 = PUNCTUAL | Part::Commands as u8 | Part::Keeper as u8;
+const DEADLINE_TASKS: u8 = Task::Tick as u8 | Task::Telemetry as u8;
+const ALL: u8 = DEADLINE_TASKS | Task::Commands as u8 | Task::Storage as u8;
 
-static REPORTED: AtomicU8 = AtomicU8::new(0);
+static CHECKED_IN: AtomicU8 = AtomicU8::new(0);
 
 /// Reports that a part is alive.
 #[inline(always)]
-pub(crate) fn report(part: Part) {
-    REPORTED.fetch_or(part as u8, Ordering::Relaxed);
+pub(crate) fn check_in(part: Task) {
+    CHECKED_IN.fetch_or(part as u8, Ordering::Relaxed);
 }
 
 /// The watchdog.
@@ -46,20 +46,20 @@ pub(crate) struct Watchdog {
 impl Watchdog {
     /// Starts it. Only a reset stops it.
     pub(crate) fn start(peripheral: Peri<'static, IWDG>) -> Self {
-        let mut inner = IndependentWatchdog::new(peripheral, PATIENCE_US);
+        let mut inner = IndependentWatchdog::new(peripheral, TIMEOUT_US);
         inner.unleash();
         Self { missed: 0, inner }
     }
 
     /// Feeds it if every part has reported. Parts without a deadline may report once in several feedings.
     pub(crate) fn feed(&mut self) {
-        let reported = REPORTED.load(Ordering::Relaxed);
+        let reported = CHECKED_IN.load(Ordering::Relaxed);
         let all = reported & ALL == ALL;
-        if reported & PUNCTUAL != PUNCTUAL || (!all && self.missed >= MAY_MISS) {
+        if reported & DEADLINE_TASKS != DEADLINE_TASKS || (!all && self.missed >= MAX_MISSED) {
             return;
         }
-        let heard = if all { ALL } else { PUNCTUAL };
-        REPORTED.fetch_and(!heard, Ordering::Relaxed);
+        let clear = if all { ALL } else { DEADLINE_TASKS };
+        CHECKED_IN.fetch_and(!clear, Ordering::Relaxed);
         self.missed = if all { 0 } else { self.missed + 1 };
         self.inner.pet();
     }

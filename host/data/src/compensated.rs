@@ -6,8 +6,8 @@ use rig_shared::scalar::Real as _;
 
 use crate::block::{Block, JointColumns};
 use crate::prepare::{
-    LowPass, Piece, PrepareError, Recording, Treatment, central_difference, each_piece, later,
-    second_difference, stretch,
+    LowPass, Piece, PrepareError, PreprocessingPlan, Recording, central_difference, each_piece,
+    later, second_difference, stretch,
 };
 use rig_model::effects::{Effects, State, Turn, is_torque, outruns, shifted};
 
@@ -40,24 +40,22 @@ impl<'a> Compensated<'a> {
         inner: &'a dyn Recording,
         effects: &'a Effects,
         chain: &'a Chain<f64>,
-        treatment: &Treatment,
+        plan: &PreprocessingPlan,
         loads: bool,
     ) -> Result<Self, PrepareError> {
-        let filter = treatment
-            .position_filter()
-            .ok_or_else(|| PrepareError::Cutoff {
-                cutoff: treatment.cutoff,
-                rate: treatment.sample_rate,
-                nyquist: treatment.sample_rate / 2.0,
-            })?;
+        let filter = plan.position_filter().ok_or_else(|| PrepareError::Cutoff {
+            cutoff: plan.cutoff,
+            rate: plan.sample_rate,
+            nyquist: plan.sample_rate / 2.0,
+        })?;
         Ok(Self {
             inner,
             effects,
             chain,
             filter,
-            period: treatment.dt(),
-            lead: treatment.torque_lead,
-            measured_derivatives: treatment.measured_derivatives,
+            period: plan.dt(),
+            lead: plan.torque_lead,
+            measured_derivatives: plan.measured_derivatives,
             loads,
         })
     }
@@ -121,7 +119,7 @@ impl Recording for Compensated<'_> {
                     let first = piece.rows.t.get(piece.core_start).copied();
                     let gap = first.unwrap_or(running.last_time) - running.last_time;
                     for (memory, placed) in running.memory.iter_mut().zip(self.effects.placed()) {
-                        *memory = placed.effect.rested(*memory, gap);
+                        *memory = placed.effect.after_pause(*memory, gap);
                     }
                 }
                 self.work(&mut piece, running)?;
@@ -284,18 +282,20 @@ impl Compensated<'_> {
                 let through = kind.acts_through_contact();
                 instant.direction = if through { 1.0 } else { at.qd[p.joint].sgn() };
                 if kind.is_presliding() {
-                    instant.beside = beside[p.joint];
+                    instant.extra_friction_ratio = beside[p.joint];
                 }
                 let mut torque = p.effect.torque(&mut memory[k], &instant);
                 if kind.is_presliding() {
-                    slid[p.joint] = p.effect.bent(&memory[k], instant.beside);
+                    slid[p.joint] = p
+                        .effect
+                        .contact_deflection(&memory[k], instant.extra_friction_ratio);
                 }
                 if through {
                     beside[p.joint] += self.effects.over_coulomb(p.joint, torque);
                     torque *= slid[p.joint];
                 }
                 sum[p.joint] += torque;
-                if !kind.on_the_link() {
+                if !kind.acts_on_link() {
                     behind[p.joint] -= torque;
                 }
             }

@@ -23,15 +23,15 @@ fn read(text: impl AsRef<[u8]>) -> Result<(Vec<Block>, Vec<String>), String> {
 /// Asserts that a file holds the rows (0, 0.5, −12.5), (0.001, 0.25, 3) in these lines, with these remarks.
 fn holds(text: impl AsRef<[u8]>, first_line: u64, remarks: &[&str]) {
     let shown = String::from_utf8_lossy(text.as_ref()).into_owned();
-    let (blocks, said) = read(text).unwrap_or_else(|e| panic!("{shown}: {e}"));
+    let (blocks, warnings) = read(text).unwrap_or_else(|e| panic!("{shown}: {e}"));
     let block = &blocks[0];
     assert_eq!(block.t, [0.0, 0.001], "{shown}");
     assert_eq!(block.joints[0].q, [0.5, 0.25], "{shown}");
     assert_eq!(block.joints[0].tau, [-12.5, 3.0], "{shown}");
     assert_eq!(block.first_line, first_line, "{shown}");
-    assert_eq!(said.len(), remarks.len(), "{shown}: {said:?}");
-    for (said, remark) in said.iter().zip(remarks) {
-        assert!(said.contains(remark), "{shown}: {said}");
+    assert_eq!(warnings.len(), remarks.len(), "{shown}: {warnings:?}");
+    for (warning, remark) in warnings.iter().zip(remarks) {
+        assert!(warning.contains(remark), "{shown}: {warning}");
     }
 }
 
@@ -58,16 +58,16 @@ fn quotes_are_those_of_csv() {
         2,
         &[],
     );
-    let said = read("t,q1,tau1,note\n0,0,0,\n0.1,0,0,\"abc\n0.2,0,0,\n").unwrap_err();
+    let message = read("t,q1,tau1,note\n0,0,0,\n0.1,0,0,\"abc\n0.2,0,0,\n").unwrap_err();
     assert!(
-        said.contains("a.csv:3:") && said.contains("not closed"),
-        "{said}"
+        message.contains("a.csv:3:") && message.contains("not closed"),
+        "{message}"
     );
     // The line of an error after a text of two lines.
-    let said = read("note,t,q1,tau1\n\"a\nb\",0,0,0\n\"c\",1,\"x\",0\n").unwrap_err();
+    let message = read("note,t,q1,tau1\n\"a\nb\",0,0,0\n\"c\",1,\"x\",0\n").unwrap_err();
     assert!(
-        said.contains("a.csv:4:") && said.contains("`q1` holds \"x\""),
-        "{said}"
+        message.contains("a.csv:4:") && message.contains("`q1` holds \"x\""),
+        "{message}"
     );
 }
 
@@ -149,10 +149,10 @@ fn separators_and_decimal_commas_are_read_where_they_are_unambiguous() {
             "separated by `;`, as in the header",
         ),
     ] {
-        let said = read(text).unwrap_err();
+        let message = read(text).unwrap_err();
         assert!(
-            said.contains(place) && said.contains(words),
-            "{text}: {said}"
+            message.contains(place) && message.contains(words),
+            "{text}: {message}"
         );
     }
 }
@@ -182,10 +182,10 @@ fn what_stands_before_the_header_is_passed_over() {
         2,
         &["line 1 begins with `%`", "blanks"],
     );
-    let said = read("# nothing\n\n").unwrap_err();
-    assert!(said.contains("is empty"), "{said}");
-    let said = read("\n\nt,q1,tau1\n0,0,0\n0.1,x,0\n").unwrap_err();
-    assert!(said.contains("a.csv:5:"), "{said}");
+    let message = read("# nothing\n\n").unwrap_err();
+    assert!(message.contains("is empty"), "{message}");
+    let message = read("\n\nt,q1,tau1\n0,0,0\n0.1,x,0\n").unwrap_err();
+    assert!(message.contains("a.csv:5:"), "{message}");
 }
 
 #[test]
@@ -197,8 +197,8 @@ fn carriage_returns_alone_end_lines() {
         4,
         &["line 3"],
     );
-    let said = read("t,q1,tau1\r0,0,0\r0.1,x,0\r").unwrap_err();
-    assert!(said.contains("a.csv:3:"), "{said}");
+    let message = read("t,q1,tau1\r0,0,0\r0.1,x,0\r").unwrap_err();
+    assert!(message.contains("a.csv:3:"), "{message}");
 }
 
 #[test]
@@ -209,8 +209,8 @@ fn exponents_of_fortran_are_exponents() {
         &[],
     );
     for bad in ["D", "1D", "D5", "1D5D", "0x1D", "5.2E-01D0"] {
-        let said = read(format!("t,q1,tau1\n0,{bad},0\n")).unwrap_err();
-        assert!(said.contains("column `q1` holds"), "{bad}: {said}");
+        let message = read(format!("t,q1,tau1\n0,{bad},0\n")).unwrap_err();
+        assert!(message.contains("column `q1` holds"), "{bad}: {message}");
     }
 }
 
@@ -234,19 +234,19 @@ fn what_no_measurement_has_is_named_in_few_digits() {
         ),
         ("t,q1,tau1\n0,0,0\n1e300,0,0\n", "a.csv:3:", "is no time"),
     ] {
-        let said = read(text).unwrap_err();
+        let message = read(text).unwrap_err();
         assert!(
-            said.contains(place) && said.contains(words),
-            "{text}: {said}"
+            message.contains(place) && message.contains(words),
+            "{text}: {message}"
         );
-        assert!(said.len() < 200, "{said}");
+        assert!(message.len() < 200, "{message}");
     }
     // Nanoseconds since 1970 have their own message; very small numbers are accepted.
     assert!(read("t,q1,tau1\n1700000000000000000,1e-321,0\n1700000000001000000,0,1e9\n").is_ok());
-    let said = read("t,q1,tau1\n1700000000.25,0,0\n1700000000.1234567,0,0\n").unwrap_err();
+    let message = read("t,q1,tau1\n1700000000.25,0,0\n1700000000.1234567,0,0\n").unwrap_err();
     assert!(
-        said.contains("jumps back from 1700000000.25 to 1700000000.123457 s"),
-        "{said}"
+        message.contains("jumps back from 1700000000.25 to 1700000000.123457 s"),
+        "{message}"
     );
 }
 
@@ -277,8 +277,11 @@ fn files_of_other_programs_are_named_by_their_first_bytes() {
         (b"[{\"t\":0,\"q1\":0}]".to_vec(), "JSON"),
         (b"<?xml version=\"1.0\"?><robot/>".to_vec(), "XML"),
     ] {
-        let said = read(&bytes).unwrap_err();
-        assert!(said.contains(words) && !said.contains('\n'), "{said}");
+        let message = read(&bytes).unwrap_err();
+        assert!(
+            message.contains(words) && !message.contains('\n'),
+            "{message}"
+        );
     }
 }
 

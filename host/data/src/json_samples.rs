@@ -313,8 +313,8 @@ mod tests {
             (r#"[1,2,3]"#, "no JSON object"),
             (r#"{"t":1,"i1":1,"note":1} {}"#, "no JSON object"),
         ] {
-            let said = samples.read(message.as_bytes(), &mut values).unwrap_err();
-            assert!(said.contains(words), "{message}: {said}");
+            let error = samples.read(message.as_bytes(), &mut values).unwrap_err();
+            assert!(error.contains(words), "{message}: {error}");
         }
     }
 }

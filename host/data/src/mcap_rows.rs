@@ -254,12 +254,12 @@ impl McapRows {
                 }
                 Ok(_) => {}
                 Err(e) => {
-                    let said = e.to_string();
-                    let said = said.lines().next().unwrap_or_default().to_owned();
+                    let message = e.to_string();
+                    let message = message.lines().next().unwrap_or_default().to_owned();
                     let at = self.records.bytes_read();
                     return Err(self.error(format!(
                         "the MCAP file is damaged before byte {at} ({}); copy it from the recorder again",
-                        said.trim_end_matches('.')
+                        message.trim_end_matches('.')
                     )));
                 }
             }

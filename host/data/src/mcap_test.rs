@@ -115,13 +115,13 @@ fn read(bytes: &[u8]) -> Result<(Vec<Block>, Vec<String>), String> {
 
 /// Asserts that a file is refused with a one-line message that contains these words.
 fn refused(result: Result<(Vec<Block>, Vec<String>), String>, words: &[&str]) {
-    let said = match result {
-        Err(said) => said,
+    let message = match result {
+        Err(message) => message,
         Ok((_, remarks)) => panic!("read, with {remarks:?}, instead of {words:?}"),
     };
-    assert!(!said.contains('\n'), "{said}");
+    assert!(!message.contains('\n'), "{message}");
     for word in words {
-        assert!(said.contains(word), "no {word:?} in: {said}");
+        assert!(message.contains(word), "no {word:?} in: {message}");
     }
 }
 
@@ -187,7 +187,7 @@ fn a_file_that_breaks_off_is_read_up_to_there() {
             ([bytes.clone(), vec![0; 4096]].concat(), 2000..=2000),
         ];
         for (k, (cut, rows)) in cuts.into_iter().enumerate() {
-            let (blocks, said) = read(&cut).unwrap();
+            let (blocks, warnings) = read(&cut).unwrap();
             let found = blocks[0].len();
             assert!(rows.contains(&found), "{compression} {k}: {found}");
             let last = format!(
@@ -195,8 +195,10 @@ fn a_file_that_breaks_off_is_read_up_to_there() {
                 (found - 1) as f64 / 1000.0
             );
             assert!(
-                said.len() == 1 && said[0].contains(&last) && said[0].contains("samples are lost"),
-                "{compression} {k}: {said:?}"
+                warnings.len() == 1
+                    && warnings[0].contains(&last)
+                    && warnings[0].contains("samples are lost"),
+                "{compression} {k}: {warnings:?}"
             );
         }
     }
@@ -409,7 +411,7 @@ fn joint_states_of_ros_2_are_read_by_the_names_of_the_joints() {
                 )
             }
         };
-        let (blocks, said) = read_with(&whole(&arm_file("/joint_states", make)), &arm).unwrap();
+        let (blocks, warnings) = read_with(&whole(&arm_file("/joint_states", make)), &arm).unwrap();
         let [shoulder, elbow] = blocks[0].joints.as_slice() else {
             panic!()
         };
@@ -422,11 +424,13 @@ fn joint_states_of_ros_2_are_read_by_the_names_of_the_joints() {
             (&shoulder.tau, &elbow.tau),
             (&vec![-0.25; 10], &vec![0.5; 10])
         );
-        assert_eq!(said.len(), 2, "{said:?}");
-        assert!(said[0].contains("header stamp") && said[0].contains("1700000000.123456789 s"));
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
         assert!(
-            said[1].contains("the robot has not are passed over: \"finger\""),
-            "{said:?}"
+            warnings[0].contains("header stamp") && warnings[0].contains("1700000000.123456789 s")
+        );
+        assert!(
+            warnings[1].contains("the robot has not are passed over: \"finger\""),
+            "{warnings:?}"
         );
     }
 }
@@ -537,11 +541,11 @@ fn joint_states_of_ros_1_are_read_too() {
         channel(1, 4, "/joint_states", "ros1"),
     ];
     let states: Vec<u8> = (0..5).flat_map(|k| message(1, ns(k), &make(k))).collect();
-    let (blocks, said) = read(&whole(&[channels.concat(), states].concat())).unwrap();
+    let (blocks, warnings) = read(&whole(&[channels.concat(), states].concat())).unwrap();
     assert_eq!(blocks[0].joints[0].q, [0.0, 1.0, 2.0, 3.0, 4.0]);
     assert!(
-        (blocks[0].t[4] - 0.008).abs() < 1e-12 && said.len() == 1,
-        "{said:?}"
+        (blocks[0].t[4] - 0.008).abs() < 1e-12 && warnings.len() == 1,
+        "{warnings:?}"
     );
 }
 
@@ -558,11 +562,11 @@ fn joints_are_matched_or_refused_by_name() {
         ["left_elbow", "left_shoulder"],
         ["a::elbow", "a::shoulder"],
     ] {
-        let (blocks, said) = read_with(&file(names), &robot(&ARM)).unwrap();
+        let (blocks, warnings) = read_with(&file(names), &robot(&ARM)).unwrap();
         assert_eq!(blocks[0].joints[0].q, [2.0; 10]);
         assert!(
-            said.iter().any(|s| s.contains("behind the prefix")),
-            "{said:?}"
+            warnings.iter().any(|s| s.contains("behind the prefix")),
+            "{warnings:?}"
         );
     }
     let ambiguous = ["a/shoulder", "b/shoulder"];
@@ -607,11 +611,12 @@ fn publishers_that_share_a_topic_are_told_apart() {
             state(false, ns(k), &["finger"], [&[9.0], &[], &[9.0]])
         }
     };
-    let (blocks, said) =
+    let (blocks, warnings) =
         read_with(&whole(&arm_file("/joint_states", mixed)), &robot(&ARM)).unwrap();
     assert_eq!(blocks[0].len(), 5);
-    let told = |s: &String| s.contains("the first is message 2 on /joint_states, with \"finger\"");
-    assert!(said.iter().any(told), "{said:?}");
+    let is_remark =
+        |s: &String| s.contains("the first is message 2 on /joint_states, with \"finger\"");
+    assert!(warnings.iter().any(is_remark), "{warnings:?}");
     // Messages that alternate between parts of the robot are refused.
     let parts = |k: u64| match k {
         0 => mixed(0),
@@ -642,16 +647,18 @@ fn publishers_that_share_a_topic_are_told_apart() {
             state(false, ns(k), &ARM, [&[1.0, 2.0], &[], &[3.0, 4.0]])
         }),
     ];
-    let (_, said) = read_with(&whole(&records.concat()), &robot(&ARM)).unwrap();
+    let (_, warnings) = read_with(&whole(&records.concat()), &robot(&ARM)).unwrap();
     assert!(
-        said.iter()
+        warnings
+            .iter()
             .any(|s| s.contains("read from topic /arm/joint_states")),
-        "{said:?}"
+        "{warnings:?}"
     );
     assert!(
-        said.iter()
+        warnings
+            .iter()
             .any(|s| s.contains("message 1 on /gripper/joint_states")),
-        "{said:?}"
+        "{warnings:?}"
     );
 }
 
@@ -710,12 +717,13 @@ fn arrays_that_are_missing_or_no_numbers_are_named() {
     );
     // Interfaces that a driver does not have are NaN from the first message on.
     let never = file(&|_| [two.clone(), nan.clone(), two.clone()]);
-    let (blocks, said) = read_with(&never, &arm).unwrap();
+    let (blocks, warnings) = read_with(&never, &arm).unwrap();
     assert_eq!(blocks[0].joints[0].qd, None);
     assert!(
-        said.iter()
+        warnings
+            .iter()
             .any(|s| s.contains("velocity of joint \"elbow\" is NaN")),
-        "{said:?}"
+        "{warnings:?}"
     );
     let huge = file(&|_| [vec![1e224, 0.0], vec![], two.clone()]);
     refused(
@@ -726,10 +734,10 @@ fn arrays_that_are_missing_or_no_numbers_are_named() {
     let unstamped = whole(&arm_file("/joint_states", |_| {
         state(false, 0, &ARM, [&two, &[], &two])
     }));
-    let (blocks, said) = read_with(&unstamped, &arm).unwrap();
+    let (blocks, warnings) = read_with(&unstamped, &arm).unwrap();
     assert!((blocks[0].t[9] - 0.018).abs() < 1e-12);
     assert!(
-        said[0].contains("header stamp of message 1 is zero"),
-        "{said:?}"
+        warnings[0].contains("header stamp of message 1 is zero"),
+        "{warnings:?}"
     );
 }

@@ -129,10 +129,10 @@ fn what_the_drives_cannot_turn_is_named_by_line_and_column() {
             ..
         }
     ));
-    let said = error.to_string();
+    let message = error.to_string();
     assert!(
-        said.contains("data.csv:22: ") && said.contains("screw of drive 2"),
-        "{said}"
+        message.contains("data.csv:22: ") && message.contains("screw of drive 2"),
+        "{message}"
     );
 
     let refused = |text: &str| {
@@ -140,20 +140,20 @@ fn what_the_drives_cannot_turn_is_named_by_line_and_column() {
             .unwrap_err()
             .to_string()
     };
-    let said = refused("t,q1,q2,q3,qm4,qm5,tau1,tau2,tau3,tau4,tau5\n");
+    let message = refused("t,q1,q2,q3,qm4,qm5,tau1,tau2,tau3,tau4,tau5\n");
     assert!(
-        said.contains("neither `q4`") && said.contains("nor `qm1`"),
-        "{said}"
+        message.contains("neither `q4`") && message.contains("nor `qm1`"),
+        "{message}"
     );
-    let said = refused("t,q1,q2,q3,q4,q5,taum1,taum2,taum3,taum4,tau5\n");
+    let message = refused("t,q1,q2,q3,q4,q5,taum1,taum2,taum3,taum4,tau5\n");
     assert!(
-        said.contains("no `tau2`") && said.contains("motor 5"),
-        "{said}"
+        message.contains("no `tau2`") && message.contains("motor 5"),
+        "{message}"
     );
-    let said = refused("t,q1,q2,q3,q4,q5,tau1,tau2,tau3,tau4\n");
+    let message = refused("t,q1,q2,q3,q4,q5,tau1,tau2,tau3,tau4\n");
     assert!(
-        said.contains("neither `tau5`") && said.contains("`taum5`"),
-        "{said}"
+        message.contains("neither `tau5`") && message.contains("`taum5`"),
+        "{message}"
     );
     let optional = file(&dir, "t,q1,q2,q3,q4,q5\n0,0,-1.5,0,0,0\n");
     let source = Source::open_with(&optional, &robot, EffortNeed::Optional).unwrap();

@@ -4,10 +4,10 @@
 //! Without limits in the robot's description, the columns are only compared with each other.
 
 use super::block::{Block, JointColumns};
-use super::held::held;
-use super::jump::jump;
+use super::position_jump::largest_position_jump;
 use super::rate_spike::rate_spike;
-use super::spike::spike;
+use super::sample_hold::repeated_rows;
+use super::torque_spike::largest_torque_spike;
 use super::unsigned::{Unsigned, unsigned};
 use rig_model::robot::{Joint, JointKind, Robot, is_placeholder};
 use rig_numerics::statistics::median;
@@ -350,7 +350,7 @@ fn repeated(block: &Block) -> Vec<Implausible> {
     let together = |of: fn(&JointColumns) -> &[f64]| {
         let mut found: Vec<(usize, Vec<usize>)> = Vec::new();
         for (k, columns) in (1..).zip(&block.joints) {
-            let Some(rows) = held(of(columns)) else {
+            let Some(rows) = repeated_rows(of(columns)) else {
                 continue;
             };
             match found.iter_mut().find(|(own, _)| *own == rows) {
@@ -453,14 +453,14 @@ fn position_fault(
     if let Some(lost) = unsigned(q) {
         return Some(lost_sign("q", k, lost));
     }
-    if let Some(jump) = jump(t, q) {
-        let turns = jump.by.abs() / core::f64::consts::TAU;
+    if let Some(jump) = largest_position_jump(t, q) {
+        let turns = jump.change.abs() / core::f64::consts::TAU;
         return Some(Implausible::Jump {
             joint: k,
             at: t[jump.row],
-            by: jump.by,
+            by: jump.change,
             more: more(jump.count),
-            fastest: jump.fastest,
+            fastest: jump.largest_motion_step,
             mend: if joint.kind == JointKind::Revolute && (turns - 1.0).abs() < 0.02 {
                 "that is a turn: give the angle counted on beyond it"
             } else {
@@ -625,13 +625,13 @@ fn check_effort(
         found.push(lost_sign("tau", k, lost));
         return;
     }
-    if let Some(spike) = spike(&columns.tau) {
+    if let Some(spike) = largest_torque_spike(&columns.tau) {
         found.push(Implausible::Spike {
             joint: k,
             at: t[spike.row],
             value: spike.value,
             more: more(spike.count),
-            usual: spike.usual,
+            usual: spike.usual_torque,
             unit,
         });
         return;

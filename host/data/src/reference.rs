@@ -303,8 +303,8 @@ fn reference_unit(k: usize, columns: &JointColumns, joint: &Joint) -> Option<Imp
 /// they are not the same motion.
 pub fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
     // The variance of a constant column is rounding error.
-    let stands = |column: &[f64]| column.windows(2).all(|pair| pair[0] == pair[1]);
-    if stands(q) || stands(reference) {
+    let is_constant = |column: &[f64]| column.windows(2).all(|pair| pair[0] == pair[1]);
+    if is_constant(q) || is_constant(reference) {
         return None;
     }
     let [xx, xy, yy] = moments_about_means(q, reference);
@@ -407,7 +407,7 @@ mod tests {
         }
     }
 
-    fn said(block: &Block) -> Vec<String> {
+    fn doubts(block: &Block) -> Vec<String> {
         let found = strange_references(block, &robot(block.joints.len()));
         found.iter().map(ToString::to_string).collect()
     }
@@ -417,16 +417,16 @@ mod tests {
         for value in block.joints[0].reference.as_mut().unwrap() {
             *value = change(*value);
         }
-        let said = said(&block);
-        assert_eq!(said.len(), 1, "{said:?}");
-        said[0].clone()
+        let doubts = doubts(&block);
+        assert_eq!(doubts.len(), 1, "{doubts:?}");
+        doubts[0].clone()
     }
 
     #[test]
     fn references_of_sound_loops_are_not_strange() {
         for joints in [1, 3] {
             for lag in [0.0, 0.02, 0.1, 0.3] {
-                assert_eq!(said(&made(joints, lag)), [""; 0], "{lag}");
+                assert_eq!(doubts(&made(joints, lag)), [""; 0], "{lag}");
             }
         }
         // A loop with droop, noise, a joint that sags while holding, a small swing at a constant reference.
@@ -436,7 +436,7 @@ mod tests {
         }
         block.joints[1].q = vec![0.31; block.t.len()];
         block.joints[1].reference = Some(vec![0.4; block.t.len()]);
-        assert_eq!(said(&block), [""; 0]);
+        assert_eq!(doubts(&block), [""; 0]);
     }
 
     #[test]
@@ -456,10 +456,10 @@ mod tests {
                 .q
                 .iter_mut()
                 .for_each(|q| *q = 2.5 * (*q - 3.0) + 3.0);
-            let said = said(&block);
+            let doubts = doubts(&block);
             assert!(
-                said[0].contains("ref1 jumps by a turn (") && said[0].contains("more places"),
-                "{said:?}"
+                doubts[0].contains("ref1 jumps by a turn (") && doubts[0].contains("more places"),
+                "{doubts:?}"
             );
         }
         let mut degrees = block;
@@ -470,7 +470,7 @@ mod tests {
             .q
             .iter_mut()
             .for_each(|q| *q = 2.5 * (*q - 3.0) + 3.0);
-        assert!(said(&degrees)[0].contains("degrees) at t ="));
+        assert!(doubts(&degrees)[0].contains("degrees) at t ="));
     }
 
     #[test]
@@ -492,11 +492,11 @@ mod tests {
             let mut block = made(1, 0.02);
             let other = made(1, by);
             block.joints[0].reference = Some(other.joints[0].q.clone());
-            let said = said(&block);
+            let doubts = doubts(&block);
             let word = if by > 0.0 { "behind" } else { "ahead of" };
             assert!(
-                said.len() == 1 && said[0].contains(&format!("s {word} q1: moved")),
-                "{by}: {said:?}"
+                doubts.len() == 1 && doubts[0].contains(&format!("s {word} q1: moved")),
+                "{by}: {doubts:?}"
             );
         }
         let mut block = made(3, 0.02);
@@ -505,11 +505,11 @@ mod tests {
             block.joints[2].reference.take(),
         );
         (block.joints[0].reference, block.joints[2].reference) = (third, first);
-        let said = said(&block);
+        let doubts = doubts(&block);
         assert!(
-            said.len() == 2 && said[0].contains("ref1 goes with q3"),
-            "{said:?}"
+            doubts.len() == 2 && doubts[0].contains("ref1 goes with q3"),
+            "{doubts:?}"
         );
-        assert!(said[1].contains("ref3 goes with q1"), "{said:?}");
+        assert!(doubts[1].contains("ref3 goes with q1"), "{doubts:?}");
     }
 }

@@ -6,9 +6,9 @@ use std::ops::Range;
 use rig_shared::safety::Mode;
 
 use super::block::Block;
-use super::history::Past;
 use super::prepare::PrepareError;
 use super::prepare::{LowPass, Recording, central_difference, second_difference};
+use super::thermal_history::ThermalHistory;
 
 /// Ratio of the noise variance from third differences to that from second differences above which noise counts as
 /// white. White noise has a ratio of 1; a low-pass filter lowers it. Noise that rises with frequency also counts as
@@ -96,7 +96,7 @@ pub struct Run {
     /// Start of the session on the clock of `t`, s: first row of this recording or of the one that it continues.
     pub began: f64,
     /// Motion of the joints from the start of the session to this stretch.
-    pub past: Past,
+    pub thermal_history: ThermalHistory,
     /// s
     pub t: Vec<f64>,
     /// One entry per joint.

@@ -159,10 +159,10 @@ impl Source {
         let sampling = Sampling::of(&times);
         // A cut-off file is reported by the pass that reaches its end.
         let remarks = rows.remarks().into_iter();
-        let said = remarks.filter(|remark| !matches!(remark, Remark::CutOff { .. }));
+        let kept = remarks.filter(|remark| !matches!(remark, Remark::CutOff { .. }));
         layout
             .warnings
-            .extend(said.map(|remark| Warning::Reading { remark }));
+            .extend(kept.map(|remark| Warning::Reading { remark }));
         Ok(Self {
             path: path.into(),
             joints,

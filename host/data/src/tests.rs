@@ -108,12 +108,12 @@ fn a_joint_without_columns_beside_others_may_be_one_that_never_moves() {
     let mut finger = robot.joints[0].clone();
     finger.name = "finger".into();
     robot.joints.push(finger);
-    let said = read(&path, &robot).unwrap_err().to_string();
+    let message = read(&path, &robot).unwrap_err().to_string();
     assert!(
-        said.contains("no column `q2` (position of joint `finger`")
-            && said
+        message.contains("no column `q2` (position of joint `finger`")
+            && message
                 .contains("where joint `finger` never moves, make it type=\"fixed\" in the URDF"),
-        "{said}"
+        "{message}"
     );
 }
 
@@ -213,21 +213,21 @@ fn wrong_recordings_are_named_by_line_and_column() {
         ),
     ];
     for (text, place, parts) in cases {
-        let said = read(&folder.file(&text), &rig()).unwrap_err().to_string();
+        let message = read(&folder.file(&text), &rig()).unwrap_err().to_string();
         assert!(
-            said.contains(place) && !said.contains('\n'),
-            "{text}: {said}"
+            message.contains(place) && !message.contains('\n'),
+            "{text}: {message}"
         );
         for part in parts {
-            assert!(said.contains(part), "{text}: {said}");
+            assert!(message.contains(part), "{text}: {message}");
         }
     }
-    let said = read(&folder.file(format!("t,q1,i1\n{rows}")), &arm(1))
+    let message = read(&folder.file(format!("t,q1,i1\n{rows}")), &arm(1))
         .unwrap_err()
         .to_string();
     assert!(
-        said.contains("`i1` is a motor current") && said.contains("no [joint.drive]"),
-        "{said}"
+        message.contains("`i1` is a motor current") && message.contains("no [joint.drive]"),
+        "{message}"
     );
     assert!(matches!(
         read(folder.0.path(), &rig()),
@@ -452,22 +452,22 @@ fn damaged_mcap_gets_a_sentence() {
     write(&path, &awkward_rows()[..2000]);
     let good = std::fs::read(&path).unwrap();
     let whole = read(&path, &rig()).unwrap().0;
-    let said_of = |bytes: &[u8]| {
+    let read_bytes = |bytes: &[u8]| {
         let damaged = folder.path("b.mcap");
         std::fs::write(&damaged, bytes).unwrap();
         read(&damaged, &rig())
     };
     for cut in [6, 9, 100, 300] {
-        let said = said_of(&good[..cut]).unwrap_err().to_string();
+        let message = read_bytes(&good[..cut]).unwrap_err().to_string();
         assert!(
-            said.contains("b.mcap") && !said.contains('\n'),
-            "{cut}: {said}"
+            message.contains("b.mcap") && !message.contains('\n'),
+            "{cut}: {message}"
         );
     }
     // The part before the break is read, and the break is reported.
     let all = &whole[0];
     for cut in [good.len() / 3, good.len() / 2, good.len() - 1] {
-        let (blocks, warnings) = said_of(&good[..cut]).unwrap();
+        let (blocks, warnings) = read_bytes(&good[..cut]).unwrap();
         let block = &blocks[0];
         let rows = block.len();
         assert!(blocks.len() == 1 && rows > 100);
@@ -478,7 +478,7 @@ fn damaged_mcap_gets_a_sentence() {
     for at in (8..good.len()).step_by(good.len() / 150) {
         let mut bytes = good.clone();
         bytes[at] ^= 0x20;
-        match said_of(&bytes) {
+        match read_bytes(&bytes) {
             Err(e) => assert!(!e.to_string().contains('\n'), "{e}"),
             // Indices, padding and metadata are not data: then every sample must be right.
             Ok((blocks, _)) => assert!(
@@ -510,13 +510,13 @@ fn writers_refuse_what_readers_would() {
     ));
     for name in ["a.csv", "a.mcap"] {
         let mut writer = create(name, &columns()).unwrap();
-        let said = writer
+        let message = writer
             .push_row(&[0.0, 1.0, f64::NAN, 0.0])
             .unwrap_err()
             .to_string();
         assert!(
-            said.contains("row 1") && said.contains("`tau1` is NaN"),
-            "{said}"
+            message.contains("row 1") && message.contains("`tau1` is NaN"),
+            "{message}"
         );
         assert!(writer.push_row(&[0.0, 1.0]).is_err());
         drop(writer);
@@ -588,8 +588,11 @@ fn wrong_units_are_named_and_right_ones_are_not() {
         (1e6, "microseconds"),
         (1e9, "nanoseconds"),
     ] {
-        let said = scaled(&|b| all(&mut b.t, factor));
-        assert!(said.contains(&format!("t looks like {unit}")), "{said}");
+        let message = scaled(&|b| all(&mut b.t, factor));
+        assert!(
+            message.contains(&format!("t looks like {unit}")),
+            "{message}"
+        );
     }
     assert!(scaled(&|b| all(&mut b.t, 1e-3)).contains("more than ten times its limit"));
 }
@@ -689,12 +692,12 @@ fn real_recordings_are_accepted_without_false_alarm() {
     assert!(count > 0);
     // Motor positions in columns of their own: no `q1`, and the message says so.
     let tx40 = Robot::load(&data.join("staubli_tx40/tx40.urdf")).unwrap();
-    let said = Source::open(&data.join("staubli_tx40/motor_1kHz.csv"), &tx40)
+    let message = Source::open(&data.join("staubli_tx40/motor_1kHz.csv"), &tx40)
         .unwrap_err()
         .to_string();
     assert!(
-        said.contains("no column `q1`") && said.contains("`qm1`"),
-        "{said}"
+        message.contains("no column `q1`") && message.contains("`qm1`"),
+        "{message}"
     );
 }
 

@@ -4,7 +4,7 @@ use rig_shared::multibody::{COLUMNS, column};
 
 use crate::ExciteError;
 use crate::error::wrong;
-use rig_model::robot::{Robot, sound};
+use rig_model::robot::{Robot, is_safe_magnitude};
 use rig_model::simulate::Model;
 
 /// Highest velocity for which a motion is sized, rad/s or m/s: above that of any robot joint.
@@ -117,7 +117,7 @@ pub(super) fn bounds_of(
             }
         }
         // A value beyond any drive often means "no limit"; a row weighted by it would be lost.
-        let reachable = |limit: &f64| sound(*limit);
+        let reachable = |limit: &f64| is_safe_magnitude(*limit);
         let acceleration = limits
             .acceleration
             .filter(reachable)

@@ -12,7 +12,7 @@ use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::position::PositionTorque;
 use crate::unmodelled::tilt::BaseTilt;
-use rig_data::prepare::{Masked, Survey, Treatment};
+use rig_data::prepare::{Masked, PreprocessingPlan, Survey};
 
 /// An identified base parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -118,7 +118,7 @@ pub struct Identification {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Details {
     /// Preparation.
-    pub treatment: Treatment,
+    pub treatment: PreprocessingPlan,
     /// Rows excluded from the fit.
     pub masked: Vec<Masked>,
     /// Summaries of the training recordings.

@@ -1,8 +1,8 @@
 //! The conversation with the rig: greeting, requests that are carried out once, keep-alive messages.
 //!
 //! One request is active at a time and keeps its number when it is sent again. If the rig has already answered a
-//! number, it only repeats the answer ([`Ledger`](rig_shared::wire::Ledger)). A request is thus carried out once, even
-//! if the line loses it or its answer. `Hello` clears the numbers in the rig.
+//! number, it only repeats the answer ([`AnswerLog`](rig_shared::wire::AnswerLog)). A request is thus carried out once,
+//! even if the line loses it or its answer. `Hello` clears the numbers in the rig.
 
 use std::collections::VecDeque;
 use std::time::Duration;

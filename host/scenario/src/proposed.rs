@@ -82,7 +82,7 @@ impl Scenario {
     /// Returns the same rig without external loads.
     pub fn unburdened(&self) -> Self {
         let outside =
-            |effect: &Effect| Kind::named(effect.name(), None).is_some_and(Kind::is_external);
+            |effect: &Effect| Kind::from_name(effect.name(), None).is_some_and(Kind::is_external);
         Self {
             hidden: (self.hidden.iter().copied())
                 .filter(|hidden| !outside(&hidden.effect))

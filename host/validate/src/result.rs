@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use rig_data::prepare::Treatment;
+use rig_data::prepare::PreprocessingPlan;
 use rig_identify::ResidualReport;
 
 /// Predicted and measured torque of one joint.
@@ -131,5 +131,5 @@ pub struct Validation {
     pub taken_off: Option<String>,
     /// Treatment of the recordings for the torque check.
     #[serde(skip)]
-    pub treatment: Treatment,
+    pub treatment: PreprocessingPlan,
 }

@@ -1,7 +1,7 @@
 //! Treatment of the recordings for the torque check.
 
 use crate::{Options, ValidateError};
-use rig_data::prepare::{Choice, Recording, Survey, Treatment};
+use rig_data::prepare::{Choice, PreprocessingPlan, Recording, Survey};
 use rig_identify::treatment_for;
 use rig_model::robot::Robot;
 
@@ -12,7 +12,7 @@ pub(crate) fn treatment(
     recordings: &[&dyn Recording],
     surveys: Vec<Survey>,
     options: &Options,
-) -> Result<(Vec<Survey>, Treatment, Option<String>), ValidateError> {
+) -> Result<(Vec<Survey>, PreprocessingPlan, Option<String>), ValidateError> {
     let chosen = |surveys, note| {
         let (surveys, treatment) = treatment_for(robot, recordings, surveys, &options.prepare)?;
         Ok((surveys, treatment, note))
@@ -32,7 +32,8 @@ pub(crate) fn treatment(
     if prepare.torque_lead == 0.0 {
         prepare.torque_lead = band.torque_lead;
     }
-    let Ok(mut treatment) = Treatment::decide(&surveys, &prepare, &robot.torque_limits()) else {
+    let Ok(mut treatment) = PreprocessingPlan::decide(&surveys, &prepare, &robot.torque_limits())
+    else {
         let note = format!(
             "These recordings cannot be judged in the band that the description was identified in (cut-off {} Hz, {} rows per second), so one was chosen from them: the errors are not those of the identification's hold-out.",
             band.cutoff, band.rate

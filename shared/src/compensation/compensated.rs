@@ -1,6 +1,6 @@
 //! One effect that has passed its checks.
 
-use super::refusal::EffectFault;
+use super::effect_fault::EffectFault;
 use super::role::Role;
 use crate::effects::{Effect, Instant, Memory, Parameter, Scale};
 use crate::precompensation::{direction, finite};
@@ -17,7 +17,7 @@ pub(super) struct Compensated<T> {
     /// True if all shapes are whole. The motor's angle within a turn then suffices, and has less rounding error.
     pub(super) whole: bool,
     /// True if the effect is smaller at high speed than at low speed.
-    pub(super) falls: bool,
+    pub(super) falls_with_speed: bool,
 }
 
 impl<T: Scalar> Compensated<T> {
@@ -29,8 +29,8 @@ impl<T: Scalar> Compensated<T> {
         let kind = effect.kind;
         let role = Role::of(kind).ok_or(EffectFault::NotCompensable(kind))?;
         let about = kind.about();
-        within(about.gains, &effect.gains, false)?;
-        within(about.shapes, &effect.shapes, true)?;
+        check_bounds(about.gains, &effect.gains, false)?;
+        check_bounds(about.shapes, &effect.shapes, true)?;
         let whole = |shape: &T| shape.to_f64() as i64 as f64 == shape.to_f64();
         let sliding = |speed: f64| {
             let at = Instant {
@@ -45,34 +45,34 @@ impl<T: Scalar> Compensated<T> {
             effect,
             role,
             whole: effect.shapes.iter().all(whole),
-            falls: sliding(SPEEDS[1]).lt(sliding(SPEEDS[0])),
+            falls_with_speed: sliding(SPEEDS[1]).lt(sliding(SPEEDS[0])),
         })
     }
 
     /// Sets the velocity and the direction of the planned motion at which the law is evaluated, from those of the
-    /// reference (`wanted`) and of the link (`measured`), rad/s. `velocity_threshold` is that of the friction law.
+    /// reference (`planned`) and of the link (`measured`), rad/s. `velocity_threshold` is that of the friction law.
     #[inline(always)]
     pub(super) fn plan(
         &self,
         instant: &mut Instant<T>,
         velocity_threshold: T,
-        wanted: T,
+        planned: T,
         measured: T,
     ) {
-        let dry = self.role == Role::Dry;
-        let ahead = wanted.abs().lt(measured.abs());
+        let dry = self.role == Role::DryFriction;
+        let ahead = planned.abs().lt(measured.abs());
         // The faster speed, in the reference's direction.
-        let backwards = wanted.lt(T::ZERO);
+        let backwards = planned.lt(T::ZERO);
         let faster = T::select(backwards, -measured.abs(), measured.abs());
-        instant.velocity = if dry && self.falls && ahead {
+        instant.velocity = if dry && self.falls_with_speed && ahead {
             faster
         } else {
-            wanted
+            planned
         };
         instant.direction = if dry {
-            direction(wanted, measured, velocity_threshold)
+            direction(planned, measured, velocity_threshold)
         } else {
-            wanted.sgn()
+            planned.sgn()
         };
     }
 }
@@ -93,7 +93,7 @@ pub(super) fn evaluate<T: Real>(effect: &Effect<T>, memory: &mut Memory<T>, at: 
 
 /// Checks the bounds of parameters. With `divided` the lower bound of a logarithmic parameter is excluded: the law
 /// divides by it.
-fn within<T: Scalar>(
+fn check_bounds<T: Scalar>(
     parameters: &[Parameter],
     values: &[T],
     divided: bool,

@@ -6,9 +6,9 @@ use crate::effects::{About, Channel, Direction};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// A torque with the direction and share of the friction law.
-    Dry,
+    DryFriction,
     /// A torque at the measured position, in full.
-    Standing,
+    StaticTorque,
     /// A correction of the measured position.
     Position,
     /// A correction of the measured current.
@@ -19,20 +19,20 @@ pub enum Role {
 
 impl Role {
     /// Returns the role by the effect's description.
-    pub(crate) const fn by(about: &About) -> Option<Self> {
+    pub(crate) const fn from_about(about: &About) -> Option<Self> {
         match (about.channel, about.direction) {
-            (Channel::Torque, Direction::Dry) if about.compensable => Some(Self::Dry),
+            (Channel::Torque, Direction::Dry) if about.compensable => Some(Self::DryFriction),
             // A payload belongs into the model, which knows the direction of gravity.
             (Channel::Torque | Channel::Load, Direction::Indifferent)
-                if about.compensable && !same(about.name, "payload") =>
+                if about.compensable && !str_eq(about.name, "payload") =>
             {
-                Some(Self::Standing)
+                Some(Self::StaticTorque)
             }
             // A sensor error can be subtracted only if it is a constant or a known function of the position.
-            (Channel::Position, _) if same(about.name, "encoder_eccentricity") => {
+            (Channel::Position, _) if str_eq(about.name, "encoder_eccentricity") => {
                 Some(Self::Position)
             }
-            (Channel::Effort, _) if same(about.name, "current_offset") => Some(Self::Current),
+            (Channel::Effort, _) if str_eq(about.name, "current_offset") => Some(Self::Current),
             (Channel::Voltage, _) => Some(Self::Voltage),
             _ => None,
         }
@@ -40,7 +40,7 @@ impl Role {
 }
 
 /// Compares two texts at compile time.
-const fn same(a: &str, b: &str) -> bool {
+const fn str_eq(a: &str, b: &str) -> bool {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     let mut k = 0;
     while k < a.len() && k < b.len() && a[k] == b[k] {

@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use crate::compensation::{Compensation, EFFECTS, Now, Output, Reading, Role, State};
+use crate::compensation::{Compensation, EFFECTS, Inputs, Output, PositionError, Role, State};
 use crate::effects::{Effect, Instant, Kind, Memory};
 use crate::precompensation::PrecompensationSettings;
 
@@ -22,11 +22,11 @@ struct Rig {
     effects: Vec<Effect<f64>>,
     position: f64,
     tick: u32,
-    lead: f64,
+    torque_delay: f64,
 }
 
 impl Rig {
-    fn new(effects: &[Effect<f64>], lead: f64) -> Self {
+    fn new(effects: &[Effect<f64>], torque_delay: f64) -> Self {
         let mut given = [None; EFFECTS];
         for (place, effect) in given.iter_mut().zip(effects) {
             *place = Some(*effect);
@@ -37,48 +37,50 @@ impl Rig {
             effects: effects.to_vec(),
             position: 0.3,
             tick: 0,
-            lead,
+            torque_delay,
         }
     }
 
-    fn now(&self, velocity: f64) -> Now<f64> {
+    fn inputs(&self, velocity: f64) -> Inputs<f64> {
         let motor = RATIO * self.position;
-        Now {
+        Inputs {
             position: self.position,
             velocity,
             gear_ratio: RATIO,
             motor_angle: motor,
             angle_in_turn: motor.rem_euclid(TAU),
-            placed: true,
+            position_known: true,
             busy: self.tick % EVERY != 1,
-            turns: self.tick % 2 == 1,
+            rotates_waves: self.tick % 2 == 1,
             drive_torque: 2.0,
             period: PERIOD,
-            lead: self.lead,
-            lead_ticks: (self.lead / PERIOD) as u8,
-            lead_share: (self.lead / PERIOD).fract(),
-            ..Now::default()
+            torque_delay: self.torque_delay,
+            delay_ticks: (self.torque_delay / PERIOD) as u8,
+            delay_fraction: (self.torque_delay / PERIOD).fract(),
+            ..Inputs::default()
         }
     }
 
-    fn step(&mut self, velocity: f64) -> (Output<f64>, Reading<f64>) {
+    fn step(&mut self, velocity: f64) -> (Output<f64>, PositionError<f64>) {
         self.position += velocity * PERIOD;
         self.tick += 1;
-        let now = self.now(velocity);
+        let inputs = self.inputs(velocity);
         let settings = PrecompensationSettings {
             enabled: false,
             gain: 0.0,
             gain_at_rest: 0.0,
             velocity_threshold: 0.01,
         };
-        let reading = self.compensation.turn(&mut self.state, &now);
-        let torque = self.compensation.torque(&settings, &mut self.state, &now);
+        let reading = self.compensation.turn(&mut self.state, &inputs);
+        let torque = self
+            .compensation
+            .torque(&settings, &mut self.state, &inputs);
         (torque, reading)
     }
 
-    /// Returns torque and reading error by the formulas, `lead` later.
-    fn truth(&self, velocity: f64, lead: f64) -> [f64; 2] {
-        let position = self.position + lead * velocity;
+    /// Returns torque and reading error by the formulas, `torque_delay` later.
+    fn truth(&self, velocity: f64, torque_delay: f64) -> [f64; 2] {
+        let position = self.position + torque_delay * velocity;
         let at = Instant {
             position,
             motor_angle: RATIO * position,
@@ -87,8 +89,8 @@ impl Rig {
         };
         let mut sums = [0.0; 2];
         for effect in &self.effects {
-            let of_position = Role::of(effect.kind) == Some(Role::Position);
-            sums[usize::from(of_position)] += effect.torque(&mut Memory::default(), &at);
+            let has_position_waves = Role::of(effect.kind) == Some(Role::Position);
+            sums[usize::from(has_position_waves)] += effect.torque(&mut Memory::default(), &at);
         }
         sums
     }
@@ -107,21 +109,21 @@ fn periodic() -> impl Iterator<Item = Kind> {
 /// the time when it acts, and the explained torque equals the formula now.
 #[test]
 fn every_periodic_effect_is_its_formula_at_any_speed() {
-    let lead = 3.7 * PERIOD;
+    let torque_delay = 3.7 * PERIOD;
     assert_eq!(periodic().count(), 5);
     for kind in periodic() {
         let effects: Vec<_> = (2..=9).map(|order| wave(kind, f64::from(order))).collect();
         let mut worst = [0.0_f64; 3];
         for speed in [0.0, 0.1, 1.0, -3.0, 6.0] {
-            let mut rig = Rig::new(&effects, lead);
+            let mut rig = Rig::new(&effects, torque_delay);
             for tick in 0..4000 {
                 let (torque, reading) = rig.step(speed);
                 if tick < 70 {
                     continue;
                 }
-                let [ahead, _] = rig.truth(speed, lead);
+                let [ahead, _] = rig.truth(speed, torque_delay);
                 let [here, read] = rig.truth(speed, 0.0);
-                worst[0] = worst[0].max((torque.feed - ahead).abs());
+                worst[0] = worst[0].max((torque.feedforward - ahead).abs());
                 worst[1] = worst[1].max((reading.error - read).abs());
                 worst[2] = worst[2].max((torque.explained - here).abs());
             }
@@ -159,7 +161,7 @@ fn fast_waves_are_followed_until_there_are_none() {
         for tick in 0..4000 {
             let (torque, _) = rig.step(speed);
             if tick > 70 {
-                worst = worst.max((torque.feed - rig.truth(speed, 0.0)[0]).abs() / 8.0);
+                worst = worst.max((torque.feedforward - rig.truth(speed, 0.0)[0]).abs() / 8.0);
             }
         }
         std::println!("order {order} at {speed} rad/s: {worst:.5} of the amplitude");
@@ -167,7 +169,7 @@ fn fast_waves_are_followed_until_there_are_none() {
     }
     let mut rig = Rig::new(&[wave(Kind::Cogging, 84.0)], 0.0);
     for _ in 0..100 {
-        assert_eq!(rig.step(2.5).0.feed, 0.0);
+        assert_eq!(rig.step(2.5).0.feedforward, 0.0);
     }
 }
 
@@ -199,14 +201,14 @@ proptest! {
             // A jump by half a turn of the joint.
             rig.position += if ticks % 7 == 0 { 3.0 } else { 0.0 };
             for _ in 0..ticks {
-                prop_assert!(rig.step(speed).0.feed.abs() < 2.02);
+                prop_assert!(rig.step(speed).0.feedforward.abs() < 2.02);
             }
         }
         // The rotation that a jump spoils, and one reset of each wave.
         for _ in 0..12 {
             rig.step(0.0);
         }
-        let off = rig.step(0.0).0.feed - rig.truth(0.0, 0.0)[0];
+        let off = rig.step(0.0).0.feedforward - rig.truth(0.0, 0.0)[0];
         prop_assert!(off.abs() < 1e-9, "{off}");
     }
 }

@@ -51,14 +51,14 @@ pub fn regressor<T: Real>(
     [acceleration, cosine, sine, velocity, direction, T::ONE]
 }
 
-/// Returns the joint torque for one tick and advances the adaptation. `feed` is a known torque in addition to the
-/// model, N·m. `gains.derivative` must be above zero.
+/// Returns the joint torque for one tick and advances the adaptation. `feedforward` is a known torque in addition to
+/// the model, N·m. `gains.derivative` must be above zero.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &mut State<T>,
     measured: Measured<T>,
     reference: Reference<T>,
-    feed: T,
+    feedforward: T,
 ) -> Torque<T> {
     let gains = &config.gains;
     let slope = gains.proportional / gains.derivative;
@@ -77,8 +77,8 @@ pub fn step<T: Real<Mask = bool>>(
     }
     let [_, _, _, _, coulomb, _] = state.theta;
     let friction = direction * coulomb;
-    let wish = model - gains.derivative * s + feed;
-    let torque = Torque::within(config.torque_limit, wish, friction);
+    let unlimited = model - gains.derivative * s + feedforward;
+    let torque = Torque::saturated(config.torque_limit, unlimited, friction);
     if !torque.limited {
         let adaptation = &config.adaptation;
         let zone = adaptation.dead_zone;

@@ -14,12 +14,13 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// Returns the joint torque for one tick; `feed` is a known additional torque, N·m. `design_inertia` must be > 0.
+/// Returns the joint torque for one tick; `feedforward` is a known additional torque, N·m. `design_inertia` must be >
+/// 0.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     measured: Measured<T>,
     reference: Reference<T>,
-    feed: T,
+    feedforward: T,
 ) -> Torque<T> {
     let model = &config.model;
     let acceleration = reference.acceleration
@@ -42,6 +43,7 @@ pub fn step<T: Real<Mask = bool>>(
         measured.velocity,
         planned,
     );
-    let wish = load + model.viscous * measured.velocity + model.offset + friction + feed;
-    Torque::within(config.torque_limit, wish, friction)
+    let unlimited =
+        load + model.viscous * measured.velocity + model.offset + friction + feedforward;
+    Torque::saturated(config.torque_limit, unlimited, friction)
 }

@@ -61,15 +61,15 @@ pub struct State<T> {
     /// Voltage that the integrator holds, V.
     pub integral: T,
     /// Expected current at the end of the period, A.
-    pub expected: T,
+    pub predicted: T,
 }
 
 /// Returns the expected current when the voltage for this reference acts, A: the reference delayed by the loop's lag.
 /// It reverses when the current does, without its noise. Call it once in a period.
 #[inline(always)]
-pub fn expect<T: Real>(config: &Config<T>, state: &mut State<T>, reference: T) -> T {
-    state.expected += config.closed * (reference - state.expected);
-    state.expected
+pub fn predict<T: Real>(config: &Config<T>, state: &mut State<T>, reference: T) -> T {
+    state.predicted += config.closed * (reference - state.predicted);
+    state.predicted
 }
 
 /// Inputs of the loop in one period.
@@ -103,23 +103,23 @@ pub fn step<T: Real<Mask = bool>>(
     input: Input<T>,
 ) -> Output<T> {
     let error = input.reference - input.current;
-    let wish = config.proportional * error + state.integral + input.back_emf;
-    let most = config.duty_limit * input.supply;
-    if !T::ZERO.lt(most) || !wish.le(wish) {
+    let unlimited = config.proportional * error + state.integral + input.back_emf;
+    let limit = config.duty_limit * input.supply;
+    if !T::ZERO.lt(limit) || !unlimited.le(unlimited) {
         return Output {
             voltage: T::ZERO,
             duty: T::ZERO,
             limited: true,
         };
     }
-    let voltage = wish.clamp_to(-most, most);
+    let voltage = unlimited.clamp_to(-limit, limit);
     // Back-calculation with the winding's time constant: the integrator ends as for the reference that the voltage can
     // just follow.
-    state.integral += config.integral * (error + (voltage - wish) / config.proportional);
+    state.integral += config.integral * (error + (voltage - unlimited) / config.proportional);
     Output {
         voltage,
         duty: voltage / input.supply,
-        limited: most.lt(wish.abs()),
+        limited: limit.lt(unlimited.abs()),
     }
 }
 
@@ -180,11 +180,11 @@ mod tests {
         for velocity in [0.0, 2.0, -2.0] {
             for (k, (current, output)) in run(1.0, velocity, 24.0, 60).iter().enumerate() {
                 let t = (k + 1) as f64 * PERIOD;
-                let expected = 1.0 - libm::exp(-core::f64::consts::TAU * 400.0 * t);
+                let predicted = 1.0 - libm::exp(-core::f64::consts::TAU * 400.0 * t);
                 assert!(!output.limited);
                 assert!(
-                    (current - expected).abs() < 1e-4,
-                    "{t}: {current} {expected}"
+                    (current - predicted).abs() < 1e-4,
+                    "{t}: {current} {predicted}"
                 );
             }
         }

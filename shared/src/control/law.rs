@@ -13,21 +13,27 @@ pub struct State<T> {
     pub adaptive: adaptive::State<T>,
 }
 
-/// Returns the joint torque for one tick by the selected law. `feed` is a known torque in addition to the model
+/// Returns the joint torque for one tick by the selected law. `feedforward` is a known torque in addition to the model
 /// ([`compensation`](crate::compensation)), N·m; the torque limit includes it.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &mut State<T>,
     measured: Measured<T>,
     reference: Reference<T>,
-    feed: T,
+    feedforward: T,
 ) -> Torque<T> {
     match config.kind {
-        ControlKind::ProportionalDerivative => pd::step(config, measured, reference, feed),
-        ControlKind::ComputedTorque => computed_torque::step(config, measured, reference, feed),
-        ControlKind::Adaptive => {
-            adaptive::step(config, &mut state.adaptive, measured, reference, feed)
+        ControlKind::ProportionalDerivative => pd::step(config, measured, reference, feedforward),
+        ControlKind::ComputedTorque => {
+            computed_torque::step(config, measured, reference, feedforward)
         }
+        ControlKind::Adaptive => adaptive::step(
+            config,
+            &mut state.adaptive,
+            measured,
+            reference,
+            feedforward,
+        ),
     }
 }
 

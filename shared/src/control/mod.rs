@@ -58,13 +58,13 @@ impl<T: Real> Gains<T> {
 
 impl<T: Real<Mask = bool>> Gains<T> {
     /// Returns true if all gains are finite and not negative, and the divisors among them are above zero.
-    pub fn usable(&self) -> bool {
-        let most = T::from_f64(1.0e30);
-        let within = |x: T| T::ZERO.le(x) && x.le(most);
-        within(self.proportional)
-            && within(self.derivative)
-            && within(self.adaptation)
-            && within(self.current_bandwidth)
+    pub fn is_valid(&self) -> bool {
+        let limit = T::from_f64(1.0e30);
+        let in_range = |x: T| T::ZERO.le(x) && x.le(limit);
+        in_range(self.proportional)
+            && in_range(self.derivative)
+            && in_range(self.adaptation)
+            && in_range(self.current_bandwidth)
             && T::ZERO.lt(self.derivative)
             && T::ZERO.lt(self.current_bandwidth)
     }
@@ -91,15 +91,15 @@ pub struct Torque<T> {
 }
 
 impl<T: Real<Mask = bool>> Torque<T> {
-    /// Returns the wished torque cut to ±`limit`, N·m. A NaN becomes 0 and counts as limited.
+    /// Returns the `unlimited` torque cut to ±`limit`, N·m. A NaN becomes 0 and counts as limited.
     #[inline]
-    pub fn within(limit: T, wish: T, friction: T) -> Self {
-        let number = wish.le(wish);
-        let wish = T::select(number, wish, T::ZERO);
-        let value = wish.clamp_to(-limit, limit);
+    pub fn saturated(limit: T, unlimited: T, friction: T) -> Self {
+        let is_number = unlimited.le(unlimited);
+        let unlimited = T::select(is_number, unlimited, T::ZERO);
+        let value = unlimited.clamp_to(-limit, limit);
         Self {
             value,
-            limited: !number || limit.lt(wish.abs()),
+            limited: !is_number || limit.lt(unlimited.abs()),
             friction,
         }
     }
@@ -159,7 +159,7 @@ mod tests {
         let omega = libm::sqrt(gains.proportional / inertia);
         assert!((omega / core::f64::consts::TAU - 8.0).abs() < 1e-12);
         let damping = gains.derivative / (2.0 * libm::sqrt(gains.proportional * inertia));
-        assert!((damping - 0.7).abs() < 1e-12 && gains.usable());
+        assert!((damping - 0.7).abs() < 1e-12 && gains.is_valid());
     }
 
     #[test]
@@ -170,28 +170,28 @@ mod tests {
                 derivative: 0.0,
                 ..good
             }
-            .usable()
+            .is_valid()
         );
         assert!(
             !Gains {
                 proportional: f32::NAN,
                 ..good
             }
-            .usable()
+            .is_valid()
         );
         assert!(
             !Gains {
                 adaptation: -1.0,
                 ..good
             }
-            .usable()
+            .is_valid()
         );
     }
 
     #[test]
     fn torque_limit_is_kept_and_reported() {
         assert_eq!(
-            Torque::within(2.0, 1.5, 0.0),
+            Torque::saturated(2.0, 1.5, 0.0),
             Torque {
                 value: 1.5,
                 limited: false,
@@ -199,7 +199,7 @@ mod tests {
             }
         );
         assert_eq!(
-            Torque::within(2.0, -3.0, 0.1),
+            Torque::saturated(2.0, -3.0, 0.1),
             Torque {
                 value: -2.0,
                 limited: true,
@@ -207,7 +207,7 @@ mod tests {
             }
         );
         assert_eq!(
-            Torque::within(2.0_f32, f32::NAN, 0.0),
+            Torque::saturated(2.0_f32, f32::NAN, 0.0),
             Torque {
                 value: 0.0,
                 limited: true,

@@ -10,12 +10,12 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// Returns the joint torque for one tick; `feed` is a known torque in addition to the model, N·m.
+/// Returns the joint torque for one tick; `feedforward` is a known torque in addition to the model, N·m.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     measured: Measured<T>,
     reference: Reference<T>,
-    feed: T,
+    feedforward: T,
 ) -> Torque<T> {
     let model = &config.model;
     let feedback = config.gains.proportional * (reference.position - measured.position)
@@ -28,6 +28,6 @@ pub fn step<T: Real<Mask = bool>>(
         measured.velocity,
         load,
     );
-    let wish = feedback + load + model.offset + friction + feed;
-    Torque::within(config.torque_limit, wish, friction)
+    let unlimited = feedback + load + model.offset + friction + feedforward;
+    Torque::saturated(config.torque_limit, unlimited, friction)
 }

@@ -81,10 +81,10 @@ impl Law for Backlash {
 /// whole backlash, rad; `stiffness` is in N·m/rad, `damping` in N·m·s/rad. Teeth with backlash only push; a shaft
 /// without pulls too.
 #[inline(always)]
-pub fn transmitted<T: Real>(gap: T, stiffness: T, damping: T, twist: T, rate: T) -> T {
+pub fn transmission_torque<T: Real>(gap: T, stiffness: T, damping: T, twist: T, rate: T) -> T {
     let half = T::from_f64(0.5) * gap;
     let bend = twist - twist.clamp_to(-half, half);
     let torque = stiffness * bend + damping * rate;
-    let apart = T::ZERO.lt(gap) & (torque * bend).le(T::ZERO);
-    T::select(apart, T::ZERO, torque)
+    let separated = T::ZERO.lt(gap) & (torque * bend).le(T::ZERO);
+    T::select(separated, T::ZERO, torque)
 }

@@ -53,8 +53,8 @@ impl<T: Real> Effect<T> {
 
     /// Returns the hidden state after a gap of `seconds`, as in a recording. Heat decays as in a joint at rest, and a
     /// memory of distance is reset.
-    pub fn rested(&self, mut memory: Memory<T>, seconds: T) -> Memory<T> {
-        self.kind.rested(&self.shapes, &mut memory.0, seconds);
+    pub fn after_pause(&self, mut memory: Memory<T>, seconds: T) -> Memory<T> {
+        self.kind.after_pause(&self.shapes, &mut memory.0, seconds);
         memory
     }
 }

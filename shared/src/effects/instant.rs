@@ -28,30 +28,30 @@ pub struct Instant<T> {
     /// Running time, s.
     pub time: T,
     /// Temperature above that at the start, K; 0 where it is not measured.
-    pub warming: T,
+    pub temperature_rise: T,
     /// Position, velocity and acceleration of the other joint that the effect names; 0 where it names none.
     pub other: [T; 3],
     /// Time since the last instant, s.
     pub period: T,
     /// Ratio of other effects' friction that acts through the joint's contact to the model's friction, 1. The contact
     /// bends farther by this ratio before it slides.
-    pub beside: T,
+    pub extra_friction_ratio: T,
 }
 
 impl<T: Real> Instant<T> {
     /// Returns the travel of the contact since the last instant, rad.
     #[inline(always)]
-    pub(super) fn way(&self) -> T {
+    pub(super) fn travel(&self) -> T {
         self.velocity * self.period
     }
 
     /// Returns the ratio of all friction that acts through the joint's contact to the model's friction, 1.
     #[inline(always)]
-    pub(super) fn whole(&self) -> T {
+    pub(super) fn friction_ratio(&self) -> T {
         // Fits and precompensation may give a slightly negative friction.
-        (T::ONE + self.beside).max(T::from_f64(LEAST_FRICTION))
+        (T::ONE + self.extra_friction_ratio).max(T::from_f64(MIN_FRICTION_RATIO))
     }
 }
 
 /// Smallest share of a contact's own friction that remains when effects reduce it, 1.
-const LEAST_FRICTION: f64 = 0.1;
+const MIN_FRICTION_RATIO: f64 = 0.1;

@@ -1,4 +1,5 @@
-//! A shaft or gear that twists under load. Its torque is [`transmitted`](super::transmitted) without a gap.
+//! A shaft or gear that twists under load. Its torque is [`transmission_torque`](super::transmission_torque) without a
+//! gap.
 
 use super::about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
 use super::instant::Instant;

@@ -58,9 +58,9 @@ macro_rules! registry {
                 }
             }
 
-            pub(super) fn rested<T: Real>(self, shapes: &[T; SHAPES], memory: &mut [T; MEMORY], seconds: T) {
+            pub(super) fn after_pause<T: Real>(self, shapes: &[T; SHAPES], memory: &mut [T; MEMORY], seconds: T) {
                 match self {
-                    $(Self::$kind => super::$module::$kind::rested(shapes, memory, seconds)),+
+                    $(Self::$kind => super::$module::$kind::after_pause(shapes, memory, seconds)),+
                 }
             }
 
@@ -76,7 +76,7 @@ macro_rules! registry {
                 match self {
                     $(Self::$kind => {
                         if const {
-                            Role::by(&<super::$module::$kind as Law>::ABOUT).is_some()
+                            Role::from_about(&<super::$module::$kind as Law>::ABOUT).is_some()
                                 && <super::$module::$kind as Law>::PERIODIC.is_none()
                         } {
                             super::$module::$kind::terms(shapes, memory, at)
@@ -160,8 +160,9 @@ impl Kind {
         self.about().gains.len()
     }
 
-    /// Returns gap, stiffness and damping of a transmission with these shapes, as [`transmitted`](super::transmitted) takes them. None
-    /// for an effect that does not act between motor and link.
+    /// Returns gap, stiffness and damping of a transmission with these shapes, as
+    /// [`transmission_torque`](super::transmission_torque) takes them. None for an effect that does not act between
+    /// motor and link.
     pub fn transmission<T: Real>(self, shapes: &[T; SHAPES]) -> Option<[T; 3]> {
         match self {
             Self::Backlash => Some([shapes[0], shapes[1], shapes[2]]),
@@ -181,7 +182,7 @@ impl Kind {
     }
 
     /// Returns true if it reduces viscous friction as the joint warms.
-    pub const fn is_warming(self) -> bool {
+    pub const fn is_viscous_warmup(self) -> bool {
         matches!(
             self,
             Self::ViscousWarmupTime | Self::ViscousWarmupTemperature | Self::ViscousWarmupHeat
@@ -189,12 +190,12 @@ impl Kind {
     }
 
     /// Returns true if its law depends on the joint's own friction: by heat, or by the torque that the gear transmits.
-    pub const fn heeds_friction(self) -> bool {
+    pub const fn depends_on_joint_friction(self) -> bool {
         matches!(self, Self::LoadFriction | Self::ViscousWarmupHeat)
     }
 
     /// Returns true if its torque acts on the link: the gear transmits it, load friction grows with it, a shaft twists.
-    pub const fn on_the_link(self) -> bool {
+    pub const fn acts_on_link(self) -> bool {
         matches!(
             self,
             Self::Spring | Self::GravityTilt | Self::InertiaCoupling | Self::TorqueOffset
@@ -202,7 +203,7 @@ impl Kind {
     }
 
     /// Returns the kind with this name and law, as a description writes them.
-    pub fn named(name: &str, law: Option<&str>) -> Option<Self> {
+    pub fn from_name(name: &str, law: Option<&str>) -> Option<Self> {
         Self::ALL.iter().copied().find(|kind| {
             let about = kind.about();
             about.name == name && (law.is_none() || about.law == law)

@@ -35,7 +35,7 @@ pub(super) trait Law {
     ) -> [T; GAINS];
 
     /// Advances the hidden state over a gap of `_seconds`, s. By default it is reset.
-    fn rested<T: Real>(_shapes: &[T; SHAPES], memory: &mut [T; MEMORY], _seconds: T) {
+    fn after_pause<T: Real>(_shapes: &[T; SHAPES], memory: &mut [T; MEMORY], _seconds: T) {
         *memory = [T::ZERO; MEMORY];
     }
 }

@@ -45,7 +45,7 @@ mod viscous_warmup_temperature;
 mod viscous_warmup_time;
 
 pub use about::{About, Channel, Confusion, Direction, Need, Parameter, Periodic, Scale};
-pub use backlash::transmitted;
+pub use backlash::transmission_torque;
 pub use effect::{Effect, Memory};
 pub use instant::Instant;
 pub use kind::Kind;

@@ -57,12 +57,12 @@ impl Law for PreslidingDahl {
         at: &Instant<T>,
     ) -> [T; GAINS] {
         // Exact over a period of constant velocity, so that any step is stable.
-        let way = at.way();
-        let (sign, whole) = (way.sgn(), at.whole());
-        let kept = (-(way.abs() / (shapes[0] * whole))).exp();
-        let goal = sign * whole;
+        let travel = at.travel();
+        let (sign, ratio) = (travel.sgn(), at.friction_ratio());
+        let kept = (-(travel.abs() / (shapes[0] * ratio))).exp();
+        let goal = sign * ratio;
         memory[0] = sign.squared() * (goal + (memory[0] - goal) * kept)
             + (T::ONE - sign.squared()) * memory[0];
-        [memory[0] / whole - at.direction, T::ZERO, T::ZERO, T::ZERO]
+        [memory[0] / ratio - at.direction, T::ZERO, T::ZERO, T::ZERO]
     }
 }

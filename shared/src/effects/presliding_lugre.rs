@@ -90,14 +90,14 @@ impl Law for PreslidingLugre {
         at: &Instant<T>,
     ) -> [T; GAINS] {
         // Exact over a period of constant velocity, so that any step is stable.
-        let way = at.way();
-        let (sign, whole) = (way.sgn(), at.whole());
+        let travel = at.travel();
+        let (sign, ratio) = (travel.sgn(), at.friction_ratio());
         let level = T::ONE + shapes[1] * (-(at.velocity / shapes[2]).squared()).exp();
-        let kept = (-(way.abs() / (shapes[0] * level * whole))).exp();
-        let goal = sign * level * whole;
+        let kept = (-(travel.abs() / (shapes[0] * level * ratio))).exp();
+        let goal = sign * level * ratio;
         memory[0] = sign.squared() * (goal + (memory[0] - goal) * kept)
             + (T::ONE - sign.squared()) * memory[0];
-        let share = memory[0] / whole;
+        let share = memory[0] / ratio;
         let bristle = at.velocity - at.velocity.abs() * share / level;
         [share - at.direction, bristle, T::ZERO, T::ZERO]
     }

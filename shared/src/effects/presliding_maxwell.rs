@@ -80,12 +80,12 @@ impl Law for PreslidingMaxwell {
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS] {
-        let (way, whole) = (at.way(), at.whole());
+        let (travel, ratio) = (at.travel(), at.friction_ratio());
         let mut yield_at = shapes[0];
         let mut terms = [T::ZERO; GAINS];
         for (state, term) in memory.iter_mut().zip(&mut terms).rev() {
-            *state = (*state + way / yield_at).clamp_to(-whole, whole);
-            *term = *state / whole - at.direction;
+            *state = (*state + travel / yield_at).clamp_to(-ratio, ratio);
+            *term = *state / ratio - at.direction;
             yield_at *= T::from_f64(0.5);
         }
         terms

@@ -35,7 +35,7 @@ fn along(q: &[f64], period: f64) -> Vec<Instant<f64>> {
                 load: -3.0,
                 friction: 0.5 * velocity.sgn(),
                 time: k as f64 * period,
-                warming: 5.0,
+                temperature_rise: 5.0,
                 period,
                 ..Instant::default()
             }
@@ -78,7 +78,7 @@ fn every_kind_says_all_there_is_to_say() {
             .count();
         // One of several laws may be selected by the name alone.
         assert!(laws > 1 || about.law.is_none(), "{kind:?}");
-        assert_eq!(Kind::named(about.name, about.law), Some(kind));
+        assert_eq!(Kind::from_name(about.name, about.law), Some(kind));
         for text in [
             about.title,
             about.equation,
@@ -118,7 +118,7 @@ fn every_kind_says_all_there_is_to_say() {
         );
         for c in about.confused {
             assert!(
-                Kind::named(c.with, None).is_some() && c.with != about.name,
+                Kind::from_name(c.with, None).is_some() && c.with != about.name,
                 "{kind:?}"
             );
             assert!(!c.separated_by.is_empty());
@@ -161,9 +161,9 @@ fn terms_beyond_the_gains_are_zero_and_no_gain_is_without_a_term() {
         friction: -0.4,
         gravity: 6.0,
         time: 40.0,
-        warming: 8.0,
+        temperature_rise: 8.0,
         other: [0.3, 0.6, -1.5],
-        beside: 0.2,
+        extra_friction_ratio: 0.2,
         period: 1e-3,
     };
     for &kind in Kind::ALL {
@@ -280,14 +280,14 @@ proptest! {
         let at = Instant {
             position, velocity, acceleration: 3.0 * velocity, direction: velocity.sgn(), motor_angle: 50.0 * position,
             drive_torque: torque, drive_rate: 30.0 * velocity, load: 0.8 * torque, friction: 0.3 * velocity.sgn(), gravity: 9.0, time: 60.0,
-            warming: 4.0, other: [0.1, velocity, -velocity], beside: 0.2, period: 1e-3,
+            temperature_rise: 4.0, other: [0.1, velocity, -velocity], extra_friction_ratio: 0.2, period: 1e-3,
         };
         let near = Instant {
             position: at.position as f32, velocity: at.velocity as f32, acceleration: at.acceleration as f32,
             direction: at.direction as f32, motor_angle: at.motor_angle as f32,
             drive_torque: at.drive_torque as f32, drive_rate: at.drive_rate as f32, load: at.load as f32, friction: at.friction as f32,
-            gravity: at.gravity as f32, time: at.time as f32, warming: at.warming as f32,
-            other: at.other.map(|x| x as f32), beside: 0.2, period: at.period as f32,
+            gravity: at.gravity as f32, time: at.time as f32, temperature_rise: at.temperature_rise as f32,
+            other: at.other.map(|x| x as f32), extra_friction_ratio: 0.2, period: at.period as f32,
         };
         for &kind in Kind::ALL {
             let shapes = example(kind).shapes;
@@ -307,14 +307,14 @@ proptest! {
         gap in 0.0..0.02_f64, twist in -0.03..0.03_f64, rate in -2.0..2.0_f64,
     ) {
         let (stiffness, damping) = (3000.0, 4.0);
-        let torque = transmitted(gap, stiffness, damping, twist, rate);
+        let torque = transmission_torque(gap, stiffness, damping, twist, rate);
         let bend = twist - twist.clamp(-0.5 * gap, 0.5 * gap);
         if gap > 0.0 {
             prop_assert!(torque * bend >= 0.0);
             prop_assert!(bend != 0.0 || torque == 0.0);
         }
-        let quasi = transmitted(gap, stiffness, 0.0, twist, rate);
-        let moved = transmitted(gap, stiffness, 0.0, twist + 1e-9, rate);
+        let quasi = transmission_torque(gap, stiffness, 0.0, twist, rate);
+        let moved = transmission_torque(gap, stiffness, 0.0, twist + 1e-9, rate);
         prop_assert!((quasi - moved).abs() <= stiffness * 1.1e-9);
         // Damping dissipates: torque minus elastic part has the sign of the rate, or the teeth are apart.
         prop_assert!(torque == 0.0 || (torque - quasi) * rate >= 0.0);
@@ -435,7 +435,7 @@ fn a_contact_is_bent_from_one_direction_to_the_other() {
         assert!(kind.is_presliding() && !kind.acts_through_contact());
         let effect = example(kind);
         let mut memory = Memory::default();
-        assert_eq!(effect.bent(&memory, 0.0), 0.0);
+        assert_eq!(effect.contact_deflection(&memory, 0.0), 0.0);
         let mut along = |velocity: f64, count: usize| -> Vec<f64> {
             let at = Instant {
                 velocity,
@@ -445,7 +445,7 @@ fn a_contact_is_bent_from_one_direction_to_the_other() {
             };
             let mut step = || {
                 effect.torque(&mut memory, &at);
-                effect.bent(&memory, 0.0)
+                effect.contact_deflection(&memory, 0.0)
             };
             (0..count).map(|_| step()).collect()
         };
@@ -499,7 +499,7 @@ fn heat_outlasts_a_pause_and_nothing_else_does() {
         for _ in 0..20_000 {
             law.torque(&mut memory, &at(0.7));
         }
-        let paused = law.rested(memory, 3.0);
+        let paused = law.after_pause(memory, 3.0);
         if kind != Kind::ViscousWarmupHeat {
             assert_eq!(paused, Memory::default(), "{kind:?}");
             continue;
@@ -524,7 +524,7 @@ fn other_friction_bends_the_contact_farther() {
     let period = 1e-4;
     let off = |widened: bool| {
         let (mut memory, mut force) = (Memory::default(), [0.0; 4]);
-        let (mut squares, mut beside) = (0.0, 0.0);
+        let (mut squares, mut extra_friction_ratio) = (0.0, 0.0);
         for k in 0..40_000 {
             let t = f64::from(k) * period;
             // Slow loops within a fast one.
@@ -533,7 +533,7 @@ fn other_friction_bends_the_contact_farther() {
                 velocity,
                 direction: velocity.sgn(),
                 period,
-                beside: if widened { beside } else { 0.0 },
+                extra_friction_ratio: if widened { extra_friction_ratio } else { 0.0 },
                 ..Instant::default()
             };
             let presliding = law.torque(&mut memory, &at);
@@ -544,8 +544,10 @@ fn other_friction_bends_the_contact_farther() {
                     ..at
                 },
             );
-            beside = whole / dry;
-            let found = dry * velocity.sgn() + presliding + whole * law.bent(&memory, at.beside);
+            extra_friction_ratio = whole / dry;
+            let found = dry * velocity.sgn()
+                + presliding
+                + whole * law.contact_deflection(&memory, at.extra_friction_ratio);
             let limit = 1.0 + whole / dry;
             for (k, force) in force.iter_mut().enumerate() {
                 let yields = stroke * 2.0_f64.powi(k as i32 - 3);
@@ -575,7 +577,7 @@ fn friction_through_a_contact_never_gives_more_than_it_has_taken() {
     ];
     let period = 1e-5;
     let cycle = |law: &Effect<f64>, reach: f64, kept: bool| {
-        let (mut memory, mut beside) = (Memory::default(), 0.0);
+        let (mut memory, mut extra_friction_ratio) = (Memory::default(), 0.0);
         let (mut taken, mut turned) = (0.0, 0.0);
         for _ in 0..6 {
             (taken, turned) = (0.0, 0.0);
@@ -584,17 +586,20 @@ fn friction_through_a_contact_never_gives_more_than_it_has_taken() {
                 for _ in 0..(reach / f64::abs(velocity) / period) as usize {
                     if !kept {
                         // A contact that keeps its share instead would be stretched without work.
-                        memory.0 = memory.0.map(|state| state * (1.0 + more) / (1.0 + beside));
+                        memory.0 = memory
+                            .0
+                            .map(|state| state * (1.0 + more) / (1.0 + extra_friction_ratio));
                     }
-                    beside = more;
+                    extra_friction_ratio = more;
                     let at = Instant {
                         velocity,
                         period,
-                        beside,
+                        extra_friction_ratio,
                         ..Instant::default()
                     };
                     law.torque(&mut memory, &at);
-                    let torque = dry * (1.0 + more) * law.bent(&memory, beside);
+                    let torque =
+                        dry * (1.0 + more) * law.contact_deflection(&memory, extra_friction_ratio);
                     taken += torque * velocity * period;
                     turned += f64::abs(torque * velocity) * period;
                 }

@@ -56,7 +56,7 @@ impl Law for ViscousWarmupHeat {
         [-(at.velocity * next), T::ZERO, T::ZERO, T::ZERO]
     }
 
-    fn rested<T: Real>(shapes: &[T; SHAPES], memory: &mut [T; MEMORY], seconds: T) {
+    fn after_pause<T: Real>(shapes: &[T; SHAPES], memory: &mut [T; MEMORY], seconds: T) {
         let [warm, rest, ..] = *memory;
         *memory = [T::ZERO; MEMORY];
         memory[0] = (warm + rest) * (-(seconds / shapes[0])).exp();

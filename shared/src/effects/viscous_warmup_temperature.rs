@@ -35,6 +35,11 @@ impl Law for ViscousWarmupTemperature {
 
     #[inline(always)]
     fn terms<T: Real>(_: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
-        [-(at.velocity * at.warming), T::ZERO, T::ZERO, T::ZERO]
+        [
+            -(at.velocity * at.temperature_rise),
+            T::ZERO,
+            T::ZERO,
+            T::ZERO,
+        ]
     }
 }

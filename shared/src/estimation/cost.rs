@@ -85,7 +85,7 @@ impl crate::scalar::Real for Counted {
 fn operations_are_as_stated() {
     let settings = EstimatorSettings::for_band(LOWER.map(Counted), UPPER.map(Counted));
     let mut e = OneLinkEstimator::new(&settings, Counted(RATE)).unwrap();
-    let (mut most, mut sum, mut used) = ([0; 3], [0_u64; 3], 0);
+    let (mut max_operations, mut sum, mut used) = ([0; 3], [0_u64; 3], 0);
     for k in 0..30_000 {
         let m = motion(f64::from(k) / RATE, 0.0);
         OPERATIONS.with(|c| c.set([0; 3]));
@@ -95,11 +95,14 @@ fn operations_are_as_stated() {
             used += 1;
             (0..3).for_each(|i| sum[i] += u64::from(n[i]));
         }
-        (0..3).for_each(|i| most[i] = n[i].max(most[i]));
+        (0..3).for_each(|i| max_operations[i] = n[i].max(max_operations[i]));
     }
     std::println!(
-        "operations at most {most:?}, mean {:?}",
+        "operations at most {max_operations:?}, mean {:?}",
         sum.map(|s| s / used)
     );
-    assert!(most[0] <= 788 && most[1] <= 18 && most[2] == 1, "{most:?}");
+    assert!(
+        max_operations[0] <= 788 && max_operations[1] <= 18 && max_operations[2] == 1,
+        "{max_operations:?}"
+    );
 }

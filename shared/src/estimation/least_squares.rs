@@ -22,9 +22,9 @@ const FLOOR: f64 = 1e-10;
 const INFORMATION_SHARE: f64 = 0.01;
 /// Relative distance from its fixed point within which leverage counts as settled. P is then left alone, so that
 /// rounding errors do not accumulate during days of the same regressor.
-const SETTLED_SHARE: f64 = 1e-3;
+const DEADBAND_SHARE: f64 = 1e-3;
 /// Smallest leverage that is used without forgetting. A sample below it changes nothing in `f32`.
-const LEAST_LEVERAGE: f64 = 1e-9;
+const MIN_LEVERAGE: f64 = 1e-9;
 
 /// Constants of the update.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,7 @@ pub struct Config<T> {
     /// 1 − λ.
     forget: T,
     gate: T,
-    settled: T,
+    deadband: T,
     ceiling: T,
     floor: T,
 }
@@ -44,8 +44,8 @@ impl<T: Real<Mask = bool>> Config<T> {
         let forget = (share * T::from_f64(directions as f64)).clamp_to(T::ZERO, T::from_f64(0.5));
         Self {
             forget,
-            gate: (forget * T::from_f64(INFORMATION_SHARE)).max(T::from_f64(LEAST_LEVERAGE)),
-            settled: forget * T::from_f64(SETTLED_SHARE),
+            gate: (forget * T::from_f64(INFORMATION_SHARE)).max(T::from_f64(MIN_LEVERAGE)),
+            deadband: forget * T::from_f64(DEADBAND_SHARE),
             ceiling,
             floor: T::from_f64(FLOOR) * ceiling,
         }
@@ -60,17 +60,17 @@ pub fn gain<T: Real<Mask = bool>, const N: usize>(
     p: &mut UdFactor<T, N>,
     phi: &[T; N],
 ) -> Option<[T; N]> {
-    let (product, leverage) = p.times(phi);
-    let most = T::from_f64(1e15);
-    if !(config.gate.le(leverage) && leverage.lt(most)) {
+    let (product, leverage) = p.multiply(phi);
+    let max_leverage = T::from_f64(1e15);
+    if !(config.gate.le(leverage) && leverage.lt(max_leverage)) {
         return None;
     }
     let lambda = T::ONE - config.forget;
     // ε·ζ: positive if the sample brings more information than is forgotten.
     let net = lambda * leverage - config.forget;
-    if config.settled.lt(net) {
+    if config.deadband.lt(net) {
         p.decrease(phi, leverage / net, config.floor);
-    } else if net.lt(-config.settled) {
+    } else if net.lt(-config.deadband) {
         // P grows by c·Pφ·(Pφ)ᵀ with c = −ε/(1+εζ), cut at the ceiling.
         let mut c = -net / (leverage * lambda * (T::ONE + leverage));
         let variances = p.variances();

@@ -21,7 +21,7 @@ const BLOCK_SECONDS: f64 = 0.25;
 /// Assumed noise as a share of the torque range of the band.
 const NOISE_SHARE: f64 = 0.01;
 /// Inputs beyond this (rad, rad/s, N·m) are refused: squares of filtered values stay finite in `f32`.
-const LARGEST_INPUT: f64 = 1e6;
+const MAX_INPUT: f64 = 1e6;
 
 /// Constants of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,9 +98,9 @@ pub fn step<T: Real<Mask = bool>>(
     qd: T,
     tau: T,
 ) -> Update {
-    let largest = T::from_f64(LARGEST_INPUT);
+    let largest = T::from_f64(MAX_INPUT);
     if !(q.abs().le(largest) && qd.abs().le(largest) && tau.abs().le(largest)) {
-        return Update::Refused;
+        return Update::Invalid;
     }
     let filtered = filtered::step(&config.filter, &mut state.filter, q, qd, tau);
     if !filtered.valid {

@@ -6,7 +6,7 @@
 //! last bit of x.
 //!
 //! Published values are always projected onto the band. A parameter outside its band is not trusted, and neither for
-//! [`EDGE_HOLD_BLOCKS`] blocks after. The gradient update itself is projected. Least squares is not: its first dozens
+//! [`BOUND_HOLD_BLOCKS`] blocks after. The gradient update itself is projected. Least squares is not: its first dozens
 //! of rows overshoot. Cutting x there would keep an error that P no longer covers (measured: coverage of the 95 %
 //! interval of J fell to 36 %).
 
@@ -18,11 +18,11 @@ use super::{gradient, least_squares};
 use crate::scalar::Real;
 
 /// Blocks during which a parameter is not trusted after it was at its band's edge.
-pub const EDGE_HOLD_BLOCKS: u32 = 10;
+pub const BOUND_HOLD_BLOCKS: u32 = 10;
 /// Largest standard deviation of a trusted parameter, as a share of its band's width.
 pub const TRUSTED_SHARE_OF_BAND: f64 = 0.05;
 /// Half-widths from the band's centre at which least squares is cut: far beyond any overshoot.
-const FARTHEST: f64 = 1e3;
+const MAX_NORMALISED: f64 = 1e3;
 /// Step of the gradient update relative to one forgetting of least squares. It is faster, because the gradient's
 /// directions converge at different speeds by their excitation.
 const GRADIENT_SPEED: f64 = 10.0;
@@ -39,7 +39,7 @@ pub struct Config<T, const N: usize> {
     band: [[T; N]; 2],
     scale: [T; N],
     unit: T,
-    edge_hold: u32,
+    bound_hold: u32,
 }
 
 impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
@@ -54,7 +54,7 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
         share: T,
         block: u32,
     ) -> Self {
-        let half_of = T::from_f64(0.5);
+        let half_factor = T::from_f64(0.5);
         let mut config = Self {
             kind,
             least_squares: least_squares::Config::new(share, N, T::ONE),
@@ -68,12 +68,12 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
             band: [*lower, *upper],
             scale: [T::ZERO; N],
             unit: noise,
-            edge_hold: block.max(1).saturating_mul(EDGE_HOLD_BLOCKS),
+            bound_hold: block.max(1).saturating_mul(BOUND_HOLD_BLOCKS),
         };
         let step = share * T::from_f64(GRADIENT_SPEED * N as f64);
         for i in 0..N {
-            config.centre[i] = half_of * (lower[i] + upper[i]);
-            config.half[i] = (half_of * (upper[i] - lower[i])).max(T::ZERO);
+            config.centre[i] = half_factor * (lower[i] + upper[i]);
+            config.half[i] = (half_factor * (upper[i] - lower[i])).max(T::ZERO);
             config.scale[i] = config.half[i] / noise;
             // In units of the band: a row as large as the assumed torque range moves by `step`.
             config.adaptation[i][i] = step * T::from_f64(1e-4);
@@ -106,7 +106,7 @@ pub struct State<T, const N: usize> {
     carry: [T; N],
     p: UdFactor<T, N>,
     uncertainty: Uncertainty<T, N>,
-    edge: [u32; N],
+    at_bound: [u32; N],
     changes: u32,
 }
 
@@ -117,7 +117,7 @@ impl<T: Real<Mask = bool>, const N: usize> Default for State<T, N> {
             carry: [T::ZERO; N],
             p: UdFactor::diagonal([T::ONE; N]),
             uncertainty: Uncertainty::new(T::ONE),
-            edge: [0; N],
+            at_bound: [0; N],
             changes: 0,
         }
     }
@@ -157,7 +157,7 @@ pub fn update<T: Real<Mask = bool>, const N: usize>(
         size += phi[i] * phi[i];
     }
     if !finite(size) {
-        return Update::Refused;
+        return Update::Invalid;
     }
     let gain = match config.kind {
         EstimatorKind::LeastSquares => {
@@ -169,7 +169,7 @@ pub fn update<T: Real<Mask = bool>, const N: usize>(
         return Update::Uninformative;
     };
     let limit = match config.kind {
-        EstimatorKind::LeastSquares => T::from_f64(FARTHEST),
+        EstimatorKind::LeastSquares => T::from_f64(MAX_NORMALISED),
         EstimatorKind::Gradient => T::ONE,
     };
     for i in 0..N {
@@ -182,17 +182,17 @@ pub fn update<T: Real<Mask = bool>, const N: usize>(
             state.carry[i] = T::ZERO;
         }
         let outside = T::ONE.le(moved.abs());
-        state.edge[i] = if outside {
-            config.edge_hold
+        state.at_bound[i] = if outside {
+            config.bound_hold
         } else {
-            state.edge[i].saturating_sub(1)
+            state.at_bound[i].saturating_sub(1)
         };
     }
     match state
         .uncertainty
         .update(&config.residuals, &phi, &k, residual)
     {
-        Block::Usual => Update::Used,
+        Block::Normal => Update::Used,
         Block::Changed => {
             state.p = UdFactor::diagonal([T::ONE; N]);
             state.uncertainty = Uncertainty::new(T::ONE);
@@ -226,8 +226,8 @@ pub fn report<T: Real<Mask = bool>, const N: usize>(
             let std = v[i].sqrt();
             out.std[i] = config.half[i] * std;
             out.trusted[i] = std.le(share)
-                && state.edge[i] == 0
-                && !state.uncertainty.suspicious()
+                && state.at_bound[i] == 0
+                && !state.uncertainty.has_alarm()
                 && T::ZERO.lt(config.half[i]);
         }
     }

@@ -10,7 +10,7 @@ pub enum Update {
     /// Too soon after a reversal, standstill or the start: the Coulomb column is not valid yet.
     Masked,
     /// Not finite, or beyond the range of any rig: nothing was changed.
-    Refused,
+    Invalid,
     /// Updated, and the residuals show that the parameters have jumped: estimation restarts from the band.
     Changed,
 }

@@ -374,7 +374,7 @@ fn nothing_that_is_not_finite_gets_in() {
         for place in 0..3 {
             let mut input = [0.1, 1.0, 0.5];
             input[place] = bad;
-            assert_eq!(e32.step(input[0], input[1], input[2]), Update::Refused);
+            assert_eq!(e32.step(input[0], input[1], input[2]), Update::Invalid);
         }
     }
     assert_eq!(before, e32);

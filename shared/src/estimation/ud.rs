@@ -25,7 +25,7 @@ impl<T: Real<Mask = bool>, const N: usize> UdFactor<T, N> {
 
     /// Returns (P·φ, φᵀ·P·φ). Cost: N(N−1) + 2N products.
     #[inline]
-    pub fn times(&self, phi: &[T; N]) -> ([T; N], T) {
+    pub fn multiply(&self, phi: &[T; N]) -> ([T; N], T) {
         let mut product = [T::ZERO; N];
         let mut leverage = T::ZERO;
         for j in 0..N {
@@ -124,7 +124,7 @@ mod tests {
         for k in 0..200 {
             let a: [f64; 4] = core::array::from_fn(|_| rng.random_range(-1.0..1.0));
             let before = p.matrix();
-            let (pa, z) = p.times(&a);
+            let (pa, z) = p.multiply(&a);
             let (sign, scale) = if k % 2 == 0 {
                 let r = rng.random_range(0.1..3.0);
                 p.decrease(&a, r, 0.0);

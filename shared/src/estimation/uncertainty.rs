@@ -28,16 +28,16 @@ const ALARM_MEAN: f64 = 36.0;
 /// Ratio of a block's mean square to the usual one that raises an alarm.
 const ALARM_POWER: f64 = 8.0;
 /// Maximum number of blocks in the average, if nothing is forgotten.
-const MOST_BLOCKS: f64 = 4096.0;
+const MAX_BLOCKS: f64 = 4096.0;
 /// Minimum number of blocks in the average of r, for any memory.
-const FEWEST_BLOCKS: f64 = 40.0;
+const MIN_BLOCKS: f64 = 40.0;
 
 /// Constants of the residual statistics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config<T> {
     block: u32,
     inverse_block: T,
-    most_blocks: T,
+    max_blocks: T,
 }
 
 impl<T: Real<Mask = bool>> Config<T> {
@@ -48,8 +48,7 @@ impl<T: Real<Mask = bool>> Config<T> {
         Self {
             block,
             inverse_block: T::ONE / T::from_f64(f64::from(block)),
-            most_blocks: memory_blocks
-                .clamp_to(T::from_f64(FEWEST_BLOCKS), T::from_f64(MOST_BLOCKS)),
+            max_blocks: memory_blocks.clamp_to(T::from_f64(MIN_BLOCKS), T::from_f64(MAX_BLOCKS)),
         }
     }
 }
@@ -58,7 +57,7 @@ impl<T: Real<Mask = bool>> Config<T> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Block {
     /// The block goes on, or it ended as expected.
-    Usual,
+    Normal,
     /// The residuals show that the parameters have changed.
     Changed,
 }
@@ -76,7 +75,7 @@ pub struct Uncertainty<T, const N: usize> {
     /// r: the long-run variance, corrected for the degrees of freedom of the estimate.
     noise: T,
     mean_square: T,
-    known: bool,
+    is_known: bool,
     alarms: u8,
 }
 
@@ -97,18 +96,18 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
             long_run: T::ZERO,
             noise: T::ONE,
             mean_square: T::ZERO,
-            known: false,
+            is_known: false,
             alarms: 0,
         }
     }
 
     /// Returns true if r has been observed long enough for valid standard deviations.
-    pub fn known(&self) -> bool {
-        self.known
+    pub fn is_known(&self) -> bool {
+        self.is_known
     }
 
     /// Returns true if Σ and r cannot explain the last block.
-    pub fn suspicious(&self) -> bool {
+    pub fn has_alarm(&self) -> bool {
         self.alarms > 0
     }
 
@@ -117,13 +116,13 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.mean_square
     }
 
-    /// Returns the error variance of each parameter; none before [`known`](Self::known).
+    /// Returns the error variance of each parameter; none before [`is_known`](Self::is_known).
     pub fn variances(&self) -> Option<[T; N]> {
         let mut out = [T::ZERO; N];
         for i in 0..N {
             out[i] = self.sigma[i][i].max(T::ZERO);
         }
-        self.known.then_some(out)
+        self.is_known.then_some(out)
     }
 
     /// Processes a move of the estimate by `k`·residual at the row `phi`. Cost at N = 6: about 250 operations.
@@ -131,17 +130,17 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
     pub fn update(&mut self, config: &Config<T>, phi: &[T; N], k: &[T; N], residual: T) -> Block {
         let mut s = [T::ZERO; N];
         let mut spread = T::ZERO;
-        let mut taken = T::ZERO;
+        let mut own_leverage = T::ZERO;
         for i in 0..N {
             for j in 0..N {
                 s[i] += self.sigma[i][j] * phi[j];
             }
             spread += s[i] * phi[i];
-            taken += k[i] * phi[i];
+            own_leverage += k[i] * phi[i];
         }
         // The residual after the update: the large errors of the start are not noise.
-        let residual = residual * (T::ONE - taken);
-        let noise = if self.known { self.noise } else { T::ONE };
+        let residual = residual * (T::ONE - own_leverage);
+        let noise = if self.is_known { self.noise } else { T::ONE };
         let square = spread + noise;
         for i in 0..N {
             for j in i..N {
@@ -157,7 +156,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         }
         self.filled += 1;
         if self.filled < config.block {
-            Block::Usual
+            Block::Normal
         } else {
             self.close(config)
         }
@@ -179,26 +178,26 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.squares = T::ZERO;
         self.rows = [T::ZERO; N];
         self.filled = 0;
-        if self.known {
+        if self.is_known {
             let expected = self.noise * config.inverse_block + spread;
-            let odd = (expected * T::from_f64(ALARM_MEAN)).lt(mean * mean)
+            let alarm = (expected * T::from_f64(ALARM_MEAN)).lt(mean * mean)
                 || (self.mean_square * T::from_f64(ALARM_POWER)).lt(square);
-            if odd {
+            if alarm {
                 self.alarms += 1;
                 if self.alarms >= 2 {
                     return Block::Changed;
                 }
                 // A single odd block is neither counted as a change nor averaged.
-                return Block::Usual;
+                return Block::Normal;
             }
         }
         self.alarms = 0;
-        if !self.known && (square * T::from_f64(ALARM_POWER)).lt(self.mean_square) {
+        if !self.is_known && (square * T::from_f64(ALARM_POWER)).lt(self.mean_square) {
             // Still converging: the average so far was error, not noise.
             self.blocks = T::ZERO;
         }
         let parameters = T::from_f64(N as f64);
-        self.blocks = (self.blocks + T::ONE).min(config.most_blocks);
+        self.blocks = (self.blocks + T::ONE).min(config.max_blocks);
         let share = T::ONE / self.blocks;
         let length = T::ONE / config.inverse_block;
         self.long_run += share * (length * mean * mean - self.long_run);
@@ -207,15 +206,15 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         // or without forgetting.
         let free = (self.blocks - parameters).max(T::ONE);
         self.noise = self.long_run * self.blocks / free;
-        let enough = T::from_f64((N + BLOCKS_PER_PARAMETER * N) as f64);
-        if !self.known && enough.le(self.blocks) {
+        let needed_blocks = T::from_f64((N + BLOCKS_PER_PARAMETER * N) as f64);
+        if !self.is_known && needed_blocks.le(self.blocks) {
             for i in 0..N {
                 for j in 0..N {
                     self.sigma[i][j] *= self.noise;
                 }
             }
-            self.known = true;
+            self.is_known = true;
         }
-        Block::Usual
+        Block::Normal
     }
 }

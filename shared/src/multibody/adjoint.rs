@@ -156,10 +156,10 @@ impl<T: Real> JointGradient<T> {
                 self.qdd += by_motion.acceleration.z();
                 self.qd += by_motion.velocity.z() + by_motion.acceleration.dot(across);
                 by_carried += z.cross(by_motion.acceleration).scaled(qd);
-                let turning = transform.direction_to_child(parent.acceleration);
+                let angular_acceleration = transform.direction_to_child(parent.acceleration);
                 // A rotated constant vector v changes by −z × v.
                 self.q -= by_carried.dot(z.cross(carried))
-                    + by_motion.acceleration.dot(z.cross(turning))
+                    + by_motion.acceleration.dot(z.cross(angular_acceleration))
                     + by_motion.proper.dot(z.cross(motion.proper));
             }
             JointKind::Prismatic => {
@@ -185,9 +185,10 @@ impl<T: Real> JointGradient<T> {
 
 /// Returns the gradient by ω of a·(ω × (ω × b)), which is symmetric in a and b.
 #[inline(always)]
-fn centripetal<T: Real>(spin: Vector3<T>, a: Vector3<T>, b: Vector3<T>) -> Vector3<T> {
+fn centripetal<T: Real>(angular_velocity: Vector3<T>, a: Vector3<T>, b: Vector3<T>) -> Vector3<T> {
     let along = a.dot(b);
-    b.scaled(spin.dot(a)) + a.scaled(spin.dot(b)) - spin.scaled(along + along)
+    b.scaled(angular_velocity.dot(a)) + a.scaled(angular_velocity.dot(b))
+        - angular_velocity.scaled(along + along)
 }
 
 /// Adds the weighted gradient of one link's ten columns along one axis. The weights act as a body, and the derivative
@@ -201,17 +202,22 @@ fn link_gradient<T: Real>(
     by_axis: &mut Wrench<T>,
 ) {
     let body = inertia(weights);
-    let (spin, turning, proper) = (motion.velocity, motion.acceleration, motion.proper);
+    let (angular_velocity, angular_acceleration, proper) =
+        (motion.velocity, motion.acceleration, motion.proper);
     let (s, l) = (axis.angular, axis.linear);
     let moment = body.first_moment;
-    let momentum = body.inertia.times(spin);
-    by_axis.force +=
-        proper.scaled(body.mass) + turning.cross(moment) + spin.cross(spin.cross(moment));
-    by_axis.moment += body.inertia.times(turning) + spin.cross(momentum) + moment.cross(proper);
+    let momentum = body.inertia.times(angular_velocity);
+    by_axis.force += proper.scaled(body.mass)
+        + angular_acceleration.cross(moment)
+        + angular_velocity.cross(angular_velocity.cross(moment));
+    by_axis.moment += body.inertia.times(angular_acceleration)
+        + angular_velocity.cross(momentum)
+        + moment.cross(proper);
     by_motion.proper += l.scaled(body.mass) + s.cross(moment);
     by_motion.acceleration += moment.cross(l) + body.inertia.times(s);
-    by_motion.velocity +=
-        centripetal(spin, moment, l) + momentum.cross(s) + body.inertia.times(s.cross(spin));
+    by_motion.velocity += centripetal(angular_velocity, moment, l)
+        + momentum.cross(s)
+        + body.inertia.times(s.cross(angular_velocity));
 }
 
 #[cfg(test)]

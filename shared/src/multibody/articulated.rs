@@ -42,7 +42,7 @@ struct Link<T> {
     body: ArticulatedBody<T>,
     bias: Wrench<T>,
     /// Wrench of the articulated body at unit acceleration along the joint.
-    along: Wrench<T>,
+    axis_wrench: Wrench<T>,
     /// Inverse of the inertia that the drive moves.
     compliance: T,
     /// Torque that remains for acceleration.
@@ -63,7 +63,7 @@ fn articulated_bodies<T: Real, const CAPACITY: usize>(
         drift: Motion::ZERO,
         body: ArticulatedBody::NOTHING,
         bias: Wrench::ZERO,
-        along: Wrench::ZERO,
+        axis_wrench: Wrench::ZERO,
         compliance: T::ZERO,
         free: T::ZERO,
     }; CAPACITY];
@@ -81,24 +81,24 @@ fn articulated_bodies<T: Real, const CAPACITY: usize>(
         let (before, link) = links.split_at_mut(i);
         let link = &mut link[0];
         let row = &parameters[i];
-        link.along = link.body.along(joint);
-        let felt = joint.project(link.along) + row[column::DRIVE_INERTIA];
+        link.axis_wrench = link.body.axis_wrench(joint);
+        let axis_inertia = joint.project(link.axis_wrench) + row[column::DRIVE_INERTIA];
         // NaN fails this comparison too.
-        if !T::ZERO.lt(felt).all() {
+        if !T::ZERO.lt(axis_inertia).all() {
             return Err(MultibodyError::NotPositiveDefinite { joint: i });
         }
-        link.compliance = T::ONE / felt;
+        link.compliance = T::ONE / axis_inertia;
         link.free = tau[i]
             - row[column::VISCOUS] * qd[i]
             - row[column::COULOMB] * qd[i].sgn()
             - row[column::OFFSET]
             - joint.project(link.bias);
         if let Some(parent) = before.last_mut() {
-            let body = link.body.freed(link.along, link.compliance);
+            let body = link.body.without_joint(link.axis_wrench, link.compliance);
             let bias = link
                 .bias
                 .plus(body.times(link.drift))
-                .plus(link.along.scaled(link.compliance * link.free));
+                .plus(link.axis_wrench.scaled(link.compliance * link.free));
             parent.body = parent.body.plus(body.to_parent(&link.transform));
             parent.bias = parent.bias.plus(link.transform.wrench_to_parent(bias));
         }
@@ -113,7 +113,7 @@ fn articulated_bodies<T: Real, const CAPACITY: usize>(
             .transform
             .motion_to_child(acceleration)
             .plus(link.drift);
-        qdd[i] = (link.free - carried.dot(link.along)) * link.compliance;
+        qdd[i] = (link.free - carried.dot(link.axis_wrench)) * link.compliance;
         acceleration = carried.plus(joint.axis().scaled(qdd[i]));
     }
     Ok(())
@@ -179,7 +179,7 @@ impl<T: Real> ArticulatedBody<T> {
     }
 
     /// Returns the wrench at unit acceleration along a joint.
-    fn along(&self, joint: &Joint<T>) -> Wrench<T> {
+    fn axis_wrench(&self, joint: &Joint<T>) -> Wrench<T> {
         let [a, b, c] = self.coupling;
         match joint.kind {
             JointKind::Revolute => Wrench {
@@ -194,7 +194,7 @@ impl<T: Real> ArticulatedBody<T> {
     }
 
     /// Returns the body seen through a free joint: minus u·uᵀ·compliance.
-    fn freed(&self, u: Wrench<T>, compliance: T) -> Self {
+    fn without_joint(&self, u: Wrench<T>, compliance: T) -> Self {
         let Wrench { force, moment } = u.scaled(compliance);
         let [x, y, z] = moment.0;
         let [a, b, c] = self.coupling;

@@ -66,14 +66,16 @@ fn regressor<T: Real, const CAPACITY: usize>(
 /// Computes the power of each of the ten unit wrenches of a link along a joint axis in the link's frame.
 #[inline(always)]
 pub(super) fn link_columns<T: Real>(motion: &LinkMotion<T>, axis: &Motion<T>, block: &mut [T]) {
-    let (spin, turning, proper) = (motion.velocity, motion.acceleration, motion.proper);
-    let Vector3([hx, hy, hz]) = proper.cross(axis.angular) - turning.cross(axis.linear)
-        + spin.cross(spin.cross(axis.linear));
+    let (angular_velocity, angular_acceleration, proper) =
+        (motion.velocity, motion.acceleration, motion.proper);
+    let Vector3([hx, hy, hz]) = proper.cross(axis.angular)
+        - angular_acceleration.cross(axis.linear)
+        + angular_velocity.cross(angular_velocity.cross(axis.linear));
     // s·(I·ω̇ + ω × I·ω) = s·I·ω̇ + (s × ω)·I·ω: two symmetric forms in the entries of I.
     let Vector3([sx, sy, sz]) = axis.angular;
-    let Vector3([ux, uy, uz]) = axis.angular.cross(spin);
-    let Vector3([wx, wy, wz]) = spin;
-    let Vector3([ax, ay, az]) = turning;
+    let Vector3([ux, uy, uz]) = axis.angular.cross(angular_velocity);
+    let Vector3([wx, wy, wz]) = angular_velocity;
+    let Vector3([ax, ay, az]) = angular_acceleration;
     let values = [
         axis.linear.dot(proper),
         hx,

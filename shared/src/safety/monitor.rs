@@ -38,9 +38,9 @@ pub struct MonitorConfig {
 }
 
 /// Share of the thermal rating below which an overloaded motor counts as cooled: 0.7 thermal times without current.
-const COOLED: f32 = 0.5;
+const COOLED_SHARE: f32 = 0.5;
 /// Ticks within which the noise of a live converter changes its code.
-const QUIET: u32 = 10;
+const CODE_NOISE_TICKS: u32 = 10;
 
 /// Inputs of the checks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -114,18 +114,23 @@ pub fn step(
     state: &mut MonitorState,
     now: &Readings,
 ) -> Option<(Fault, f32)> {
-    heat_up(config, limits, state, now);
-    let found = check(config, limits, state, now);
+    update_heat(config, limits, state, now);
+    let failed = check(config, limits, state, now);
     // A fault is rare, and building the list costs more than this test.
-    if !found.any(state, now) {
+    if !failed.any(state, now) {
         return None;
     }
-    found.first(state, now)
+    failed.first(state, now)
 }
 
 /// Updates the heat of the winding, and whether the motor is overloaded.
 #[inline(always)]
-fn heat_up(config: &MonitorConfig, limits: &Limits<f32>, state: &mut MonitorState, now: &Readings) {
+fn update_heat(
+    config: &MonitorConfig,
+    limits: &Limits<f32>,
+    state: &mut MonitorState,
+    now: &Readings,
+) {
     // With the bridge off the winding is open, so a current reading of a broken converter heats nothing.
     let heating = if now.driving {
         now.current * now.current
@@ -137,14 +142,14 @@ fn heat_up(config: &MonitorConfig, limits: &Limits<f32>, state: &mut MonitorStat
     // The overload lasts until the motor has cooled: just after the bridge is off the heat is barely below its limit.
     state.overloaded = !(state.heat
         <= if state.overloaded {
-            COOLED * rating
+            COOLED_SHARE * rating
         } else {
             rating
         });
 }
 
 /// Which checks of a tick fail, beside those that [`Readings`] and [`MonitorState`] tell directly.
-struct Failing {
+struct FailedChecks {
     over_current: bool,
     at_rail: bool,
     bad_supply: bool,
@@ -164,7 +169,7 @@ fn check(
     limits: &Limits<f32>,
     state: &mut MonitorState,
     now: &Readings,
-) -> Failing {
+) -> FailedChecks {
     let magnitude = now.current.abs();
     let n = config.persistence;
     // All counters are updated before any is judged: an early return must not stop the others.
@@ -201,11 +206,11 @@ fn check(
     };
     let stuck = converter_is_stuck(config, state, now);
     // A constant current does not count against the encoder until the converter is known not to be stuck.
-    let suspect = (QUIET..config.stuck_ticks).contains(&state.same_code);
+    let converter_suspect = (CODE_NOISE_TICKS..config.stuck_ticks).contains(&state.same_code);
     let outside = now.driving
         && !(limits.position_low - config.position_margin <= now.position
             && now.position <= limits.position_high + config.position_margin);
-    Failing {
+    FailedChecks {
         over_current,
         at_rail,
         bad_supply,
@@ -214,12 +219,12 @@ fn check(
         stuck,
         outside,
         jumped: now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs(),
-        lost: now.encoder_open || lost && !suspect,
+        lost: now.encoder_open || lost && !converter_suspect,
         late: now.overrun && now.driving,
     }
 }
 
-impl Failing {
+impl FailedChecks {
     /// Returns true if any check fails.
     #[inline(always)]
     fn any(&self, state: &MonitorState, now: &Readings) -> bool {

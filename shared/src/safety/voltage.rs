@@ -97,7 +97,7 @@ mod tests {
     }
 
     /// Returns the ticks until detection at constant voltage, current and motor speed (rad/s).
-    fn told(voltage: f32, current: f32, speed: f32) -> Option<u32> {
+    fn step_voltages(voltage: f32, current: f32, speed: f32) -> Option<u32> {
         let (model, mut state) = (model(), VoltageState::default());
         let per_tick = speed * 1e-4 * 8192.0 / core::f32::consts::TAU;
         let (mut angle, mut count) = (0.0_f32, 0);
@@ -112,14 +112,14 @@ mod tests {
     #[test]
     fn a_blocked_motor_is_explained_and_a_lost_encoder_is_not() {
         // 0.6 Ω · 3.2 A, at rest; the same in a winding 100 K warmer.
-        assert_eq!(told(1.92, 3.2, 0.0), None);
-        assert_eq!(told(1.92 * 1.39, 3.2, 0.0), None);
+        assert_eq!(step_voltages(1.92, 3.2, 0.0), None);
+        assert_eq!(step_voltages(1.92 * 1.39, 3.2, 0.0), None);
         // 50 rad/s of the motor are 1 rad/s of the joint, and 2.5 V.
-        assert_eq!(told(0.6 + 2.5, 1.0, 50.0), None);
-        let after = told(0.6 + 2.5, 1.0, 0.0);
+        assert_eq!(step_voltages(0.6 + 2.5, 1.0, 50.0), None);
+        let after = step_voltages(0.6 + 2.5, 1.0, 0.0);
         assert!(after.is_some_and(|ticks| ticks < 300), "{after:?}");
         // Encoder counts with the wrong sign.
-        assert!(told(0.6 + 2.5, 1.0, -50.0).is_some());
+        assert!(step_voltages(0.6 + 2.5, 1.0, -50.0).is_some());
     }
 
     #[test]
@@ -127,9 +127,13 @@ mod tests {
         for speed in [0.0, 30.0, 300.0_f32] {
             for current in [-3.2, 0.5, 3.2_f32] {
                 let voltage = 1.39 * 0.6 * current + 0.85 * 0.05 * speed;
-                assert_eq!(told(voltage, current, speed), None, "{speed} {current}");
+                assert_eq!(
+                    step_voltages(voltage, current, speed),
+                    None,
+                    "{speed} {current}"
+                );
             }
         }
-        assert_eq!(told(f32::NAN, 0.0, 0.0), Some(0));
+        assert_eq!(step_voltages(f32::NAN, 0.0, 0.0), Some(0));
     }
 }

@@ -4,7 +4,7 @@ use super::Trajectory;
 use super::elapsed::Elapsed;
 use super::error::TrajectoryError;
 use super::extremes::Extremes;
-use super::phase::{HIGHEST_HZ, MOST_OCTAVES};
+use super::phase::{MAX_HZ, MAX_OCTAVES};
 use super::reference::Reference;
 use super::segment::Segment;
 use super::staged::SlowReversals;
@@ -66,11 +66,11 @@ impl<T: Scalar> Trajectory<T> {
                 check(m.cosine.iter().all(finite), "cosine")
             }
             Self::Chirp(m) => {
-                let swept = |hz: &T| positive(hz) && hz.le(T::from_f64(HIGHEST_HZ));
+                let swept = |hz: &T| positive(hz) && hz.le(T::from_f64(MAX_HZ));
                 check(swept(&m.start_hz), "start_hz")?;
                 check(swept(&m.end_hz), "end_hz")?;
                 let octaves = libm::log2(m.end_hz.to_f64() / m.start_hz.to_f64());
-                check(octaves.abs() <= MOST_OCTAVES, "end_hz")?;
+                check(octaves.abs() <= MAX_OCTAVES, "end_hz")?;
                 check(m.duration_us > 0, "duration_us")?;
                 check(m.ramp_us > 0 && m.ramp_us <= m.duration_us / 2, "ramp_us")?;
                 check(positive(&m.amplitude), "amplitude")?;

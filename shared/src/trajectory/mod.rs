@@ -138,15 +138,15 @@ impl<T: Scalar> Trajectory<T> {
 
 /// Precomputed values of a trajectory. A control tick is too short to compute them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Preparation<T> {
+pub struct TrajectoryConstants<T> {
     phase: Phase<T>,
     duration_micros: u64,
 }
 
 impl<T: Scalar> Trajectory<T> {
-    /// Computes the values that a [`Course`] needs: some thousand cycles of the microcontroller.
-    pub fn prepare(&self) -> Preparation<T> {
-        Preparation {
+    /// Computes the values that a [`PreparedTrajectory`] needs: some thousand cycles of the microcontroller.
+    pub fn prepare(&self) -> TrajectoryConstants<T> {
+        TrajectoryConstants {
             phase: self.phase(),
             duration_micros: self.duration_micros(),
         }
@@ -155,14 +155,14 @@ impl<T: Scalar> Trajectory<T> {
 
 /// A trajectory ready for the control tick.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course<T> {
+pub struct PreparedTrajectory<T> {
     trajectory: Trajectory<T>,
-    prepared: Preparation<T>,
+    prepared: TrajectoryConstants<T>,
 }
 
-impl<T: Scalar> Course<T> {
+impl<T: Scalar> PreparedTrajectory<T> {
     /// Returns a trajectory with its preparation. The preparation must be of the same trajectory.
-    pub fn new(trajectory: Trajectory<T>, prepared: Preparation<T>) -> Self {
+    pub fn new(trajectory: Trajectory<T>, prepared: TrajectoryConstants<T>) -> Self {
         Self {
             trajectory,
             prepared,

@@ -10,12 +10,12 @@ use super::sweep::Sweep;
 use crate::scalar::Scalar;
 
 /// Highest frequency of a sweep, Hz.
-pub(super) const HIGHEST_HZ: f64 = 1.0e5;
+pub(super) const MAX_HZ: f64 = 1.0e5;
 /// Largest number of octaves of a logarithmic sweep.
-pub(super) const MOST_OCTAVES: f64 = 31.0;
+pub(super) const MAX_OCTAVES: f64 = 31.0;
 /// A logarithmic sweep over fewer octaves runs as a linear one. The two differ by less than 10⁻⁸ of the phase, and the
 /// logarithmic formula would be the difference of two large numbers.
-const FEWEST_OCTAVES: f64 = 1.0 / 4096.0;
+const MIN_OCTAVES: f64 = 1.0 / 4096.0;
 
 /// Returns the upper half of a product.
 ///
@@ -135,7 +135,7 @@ impl<T: Scalar> Phase<T> {
         let falls = end_hz < start_hz;
         // Casts from floating point saturate, and turn NaN into zero: no value overflows its word.
         let seconds = f64::from(duration_us) * 1e-6;
-        let (rate, law) = if sweep == Sweep::Linear || !(octaves.abs() >= FEWEST_OCTAVES) {
+        let (rate, law) = if sweep == Sweep::Linear || !(octaves.abs() >= MIN_OCTAVES) {
             let per_us = |hz: f64| (hz * 1e-6 * power_of_two(64)) as u64;
             let law = Law::Linear {
                 start: per_us(start_hz),
@@ -148,7 +148,7 @@ impl<T: Scalar> Phase<T> {
             let scale = start_hz / rate.abs();
             let (mantissa, exponent) = libm::frexp(scale);
             let law = Law::Logarithmic {
-                octaves: (octaves.abs().min(MOST_OCTAVES) * power_of_two(58)) as u64,
+                octaves: (octaves.abs().min(MAX_OCTAVES) * power_of_two(58)) as u64,
                 falls,
                 mantissa: (mantissa * power_of_two(64)) as u64,
                 exponent: exponent + 1,
@@ -261,8 +261,7 @@ mod tests {
                     let micros = length / 2000 * k;
                     let t = f64::from(micros) * 1e-6;
                     let ratio: f64 = to / from;
-                    let straight =
-                        sweep == Sweep::Linear || libm::log2(ratio).abs() < FEWEST_OCTAVES;
+                    let straight = sweep == Sweep::Linear || libm::log2(ratio).abs() < MIN_OCTAVES;
                     let (turns, hz) = if straight {
                         let slope = (to - from) / seconds;
                         (t * (from + 0.5 * slope * t), from + slope * t)

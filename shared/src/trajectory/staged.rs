@@ -68,7 +68,7 @@ fn micros(seconds: f64) -> Option<u32> {
 }
 
 /// Returns a quotient, in 32 bits if they suffice, because the microcontroller divides them in hardware.
-fn divided(number: u64, by: u64) -> u64 {
+fn divide(number: u64, by: u64) -> u64 {
     match (u32::try_from(number), u32::try_from(by)) {
         (Ok(number), Ok(by)) => u64::from(number / by.max(1)),
         _ => number / by.max(1),
@@ -205,7 +205,7 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
             let mut done = 0;
             if left >= lead && self.cycles > 0 {
                 // At most the number of cycles, so it fits into 16 bits.
-                let whole = divided(left - lead, cycle.max(1)).min(u64::from(self.cycles) - 1);
+                let whole = divide(left - lead, cycle.max(1)).min(u64::from(self.cycles) - 1);
                 left -= lead + whole * cycle;
                 done = whole as u16 + 1;
             }
@@ -236,27 +236,30 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
         let edge = v * Elapsed::seconds(quarter, T::ZERO);
         let short = quarter.saturating_sub(self.half_turn_us);
         let straight = quarter.saturating_mul(2);
-        let mut go = |micros: u32, start: T, from: T, to: T| {
+        let mut visit_blend = |micros: u32, start: T, from: T, to: T| {
             visit(Segment {
                 micros,
                 start,
                 shape: Shape::Blend(from, to),
             })
         };
-        if first == 0 && !(go(turn_us, T::ZERO, T::ZERO, v) && go(short, start_distance, v, v)) {
+        if first == 0
+            && !(visit_blend(turn_us, T::ZERO, T::ZERO, v)
+                && visit_blend(short, start_distance, v, v))
+        {
             return false;
         }
         for cycle in first.max(1)..=self.cycles {
             let last = cycle == self.cycles;
-            let on = go(turn_us, edge, v, -v)
-                && go(straight, edge, -v, -v)
-                && go(turn_us, -edge, -v, v)
-                && go(if last { short } else { straight }, -edge, v, v);
+            let on = visit_blend(turn_us, edge, v, -v)
+                && visit_blend(straight, edge, -v, -v)
+                && visit_blend(turn_us, -edge, -v, v)
+                && visit_blend(if last { short } else { straight }, -edge, v, v);
             if !on {
                 return false;
             }
         }
-        go(turn_us, -start_distance, v, T::ZERO)
+        visit_blend(turn_us, -start_distance, v, T::ZERO)
     }
 }
 
@@ -344,17 +347,17 @@ impl<T: Real<Mask = bool>> FrictionSweep<T> {
                 let v = -side * self.speed_of(cruise);
                 let start = side * end;
                 let run_up = T::from_f64(0.5) * v * Elapsed::seconds(self.ramp_us, T::ZERO);
-                let mut go = |micros: u32, start: T, from: T, to: T| {
+                let mut visit_blend = |micros: u32, start: T, from: T, to: T| {
                     visit(Segment {
                         micros,
                         start,
                         shape: Shape::Blend(from, to),
                     })
                 };
-                let on = go(self.ramp_us, start, T::ZERO, v)
-                    && go(cruise, start + run_up, v, v)
-                    && go(self.ramp_us, -start - run_up, v, T::ZERO)
-                    && go(self.dwell_us, -start, T::ZERO, T::ZERO);
+                let on = visit_blend(self.ramp_us, start, T::ZERO, v)
+                    && visit_blend(cruise, start + run_up, v, v)
+                    && visit_blend(self.ramp_us, -start - run_up, v, T::ZERO)
+                    && visit_blend(self.dwell_us, -start, T::ZERO, T::ZERO);
                 if !on {
                     return;
                 }

@@ -30,7 +30,7 @@ impl<T: Real> MotorSpace<T> {
         let n = transmission.joint_count();
         check("q", n, q.len())?;
         check("qd", n, qd.len())?;
-        let factors = transmission.factored(q)?;
+        let factors = transmission.factored_jacobian(q)?;
         let mut convective = [T::ZERO; MAX_JOINTS];
         for (entry, motor) in convective.iter_mut().zip(&transmission.motors) {
             *entry = motor.convective(q, qd);

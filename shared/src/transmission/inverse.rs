@@ -7,13 +7,13 @@ use crate::multibody::MAX_JOINTS;
 use crate::scalar::{Mask, Real};
 
 /// Maximum number of Newton steps of [`Transmission::joint_position`]. Two or three suffice from a neighbouring sample.
-pub const MOST_STEPS: usize = 60;
+pub const MAX_NEWTON_STEPS: usize = 60;
 
 /// Maximum number of halvings of a Newton step that leaves the screws' reach or does not reduce the error.
-const MOST_HALVINGS: usize = 30;
+const MAX_HALVINGS: usize = 30;
 
 /// Tolerance of the motor positions, in units of the type's rounding times the largest position or ratio.
-const ROUNDINGS: f64 = 64.0;
+const TOLERANCE_ROUNDINGS: f64 = 64.0;
 
 impl<T: Real> Transmission<T> {
     /// Returns the motor torques for the joint torques τ: τ_motor = J⁻ᵀ·τ.
@@ -29,7 +29,7 @@ impl<T: Real> Transmission<T> {
         let n = self.joint_count();
         check("tau", n, tau.len())?;
         check("tau_motor", n, tau_motor.len())?;
-        let factors = self.factored(q)?;
+        let factors = self.factored_jacobian(q)?;
         tau_motor.copy_from_slice(tau);
         factors.solve_transposed(tau_motor);
         Ok(())
@@ -48,7 +48,7 @@ impl<T: Real> Transmission<T> {
         let n = self.joint_count();
         check("psid", n, psid.len())?;
         check("qd", n, qd.len())?;
-        let factors = self.factored(q)?;
+        let factors = self.factored_jacobian(q)?;
         qd.copy_from_slice(psid);
         factors.solve(qd);
         Ok(())
@@ -69,7 +69,7 @@ impl<T: Real> Transmission<T> {
         check("qd", n, qd.len())?;
         check("psidd", n, psidd.len())?;
         check("qdd", n, qdd.len())?;
-        let factors = self.factored(q)?;
+        let factors = self.factored_jacobian(q)?;
         for ((out, motor), &acceleration) in qdd.iter_mut().zip(&self.motors).zip(psidd) {
             *out = acceleration - motor.convective(q, qd);
         }
@@ -89,68 +89,68 @@ impl<T: Real> Transmission<T> {
         let n = self.joint_count();
         check("psi", n, psi.len())?;
         check("q", n, q.len())?;
-        self.reach(psi)?;
+        self.check_reach(psi)?;
         let mut at = [T::ZERO; MAX_JOINTS];
         at[..n].copy_from_slice(q);
-        let mut rest = [T::ZERO; MAX_JOINTS];
-        self.residual(psi, &at[..n], &mut rest[..n])?;
-        let mut before = size(&rest[..n]);
+        let mut error_vector = [T::ZERO; MAX_JOINTS];
+        self.residual(psi, &at[..n], &mut error_vector[..n])?;
+        let mut previous_error = max_abs(&error_vector[..n]);
         let scale = self.scale(psi);
-        let enough = T::from_f64(ROUNDINGS) * rounding::<T>() * scale;
-        for _ in 0..MOST_STEPS {
-            let factors = self.factored(&at[..n])?;
-            let mut step = rest;
+        let tolerance = T::from_f64(TOLERANCE_ROUNDINGS) * machine_epsilon::<T>() * scale;
+        for _ in 0..MAX_NEWTON_STEPS {
+            let factors = self.factored_jacobian(&at[..n])?;
+            let mut step = error_vector;
             factors.solve(&mut step[..n]);
-            if before.le(enough).all() {
+            if previous_error.le(tolerance).all() {
                 // One more step is cheap and updates the derivatives of dual numbers.
                 for (out, (&position, &last)) in q.iter_mut().zip(at.iter().zip(&step)) {
                     *out = position + last;
                 }
                 return Ok(());
             }
-            let mut share = T::ONE;
+            let mut step_scale = T::ONE;
             let mut next = at;
-            for halving in 0..=MOST_HALVINGS {
+            for halving in 0..=MAX_HALVINGS {
                 for j in 0..n {
-                    next[j] = at[j] + share * step[j];
+                    next[j] = at[j] + step_scale * step[j];
                 }
-                self.residual(psi, &next[..n], &mut rest[..n])?;
-                let now = size(&rest[..n]);
+                self.residual(psi, &next[..n], &mut error_vector[..n])?;
+                let error = max_abs(&error_vector[..n]);
                 // Each lane shortens its own step. A screw out of reach gives NaN, which never counts as nearer.
-                let nearer = now.lt(before) | now.le(enough);
-                let good = nearer & self.same_side(&at[..n], &next[..n]);
-                if good.all() {
-                    before = now;
+                let improved = error.lt(previous_error) | error.le(tolerance);
+                let accepted = improved & self.same_side(&at[..n], &next[..n]);
+                if accepted.all() {
+                    previous_error = error;
                     break;
                 }
-                if halving == MOST_HALVINGS {
-                    return Err(self.farthest(psi, &at[..n]));
+                if halving == MAX_HALVINGS {
+                    return Err(self.worst_motor(psi, &at[..n]));
                 }
-                share = T::select(good, share, T::from_f64(0.5) * share);
+                step_scale = T::select(accepted, step_scale, T::from_f64(0.5) * step_scale);
             }
             at = next;
         }
-        Err(self.farthest(psi, &at[..n]))
+        Err(self.worst_motor(psi, &at[..n]))
     }
 
     /// Returns the factored Jacobian.
-    pub(super) fn factored(&self, q: &[T]) -> Result<Factors<T>, TransmissionError> {
+    pub(super) fn factored_jacobian(&self, q: &[T]) -> Result<Factors<T>, TransmissionError> {
         let n = self.joint_count();
         let mut square = [[T::ZERO; MAX_JOINTS]; MAX_JOINTS];
         let matrix = &mut square.as_flattened_mut()[..n * n];
         self.jacobian(q, matrix)?;
         Factors::of(matrix, n).ok_or_else(|| TransmissionError::Singular {
-            motor: self.dependent(q, matrix),
+            motor: self.dependent_motor(q, matrix),
         })
     }
 
     /// Returns the motor whose row of a singular Jacobian depends most on the rows before it (Gram and Schmidt).
-    fn dependent(&self, q: &[T], jacobian: &mut [T]) -> usize {
+    fn dependent_motor(&self, q: &[T], jacobian: &mut [T]) -> usize {
         let n = self.joint_count();
         let mut worst = (n - 1, T::from_f64(f64::INFINITY));
         for (k, motor) in self.motors.iter().enumerate() {
-            let (done, rest) = jacobian.split_at_mut(k * n);
-            let row = &mut rest[..n];
+            let (previous_rows, remaining_rows) = jacobian.split_at_mut(k * n);
+            let row = &mut remaining_rows[..n];
             // Size of the row at the best angle of its crank.
             let reach = motor
                 .screw
@@ -158,24 +158,24 @@ impl<T: Real> Transmission<T> {
                 .map_or(T::ZERO, |s| s.at(s.angle(q)).position.abs());
             let length = norm(row).max(reach);
             for _ in 0..2 {
-                for unit in done.chunks_exact(n) {
-                    let mut along = T::ZERO;
+                for unit in previous_rows.chunks_exact(n) {
+                    let mut projection = T::ZERO;
                     for (&u, &r) in unit.iter().zip(row.iter()) {
-                        along += u * r;
+                        projection += u * r;
                     }
                     for (&u, r) in unit.iter().zip(row.iter_mut()) {
-                        *r -= along * u;
+                        *r -= projection * u;
                     }
                 }
             }
-            let left = norm(row);
-            let share = left / length;
-            if share.lt(worst.1).any() {
-                worst = (k, share);
+            let remaining = norm(row);
+            let independent_share = remaining / length;
+            if independent_share.lt(worst.1).any() {
+                worst = (k, independent_share);
             }
-            let safe = left.max(T::from_f64(f64::MIN_POSITIVE.sqrt()));
+            let divisor = remaining.max(T::from_f64(f64::MIN_POSITIVE.sqrt()));
             for entry in row {
-                *entry /= safe;
+                *entry /= divisor;
             }
         }
         worst.0
@@ -184,8 +184,8 @@ impl<T: Real> Transmission<T> {
     /// Computes Ψ − F(q).
     fn residual(&self, psi: &[T], q: &[T], out: &mut [T]) -> Result<(), TransmissionError> {
         self.motor_position(q, out)?;
-        for (entry, &wanted) in out.iter_mut().zip(psi) {
-            *entry = wanted - *entry;
+        for (entry, &target) in out.iter_mut().zip(psi) {
+            *entry = target - *entry;
         }
         Ok(())
     }
@@ -201,11 +201,11 @@ impl<T: Real> Transmission<T> {
     }
 
     /// Refuses positions that a screw, which depends on its crank alone, cannot reach at any angle.
-    fn reach(&self, psi: &[T]) -> Result<(), TransmissionError> {
-        for (motor, (m, &wanted)) in self.motors.iter().zip(psi).enumerate() {
+    fn check_reach(&self, psi: &[T]) -> Result<(), TransmissionError> {
+        for (motor, (m, &target)) in self.motors.iter().zip(psi).enumerate() {
             let Some(screw) = &m.screw else { continue };
-            let own = m.ratios.iter().all(|r| r.abs().le(T::ZERO).all());
-            if own && !screw.reaches(wanted - m.zero).all() {
+            let crank_only = m.ratios.iter().all(|r| r.abs().le(T::ZERO).all());
+            if crank_only && !screw.reaches(target - m.zero).all() {
                 return Err(TransmissionError::OutOfReach { motor });
             }
         }
@@ -215,8 +215,8 @@ impl<T: Real> Transmission<T> {
     /// Returns the largest of 1 rad, the motor positions and the terms of their functions, rad.
     fn scale(&self, psi: &[T]) -> T {
         let mut scale = T::ONE;
-        for (m, &wanted) in self.motors.iter().zip(psi) {
-            scale = scale.max(wanted.abs()).max(m.zero.abs());
+        for (m, &target) in self.motors.iter().zip(psi) {
+            scale = scale.max(target.abs()).max(m.zero.abs());
             for &ratio in &m.ratios {
                 scale = scale.max(ratio.abs());
             }
@@ -228,15 +228,15 @@ impl<T: Real> Transmission<T> {
     }
 
     /// Returns the motor with the largest position error, as an error.
-    fn farthest(&self, psi: &[T], q: &[T]) -> TransmissionError {
+    fn worst_motor(&self, psi: &[T], q: &[T]) -> TransmissionError {
         let n = self.joint_count();
-        let mut rest = [T::ZERO; MAX_JOINTS];
-        if let Err(error) = self.residual(psi, q, &mut rest[..n]) {
+        let mut error_vector = [T::ZERO; MAX_JOINTS];
+        if let Err(error) = self.residual(psi, q, &mut error_vector[..n]) {
             return error;
         }
         let mut motor = 0;
         for k in 1..n {
-            if rest[motor].abs().lt(rest[k].abs()).any() {
+            if error_vector[motor].abs().lt(error_vector[k].abs()).any() {
                 motor = k;
             }
         }
@@ -254,7 +254,7 @@ fn norm<T: Real>(values: &[T]) -> T {
 }
 
 /// Returns the largest absolute entry; NaN if any entry is NaN.
-fn size<T: Real>(values: &[T]) -> T {
+fn max_abs<T: Real>(values: &[T]) -> T {
     let mut largest = T::ZERO;
     for &value in values {
         largest = largest.max(value.abs());
@@ -268,7 +268,7 @@ fn size<T: Real>(values: &[T]) -> T {
 }
 
 /// Returns the distance from 1 to the next number of the type, by the textbook loop.
-fn rounding<T: Real>() -> T {
+fn machine_epsilon<T: Real>() -> T {
     let half = T::from_f64(0.5);
     let mut step = T::ONE;
     while T::ONE.lt(T::ONE + half * step).any() {

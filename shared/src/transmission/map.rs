@@ -7,7 +7,7 @@ use crate::scalar::Real;
 
 /// A screw at an angle of its crank: length over lead (as motor angle) and its first two derivatives.
 #[derive(Clone, Copy)]
-pub(super) struct Turned<T> {
+pub(super) struct ScrewState<T> {
     pub(super) position: T,
     slope: T,
     curvature: T,
@@ -36,14 +36,14 @@ impl<T: Real> Screw<T> {
 
     /// With L² = w = s + m·cos φ − n·sin φ: L' = w'/2L, L'' = (w''/2 − L'²)/L and w'' = s − w.
     #[inline(always)]
-    pub(super) fn at(&self, angle: T) -> Turned<T> {
+    pub(super) fn at(&self, angle: T) -> ScrewState<T> {
         let half = T::from_f64(0.5);
         let (sin, cos) = angle.sin_cos();
         let square = self.constant + self.cosine * cos - self.sine * sin;
         let length = square.sqrt();
         let slope = -half * (self.cosine * sin + self.sine * cos) / length;
         let curvature = (half * (self.constant - square) - slope.squared()) / length;
-        Turned {
+        ScrewState {
             position: self.factor * length,
             slope: self.factor * slope,
             curvature: self.factor * curvature,

@@ -48,5 +48,5 @@ mod tests;
 pub use drives::{DriveKind, DriveMap, MOTOR_COLUMN_NAMES, MOTOR_COLUMNS, ScrewMap, motor_column};
 pub use dynamics::MotorSpace;
 pub use error::TransmissionError;
-pub use inverse::MOST_STEPS;
+pub use inverse::MAX_NEWTON_STEPS;
 pub use motors::Transmission;

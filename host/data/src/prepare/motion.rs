@@ -3,7 +3,7 @@
 use super::error::PrepareError;
 use super::filter::{LowPass, central_difference, second_difference};
 use super::pieces::{Piece, Recording, each_piece};
-use super::treatment::Treatment;
+use super::preprocessing_plan::PreprocessingPlan;
 use super::workers::{in_order, threads};
 
 /// Motion of one joint over a piece, at the full rate.
@@ -50,56 +50,53 @@ pub struct Motion {
 /// Errors of the reader or of `take`; [`PrepareError::NoDerivative`].
 pub fn each_motion(
     recording: &dyn Recording,
-    treatment: &Treatment,
+    plan: &PreprocessingPlan,
     reach: usize,
     take: &mut dyn FnMut(&Motion) -> Result<(), PrepareError>,
 ) -> Result<(), PrepareError> {
-    worked_motion(recording, treatment, reach, &Ok, &mut |motion| {
-        take(&motion)
-    })
+    worked_motion(recording, plan, reach, &Ok, &mut |motion| take(&motion))
 }
 
 /// Calls `take` with the results of `work` on the motion of the whole recording, in order. The work is spread over
-/// [`Treatment::threads`].
+/// [`PreprocessingPlan::threads`].
 ///
 /// # Errors
 /// Errors of the reader, `work` or `take`; [`PrepareError::NoDerivative`].
 pub fn worked_motion<R: Send>(
     recording: &dyn Recording,
-    treatment: &Treatment,
+    plan: &PreprocessingPlan,
     reach: usize,
     work: &(dyn Fn(Motion) -> Result<R, PrepareError> + Sync),
     take: &mut dyn FnMut(R) -> Result<(), PrepareError>,
 ) -> Result<(), PrepareError> {
     let impossible = || PrepareError::Cutoff {
-        cutoff: treatment.cutoff,
-        rate: treatment.sample_rate,
-        nyquist: treatment.sample_rate / 2.0,
+        cutoff: plan.cutoff,
+        rate: plan.sample_rate,
+        nyquist: plan.sample_rate / 2.0,
     };
-    let position = treatment.position_filter().ok_or_else(impossible)?;
-    let parallel = treatment.parallel_low_pass().ok_or_else(impossible)?;
-    let round = |rows: usize| rows.div_ceil(treatment.decimation) * treatment.decimation;
-    let margin = round(
-        position.settle_samples() + parallel.settle_samples() + treatment.trimmed + reach + 4,
-    );
-    let core = round(treatment.piece_rows.max(margin));
+    let position = plan.position_filter().ok_or_else(impossible)?;
+    let parallel = plan.parallel_low_pass().ok_or_else(impossible)?;
+    let round = |rows: usize| rows.div_ceil(plan.decimation) * plan.decimation;
+    let margin =
+        round(position.settle_samples() + parallel.settle_samples() + plan.trimmed + reach + 4);
+    let core = round(plan.piece_rows.max(margin));
     let label = recording.label();
     in_order(
-        threads(treatment.threads),
+        threads(plan.threads),
         |push| each_piece(recording, core, margin, push),
-        &|piece| work(motion_of(piece, treatment, &position, &label)?),
+        &|piece| work(motion_of(piece, plan, &position, &label)?),
         take,
     )
 }
 
 fn motion_of(
     piece: Piece,
-    treatment: &Treatment,
+    plan: &PreprocessingPlan,
     position: &LowPass,
     label: &str,
 ) -> Result<Motion, PrepareError> {
     let rows = piece.rows.len();
-    let dt = treatment.dt();
+    let dt = plan.dt();
     let joints = piece
         .rows
         .joints
@@ -111,7 +108,7 @@ fn motion_of(
                 column: format!("{name}{}", j + 1),
             };
             let q = position.zero_phase(&column.q);
-            let (qd, qdd) = if treatment.measured_derivatives {
+            let (qd, qdd) = if plan.measured_derivatives {
                 let qd = position.zero_phase(column.qd.as_ref().ok_or_else(|| missing("qd"))?);
                 let qdd = match &column.qdd {
                     Some(qdd) => position.zero_phase(qdd),
@@ -121,9 +118,9 @@ fn motion_of(
             } else {
                 (central_difference(&q, dt), second_difference(&q, dt))
             };
-            let (q, qd, qdd) = later(q, qd, qdd, treatment.torque_lead, dt);
-            let threshold = treatment.speed_threshold[j];
-            let [low, high] = treatment.saturation[j];
+            let (q, qd, qdd) = later(q, qd, qdd, plan.torque_lead, dt);
+            let threshold = plan.speed_threshold[j];
+            let [low, high] = plan.saturation[j];
             Ok(JointMotion {
                 slow: qd.iter().map(|v| v.abs() < threshold).collect(),
                 saturated: column
@@ -138,7 +135,7 @@ fn motion_of(
             })
         })
         .collect::<Result<Vec<_>, PrepareError>>()?;
-    let trim = |end: bool| if end { treatment.trimmed.min(rows) } else { 0 };
+    let trim = |end: bool| if end { plan.trimmed.min(rows) } else { 0 };
     let (front, back) = (trim(piece.at_ends[0]), trim(piece.at_ends[1]));
     let start = if piece.at_ends[0] {
         piece.core_start.max(front)
@@ -230,9 +227,9 @@ mod tests {
         }
     }
 
-    fn collect(recording: &InMemory, treatment: &Treatment) -> (Vec<f64>, Vec<f64>, usize) {
+    fn collect(recording: &InMemory, plan: &PreprocessingPlan) -> (Vec<f64>, Vec<f64>, usize) {
         let (mut qdd, mut t, mut pieces) = (Vec::new(), Vec::new(), 0);
-        each_motion(recording, treatment, 10, &mut |m| {
+        each_motion(recording, plan, 10, &mut |m| {
             qdd.extend_from_slice(&m.joints[0].qdd[m.usable.0..m.usable.1]);
             t.extend_from_slice(&m.t[m.usable.0..m.usable.1]);
             pieces += 1;
@@ -252,11 +249,11 @@ mod tests {
             decimation: Choice::Fixed(4),
             ..Default::default()
         };
-        let mut treatment = Treatment::decide(&[survey], &options, &[None]).unwrap();
-        let (t_whole, expected, one) = collect(&whole, &treatment);
+        let mut plan = PreprocessingPlan::decide(&[survey], &options, &[None]).unwrap();
+        let (t_whole, expected, one) = collect(&whole, &plan);
         assert_eq!(one, 1);
-        treatment.piece_rows = 4000;
-        let (t_cut, found, pieces) = collect(&cut, &treatment);
+        plan.piece_rows = 4000;
+        let (t_cut, found, pieces) = collect(&cut, &plan);
         assert!(pieces > 8, "{pieces}");
         assert_eq!(t_whole, t_cut);
         let scale = expected.iter().fold(0.0f64, |m, x| m.max(x.abs()));

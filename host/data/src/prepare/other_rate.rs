@@ -1,13 +1,13 @@
-//! Adapts a treatment that was decided at one sample rate to a recording of another rate.
+//! Adapts a plan that was decided at one sample rate to a recording of another rate.
 
 use super::error::PrepareError;
+use super::preprocessing_plan::{MAX_CUTOFF_SHARE, PreprocessingPlan};
 use super::rate::{parallel_pass, same_rate, trimmed_rows};
 use super::survey::Survey;
-use super::treatment::{HIGHEST, Treatment};
 use rig_output::format_short;
 
-impl Treatment {
-    /// Returns the treatment for a further recording (a hold-out) at that recording's own rate. The band of torque and
+impl PreprocessingPlan {
+    /// Returns the plan for a further recording (a hold-out) at that recording's own rate. The band of torque and
     /// regressor is as close as a whole number of rows allows; masks and torque lead are kept. Returns it unchanged if
     /// the rates agree within 1 %.
     ///
@@ -21,7 +21,7 @@ impl Treatment {
             return Ok(self.clone());
         }
         let rate = survey.sample_rate;
-        let most = HIGHEST * rate / 2.0;
+        let most = MAX_CUTOFF_SHARE * rate / 2.0;
         if self.parallel_edge > most {
             return Err(PrepareError::BandBeyondRate {
                 label: survey.label.clone(),
@@ -86,13 +86,13 @@ mod tests {
         Survey::take(&recording, 1).unwrap()
     }
 
-    fn decided(cutoff: f64, decimation: usize) -> Treatment {
+    fn decided(cutoff: f64, decimation: usize) -> PreprocessingPlan {
         let options = PrepareOptions {
             cutoff: Choice::Fixed(cutoff),
             decimation: Choice::Fixed(decimation),
             ..Default::default()
         };
-        Treatment::decide(&[survey(1000.0)], &options, &[None]).unwrap()
+        PreprocessingPlan::decide(&[survey(1000.0)], &options, &[None]).unwrap()
     }
 
     #[test]

@@ -288,7 +288,8 @@ impl Source<'_> {
         let gains = candidate.kind.about().gains.len();
         let mut out = vec![Vec::with_capacity(run.len()); gains];
         let effect = Effect::new(candidate.kind, &[], shapes);
-        let mut memory = (run.past).remembered(&effect, candidate.joint, [viscous, coulomb]);
+        let mut memory =
+            (run.thermal_history).state_after(&effect, candidate.joint, [viscous, coulomb]);
         for k in 0..run.len() {
             let slid = match bent {
                 Some(bent) => bent[k],
@@ -304,13 +305,13 @@ impl Source<'_> {
                 load: load[k],
                 friction: coulomb * slid + viscous * joint.qd[k],
                 time: run.t[k] - run.began,
-                warming: joint
+                temperature_rise: joint
                     .temperature
                     .as_ref()
                     .map_or(0.0, |t| t[k] - first_temperature),
                 other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
                 period: 1.0 / run.rate,
-                beside: beside.map_or(0.0, |beside| beside[k]),
+                extra_friction_ratio: beside.map_or(0.0, |beside| beside[k]),
                 // Delays and payloads have separate columns.
                 drive_rate: 0.0,
                 gravity: 0.0,

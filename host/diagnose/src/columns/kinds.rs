@@ -41,7 +41,7 @@ pub(crate) fn has_many_orders(kind: Kind) -> bool {
 
 /// Returns true for the default law of a name. Other laws are tried only as replacements.
 pub(crate) fn is_first_law(kind: Kind) -> bool {
-    Kind::named(kind.about().name, None) == Some(kind)
+    Kind::from_name(kind.about().name, None) == Some(kind)
         // Rings of motor and joint are at different places, not different laws.
         || kind == Kind::EncoderEccentricityJoint
         || kind == Kind::ViscousWarmupTemperature
@@ -50,7 +50,7 @@ pub(crate) fn is_first_law(kind: Kind) -> bool {
 /// Returns true if a kind is searched for itself: the default law, or a law with as many parameters.
 pub(crate) fn is_searched(kind: Kind) -> bool {
     let size = |kind: Kind| kind.about().gains.len() + kind.about().shapes.len();
-    let first = Kind::named(kind.about().name, None);
+    let first = Kind::from_name(kind.about().name, None);
     is_first_law(kind) || first.is_some_and(|first| !is_gear(kind) && size(first) == size(kind))
 }
 

@@ -4,11 +4,11 @@
 //! link's equation, linearised about the motor's position, is M·ẍ = λ + f − K·x − τc(x, ẋ). M is the joint's own
 //! inertia without the drive and K the slope of gravity. f is the share of friction on the link, which sticks (Moreau's
 //! time stepping). τc is the torque of spring, damping and backlash. The drive's torque then differs from the rigid
-//! model's by τc − λ − f(θ̇m/ratio). Contacts only push: [`transmitted`] has the law.
+//! model's by τc − λ − f(θ̇m/ratio). Contacts only push: [`transmission_torque`] has the law.
 //!
 //! Leaves out: effects of one joint's twist on the others.
 
-use rig_shared::effects::{Kind, SHAPES, transmitted};
+use rig_shared::effects::{Kind, SHAPES, transmission_torque};
 use rig_shared::lanes::Lanes;
 use rig_shared::scalar::Real;
 
@@ -175,7 +175,7 @@ impl Driven {
             let part = (s as f64 + 0.5) * per_step;
             // Half a step of the twist, torque at the midpoint, second half: second order.
             let middle = x + half * v;
-            let torque = transmitted(gap, stiffness, damping, middle, v);
+            let torque = transmission_torque(gap, stiffness, damping, middle, v);
             let pull = number(from + part * (to - from)) - slope * middle - torque;
             // The link's own velocity after the step, without and with its friction.
             let motor = number(before + part * (after - before));
@@ -193,7 +193,7 @@ impl Driven {
 /// A gear with given shapes.
 #[derive(Clone, Copy, Debug)]
 struct Gear<T> {
-    /// Gap, stiffness and damping, as [`transmitted`] takes them.
+    /// Gap, stiffness and damping, as [`transmission_torque`] takes them.
     law: [T; 3],
     /// Share of the joint's friction that acts on the link.
     share: T,

@@ -76,10 +76,10 @@ impl Course {
                         friction: viscous * at.velocity + coulomb * direction,
                         gravity: gravity * place.pull_at(position),
                         time,
-                        warming: 0.0,
+                        temperature_rise: 0.0,
                         other: [0.0; 3],
                         period,
-                        beside: 0.0,
+                        extra_friction_ratio: 0.0,
                     }
                 })
                 .collect()

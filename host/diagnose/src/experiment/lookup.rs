@@ -173,7 +173,7 @@ fn of_one([a, b]: [Kind; 2]) -> Option<Split> {
         made(Remedy::FastAndSlow, FAST_AND_SLOW, Family::Sine)
     } else if has(&[Kind::GravityTilt]) {
         by_hand(Remedy::BaseTurned, TURNED, Family::Sine)
-    } else if a.is_warming() || b.is_warming() {
+    } else if a.is_viscous_warmup() || b.is_viscous_warmup() {
         made(Remedy::WarmUp, COLD_AND_WARM, Family::WarmUp)
     } else if has(&[Kind::QuadraticDrag]) {
         by_motion(Family::ConstantSpeeds, LOAD_OR_SPEED)

@@ -220,8 +220,8 @@ fn every_confused_pair_of_the_registry_has_an_answer() {
     for kind in Kind::ALL {
         let about = kind.about();
         for confusion in about.confused {
-            let other =
-                Kind::named(confusion.with, None).unwrap_or_else(|| panic!("{}", confusion.with));
+            let other = Kind::from_name(confusion.with, None)
+                .unwrap_or_else(|| panic!("{}", confusion.with));
             let mut pair = [about.name, confusion.with];
             pair.sort_unstable();
             if seen.contains(&pair) {

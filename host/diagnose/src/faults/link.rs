@@ -2,7 +2,7 @@
 
 use crate::faults::{columns, names};
 use crate::outcome::{About, DataFault, FaultKind};
-use rig_data::jumps;
+use rig_data::has_position_jump;
 use rig_data::runs::Run;
 use rig_model::robot::{JointKind, Robot};
 use rig_numerics::statistics::mean_or_zero;
@@ -22,7 +22,7 @@ pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
             continue;
         };
         // Its zero is free, so only a jump is a fault.
-        if jumps(&run.t, reading) {
+        if has_position_jump(&run.t, reading) {
             return named(
                 FaultKind::Jump,
                 format!(

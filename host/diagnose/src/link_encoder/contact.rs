@@ -1,5 +1,5 @@
 //! Backlash from the torque that closed contacts transmit: λ = K·b + D·ḃ − φ·sgn q̇ − f·q̇. b = x − clamp(x, ±gap/2) is
-//! the encoder difference beyond the gap (the law of [`rig_shared::effects::transmitted`]).
+//! the encoder difference beyond the gap (the law of [`rig_shared::effects::transmission_torque`]).
 //!
 //! The flank in contact follows from x itself, at the recording's rate and unfiltered. So impacts and the times between
 //! them, without torque, keep their place.

@@ -13,7 +13,7 @@ use crate::models::tilt::turn;
 use crate::rows::nominal::Nominal;
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_identify::{Combinations, described as standard, redistributed};
-use rig_model::robot::{Origin, Robot, RobotEffect, sane};
+use rig_model::robot::{Origin, Robot, RobotEffect, plausible_range};
 
 /// Least weight of a standard parameter, as a share of the largest value of its kind.
 const LEAST_WEIGHT: f64 = 0.1;
@@ -171,7 +171,7 @@ fn within(
     let about = kind.about();
     let places = about.gains.iter().zip(&mut effect.gains);
     for (p, value) in places.chain(about.shapes.iter().zip(&mut effect.shapes)) {
-        let [low, high] = sane(p);
+        let [low, high] = plausible_range(p);
         let kept = value.clamp(low, high);
         if kept != *value {
             remarks.push(ModelRemark::OutOfRange {

@@ -20,7 +20,9 @@ use crate::rows::one_way::OneWay;
 use crate::rows::regression::{Column, Rows, combined, take_off};
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::Compensated;
-use rig_data::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
+use rig_data::prepare::{
+    Choice, LowPass, PrepareOptions, PreprocessingPlan, Recording, Survey, same_rate,
+};
 use rig_data::runs::{Run, runs_of};
 use rig_model::effects::Effects;
 use rig_model::robot::{JointKind, Robot};
@@ -36,7 +38,7 @@ pub(crate) struct PreparedData {
     /// Regression rows, without the torque of the held parameters.
     pub(crate) rows: Rows,
     /// Treatment of these recordings, at their own sample rate.
-    pub(crate) treatment: Treatment,
+    pub(crate) treatment: PreprocessingPlan,
 }
 
 impl PreparedData {
@@ -61,7 +63,7 @@ pub(crate) struct DiagnosisContext<'a> {
     pub(crate) nominal: Nominal,
     /// Which of them are free.
     pub(crate) anchor: ParameterPrior,
-    treatment: Treatment,
+    treatment: PreprocessingPlan,
     /// Joints whose rows near standstill are used.
     pub(crate) rests: Vec<usize>,
     /// Joints that move in one direction only. Their constant torques are held.
@@ -121,7 +123,7 @@ impl<'a> DiagnosisContext<'a> {
         recordings: &[&dyn Recording],
     ) -> Result<PreparedData, DiagnoseError> {
         let joints = self.robot.joints.len();
-        let mut own: Option<Treatment> = None;
+        let mut own: Option<PreprocessingPlan> = None;
         for recording in recordings {
             let survey = Survey::take(*recording, joints)?;
             match &own {
@@ -135,7 +137,7 @@ impl<'a> DiagnosisContext<'a> {
     fn prepared(
         &self,
         recordings: &[&dyn Recording],
-        treatment: &Treatment,
+        treatment: &PreprocessingPlan,
     ) -> Result<PreparedData, DiagnoseError> {
         let position = position_filter(treatment)?;
         let mut runs = Vec::new();
@@ -159,7 +161,7 @@ impl<'a> DiagnosisContext<'a> {
     pub(crate) fn rows(
         &self,
         runs: Vec<Run>,
-        treatment: &Treatment,
+        treatment: &PreprocessingPlan,
     ) -> Result<PreparedData, DiagnoseError> {
         let mut rows = Rows::of(&runs, &self.nominal, treatment)?;
         let held = self.anchor.held_torque(&rows);
@@ -320,7 +322,7 @@ fn rms(rows: &Rows, residual: &[Vec<f64>]) -> Vec<f64> {
         .collect()
 }
 
-fn position_filter(treatment: &Treatment) -> Result<LowPass, DiagnoseError> {
+fn position_filter(treatment: &PreprocessingPlan) -> Result<LowPass, DiagnoseError> {
     (treatment.position_filter())
         .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))
 }
@@ -332,7 +334,7 @@ fn position_filter(treatment: &Treatment) -> Result<LowPass, DiagnoseError> {
 pub(crate) fn treatment_of(
     recordings: &[&dyn Recording],
     robot: &Robot,
-) -> Result<Treatment, DiagnoseError> {
+) -> Result<PreprocessingPlan, DiagnoseError> {
     let options = PrepareOptions::default();
     let surveys = (recordings.iter())
         .map(|r| Survey::take(*r, robot.joints.len()))
@@ -340,7 +342,7 @@ pub(crate) fn treatment_of(
     let limits = robot.torque_limits();
     // An identification uses the torque residual of the model here. The diagnosis looks for that residual, and a low
     // cut-off would smooth it away.
-    let first = Treatment::decide(&surveys, &options, &limits)?;
+    let first = PreprocessingPlan::decide(&surveys, &options, &limits)?;
     let (surveys, options, first) = match end_of_motion(recordings, &surveys, &first)? {
         None => (surveys, options, first),
         Some(end) => {
@@ -351,7 +353,7 @@ pub(crate) fn treatment_of(
                 cutoff: Choice::Fixed(end),
                 ..options
             };
-            let mut treatment = Treatment::decide(&surveys, &options, &limits)?;
+            let mut treatment = PreprocessingPlan::decide(&surveys, &options, &limits)?;
             treatment.spectral_cutoff = Some(first.cutoff);
             (surveys, options, treatment)
         }
@@ -370,7 +372,7 @@ pub(crate) fn treatment_of(
 fn end_of_motion(
     recordings: &[&dyn Recording],
     surveys: &[Survey],
-    first: &Treatment,
+    first: &PreprocessingPlan,
 ) -> Result<Option<f64>, DiagnoseError> {
     let doubtful = (first.spectra.iter()).any(|s| s.crossing.min(s.clean) < s.motion);
     if !doubtful {

@@ -14,9 +14,9 @@ use crate::recordings::rest_rows::joints_loud_at_rest;
 use crate::recordings::sampling::sampling_jitter;
 use crate::rows::one_way::{OneWay, one_way};
 use crate::{DiagnoseError, Options};
-use rig_data::past::in_sessions;
 use rig_data::prepare::Recording;
 use rig_data::runs::{Run, copies};
+use rig_data::sessions::join_sessions;
 
 /// Outcome of the intake.
 pub(crate) enum Intake<'a> {
@@ -67,9 +67,9 @@ impl Readings {
         } else {
             Some(context.load_held(holdout)?)
         };
-        in_sessions(&mut training.runs, &[]);
+        join_sessions(&mut training.runs, &[]);
         if let Some(held_out) = &mut held_out {
-            in_sessions(&mut held_out.runs, &training.runs);
+            join_sessions(&mut held_out.runs, &training.runs);
         }
         Ok(Self { training, held_out })
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use rig_data::prepare::{Evened, PrepareError, Recording, Resampled, interpolation};
+use rig_data::prepare::{MaybeResampled, PrepareError, Recording, Resampled, interpolation};
 
 /// Interpolation step (s) and message of each resampled recording, by label.
 #[derive(Default)]
@@ -19,11 +19,11 @@ impl Uneven {
     }
 
     /// Returns the recordings, resampled where necessary.
-    pub(crate) fn even<'a>(&self, recordings: &[&'a dyn Recording]) -> Vec<Evened<'a>> {
+    pub(crate) fn even<'a>(&self, recordings: &[&'a dyn Recording]) -> Vec<MaybeResampled<'a>> {
         (recordings.iter())
             .map(|recording| match self.0.get(&recording.label()) {
-                Some((step, _)) => Evened::Resampled(Resampled::new(*recording, *step)),
-                None => Evened::AsItIs(*recording),
+                Some((step, _)) => MaybeResampled::Resampled(Resampled::new(*recording, *step)),
+                None => MaybeResampled::Unchanged(*recording),
             })
             .collect()
     }

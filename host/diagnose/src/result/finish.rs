@@ -74,5 +74,5 @@ fn untested<'a>(found: &'a Found, diagnosis: &'a Diagnosis, repeated: bool) -> U
 /// Returns true if an effect of this name is friction near standstill.
 fn is_near_rest(effect: &str) -> bool {
     let stribeck = |kind: Kind| matches!(kind, Kind::Stribeck | Kind::StribeckExponential);
-    Kind::named(effect, None).is_some_and(|kind| kind.is_presliding() || stribeck(kind))
+    Kind::from_name(effect, None).is_some_and(|kind| kind.is_presliding() || stribeck(kind))
 }

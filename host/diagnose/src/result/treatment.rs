@@ -4,7 +4,7 @@ use crate::outcome::{Rows, Treated};
 use crate::recordings::context::PreparedData;
 use crate::result::sentences::treatment::cutoff;
 use crate::rows::regression::Rows as Regression;
-use rig_data::prepare::Treatment;
+use rig_data::prepare::PreprocessingPlan;
 use rig_model::robot::Robot;
 
 /// Returns the treatment of the training recordings and of the hold-out.
@@ -40,6 +40,6 @@ pub(crate) fn treated(
 }
 
 /// Returns the upper end of the rows' band, Hz: the lower one of both filters.
-fn band(treatment: &Treatment) -> f64 {
+fn band(treatment: &PreprocessingPlan) -> f64 {
     treatment.parallel_edge.min(treatment.cutoff)
 }

@@ -4,7 +4,7 @@ use crate::DiagnoseError;
 use crate::rows::motion::motion_of;
 use crate::rows::nominal::Nominal;
 use crate::rows::thinning::Thinning;
-use rig_data::prepare::Treatment;
+use rig_data::prepare::PreprocessingPlan;
 use rig_data::runs::{JointRun, Run};
 
 /// Share of slow or saturated samples around a row above which the row is not used. It is the low-passed indicator of
@@ -109,7 +109,7 @@ fn push_nominal(
 }
 
 /// Returns 1 for the samples of a joint that stand still or saturate, and 0 for the others.
-fn spoilt(joint: &JointRun, j: usize, treatment: &Treatment) -> Vec<f64> {
+fn spoilt(joint: &JointRun, j: usize, treatment: &PreprocessingPlan) -> Vec<f64> {
     let threshold = treatment.speed_threshold.get(j).copied().unwrap_or(0.0);
     let [low, high] = treatment.saturation.get(j).copied().unwrap_or_default();
     (joint.qd.iter().zip(joint.recorded().iter()))
@@ -166,7 +166,7 @@ impl Rows {
     pub(crate) fn of(
         runs: &[Run],
         nominal: &Nominal,
-        treatment: &Treatment,
+        treatment: &PreprocessingPlan,
     ) -> Result<Self, DiagnoseError> {
         let thinning = Thinning::of(treatment)?;
         let n = nominal.joints();

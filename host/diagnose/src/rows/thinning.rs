@@ -6,7 +6,7 @@ use rig_shared::lanes::Lanes;
 
 use crate::DiagnoseError;
 use crate::rows::lanes::ABREAST;
-use rig_data::prepare::{LowPass, Treatment, central_difference, second_difference};
+use rig_data::prepare::{LowPass, PreprocessingPlan, central_difference, second_difference};
 use rig_data::runs::Run;
 
 /// Periods of the position filter's cut-off frequency by which the filter may shift a reversal. It rounds the corner
@@ -48,7 +48,7 @@ impl Thinning {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] if a filter cannot be built.
-    pub(crate) fn of(treatment: &Treatment) -> Result<Self, DiagnoseError> {
+    pub(crate) fn of(treatment: &PreprocessingPlan) -> Result<Self, DiagnoseError> {
         let low_pass = treatment
             .parallel_low_pass()
             .ok_or_else(|| DiagnoseError::Model("its low-pass cannot be built.".into()))?;
@@ -194,7 +194,7 @@ impl Thinning {
 
 /// Returns a position filter with a power loss of at most [`HEARD`] at the upper band edge, as far as the sampling
 /// allows. A Butterworth filter of order n, forward and backward, loses the power share 2·(f/cut-off)²ⁿ.
-fn wide(treatment: &Treatment) -> Option<(f64, LowPass)> {
+fn wide(treatment: &PreprocessingPlan) -> Option<(f64, LowPass)> {
     let rate = treatment.sample_rate;
     let order = treatment.order;
     let share = (0.5 * HEARD).powf(0.5 / order as f64);

@@ -481,7 +481,7 @@ fn the_real_slide_gets_no_wave_that_it_does_not_travel_and_keeps_its_parameters(
     };
     let (diagnosis, model) = real.told("emps");
     for (effect, _) in named(&diagnosis) {
-        let along = Kind::named(effect, None).unwrap();
+        let along = Kind::from_name(effect, None).unwrap();
         assert!(
             !is_of_the_motor(along) && along != Kind::PositionFriction,
             "{effect}"

@@ -245,7 +245,7 @@ fn friction_under_load_tells_a_constant_on_the_link_from_one_of_the_sensor() {
         (Effect::TorqueOffset { torque: 0.3 }, true),
         (Effect::CurrentOffset { current: 0.12 }, false),
     ];
-    for (constant, on_the_link) in sides {
+    for (constant, acts_on_link) in sides {
         let made = Scenario::short([constant, load], 43).make().unwrap();
         let (found, _) = diagnosed(&made);
         assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.words);
@@ -258,12 +258,12 @@ fn friction_under_load_tells_a_constant_on_the_link_from_one_of_the_sensor() {
         };
         assert_eq!(
             side(&constant.effect),
-            Some(on_the_link),
+            Some(acts_on_link),
             "{:?}",
             found.words
         );
         let mut sides = constant.set.iter().filter_map(|name| side(name));
-        assert!(sides.all(|side| side == on_the_link), "{:?}", constant.set);
+        assert!(sides.all(|side| side == acts_on_link), "{:?}", constant.set);
         assert_eq!(found.steps.len(), 2, "{:?}", found.words);
     }
 }

@@ -65,7 +65,7 @@ fn parts(effects: &[Kind], theta: &[f64]) -> Vec<Part> {
                     _ if presliding && kind.acts_through_contact() => Role::Contact,
                     _ => Role::Dry,
                 },
-                remembers: kind.is_presliding() || kind.is_warming(),
+                remembers: kind.is_presliding() || kind.is_viscous_warmup(),
             }
         })
         .collect()
@@ -80,7 +80,8 @@ impl Part {
     fn bent(&self, at: &Instant<f64>) -> f64 {
         let mut memory = self.memory;
         self.effect.torque(&mut memory, at);
-        self.effect.bent(&memory, at.beside)
+        self.effect
+            .contact_deflection(&memory, at.extra_friction_ratio)
     }
 }
 
@@ -201,7 +202,7 @@ impl<'a> Stepper<'a> {
             reference_velocity: fed(law.velocity_feedforward, &log.reference_velocity),
             reference_acceleration: fed(law.acceleration_feedforward, &log.reference_acceleration),
         };
-        let wish = law.wish(&demand);
+        let wish = law.unlimited_share(&demand);
         self.integral += law.integrated(wish, demand.error, dt);
         law.voltage(wish)
     }
@@ -329,7 +330,7 @@ impl<'a> Stepper<'a> {
                 Role::Dry => [low, high] = [low + towards(-1.0, -1.0), high + towards(1.0, 1.0)],
             }
         }
-        at.beside = over_coulomb(through, self.coulomb);
+        at.extra_friction_ratio = over_coulomb(through, self.coulomb);
         Torques {
             torque,
             dry: [low, high],

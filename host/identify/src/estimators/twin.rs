@@ -10,7 +10,7 @@ use crate::rows::equation::Rows;
 use crate::rows::stream::rows_of;
 use crate::rows::tally::Tally;
 use rig_data::prepare::{
-    LowPass, Motion, PrepareError, Recording, Treatment, central_difference, each_motion,
+    LowPass, Motion, PrepareError, PreprocessingPlan, Recording, central_difference, each_motion,
     second_difference,
 };
 use rig_data::{Block, JointColumns};
@@ -116,7 +116,7 @@ pub(crate) fn each_pair(
 }
 
 /// Returns the treatment of a robot and its companion: the same twice.
-fn twice(treatment: &Treatment) -> Treatment {
+fn twice(treatment: &PreprocessingPlan) -> PreprocessingPlan {
     let mut both = treatment.clone();
     both.speed_threshold.extend(&treatment.speed_threshold);
     both.judged_speed.extend(&treatment.judged_speed);

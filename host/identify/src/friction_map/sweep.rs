@@ -8,17 +8,19 @@ use crate::error::IdentifyError;
 use crate::identification::Identification;
 use crate::structure::chain::chain_of;
 use crate::treatment::decide::treatment_for;
-use rig_data::prepare::{PrepareError, PrepareOptions, Recording, Survey, Treatment, each_motion};
+use rig_data::prepare::{
+    PrepareError, PrepareOptions, PreprocessingPlan, Recording, Survey, each_motion,
+};
 use rig_model::robot::Robot;
 
 /// Decides the treatment of the sweep: the band of the identification, limited by the sweep's own rate and noise, and
 /// the sweep's own clipping. There is no decimation, because means over passes are taken.
 pub(super) fn treatment_of(
     robot: &Robot,
-    fitted: &Treatment,
+    fitted: &PreprocessingPlan,
     sweep: &Survey,
     recording: &dyn Recording,
-) -> Result<Treatment, IdentifyError> {
+) -> Result<PreprocessingPlan, IdentifyError> {
     let rate = sweep.sample_rate;
     // A noisier position, or one with worse time stamps, must not be differentiated in the band of a better one.
     let (_, own) = treatment_for(
@@ -39,7 +41,7 @@ pub(super) fn treatment_of(
             ]
         })
         .collect();
-    Ok(Treatment {
+    Ok(PreprocessingPlan {
         sample_rate: rate,
         cutoff,
         decimation: 1,
@@ -75,7 +77,7 @@ pub(super) fn rows_of(
     identification: &Identification,
     recording: &dyn Recording,
     joint: usize,
-    treatment: &Treatment,
+    treatment: &PreprocessingPlan,
 ) -> Result<Rows, IdentifyError> {
     let details = &identification.details;
     let chain = chain_of(robot)?;

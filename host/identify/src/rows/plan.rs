@@ -5,7 +5,7 @@ use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, Transmission};
 
 use super::cache::RowCache;
 use super::one_way::OneWay;
-use rig_data::prepare::Treatment;
+use rig_data::prepare::PreprocessingPlan;
 
 /// The definition of the rows.
 pub struct Plan<'a> {
@@ -16,7 +16,7 @@ pub struct Plan<'a> {
     /// Wanted columns (of the base parameters): 14 per joint, followed by 3 per motor.
     pub columns: &'a [usize],
     /// Treatment of the recordings.
-    pub treatment: &'a Treatment,
+    pub treatment: &'a PreprocessingPlan,
     /// Length of a window of the integral model, rows at the full rate.
     pub window: usize,
     /// Distance between the starts of neighbouring windows, rows at the full rate.

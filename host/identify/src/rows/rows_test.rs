@@ -11,7 +11,9 @@ use super::differential::Differential;
 use super::plan::Plan;
 use super::tally::Tally;
 use crate::{Base, ModelKind, Options, chain_of, grouped, identify, transmission_of};
-use rig_data::prepare::{Choice, InMemory, Motion, PrepareOptions, Survey, Treatment, each_motion};
+use rig_data::prepare::{
+    Choice, InMemory, Motion, PrepareOptions, PreprocessingPlan, Survey, each_motion,
+};
 use rig_data::{Block, JointColumns};
 use rig_model::robot::{EDDA_TEMPLATE, IRP6_TEMPLATE, Robot, TX40};
 
@@ -216,7 +218,7 @@ fn rows_are_those_of_the_plain_way() {
             piece_rows: 1000,
             ..Default::default()
         };
-        let treatment = Treatment::decide(&[survey], &options, &vec![None; n]).unwrap();
+        let treatment = PreprocessingPlan::decide(&[survey], &options, &vec![None; n]).unwrap();
         let plan = Plan {
             chain: &chain,
             transmission: &transmission,

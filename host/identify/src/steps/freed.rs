@@ -5,7 +5,7 @@ use rig_shared::multibody::Chain;
 use super::recordings::{Sets, Surveyed};
 use crate::error::IdentifyError;
 use rig_data::Compensated;
-use rig_data::prepare::{Recording, Spooled, Treatment, as_recordings};
+use rig_data::prepare::{PreprocessingPlan, Recording, Spooled, as_recordings};
 use rig_model::effects::Effects;
 
 /// Subtracts effects and payloads from each recording with its treatment: the bare robot is identified.
@@ -13,7 +13,7 @@ fn freed<'a>(
     list: &[&'a dyn Recording],
     effects: &'a Effects,
     chain: &'a Chain<f64>,
-    treatments: &[Treatment],
+    treatments: &[PreprocessingPlan],
 ) -> Result<Vec<Compensated<'a>>, IdentifyError> {
     list.iter()
         .zip(treatments)
@@ -37,14 +37,14 @@ impl<'a> Freed<'a> {
     pub(crate) fn of(
         sets: &Sets<'a>,
         surveyed: &Surveyed,
-        treatment: &Treatment,
+        treatment: &PreprocessingPlan,
         effects: &'a Effects,
         chain: &'a Chain<f64>,
     ) -> Result<Option<Self>, IdentifyError> {
         if effects.is_empty() {
             return Ok(None);
         }
-        let free = |list: &[&'a dyn Recording], treatments: &[Treatment]| {
+        let free = |list: &[&'a dyn Recording], treatments: &[PreprocessingPlan]| {
             freed(list, effects, chain, treatments)
         };
         let fitted = vec![treatment.clone(); sets.training.len()];

@@ -4,7 +4,7 @@ use super::robot_model::RobotModel;
 use crate::rows::cache::RowCache;
 use crate::rows::plan::Plan;
 use crate::rows::planned::Planned;
-use rig_data::prepare::{Recording, Survey, Treatment};
+use rig_data::prepare::{PreprocessingPlan, Recording, Survey};
 
 /// Builds the plans of an identification.
 pub(crate) struct Planner<'a> {
@@ -29,7 +29,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Returns the plan for a treatment and a window length in samples, without computed rows.
-    pub(crate) fn plan<'b>(&self, treatment: &'b Treatment, window: usize) -> Plan<'b>
+    pub(crate) fn plan<'b>(&self, treatment: &'b PreprocessingPlan, window: usize) -> Plan<'b>
     where
         'a: 'b,
     {

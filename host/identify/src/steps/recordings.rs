@@ -2,7 +2,8 @@
 
 use crate::error::IdentifyError;
 use rig_data::prepare::{
-    Evened, PrepareError, Recording, Spooled, Survey, Treatment, as_recordings, surveyed,
+    MaybeResampled, PrepareError, PreprocessingPlan, Recording, Spooled, Survey, as_recordings,
+    surveyed,
 };
 
 /// The recordings that the passes of an identification read.
@@ -22,8 +23,8 @@ pub(crate) struct Surveyed<'a> {
     pub training_surveys: Vec<Survey>,
     /// Of the hold-out recordings.
     pub holdout_surveys: Vec<Survey>,
-    training: Vec<Evened<'a>>,
-    holdout: Vec<Evened<'a>>,
+    training: Vec<MaybeResampled<'a>>,
+    holdout: Vec<MaybeResampled<'a>>,
 }
 
 impl<'a> Surveyed<'a> {
@@ -87,8 +88,8 @@ impl<'a> Surveyed<'a> {
     /// [`PrepareError::BandBeyondRate`].
     pub(crate) fn at_holdout_rates(
         &self,
-        treatment: &Treatment,
-    ) -> Result<Vec<Treatment>, PrepareError> {
+        treatment: &PreprocessingPlan,
+    ) -> Result<Vec<PreprocessingPlan>, PrepareError> {
         let of = |survey| treatment.at_rate_of(survey);
         self.holdout_surveys.iter().map(of).collect()
     }

@@ -19,7 +19,7 @@ use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::beyond::Beyond;
 use crate::unmodelled::lag::Lag;
-use rig_data::prepare::{Survey, Treatment};
+use rig_data::prepare::{PreprocessingPlan, Survey};
 use rig_model::effects::Effects;
 use rig_model::robot::Robot;
 use rig_numerics::autocorrelation::correlation_time;
@@ -45,7 +45,7 @@ pub(crate) struct Results<'a> {
     /// Treatment of the training recordings.
     pub treated: &'a Treated,
     /// Treatments of the hold-out recordings.
-    pub treatments: &'a [Treatment],
+    pub treatments: &'a [PreprocessingPlan],
     /// The hold-out recordings with their rows.
     pub held: &'a [Planned<'a>],
     /// True if effects were subtracted from the rows.

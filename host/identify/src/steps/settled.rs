@@ -28,7 +28,9 @@ pub fn identify(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     let placed = robot.placed_effects();
-    let heeded = placed.iter().any(|p| p.effect.kind.heeds_friction());
+    let heeded = placed
+        .iter()
+        .any(|p| p.effect.kind.depends_on_joint_friction());
     let mut beside = robot.standard_parameters();
     for pass in 1..=MOST_PASSES {
         let mut found = identify_beside(robot, training, holdout, options, &beside)?;

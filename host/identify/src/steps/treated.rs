@@ -15,7 +15,7 @@ use crate::treatment::cutoff::decided;
 use crate::treatment::decimation;
 use crate::treatment::speed::speed_thresholds;
 use crate::treatment::window::choose_window;
-use rig_data::prepare::{Choice, Recording, Survey, Treatment};
+use rig_data::prepare::{Choice, PreprocessingPlan, Recording, Survey};
 
 /// Smallest number of kept rows per parameter, over all joints of the shortest recording, in a narrower band.
 const ROWS_A_PARAMETER: usize = 10;
@@ -26,7 +26,7 @@ pub(crate) struct Prepared {
     /// Surveys of the training recordings.
     pub surveys: Vec<Survey>,
     /// Treatment in the widest band.
-    pub treatment: Treatment,
+    pub treatment: PreprocessingPlan,
 }
 
 impl Prepared {
@@ -54,7 +54,7 @@ impl Prepared {
 /// The treatment of the fitted rows.
 pub(crate) struct Treated {
     /// Treatment of the training recordings.
-    pub treatment: Treatment,
+    pub treatment: PreprocessingPlan,
     /// Length of a window of the integral model, samples.
     pub window: usize,
     /// The reason for that length.
@@ -124,7 +124,7 @@ fn banded(
         surveys,
         treatment: wide,
     }: &Prepared,
-) -> Result<Treatment, IdentifyError> {
+) -> Result<PreprocessingPlan, IdentifyError> {
     let model = planner.model;
     let bands = match options.prepare.decimation {
         // A narrow band spreads the outliers that a robust fit should exclude over their neighbours.

@@ -8,7 +8,7 @@ use crate::treatment::cutoff;
 use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::lag::Lag;
-use rig_data::prepare::{Survey, Treatment};
+use rig_data::prepare::{PreprocessingPlan, Survey};
 use rig_model::robot::{Joint, JointKind, Robot};
 use rig_output::{Finding, format_significant, format_unit, one_a_kind};
 
@@ -23,9 +23,9 @@ pub(crate) struct Heard<'a> {
     pub options: &'a Options,
     pub surveys: &'a [Survey],
     pub holdout_surveys: &'a [Survey],
-    pub treatment: &'a Treatment,
+    pub treatment: &'a PreprocessingPlan,
     /// Treatment of each hold-out recording.
-    pub treatments: &'a [Treatment],
+    pub treatments: &'a [PreprocessingPlan],
     /// Samples between the windows of the integral model.
     pub stride: usize,
     pub lag: Option<Lag>,

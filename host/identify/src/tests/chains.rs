@@ -10,20 +10,20 @@ use crate::estimators::linear::least_squares;
 use crate::structure::independent::independent_columns;
 use crate::structure::states::States;
 use nalgebra::{DMatrix, DVector};
-use rig_model::robot::{Drive, Inertial, JointFriction, Screw};
+use rig_model::robot::{BallScrewCrank, Drive, Inertial, JointFriction};
 use rig_shared::multibody::{Chain, inverse_dynamics};
 use rig_shared::transmission::Transmission;
 
 /// Middle of the range of the crank: far from both dead centres of this screw, rad.
 const CRANK: f64 = -2.88;
 
-fn screw(chance: &mut Chance, own: &str, other: &str) -> Screw {
+fn screw(chance: &mut Chance, own: &str, other: &str) -> BallScrewCrank {
     let sign = |x: f64| x.signum();
     let mut angle = std::collections::BTreeMap::from([(own.to_owned(), sign(chance.even()))]);
     if chance.even() > 0.0 && own != other {
         angle.insert(other.to_owned(), sign(chance.even()));
     }
-    Screw {
+    BallScrewCrank {
         lead: 0.02 * sign(chance.even()),
         crank: 0.14,
         anchor: [-0.1575, 0.183],

@@ -2,7 +2,7 @@
 
 use super::made::{TRUTH, swing};
 use super::*;
-use rig_data::prepare::{Survey, Treatment};
+use rig_data::prepare::{PreprocessingPlan, Survey};
 
 /// A recorder flaw, applied to the position of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +89,8 @@ fn noise_that_is_not_white_is_not_taken_for_motion() {
 fn the_spectrum_alone_takes_filtered_noise_for_motion() {
     let recording = flawed(Flaw::Filtered(1e-2), 2);
     let survey = Survey::take(&recording, 1).unwrap();
-    let by_spectrum = Treatment::decide(&[survey], &PrepareOptions::default(), &[None]).unwrap();
+    let by_spectrum =
+        PreprocessingPlan::decide(&[survey], &PrepareOptions::default(), &[None]).unwrap();
     let found = identify(&pendulum(), &[&recording], &[], &Options::default()).unwrap();
     let treatment = &found.details.treatment;
     assert_eq!(treatment.spectral_cutoff, Some(by_spectrum.cutoff));
@@ -112,7 +113,7 @@ fn white_noise_leaves_the_cut_off_to_the_spectrum() {
         let recording = flawed(Flaw::White(sigma), seed);
         let survey = Survey::take(&recording, 1).unwrap();
         let by_spectrum =
-            Treatment::decide(&[survey], &PrepareOptions::default(), &[None]).unwrap();
+            PreprocessingPlan::decide(&[survey], &PrepareOptions::default(), &[None]).unwrap();
         let found = identify(&pendulum(), &[&recording], &[], &Options::default()).unwrap();
         let treatment = &found.details.treatment;
         assert_eq!(treatment.spectral_cutoff, None);
@@ -146,7 +147,7 @@ fn no_decimation_refuses_its_own_recording() {
     };
     for rows in [1000, 2000, 5000, 20_000] {
         let survey = Survey::take(&recording(rows), 1).unwrap();
-        let decided = Treatment::decide(&[survey], &PrepareOptions::default(), &[None]);
+        let decided = PreprocessingPlan::decide(&[survey], &PrepareOptions::default(), &[None]);
         let treatment = decided.unwrap_or_else(|e| panic!("{rows} rows: {e}"));
         assert!(50 * treatment.decimation + 2 * treatment.trimmed <= rows);
     }

@@ -24,11 +24,11 @@ use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
 use rig_data::prepare::Choice;
 use rig_data::prepare::CutoffTrial;
-use rig_data::prepare::HIGHEST;
+use rig_data::prepare::MAX_CUTOFF_SHARE;
 use rig_data::prepare::PrepareOptions;
+use rig_data::prepare::PreprocessingPlan;
 use rig_data::prepare::Recording;
 use rig_data::prepare::Survey;
-use rig_data::prepare::Treatment;
 use rig_data::prepare::trimmed_rows;
 use rig_model::robot::Robot;
 use rig_numerics::statistics::mean_or_zero;
@@ -62,19 +62,20 @@ pub(crate) struct Equations<'a> {
     pub complete: bool,
 }
 
-/// Decides the treatment of `recordings` as [`Treatment::decide`] does, with the cut-off that explains the torque best.
-/// Returns updated surveys: the signal of each joint ends at the cut-off if the torque shows no motion above it.
+/// Decides the treatment of `recordings` as [`PreprocessingPlan::decide`] does, with the cut-off that explains the
+/// torque best. Returns updated surveys: the signal of each joint ends at the cut-off if the torque shows no motion
+/// above it.
 ///
 /// # Errors
-/// [`IdentifyError`]: as [`Treatment::decide`]; recordings that cannot be read.
+/// [`IdentifyError`]: as [`PreprocessingPlan::decide`]; recordings that cannot be read.
 pub(crate) fn decided(
     equations: Equations,
     recordings: &[&dyn Recording],
     surveys: Vec<Survey>,
     options: &PrepareOptions,
     limits: &[Option<f64>],
-) -> Result<(Vec<Survey>, Treatment), IdentifyError> {
-    let first = Treatment::decide(&surveys, options, limits)?;
+) -> Result<(Vec<Survey>, PreprocessingPlan), IdentifyError> {
+    let first = PreprocessingPlan::decide(&surveys, options, limits)?;
     if options.cutoff != Choice::Auto || !equations.complete {
         return Ok((surveys, first));
     }
@@ -96,7 +97,7 @@ pub(crate) fn decided(
         .map_or(f64::INFINITY, score);
     let least = trials.iter().map(score).fold(f64::INFINITY, f64::min);
     if by_spectrum <= least + BETTER {
-        return Ok((surveys, Treatment { trials, ..first }));
+        return Ok((surveys, PreprocessingPlan { trials, ..first }));
     }
     // Of equal cut-offs the lowest one has the least noise in the speed.
     let equal = trials.iter().find(|t| score(t) <= least + EQUAL);
@@ -109,7 +110,7 @@ pub(crate) fn decided(
         gain.is_some_and(|g| g > BETTER) && first.spectra[j].flattens(cutoff, first.cutoff)
     };
     if cutoff < first.cutoff && !(0..first.spectra.len()).any(noisy) {
-        return Ok((surveys, Treatment { trials, ..first }));
+        return Ok((surveys, PreprocessingPlan { trials, ..first }));
     }
     let ends: Vec<f64> = (0..first.spectra.len())
         .map(|j| own_cutoff(&trials, j).max(cutoff))
@@ -119,7 +120,7 @@ pub(crate) fn decided(
         cutoff: Choice::Fixed(cutoff),
         ..options.clone()
     };
-    let mut treatment = Treatment::decide(&surveys, &fixed, limits)?;
+    let mut treatment = PreprocessingPlan::decide(&surveys, &fixed, limits)?;
     treatment.cutoff_reason = format!(
         "{cutoff:.3} Hz: of {} cut-offs it explains the torque best. The spectrum of the position alone gives {:.3} Hz, which leaves {:.0} % more of the torque.",
         trials.len(),
@@ -133,7 +134,7 @@ pub(crate) fn decided(
 
 /// Returns warnings about the cut-off: the torque gave another one than the spectrum, or some joints are explained
 /// clearly better with a cut-off of their own.
-pub(crate) fn doubts(treatment: &Treatment, robot: &Robot) -> Vec<String> {
+pub(crate) fn doubts(treatment: &PreprocessingPlan, robot: &Robot) -> Vec<String> {
     let mut doubts = Vec::new();
     let (cutoff, trials) = (treatment.cutoff, &treatment.trials);
     let error = |cutoff: f64, j: usize| {
@@ -193,7 +194,7 @@ struct Comparison<'a> {
     surveys: &'a [Survey],
     options: &'a PrepareOptions,
     limits: &'a [Option<f64>],
-    first: &'a Treatment,
+    first: &'a PreprocessingPlan,
 }
 
 impl Comparison<'_> {
@@ -202,7 +203,7 @@ impl Comparison<'_> {
     fn trials(&self) -> Result<Option<Vec<CutoffTrial>>, IdentifyError> {
         let rate = self.first.sample_rate;
         let shortest = self.surveys.iter().map(|s| s.longest).min().unwrap_or(0);
-        let most = HIGHEST * rate / 2.0;
+        let most = MAX_CUTOFF_SHARE * rate / 2.0;
         let swing = (self.first.spectra.iter())
             .map(|s| s.swing())
             .fold(0.0, f64::max);
@@ -266,7 +267,7 @@ impl Comparison<'_> {
             decimation: Choice::Fixed(decimation),
             ..self.options.clone()
         };
-        let mut treatment = Treatment::decide(self.surveys, &options, self.limits)?;
+        let mut treatment = PreprocessingPlan::decide(self.surveys, &options, self.limits)?;
         treatment.trimmed = trimmed;
         let band = treatment.parallel_edge;
         for (slow, spectrum) in (treatment.speed_threshold.iter_mut()).zip(&self.first.spectra) {

@@ -9,9 +9,9 @@ use crate::structure::base::Base;
 use crate::structure::chain::chain_of;
 use crate::structure::chain::transmission_of;
 use rig_data::prepare::PrepareOptions;
+use rig_data::prepare::PreprocessingPlan;
 use rig_data::prepare::Recording;
 use rig_data::prepare::Survey;
-use rig_data::prepare::Treatment;
 use rig_model::robot::Robot;
 
 /// Decides the treatment of the `recordings` of `robot` without an identification.
@@ -23,7 +23,7 @@ pub fn treatment_for(
     recordings: &[&dyn Recording],
     surveys: Vec<Survey>,
     options: &PrepareOptions,
-) -> Result<(Vec<Survey>, Treatment), IdentifyError> {
+) -> Result<(Vec<Survey>, PreprocessingPlan), IdentifyError> {
     let (chain, transmission) = (chain_of(robot)?, transmission_of(robot)?);
     let base = Base::structural(robot, ModelKind::Differential, Options::default().seed)?;
     let equations = Equations {

@@ -13,7 +13,7 @@ use super::trial_rows::beginnings;
 use super::trial_rows::kept;
 use crate::error::IdentifyError;
 use crate::rows::plan::Plan;
-use rig_data::prepare::{PrepareError, Recording, Treatment};
+use rig_data::prepare::{PrepareError, PreprocessingPlan, Recording};
 
 /// Ratio of neighbouring bands.
 const STEP: f64 = std::f64::consts::SQRT_2;
@@ -25,9 +25,9 @@ const HEADROOM: f64 = 4.0;
 /// # Errors
 /// Errors of `narrowed`.
 pub(crate) fn candidates(
-    first: Treatment,
-    narrowed: &dyn Fn(f64) -> Result<Treatment, PrepareError>,
-) -> Result<Vec<Treatment>, PrepareError> {
+    first: PreprocessingPlan,
+    narrowed: &dyn Fn(f64) -> Result<PreprocessingPlan, PrepareError>,
+) -> Result<Vec<PreprocessingPlan>, PrepareError> {
     let swing = (first.spectra.iter())
         .map(|s| s.swing())
         .fold(0.0, f64::max);
@@ -50,9 +50,9 @@ pub(crate) fn candidates(
 /// [`IdentifyError`]: recordings that cannot be read.
 pub(crate) fn best(
     training: &[&dyn Recording],
-    widest: &Treatment,
+    widest: &PreprocessingPlan,
     plans: &[Plan],
-) -> Result<Treatment, IdentifyError> {
+) -> Result<PreprocessingPlan, IdentifyError> {
     if plans.len() < 2 {
         return Ok(widest.clone());
     }

@@ -7,8 +7,8 @@ use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
 use crate::rows::stream::each_rows;
 use rig_data::prepare::Beginning;
+use rig_data::prepare::PreprocessingPlan;
 use rig_data::prepare::Recording;
-use rig_data::prepare::Treatment;
 use rig_data::prepare::each_of;
 use rig_data::prepare::threads;
 
@@ -19,7 +19,7 @@ const TRIAL_SECONDS: f64 = 50.0;
 /// Returns the beginnings of `recordings` that a trial uses.
 pub(crate) fn beginnings<'a>(
     recordings: &[&'a dyn Recording],
-    treatment: &Treatment,
+    treatment: &PreprocessingPlan,
 ) -> Vec<Beginning<'a>> {
     let rows = (TRIAL_SECONDS * treatment.sample_rate) as usize / recordings.len().max(1);
     (recordings.iter())

@@ -2,7 +2,7 @@
 
 use crate::error::IdentifyError;
 use crate::options::{ModelKind, Options};
-use rig_data::prepare::{Survey, Treatment};
+use rig_data::prepare::{PreprocessingPlan, Survey};
 
 /// Frequency times window length at which a mean passes half of the power: sin²(πx)/(πx)² = ½.
 const HALF_POWER: f64 = 0.443;
@@ -18,7 +18,7 @@ const HALF_POWER: f64 = 0.443;
 /// [`IdentifyError::Window`]: a given window does not fit the recordings.
 pub(crate) fn choose_window(
     options: &Options,
-    treatment: &Treatment,
+    treatment: &PreprocessingPlan,
     surveys: &[Survey],
 ) -> Result<(usize, String), IdentifyError> {
     let rate = treatment.sample_rate;

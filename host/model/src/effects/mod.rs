@@ -209,7 +209,7 @@ impl Effects {
             drive_torque: at.drive[joint],
             friction: self.friction(joint, at.qd[joint], at.qd[joint].sgn()),
             time: at.time,
-            warming: at.warming.get(joint).copied().unwrap_or(0.0),
+            temperature_rise: at.warming.get(joint).copied().unwrap_or(0.0),
             other: other.map_or([0.0; 3], |o| [at.q[o], at.qd[o], at.qdd[o]]),
             period: at.period,
             ..Instant::default()

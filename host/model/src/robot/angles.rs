@@ -16,12 +16,12 @@ use super::urdf::{Body, Chain};
 use rig_output::format_significant;
 
 /// Returns the multiple of π/2 that `angle` means, if it means one.
-fn meant(angle: f64) -> Option<f64> {
+fn intended_angle(angle: f64) -> Option<f64> {
     right_angle(angle, WRITTEN)
 }
 
 /// Returns the distance of an angle from its multiple, as the end of a sentence.
-fn taken(off: f64, exact: f64) -> String {
+fn rounding_note(off: f64, exact: f64) -> String {
     let name = match (exact / FRAC_PI_2).round() as i64 {
         0 => "0".to_owned(),
         1 => "π/2".to_owned(),
@@ -40,7 +40,7 @@ pub(super) struct Squared {
     /// Key of the angle.
     pub key: &'static str,
     /// The remark without its place.
-    pub said: String,
+    pub remark: String,
 }
 
 /// Sets the angles of `robot` that mean multiples of a right angle to exact values.
@@ -54,16 +54,18 @@ pub(super) fn square(robot: &mut Robot) -> Vec<Squared> {
         ];
         for (key, angle) in angles {
             let Some(angle) = angle else { continue };
-            let Some(exact) = meant(*angle) else { continue };
+            let Some(exact) = intended_angle(*angle) else {
+                continue;
+            };
             let off = (*angle - exact).abs();
             if off > ROUNDING {
                 all.push(Squared {
                     joint: number,
                     key,
-                    said: format!(
+                    remark: format!(
                         "{key} of joint `{}` is {angle} rad, {}.",
                         joint.name,
-                        taken(off, exact)
+                        rounding_note(off, exact)
                     ),
                 });
             }
@@ -77,7 +79,7 @@ pub(super) fn square(robot: &mut Robot) -> Vec<Squared> {
 /// turned joint. Neighbouring axes that are nearly parallel or perpendicular become exactly so: a joint turns about its
 /// own origin and carries all bodies behind it.
 pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>) {
-    let (mut poses, mut said) = (Vec::new(), Vec::new());
+    let (mut poses, mut remarks) = (Vec::new(), Vec::new());
     let mut pose = Isometry3::identity();
     let mut axes: Vec<Vector3<f64>> = Vec::new();
     for (k, body) in chain.bodies.iter().enumerate() {
@@ -89,16 +91,16 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
         };
         let axis = pose.rotation * body.axis;
         let angle = between(&before, &axis);
-        if let Some(exact) = meant(angle)
+        if let Some(exact) = intended_angle(angle)
             && (angle - exact).abs() > ROUNDING
         {
-            said.push(format!(
+            remarks.push(format!(
                 "{}:{}: the axis of joint `{}` stands at {} rad to {other}, {}.",
                 chain.file,
                 body.place,
                 body.joint,
                 format_significant(angle, 8),
-                taken((angle - exact).abs(), exact)
+                rounding_note((angle - exact).abs(), exact)
             ));
             // Direction along `before`, or across it.
             let square = match axis.dot(&before) {
@@ -113,17 +115,17 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
             let (from, to) = (across(&from), across(&axis));
             let angle = angle_about(from, to, about);
             if to.norm() > WRITTEN
-                && let Some(exact) = meant(angle)
+                && let Some(exact) = intended_angle(angle)
                 && (angle - exact).abs() > ROUNDING
             {
-                said.push(format!(
+                remarks.push(format!(
                     "{}:{}: about the axis of prismatic joint `{}`, joint `{}` stands at {} rad to the axes before, {}.",
                     chain.file,
                     body.place,
                     chain.bodies[k - 1].joint,
                     body.joint,
                     format_significant(angle, 8),
-                    taken((angle - exact).abs(), exact)
+                    rounding_note((angle - exact).abs(), exact)
                 ));
                 pose = turned(&pose, &about, exact - angle);
             }
@@ -131,22 +133,22 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
         axes.push(pose.rotation * body.axis);
         poses.push(pose);
     }
-    (poses, said)
+    (poses, remarks)
 }
 
 /// Returns the multiple of π/2 that theta of a prismatic joint means, with a sentence if theta differs from it.
 pub(super) fn squared_theta(file: &str, body: &Body, theta: f64) -> Option<(f64, Option<String>)> {
-    let exact = meant(theta)?;
+    let exact = intended_angle(theta)?;
     let off = (theta - exact).abs();
-    let said = (off > ROUNDING).then(|| {
+    let remark = (off > ROUNDING).then(|| {
         format!(
             "{file}:{}: theta of prismatic joint `{}` is {theta} rad, {}.",
             body.place,
             body.joint,
-            taken(off, exact)
+            rounding_note(off, exact)
         )
     });
-    Some((exact, said))
+    Some((exact, remark))
 }
 
 /// If the last joint of `axes` is prismatic: returns its axis, and the last earlier axis that has a fixed angle to the

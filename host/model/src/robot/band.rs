@@ -26,12 +26,12 @@ pub struct IdentifiedBand {
 
 impl IdentifiedBand {
     pub(super) fn check(&self, joints: usize) -> Result<(), Fault> {
-        let fault = |key: &'static str, found: String, right: &str| {
+        let fault = |key: &'static str, found: String, advice: &str| {
             Err(Fault {
-                way: vec![Step::Key("identified"), Step::Key(key)],
+                key_path: vec![Step::Key("identified"), Step::Key(key)],
                 what: format!("`{key}` of the band of identification"),
                 found,
-                right: right.to_owned(),
+                advice: advice.to_owned(),
             })
         };
         if !(self.cutoff.is_finite() && self.cutoff > 0.0) {

@@ -43,7 +43,7 @@ impl Robot {
 }
 
 /// Returns the fault of a body as the rest of a sentence about its link; `None` if it has no fault.
-pub(super) fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
+pub(super) fn implausibility(body: &SpatialInertia, shown: &Shown) -> Option<String> {
     let about_origin_is_zero = body.inertia == Matrix3::zeros();
     if body.mass <= 0.0 {
         return Some(
@@ -132,8 +132,8 @@ impl Robot {
                     ));
                 }
                 None => {
-                    let why = strange(&body, &Shown::All)
-                        .or_else(|| strange(&body, &shown))
+                    let why = implausibility(&body, &Shown::All)
+                        .or_else(|| implausibility(&body, &shown))
                         .unwrap_or_else(|| "has moments of inertia that no body has".to_owned());
                     remarks.push(format!(
                         "MuJoCo and Gazebo will refuse the link of joint {name}: it {why}. Values of combinations (base parameters) are no bodies; give each link its own, or take identified.urdf of `rig identify` with --estimator consistent."

@@ -8,7 +8,7 @@ use crate::robot::{
     Description, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Robot, TX40, XL330,
 };
 
-fn said(inertial: &str) -> Vec<String> {
+fn remarks(inertial: &str) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("arm.urdf");
     let link = |name: &str, inertial: &str| {
@@ -55,16 +55,17 @@ fn what_no_body_has_is_named_by_link_and_joint() {
             "neither mass nor",
         ),
     ] {
-        let said = said(&text);
-        assert_eq!(said.len(), 1, "{said:?}");
+        let remarks = remarks(&text);
+        assert_eq!(remarks.len(), 1, "{remarks:?}");
         assert!(
-            said[0].starts_with("Link `fore`, moved by joint `elbow`,") && said[0].contains(words),
-            "{words}: {said:?}"
+            remarks[0].starts_with("Link `fore`, moved by joint `elbow`,")
+                && remarks[0].contains(words),
+            "{words}: {remarks:?}"
         );
     }
     // A thin plate, rounded to three digits, and a rod.
     for possible in [[0.1, 0.2, 0.302], [0.1, 0.1, 0.0]] {
-        assert_eq!(said(&inertia(possible)), [""; 0]);
+        assert_eq!(remarks(&inertia(possible)), [""; 0]);
     }
 }
 
@@ -76,18 +77,18 @@ fn what_a_motion_does_not_show_may_stay_open() {
     }
     // As published: the last link is a point mass.
     let tx40 = Robot::from_toml(TX40, Path::new("r.toml")).unwrap();
-    let said = tx40.implausible_bodies(None);
+    let remarks = tx40.implausible_bodies(None);
     assert!(
-        said.len() == 1 && said[0].contains("joint `joint_6` has no inertia"),
-        "{said:?}"
+        remarks.len() == 1 && remarks[0].contains("joint `joint_6` has no inertia"),
+        "{remarks:?}"
     );
     let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("r.toml")).unwrap();
     // Less than the moment of its own mass at its centre of mass about the axis.
     robot.joints[0].inertial.as_mut().unwrap().inertia[5] = 0.01;
-    let said = robot.implausible_bodies(None);
+    let remarks = robot.implausible_bodies(None);
     assert!(
-        said.len() == 1 && said[0].contains("joint `link` has a moment of inertia of −0.0"),
-        "{said:?}"
+        remarks.len() == 1 && remarks[0].contains("joint `link` has a moment of inertia of −0.0"),
+        "{remarks:?}"
     );
 }
 

@@ -11,60 +11,60 @@ use super::check_drives::check_transmission;
 use super::check_effects::check_effects;
 use super::check_joint::check_joint;
 use super::check_workspace::check_workspace;
-use super::fault::{Fault, LARGEST, Step, fault, sound};
+use super::fault::{Fault, MAX_NUMBER, Step, fault, is_safe_magnitude};
 use super::inertia::negative_inertia;
 use super::serial_robot::Robot;
-use super::sizes::oversized;
+use super::unit_check::oversized;
 
 /// Returns the first fault of `robot`, if any.
 pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
     use Step::{At, Key};
     for (i, g) in robot.gravity.iter().enumerate() {
-        if !sound(*g) {
+        if !is_safe_magnitude(*g) {
             return Err(fault(
                 &[Key("gravity"), At(i)],
                 "gravity",
                 g,
-                &format!("it must be three finite numbers, in m/s², at most {LARGEST:e}"),
+                &format!("it must be three finite numbers, in m/s², at most {MAX_NUMBER:e}"),
             ));
         }
     }
     if robot.joints.is_empty() {
         return Err(Fault {
-            way: vec![Key("joint")],
+            key_path: vec![Key("joint")],
             what: "the list of joints".into(),
             found: "empty".into(),
-            right: "a robot has at least one [[joint]]".into(),
+            advice: "a robot has at least one [[joint]]".into(),
         });
     }
     if robot.joints.len() > MAX_JOINTS {
         return Err(Fault {
-            way: vec![Key("joint"), At(MAX_JOINTS)],
+            key_path: vec![Key("joint"), At(MAX_JOINTS)],
             what: "the number of joints".into(),
             found: robot.joints.len().to_string(),
-            right: format!("a robot has at most {MAX_JOINTS}"),
+            advice: format!("a robot has at most {MAX_JOINTS}"),
         });
     }
     let mut names = HashSet::new();
     for (i, joint) in robot.joints.iter().enumerate() {
         if joint.name.trim().is_empty() {
             return Err(Fault {
-                way: vec![Key("joint"), At(i), Key("name")],
+                key_path: vec![Key("joint"), At(i), Key("name")],
                 what: format!("the name of joint {}", i + 1),
                 found: "empty".into(),
-                right: "every joint has a name of its own".into(),
+                advice: "every joint has a name of its own".into(),
             });
         }
         if !names.insert(joint.name.as_str()) {
             return Err(Fault {
-                way: vec![Key("joint"), At(i), Key("name")],
+                key_path: vec![Key("joint"), At(i), Key("name")],
                 what: format!("the name of joint {}", i + 1),
                 found: format!("`{}` again", joint.name),
-                right: "every joint has a name of its own".into(),
+                advice: "every joint has a name of its own".into(),
             });
         }
         check_joint(joint).map_err(|mut f| {
-            f.way.splice(0..0, [Key("joint"), At(i)]);
+            f.key_path.splice(0..0, [Key("joint"), At(i)]);
             f
         })?;
     }
@@ -72,12 +72,12 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
     if robot.identified.is_none()
         && let Some((i, mut fault)) = oversized(&robot.joints)
     {
-        fault.way.splice(0..0, [Key("joint"), At(i)]);
+        fault.key_path.splice(0..0, [Key("joint"), At(i)]);
         return Err(fault);
     }
     check_transmission(robot)?;
     if let Some((i, mut fault)) = negative_inertia(robot) {
-        fault.way.splice(0..0, [Key("joint"), At(i)]);
+        fault.key_path.splice(0..0, [Key("joint"), At(i)]);
         return Err(fault);
     }
     check_workspace(robot)?;

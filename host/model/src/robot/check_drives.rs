@@ -2,10 +2,10 @@
 
 use rig_shared::transmission::TransmissionError;
 
+use super::ball_screw_crank::BallScrewCrank;
 use super::drive::Drive;
-use super::fault::{Fault, LARGEST, Must, Step, number, sound, written};
+use super::fault::{Fault, MAX_NUMBER, Requirement, Step, is_safe_magnitude, number, written};
 use super::joint::Joint;
-use super::screw::Screw;
 use super::serial_robot::Robot;
 
 /// Margin around the crank's range within which a dead centre is refused, rad. There the ratio is 1 % of its maximum.
@@ -14,10 +14,10 @@ const MARGIN: f64 = 0.01;
 /// Number of positions at which the Jacobian is tested, in addition to the middle position.
 const TRIED: usize = 200;
 
-fn way(k: usize, rest: &[Step]) -> Vec<Step> {
-    let mut way = vec![Step::Key("joint"), Step::At(k), Step::Key("drive")];
-    way.extend_from_slice(rest);
-    way
+fn key_path(k: usize, rest: &[Step]) -> Vec<Step> {
+    let mut key_path = vec![Step::Key("joint"), Step::At(k), Step::Key("drive")];
+    key_path.extend_from_slice(rest);
+    key_path
 }
 
 /// Returns the first fault of the drives, if any.
@@ -26,14 +26,14 @@ pub(super) fn check_transmission(robot: &Robot) -> Result<(), Fault> {
     for (k, joint) in robot.joints.iter().enumerate() {
         let Some(drive) = &joint.drive else { continue };
         for (name, ratio) in &drive.couples {
-            let place = || way(k, &[Key("couples"), Name(name.clone())]);
+            let place = || key_path(k, &[Key("couples"), Name(name.clone())]);
             known(robot, &joint.name, name, "couples", place)?;
             if *name == joint.name {
                 return Err(Fault {
-                    way: place(),
+                    key_path: place(),
                     what: format!("a joint that the drive of joint `{}` couples", joint.name),
                     found: format!("`{name}` itself"),
-                    right: "its own ratio is gear_ratio; name other joints here".into(),
+                    advice: "its own ratio is gear_ratio; name other joints here".into(),
                 });
             }
             finite(
@@ -46,7 +46,7 @@ pub(super) fn check_transmission(robot: &Robot) -> Result<(), Fault> {
         }
         if let Some(screw) = &drive.screw {
             for (name, weight) in &screw.angle {
-                let place = || way(k, &[Key("screw"), Key("angle"), Name(name.clone())]);
+                let place = || key_path(k, &[Key("screw"), Key("angle"), Name(name.clone())]);
                 known(robot, &joint.name, name, "turns its crank by", place)?;
                 finite(
                     &joint.name,
@@ -74,10 +74,10 @@ fn known(
     }
     let all: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
     Err(Fault {
-        way: place(),
+        key_path: place(),
         what: format!("a joint that the drive of joint `{joint}` {what}"),
         found: format!("`{name}`"),
-        right: format!("this robot's joints are {}", all.join(", ")),
+        advice: format!("this robot's joints are {}", all.join(", ")),
     })
 }
 
@@ -88,35 +88,35 @@ fn finite(
     unit: &str,
     place: impl Fn() -> Vec<Step>,
 ) -> Result<(), Fault> {
-    if sound(value) {
+    if is_safe_magnitude(value) {
         return Ok(());
     }
     Err(Fault {
-        way: place(),
+        key_path: place(),
         what: format!("the ratio of joint `{name}` in the drive of joint `{joint}`"),
         found: written(value),
-        right: format!("it must be a finite number, at most {LARGEST:e}, in {unit}"),
+        advice: format!("it must be a finite number, at most {MAX_NUMBER:e}, in {unit}"),
     })
 }
 
 /// Checks that the crank turns with its own joint, has a range, and has no dead centre within the range.
-fn check_crank(robot: &Robot, k: usize, screw: &Screw) -> Result<(), Fault> {
+fn check_crank(robot: &Robot, k: usize, screw: &BallScrewCrank) -> Result<(), Fault> {
     use Step::Key;
     let joint = &robot.joints[k].name;
     if screw.angle.get(joint).is_none_or(|w| *w == 0.0) {
         return Err(Fault {
-            way: way(k, &[Key("screw"), Key("angle")]),
+            key_path: key_path(k, &[Key("screw"), Key("angle")]),
             what: format!("what turns the crank of joint `{joint}`"),
             found: "other joints only".into(),
-            right: format!("its own joint must; write for instance {joint} = 1.0"),
+            advice: format!("its own joint must; write for instance {joint} = 1.0"),
         });
     }
     let Some([low, high]) = screw.range.or_else(|| robot.crank_box(screw)) else {
         return Err(Fault {
-            way: way(k, &[Key("screw")]),
+            key_path: key_path(k, &[Key("screw")]),
             what: format!("the range of the crank of joint `{joint}`"),
             found: "not given".into(),
-            right: "a screw's length does not say which of two angles its crank has; give range = [lowest, highest] in rad, or the position limits of its joints".into(),
+            advice: "a screw's length does not say which of two angles its crank has; give range = [lowest, highest] in rad, or the position limits of its joints".into(),
         });
     };
     // Dead centres repeat every half turn.
@@ -125,10 +125,10 @@ fn check_crank(robot: &Robot, k: usize, screw: &Screw) -> Result<(), Fault> {
     let next = first + half * ((low - MARGIN - first) / half).ceil();
     if next <= high + MARGIN {
         return Err(Fault {
-            way: way(k, &[Key("screw")]),
+            key_path: key_path(k, &[Key("screw")]),
             what: format!("the ratio of the screw of joint `{joint}`"),
             found: format!("0 where its crank is at {next:.4} rad, a dead centre in its range {low:.4} to {high:.4}"),
-            right: "no motor torque reaches the joint there; correct crank and anchor, or give a range without it".into(),
+            advice: "no motor torque reaches the joint there; correct crank and anchor, or give a range without it".into(),
         });
     }
     Ok(())
@@ -151,10 +151,10 @@ fn check_jacobian(robot: &Robot) -> Result<(), Fault> {
         };
         let shown: Vec<String> = q.iter().map(|x| format!("{x:.3}")).collect();
         Err(Fault {
-            way: way(k, &[]),
+            key_path: key_path(k, &[]),
             what,
             found: format!("singular at joint positions [{}]", shown.join(", ")),
-            right: "the motors must move every joint, each in a way of its own; correct its ratios (couples, gear_ratio) or its screw".into(),
+            advice: "the motors must move every joint, each in a way of its own; correct its ratios (couples, gear_ratio) or its screw".into(),
         })
     };
     if robot.joints.iter().all(|j| j.drive.is_none()) {
@@ -244,15 +244,15 @@ fn check_ratio(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
             &of_drive("gear_ratio"),
             "gear ratio",
             "motor turns per joint turn",
-            Must::NotZero,
+            Requirement::NotZero,
             drive.gear_ratio,
         )?;
     } else if drive.gear_ratio != 0.0 {
         return Err(Fault {
-            way: of_drive("gear_ratio").to_vec(),
+            key_path: of_drive("gear_ratio").to_vec(),
             what: format!("the gear ratio of joint `{}`", joint.name),
             found: drive.gear_ratio.to_string(),
-            right: "a screw moves this joint ([joint.drive.screw]); leave gear_ratio out".into(),
+            advice: "a screw moves this joint ([joint.drive.screw]); leave gear_ratio out".into(),
         });
     }
     Ok(())
@@ -260,7 +260,7 @@ fn check_ratio(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
 
 /// Checks the single numbers of motor, gear and encoder.
 fn check_numbers(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative, Positive};
+    use Requirement::{Finite, NotNegative, Positive};
     let numbers = [
         ("zero", "motor zero", "rad", Finite, drive.zero),
         (
@@ -299,8 +299,8 @@ fn check_numbers(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
             drive.torque_constant,
         ),
     ];
-    for (key, what, unit, must, value) in numbers {
-        number(joint, &of_drive(key), what, unit, must, value)?;
+    for (key, what, unit, requirement, value) in numbers {
+        number(joint, &of_drive(key), what, unit, requirement, value)?;
     }
     let optional = [
         ("resistance", "Ω", drive.resistance),
@@ -325,13 +325,13 @@ fn check_numbers(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
 }
 
 /// Checks the numbers of a screw.
-fn check_screw(joint: &Joint, screw: &Screw) -> Result<(), Fault> {
-    use Must::{Finite, NotZero, Positive};
+fn check_screw(joint: &Joint, screw: &BallScrewCrank) -> Result<(), Fault> {
+    use Requirement::{Finite, NotZero, Positive};
     use Step::{At, Key};
-    let way = |k| [Key("drive"), Key("screw"), Key(k)];
+    let key_path = |k| [Key("drive"), Key("screw"), Key(k)];
     number(
         joint,
-        &way("lead"),
+        &key_path("lead"),
         "lead of the screw",
         "m per motor turn",
         NotZero,
@@ -339,19 +339,19 @@ fn check_screw(joint: &Joint, screw: &Screw) -> Result<(), Fault> {
     )?;
     number(
         joint,
-        &way("crank"),
+        &key_path("crank"),
         "crank of the screw",
         "m",
         Positive,
         screw.crank,
     )?;
     for (i, v) in screw.anchor.iter().enumerate() {
-        let way = [Key("drive"), Key("screw"), Key("anchor"), At(i)];
-        number(joint, &way, "anchor of the screw", "m", Finite, *v)?;
+        let key_path = [Key("drive"), Key("screw"), Key("anchor"), At(i)];
+        number(joint, &key_path, "anchor of the screw", "m", Finite, *v)?;
     }
     number(
         joint,
-        &way("offset"),
+        &key_path("offset"),
         "crank's offset",
         "rad",
         Finite,
@@ -361,10 +361,10 @@ fn check_screw(joint: &Joint, screw: &Screw) -> Result<(), Fault> {
         && !(low.is_finite() && high.is_finite() && low < high)
     {
         return Err(Fault {
-            way: way("range").to_vec(),
+            key_path: key_path("range").to_vec(),
             what: format!("the range of the crank of joint `{}`", joint.name),
             found: format!("[{low}, {high}]"),
-            right: "it must be [lowest, highest], two finite angles in rad".into(),
+            advice: "it must be [lowest, highest], two finite angles in rad".into(),
         });
     }
     Ok(())

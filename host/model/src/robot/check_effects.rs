@@ -27,14 +27,14 @@ pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
         let table = toml::Table::from(effect.clone());
         RobotEffect::from_table(&table).map_err(|refusal| refusal.at(i))?;
         let kind = effect.effect.kind;
-        let refuse = |key: &str, found: &Option<String>, right: &str| {
+        let refuse = |key: &str, found: &Option<String>, advice: &str| {
             Refusal {
                 key: Some(key.to_owned()),
                 what: format!("the {key}"),
                 found: found
                     .as_ref()
                     .map_or_else(|| "missing".into(), |name| format!("`{name}`")),
-                right: right.to_owned(),
+                advice: advice.to_owned(),
             }
             .at(i)
         };
@@ -44,18 +44,18 @@ pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
         if has_other(kind) {
             let other = effect.other.as_deref().and_then(|n| robot.joint_index(n));
             if other.is_none_or(|other| other == joint) {
-                let right = format!("it must name another joint; {names}");
-                return Err(refuse("other", &effect.other, &right));
+                let advice = format!("it must name another joint; {names}");
+                return Err(refuse("other", &effect.other, &advice));
             }
         }
         let found = Some(kind.about().name.to_owned());
         if kind.about().channel == Channel::Transmission && !elastic.insert(joint) {
-            let right = "the joint has another effect between motor and link; state one of them, backlash with the stiffness of both";
-            return Err(refuse("kind", &found, right));
+            let advice = "the joint has another effect between motor and link; state one of them, backlash with the stiffness of both";
+            return Err(refuse("kind", &found, advice));
         }
         if kind.is_presliding() && !presliding.insert(joint) {
-            let right = "the joint has another presliding, and one contact through which its friction acts; state one of them";
-            return Err(refuse("kind", &found, right));
+            let advice = "the joint has another presliding, and one contact through which its friction acts; state one of them";
+            return Err(refuse("kind", &found, advice));
         }
     }
     Ok(())

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::check_drives::check_drive;
-use super::fault::{Fault, Must, Step, fault, number};
+use super::fault::{Fault, Requirement, Step, fault, number};
 use super::joint::{Controller, Inertial, Joint, JointFriction, JointKind, JointLimits};
 use super::voltage_controller::VoltageController;
 
@@ -50,7 +50,7 @@ pub(super) fn check_joint(joint: &Joint) -> Result<(), Fault> {
 }
 
 fn check_geometry(joint: &Joint) -> Result<(), Fault> {
-    use Must::Finite;
+    use Requirement::Finite;
     use Step::Key;
     number(joint, &[Key("alpha")], "alpha", "rad", Finite, joint.alpha)?;
     // The angle between two axes: a value beyond one turn has another unit.
@@ -71,7 +71,7 @@ fn check_geometry(joint: &Joint) -> Result<(), Fault> {
 }
 
 fn check_inertial(joint: &Joint, inertial: &Inertial) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative};
+    use Requirement::{Finite, NotNegative};
     use Step::{At, Key};
     number(
         joint,
@@ -82,8 +82,8 @@ fn check_inertial(joint: &Joint, inertial: &Inertial) -> Result<(), Fault> {
         inertial.mass,
     )?;
     for (i, v) in inertial.first_moment.iter().enumerate() {
-        let way = [Key("inertial"), Key("first_moment"), At(i)];
-        number(joint, &way, "first_moment", "kg·m", Finite, *v)?;
+        let key_path = [Key("inertial"), Key("first_moment"), At(i)];
+        number(joint, &key_path, "first_moment", "kg·m", Finite, *v)?;
     }
     for (i, v) in inertial.inertia.iter().enumerate() {
         number(
@@ -99,15 +99,15 @@ fn check_inertial(joint: &Joint, inertial: &Inertial) -> Result<(), Fault> {
 }
 
 fn check_limits(joint: &Joint, limits: &JointLimits, units: Units) -> Result<(), Fault> {
-    use Must::Limit;
+    use Requirement::Limit;
     use Step::Key;
     let Units { angle, force } = units;
     check_position_limits(joint, limits.position, angle)?;
     check_soft_limits(joint, limits, angle)?;
-    let way = |k| [Key("limits"), Key(k)];
+    let key_path = |k| [Key("limits"), Key(k)];
     number(
         joint,
-        &way("velocity"),
+        &key_path("velocity"),
         "velocity limit",
         &format!("{angle}/s"),
         Limit,
@@ -116,7 +116,7 @@ fn check_limits(joint: &Joint, limits: &JointLimits, units: Units) -> Result<(),
     if let Some(v) = limits.acceleration {
         number(
             joint,
-            &way("acceleration"),
+            &key_path("acceleration"),
             "acceleration limit",
             &format!("{angle}/s²"),
             Limit,
@@ -124,7 +124,7 @@ fn check_limits(joint: &Joint, limits: &JointLimits, units: Units) -> Result<(),
         )?;
     }
     if let Some(v) = limits.torque {
-        number(joint, &way("torque"), "torque limit", force, Limit, v)?;
+        number(joint, &key_path("torque"), "torque limit", force, Limit, v)?;
     }
     Ok(())
 }
@@ -143,10 +143,10 @@ fn check_soft_limits(joint: &Joint, limits: &JointLimits, unit: &str) -> Result<
         return Ok(());
     }
     Err(Fault {
-        way: vec![Step::Key("limits"), Step::Key("soft_position")],
+        key_path: vec![Step::Key("limits"), Step::Key("soft_position")],
         what: format!("the soft position range of joint `{}`", joint.name),
         found: format!("[{lower}, {upper}]"),
-        right: format!(
+        advice: format!(
             "it must be [lowest, highest], two finite numbers in {unit} within position = [{lowest}, {highest}]"
         ),
     })
@@ -159,23 +159,23 @@ fn check_position_limits(joint: &Joint, [lower, upper]: [f64; 2], unit: &str) ->
         return Ok(());
     }
     Err(Fault {
-        way: vec![Step::Key("limits"), Step::Key("position")],
+        key_path: vec![Step::Key("limits"), Step::Key("position")],
         what: format!("the position range of joint `{}`", joint.name),
         found: format!("[{lower}, {upper}]"),
-        right: format!(
+        advice: format!(
             "it must be [lowest, highest], two finite numbers in {unit} (or [-inf, inf] for a revolute joint that turns endlessly)"
         ),
     })
 }
 
 fn check_friction(joint: &Joint, friction: &JointFriction, units: Units) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative};
+    use Requirement::{Finite, NotNegative};
     use Step::Key;
     let Units { angle, force } = units;
-    let way = |k| [Key("friction"), Key(k)];
+    let key_path = |k| [Key("friction"), Key(k)];
     number(
         joint,
-        &way("coulomb"),
+        &key_path("coulomb"),
         "Coulomb friction",
         force,
         NotNegative,
@@ -184,7 +184,7 @@ fn check_friction(joint: &Joint, friction: &JointFriction, units: Units) -> Resu
     let unit = format!("{force}·s/{angle}");
     number(
         joint,
-        &way("viscous"),
+        &key_path("viscous"),
         "viscous friction",
         &unit,
         NotNegative,
@@ -192,7 +192,7 @@ fn check_friction(joint: &Joint, friction: &JointFriction, units: Units) -> Resu
     )?;
     number(
         joint,
-        &way("offset"),
+        &key_path("offset"),
         "constant torque",
         force,
         Finite,
@@ -202,13 +202,13 @@ fn check_friction(joint: &Joint, friction: &JointFriction, units: Units) -> Resu
 }
 
 fn check_controller(joint: &Joint, controller: &Controller, units: Units) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative, NotZero};
+    use Requirement::{Finite, NotNegative, NotZero};
     use Step::Key;
     let Units { angle, force } = units;
-    let way = |k| [Key("controller"), Key(k)];
+    let key_path = |k| [Key("controller"), Key(k)];
     number(
         joint,
-        &way("position_gain"),
+        &key_path("position_gain"),
         "position gain",
         "1/s",
         NotNegative,
@@ -217,7 +217,7 @@ fn check_controller(joint: &Joint, controller: &Controller, units: Units) -> Res
     let unit = format!("controller output per {angle}/s");
     number(
         joint,
-        &way("velocity_gain"),
+        &key_path("velocity_gain"),
         "velocity gain",
         &unit,
         Finite,
@@ -226,7 +226,7 @@ fn check_controller(joint: &Joint, controller: &Controller, units: Units) -> Res
     let unit = format!("{force} per controller output");
     number(
         joint,
-        &way("torque_gain"),
+        &key_path("torque_gain"),
         "torque gain",
         &unit,
         NotZero,
@@ -237,10 +237,10 @@ fn check_controller(joint: &Joint, controller: &Controller, units: Units) -> Res
 
 /// Refuses values that no controller has.
 fn check_voltage_controller(joint: &Joint, c: &VoltageController) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative, Positive};
-    let way = |key| [Step::Key("voltage_controller"), Step::Key(key)];
+    use Requirement::{Finite, NotNegative, Positive};
+    let key_path = |key| [Step::Key("voltage_controller"), Step::Key(key)];
     let unit = joint.kind.units().0;
-    for (key, what, per, must, value) in [
+    for (key, what, per, requirement, value) in [
         (
             "proportional",
             "proportional gain",
@@ -265,29 +265,43 @@ fn check_voltage_controller(joint: &Joint, c: &VoltageController) -> Result<(), 
             c.acceleration_feedforward,
         ),
     ] {
-        number(joint, &way(key), what, &format!("{per}{unit}"), must, value)?;
+        number(
+            joint,
+            &key_path(key),
+            what,
+            &format!("{per}{unit}"),
+            requirement,
+            value,
+        )?;
     }
-    number(joint, &way("bias"), "constant share", "1", Finite, c.bias)?;
+    number(
+        joint,
+        &key_path("bias"),
+        "constant share",
+        "1",
+        Finite,
+        c.bias,
+    )?;
     if let Some(limit) = c.limit {
         number(
             joint,
-            &way("limit"),
+            &key_path("limit"),
             "largest share of the supply",
             "1",
             Positive,
             limit,
         )?;
     }
-    for (place, what, must) in [
+    for (place, what, requirement) in [
         (0, "supply without load", Positive),
         (1, "change of the supply", Finite),
     ] {
-        let way = [
+        let key_path = [
             Step::Key("voltage_controller"),
             Step::Key("supply"),
             Step::At(place),
         ];
-        number(joint, &way, what, "V", must, c.supply[place])?;
+        number(joint, &key_path, what, "V", requirement, c.supply[place])?;
     }
     Ok(())
 }

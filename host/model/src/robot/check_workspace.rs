@@ -23,14 +23,14 @@ pub(super) fn check_workspace(robot: &Robot) -> Result<(), Fault> {
 }
 
 /// Returns the fault of region `i` (from 0) at one of its keys, or of the region itself.
-fn refused(i: usize, key: Option<&'static str>, what: &str, found: String, right: &str) -> Fault {
-    let mut way = vec![Step::Key("workspace"), Step::At(i)];
-    way.extend(key.map(Step::Key));
+fn refused(i: usize, key: Option<&'static str>, what: &str, found: String, advice: &str) -> Fault {
+    let mut key_path = vec![Step::Key("workspace"), Step::At(i)];
+    key_path.extend(key.map(Step::Key));
     Fault {
-        way,
+        key_path,
         what: format!("{what} of [[workspace]] {}", i + 1),
         found,
-        right: right.into(),
+        advice: advice.into(),
     }
 }
 

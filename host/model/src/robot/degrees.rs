@@ -75,8 +75,11 @@ mod tests {
             ([-3.1, 3.1], 57.0, "0.9948"),
             ([-2.9, 2.9], 180.0, "3.142"),
         ] {
-            let said = with(position, velocity);
-            assert!(said.len() == 1 && said[0].contains(told), "{said:?}");
+            let message = with(position, velocity);
+            assert!(
+                message.len() == 1 && message[0].contains(told),
+                "{message:?}"
+            );
         }
         for (position, velocity) in [
             ([-3.1, 3.1], 6.0),

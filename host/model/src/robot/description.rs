@@ -28,7 +28,7 @@ impl Robot {
     pub fn from_urdf(text: &str, path: &Path) -> Result<Self, RobotError> {
         let chain = urdf::read(text, path)?;
         let robot = dh::convert(&chain).robot;
-        urdf::check_sizes(&chain, &robot, path)?;
+        urdf::check_units(&chain, &robot, path)?;
         Ok(robot)
     }
 

@@ -137,10 +137,10 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         };
         let mut theta = snap_angle(angle_about(x_before, x, z));
         if body.kind == JointKind::Prismatic
-            && let Some((exact, said)) = squared_theta(&chain.file, body, theta)
+            && let Some((exact, remark)) = squared_theta(&chain.file, body, theta)
         {
             theta = exact;
-            remarks.extend(said);
+            remarks.extend(remark);
         }
         let d = snap_length((origin - foot).dot(&z));
         if a.abs().max(d.abs()) > FAR * reach {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::screw::Screw;
+use super::ball_screw_crank::BallScrewCrank;
 
 /// Motor and gear. Motor position = gear_ratio·q + Σ couples·q_j + contribution of the screw + zero.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -52,5 +52,5 @@ pub struct Drive {
     pub pole_pairs: Option<u32>,
     /// A ball screw on a crank instead of a constant ratio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub screw: Option<Screw>,
+    pub screw: Option<BallScrewCrank>,
 }

@@ -6,9 +6,9 @@ use rig_shared::transmission::{
     DriveKind, DriveMap, MOTOR_COLUMNS, Transmission, TransmissionError, motor_column,
 };
 
+use super::ball_screw_crank::BallScrewCrank;
 use super::drive::Drive;
 use super::joint::{Inertial, Joint, JointFriction, JointKind};
-use super::screw::Screw;
 use super::serial_robot::Robot;
 
 /// The numbers of one drive.
@@ -79,7 +79,7 @@ impl Robot {
     }
 
     /// Returns the weight of each joint in the crank's angle.
-    fn weights(&self, screw: &Screw) -> Vec<f64> {
+    fn weights(&self, screw: &BallScrewCrank) -> Vec<f64> {
         let weight = |name: &String| screw.angle.get(name).copied().unwrap_or(0.0);
         self.joints.iter().map(|j| weight(&j.name)).collect()
     }
@@ -258,7 +258,7 @@ impl Robot {
     }
 
     /// Returns the range of a crank's angle within the limits of its joints; `None` if one of them has no limits.
-    pub(super) fn crank_box(&self, screw: &Screw) -> Option<[f64; 2]> {
+    pub(super) fn crank_box(&self, screw: &BallScrewCrank) -> Option<[f64; 2]> {
         let mut range = [screw.offset; 2];
         for (weight, joint) in self.weights(screw).into_iter().zip(&self.joints) {
             if weight == 0.0 {

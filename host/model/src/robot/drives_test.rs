@@ -12,7 +12,7 @@ fn load(text: &str) -> Result<Robot, RobotError> {
     Robot::from_toml(text, Path::new("r.toml"))
 }
 
-fn says(text: &str) -> String {
+fn error_of(text: &str) -> String {
     load(text).unwrap_err().to_string()
 }
 
@@ -182,13 +182,13 @@ fn wrong_drives_are_named_by_line_and_mend() {
             .into_iter()
             .find(|t| t.contains(old))
             .unwrap();
-        let said = says(&text.replacen(old, new, 1));
+        let message = error_of(&text.replacen(old, new, 1));
         assert!(
-            said.starts_with("r.toml:") && !said.contains('\n'),
-            "{said}"
+            message.starts_with("r.toml:") && !message.contains('\n'),
+            "{message}"
         );
         for part in parts {
-            assert!(said.contains(part), "{said}");
+            assert!(message.contains(part), "{message}");
         }
     }
     let line = |text: &str, what: &str| {
@@ -196,13 +196,13 @@ fn wrong_drives_are_named_by_line_and_mend() {
         format!("r.toml:{}:", text[..at].matches('\n').count() + 1)
     };
     let text = TX40.replace("joint_5 = 32.0", "joint_7 = 32.0");
-    assert!(says(&text).starts_with(&line(&text, "joint_7")));
+    assert!(error_of(&text).starts_with(&line(&text, "joint_7")));
     let text = ONE_LINK_TEMPLATE.replace("coulomb = 0.4", "coulomb = -0.4");
-    let said = says(&text);
-    assert!(said.starts_with(&line(&text, "coulomb")), "{said}");
+    let message = error_of(&text);
+    assert!(message.starts_with(&line(&text, "coulomb")), "{message}");
     assert!(
-        said.contains("Coulomb friction of joint `link` is -0.4"),
-        "{said}"
+        message.contains("Coulomb friction of joint `link` is -0.4"),
+        "{message}"
     );
 }
 
@@ -214,10 +214,10 @@ fn motors_that_turn_alike_are_refused_with_the_joint_at_fault() {
         "gear_ratio = 32.0\ncouples = { joint_6 = 32.0 }\n\n[[joint]]\nname = \"joint_6\"",
         1,
     );
-    let said = says(&text);
+    let message = error_of(&text);
     assert!(
-        said.contains("drive of joint `joint_6` is singular"),
-        "{said}"
+        message.contains("drive of joint `joint_6` is singular"),
+        "{message}"
     );
 }
 

@@ -53,19 +53,19 @@ pub(super) struct Refusal {
     pub key: Option<String>,
     pub what: String,
     pub found: String,
-    pub right: String,
+    pub advice: String,
 }
 
 impl Refusal {
     /// Returns the refusal as the fault of effect `index` of a description.
     pub(super) fn at(self, index: usize) -> Fault {
-        let mut way = vec![Step::Key("effect"), Step::At(index)];
-        way.extend(self.key.map(Step::Name));
+        let mut key_path = vec![Step::Key("effect"), Step::At(index)];
+        key_path.extend(self.key.map(Step::Name));
         Fault {
-            way,
+            key_path,
             what: format!("{} of effect {}", self.what, index + 1),
             found: self.found,
-            right: self.right,
+            advice: self.advice,
         }
     }
 }
@@ -141,7 +141,7 @@ const LARGEST_ORDER: f64 = 1.0e4;
 const LARGEST_SHARE: f64 = 1.0;
 
 /// Returns the range that a description may state: the physical bounds, narrowed to those of real machines.
-pub fn sane(parameter: &Parameter) -> [f64; 2] {
+pub fn plausible_range(parameter: &Parameter) -> [f64; 2] {
     let of_unit = LARGEST.iter().find(|(unit, _)| *unit == parameter.unit);
     let largest = match (of_unit, parameter.unit, parameter.name) {
         (Some((_, largest)), ..) => *largest,
@@ -163,7 +163,7 @@ fn allowed(parameter: &Parameter) -> String {
             format!("at least {x}")
         }
     };
-    let [low, high] = sane(parameter);
+    let [low, high] = plausible_range(parameter);
     let range = match (low.is_finite(), high.is_finite()) {
         (false, false) => "a finite number".to_owned(),
         (true, false) => number(low),
@@ -176,12 +176,12 @@ fn allowed(parameter: &Parameter) -> String {
     }
 }
 
-fn refuse(key: &str, what: &str, found: String, right: String) -> Refusal {
+fn refuse(key: &str, what: &str, found: String, advice: String) -> Refusal {
     Refusal {
         key: Some(key.to_owned()),
         what: what.to_owned(),
         found,
-        right,
+        advice,
     }
 }
 
@@ -212,7 +212,7 @@ fn kind_of(table: &toml::Table) -> Result<Kind, Refusal> {
         ));
     };
     let laws = laws(&name);
-    let kind = Kind::named(&name, law.as_deref());
+    let kind = Kind::from_name(&name, law.as_deref());
     kind.filter(|kind| kind.about().law.is_some() == law.is_some())
         .ok_or_else(|| {
             refuse(
@@ -222,7 +222,8 @@ fn kind_of(table: &toml::Table) -> Result<Kind, Refusal> {
                 if laws.is_empty() {
                     format!("{name} has one law only; remove this key")
                 } else {
-                    let plain = Kind::named(&name, None).is_some_and(|k| k.about().law.is_none());
+                    let plain =
+                        Kind::from_name(&name, None).is_some_and(|k| k.about().law.is_none());
                     let or = if plain {
                         ", or none where this key is missing"
                     } else {
@@ -263,7 +264,7 @@ fn value_of(table: &toml::Table, kind: Kind, p: &Parameter) -> Result<f64, Refus
         Some(toml::Value::Integer(x)) => Some(*x as f64),
         _ => None,
     };
-    let [low, high] = sane(p);
+    let [low, high] = plausible_range(p);
     number.filter(|x| (low..=high).contains(x)).ok_or_else(|| {
         refuse(
             p.name,
@@ -306,7 +307,7 @@ impl TryFrom<toml::Table> for RobotEffect {
     type Error = String;
 
     fn try_from(table: toml::Table) -> Result<Self, String> {
-        Self::from_table(&table).map_err(|r| format!("{} is {}, but {}", r.what, r.found, r.right))
+        Self::from_table(&table).map_err(|r| format!("{} is {}, but {}", r.what, r.found, r.advice))
     }
 }
 

@@ -174,14 +174,14 @@ fn faults_name_line_value_and_mend() {
             &["presliding", "effect 2", "another presliding"],
         ),
     ] {
-        let said = with(effect).unwrap_err();
+        let message = with(effect).unwrap_err();
         let place = format!("robot.toml:{}:", first as i64 + line);
         assert!(
-            said.starts_with(&place),
-            "{effect}: {said}, expected {place}"
+            message.starts_with(&place),
+            "{effect}: {message}, expected {place}"
         );
         for word in words {
-            assert!(said.contains(word), "{effect}: {said}");
+            assert!(message.contains(word), "{effect}: {message}");
         }
     }
 }
@@ -202,7 +202,7 @@ fn the_share_that_a_gear_carries_may_be_left_out() {
 #[test]
 fn what_is_refused_is_far_from_what_rigs_have() {
     for p in Kind::ALL.iter().flat_map(|kind| parameters(*kind)) {
-        let [low, high] = sane(p);
+        let [low, high] = plausible_range(p);
         assert!(low >= p.bounds[0] && high <= p.bounds[1], "{p:?}");
         let far = if p.bounds[1].is_finite() { 1.0 } else { 4.0 };
         assert!(high >= far * p.range[1], "{p:?}");
@@ -214,17 +214,17 @@ fn what_could_not_be_read_back_is_not_written() {
     let mut robot = two_joints(JointKind::Revolute);
     robot.effects = vec![smallest(Kind::Cogging)];
     robot.effects[0].effect.gains[1] = f64::NAN;
-    let said = robot.to_toml().unwrap_err().to_string();
+    let message = robot.to_toml().unwrap_err().to_string();
     assert!(
-        said.contains("sine of effect 1") && said.contains("nan"),
-        "{said}"
+        message.contains("sine of effect 1") && message.contains("nan"),
+        "{message}"
     );
     robot.effects = vec![smallest(Kind::Cogging)];
     robot.effects[0].joint = None;
-    let said = robot.to_toml().unwrap_err().to_string();
+    let message = robot.to_toml().unwrap_err().to_string();
     assert!(
-        said.contains("joint of effect 1") && said.contains("a, b"),
-        "{said}"
+        message.contains("joint of effect 1") && message.contains("a, b"),
+        "{message}"
     );
 }
 

@@ -87,7 +87,7 @@ pub enum RobotError {
         message: String,
     },
     /// A value that parses but cannot be right.
-    #[error("{}:{place}: {what} is {found}, but {right}", path.display())]
+    #[error("{}:{place}: {what} is {found}, but {advice}", path.display())]
     Value {
         /// The file.
         path: PathBuf,
@@ -98,7 +98,7 @@ pub enum RobotError {
         /// The value found.
         found: String,
         /// The correction.
-        right: String,
+        advice: String,
     },
     /// XML or URDF that does not describe a serial robot.
     #[error("{}:{place}: {message}", path.display())]

@@ -1,10 +1,10 @@
-//! Faults of a description, each with the way to its place, and the checks of single numbers.
+//! Faults of a description, each with the path of its key, and the checks of single numbers.
 
 use super::joint::Joint;
 
 /// Largest number of a description, in its written unit. It exceeds every robot's values, and products of such numbers
 /// do not overflow.
-pub(super) const LARGEST: f64 = 1e12;
+pub(super) const MAX_NUMBER: f64 = 1e12;
 
 /// One step of the path to a value in the tree of a description.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,26 +20,26 @@ pub(super) enum Step {
 /// A value that cannot be right.
 #[derive(Debug)]
 pub(super) struct Fault {
-    pub way: Vec<Step>,
+    pub key_path: Vec<Step>,
     pub what: String,
     pub found: String,
-    pub right: String,
+    pub advice: String,
 }
 
 /// Returns the fault of a number.
-pub(super) fn fault(way: &[Step], what: &str, found: &f64, right: &str) -> Fault {
+pub(super) fn fault(key_path: &[Step], what: &str, found: &f64, advice: &str) -> Fault {
     Fault {
-        way: way.to_vec(),
+        key_path: key_path.to_vec(),
         what: what.into(),
         found: written(*found),
-        right: right.into(),
+        advice: advice.into(),
     }
 }
 
 /// Returns a number in the form that a person writes.
 pub fn written(value: f64) -> String {
-    let small = value != 0.0 && value.abs() < 1.0 / LARGEST;
-    if (sound(value) && !small) || !value.is_finite() {
+    let small = value != 0.0 && value.abs() < 1.0 / MAX_NUMBER;
+    if (is_safe_magnitude(value) && !small) || !value.is_finite() {
         value.to_string()
     } else {
         format!("{value:e}")
@@ -47,13 +47,13 @@ pub fn written(value: f64) -> String {
 }
 
 /// Returns true if products of `value` do not overflow.
-pub fn sound(value: f64) -> bool {
-    value.abs() <= LARGEST
+pub fn is_safe_magnitude(value: f64) -> bool {
+    value.abs() <= MAX_NUMBER
 }
 
 /// Requirement on a number.
 #[derive(Clone, Copy)]
-pub(super) enum Must {
+pub(super) enum Requirement {
     Finite,
     Positive,
     /// Greater than 0, of any size: a very large limit means no limit.
@@ -64,27 +64,29 @@ pub(super) enum Must {
 
 pub(super) fn number(
     joint: &Joint,
-    way: &[Step],
+    key_path: &[Step],
     what: &str,
     unit: &str,
-    must: Must,
+    requirement: Requirement,
     value: f64,
 ) -> Result<(), Fault> {
-    let (good, right) = match must {
-        Must::Finite => (true, "a finite number"),
-        Must::Positive | Must::Limit => (value > 0.0, "greater than 0"),
-        Must::NotNegative => (value >= 0.0, "0 or greater"),
-        Must::NotZero => (value != 0.0, "different from 0"),
+    let (valid, advice) = match requirement {
+        Requirement::Finite => (true, "a finite number"),
+        Requirement::Positive | Requirement::Limit => (value > 0.0, "greater than 0"),
+        Requirement::NotNegative => (value >= 0.0, "0 or greater"),
+        Requirement::NotZero => (value != 0.0, "different from 0"),
     };
-    let large = !matches!(must, Must::Limit) && value.is_finite() && !sound(value);
-    if good && value.is_finite() && !large {
+    let large = !matches!(requirement, Requirement::Limit)
+        && value.is_finite()
+        && !is_safe_magnitude(value);
+    if valid && value.is_finite() && !large {
         return Ok(());
     }
     let what = format!("the {what} of joint `{}`", joint.name);
-    let right = if large {
-        format!("it must be at most {LARGEST:e} in {unit}")
+    let advice = if large {
+        format!("it must be at most {MAX_NUMBER:e} in {unit}")
     } else {
-        format!("it must be {right}, in {unit}")
+        format!("it must be {advice}, in {unit}")
     };
-    Err(fault(way, &what, &value, &right))
+    Err(fault(key_path, &what, &value, &advice))
 }

@@ -3,7 +3,7 @@
 //! Such values are not refused: identified values are often known only in combinations, and values that no motion shows
 //! are often left at zero.
 
-use super::bodies::strange;
+use super::bodies::implausibility;
 use super::serial_robot::Robot;
 use super::urdf::{Original, SpatialInertia};
 
@@ -13,7 +13,7 @@ impl Robot {
         (0..self.joints.len())
             .filter_map(|k| {
                 let inertial = self.joints[k].inertial.as_ref()?;
-                let why = strange(&SpatialInertia::of(inertial), &self.shown(k))?;
+                let why = implausibility(&SpatialInertia::of(inertial), &self.shown(k))?;
                 let joint = &self.joints[k].name;
                 let link = match urdf.and_then(|original| original.link(k)) {
                     Some(link) => format!("Link `{link}`, moved by joint `{joint}`,"),

@@ -36,10 +36,10 @@ fn of_drive(robot: &Robot, rows: &[[f64; COLUMNS]], k: usize) -> Option<Fault> {
     let total = rows[k][column::DRIVE_INERTIA];
     let is_negative = total < -ROUNDING * own.joint_inertia.abs();
     is_negative.then(|| Fault {
-        way: vec![Step::Key("drive"), Step::Key("joint_inertia")],
+        key_path: vec![Step::Key("drive"), Step::Key("joint_inertia")],
         what: format!("the drive inertia seen at joint `{}`", joint.name),
         found: format!("{} {}", written(total), unit(joint.kind)),
-        right: "a drive has no less inertia than none; it must be 0 or greater, with the rotors' part in it".into(),
+        advice: "a drive has no less inertia than none; it must be 0 or greater, with the rotors' part in it".into(),
     })
 }
 
@@ -63,7 +63,7 @@ fn of_joints(robot: &Robot, rows: &[[f64; COLUMNS]]) -> Option<(usize, Fault)> {
 
 fn too_little(robot: &Robot, k: usize, inertia: f64) -> Fault {
     let joint = &robot.joints[k];
-    let (key, mend) = match joint.kind {
+    let (key, advice) = match joint.kind {
         JointKind::Revolute => (
             "inertia",
             "Izz of the links that it moves, about its axis, with the drive inertia must be greater than 0",
@@ -74,13 +74,13 @@ fn too_little(robot: &Robot, k: usize, inertia: f64) -> Fault {
         ),
     };
     Fault {
-        way: vec![Step::Key("inertial"), Step::Key(key)],
+        key_path: vec![Step::Key("inertial"), Step::Key(key)],
         what: format!(
             "the inertia that the torque of joint `{}` accelerates",
             joint.name
         ),
         found: format!("{} {}", written(inertia), unit(joint.kind)),
-        right: mend.into(),
+        advice: advice.into(),
     }
 }
 

@@ -8,8 +8,8 @@
 
 mod angles;
 mod array;
+mod ball_screw_crank;
 mod band;
-mod bare;
 mod bodies;
 mod check;
 mod check_drives;
@@ -26,6 +26,7 @@ mod encoding;
 mod error;
 mod fault;
 mod frame;
+mod geometry_only;
 mod implausible;
 mod inertia;
 mod joint;
@@ -33,12 +34,11 @@ mod link_size;
 mod numbers;
 mod placed;
 mod right_angle;
-mod screw;
 mod serial_robot;
-mod sizes;
 mod templates;
 mod text;
 mod toml_lines;
+mod unit_check;
 mod unlikely;
 mod urdf;
 mod voltage_controller;
@@ -46,15 +46,15 @@ mod workspace;
 mod worth;
 mod written;
 
+pub use ball_screw_crank::BallScrewCrank;
 pub use band::{IdentifiedBand, MOST_LEAD};
 pub use description::Description;
 pub use drive::Drive;
-pub use effects::{EFFECT_NAMES, RobotEffect, sane, title_of, unit_of};
+pub use effects::{EFFECT_NAMES, RobotEffect, plausible_range, title_of, unit_of};
 pub use error::{MAX_BYTES, Place, RobotError};
-pub use fault::{sound, written};
+pub use fault::{is_safe_magnitude, written};
 pub use joint::{Controller, Inertial, Joint, JointFriction, JointKind, JointLimits};
 pub use placed::Placed;
-pub use screw::Screw;
 pub use serial_robot::Robot;
 pub use templates::{
     DOUBLE_PENDULUM, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, TX40, XL330, template,

@@ -9,13 +9,13 @@ fn example() -> Robot {
     Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
 }
 
-fn toml_says(text: &str) -> String {
+fn toml_error(text: &str) -> String {
     Robot::from_toml(text, Path::new("r.toml"))
         .unwrap_err()
         .to_string()
 }
 
-fn urdf_says(text: &str) -> String {
+fn urdf_error(text: &str) -> String {
     Robot::from_urdf(text, Path::new("r.urdf"))
         .unwrap_err()
         .to_string()
@@ -155,35 +155,35 @@ fn wrong_toml_is_named_by_line_and_mend() {
     ];
     for (old, new, parts) in cases {
         let text = with(old, new);
-        let said = toml_says(&text);
+        let message = toml_error(&text);
         let place = format!("r.toml:{}:", line_of(&text, new));
-        assert!(said.starts_with(&place), "{new}: {said}");
-        assert!(!said.contains('\n'), "{new}: {said}");
+        assert!(message.starts_with(&place), "{new}: {message}");
+        assert!(!message.contains('\n'), "{new}: {message}");
         for part in parts {
-            assert!(said.contains(part), "{new}: {said}");
+            assert!(message.contains(part), "{new}: {message}");
         }
     }
 }
 
 #[test]
 fn missing_and_repeated_parts_are_named() {
-    let said = toml_says(&with("alpha", "# gone"));
-    assert!(said.contains("missing field `alpha`"), "{said}");
+    let message = toml_error(&with("alpha", "# gone"));
+    assert!(message.contains("missing field `alpha`"), "{message}");
     assert_eq!(
-        said.split(':').nth(1).unwrap(),
+        message.split(':').nth(1).unwrap(),
         line_of(ONE_LINK_TEMPLATE, "[[joint]]").to_string(),
-        "{said}"
+        "{message}"
     );
-    assert!(toml_says("name = 'x'\ngravity = [0, 0, 0]\n").contains("missing field `joint`"));
+    assert!(toml_error("name = 'x'\ngravity = [0, 0, 0]\n").contains("missing field `joint`"));
     assert!(
-        toml_says("name = 'x'\ngravity = [0, 0, 0]\njoint = []\n")
+        toml_error("name = 'x'\ngravity = [0, 0, 0]\njoint = []\n")
             .contains("at least one [[joint]]")
     );
     let joint = ONE_LINK_TEMPLATE.split_once("[[joint]]").unwrap().1;
     let twice = format!("{ONE_LINK_TEMPLATE}\n[[joint]]{joint}");
-    let said = toml_says(&twice);
-    assert!(said.contains("`link` again"), "{said}");
-    let effect = |body: &str| toml_says(&format!("{ONE_LINK_TEMPLATE}\n[[effect]]\n{body}\n"));
+    let message = toml_error(&twice);
+    assert!(message.contains("`link` again"), "{message}");
+    let effect = |body: &str| toml_error(&format!("{ONE_LINK_TEMPLATE}\n[[effect]]\n{body}\n"));
     assert!(effect("kind = 'magic'").contains("`magic`, but it must be one of stribeck"));
     assert!(effect("joint = 'link'").contains("kind of effect 1 is missing"));
     assert!(
@@ -414,13 +414,13 @@ fn what_is_no_serial_chain_is_refused_by_name() {
         ("<robot name='x'><link".into(), &["not well-formed XML"]),
     ];
     for (text, parts) in cases {
-        let said = urdf_says(&text);
+        let message = urdf_error(&text);
         assert!(
-            said.starts_with("r.urdf:") && !said.contains('\n'),
-            "{said}"
+            message.starts_with("r.urdf:") && !message.contains('\n'),
+            "{message}"
         );
         for part in parts {
-            assert!(said.contains(part), "{said}");
+            assert!(message.contains(part), "{message}");
         }
     }
     // A loop beside the base, and one that includes the base.
@@ -429,29 +429,29 @@ fn what_is_no_serial_chain_is_refused_by_name() {
         + &joint("two", "fixed", "a", "b", "")
         + &joint("three", "revolute", "b", "base", "");
     for (text, names) in [(beside, "`two`, `one`"), (through, "`two`, `three`, `one`")] {
-        let said = urdf_says(&urdf(&text));
+        let message = urdf_error(&urdf(&text));
         assert!(
-            said.contains(&format!("joints {names} form a closed loop")),
-            "{said}"
+            message.contains(&format!("joints {names} form a closed loop")),
+            "{message}"
         );
     }
     let all_fixed = joint("one", "fixed", "base", "a", "") + &joint("two", "fixed", "a", "b", "");
-    assert!(urdf_says(&urdf(&all_fixed)).contains("no movable joint"));
+    assert!(urdf_error(&urdf(&all_fixed)).contains("no movable joint"));
 }
 
 #[test]
 fn a_moved_link_without_inertial_is_named_with_its_line() {
     let text = "<robot name='r'>\n<link name='base'/>\n<link name='arm'/>\n<joint name='one' type='continuous'><parent link='base'/><child link='arm'/></joint>\n</robot>";
-    let said = urdf_says(text);
+    let message = urdf_error(text);
     assert!(
-        said.starts_with("r.urdf:3:1: link `arm` is moved by joint `one` but has no <inertial>"),
-        "{said}"
+        message.starts_with("r.urdf:3:1: link `arm` is moved by joint `one` but has no <inertial>"),
+        "{message}"
     );
     let negative = text.replace(
         "<link name='arm'/>",
         "<link name='arm'><inertial><mass value='-1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>",
     );
-    assert!(urdf_says(&negative).contains("mass of link `arm` is -1"));
+    assert!(urdf_error(&negative).contains("mass of link `arm` is -1"));
 }
 
 #[test]
@@ -460,25 +460,25 @@ fn what_xacro_has_not_expanded_is_refused_where_it_matters() {
     let two = joint("two", "continuous", "a", "b", "");
     let whole = urdf(&(one.clone() + &two));
     assert!(Robot::from_urdf(&whole, Path::new("r.urdf")).is_ok());
-    let said = urdf_says(&urdf(&(one.clone() + "<xacro:arm side='left'/>")));
+    let message = urdf_error(&urdf(&(one.clone() + "<xacro:arm side='left'/>")));
     assert!(
-        said.starts_with("r.urdf:6:2: ") && said.contains("run xacro over the file first"),
-        "{said}"
+        message.starts_with("r.urdf:6:2: ") && message.contains("run xacro over the file first"),
+        "{message}"
     );
     let declared = |text: &str| {
         let root = "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>";
         text.replace("<robot name='r'>", root)
     };
     let with_element = declared(&urdf(&(one.clone() + "<xacro:arm side='left'/>")));
-    let said = urdf_says(&with_element);
+    let message = urdf_error(&with_element);
     assert!(
-        said.contains("this is <xacro:arm>") && said.contains("run xacro"),
-        "{said}"
+        message.contains("this is <xacro:arm>") && message.contains("run xacro"),
+        "{message}"
     );
-    let said = urdf_says(&whole.replace("name='two'", "name='${side}_two'"));
+    let message = urdf_error(&whole.replace("name='two'", "name='${side}_two'"));
     assert!(
-        said.contains("`name` of <joint> is \"${side}_two\"") && said.contains("run xacro"),
-        "{said}"
+        message.contains("`name` of <joint> is \"${side}_two\"") && message.contains("run xacro"),
+        "{message}"
     );
     // Macros that xacro leaves, and text that other programs expand.
     let mesh = "<visual><geometry><mesh filename='$(find arm)/a.stl'/></geometry></visual></link>";
@@ -494,10 +494,10 @@ fn a_transmission_of_no_joint_is_named() {
         joint("one", "continuous", "base", "a", ""),
         joint("two", "continuous", "a", "b", "")
     ));
-    let said = urdf_says(&text);
+    let message = urdf_error(&text);
     assert!(
-        said.starts_with("r.urdf:7:") && said.contains("names joint `onne`"),
-        "{said}"
+        message.starts_with("r.urdf:7:") && message.contains("names joint `onne`"),
+        "{message}"
     );
 }
 
@@ -506,12 +506,12 @@ fn a_robot_of_too_many_joints_is_refused_with_its_file() {
     let bare = |k: usize| Joint::new(&format!("j{k}"), JointKind::Revolute, [0.0; 4]);
     let robot = Robot::new("long", (0..17).map(bare).collect());
     let text = robot.to_toml().unwrap();
-    let said = toml_says(&text);
+    let message = toml_error(&text);
     let line = line_of(&text, "name = \"j16\"") - 1;
     assert!(
-        said.contains(&format!(":{line}:"))
-            && said.contains("the number of joints is 17, but a robot has at most 16"),
-        "{said}"
+        message.contains(&format!(":{line}:"))
+            && message.contains("the number of joints is 17, but a robot has at most 16"),
+        "{message}"
     );
     let mut body = String::new();
     for k in 0..17 {
@@ -528,12 +528,14 @@ fn a_robot_of_too_many_joints_is_refused_with_its_file() {
             "",
         );
     }
-    let said = urdf_says(&format!(
+    let message = urdf_error(&format!(
         "<robot name='r'><link name='base'/>{body}</robot>"
     ));
     assert!(
-        said.starts_with("r.urdf:") && said.contains("joint 17") && said.contains("at most 16"),
-        "{said}"
+        message.starts_with("r.urdf:")
+            && message.contains("joint 17")
+            && message.contains("at most 16"),
+        "{message}"
     );
 }
 
@@ -541,11 +543,11 @@ fn a_robot_of_too_many_joints_is_refused_with_its_file() {
 fn an_alpha_in_degrees_is_refused() {
     for (line, right) in [("alpha = 90.0", "1.570796"), ("alpha = -180", "-3.141593")] {
         let text = with("alpha", line);
-        let said = toml_says(&text);
+        let message = toml_error(&text);
         let at = format!(":{}:", line_of(&text, line));
         assert!(
-            said.contains(&at) && said.contains("in rad") && said.contains(right),
-            "{said}"
+            message.contains(&at) && message.contains("in rad") && message.contains(right),
+            "{message}"
         );
     }
     assert!(Robot::from_toml(&with("alpha", "alpha = 6.28"), Path::new("r.toml")).is_ok());

@@ -17,10 +17,10 @@ use super::serial_robot::Robot;
 pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), RobotError> {
     let refused = |f: Fault| RobotError::Value {
         path: path.into(),
-        place: Place::of(text, offset(text, &f.way)),
+        place: Place::of(text, offset(text, &f.key_path)),
         what: f.what,
         found: f.found,
-        right: f.right,
+        advice: f.advice,
     };
     // Effects are checked first: the reader of the whole file gives no line for an effect.
     if let Ok(tables) = toml::from_str::<toml::Table>(text)
@@ -37,31 +37,31 @@ pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), Robo
     check(&robot).map_err(refused)?;
     for (i, joint) in robot.joints.iter().enumerate() {
         let drive = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
-        let way = [&drive[..], &[Step::Key("torque_constant")]].concat();
+        let key_path = [&drive[..], &[Step::Key("torque_constant")]].concat();
         // Absent means unknown. A written zero can only be a mistake.
         if joint
             .drive
             .as_ref()
             .is_some_and(|d| d.torque_constant == 0.0)
-            && reaches(text, &way)
+            && reaches(text, &key_path)
         {
             return Err(RobotError::Value {
                 path: path.into(),
-                place: Place::of(text, offset(text, &way)),
+                place: Place::of(text, offset(text, &key_path)),
                 what: format!("the torque constant of joint `{}`", joint.name),
                 found: "0".into(),
-                right: "it must be greater than 0, in N·m/A, or left out where unknown".into(),
+                advice: "it must be greater than 0, in N·m/A, or left out where unknown".into(),
             });
         }
     }
     let remarks = square(&mut robot).into_iter().map(|squared| {
-        let way = [
+        let key_path = [
             Step::Key("joint"),
             Step::At(squared.joint),
             Step::Key(squared.key),
         ];
-        let place = Place::of(text, offset(text, &way));
-        format!("{}:{place}: {}", path.display(), squared.said)
+        let place = Place::of(text, offset(text, &key_path));
+        format!("{}:{place}: {}", path.display(), squared.remark)
     });
     let remarks = remarks.collect();
     Ok((robot, remarks))
@@ -70,14 +70,14 @@ pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), Robo
 /// Checks that every drive has a ratio or a screw.
 fn missing_ratio(robot: &Robot, text: &str, path: &Path) -> Result<(), RobotError> {
     for (i, joint) in robot.joints.iter().enumerate() {
-        let way = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
+        let key_path = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
         let absent = |drive: &Drive| drive.screw.is_none() && drive.gear_ratio == 0.0;
         if joint.drive.as_ref().is_some_and(absent)
-            && !reaches(text, &[&way[..], &[Step::Key("gear_ratio")]].concat())
+            && !reaches(text, &[&key_path[..], &[Step::Key("gear_ratio")]].concat())
         {
             return Err(RobotError::Toml {
                 path: path.into(),
-                place: Place::of(text, offset(text, &way)),
+                place: Place::of(text, offset(text, &key_path)),
                 message: "missing field `gear_ratio`; add this key (motor turns per joint turn) to the table that begins here, or a table [joint.drive.screw]".into(),
             });
         }
@@ -87,45 +87,45 @@ fn missing_ratio(robot: &Robot, text: &str, path: &Path) -> Result<(), RobotErro
 
 /// Returns the message of the TOML reader on one line, with a correction if one is known.
 fn sentence(error: &toml::de::Error) -> String {
-    let said = error
+    let message = error
         .message()
         .lines()
         .map(str::trim)
         .collect::<Vec<_>>()
         .join(", ");
     // The reader takes a bare word for the beginning of `true` or `false`.
-    if said.starts_with("invalid boolean") || said.contains("must be quoted") {
+    if message.starts_with("invalid boolean") || message.contains("must be quoted") {
         return "what stands here is no TOML value; write a number like 20 or 2e-5, text in quotation marks, true or false".into();
     }
-    let mend = if said.starts_with("missing field") {
+    let advice = if message.starts_with("missing field") {
         "; add this key to the table that begins here (`rig init one-link` writes an example)"
-    } else if said.starts_with("unknown field") {
+    } else if message.starts_with("unknown field") {
         "; correct or remove this key"
-    } else if said.starts_with("invalid length") {
+    } else if message.starts_with("invalid length") {
         "; give exactly that many numbers in brackets"
-    } else if said.starts_with("invalid type") || said.starts_with("unknown variant") {
+    } else if message.starts_with("invalid type") || message.starts_with("unknown variant") {
         "; give a value of that kind"
     } else {
         " (this is not valid TOML; `rig init one-link` writes an example)"
     };
-    said.replace("expected f64", "expected a number") + mend
+    message.replace("expected f64", "expected a number") + advice
 }
 
-/// Returns the byte offset of the deepest value that `way` reaches.
-fn offset(text: &str, way: &[Step]) -> usize {
-    walk(text, way).0
+/// Returns the byte offset of the deepest value that `key_path` reaches.
+fn offset(text: &str, key_path: &[Step]) -> usize {
+    walk(text, key_path).0
 }
 
-fn reaches(text: &str, way: &[Step]) -> bool {
-    walk(text, way).1
+fn reaches(text: &str, key_path: &[Step]) -> bool {
+    walk(text, key_path).1
 }
 
-fn walk(text: &str, way: &[Step]) -> (usize, bool) {
+fn walk(text: &str, key_path: &[Step]) -> (usize, bool) {
     let Ok(root) = DeTable::parse(text) else {
         return (0, false);
     };
     let root = root.into_inner();
-    let Some((Step::Key(first), rest)) = way.split_first() else {
+    let Some((Step::Key(first), rest)) = key_path.split_first() else {
         return (0, true);
     };
     let Some(mut here): Option<&Spanned<DeValue<'_>>> = root.get(*first) else {

@@ -92,7 +92,7 @@ mod tests {
     use super::super::{ONE_LINK_TEMPLATE, template};
     use super::*;
 
-    fn said(change: impl Fn(&mut Robot)) -> Vec<String> {
+    fn remarks(change: impl Fn(&mut Robot)) -> Vec<String> {
         let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("r.toml")).unwrap();
         change(&mut robot);
         robot.unlikely_values()
@@ -105,8 +105,8 @@ mod tests {
             assert_eq!(robot.unlikely_values(), [""; 0], "{}", robot.name);
         }
         let leaning = |robot: &mut Robot| robot.gravity = [3.0, 0.0, -9.34];
-        assert_eq!(said(leaning), [""; 0]);
-        assert_eq!(said(|robot| robot.gravity = [0.0; 3]), [""; 0]);
+        assert_eq!(remarks(leaning), [""; 0]);
+        assert_eq!(remarks(|robot| robot.gravity = [0.0; 3]), [""; 0]);
     }
 
     #[test]
@@ -119,7 +119,7 @@ mod tests {
             (386.1, "in in/s²"),
             (1.62, "on the earth it is 9.81"),
         ] {
-            let found = said(|robot| robot.gravity = [0.0, 0.0, -size]);
+            let found = remarks(|robot| robot.gravity = [0.0, 0.0, -size]);
             assert!(found.len() == 1 && found[0].contains(words), "{found:?}");
         }
     }
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn drives_in_other_units_are_named() {
         let of = |change: &dyn Fn(&mut super::super::Drive)| {
-            let found = said(|robot| change(robot.joints[0].drive.as_mut().unwrap()));
+            let found = remarks(|robot| change(robot.joints[0].drive.as_mut().unwrap()));
             assert_eq!(found.len(), 1, "{found:?}");
             found[0].clone()
         };

@@ -65,24 +65,27 @@ pub struct Demand {
 
 impl VoltageController {
     /// Returns the share of the supply before the limit.
-    pub fn wish(&self, at: &Demand) -> f64 {
+    pub fn unlimited_share(&self, at: &Demand) -> f64 {
         self.proportional * at.error + self.integral * at.integral - self.derivative * at.velocity
             + self.velocity_feedforward * at.reference_velocity
             + self.acceleration_feedforward * at.reference_acceleration
             + self.bias
     }
 
-    /// Returns the growth of the integral of `error` over `dt`, s, for an unlimited share `wish`.
-    pub fn integrated(&self, wish: f64, error: f64, dt: f64) -> f64 {
-        let beyond = self.limit.is_some_and(|limit| wish.abs() > limit);
-        let stands = beyond && self.anti_windup == AntiWindup::Clamping && wish * error > 0.0;
-        if stands { 0.0 } else { error * dt }
+    /// Returns the growth of the integral of `error` over `dt`, s, for an `unlimited_share`.
+    pub fn integrated(&self, unlimited_share: f64, error: f64, dt: f64) -> f64 {
+        let beyond = self
+            .limit
+            .is_some_and(|limit| unlimited_share.abs() > limit);
+        let holds_integral =
+            beyond && self.anti_windup == AntiWindup::Clamping && unlimited_share * error > 0.0;
+        if holds_integral { 0.0 } else { error * dt }
     }
 
     /// Returns the voltage for an unlimited share, V.
-    pub fn voltage(&self, wish: f64) -> f64 {
+    pub fn voltage(&self, unlimited_share: f64) -> f64 {
         let limit = self.limit.unwrap_or(f64::INFINITY);
-        let share = wish.clamp(-limit, limit);
+        let share = unlimited_share.clamp(-limit, limit);
         share * (self.supply[0] + self.supply[1] * share.abs())
     }
 

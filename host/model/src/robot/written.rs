@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
+use super::ball_screw_crank::BallScrewCrank;
 use super::check_effects::check_effects;
 use super::drive::Drive;
 use super::effects::{RobotEffect, unit_of};
 use super::error::RobotError;
 use super::joint::{Controller, Inertial, Joint, JointFriction, JointKind, JointLimits};
-use super::screw::Screw;
 use super::serial_robot::Robot;
 use super::toml_lines::{float, line, list, optional, quoted, table};
 use super::voltage_controller::{AntiWindup, VoltageController};
@@ -38,7 +38,7 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     }
     check_effects(robot).map_err(|fault| RobotError::Write {
         robot: robot.name.clone(),
-        message: format!("{} is {}, but {}", fault.what, fault.found, fault.right),
+        message: format!("{} is {}, but {}", fault.what, fault.found, fault.advice),
     })?;
     for effect in &robot.effects {
         write_effect(&mut out, robot, effect);
@@ -335,7 +335,7 @@ fn write_drive(out: &mut String, d: &Drive) {
     }
 }
 
-fn write_screw(out: &mut String, s: &Screw) {
+fn write_screw(out: &mut String, s: &BallScrewCrank) {
     out.push_str("\n[joint.drive.screw]\n");
     line(
         out,

@@ -97,10 +97,10 @@ impl<'a> Acting<'a> {
         );
         instant.other[2] = 0.0;
         if place.effect.kind.is_presliding() {
-            instant.beside = self.beside[place.joint];
+            instant.extra_friction_ratio = self.beside[place.joint];
         }
         if let Some(link) = self.link
-            && place.effect.kind.on_the_link()
+            && place.effect.kind.acts_on_link()
         {
             (instant.position, instant.velocity) = (q[link], v[link]);
         }
@@ -137,7 +137,7 @@ impl<'a> Acting<'a> {
                 let mut instant = self.instant(k, motion, 0.5 * dt);
                 instant.load = load[p.joint];
                 if kind.about().direction == Direction::Dry {
-                    let beside = instant.beside;
+                    let beside = instant.extra_friction_ratio;
                     let mut towards = |direction: f64, bent: f64| {
                         instant.direction = direction;
                         instant.friction = (self.effects).friction(p.joint, instant.velocity, bent);
@@ -156,21 +156,21 @@ impl<'a> Acting<'a> {
                         self.dry[p.joint][side] += torque;
                         if kind.is_presliding() {
                             self.remembered[p.joint][side] += torque;
-                            self.bent[p.joint] = Some(p.effect.bent(&memory, beside));
+                            self.bent[p.joint] = Some(p.effect.contact_deflection(&memory, beside));
                         }
                     }
                     continue;
                 }
                 let torque = p.effect.torque(&mut self.memory[k].clone(), &instant);
-                if kind.is_warming() && instant.velocity != 0.0 {
+                if kind.is_viscous_warmup() && instant.velocity != 0.0 {
                     self.warmed[p.joint] += torque / instant.velocity;
                     self.refuse_driving(p.joint)?;
                 }
-                match self.link.filter(|_| kind.on_the_link()) {
+                match self.link.filter(|_| kind.acts_on_link()) {
                     Some(link) => self.torque[link] += torque,
                     None => self.torque[p.joint] += torque,
                 }
-                if kind.on_the_link() && self.link.is_none() {
+                if kind.acts_on_link() && self.link.is_none() {
                     load[p.joint] += torque;
                 }
             }

@@ -4,7 +4,7 @@
 //! on the motor's side. The effect moves a share of viscous and Coulomb friction to the link's side. Friction of other
 //! effects stays on the motor.
 
-use rig_shared::effects::{Kind, SHAPES, transmitted};
+use rig_shared::effects::{Kind, SHAPES, transmission_torque};
 use rig_shared::multibody::{bias_torque, column, inertia_matrix};
 
 use super::error::SimulateError;
@@ -69,7 +69,7 @@ impl Elastic {
     /// Returns the torque from motor to link for positions and velocities of both.
     pub(super) fn torque(&self, q: &[f64], v: &[f64]) -> f64 {
         let [gap, stiffness, damping] = self.law;
-        transmitted(gap, stiffness, damping, q[0] - q[1], v[0] - v[1])
+        transmission_torque(gap, stiffness, damping, q[0] - q[1], v[0] - v[1])
     }
 
     /// Returns the number of substeps of a step of `dt`.

@@ -399,10 +399,10 @@ fn a_link_without_inertia_is_named_whatever_the_controllers() {
         velocity_gain: 20.0,
         torque_gain: 0.1,
     };
-    let said = named(&robot, &[0.3, 0.2]).unwrap_err();
+    let message = named(&robot, &[0.3, 0.2]).unwrap_err();
     assert!(
-        said.contains("joint \"second\" has no inertia to move"),
-        "{said}"
+        message.contains("joint \"second\" has no inertia to move"),
+        "{message}"
     );
     for joint in &mut robot.joints {
         joint.controller = Some(controller.clone());

@@ -2,7 +2,7 @@
 
 use rig_firmware::config::Config;
 use rig_firmware::sample::Command;
-use rig_firmware::speaker::Speaker;
+use rig_firmware::session::Session;
 use rig_firmware::state::State;
 use rig_firmware::step::{Output, step};
 
@@ -16,7 +16,7 @@ use rig_link::Device;
 pub struct EmulatedRig {
     config: Config,
     state: State,
-    speaker: Speaker,
+    session: Session,
     plant: Plant,
     command: Command,
 }
@@ -35,7 +35,7 @@ impl EmulatedRig {
         Ok(Self {
             config,
             state: State::new(&config, settings)?,
-            speaker: Speaker::new(),
+            session: Session::new(),
             plant: Plant::new(plant, seed),
             command: Command::default(),
         })
@@ -76,11 +76,11 @@ impl Device for EmulatedRig {
             to_host.extend_from_slice(frame);
             true
         };
-        self.speaker
+        self.session
             .receive(&self.config, &mut self.state, from_host, &mut transmit);
         for _ in 0..self.ticks_per_slice() {
             let output = self.tick();
-            self.speaker
+            self.session
                 .publish(&self.config, &self.state, &output, &mut transmit);
         }
     }

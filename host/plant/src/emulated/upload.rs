@@ -1,6 +1,6 @@
 //! Requests that send a description to a rig.
 
-use rig_firmware::usable;
+use rig_firmware::validation;
 use rig_shared::compensation::{Compensation, EFFECTS, Effects, Role};
 use rig_shared::effects::{Effect, Kind};
 use rig_shared::wire::message::RequestBody;
@@ -87,7 +87,7 @@ pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError
         *place = Some(*effect);
     }
     let compensation = Compensation::new(&given).map_err(|fault| unusable(fault.to_string()))?;
-    usable::effects(&nameplate.config, &compensation)
+    validation::effects(&nameplate.config, &compensation)
         .map_err(|excess| unusable(excess.to_string()))?;
     let mut requests = settings(&nameplate, true);
     requests.push(RequestBody::SetEffects(effects.into_iter().collect()));

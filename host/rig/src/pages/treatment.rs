@@ -1,13 +1,13 @@
 //! Treatment of the data before a fit.
 
 use super::parts;
-use rig_data::prepare::{PositionSpectrum, Treatment};
+use rig_data::prepare::{PositionSpectrum, PreprocessingPlan};
 use rig_model::robot::Joint;
 use rig_output::format_significant;
 use rig_report::{Axis, Block, Marker, Plot, Role, Series};
 
 /// Draws the torque residual over the cut-offs that were tried.
-fn over_cutoff(joints: &[Joint], treatment: &Treatment) -> Plot {
+fn over_cutoff(joints: &[Joint], treatment: &PreprocessingPlan) -> Plot {
     let mut plot = Plot::new(
         "Torque residual over the cut-off".to_owned(),
         Axis::log("cut-off of the position filter", "Hz"),
@@ -38,7 +38,7 @@ fn over_cutoff(joints: &[Joint], treatment: &Treatment) -> Plot {
 }
 
 /// Treatment of the data: sentences, and the spectra behind them.
-pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
+pub(super) fn treatment(joints: &[Joint], treatment: &PreprocessingPlan) -> Vec<Block> {
     let rate = treatment.sample_rate;
     let mut items = vec![
         format!(
@@ -72,7 +72,7 @@ pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
 }
 
 /// Draws the spectrum of a joint's position, with noise floor and cut-off.
-fn over_frequency(joint: &Joint, s: &PositionSpectrum, treatment: &Treatment) -> Plot {
+fn over_frequency(joint: &Joint, s: &PositionSpectrum, treatment: &PreprocessingPlan) -> Plot {
     let rate = treatment.sample_rate;
     let position = parts::units(joint.kind)[0];
     let ends: Vec<f64> = [s.frequency.first(), s.frequency.last()]

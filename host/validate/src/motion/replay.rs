@@ -2,7 +2,7 @@
 
 use super::stretch::Stretch;
 use crate::replay::{of_joints, replayed};
-use rig_data::prepare::{LowPass, Treatment};
+use rig_data::prepare::{LowPass, PreprocessingPlan};
 use rig_data::runs::{Run, runs_of_blocks};
 use rig_data::{Block, JointColumns};
 use rig_model::robot::{Controller, Robot};
@@ -24,7 +24,7 @@ impl Replay {
         robot: &Robot,
         stretches: &[Stretch],
         rate: f64,
-        treatment: &Treatment,
+        treatment: &PreprocessingPlan,
     ) -> Result<Self, String> {
         let filter = LowPass::butterworth(treatment.order, treatment.cutoff, rate);
         let filter = filter.ok_or("The filter of its positions cannot be built.")?;

@@ -5,7 +5,7 @@ use super::reference::first_reference;
 use super::replay::Replay;
 use super::stretch::{FEWEST_ROWS, Gathered, Stretch, first_state, gather};
 use crate::{Options, ValidateError};
-use rig_data::prepare::{Recording, Survey, Treatment};
+use rig_data::prepare::{PreprocessingPlan, Recording, Survey};
 use rig_excite::REPLAY_STEP;
 use rig_model::robot::{Controller, Robot};
 use rig_model::simulate::{Inputs, Model, Motion, SimulateError, closed_loop, controllers};
@@ -21,7 +21,7 @@ pub(crate) struct Subject<'a> {
     pub model: &'a Model,
     pub recording: &'a dyn Recording,
     pub survey: &'a Survey,
-    pub treatment: &'a Treatment,
+    pub treatment: &'a PreprocessingPlan,
     pub options: &'a Options,
 }
 

@@ -48,7 +48,8 @@ pub fn replayed(
     let remembered = |p: &Placed| {
         let row = &model.parameters[p.joint];
         let friction = [row[column::VISCOUS], row[column::COULOMB]];
-        run.past.remembered(&p.effect, p.joint, friction)
+        run.thermal_history
+            .state_after(&p.effect, p.joint, friction)
     };
     let since = Since {
         time: run.t[0] - run.began,

@@ -5,8 +5,8 @@ use rig_shared::effects::{Effect, Kind};
 
 use super::controller::regressed;
 use super::*;
-use rig_data::past::in_sessions;
 use rig_data::runs::{JointRun, Run};
+use rig_data::sessions::join_sessions;
 use rig_model::robot::{Controller, JointFriction, ONE_LINK_TEMPLATE, Robot, RobotEffect};
 use rig_model::simulate::{Inputs, Model, closed_loop};
 
@@ -196,7 +196,7 @@ fn what_goes_on_in_a_session_moves_as_warm_as_it_is() {
     let half = whole.len() / 2;
     let mut runs = vec![part(0..half), part(half..whole.len())];
     let cold = off(&truth, &[own()], &runs[1])[0];
-    in_sessions(&mut runs, &[]);
+    join_sessions(&mut runs, &[]);
     assert_eq!(runs[1].began, 0.0);
     let warm = off(&truth, &[own()], &runs[1])[0];
     assert!(warm < 0.05 * cold, "{warm} {cold}");

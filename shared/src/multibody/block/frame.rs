@@ -63,17 +63,17 @@ impl Frame {
             return;
         }
         // An integer, because a maximum of floats is no vector operation if NaN may occur.
-        let mut beyond = 0;
+        let mut out_of_range = 0;
         for k in 0..LANES {
             let angle = self.theta + q[k];
-            beyond |= if angle.abs() > lanes::ANGLE_LIMIT {
+            out_of_range |= if angle.abs() > lanes::ANGLE_LIMIT {
                 !0_u64
             } else {
                 0
             };
             (sin[k], cos[k]) = lanes::sin_cos::<F>(angle);
         }
-        if beyond != 0 {
+        if out_of_range != 0 {
             large_angles(self.theta, q, sin, cos);
         }
     }
@@ -93,7 +93,7 @@ fn large_angles(theta: f64, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
 /// Between frames i − 1 and i lies the frame that is turned by α only. In it the origin of frame i has the coordinates
 /// (a, 0, d) for any twist, so offsets are applied there.
 #[derive(Clone, Copy)]
-pub(super) struct Place<F, const TWIST: u8, const A: bool, const D: bool> {
+pub(super) struct LinkTransform<F, const TWIST: u8, const A: bool, const D: bool> {
     arithmetic: PhantomData<F>,
     pub(super) sin_alpha: f64,
     pub(super) cos_alpha: f64,
@@ -106,7 +106,7 @@ pub(super) const QUARTER: u8 = 1;
 pub(super) const MINUS_QUARTER: u8 = 2;
 pub(super) const GENERAL: u8 = 3;
 
-impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A, D> {
+impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, TWIST, A, D> {
     #[inline(always)]
     pub(super) fn new(frame: &Frame) -> Self {
         Self {
@@ -120,7 +120,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
 
     /// Transforms a direction from frame i − 1 to the turned frame.
     #[inline(always)]
-    pub(super) fn turn(&self, v: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn rotate(&self, v: Vector3<f64>) -> Vector3<f64> {
         let [x, y, z] = v.0;
         let (s, c) = (self.sin_alpha, self.cos_alpha);
         match TWIST {
@@ -133,7 +133,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
 
     /// Transforms a direction from the turned frame to frame i − 1.
     #[inline(always)]
-    pub(super) fn turn_back(&self, v: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn rotate_back(&self, v: Vector3<f64>) -> Vector3<f64> {
         let [x, y, z] = v.0;
         let (s, c) = (self.sin_alpha, self.cos_alpha);
         match TWIST {
@@ -147,7 +147,12 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
     /// Returns `v` plus the acceleration of the origin of frame i relative to that of frame i − 1 at angular velocity
     /// `w` and acceleration `e`, all in the turned frame: ė × p + w × (w × p) with p = (a, 0, d).
     #[inline(always)]
-    pub(super) fn carry(&self, v: Vector3<f64>, w: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn shift_acceleration(
+        &self,
+        v: Vector3<f64>,
+        w: Vector3<f64>,
+        e: Vector3<f64>,
+    ) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [wx, wy, wz], [ex, ey, ez]) = (v.0, w.0, e.0);
         if A {
             x = F::mul_add(-self.a, F::mul_add(wy, wy, wz * wz), x);
@@ -164,7 +169,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
 
     /// Returns `v` plus the velocity of the origin of frame i against frame i − 1's at angular velocity `w`: w × p.
     #[inline(always)]
-    pub(super) fn sweep(&self, v: Vector3<f64>, w: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn shift_velocity(&self, v: Vector3<f64>, w: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [wx, wy, wz]) = (v.0, w.0);
         if A {
             y = F::mul_add(self.a, wz, y);
@@ -186,14 +191,14 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         force: Vector3<f64>,
         moment: Vector3<f64>,
     ) -> (Vector3<f64>, Vector3<f64>) {
-        let f = spin_back::<F>(s, c, force);
-        let m = self.lever(spin_back::<F>(s, c, moment), f);
-        (self.turn_back(f), self.turn_back(m))
+        let f = rotate_z_back::<F>(s, c, force);
+        let m = self.shift_moment(rotate_z_back::<F>(s, c, moment), f);
+        (self.rotate_back(f), self.rotate_back(m))
     }
 
     /// Returns `m` plus p × f with p = (a, 0, d).
     #[inline(always)]
-    pub(super) fn lever(&self, m: Vector3<f64>, f: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn shift_moment(&self, m: Vector3<f64>, f: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [fx, fy, fz]) = (m.0, f.0);
         if A {
             y = F::mul_add(-self.a, fz, y);
@@ -209,39 +214,43 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
 
 /// Returns the constant part of a prismatic joint's pose at position `q`.
 #[inline(always)]
-pub(super) fn slid<F: MulAdd>(frame: &Frame, q: f64) -> Place<F, GENERAL, true, true> {
-    Place {
+pub(super) fn prismatic_transform<F: MulAdd>(
+    frame: &Frame,
+    q: f64,
+) -> LinkTransform<F, GENERAL, true, true> {
+    LinkTransform {
         d: frame.d + q,
-        ..Place::new(frame)
+        ..LinkTransform::new(frame)
     }
 }
 
 /// Transforms a direction by the turn about z, forwards.
 #[inline(always)]
-pub(super) fn spin<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+pub(super) fn rotate_z<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
     let [x, y, z] = v.0;
     Vector3([F::mul_add(c, x, s * y), F::mul_add(c, y, -(s * x)), z])
 }
 
 /// Transforms a direction by the turn about z, backwards.
 #[inline(always)]
-pub(super) fn spin_back<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+pub(super) fn rotate_z_back<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
     let [x, y, z] = v.0;
     Vector3([F::mul_add(c, x, -(s * y)), F::mul_add(c, y, s * x), z])
 }
 
-/// Runs an expression with a function that returns the [`Place`] of a joint at a lane. The expression has one copy for
-/// each kind of revolute joint (twist and zeros known to the compiler), and one for prismatic joints at position `q`.
+/// Runs an expression with a function that returns the [`LinkTransform`] of a joint at a lane. The expression has one
+/// copy for each kind of revolute joint (twist and zeros known to the compiler), and one for prismatic joints at
+/// position `q`.
 macro_rules! at_each_lane {
-    ($arithmetic:ty, $frame:expr, $q:expr, $place:ident => $body:expr) => {{
+    ($arithmetic:ty, $frame:expr, $q:expr, $transform:ident => $body:expr) => {{
         let frame: &$crate::multibody::block::Frame = $frame;
         if frame.prismatic {
             let q: &$crate::multibody::block::Lane = $q;
-            let $place = |k: usize| $crate::multibody::block::frame::slid::<$arithmetic>(frame, q[k]);
+            let $transform = |k: usize| $crate::multibody::block::frame::prismatic_transform::<$arithmetic>(frame, q[k]);
             $body
         } else {
-            $crate::multibody::block::frame::placed!($arithmetic, frame, place => {
-                let $place = |_: usize| place;
+            $crate::multibody::block::frame::with_link_transform!($arithmetic, frame, transform => {
+                let $transform = |_: usize| transform;
                 $body
             })
         }
@@ -249,16 +258,17 @@ macro_rules! at_each_lane {
 }
 pub(super) use at_each_lane;
 
-/// Runs an expression with the [`Place`] of a revolute joint; the compiler knows its kind of twist and its zeros.
-macro_rules! placed {
-    ($arithmetic:ty, $frame:expr, $place:ident => $body:expr) => {{
+/// Runs an expression with the [`LinkTransform`] of a revolute joint; the compiler knows its kind of twist and its
+/// zeros.
+macro_rules! with_link_transform {
+    ($arithmetic:ty, $frame:expr, $transform:ident => $body:expr) => {{
         use $crate::multibody::block::frame::{
-            GENERAL, MINUS_QUARTER, NONE, Place, QUARTER, Twist,
+            GENERAL, LinkTransform, MINUS_QUARTER, NONE, QUARTER, Twist,
         };
         let frame: &$crate::multibody::block::Frame = $frame;
         macro_rules! run {
             ($twist:ident, $a:literal, $d:literal) => {{
-                let $place = Place::<$arithmetic, $twist, $a, $d>::new(frame);
+                let $transform = LinkTransform::<$arithmetic, $twist, $a, $d>::new(frame);
                 $body
             }};
         }
@@ -279,4 +289,4 @@ macro_rules! placed {
         }
     }};
 }
-pub(super) use placed;
+pub(super) use with_link_transform;

@@ -3,7 +3,9 @@
 use super::super::spatial::Vector3;
 use super::body::Body;
 use super::columns::{Columns, Section};
-use super::frame::{Frame, MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
+use super::frame::{
+    Frame, LinkTransform, MINUS_QUARTER, NONE, QUARTER, at_each_lane, rotate_z_back,
+};
 use super::inverse::JointBlock;
 use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
@@ -81,24 +83,24 @@ pub(super) fn composite_bodies<F: MulAdd>(
         let [diagonal, entry] = out.two(lower(i - 1, i - 1), lower(i, i - 1));
         let own = &bodies[i - 1];
         if i == 1 {
-            at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, false, true>(
-                place, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
+            at_each_lane!(F, frame, &q[i], link => inwards::<_, _, _, _, false, true>(
+                link, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         } else if i == n - 1 {
-            at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, true, false>(
-                place, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
+            at_each_lane!(F, frame, &q[i], link => inwards::<_, _, _, _, true, false>(
+                link, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         } else {
-            at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, false, false>(
-                place, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
+            at_each_lane!(F, frame, &q[i], link => inwards::<_, _, _, _, false, false>(
+                link, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         }
         for j in (0..i - 1).rev() {
             let (joint, between, slides) = (&work[j + 1], &frames[j + 1], frames[j].prismatic);
             let entry = out.lane(lower(i, j));
             if j == 0 {
-                at_each_lane!(F, between, &q[j + 1], place =>
-                    onwards::<_, _, _, _, true>(place, slides, joint, composite, entry));
+                at_each_lane!(F, between, &q[j + 1], link =>
+                    onwards::<_, _, _, _, true>(link, slides, joint, composite, entry));
             } else {
-                at_each_lane!(F, between, &q[j + 1], place =>
-                    onwards::<_, _, _, _, false>(place, slides, joint, composite, entry));
+                at_each_lane!(F, between, &q[j + 1], link =>
+                    onwards::<_, _, _, _, false>(link, slides, joint, composite, entry));
             }
         }
         mass += own.mass;
@@ -138,7 +140,7 @@ fn inwards<
     const TIP: bool,
     const LAST: bool,
 >(
-    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
+    link: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
     prismatic: bool,
     slides: bool,
     joint: &JointBlock,
@@ -159,7 +161,7 @@ fn inwards<
         moment,
     } = composite;
     for k in 0..LANES {
-        let place = place(k);
+        let link = link(k);
         let (s, c) = (joint.sin[k], joint.cos[k]);
         let ([hxk, hyk, hzk], [xxk, xyk, xzk, yyk, yzk, zzk]) = if TIP {
             (tip_moment, tip_inertia)
@@ -169,13 +171,13 @@ fn inwards<
                 [xx[k], xy[k], xz[k], yy[k], yz[k], zz[k]],
             )
         };
-        let moment_back = spin_back::<F>(s, c, Vector3([hxk, hyk, hzk]));
-        let Vector3([ixz, iyz, izz]) = spin_back::<F>(s, c, Vector3([xzk, yzk, zzk]));
+        let moment_back = rotate_z_back::<F>(s, c, Vector3([hxk, hyk, hzk]));
+        let Vector3([ixz, iyz, izz]) = rotate_z_back::<F>(s, c, Vector3([xzk, yzk, zzk]));
 
         let (f, m) = if prismatic {
-            place.wrench_back(s, c, Vector3([0.0, 0.0, mass]), Vector3([hyk, -hxk, 0.0]))
+            link.wrench_back(s, c, Vector3([0.0, 0.0, mass]), Vector3([hyk, -hxk, 0.0]))
         } else {
-            started_turn(&place, moment_back, [ixz, iyz, izz])
+            started_turn(&link, moment_back, [ixz, iyz, izz])
         };
         entry[k] = if slides { f.z() } else { m.z() };
         if !LAST {
@@ -185,17 +187,17 @@ fn inwards<
 
         let [ixx, ixy, iyy] = turned::<F>(s, c, xxk, xyk, yyk);
         let [ixx, ixy, ixz, iyy, iyz, izz] =
-            moved_inertia(&place, mass, moment_back, [ixx, ixy, ixz, iyy, iyz, izz]);
+            moved_inertia(&link, mass, moment_back, [ixx, ixy, ixz, iyy, iyz, izz]);
         let about_z = izz + inertia[5];
         diagonal[k] = if slides { total } else { about_z + own.drive };
         if !LAST {
             let Vector3([mx, my, mz]) = moment_back;
             let moved = Vector3([
-                F::mul_add(mass, place.a, mx),
+                F::mul_add(mass, link.a, mx),
                 my,
-                F::mul_add(mass, place.d, mz),
+                F::mul_add(mass, link.d, mz),
             ]);
-            let [x, y, z] = place.turn_back(moved).0;
+            let [x, y, z] = link.rotate_back(moved).0;
             hx[k] = x + first_moment[0];
             hy[k] = y + first_moment[1];
             hz[k] = z + first_moment[2];
@@ -214,22 +216,22 @@ fn inwards<
 /// from its first `moment` and the entries xz, yz, zz of its `inertia`, both after the turn back about z.
 #[inline(always)]
 fn started_turn<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: &Place<F, TWIST, A, D>,
+    link: &LinkTransform<F, TWIST, A, D>,
     moment: Vector3<f64>,
     inertia: [f64; 3],
 ) -> (Vector3<f64>, Vector3<f64>) {
     let Vector3([mx, my, _]) = moment;
     let [mut x, mut y, mut z] = inertia;
     if A {
-        z = F::mul_add(place.a, mx, z);
+        z = F::mul_add(link.a, mx, z);
     }
     if D {
-        x = F::mul_add(-place.d, mx, x);
-        y = F::mul_add(-place.d, my, y);
+        x = F::mul_add(-link.d, mx, x);
+        y = F::mul_add(-link.d, my, y);
     }
     (
-        place.turn_back(Vector3([-my, mx, 0.0])),
-        place.turn_back(Vector3([x, y, z])),
+        link.rotate_back(Vector3([-my, mx, 0.0])),
+        link.rotate_back(Vector3([x, y, z])),
     )
 }
 
@@ -237,7 +239,7 @@ fn started_turn<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 /// axes. `mass`, first `moment` and inertia of the body are given after the turn back about z.
 #[inline(always)]
 fn moved_inertia<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: &Place<F, TWIST, A, D>,
+    link: &LinkTransform<F, TWIST, A, D>,
     mass: f64,
     moment: Vector3<f64>,
     inertia: [f64; 6],
@@ -245,26 +247,26 @@ fn moved_inertia<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     let Vector3([mx, my, mz]) = moment;
     let [mut ixx, mut ixy, mut ixz, mut iyy, mut iyz, mut izz] = inertia;
     // Parallel axes with p = (a, 0, d): the mixed term of p with m·c + m·p/2.
-    let bx = F::mul_add(0.5 * mass, place.a, mx);
-    let bz = F::mul_add(0.5 * mass, place.d, mz);
+    let bx = F::mul_add(0.5 * mass, link.a, mx);
+    let bz = F::mul_add(0.5 * mass, link.d, mz);
     if A {
-        ixy = F::mul_add(-place.a, my, ixy);
-        ixz = F::mul_add(-place.a, bz, ixz);
-        iyy = F::mul_add(2.0 * place.a, bx, iyy);
-        izz = F::mul_add(2.0 * place.a, bx, izz);
+        ixy = F::mul_add(-link.a, my, ixy);
+        ixz = F::mul_add(-link.a, bz, ixz);
+        iyy = F::mul_add(2.0 * link.a, bx, iyy);
+        izz = F::mul_add(2.0 * link.a, bx, izz);
     }
     if D {
-        ixx = F::mul_add(2.0 * place.d, bz, ixx);
-        ixz = F::mul_add(-place.d, bx, ixz);
-        iyy = F::mul_add(2.0 * place.d, bz, iyy);
-        iyz = F::mul_add(-place.d, my, iyz);
+        ixx = F::mul_add(2.0 * link.d, bz, ixx);
+        ixz = F::mul_add(-link.d, bx, ixz);
+        iyy = F::mul_add(2.0 * link.d, bz, iyy);
+        iyz = F::mul_add(-link.d, my, iyz);
     }
     match TWIST {
         NONE => [ixx, ixy, ixz, iyy, iyz, izz],
         QUARTER => [ixx, -ixz, ixy, izz, -iyz, iyy],
         MINUS_QUARTER => [ixx, ixz, -ixy, izz, -iyz, iyy],
         _ => {
-            let (s, c) = (place.sin_alpha, place.cos_alpha);
+            let (s, c) = (link.sin_alpha, link.cos_alpha);
             let [iyy, iyz, izz] = turned::<F>(s, c, iyy, iyz, izz);
             [
                 ixx,
@@ -292,7 +294,7 @@ fn turned<F: MulAdd>(s: f64, c: f64, xx: f64, xy: f64, yy: f64) -> [f64; 3] {
 /// Transforms the wrench to the next frame inwards.
 #[inline(always)]
 fn onwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
-    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
+    link: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
     slides: bool,
     joint: &JointBlock,
     composite: &mut CompositeBlock,
@@ -301,7 +303,7 @@ fn onwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool, const LAST:
     let CompositeBlock { force, moment, .. } = composite;
     for k in 0..LANES {
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let (f, m) = place(k).wrench_back(s, c, get(force, k), get(moment, k));
+        let (f, m) = link(k).wrench_back(s, c, get(force, k), get(moment, k));
         entry[k] = if slides { f.z() } else { m.z() };
         if !LAST {
             set(force, k, f);

@@ -2,7 +2,9 @@
 
 use super::super::spatial::Vector3;
 use super::body::Body;
-use super::frame::{Frame, GENERAL, Place, at_each_lane, placed, slid, spin};
+use super::frame::{
+    Frame, GENERAL, LinkTransform, at_each_lane, prismatic_transform, rotate_z, with_link_transform,
+};
 use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 use crate::scalar::Real;
@@ -29,8 +31,8 @@ impl JointBlock {
 
 /// Angular velocity and acceleration of a link, and the acceleration of its origin minus gravity, in its frame.
 struct MotionBlock {
-    spin: Lane3,
-    turning: Lane3,
+    angular_velocity: Lane3,
+    angular_acceleration: Lane3,
     proper: Lane3,
 }
 
@@ -52,8 +54,8 @@ pub fn inverse_dynamics<F: MulAdd>(
     let still = ZERO;
     let qdd = |i: usize| qdd.map_or(&still, |qdd| &qdd[i]);
     let mut motion = MotionBlock {
-        spin: ZERO3,
-        turning: ZERO3,
+        angular_velocity: ZERO3,
+        angular_acceleration: ZERO3,
         proper: gravity.map(|g| Lane([-g; LANES])),
     };
     for (i, frame) in frames.iter().enumerate() {
@@ -72,7 +74,7 @@ pub fn inverse_dynamics<F: MulAdd>(
         } else if frame.prismatic {
             outwards_prismatic::<F>(frame, &bodies[i], &q[i], &qd[i], qdd(i), &mut motion, joint);
         } else {
-            placed!(F, frame, place => outwards(place, &bodies[i], &qd[i], qdd(i), &mut motion, joint));
+            with_link_transform!(F, frame, transform => outwards(transform, &bodies[i], &qd[i], qdd(i), &mut motion, joint));
         }
     }
     for (i, frame) in frames.iter().enumerate().rev() {
@@ -94,9 +96,9 @@ pub fn inverse_dynamics<F: MulAdd>(
         }
         if let Some(parent) = before.last_mut() {
             if i == 1 && !frames[0].prismatic {
-                at_each_lane!(F, frame, &q[i], place => inwards_along_axis(place, joint, parent));
+                at_each_lane!(F, frame, &q[i], transform => inwards_along_axis(transform, joint, parent));
             } else {
-                at_each_lane!(F, frame, &q[i], place => inwards(place, joint, parent));
+                at_each_lane!(F, frame, &q[i], transform => inwards(transform, joint, parent));
             }
         }
     }
@@ -105,7 +107,7 @@ pub fn inverse_dynamics<F: MulAdd>(
 /// Moves across a revolute joint to the next link outwards, and computes that link's inertial wrench.
 #[inline(always)]
 fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: Place<F, TWIST, A, D>,
+    transform: LinkTransform<F, TWIST, A, D>,
     body: &Body,
     qd: &Lane,
     qdd: &Lane,
@@ -115,17 +117,17 @@ fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     let [mx, my, _] = body.first_moment;
     let i = body.inertia;
     for k in 0..LANES {
-        let w = place.turn(get(&motion.spin, k));
-        let e = place.turn(get(&motion.turning, k));
-        let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
+        let w = transform.rotate(get(&motion.angular_velocity, k));
+        let e = transform.rotate(get(&motion.angular_acceleration, k));
+        let v = transform.shift_acceleration(transform.rotate(get(&motion.proper, k)), w, e);
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let [wx, wy, wz] = spin::<F>(s, c, w).0;
-        let [ex, ey, ez] = spin::<F>(s, c, e).0;
-        let v = spin::<F>(s, c, v);
+        let [wx, wy, wz] = rotate_z::<F>(s, c, w).0;
+        let [ex, ey, ez] = rotate_z::<F>(s, c, e).0;
+        let v = rotate_z::<F>(s, c, v);
         let (ex, ey, ez) = (ex + wy * qd[k], ey - wx * qd[k], ez + qdd[k]);
         let wz = wz + qd[k];
-        set(&mut motion.spin, k, Vector3([wx, wy, wz]));
-        set(&mut motion.turning, k, Vector3([ex, ey, ez]));
+        set(&mut motion.angular_velocity, k, Vector3([wx, wy, wz]));
+        set(&mut motion.angular_acceleration, k, Vector3([ex, ey, ez]));
         set(&mut motion.proper, k, v);
         let [vx, vy, vz] = v.0;
         let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
@@ -164,11 +166,15 @@ fn first_revolute<F: MulAdd>(
     joint: &mut JointBlock,
 ) {
     let [mx, my, _] = body.first_moment;
-    let up = Place::<F, GENERAL, true, true>::new(frame).turn(-Vector3(gravity));
+    let up = LinkTransform::<F, GENERAL, true, true>::new(frame).rotate(-Vector3(gravity));
     for k in 0..LANES {
-        let v = spin::<F>(joint.sin[k], joint.cos[k], up);
-        set(&mut motion.spin, k, Vector3([0.0, 0.0, qd[k]]));
-        set(&mut motion.turning, k, Vector3([0.0, 0.0, qdd[k]]));
+        let v = rotate_z::<F>(joint.sin[k], joint.cos[k], up);
+        set(&mut motion.angular_velocity, k, Vector3([0.0, 0.0, qd[k]]));
+        set(
+            &mut motion.angular_acceleration,
+            k,
+            Vector3([0.0, 0.0, qdd[k]]),
+        );
         set(&mut motion.proper, k, v);
         let [vx, vy, _] = v.0;
         joint.moment[2][k] = body.inertia.zz * qdd[k] + (mx * vy - my * vx);
@@ -188,16 +194,16 @@ fn outwards_prismatic<F: MulAdd>(
 ) {
     let [mx, my, mz] = body.first_moment;
     for k in 0..LANES {
-        let place = slid::<F>(frame, q[k]);
-        let w = place.turn(get(&motion.spin, k));
-        let e = place.turn(get(&motion.turning, k));
-        let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
+        let transform = prismatic_transform::<F>(frame, q[k]);
+        let w = transform.rotate(get(&motion.angular_velocity, k));
+        let e = transform.rotate(get(&motion.angular_acceleration, k));
+        let v = transform.shift_acceleration(transform.rotate(get(&motion.proper, k)), w, e);
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let w = spin::<F>(s, c, w);
-        let e = spin::<F>(s, c, e);
-        let v = (spin::<F>(s, c, v) + w.cross_z(qd[k] + qd[k])).plus_z(qdd[k]);
-        set(&mut motion.spin, k, w);
-        set(&mut motion.turning, k, e);
+        let w = rotate_z::<F>(s, c, w);
+        let e = rotate_z::<F>(s, c, e);
+        let v = (rotate_z::<F>(s, c, v) + w.cross_z(qd[k] + qd[k])).plus_z(qdd[k]);
+        set(&mut motion.angular_velocity, k, w);
+        set(&mut motion.angular_acceleration, k, e);
         set(&mut motion.proper, k, v);
         let m = Vector3([mx, my, mz]);
         set(
@@ -212,13 +218,13 @@ fn outwards_prismatic<F: MulAdd>(
 /// Adds a link's wrench to that of the link before.
 #[inline(always)]
 fn inwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
+    transform: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
     joint: &JointBlock,
     parent: &mut JointBlock,
 ) {
     for k in 0..LANES {
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let (f, m) = place(k).wrench_back(s, c, get(&joint.force, k), get(&joint.moment, k));
+        let (f, m) = transform(k).wrench_back(s, c, get(&joint.force, k), get(&joint.moment, k));
         let (force, moment) = (get(&parent.force, k) + f, get(&parent.moment, k) + m);
         set(&mut parent.force, k, force);
         set(&mut parent.moment, k, moment);
@@ -228,13 +234,13 @@ fn inwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 /// The same if only the moment along the parent's axis is needed.
 #[inline(always)]
 fn inwards_along_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
+    transform: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
     joint: &JointBlock,
     parent: &mut JointBlock,
 ) {
     for k in 0..LANES {
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let (_, m) = place(k).wrench_back(s, c, get(&joint.force, k), get(&joint.moment, k));
+        let (_, m) = transform(k).wrench_back(s, c, get(&joint.force, k), get(&joint.moment, k));
         parent.moment[2][k] += m.z();
     }
 }

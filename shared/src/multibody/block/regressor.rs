@@ -3,7 +3,7 @@
 use super::super::parameters::{COLUMNS, column};
 use super::super::spatial::Vector3;
 use super::columns::{Columns, Section};
-use super::frame::{Frame, Place, at_each_lane, spin};
+use super::frame::{Frame, LinkTransform, at_each_lane, rotate_z};
 use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 use crate::scalar::Real;
@@ -11,9 +11,9 @@ use crate::scalar::Real;
 /// Motion of a link, from which all its columns are computed.
 struct LinkBlock {
     /// Angular velocity ω.
-    spin: Lane3,
+    angular_velocity: Lane3,
     /// Angular acceleration.
-    turning: Lane3,
+    angular_acceleration: Lane3,
     /// Acceleration of the origin minus gravity.
     proper: Lane3,
     /// ωx·ωy, ωx·ωz, ωy·ωz
@@ -60,8 +60,8 @@ pub fn differential_regressor<F: MulAdd>(
     out: &mut Section,
 ) {
     let mut motion = LinkBlock {
-        spin: ZERO3,
-        turning: ZERO3,
+        angular_velocity: ZERO3,
+        angular_acceleration: ZERO3,
         proper: gravity.map(|g| Lane([-g; LANES])),
         mixed: ZERO3,
         sums: ZERO3,
@@ -73,12 +73,12 @@ pub fn differential_regressor<F: MulAdd>(
     let (mut sin, mut cos) = (ZERO, ZERO);
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
-        at_each_lane!(F, frame, &q[i], place => {
-            next_link(&place, frame.prismatic, &sin, &cos, &qd[i], &qdd[i], &mut motion);
+        at_each_lane!(F, frame, &q[i], transform => {
+            next_link(&transform, frame.prismatic, &sin, &cos, &qd[i], &qdd[i], &mut motion);
             for (j, axis) in axes[..i].iter_mut().enumerate() {
                 let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz] = out.lanes(j * width + i * COLUMNS);
                 carried_axis(
-                    &place, &sin, &cos, axis, &motion, m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz,
+                    &transform, &sin, &cos, axis, &motion, m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz,
                 );
             }
         });
@@ -96,7 +96,7 @@ pub fn differential_regressor<F: MulAdd>(
 /// Moves across a joint to the next link outwards (Luh, Walker & Paul 1980).
 #[inline(always)]
 fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: &impl Fn(usize) -> Place<F, TWIST, A, D>,
+    transform: &impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
     prismatic: bool,
     sin: &Lane,
     cos: &Lane,
@@ -107,18 +107,22 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     // Both kinds in one body: terms of the other kind are multiplied by 0.
     let (turns, slides) = if prismatic { (0.0, 1.0) } else { (1.0, 0.0) };
     for k in 0..LANES {
-        let place = place(k);
-        let w = place.turn(get(&motion.spin, k));
-        let e = place.turn(get(&motion.turning, k));
-        let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
+        let transform = transform(k);
+        let w = transform.rotate(get(&motion.angular_velocity, k));
+        let e = transform.rotate(get(&motion.angular_acceleration, k));
+        let v = transform.shift_acceleration(transform.rotate(get(&motion.proper, k)), w, e);
         let (s, c) = (sin[k], cos[k]);
-        let (w, e, v) = (spin::<F>(s, c, w), spin::<F>(s, c, e), spin::<F>(s, c, v));
-        let (turn, slide) = (turns * qd[k], slides * qd[k]);
-        let e = (e + w.cross_z(turn)).plus_z(turns * qdd[k]);
-        let v = (v + w.cross_z(slide + slide)).plus_z(slides * qdd[k]);
-        let w = w.plus_z(turn);
-        set(&mut motion.spin, k, w);
-        set(&mut motion.turning, k, e);
+        let (w, e, v) = (
+            rotate_z::<F>(s, c, w),
+            rotate_z::<F>(s, c, e),
+            rotate_z::<F>(s, c, v),
+        );
+        let (rotation_rate, sliding_rate) = (turns * qd[k], slides * qd[k]);
+        let e = (e + w.cross_z(rotation_rate)).plus_z(turns * qdd[k]);
+        let v = (v + w.cross_z(sliding_rate + sliding_rate)).plus_z(slides * qdd[k]);
+        let w = w.plus_z(rotation_rate);
+        set(&mut motion.angular_velocity, k, w);
+        set(&mut motion.angular_acceleration, k, e);
         set(&mut motion.proper, k, v);
         let ([wx, wy, wz], [ex, ey, ez]) = (w.0, e.0);
         let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
@@ -140,7 +144,7 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 // overlap, and only then does it vectorise the loop.
 #[inline(always)]
 fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: &impl Fn(usize) -> Place<F, TWIST, A, D>,
+    transform: &impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
     sin: &Lane,
     cos: &Lane,
     axis: &mut AxisBlock,
@@ -159,16 +163,16 @@ fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     let dot =
         |a: f64, x: f64, b: f64, y: f64, c: f64, z: f64| F::mul_add(a, x, F::mul_add(b, y, c * z));
     for k in 0..LANES {
-        let place = place(k);
+        let transform = transform(k);
         let (s, c) = (sin[k], cos[k]);
-        let turned = place.turn(get(&axis.angular, k));
-        let swept = place.sweep(place.turn(get(&axis.linear, k)), turned);
-        let (angular, linear) = (spin::<F>(s, c, turned), spin::<F>(s, c, swept));
+        let turned = transform.rotate(get(&axis.angular, k));
+        let swept = transform.shift_velocity(transform.rotate(get(&axis.linear, k)), turned);
+        let (angular, linear) = (rotate_z::<F>(s, c, turned), rotate_z::<F>(s, c, swept));
         set(&mut axis.angular, k, angular);
         set(&mut axis.linear, k, linear);
         let ([sx, sy, sz], [lx, ly, lz]) = (angular.0, linear.0);
         let [vx, vy, vz] = get(&motion.proper, k).0;
-        let [ex, ey, ez] = get(&motion.turning, k).0;
+        let [ex, ey, ez] = get(&motion.angular_acceleration, k).0;
         let [xy, xz, yz] = get(&motion.mixed, k).0;
         let [yy_zz, xx_zz, xx_yy] = get(&motion.sums, k).0;
         let [x_y, z_x, y_z] = get(&motion.differences, k).0;
@@ -231,7 +235,7 @@ fn own_axis(
         negated(&motion.above[2], ixz);
         *iyy = motion.mixed[0].0;
         *iyz = motion.above[1].0;
-        *izz = motion.turning[2].0;
+        *izz = motion.angular_acceleration[2].0;
     }
 }
 
@@ -258,8 +262,8 @@ pub fn energy_regressor<F: MulAdd>(
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
         let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive] = out.lanes(i * COLUMNS);
-        at_each_lane!(F, frame, &q[i], place => link_energy(
-            place, frame.prismatic, &sin, &cos, &qd[i],
+        at_each_lane!(F, frame, &q[i], transform => link_energy(
+            transform, frame.prismatic, &sin, &cos, &qd[i],
             &mut angular, &mut linear, &mut field, &mut depth,
             m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive,
         ));
@@ -269,7 +273,7 @@ pub fn energy_regressor<F: MulAdd>(
 /// Moves across a joint to the next link outwards, and computes the energy columns of that link and of the drive.
 #[inline(always)]
 fn link_energy<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
+    transform: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
     prismatic: bool,
     sin: &Lane,
     cos: &Lane,
@@ -292,15 +296,15 @@ fn link_energy<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 ) {
     let (turns, slides) = if prismatic { (0.0, 1.0) } else { (1.0, 0.0) };
     for k in 0..LANES {
-        let place = place(k);
+        let transform = transform(k);
         let (s, c) = (sin[k], cos[k]);
-        let w = place.turn(get(angular, k));
-        let v = place.sweep(place.turn(get(linear, k)), w);
-        let w = spin::<F>(s, c, w).plus_z(turns * qd[k]);
-        let v = spin::<F>(s, c, v).plus_z(slides * qd[k]);
-        let down = place.turn(get(gravity, k));
-        depth[k] += down.0[0] * place.a + down.0[2] * place.d;
-        let down = spin::<F>(s, c, down);
+        let w = transform.rotate(get(angular, k));
+        let v = transform.shift_velocity(transform.rotate(get(linear, k)), w);
+        let w = rotate_z::<F>(s, c, w).plus_z(turns * qd[k]);
+        let v = rotate_z::<F>(s, c, v).plus_z(slides * qd[k]);
+        let down = transform.rotate(get(gravity, k));
+        depth[k] += down.0[0] * transform.a + down.0[2] * transform.d;
+        let down = rotate_z::<F>(s, c, down);
         set(angular, k, w);
         set(linear, k, v);
         set(gravity, k, down);

@@ -4,9 +4,9 @@
 
 use rig_data::prepare::InMemory;
 use rig_data::{Block, JointColumns};
-use rig_firmware::examined::examine;
 use rig_firmware::nameplate;
-use rig_firmware::request::carry_out;
+use rig_firmware::prechecked_request::precheck;
+use rig_firmware::request::execute;
 use rig_firmware::sample::Sample;
 use rig_firmware::state::State;
 use rig_firmware::step::step;
@@ -233,13 +233,13 @@ fn replay(
     config.monitor.voltage.floor = f32::INFINITY;
     let mut state = State::new(&config, settings).unwrap();
     let ask = |state: &mut State, body: RequestBody| {
-        carry_out(&config, state, &examine(&config, Request { id: 0, body })).unwrap();
+        execute(&config, state, &precheck(&config, Request { id: 0, body })).unwrap();
     };
     let mut next = sent.iter().peekable();
     let mut equal = 0;
     for (trigger, sample) in samples {
         let tick = trigger - samples[0].0;
-        state.heard = state.tick;
+        state.last_contact_tick = state.tick;
         let output = step(&config, &mut state, *sample);
         if let Some(estimate) = output.estimate {
             while next.peek().is_some_and(|e| e.tick < estimate.tick) {

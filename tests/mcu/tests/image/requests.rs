@@ -161,7 +161,7 @@ fn each_part_that_stops_is_found_by_the_watchdog() {
     type Stop = fn(&mut BoardSession);
     fn silence(line: &mut BoardSession, bits: u8) {
         let emulated = board(line);
-        let reported = emulated.image().symbol_with("8watchdog8REPORTED");
+        let reported = emulated.image().symbol_with("8watchdog10CHECKED_IN");
         let (address, _) = reported.unwrap();
         emulated.silenced = Some(Silenced {
             exception: FEEDER,

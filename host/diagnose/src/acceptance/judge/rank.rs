@@ -27,7 +27,7 @@ pub(crate) fn rank(
     let mut names = vec![step.effect.clone()];
     let mut exact = |kind: Kind| {
         for confusion in confounded(kind, own.candidate.joint, runs) {
-            if Kind::named(confusion.with, None).is_some_and(is_not) {
+            if Kind::from_name(confusion.with, None).is_some_and(is_not) {
                 continue;
             }
             if !names.iter().any(|n| n == confusion.with) {

@@ -24,11 +24,11 @@ fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -
         let at = Instant {
             velocity,
             period,
-            beside,
+            extra_friction_ratio: beside,
             ..Instant::default()
         };
         effect.torque(&mut memory, &at);
-        effect.bent(&memory, beside)
+        effect.contact_deflection(&memory, beside)
     };
     velocities.iter().zip(beside).map(along).collect()
 }
@@ -64,7 +64,7 @@ impl Source<'_> {
         }
         let asked = (chosen.iter()).any(|p| OF_THE_DRIVE.contains(&p.candidate.kind));
         for r in 0..self.runs.len() {
-            let load = self.sum(r, chosen, gains, &Kind::on_the_link)?;
+            let load = self.sum(r, chosen, gains, &Kind::acts_on_link)?;
             add(&mut self.predicted[r].load, &load);
             if !asked {
                 continue;

@@ -355,7 +355,7 @@ impl Driven {
 
 #[cfg(test)]
 mod tests {
-    use rig_shared::effects::transmitted;
+    use rig_shared::effects::transmission_torque;
 
     use super::*;
 
@@ -431,7 +431,7 @@ mod tests {
             let known = Contact::of(1.0, twist, 1e-8);
             assert!((known.bend - bend).abs() < 1e-6 && known.left < 1e-8);
             assert!((known.slope - f64::from(u8::from(bend != 0.0))).abs() < 1e-6);
-            let torque = transmitted(2.0, 1.0, 0.0, twist, 0.0);
+            let torque = transmission_torque(2.0, 1.0, 0.0, twist, 0.0);
             assert!((known.bend - torque).abs() < 1e-6);
         }
         // Compares with sums over the normal density.
@@ -440,7 +440,7 @@ mod tests {
         for k in -6000..=6000 {
             let z = f64::from(k) * 1e-3;
             let w = (-0.5 * z * z).exp();
-            let b = transmitted(2.0, 1.0, 0.0, twist + spread * z, 0.0);
+            let b = transmission_torque(2.0, 1.0, 0.0, twist + spread * z, 0.0);
             weight += w;
             bend += w * b;
             along += w * b * z;

@@ -12,7 +12,7 @@ pub fn confounded(kind: Kind, joint: usize, runs: &[Run]) -> Vec<&'static Confus
         && runs
             .iter()
             .all(|run| run.joints.get(joint).is_some_and(|j| j.voltage.is_some()));
-    let is = |name: &str, of: fn(Kind) -> bool| Kind::named(name, None).is_some_and(of);
+    let is = |name: &str, of: fn(Kind) -> bool| Kind::from_name(name, None).is_some_and(of);
     let by_pull = |with: &str| {
         external_load::told_apart(runs) && kind.is_external() != is(with, Kind::is_external)
     };

@@ -74,7 +74,7 @@ impl<'a> Search<'a> {
     /// Returns true if a gear excludes that this constant is of another kind.
     pub(crate) fn is_not(&self, own: &Candidate, kind: Kind) -> bool {
         is_constant(kind)
-            && own.kind.on_the_link() != kind.on_the_link()
+            && own.kind.acts_on_link() != kind.acts_on_link()
             && self.sided.contains(own)
     }
 }

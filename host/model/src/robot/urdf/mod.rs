@@ -8,16 +8,16 @@ mod original;
 mod reader;
 mod remarks;
 mod schema;
-mod sizes;
 mod spatial;
 mod tree;
+mod unit_check;
 mod values;
 mod write;
 
 pub(super) use chain::{Body, Chain};
 pub use original::Original;
-pub(super) use sizes::check_sizes;
 pub(super) use spatial::SpatialInertia;
 pub(super) use tree::read;
+pub(super) use unit_check::check_units;
 pub use values::is_placeholder;
 pub use write::Urdf;

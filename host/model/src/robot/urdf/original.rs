@@ -13,9 +13,9 @@ use roxmltree::Document;
 use super::chain::Chain;
 use super::edits::{Edit, at, put_friction, put_inertia, spliced};
 use super::reader::{Xml, parsed};
-use super::sizes::check_sizes;
 use super::spatial::SpatialInertia;
 use super::tree::read;
+use super::unit_check::check_units;
 use super::write::{Urdf, comment, escaped, levelled, rpy};
 use crate::robot::dh::convert;
 use crate::robot::error::RobotError;
@@ -47,7 +47,7 @@ impl Original {
     pub fn read(text: String, path: &Path) -> Result<Self, RobotError> {
         let mut chain = read(&text, path)?;
         let converted = convert(&chain);
-        check_sizes(&chain, &converted.robot, path)?;
+        check_units(&chain, &converted.robot, path)?;
         chain.remarks.extend(converted.remarks);
         Ok(Self {
             text,
@@ -86,8 +86,8 @@ impl Original {
         let mut remarks = Vec::new();
         let rows = robot.standard_parameters();
         let replaced = self.put_values(robot, &rows, &document, &mut edits, &mut remarks)?;
-        if let Some(told) = replaced.told(&robot.name) {
-            remarks.insert(0, told);
+        if let Some(remark) = replaced.remark(&robot.name) {
+            remarks.insert(0, remark);
         }
         self.level(&document, robot, &mut edits, &mut remarks);
         robot.left_out(&rows, &mut remarks);
@@ -162,13 +162,13 @@ impl Original {
     /// Refuses a description with other joints or frames.
     fn same_chain(&self, robot: &Robot) -> Result<(), RobotError> {
         let numbers = |j: &Joint| [j.alpha, j.a, j.theta, j.d];
-        let strange = |joint: &Joint, why: String| RobotError::NotUrdf {
+        let not_representable = |joint: &Joint, why: String| RobotError::NotUrdf {
             joint: joint.name.clone(),
             why,
         };
         for (joint, own) in robot.joints.iter().zip(&self.robot.joints) {
             if joint.name != own.name || joint.kind != own.kind {
-                return Err(strange(
+                return Err(not_representable(
                     joint,
                     format!("stands where the URDF file has joint `{}`", own.name),
                 ));
@@ -178,7 +178,7 @@ impl Original {
                 .zip(numbers(own))
                 .any(|(a, b)| (a - b).abs() > SAME_FRAME)
             {
-                return Err(strange(
+                return Err(not_representable(
                     joint,
                     "has another frame (alpha, a, theta, d) than the one that the URDF file gives it".into(),
                 ));
@@ -186,7 +186,7 @@ impl Original {
         }
         let (n, own) = (robot.joints.len(), self.robot.joints.len());
         if let Some(joint) = robot.joints.get(own).or_else(|| self.robot.joints.get(n)) {
-            return Err(strange(
+            return Err(not_representable(
                 joint,
                 format!("is not in both: the description has {n} joints and the URDF file {own}"),
             ));
@@ -258,7 +258,7 @@ struct Replaced<'a> {
 
 impl Replaced<'_> {
     /// Returns a sentence on the values that now are those of the description `name`; `None` if there are none.
-    fn told(&self, name: &str) -> Option<String> {
+    fn remark(&self, name: &str) -> Option<String> {
         let listed = |names: &[&str], what: &str| {
             (!names.is_empty()).then(|| format!("{what} of {}", names.join(", ")))
         };

@@ -171,11 +171,11 @@ fn values_stand_in_the_authors_frames_and_the_rest_stays() {
     ] {
         assert!(written.text.contains(kept), "{kept}\n{}", written.text);
     }
-    let said = written.remarks.join(" ");
+    let message = written.remarks.join(" ");
     assert!(
-        said.contains("the inertial values of upper, slide, hand; damping and friction of shoulder, feed, wrist")
-            && said.contains("<inertial> of slide holds that of rail too, which has one no more"),
-        "{said}"
+        message.contains("the inertial values of upper, slide, hand; damping and friction of shoulder, feed, wrist")
+            && message.contains("<inertial> of slide holds that of rail too, which has one no more"),
+        "{message}"
     );
     for _ in 0..100 {
         let text = random_urdf(&mut rng);
@@ -234,15 +234,15 @@ fn what_urdf_cannot_hold_is_said_and_a_tilt_has_a_link_of_its_own() {
     robot.joints[1].friction.as_mut().unwrap().offset = 0.125;
     same_dynamics(&original, &robot, &mut rng);
     let written = original.with_values(&robot).unwrap();
-    let said = written.remarks.join(" ");
+    let message = written.remarks.join(" ");
     for words in [
         "level_world_to_base at the end of the file turns floor in it by 2.1",
         "spring of wrist (stiffness 0.25 N*m/rad, preload 0.5 N*m)",
         "constant torques at the joints: feed 0.1250 N",
     ] {
         assert!(
-            said.contains(words) && written.text.contains(words),
-            "{words}: {said}"
+            message.contains(words) && written.text.contains(words),
+            "{words}: {message}"
         );
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
 use crate::robot::error::{Place, RobotError};
-use crate::robot::fault::{LARGEST, sound};
+use crate::robot::fault::{MAX_NUMBER, is_safe_magnitude};
 use crate::robot::right_angle::WRITTEN;
 
 /// A file being read.
@@ -117,10 +117,12 @@ impl<'a> Reader<'a> {
     ) -> Result<f64, RobotError> {
         match text.trim().parse::<f64>() {
             // A very large limit means no limit.
-            Ok(v) if sound(v) || v.is_finite() && node.tag_name().name() == "limit" => Ok(v),
+            Ok(v) if is_safe_magnitude(v) || v.is_finite() && node.tag_name().name() == "limit" => {
+                Ok(v)
+            }
             Ok(v) if v.is_finite() => Err(self.error(
                 node,
-                format!("{what} is {v:e}, but it must be at most {LARGEST:e}"),
+                format!("{what} is {v:e}, but it must be at most {MAX_NUMBER:e}"),
             )),
             _ if text.contains("${") => {
                 Err(self.error(node, format!("{what} is \"{text}\", {EXPAND}")))

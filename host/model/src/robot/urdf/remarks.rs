@@ -49,7 +49,7 @@ impl Robot {
             remarks.push(format!("URDF has no place for drives that move several joints or do so at a changing ratio: {}; inertia and friction of their motors beyond the joints' own are left out.", coupled.join(", ")));
         }
         if !self.effects.is_empty() {
-            let entries: Vec<String> = self.effects.iter().map(|e| self.told(e)).collect();
+            let entries: Vec<String> = self.effects.iter().map(|e| self.effect_text(e)).collect();
             remarks.push(format!(
                 "URDF has no place for effects beyond the standard model: {}.",
                 entries.join("; ")
@@ -58,7 +58,7 @@ impl Robot {
     }
 
     /// Returns an effect with its parameters, as text.
-    fn told(&self, effect: &RobotEffect) -> String {
+    fn effect_text(&self, effect: &RobotEffect) -> String {
         let about = effect.effect.kind.about();
         let joint = match &effect.joint {
             Some(name) => self.joints.iter().find(|j| j.name == *name),

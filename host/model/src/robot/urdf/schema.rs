@@ -152,11 +152,11 @@ impl<'a> Reader<'a> {
             let is_known = names.clone().any(|other| *other == tag);
             let missing =
                 names.filter(|other| !children.iter().any(|own| own.has_tag_name(**other)));
-            if let (Some(meant), false) = (nearest(tag, missing), is_known) {
+            if let (Some(suggestion), false) = (nearest(tag, missing), is_known) {
                 return Err(self.error(
                     *child,
                     format!(
-                        "<{tag}> of {} is no element of URDF; is <{meant}> meant?",
+                        "<{tag}> of {} is no element of URDF; is <{suggestion}> meant?",
                         self.called(node)
                     ),
                 ));
@@ -179,10 +179,10 @@ impl<'a> Reader<'a> {
                 .attributes
                 .iter()
                 .filter(|other| !node.has_attribute(**other));
-            if let Some(meant) = nearest(name, missing) {
+            if let Some(suggestion) = nearest(name, missing) {
                 return Err(self.error(
                     node,
-                    format!("`{name}` is no attribute of <{tag}>; is `{meant}` meant?"),
+                    format!("`{name}` is no attribute of <{tag}>; is `{suggestion}` meant?"),
                 ));
             }
             let first = || (self.place(node), BTreeSet::new(), 0);
@@ -256,10 +256,10 @@ mod tests {
     fn elements_that_stand_twice_are_refused_by_line() {
         assert!(read(INERTIAL, LIMIT).is_ok());
         let twice = |link: &str, joint: &str, words: &str| {
-            let said = read(link, joint).unwrap_err();
+            let message = read(link, joint).unwrap_err();
             assert!(
-                said.contains(words) && said.contains("whose first stands at"),
-                "{said}"
+                message.contains(words) && message.contains("whose first stands at"),
+                "{message}"
             );
         };
         twice(&format!("{INERTIAL}\n{INERTIAL}"), LIMIT, "r.urdf:5");
@@ -286,9 +286,10 @@ mod tests {
             "<robot name='r'>\n<link name='stand'/>\n<link name='base'/>\n<link name='arm'>{INERTIAL}</link>\n<joint name='foot' type='fixed'><parent link='stand'/><child link='base'/><origin xyz='0 0 1'/>\n<origin xyz='0 0 2'/></joint>\n<joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>{LIMIT}</joint>\n</robot>"
         );
         let original = Original::read(text, Path::new("r.urdf")).unwrap();
-        let said = original.remarks();
+        let message = original.remarks();
         assert!(
-            said.iter()
+            message
+                .iter()
                 .any(|own| own.contains("r.urdf:6") && own.contains("the first counts"))
         );
     }
@@ -300,55 +301,60 @@ mod tests {
             "<robot name='r'>\n<link name='base'/><link name='arm'>{INERTIAL}</link><link name='hand'>{INERTIAL}</link>\n<joint name='a' type='revolute'><parent link='base'/><child link='arm'/>{dynamics}</joint>\n<joint name='b' type='revolute'><parent link='arm'/><child link='hand'/>{dynamics}<origin quat_xyzw='0 0 0 1'/></joint></robot>"
         );
         let original = Original::read(text, Path::new("r.urdf")).unwrap();
-        let said: Vec<&String> = (original.remarks().iter())
+        let message: Vec<&String> = (original.remarks().iter())
             .filter(|own| own.contains("not read"))
             .collect();
-        assert_eq!(said.len(), 2, "{said:?}");
-        assert!(said[0].contains("r.urdf:3:") && said[0].contains("here and in 1 more elements"));
+        assert_eq!(message.len(), 2, "{message:?}");
         assert!(
-            said[0].contains("`D` and `mu_viscous` of <dynamics> are"),
-            "{said:?}"
+            message[0].contains("r.urdf:3:") && message[0].contains("here and in 1 more elements")
         );
-        assert!(said[1].contains("`quat_xyzw` of <origin> is"), "{said:?}");
+        assert!(
+            message[0].contains("`D` and `mu_viscous` of <dynamics> are"),
+            "{message:?}"
+        );
+        assert!(
+            message[1].contains("`quat_xyzw` of <origin> is"),
+            "{message:?}"
+        );
     }
 
     #[test]
     fn misspelt_elements_and_attributes_are_refused_with_what_is_meant() {
-        let meant = |link: &str, joint: &str, words: &str| {
-            let said = read(link, joint).unwrap_err();
-            assert!(said.contains(words), "{said}");
+        let suggestion = |link: &str, joint: &str, words: &str| {
+            let message = read(link, joint).unwrap_err();
+            assert!(message.contains(words), "{message}");
         };
-        meant(
+        suggestion(
             INERTIAL,
             &LIMIT.replace("upper", "uper"),
             "is `upper` meant?",
         );
-        meant(
+        suggestion(
             INERTIAL,
             &LIMIT.replace("velocity", "Velocity"),
             "is `velocity` meant?",
         );
-        meant(
+        suggestion(
             INERTIAL,
             &format!("{LIMIT}<dynamics dampin='1'/>"),
             "is `damping` meant?",
         );
-        meant(
+        suggestion(
             INERTIAL,
             &format!("{LIMIT}<dynamic damping='1'/>"),
             "is <dynamics> meant?",
         );
-        meant(
+        suggestion(
             INERTIAL,
             &format!("{LIMIT}<axes xyz='1 0 0'/>"),
             "is <axis> meant?",
         );
-        meant(
+        suggestion(
             &INERTIAL.replace("inertial>", "inertail>"),
             LIMIT,
             "is <inertial> meant?",
         );
-        meant(
+        suggestion(
             INERTIAL,
             &LIMIT.replace("limit", "limits"),
             "is <limit> meant?",
@@ -358,8 +364,11 @@ mod tests {
             "<robot name='r' xmlns='http://www.ros.org'><link name='base'/><link name='arm'>{INERTIAL}</link><joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>{}</joint></robot>",
             LIMIT.replace("upper", "uper")
         );
-        let said = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap_err();
-        assert!(said.to_string().contains("is `upper` meant?"), "{said}");
+        let message = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap_err();
+        assert!(
+            message.to_string().contains("is `upper` meant?"),
+            "{message}"
+        );
         // Elements of other programs are accepted.
         let more = "<hardwareInterface/><gazebo/><sensor name='s'/>";
         assert!(read(&format!("{INERTIAL}{more}"), &format!("{LIMIT}{more}")).is_ok());

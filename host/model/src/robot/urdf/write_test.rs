@@ -189,10 +189,10 @@ fn limits_drives_and_what_is_left_out_are_told() {
             .any(|r| r.contains("several joints") && r.contains("joint_6"))
     );
     let irp6 = Robot::from_toml(IRP6_TEMPLATE, Path::new("r.toml")).unwrap();
-    let said = irp6.to_urdf().unwrap().remarks.join(" ");
+    let message = irp6.to_urdf().unwrap().remarks.join(" ");
     assert!(
-        said.contains("inertia of the drives") && said.contains("column 4.99"),
-        "{said}"
+        message.contains("inertia of the drives") && message.contains("column 4.99"),
+        "{message}"
     );
 }
 
@@ -200,6 +200,9 @@ fn limits_drives_and_what_is_left_out_are_told() {
 fn a_link_without_inertia_cannot_be_written() {
     let mut robot = Robot::from_toml(TX40, Path::new("r.toml")).unwrap();
     robot.joints[2].inertial = None;
-    let said = robot.to_urdf().unwrap_err().to_string();
-    assert!(said.contains("`joint_3` has no [joint.inertial]"), "{said}");
+    let message = robot.to_urdf().unwrap_err().to_string();
+    assert!(
+        message.contains("`joint_3` has no [joint.inertial]"),
+        "{message}"
+    );
 }

@@ -60,7 +60,7 @@ pub(super) fn note(verdict: Verdict) -> NoteKind {
 
 /// Entry of an effect in the catalogue; none if the catalogue has no such name.
 pub(super) fn about(effect: &str, law: Option<&str>) -> Option<&'static About> {
-    Kind::named(effect, law).map(Kind::about)
+    Kind::from_name(effect, law).map(Kind::about)
 }
 
 /// An effect for a heading: its title, or its name without underscores.

@@ -47,17 +47,17 @@ fn a_urdf_in_another_unit_is_refused_by_line() {
         ),
     ];
     for (found, place, words) in cases {
-        let said = found.unwrap_err();
-        println!("{said}");
+        let message = found.unwrap_err();
+        println!("{message}");
         assert!(
-            said.starts_with(place) && said.contains(words),
-            "{words}: {said}"
+            message.starts_with(place) && message.contains(words),
+            "{words}: {message}"
         );
     }
-    let said = urdf("0 0 0", &inertial("0 0 0", 3.0, 0.04e9)).unwrap_err();
+    let message = urdf("0 0 0", &inertial("0 0 0", 3.0, 0.04e9)).unwrap_err();
     assert!(
-        said.contains("in kg·mm², it would be 40.00, in g·mm² 0.04000"),
-        "{said}"
+        message.contains("in kg·mm², it would be 40.00, in g·mm² 0.04000"),
+        "{message}"
     );
 }
 
@@ -93,11 +93,11 @@ fn toml_in_another_unit_is_refused_by_line() {
     let refused = |change: &dyn Fn(&mut Robot), words: &str| {
         let mut robot = tx40.clone();
         change(&mut robot);
-        let said = read(&robot).unwrap_err();
-        println!("{said}");
+        let message = read(&robot).unwrap_err();
+        println!("{message}");
         assert!(
-            said.starts_with("arm.toml:") && said.contains(words),
-            "{words}: {said}"
+            message.starts_with("arm.toml:") && message.contains(words),
+            "{words}: {message}"
         );
     };
     let third = &tx40.joints[2].name;
@@ -128,12 +128,12 @@ fn toml_in_another_unit_is_refused_by_line() {
 #[test]
 fn angles_beyond_a_turn_are_refused_by_line() {
     let good = inertial("0.1 0 0", 3.0, 0.04);
-    let said = urdf("0.3 0 0.2' rpy='-90 0 0", &good).unwrap_err();
+    let message = urdf("0.3 0 0.2' rpy='-90 0 0", &good).unwrap_err();
     assert!(
-        said.starts_with("arm.urdf:7:")
-            && said.contains("`rpy` of <origin> is \"-90 0 0\"")
-            && said.contains("were these degrees, it would be \"-1.570796 0.000000 0.000000\""),
-        "{said}"
+        message.starts_with("arm.urdf:7:")
+            && message.contains("`rpy` of <origin> is \"-90 0 0\"")
+            && message.contains("were these degrees, it would be \"-1.570796 0.000000 0.000000\""),
+        "{message}"
     );
     assert!(urdf("0.3 0 0.2' rpy='-6.2832 0 3.14", &good).is_ok());
 }

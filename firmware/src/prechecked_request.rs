@@ -2,79 +2,82 @@
 
 use rig_shared::compensation::{Compensation, EffectFault, Effects};
 use rig_shared::estimation::one_link;
-use rig_shared::trajectory::{Extremes, Preparation};
+use rig_shared::trajectory::{Extremes, TrajectoryConstants};
 use rig_shared::wire::message::{Refusal, Request, RequestBody};
 
 use crate::config::Config;
-use crate::usable;
+use crate::validation;
 
-/// A request with the result of its examination.
+/// A request with the result of its precheck.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Examined {
+pub struct PrecheckedRequest {
     /// The request as the host sent it.
     pub request: Request,
     /// The result, or the refusal if the request is invalid in every state of the rig.
-    pub finding: Result<Finding, Refusal>,
+    pub prepared: Result<Prepared, Refusal>,
 }
 
-/// Result of an examination.
+/// Values computed by a precheck.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)] // four of them lie in a queue, and nowhere else
-pub enum Finding {
+pub enum Prepared {
     /// No further result.
-    Plain,
+    Nothing,
     /// Extremes of a trajectory, and its preparation.
-    Motion(Extremes<f32>, Preparation<f32>),
+    Trajectory(Extremes<f32>, TrajectoryConstants<f32>),
     /// Effects, checked.
     Effects(Compensation<f32>),
     /// An estimator's constants.
     Estimator(one_link::Config<f32>),
 }
 
-/// Examines a request. Evaluates a Fourier series about a thousand times: call this outside the tick.
-pub fn examine(config: &Config, request: Request) -> Examined {
-    let finding = find(config, &request.body);
-    Examined { request, finding }
+/// Checks a request. Evaluates a Fourier series about a thousand times: call this outside the tick.
+pub fn precheck(config: &Config, request: Request) -> PrecheckedRequest {
+    let prepared = prepare(config, &request.body);
+    PrecheckedRequest { request, prepared }
 }
 
-fn find(config: &Config, body: &RequestBody) -> Result<Finding, Refusal> {
-    let good = match body {
+fn prepare(config: &Config, body: &RequestBody) -> Result<Prepared, Refusal> {
+    let valid = match body {
         RequestBody::SetTrajectory(trajectory) => {
             return match trajectory.validate() {
-                Ok(()) => Ok(Finding::Motion(trajectory.extremes(), trajectory.prepare())),
+                Ok(()) => Ok(Prepared::Trajectory(
+                    trajectory.extremes(),
+                    trajectory.prepare(),
+                )),
                 Err(_) => Err(Refusal::BadValue),
             };
         }
         RequestBody::SetEffects(given) => {
             let mut effects = Effects::default();
-            for (place, effect) in effects.iter_mut().zip(given) {
-                *place = Some(*effect);
+            for (slot, effect) in effects.iter_mut().zip(given) {
+                *slot = Some(*effect);
             }
             let compensation = Compensation::new(&effects).map_err(|fault| match fault {
                 EffectFault::NotCompensable(kind) => Refusal::NotCompensable(kind),
                 EffectFault::Parameter(_) | EffectFault::Surplus => Refusal::BadValue,
             })?;
-            return match usable::effects(config, &compensation) {
-                Ok(()) => Ok(Finding::Effects(compensation)),
+            return match validation::effects(config, &compensation) {
+                Ok(()) => Ok(Prepared::Effects(compensation)),
                 Err(_) => Err(Refusal::BadValue),
             };
         }
         RequestBody::SetEstimator(settings) => {
             return one_link::Config::new(settings, config.rates.estimator_hz())
-                .map(Finding::Estimator)
+                .map(Prepared::Estimator)
                 .map_err(|_| Refusal::BadValue);
         }
-        RequestBody::SetGains(gains) => usable::gains(config, gains),
-        RequestBody::SetModel(model) => usable::model(model),
+        RequestBody::SetGains(gains) => validation::gains(config, gains),
+        RequestBody::SetModel(model) => validation::model(model),
         RequestBody::SetFriction(friction) => friction.check().is_ok(),
         RequestBody::SetPrecompensation(precompensation) => {
-            usable::precompensation(precompensation)
+            validation::precompensation(precompensation)
         }
-        RequestBody::SetLimits(limits) => usable::limits(config, limits),
+        RequestBody::SetLimits(limits) => validation::limits(config, limits),
         _ => true,
     };
-    if good {
-        Ok(Finding::Plain)
+    if valid {
+        Ok(Prepared::Nothing)
     } else {
         Err(Refusal::BadValue)
     }

@@ -1,4 +1,4 @@
-//! Part of the conversation without a deadline: notes in, frames out.
+//! Part of the session outside the control tick, without a deadline: events in, frames out.
 
 use heapless::{String, Vec};
 use rig_shared::safety::SnapshotSample;
@@ -6,7 +6,7 @@ use rig_shared::wire::message::{Batch, Greeting, Report, SNAPSHOT_PART, Snapshot
 use rig_shared::wire::{Batcher, MAX_FRAME, PROTOCOL_VERSION, encode, schema};
 
 use crate::config::Config;
-use crate::note::{Kept, Note, Topic};
+use crate::event::{Event, FollowUp, RecordedTick};
 
 /// Destination of frames.
 pub trait Transmit {
@@ -29,94 +29,102 @@ struct Part {
 
 impl Part {
     /// Adds a tick; returns a part if it is full or the last.
-    fn push(&mut self, kept: &Kept) -> Option<SnapshotPart> {
-        if kept.index == 0 || self.samples.is_full() {
+    fn push(&mut self, recorded: &RecordedTick) -> Option<SnapshotPart> {
+        if recorded.index == 0 || self.samples.is_full() {
             self.samples.clear();
         }
         if self.samples.is_empty() {
-            self.first = kept.index;
+            self.first = recorded.index;
         }
-        let nothing = kept.total == 0;
-        let last = nothing || kept.index + 1 == kept.total;
+        let nothing = recorded.total == 0;
+        let last = nothing || recorded.index + 1 == recorded.total;
         if !nothing {
-            self.samples.push(kept.sample).ok()?;
+            self.samples.push(recorded.sample).ok()?;
         }
         (last || self.samples.is_full()).then(|| SnapshotPart {
             first: self.first,
-            total: kept.total,
+            total: recorded.total,
             samples: core::mem::take(&mut self.samples),
         })
     }
 }
 
-/// State of the conversation.
+/// Encodes events as reports and sends their frames.
 #[derive(Default)]
-pub struct Desk {
+pub struct ReportSender {
     batcher: Batcher,
     snapshot: Part,
     capture: Part,
 }
 
-impl Desk {
+impl ReportSender {
     /// Returns the state at power on.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Sends the content of a note to the host.
-    pub fn tell(&mut self, config: &Config, note: &Note, transmit: &mut impl Transmit) {
-        match note {
-            Note::Answer(acknowledge, topic) => {
+    /// Sends the content of an event to the host.
+    pub fn send_event(&mut self, config: &Config, event: &Event, transmit: &mut impl Transmit) {
+        match event {
+            Event::Answer(acknowledge, follow_up) => {
                 send(&Report::Acknowledge(*acknowledge), transmit);
-                self.converse(config, topic, transmit);
+                self.send_follow_up(config, follow_up, transmit);
             }
-            Note::Sample { sample, missed } => {
-                for _ in 0..*missed {
+            Event::Sample {
+                sample,
+                missed_windows,
+            } => {
+                for _ in 0..*missed_windows {
                     self.batcher.skip();
                 }
                 if let Some(batch) = self.batcher.push(*sample) {
                     self.send_batch(batch, transmit);
                 }
             }
-            Note::Estimate(estimate) => {
+            Event::Estimate(estimate) => {
                 send(&Report::Estimate(*estimate), transmit);
             }
-            Note::Fault(record) => {
+            Event::Fault(record) => {
                 send(&Report::Fault(*record), transmit);
             }
-            Note::Snapshot(kept) => {
-                if let Some(part) = self.snapshot.push(kept) {
+            Event::Snapshot(recorded) => {
+                if let Some(part) = self.snapshot.push(recorded) {
                     send(&Report::Snapshot(part), transmit);
                 }
             }
-            Note::Capture(kept) => {
-                if let Some(part) = self.capture.push(kept) {
+            Event::Capture(recorded) => {
+                if let Some(part) = self.capture.push(recorded) {
                     send(&Report::Capture(part), transmit);
                 }
             }
-            Note::Health(health) => {
+            Event::Health(health) => {
                 send(&Report::Health(*health), transmit);
             }
         }
     }
 
     /// Sends the consequences of an acknowledgement.
-    fn converse(&mut self, config: &Config, topic: &Topic, transmit: &mut impl Transmit) {
-        match topic {
-            Topic::None => {}
-            Topic::Greeting => {
+    fn send_follow_up(
+        &mut self,
+        config: &Config,
+        follow_up: &FollowUp,
+        transmit: &mut impl Transmit,
+    ) {
+        match follow_up {
+            FollowUp::None => {}
+            FollowUp::Greeting => {
                 send(&Report::Greeting(greeting(config)), transmit);
             }
-            Topic::StreamStart(first_tick) => self
+            FollowUp::StreamStart(first_tick) => self
                 .batcher
                 .start(*first_tick, config.rates.telemetry_decimation),
-            Topic::StreamEnd => {
+            FollowUp::StreamEnd => {
                 if let Some(batch) = self.batcher.close() {
                     self.send_batch(batch, transmit);
                 }
                 send(&Report::StreamEnd(self.batcher.end()), transmit);
             }
-            Topic::Snapshot(record) => {
+            FollowUp::Snapshot(record) => {
                 if let Some(record) = record {
                     send(&Report::Fault(*record), transmit);
                 }

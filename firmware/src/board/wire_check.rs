@@ -2,9 +2,9 @@
 //! irregular order. A driven wire does not change; an undriven wire follows.
 //!
 //! The channels are pulled one after the other, never both at once, which would be a wrong step. A cut wire is found
-//! after [`AGREEMENTS`] checks, one every fourth tick: 12.8 ms at 10 kHz. The order repeats every 127 pulls and has at
-//! most seven equal values in a row, so a line at rest agrees with at most seven. A moving line follows 32 of them only
-//! if its edges are equally irregular.
+//! after [`MIN_AGREEMENTS`] checks, one every fourth tick: 12.8 ms at 10 kHz. The order repeats every 127 pulls and has
+//! at most seven equal values in a row, so a line at rest agrees with at most seven. A moving line follows 32 of them
+//! only if its edges are equally irregular.
 //!
 //! Not detected: a cut wire that touches another, or an encoder without supply that holds its outputs low. Motion shows
 //! these.
@@ -12,53 +12,53 @@
 use super::pins::{is_high, pull};
 
 /// Number of consecutive checks in which a channel followed its pull.
-const AGREEMENTS: u8 = 32;
+const MIN_AGREEMENTS: u8 = 32;
 
 /// State of the wires.
-pub(crate) struct Wires {
+pub(crate) struct WireCheck {
     /// Shift register of seven bits, x⁷ + x⁶ + 1 (Golomb 1967, "Shift Register Sequences"), for both channels.
-    order: u8,
+    sequence: u8,
     turn: usize,
-    pulled: [bool; 2],
-    agreed: [u8; 2],
+    pull_up: [bool; 2],
+    agreements: [u8; 2],
 }
 
-impl Wires {
+impl WireCheck {
     /// Starts with both pulled up, as [`EncoderPins`](super::pins::EncoderPins) leaves them.
     pub(crate) const fn new() -> Self {
         Self {
-            order: 1,
+            sequence: 1,
             turn: 0,
-            pulled: [true; 2],
-            agreed: [0; 2],
+            pull_up: [true; 2],
+            agreements: [0; 2],
         }
     }
 
     /// Checks one channel if it is its `turn`, and pulls it for the next check. Returns true if a channel is undriven.
     #[inline(always)]
-    pub(crate) fn look(&mut self, turn: bool) -> bool {
+    pub(crate) fn check(&mut self, turn: bool) -> bool {
         if turn {
-            self.next();
+            self.check_channel();
         }
-        self.agreed[0].max(self.agreed[1]) >= AGREEMENTS
+        self.agreements[0].max(self.agreements[1]) >= MIN_AGREEMENTS
     }
 
     #[inline(always)]
-    fn next(&mut self) {
+    fn check_channel(&mut self) {
         let channel = self.turn & 1;
         self.turn ^= 1;
-        let agreed = if is_high(channel) == self.pulled[channel] {
-            self.agreed[channel].saturating_add(1)
+        let agreements = if is_high(channel) == self.pull_up[channel] {
+            self.agreements[channel].saturating_add(1)
         } else {
             0
         };
-        self.agreed[channel] = agreed;
+        self.agreements[channel] = agreements;
         if channel == 0 {
-            let next = (self.order >> 6 ^ self.order >> 5) & 1;
-            self.order = (self.order << 1 | next) & 0x7F;
+            let feedback = (self.sequence >> 6 ^ self.sequence >> 5) & 1;
+            self.sequence = (self.sequence << 1 | feedback) & 0x7F;
         }
-        let up = self.order & 1 != 0;
-        self.pulled[channel] = up;
+        let up = self.sequence & 1 != 0;
+        self.pull_up[channel] = up;
         pull(channel, up);
     }
 }

@@ -1,4 +1,4 @@
-//! Treatment of the recordings, decided once and recorded.
+//! Preprocessing plan of the recordings, decided once and recorded.
 
 use rig_model::robot::IdentifiedBand;
 use serde::Serialize;
@@ -70,9 +70,9 @@ pub struct Masked {
     pub why: String,
 }
 
-/// Treatment of every recording of an identification.
+/// Preprocessing of every recording of an identification.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Treatment {
+pub struct PreprocessingPlan {
     /// Hz
     pub sample_rate: f64,
     /// Cut-off of the position filter, Hz.
@@ -123,17 +123,17 @@ pub struct Treatment {
 }
 
 /// Lowest cut-off as a multiple of the highest frequency of the motion. A lower one would distort the motion itself.
-const LEAST_HEADROOM: f64 = 5.0;
+const MIN_HEADROOM: f64 = 5.0;
 
 /// Pass band of the parallel low-pass as a multiple of the highest frequency of the motion. Reversals of friction have
 /// harmonics well above the motion, and the residual must show them.
 const PARALLEL_HEADROOM: f64 = 10.0;
 
 /// Highest cut-off as a share of the Nyquist frequency.
-pub const HIGHEST: f64 = 0.8;
+pub const MAX_CUTOFF_SHARE: f64 = 0.8;
 
 /// Speed below which a joint stands still, rad/s or m/s: above the rounding error, below the resolution of any encoder.
-const STILL: f64 = 1e-6;
+const STANDSTILL_SPEED: f64 = 1e-6;
 
 /// A cut-off that was tried, and the torque error with it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -144,7 +144,7 @@ pub struct CutoffTrial {
     pub relative_error: Vec<f64>,
 }
 
-impl Treatment {
+impl PreprocessingPlan {
     /// Returns the band for the description, in which the identified values are judged.
     #[must_use]
     pub fn band(&self) -> IdentifiedBand {
@@ -187,16 +187,16 @@ impl Treatment {
             });
         }
         let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
-        let most = most_decimated(shortest, FEWEST_KEPT, cutoff, rate);
+        let max_decimation = most_decimated(shortest, MIN_KEPT_ROWS, cutoff, rate);
         let (decimation, decimation_reason) = match options.decimation {
             Choice::Fixed(n) => (n, format!("Every {n}th row, as given.")),
-            Choice::Auto => choose_decimation(motion, cutoff, rate, most),
+            Choice::Auto => choose_decimation(motion, cutoff, rate, max_decimation),
         };
-        if decimation == 0 || (decimation as u64) > most {
+        if decimation == 0 || (decimation as u64) > max_decimation {
             return Err(PrepareError::Decimation {
                 factor: decimation,
                 rows: shortest,
-                most,
+                most: max_decimation,
             });
         }
         let (speed_threshold, speed_reason) =
@@ -206,7 +206,7 @@ impl Treatment {
         let trimmed = trimmed_rows(cutoff, decimation, rate);
         enough_rows(
             surveys,
-            FEWEST_KEPT * decimation as u64 + 2 * trimmed as u64,
+            MIN_KEPT_ROWS * decimation as u64 + 2 * trimmed as u64,
         )?;
         Ok(Self {
             sample_rate: rate,
@@ -254,9 +254,9 @@ impl Treatment {
         torque_limits: &[Option<f64>],
     ) -> Result<Self, PrepareError> {
         let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
-        let possible = most_decimated(shortest, FEWEST_KEPT, self.cutoff, self.sample_rate);
-        let most = (shortest / rows.max(FEWEST_KEPT)).clamp(1, possible);
-        let n = ((0.4 * self.sample_rate / band).floor() as u64).clamp(1, most) as usize;
+        let possible = most_decimated(shortest, MIN_KEPT_ROWS, self.cutoff, self.sample_rate);
+        let max_decimation = (shortest / rows.max(MIN_KEPT_ROWS)).clamp(1, possible);
+        let n = ((0.4 * self.sample_rate / band).floor() as u64).clamp(1, max_decimation) as usize;
         if options.decimation != Choice::Auto || n <= self.decimation {
             return Ok(self.clone());
         }
@@ -326,34 +326,35 @@ impl Treatment {
 }
 
 /// Minimum number of rows after decimation.
-const FEWEST_KEPT: u64 = 50;
+const MIN_KEPT_ROWS: u64 = 50;
 
 /// Returns the spectrum of each joint, from the longest recording in which the joint moves.
 fn spectra_of(surveys: &[Survey], first: &Survey) -> Vec<PositionSpectrum> {
-    let speaker = surveys.iter().max_by_key(|s| s.rows).unwrap_or(first);
-    (0..speaker.joints.len())
+    let longest = surveys.iter().max_by_key(|s| s.rows).unwrap_or(first);
+    (0..longest.joints.len())
         .map(|j| {
             let moving = surveys.iter().filter(|s| !s.joints[j].still());
-            let own = moving.max_by_key(|s| s.rows).unwrap_or(speaker);
-            own.joints[j].spectrum.clone()
+            let longest_moving = moving.max_by_key(|s| s.rows).unwrap_or(longest);
+            longest_moving.joints[j].spectrum.clone()
         })
         .collect()
 }
 
 /// Returns the highest decimation that leaves `kept` rows of a stretch of `rows` rows after trimming both ends.
 fn most_decimated(rows: u64, kept: u64, cutoff: f64, rate: f64) -> u64 {
-    let fits = |n: u64| kept * n + 2 * trimmed_rows(cutoff, n as usize, rate) as u64 <= rows;
-    let mut most = rows / kept;
-    while most > 1 && !fits(most) {
-        most -= 1;
+    let is_long_enough =
+        |n: u64| kept * n + 2 * trimmed_rows(cutoff, n as usize, rate) as u64 <= rows;
+    let mut max_decimation = rows / kept;
+    while max_decimation > 1 && !is_long_enough(max_decimation) {
+        max_decimation -= 1;
     }
-    most.max(1)
+    max_decimation.max(1)
 }
 
 /// Chooses the decimation. Torque and regressor pass the same filter, so its band causes no bias and removes noise.
-fn choose_decimation(motion: f64, cutoff: f64, rate: f64, most: u64) -> (usize, String) {
+fn choose_decimation(motion: f64, cutoff: f64, rate: f64, max_decimation: u64) -> (usize, String) {
     let band = (PARALLEL_HEADROOM * motion).min(cutoff);
-    let n = ((0.4 * rate / band).floor() as u64).clamp(1, most) as usize;
+    let n = ((0.4 * rate / band).floor() as u64).clamp(1, max_decimation) as usize;
     (
         n,
         format!(
@@ -386,7 +387,7 @@ fn choose_speeds(
     // At rest, friction or a brake carries any part of the torque, so rows of such a joint contain no information.
     for (j, speed) in speeds.iter_mut().enumerate() {
         if surveys.iter().all(|s| s.joints[j].still()) {
-            *speed = speed.max(STILL);
+            *speed = speed.max(STANDSTILL_SPEED);
         }
     }
     (speeds, reason)
@@ -438,15 +439,15 @@ fn choose_cutoff(spectra: &[PositionSpectrum], motion: f64, nyquist: f64) -> (f6
         .iter()
         .map(|s| s.clean)
         .fold(f64::INFINITY, f64::min);
-    let most = HIGHEST * nyquist;
-    let least = (LEAST_HEADROOM * motion).min(most);
+    let max_decimation = MAX_CUTOFF_SHARE * nyquist;
+    let least = (MIN_HEADROOM * motion).min(max_decimation);
     let wish = crossing.min(clean);
-    let cutoff = wish.clamp(least, most);
+    let cutoff = wish.clamp(least, max_decimation);
     let reason = if wish < least {
         format!(
             "{cutoff:.3} Hz, five times the highest frequency of the motion ({motion:.3} Hz), although noise outweighs the signal from {crossing:.3} Hz on: a lower cut-off would bend the motion itself."
         )
-    } else if wish > most {
+    } else if wish > max_decimation {
         format!(
             "{cutoff:.3} Hz, 80 % of the Nyquist frequency: the position stands above its noise over the whole band."
         )

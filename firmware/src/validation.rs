@@ -11,17 +11,17 @@ use rig_shared::safety::Limits;
 use crate::config::{Config, Settings};
 
 /// Slowest current loop, as a share of the control rate. Its lag must fit the remembered ticks of the effects
-/// ([`GIVEN`](rig_shared::compensation::GIVEN)). At 10 kHz 39 Hz, enough for a position loop of 4 Hz
+/// ([`HISTORY_TICKS`](rig_shared::compensation::HISTORY_TICKS)). At 10 kHz 39 Hz, enough for a position loop of 4 Hz
 /// ([`Gains::design`]).
-const SLOWEST_CURRENT_LOOP: f32 = 1.0 / 256.0;
+const MIN_CURRENT_BANDWIDTH: f32 = 1.0 / 256.0;
 /// Fastest current loop, as a share of the control rate. At a tenth the loop's delay of a tick gives a damping ratio of
 /// 0.45, and less above it (the poles of z² − z + 1 − exp(−2π·share)).
-const FASTEST_CURRENT_LOOP: f32 = 0.1;
+const MAX_CURRENT_BANDWIDTH: f32 = 0.1;
 /// Largest share of the velocity that an eccentric encoder may cause; above it a correction could change its sign.
-const LARGEST_SLOPE: f32 = 0.5;
+const MAX_VELOCITY_SLOPE: f32 = 0.5;
 /// Largest voltage loss of a bridge as a share of the lowest supply: the check of the encoder cannot see a voltage that
 /// counts as lost.
-const LARGEST_LOSS: f32 = 0.125;
+const MAX_VOLTAGE_LOSS: f32 = 0.125;
 
 /// Checks all settings that the host may replace.
 pub(crate) fn settings(config: &Config, settings: &Settings) -> bool {
@@ -34,7 +34,8 @@ pub(crate) fn settings(config: &Config, settings: &Settings) -> bool {
             .estimator
             .check(config.rates.estimator_hz())
             .is_ok()
-        && Compensation::new(&settings.effects).is_ok_and(|found| effects(config, &found).is_ok())
+        && Compensation::new(&settings.effects)
+            .is_ok_and(|compensation| effects(config, &compensation).is_ok())
 }
 
 pub(crate) fn limits(config: &Config, limits: &Limits<f32>) -> bool {
@@ -43,7 +44,7 @@ pub(crate) fn limits(config: &Config, limits: &Limits<f32>) -> bool {
 
 pub(crate) fn gains(config: &Config, gains: &Gains<f32>) -> bool {
     let share = gains.current_bandwidth / config.rates.control_hz as f32;
-    gains.usable() && (SLOWEST_CURRENT_LOOP..=FASTEST_CURRENT_LOOP).contains(&share)
+    gains.is_valid() && (MIN_CURRENT_BANDWIDTH..=MAX_CURRENT_BANDWIDTH).contains(&share)
 }
 
 pub(crate) fn model(model: &LinkParameters<f32>) -> bool {
@@ -62,76 +63,76 @@ pub(crate) fn precompensation(settings: &PrecompensationSettings<f32>) -> bool {
 
 /// A correction beyond the possible error of a sensor or bridge: it would hide a fault, or reverse a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Excess {
+pub enum CorrectionTooLarge {
     /// The current's constant error, A.
     CurrentOffset {
         /// Value of the effects.
-        found: f32,
+        value: f32,
         /// Largest allowed value.
-        most: f32,
+        limit: f32,
     },
     /// The voltage loss of the bridge, V.
     DriveDeadzone {
         /// Value of the effects.
-        found: f32,
+        value: f32,
         /// Largest allowed value.
-        most: f32,
+        limit: f32,
     },
     /// Velocity caused by the encoder's error, as a share of the velocity.
     EncoderEccentricity {
         /// Value of the effects.
-        found: f32,
+        value: f32,
         /// Largest allowed value.
-        most: f32,
+        limit: f32,
     },
 }
 
-impl fmt::Display for Excess {
+impl fmt::Display for CorrectionTooLarge {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::CurrentOffset { found, most } => write!(
+            Self::CurrentOffset { value, limit } => write!(
                 f,
-                "current_offset makes {found} A of the reading its error, and the rig takes {most} A at most: mend the sensor"
+                "current_offset makes {value} A of the reading its error, and the rig takes {limit} A at most: mend the sensor"
             ),
-            Self::DriveDeadzone { found, most } => write!(
+            Self::DriveDeadzone { value, limit } => write!(
                 f,
-                "drive_deadzone says that the bridge loses {found} V, and the rig takes {most} V at most: an eighth of the least supply"
+                "drive_deadzone says that the bridge loses {value} V, and the rig takes {limit} V at most: an eighth of the least supply"
             ),
-            Self::EncoderEccentricity { found, most } => write!(
+            Self::EncoderEccentricity { value, limit } => write!(
                 f,
-                "encoder_eccentricity makes up {found} of the velocity, and the rig takes {most} at most: beyond it the correction could turn the velocity's sense round"
+                "encoder_eccentricity makes up {value} of the velocity, and the rig takes {limit} at most: beyond it the correction could turn the velocity's sense round"
             ),
         }
     }
 }
 
-impl core::error::Error for Excess {}
+impl core::error::Error for CorrectionTooLarge {}
 
 /// Checks that corrections of measured values stay within the possible errors of sensors and bridge.
 ///
 /// # Errors
 /// The first correction that does not.
-pub fn effects(config: &Config, effects: &Compensation<f32>) -> Result<(), Excess> {
+pub fn effects(config: &Config, effects: &Compensation<f32>) -> Result<(), CorrectionTooLarge> {
     // False for NaN too.
-    let within = |found: f32, most: f32| found <= most;
-    let found = effects.current_error(config.drive.joint_torque(1.0)).abs();
-    let most = config.largest_offset;
-    if !within(found, most) {
-        return Err(Excess::CurrentOffset { found, most });
+    let is_within = |value: f32, limit: f32| value <= limit;
+    let value = effects.current_error(config.drive.joint_torque(1.0)).abs();
+    let limit = config.largest_offset;
+    if !is_within(value, limit) {
+        return Err(CorrectionTooLarge::CurrentOffset { value, limit });
     }
-    let (found, most) = (
+    let (value, limit) = (
         effects.lost_voltage(),
-        LARGEST_LOSS * config.monitor.supply[0],
+        MAX_VOLTAGE_LOSS * config.monitor.supply[0],
     );
-    if !within(found, most) {
-        return Err(Excess::DriveDeadzone { found, most });
+    if !is_within(value, limit) {
+        return Err(CorrectionTooLarge::DriveDeadzone { value, limit });
     }
-    let (found, most) = (
+    let (value, limit) = (
         effects.position_slope(config.drive.gear_ratio),
-        LARGEST_SLOPE,
+        MAX_VELOCITY_SLOPE,
     );
-    if !within(found, most) {
-        return Err(Excess::EncoderEccentricity { found, most });
+    if !is_within(value, limit) {
+        return Err(CorrectionTooLarge::EncoderEccentricity { value, limit });
     }
     Ok(())
 }
@@ -141,7 +142,7 @@ pub fn effects(config: &Config, effects: &Compensation<f32>) -> Result<(), Exces
 mod tests {
     use super::*;
     use crate::nameplate::one_link;
-    use rig_shared::compensation::{Effects, GIVEN};
+    use rig_shared::compensation::{Effects, HISTORY_TICKS};
     use rig_shared::effects::{Effect, Kind};
 
     #[test]
@@ -150,7 +151,7 @@ mod tests {
         assert!(settings(&config, &own));
     }
 
-    fn allowed(effect: Effect<f32>) -> bool {
+    fn is_allowed(effect: Effect<f32>) -> bool {
         let mut all = Effects::default();
         all[0] = Some(effect);
         effects(&one_link().0, &Compensation::new(&all).unwrap()).is_ok()
@@ -159,14 +160,14 @@ mod tests {
     #[test]
     fn corrections_beyond_what_a_sensor_can_be_wrong_by_are_refused() {
         // As a torque: 2.5 N·m/A.
-        let offset = |torque| allowed(Effect::new(Kind::CurrentOffset, &[torque], &[]));
+        let offset = |torque| is_allowed(Effect::new(Kind::CurrentOffset, &[torque], &[]));
         assert!(offset(1.24) && offset(-1.24) && !offset(1.26) && !offset(-8.0));
-        let loss = |volts| allowed(Effect::new(Kind::DriveDeadzone, &[volts], &[]));
+        let loss = |volts| is_allowed(Effect::new(Kind::DriveDeadzone, &[volts], &[]));
         assert!(loss(2.0) && !loss(3.0) && !loss(24.0));
         // 0.5 rad of the position with one period per motor turn: order · 50 · amplitude is the share of the velocity.
         let of_motor = |order: f32, amplitude: f32| {
             let gains = [0.6 * amplitude, 0.8 * amplitude];
-            allowed(Effect::new(
+            is_allowed(Effect::new(
                 Kind::EncoderEccentricityMotor,
                 &gains,
                 &[order],
@@ -175,7 +176,7 @@ mod tests {
         assert!(of_motor(1.0, 0.0099) && !of_motor(1.0, 0.0101) && !of_motor(12.0, 0.02));
         let of_joint = |order| {
             let gains = [0.02, 0.0];
-            allowed(Effect::new(
+            is_allowed(Effect::new(
                 Kind::EncoderEccentricityJoint,
                 &gains,
                 &[order],
@@ -188,7 +189,7 @@ mod tests {
     #[test]
     fn current_loops_are_neither_too_slow_nor_too_fast() {
         let (config, mut settings) = one_link();
-        for (hertz, good) in [
+        for (hertz, valid) in [
             (1e-45_f32, false),
             (0.0, false),
             (39.0, false),
@@ -200,11 +201,11 @@ mod tests {
             (f32::NAN, false),
         ] {
             settings.gains.current_bandwidth = hertz;
-            assert_eq!(gains(&config, &settings.gains), good, "{hertz} Hz");
-            if good {
+            assert_eq!(gains(&config, &settings.gains), valid, "{hertz} Hz");
+            if valid {
                 let derived = crate::derived::Derived::new(&config, &settings);
                 let (ticks, share) = derived.lag;
-                assert!(usize::from(ticks) < GIVEN - 1, "{ticks} ticks");
+                assert!(usize::from(ticks) < HISTORY_TICKS - 1, "{ticks} ticks");
                 assert!((0.0..1.0).contains(&share));
             }
         }

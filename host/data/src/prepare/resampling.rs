@@ -8,9 +8,9 @@ use super::survey::Survey;
 use crate::block::Block;
 
 /// A recording with an even step.
-pub enum Evened<'a> {
+pub enum MaybeResampled<'a> {
     /// Its rows have an even step already.
-    AsItIs(&'a dyn Recording),
+    Unchanged(&'a dyn Recording),
     /// Its rows were interpolated.
     Resampled(Resampled<'a>),
 }
@@ -35,16 +35,16 @@ pub fn interpolation(error: &PrepareError) -> Option<(f64, String)> {
     })
 }
 
-impl Evened<'_> {
+impl MaybeResampled<'_> {
     fn inner(&self) -> &dyn Recording {
         match self {
-            Self::AsItIs(recording) => *recording,
+            Self::Unchanged(recording) => *recording,
             Self::Resampled(recording) => recording,
         }
     }
 }
 
-impl Recording for Evened<'_> {
+impl Recording for MaybeResampled<'_> {
     fn source(&self) -> Option<&dyn Recording> {
         Some(self.inner())
     }
@@ -73,14 +73,14 @@ pub fn as_recordings<R: Recording>(list: &[R]) -> Vec<&dyn Recording> {
 pub fn surveyed<'a>(
     recordings: &[&'a dyn Recording],
     joints: usize,
-) -> Result<(Vec<Survey>, Vec<Evened<'a>>), PrepareError> {
+) -> Result<(Vec<Survey>, Vec<MaybeResampled<'a>>), PrepareError> {
     let mut surveys = Vec::with_capacity(recordings.len());
     let mut usable = Vec::with_capacity(recordings.len());
     for recording in recordings {
         match Survey::take(*recording, joints) {
             Ok(survey) => {
                 surveys.push(survey);
-                usable.push(Evened::AsItIs(*recording));
+                usable.push(MaybeResampled::Unchanged(*recording));
             }
             Err(error) => {
                 let (step, note) = interpolation(&error).ok_or(error)?;
@@ -88,7 +88,7 @@ pub fn surveyed<'a>(
                 let mut survey = Survey::take(&even, joints)?;
                 survey.note = Some(note);
                 surveys.push(survey);
-                usable.push(Evened::Resampled(even));
+                usable.push(MaybeResampled::Resampled(even));
             }
         }
     }

@@ -1,32 +1,32 @@
-//! The rig's whole end of the conversation: bytes in, requests carried out, reports out.
+//! The rig's whole side of the session with the host: bytes in, requests executed, reports out.
 //!
 //! For programs without a time limit between two ticks, such as the emulated rig. On a board its three parts run
-//! separately: a task decodes and [examines](crate::examined) requests, the [`Clerk`] serves them in the tick, and the
-//! [`Desk`] makes frames of the answers in another task.
+//! separately: a task decodes and [prechecks](crate::prechecked_request) requests, the [`TickSession`] serves them in
+//! the tick, and the [`ReportSender`] encodes the answers as frames in another task.
 
 use rig_shared::wire::MessageDecoder;
 use rig_shared::wire::message::{Refusal, Request};
 
 use crate::capture::Capture;
-use crate::clerk::Clerk;
 use crate::config::Config;
-use crate::desk::Desk;
-pub use crate::desk::Transmit;
-use crate::examined::examine;
-use crate::note::Note;
+use crate::event::Event;
+use crate::prechecked_request::precheck;
+use crate::report_sender::ReportSender;
+pub use crate::report_sender::Transmit;
 use crate::state::State;
 use crate::step::Output;
+use crate::tick_session::TickSession;
 
-/// State of the conversation.
+/// State of the session.
 #[derive(Default)]
-pub struct Speaker {
+pub struct Session {
     decoder: MessageDecoder<Request>,
-    clerk: Clerk,
+    tick_session: TickSession,
     capture: Capture,
-    desk: Desk,
+    report_sender: ReportSender,
 }
 
-impl Speaker {
+impl Session {
     /// Returns the state at power on.
     pub fn new() -> Self {
         Self::default()
@@ -43,28 +43,28 @@ impl Speaker {
     ) {
         let Self {
             decoder,
-            clerk,
+            tick_session,
             capture,
-            desk,
+            report_sender,
         } = self;
-        let mut notes = |note: Note| {
-            desk.tell(config, &note, transmit);
+        let mut events = |event: Event| {
+            report_sender.send_event(config, &event, transmit);
             true
         };
         for &byte in bytes {
             // The decoder has counted a damaged frame. The host gets no answer and repeats its request.
             if let Some(Ok(request)) = decoder.push(byte)
-                && clerk
+                && tick_session
                     .serve(
                         config,
                         state,
                         capture,
-                        &examine(config, request),
-                        &mut notes,
+                        &precheck(config, request),
+                        &mut events,
                     )
                     .is_some()
             {
-                clerk.stored(state, Err(Refusal::NoStorage), &mut notes);
+                tick_session.finish_store(state, Err(Refusal::NoStorage), &mut events);
             }
         }
     }
@@ -78,13 +78,13 @@ impl Speaker {
         transmit: &mut impl Transmit,
     ) {
         let Self {
-            clerk,
+            tick_session,
             capture,
-            desk,
+            report_sender,
             ..
         } = self;
-        clerk.report(state, capture, output, &mut |note: Note| {
-            desk.tell(config, &note, transmit);
+        tick_session.report(state, capture, output, &mut |event: Event| {
+            report_sender.send_event(config, &event, transmit);
             true
         });
     }

@@ -29,14 +29,23 @@ fn what_goes_on_by_one_clock_is_one_session() {
         run(1, 195.0, &[230.0, 280.0]),
         run(3, 4000.0, &[4000.0, 4060.0]),
     ];
-    in_sessions(&mut runs, &[]);
+    join_sessions(&mut runs, &[]);
     let began: Vec<f64> = runs.iter().map(|r| r.began).collect();
     assert_eq!(began, [100.0, 100.0, 0.0, 100.0, 4000.0]);
-    let pauses = |run: &Run| run.past.0.iter().map(|p| p.1).collect::<Vec<f64>>();
-    let past: Vec<Vec<f64>> = runs.iter().map(pauses).collect();
-    assert_eq!(past, [vec![], vec![5.0], vec![], vec![5.0, 10.0], vec![]]);
+    let pauses = |run: &Run| {
+        run.thermal_history
+            .0
+            .iter()
+            .map(|p| p.1)
+            .collect::<Vec<f64>>()
+    };
+    let thermal_history: Vec<Vec<f64>> = runs.iter().map(pauses).collect();
+    assert_eq!(
+        thermal_history,
+        [vec![], vec![5.0], vec![], vec![5.0, 10.0], vec![]]
+    );
     let mut held = vec![run(0, 281.0, &[281.0, 300.0])];
-    in_sessions(&mut held, &runs);
+    join_sessions(&mut held, &runs);
     assert_eq!(held[0].began, 100.0);
     assert_eq!(pauses(&held[0]), [5.0, 10.0, 1.0]);
 }
@@ -50,15 +59,18 @@ fn of_equal_clocks_each_stretch_goes_on_from_its_own_recording() {
         runs.push(run(recording, 0.0, &[60.0, 90.0]));
     }
     runs[0].joints[0].qd.fill(2.0);
-    in_sessions(&mut runs, &[]);
+    join_sessions(&mut runs, &[]);
     for (first, second) in [(0, 1), (2, 3)] {
-        assert_eq!(runs[first].past, Past::default());
-        let own = spell_of(&runs[first]);
-        assert_eq!(runs[second].past, Past(vec![(own, 10.0)]));
+        assert_eq!(runs[first].thermal_history, ThermalHistory::default());
+        let own = segment_of(&runs[first]);
+        assert_eq!(
+            runs[second].thermal_history,
+            ThermalHistory(vec![(own, 10.0)])
+        );
     }
     let mut held = vec![run(0, 0.0, &[0.0, 50.0])];
-    in_sessions(&mut held, &runs);
-    assert_eq!(held[0].past, Past::default());
+    join_sessions(&mut held, &runs);
+    assert_eq!(held[0].thermal_history, ThermalHistory::default());
 }
 
 /// Heat over 40 s of a swinging joint and a pause: sample by sample at 1 kHz, and from the stored means.
@@ -80,12 +92,12 @@ fn heat_by_means_is_heat_sample_by_sample() {
         };
         effect.torque(&mut memory, &at);
     }
-    let exact = effect.rested(memory, 8.0).0[0];
+    let exact = effect.after_pause(memory, 8.0).0[0];
     let mut runs = vec![run(0, 0.0, &[0.0, 39.999]), run(1, 47.999, &[47.999, 60.0])];
     (runs[0].rate, runs[0].joints[0].qd) = (1000.0, qd);
-    in_sessions(&mut runs, &[]);
-    let kept = runs[1].past.remembered(&effect, 0, friction).0[0];
+    join_sessions(&mut runs, &[]);
+    let kept = runs[1].thermal_history.state_after(&effect, 0, friction).0[0];
     assert!((kept / exact - 1.0).abs() < 0.01, "{kept} {exact}");
-    let cold = Past::default().remembered(&effect, 0, friction);
+    let cold = ThermalHistory::default().state_after(&effect, 0, friction);
     assert_eq!(cold, Memory::default());
 }

@@ -12,8 +12,8 @@ use super::array::{exact, exact_or_none};
 /// In the plane of the crank, its axle at the origin: the tip lies at crank·(cos ψ, sin ψ) with ψ = Σ c_j·q_j + offset,
 /// the anchor at (x, y). The motor turns by (2π/lead)·distance (Kozłowski 1998, joints 2 and 3 of the IRp-6).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Screw {
+#[serde(deny_unknown_fields, expecting = "struct Screw")]
+pub struct BallScrewCrank {
     /// Screw lead, m per motor turn; negative if the screw shortens as the motor turns forwards.
     pub lead: f64,
     /// m
@@ -35,7 +35,7 @@ pub struct Screw {
     pub range: Option<[f64; 2]>,
 }
 
-impl Screw {
+impl BallScrewCrank {
     /// Returns the map with distance² = s + m·cos ψ − n·sin ψ.
     pub(super) fn map<'a>(&self, weights: &'a [f64]) -> ScrewMap<'a> {
         let [x, y] = self.anchor;

@@ -21,12 +21,12 @@ pub(super) fn oversized(joints: &[Joint]) -> Option<(usize, Fault)> {
 
 fn of_joint(joints: &[Joint], k: usize) -> Option<Fault> {
     let joint = &joints[k];
-    let length = |way: Vec<Step>, what: String, value: f64| {
+    let length = |key_path: Vec<Step>, what: String, value: f64| {
         (value.abs() > LARGEST_LINK).then(|| Fault {
-            way,
+            key_path,
             what,
             found: format!("{} m", written(value)),
-            right: too_long(value),
+            advice: too_long(value),
         })
     };
     let name = &joint.name;
@@ -51,27 +51,27 @@ fn of_joint(joints: &[Joint], k: usize) -> Option<Fault> {
     let inertial = joint.inertial.as_ref().filter(|i| i.mass > 0.0)?;
     let [x, y, _] = inertial.first_moment;
     let off = x.hypot(y) / inertial.mass;
-    let way = |key| vec![Step::Key("inertial"), Step::Key(key)];
+    let key_path = |key| vec![Step::Key("inertial"), Step::Key(key)];
     if off > LARGEST_LINK {
         return Some(Fault {
-            way: way("first_moment"),
+            key_path: key_path("first_moment"),
             what: format!(
                 "the distance of the centre of mass of the link of joint `{name}` from its axis"
             ),
             found: format!("{} m", format_significant(off, 4)),
-            right: too_long(off),
+            advice: too_long(off),
         });
     }
     let (_, about_centre) = SpatialInertia::of(inertial).about_centre()?;
     let largest = about_centre.amax();
     Some(Fault {
-        way: way("inertia"),
+        key_path: key_path("inertia"),
         what: format!("the inertia of the link of joint `{name}` about its centre of mass"),
         found: format!("{} kg·m²", format_significant(largest, 4)),
-        right: too_wide(largest, inertial.mass)?,
+        advice: too_wide(largest, inertial.mass)?,
     })
 }
 
 #[cfg(test)]
-#[path = "sizes_test.rs"]
+#[path = "unit_check_test.rs"]
 mod tests;

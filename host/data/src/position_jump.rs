@@ -1,67 +1,68 @@
 //! Position jumps from one row to the next: a lost count, an angle that wraps after a turn, two joined recordings.
 
 /// Number of row intervals whose median speed is the local speed of the joint.
-const SPAN: usize = 8;
+const SPAN_ROWS: usize = 8;
 /// Minimum ratio of a jump to the largest other motion from row to row …
-const FASTER: f64 = 3.0;
+const MIN_MOTION_RATIO: f64 = 3.0;
 /// … and to the changes by noise and acceleration (99th percentile), and to the smallest change.
-const LARGER: f64 = 20.0;
+const MIN_NOISE_RATIO: f64 = 20.0;
 
 /// The largest jump of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Jump {
+pub(super) struct PositionJump {
     /// Row before the jump.
     pub row: usize,
     /// Change of position minus that of the motion around it.
-    pub by: f64,
+    pub change: f64,
     /// Number of jumps.
     pub count: usize,
     /// Largest change from row to row without the jumps.
-    pub fastest: f64,
+    pub largest_motion_step: f64,
 }
 
 /// Returns true if a column has a jump.
-pub fn jumps(t: &[f64], q: &[f64]) -> bool {
-    jump(t, q).is_some()
+pub fn has_position_jump(t: &[f64], q: &[f64]) -> bool {
+    largest_position_jump(t, q).is_some()
 }
 
 /// Returns the largest jump of `q` over `t`, if any. Returns `None` if there are too few rows to know the motion.
-pub(super) fn jump(t: &[f64], q: &[f64]) -> Option<Jump> {
+pub(super) fn largest_position_jump(t: &[f64], q: &[f64]) -> Option<PositionJump> {
     let steps: Vec<[f64; 2]> = (t.windows(2).zip(q.windows(2)))
         .map(|(t, q)| [t[1] - t[0], q[1] - q[0]])
         .collect();
-    let parts = steps.chunks_exact(SPAN);
-    if parts.len() < LARGER as usize {
+    let spans = steps.chunks_exact(SPAN_ROWS);
+    if spans.len() < MIN_NOISE_RATIO as usize {
         return None;
     }
-    let (mut apart, mut fastest) = (Vec::with_capacity(steps.len()), 0.0f64);
-    for part in parts {
-        let mut speeds: Vec<f64> = part.iter().map(|[dt, dq]| dq / dt).collect();
+    let (mut deviations, mut largest_motion_step) = (Vec::with_capacity(steps.len()), 0.0f64);
+    for span in spans {
+        let mut speeds: Vec<f64> = span.iter().map(|[dt, dq]| dq / dt).collect();
         speeds.sort_by(f64::total_cmp);
-        let speed = 0.5 * (speeds[SPAN / 2 - 1] + speeds[SPAN / 2]);
-        for [dt, dq] in part {
-            fastest = fastest.max((speed * dt).abs());
-            apart.push(dq - speed * dt);
+        let speed = 0.5 * (speeds[SPAN_ROWS / 2 - 1] + speeds[SPAN_ROWS / 2]);
+        for [dt, dq] in span {
+            largest_motion_step = largest_motion_step.max((speed * dt).abs());
+            deviations.push(dq - speed * dt);
         }
     }
-    let mut sizes: Vec<f64> = apart.iter().map(|x| x.abs()).collect();
+    let mut sizes: Vec<f64> = deviations.iter().map(|x| x.abs()).collect();
     sizes.sort_by(f64::total_cmp);
-    let usual = sizes[sizes.len() - 1 - sizes.len() / 100];
-    let least = steps
+    let usual_change = sizes[sizes.len() - 1 - sizes.len() / 100];
+    let smallest_change = steps
         .iter()
         .map(|[_, dq]| dq.abs())
         .filter(|dq| *dq > 0.0)
         .fold(f64::INFINITY, f64::min);
-    let above = (FASTER * fastest).max(LARGER * usual.max(least));
-    let count = apart.iter().filter(|x| x.abs() > above).count();
-    let (row, by) = (0..)
-        .zip(apart)
+    let threshold = (MIN_MOTION_RATIO * largest_motion_step)
+        .max(MIN_NOISE_RATIO * usual_change.max(smallest_change));
+    let count = deviations.iter().filter(|x| x.abs() > threshold).count();
+    let (row, change) = (0..)
+        .zip(deviations)
         .max_by(|a: &(usize, f64), b| a.1.abs().total_cmp(&b.1.abs()))?;
-    (count > 0).then_some(Jump {
+    (count > 0).then_some(PositionJump {
         row,
-        by,
+        change,
         count,
-        fastest,
+        largest_motion_step,
     })
 }
 
@@ -83,11 +84,11 @@ mod tests {
         for step in [1e-3, 5e-3] {
             for count in [1e-12, 1e-4, 5e-3] {
                 let (t, mut q) = motion(step, count);
-                assert_eq!(jump(&t, &q), None, "{step} {count}");
+                assert_eq!(largest_position_jump(&t, &q), None, "{step} {count}");
                 q[2345..].iter_mut().for_each(|q| *q -= 0.3);
-                let found = jump(&t, &q).unwrap();
+                let found = largest_position_jump(&t, &q).unwrap();
                 assert_eq!((found.row, found.count), (2344, 1));
-                assert!((found.by + 0.3).abs() < 0.02, "{found:?}");
+                assert!((found.change + 0.3).abs() < 0.02, "{found:?}");
             }
         }
         // At rest, except for the last count of the encoder.
@@ -96,9 +97,9 @@ mod tests {
         for k in (0..q.len()).step_by(701) {
             q[k] += 1e-4;
         }
-        assert_eq!(jump(&t, &q), None);
+        assert_eq!(largest_position_jump(&t, &q), None);
         // Rest, then a sudden start.
         let q: Vec<f64> = t.iter().map(|t| (t - 3.9).max(0.0)).collect();
-        assert_eq!(jump(&t, &q), None);
+        assert_eq!(largest_position_jump(&t, &q), None);
     }
 }

@@ -6,10 +6,10 @@ use super::chain::Chain;
 use crate::robot::error::RobotError;
 use crate::robot::inertia::negative_inertia;
 use crate::robot::serial_robot::Robot;
-use crate::robot::sizes::oversized;
+use crate::robot::unit_check::oversized;
 
 /// Refuses a chain whose links, as `joints` describe them, are larger than any real link.
-pub(in crate::robot) fn check_sizes(
+pub(in crate::robot) fn check_units(
     chain: &Chain,
     robot: &Robot,
     path: &Path,
@@ -21,7 +21,7 @@ pub(in crate::robot) fn check_sizes(
             place: chain.bodies[k].place,
             what: fault.what,
             found: fault.found,
-            right: fault.right,
+            advice: fault.advice,
         }),
     }
 }

@@ -9,21 +9,21 @@ use crate::state::State;
 use crate::window::{Tick, Window};
 
 /// Place of `off` among the parameters: [`rig_shared::link::PARAMETER_NAMES`].
-const OFFSET: usize = PARAMETER_COUNT - 1;
+const OFFSET_INDEX: usize = PARAMETER_COUNT - 1;
 
 /// Feeds the on-line estimator when a window is full, and reports at its own, slower rate.
 ///
 /// Velocity is the difference of two windows' mean positions. So position and torque are averaged over the same two
 /// windows: all belong to the instant between them, and no column lags another.
-pub(super) fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
+pub(super) fn feed_estimator(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
     // In the tick after an update, because the update has a high load.
-    let due = core::mem::take(&mut state.report_due);
-    update(config, state, tick);
-    due.then(|| estimate_report(state))
+    let report_due = core::mem::take(&mut state.report_due);
+    accumulate(config, state, tick);
+    report_due.then(|| estimate_report(state))
 }
 
 /// Fills a window; updates the estimator when it is full.
-fn update(config: &Config, state: &mut State, tick: &Tick) {
+fn accumulate(config: &Config, state: &mut State, tick: &Tick) {
     // Half a window later than the telemetry's, so that one tick never completes both. It starts at an odd tick, so
     // that windows of an even number of ticks end in even ticks, in which no effect is turned or evaluated.
     if state.tick < u64::from((config.rates.estimator_decimation / 2) | 1) {
@@ -33,19 +33,19 @@ fn update(config: &Config, state: &mut State, tick: &Tick) {
         .estimation
         .push(tick, config.rates.estimator_decimation);
     let Some(window) = window else { return };
-    if state.forget {
-        state.forget = false;
-        state.previous = None;
+    if state.restart_due {
+        state.restart_due = false;
+        state.previous_window = None;
         state.estimator.restart();
         return;
     }
     // With the bridge off a hand may move the link, and after a fault the readings are in doubt: neither is information
     // on the rig's parameters.
     if !state.mode.drives() {
-        state.previous = None;
+        state.previous_window = None;
         state.estimator.interrupt();
-    } else if let Some(before) = state.previous.replace(window) {
-        learn(config, state, &before, &window);
+    } else if let Some(previous) = state.previous_window.replace(window) {
+        update_estimate(config, state, &previous, &window);
     }
     if state.mode == Mode::Calibrating {
         return;
@@ -62,18 +62,18 @@ fn update(config: &Config, state: &mut State, tick: &Tick) {
 ///
 /// Not inlined: one tick in ten runs it, and `firmware/fast_code.list` ranks it apart from the rest of the tick.
 #[inline(never)]
-fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
+fn update_estimate(config: &Config, state: &mut State, previous: &Window, window: &Window) {
     let ticks = f32::from(config.rates.estimator_decimation);
     let per_count = state.derived.radians_per_count / ticks;
-    let errors = [before, window].map(|w| w.mean(w.position_error));
+    let errors = [previous, window].map(|w| w.mean(w.position_error));
     // The difference is computed in integers: exact at any position.
-    let qd = ((window.position - before.position) as f32 * per_count - (errors[1] - errors[0]))
+    let qd = ((window.position - previous.position) as f32 * per_count - (errors[1] - errors[0]))
         / state.derived.estimator_period;
     let q =
-        0.5 * ((window.position + before.position) as f32 * per_count - (errors[0] + errors[1]));
-    let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
+        0.5 * ((window.position + previous.position) as f32 * per_count - (errors[0] + errors[1]));
+    let current = 0.5 * (window.mean(window.current) + previous.mean(previous.current));
     // Torque explained by effects is removed; otherwise the model's parameters would absorb it.
-    let explained = 0.5 * (window.mean(window.explained) + before.mean(before.explained));
+    let explained = 0.5 * (window.mean(window.explained) + previous.mean(previous.explained));
     let torque = (current - state.current_error) * state.derived.torque_per_ampere - explained;
     state.estimator.step(q, qd, torque);
 }
@@ -81,20 +81,21 @@ fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
 /// Returns the estimate in wire format.
 fn estimate_report(state: &State) -> Estimate {
     let report = state.estimator.report();
-    let mut estimate = Estimate {
+    let mut feed_estimator = Estimate {
         tick: state.tick,
         value: [0.0; PARAMETER_COUNT],
         std: [0.0; PARAMETER_COUNT],
         trusted: [false; PARAMETER_COUNT],
         residual_rms: report.residual_rms,
     };
-    estimate.value = report.value;
-    estimate.std = report.std;
+    feed_estimator.value = report.value;
+    feed_estimator.std = report.std;
     // The current offset was measured from finitely many samples. Its error is a constant torque that no motion shows,
     // and enters only `off`.
     let measured = state.calibration.std * state.derived.torque_per_ampere;
-    estimate.std[OFFSET] =
-        libm::sqrtf(estimate.std[OFFSET] * estimate.std[OFFSET] + measured * measured);
-    estimate.trusted = report.trusted;
-    estimate
+    feed_estimator.std[OFFSET_INDEX] = libm::sqrtf(
+        feed_estimator.std[OFFSET_INDEX] * feed_estimator.std[OFFSET_INDEX] + measured * measured,
+    );
+    feed_estimator.trusted = report.trusted;
+    feed_estimator
 }

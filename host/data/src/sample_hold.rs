@@ -9,13 +9,13 @@
 //! Not detected: a rate above two thirds of the recording's rate, where most values fill one row.
 
 /// Minimum size of the changes on both sides of a repeated value, in sensor steps (the smallest change of the column).
-const CLEAR_CHANGE: f64 = 2.5;
+const MIN_CHANGE_STEPS: f64 = 2.5;
 /// Minimum number of values between clear changes.
-const FEWEST: usize = 20;
+const MIN_CHANGES: usize = 20;
 
 /// Returns the median number of rows in which `values` keep one value between two clear changes. Returns `None` if that
 /// is one row, or if there are too few clear changes.
-pub(super) fn held(values: &[f64]) -> Option<usize> {
+pub(super) fn repeated_rows(values: &[f64]) -> Option<usize> {
     let changes: Vec<(usize, f64)> = (values.windows(2).enumerate())
         .map(|(row, pair)| (row, (pair[1] - pair[0]).abs()))
         .filter(|(_, by)| *by > 0.0)
@@ -24,13 +24,13 @@ pub(super) fn held(values: &[f64]) -> Option<usize> {
         .iter()
         .map(|(_, by)| *by)
         .fold(f64::INFINITY, f64::min);
-    let clear = |(_, by): &(usize, f64)| *by > CLEAR_CHANGE * step;
+    let is_clear = |(_, by): &(usize, f64)| *by > MIN_CHANGE_STEPS * step;
     let mut rows: Vec<usize> = changes
         .windows(2)
-        .filter(|pair| pair.iter().all(clear))
+        .filter(|pair| pair.iter().all(is_clear))
         .map(|pair| pair[1].0 - pair[0].0)
         .collect();
-    if rows.len() < FEWEST {
+    if rows.len() < MIN_CHANGES {
         return None;
     }
     let middle = rows.len() / 2;
@@ -60,10 +60,10 @@ mod tests {
     fn repeated_samples_are_found_whatever_their_number() {
         for count in [1e-12, 1e-5, 2e-4] {
             let clean = motion(12_000, count);
-            assert_eq!(held(&clean), None, "{count}");
+            assert_eq!(repeated_rows(&clean), None, "{count}");
             for n in [2, 3, 4, 5, 10, 20] {
                 let stairs: Vec<f64> = (0..clean.len()).map(|k| clean[k - k % n]).collect();
-                assert_eq!(held(&stairs), Some(n), "{count} {n}");
+                assert_eq!(repeated_rows(&stairs), Some(n), "{count} {n}");
             }
         }
     }
@@ -80,13 +80,17 @@ mod tests {
             }
             stairs.push(last);
         }
-        assert!(matches!(held(&stairs), Some(2..=4)), "{:?}", held(&stairs));
+        assert!(
+            matches!(repeated_rows(&stairs), Some(2..=4)),
+            "{:?}",
+            repeated_rows(&stairs)
+        );
     }
 
     #[test]
     fn coarse_encoders_rests_and_coarse_converters_are_no_stairs() {
         // An encoder count of 5 mrad at 1 kHz: one value fills many rows, and each change is one count.
-        assert_eq!(held(&motion(12_000, 5e-3)), None);
+        assert_eq!(repeated_rows(&motion(12_000, 5e-3)), None);
         // Steps and dwells of a staircase motion, with noise of three counts.
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
         let rests: Vec<f64> = (0..12_000)
@@ -95,7 +99,7 @@ mod tests {
                 place + (3e-4 * (rng.random::<f64>() - 0.5) / 1e-4).round() * 1e-4
             })
             .collect();
-        assert_eq!(held(&rests), None);
+        assert_eq!(repeated_rows(&rests), None);
         // A torque in converter counts, with noise of two counts.
         let torque: Vec<f64> = (0..12_000)
             .map(|k| {
@@ -103,6 +107,6 @@ mod tests {
                 ((2.0 * (3.0 * t).sin() + 0.08 * (rng.random::<f64>() - 0.5)) / 0.02).round() * 0.02
             })
             .collect();
-        assert_eq!(held(&torque), None);
+        assert_eq!(repeated_rows(&torque), None);
     }
 }

@@ -8,7 +8,7 @@ use crate::effects::{Channel, Kind};
 impl Role {
     /// Returns the role of this kind; `None` if it cannot be compensated.
     pub const fn of(kind: Kind) -> Option<Self> {
-        Self::by(kind.about())
+        Self::from_about(kind.about())
     }
 
     /// Returns why this kind is not compensated, and what to do instead; `None` if it is compensated.

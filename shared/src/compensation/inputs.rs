@@ -6,7 +6,7 @@ use crate::trajectory::Reference;
 
 /// Inputs of the compensation in a control tick. Joint-side, SI.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Now<T> {
+pub struct Inputs<T> {
     /// Desired motion of the link.
     pub reference: Reference<T>,
     /// Measured position, rad.
@@ -20,12 +20,12 @@ pub struct Now<T> {
     /// Motor angle within one turn, rad, without the rounding error of many turns.
     pub angle_in_turn: T,
     /// True if the position is known. Otherwise effects that depend on the position give no torque.
-    pub placed: bool,
+    pub position_known: bool,
     /// True if the tick has no time for a law: all laws then hold their values.
     pub busy: bool,
     /// True if the periodic effects are updated by their angle in this tick, as every tick that is not busy must do.
     /// Otherwise they are extrapolated along a parabola.
-    pub turns: bool,
+    pub rotates_waves: bool,
     /// Torque that the drive gives, N·m.
     pub drive_torque: T,
     /// Torque that the gear transmits, without the torque of effects, N·m.
@@ -37,18 +37,18 @@ pub struct Now<T> {
     /// Running time, s.
     pub time: T,
     /// Temperature above that at the start, K.
-    pub warming: T,
+    pub temperature_rise: T,
     /// Time since the last tick that was not busy, s.
     pub period: T,
     /// Delay until an ordered torque acts, s.
-    pub lead: T,
-    /// Whole ticks of that delay, below [`GIVEN`](super::GIVEN) − 1.
-    pub lead_ticks: u8,
+    pub torque_delay: T,
+    /// Whole ticks of that delay, below [`HISTORY_TICKS`](super::HISTORY_TICKS) − 1.
+    pub delay_ticks: u8,
     /// The fraction of a tick that remains of that delay.
-    pub lead_share: T,
+    pub delay_fraction: T,
 }
 
-impl<T: Real> Now<T> {
+impl<T: Real> Inputs<T> {
     /// Returns the motor's angle: within a turn for `whole` orders, else over all turns.
     #[inline(always)]
     pub(super) fn angle(&self, whole: bool) -> T {
@@ -81,10 +81,10 @@ impl<T: Real> Now<T> {
             load: self.load,
             friction: T::ZERO,
             time: self.time,
-            warming: self.warming,
+            temperature_rise: self.temperature_rise,
             other: [T::ZERO; 3],
             period: self.period,
-            beside: T::ZERO,
+            extra_friction_ratio: T::ZERO,
         }
     }
 }

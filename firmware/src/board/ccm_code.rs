@@ -5,7 +5,7 @@ use core::arch::global_asm;
 // In assembly because it runs before any variable has its value. A copying loop in Rust may become a call of a function
 // that is itself among the copied code. Section and lengths (whole words) come from build.rs.
 #[allow(unsafe_code)]
-mod before_everything {
+mod pre_init {
     use super::global_asm;
 
     global_asm!(

@@ -1,36 +1,36 @@
-//! Messages of a control tick, small enough for a queue; other code converts them to bytes.
+//! Events of a control tick, small enough for a queue; other code converts them to bytes.
 
 use rig_shared::safety::{FaultRecord, SnapshotSample};
 use rig_shared::wire::message::{Acknowledge, Estimate, Health, StateSample};
 
-/// One message for the host.
+/// One event to report to the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(clippy::large_enum_variant)] // the estimate is 70 bytes; a queue of notes is small all the same
-pub enum Note {
+#[allow(clippy::large_enum_variant)] // the estimate is 70 bytes; a queue of events is small all the same
+pub enum Event {
     /// A request has been answered.
-    Answer(Acknowledge, Topic),
-    /// A telemetry window is complete. `missed` windows before it found the queue full.
+    Answer(Acknowledge, FollowUp),
+    /// A telemetry window is complete. `missed_windows` windows before it found the queue full.
     Sample {
         /// The window's mean.
         sample: StateSample,
         /// Windows lost before it.
-        missed: u32,
+        missed_windows: u32,
     },
     /// The on-line estimate.
     Estimate(Estimate),
     /// A fault has latched.
     Fault(FaultRecord),
     /// One control tick of the fault snapshot.
-    Snapshot(Kept),
+    Snapshot(RecordedTick),
     /// One control tick of the triggered capture.
-    Capture(Kept),
+    Capture(RecordedTick),
     /// State of the board.
     Health(Health),
 }
 
-/// Consequence of an accepted request for the conversation.
+/// Consequence of an accepted request for the session.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Topic {
+pub enum FollowUp {
     /// Nothing.
     None,
     /// The greeting is due.
@@ -43,9 +43,9 @@ pub enum Topic {
     Snapshot(Option<FaultRecord>),
 }
 
-/// One kept control tick with its place.
+/// One recorded control tick with its index.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kept {
+pub struct RecordedTick {
     /// Index, 0 the oldest.
     pub index: u16,
     /// Number of ticks kept; 0 if there are none: `sample` is then not valid.
