@@ -93,8 +93,19 @@ fn staged_motions_keep_the_limits_and_every_kind_survives_its_file() {
             trajectory: Trajectory::Hold(123_457),
         }],
     });
+    let mut seeded = files[0].clone();
+    seeded.design.as_mut().unwrap().seed = u64::MAX;
+    files.push(seeded);
     let folder = tempfile::tempdir().unwrap();
     for file in files {
+        let text = file.to_toml(&robot);
+        let mut values = text
+            .lines()
+            .filter(|l| !l.is_empty() && !l.starts_with('['));
+        assert!(
+            values.all(|l| l.contains(" # ") && !l.contains('{')),
+            "{text}"
+        );
         let path = folder.path().join("t.toml");
         file.save(&path, &robot, 1000.0).unwrap();
         assert_eq!(TrajectoryFile::load(&path).unwrap(), file);

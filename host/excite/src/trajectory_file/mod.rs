@@ -5,6 +5,7 @@ mod read;
 mod reference;
 mod samples;
 mod storage;
+mod text;
 mod write;
 
 pub use content::{COASTING, DesignRecord, JointTrajectory, TrajectoryFile};

@@ -6,88 +6,12 @@ use rig_shared::trajectory::{
     AMPLITUDES, Chirp, Fourier, FrictionSweep, HARMONICS, LEVELS, SPEEDS, SlowReversals, Staircase,
     Sweep, Trajectory,
 };
-use serde::Deserialize;
 use toml::Spanned;
 
 use super::content::{DesignRecord, JointTrajectory, TrajectoryFile};
+use super::text::{DesignText, FileText, JointText, MotionText};
 use crate::{Criterion, ExciteError};
 use rig_model::robot::Place;
-
-/// The file's TOML structure; all times in seconds.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileText {
-    robot: String,
-    #[serde(default)]
-    design: Option<Spanned<DesignText>>,
-    #[serde(default)]
-    drive_off: Option<Spanned<f64>>,
-    #[serde(rename = "joint")]
-    joints: Vec<JointText>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DesignText {
-    criterion: String,
-    value: f64,
-    condition_number: f64,
-    seed: u64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct JointText {
-    name: String,
-    start: Spanned<f64>,
-    trajectory: Spanned<MotionText>,
-}
-
-#[derive(Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-enum MotionText {
-    Hold {
-        duration: f64,
-    },
-    Fourier {
-        period: f64,
-        periods: u16,
-        ramp: f64,
-        sine: Vec<f64>,
-        cosine: Vec<f64>,
-    },
-    Chirp {
-        start_hz: f64,
-        end_hz: f64,
-        sweep: String,
-        duration: f64,
-        ramp: f64,
-        amplitude: f64,
-        velocity: f64,
-        acceleration: f64,
-        #[serde(default)]
-        again: f64,
-    },
-    Staircase {
-        levels: Vec<f64>,
-        #[serde(rename = "move")]
-        moving: f64,
-        dwell: f64,
-    },
-    Reversals {
-        speed: f64,
-        half_turn: f64,
-        quarter: Vec<f64>,
-        cycles: u16,
-    },
-    Sweep {
-        half_span: f64,
-        cruise: Vec<f64>,
-        ramp: f64,
-        dwell: f64,
-        lead: f64,
-    },
-}
 
 /// Converts a time to whole microseconds, exactly.
 fn micros(name: &str, seconds: f64) -> Result<u32, String> {

@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::fault::{Fault, Step};
-use super::toml_lines::{float, line, list};
 
 /// Largest torque lead, s. A torque that acts later than this belongs to another motion.
 pub const MOST_LEAD: f64 = 1.0;
@@ -73,36 +72,6 @@ impl IdentifiedBand {
                 "speeds must be numbers not below 0, in rad/s or m/s",
             ),
             None => Ok(()),
-        }
-    }
-
-    pub(super) fn write(&self, out: &mut String) {
-        out.push_str("\n[identified]\n");
-        line(
-            out,
-            "cutoff",
-            &float(self.cutoff),
-            "Hz, low-pass on the position that the values above were found with",
-        );
-        line(
-            out,
-            "rate",
-            &float(self.rate),
-            "rows per second after the low-pass over torque and regressor",
-        );
-        line(
-            out,
-            "min_speed",
-            &list(&self.min_speed),
-            "rad/s or m/s by joint; slower rows were left out",
-        );
-        if self.torque_lead != 0.0 {
-            line(
-                out,
-                "torque_lead",
-                &float(self.torque_lead),
-                "s, how much later the recorded torque acts",
-            );
         }
     }
 }

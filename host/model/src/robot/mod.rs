@@ -37,7 +37,6 @@ mod right_angle;
 mod serial_robot;
 mod templates;
 mod text;
-mod toml_lines;
 mod unit_check;
 mod unlikely;
 mod urdf;

@@ -88,6 +88,70 @@ fn everything_optional_survives_writing() {
 }
 
 #[test]
+fn every_written_value_has_its_comment_in_the_joint_s_units() {
+    let shipped = [ONE_LINK_TEMPLATE, EDDA_TEMPLATE, IRP6_TEMPLATE, TX40, XL330];
+    let load = |text: &str| Robot::from_toml(text, Path::new("x.toml")).unwrap();
+    let mut robots: Vec<Robot> = shipped.map(load).to_vec();
+    let mut full = robots[4].clone();
+    full.workspace = vec![Region {
+        joint: full.joints[0].name.clone(),
+        point: [0.0; 3],
+        min: Some([-1.0; 3]),
+        max: Some([1.0; 3]),
+        normal: Some([0.0, 0.0, 1.0]),
+        beyond: Some(0.1),
+    }];
+    full.identified = Some(IdentifiedBand {
+        cutoff: 20.0,
+        rate: 200.0,
+        min_speed: vec![0.05],
+        torque_lead: 1e-3,
+    });
+    let joint = &mut full.joints[0];
+    joint.friction = Some(JointFriction::default());
+    joint.controller = Some(Controller {
+        position_gain: 1.0,
+        velocity_gain: 2.0,
+        torque_gain: 3.0,
+    });
+    joint.limits.as_mut().unwrap().soft_position = Some([-0.5, 0.5]);
+    joint.voltage_controller = Some(VoltageController {
+        proportional: 1.0,
+        integral: 0.1,
+        derivative: 0.2,
+        velocity_feedforward: 0.3,
+        acceleration_feedforward: 0.4,
+        bias: 0.5,
+        limit: Some(0.9),
+        anti_windup: AntiWindup::Clamping,
+        supply: [12.0, -1.0],
+    });
+    let drive = joint.drive.as_mut().unwrap();
+    (
+        drive.zero,
+        drive.joint_inertia,
+        drive.coulomb,
+        drive.viscous,
+    ) = (0.1, 1e-300, 1e-3, 1e-5);
+    drive.duty_full_scale = Some(885.0);
+    (drive.inductance, drive.pole_pairs) = (Some(1e-3), Some(7));
+    let mut slide = full.clone();
+    slide.joints[0].kind = JointKind::Prismatic;
+    robots.extend([full, slide]);
+    for robot in robots {
+        let text = robot.to_toml().unwrap();
+        let values = text
+            .lines()
+            .filter(|l| !l.is_empty() && !l.starts_with('['));
+        for line in values {
+            let (value, comment) = line.split_once(" # ").unwrap_or((line, ""));
+            assert!(value.len() >= 40 && !comment.is_empty(), "{line}");
+            assert!(!comment.contains('{'), "{line}");
+        }
+    }
+}
+
+#[test]
 fn wrong_toml_is_named_by_line_and_mend() {
     let cases: [(&str, &str, &[&str]); 18] = [
         (
