@@ -6,7 +6,7 @@ use rig_shared::effects::Kind;
 use serde::Serialize;
 
 use super::error::BenchError;
-use rig_diagnose::experiment::PULLS_OFF;
+use rig_diagnose::experiment::ExperimentKind;
 use rig_diagnose::outcome::{Diagnosis, Value, Verdict};
 use rig_scenario::Made;
 
@@ -39,10 +39,10 @@ pub struct Answer {
 }
 
 /// An experiment that a method proposes.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Proposed {
     /// Kind of experiment.
-    pub kind: String,
+    pub kind: ExperimentKind,
     /// Names that the experiment should separate.
     pub separates: Vec<String>,
     /// Motion as a [`rig_excite::TrajectoryFile`], if the rig can run it unchanged or without external loads.
@@ -115,10 +115,10 @@ impl Answer {
                 .map(|n| n.effect.clone())
                 .collect(),
             next: diagnosis.next_experiment.as_ref().map(|next| Proposed {
-                kind: next.kind.clone(),
+                kind: next.kind,
                 separates: next.separates.clone(),
                 trajectory: (next.trajectory.clone())
-                    .filter(|_| !next.hands || next.kind == PULLS_OFF),
+                    .filter(|_| !next.hands || next.kind == ExperimentKind::PullsOff),
             }),
         }
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::answer::{Answer, Method};
 use super::cases::Case;
 use super::error::BenchError;
-use rig_diagnose::experiment::{FILE, Family, OFF_LOG, PULLS_OFF};
+use rig_diagnose::experiment::{ExperimentKind, FILE, Family};
 use rig_excite::TrajectoryFile;
 use rig_scenario::Made;
 use rig_scenario::ScenarioError;
@@ -39,13 +39,12 @@ pub(super) fn follow(
         failure: None,
     };
     let more = match &next.trajectory {
-        Some(trajectory) if next.kind == PULLS_OFF => Some(unburdened(case, made, trajectory)),
-        Some(trajectory) if next.kind == Family::LockedRotor.name() => {
-            Some(clamped(case, made, trajectory))
-        }
-        Some(trajectory) => Some(moved(case, made, trajectory)),
-        None if next.kind == OFF_LOG => Some(at_rest(case, made)),
-        None => None,
+        Some(trajectory) => Some(match next.kind {
+            ExperimentKind::PullsOff => unburdened(case, made, trajectory),
+            ExperimentKind::Motion(Family::LockedRotor) => clamped(case, made, trajectory),
+            _ => moved(case, made, trajectory),
+        }),
+        None => (next.kind == ExperimentKind::DriveOffLog).then(|| at_rest(case, made)),
     };
     match more.map(|more| method.answer(&more?, &case.without)) {
         Some(Ok(answer)) => followed.answer = Some(answer),

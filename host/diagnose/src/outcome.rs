@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::experiment::ExperimentKind;
 use rig_output::{format_significant, format_unit, format_value};
 
 /// Difference below which two shares of a gap are printed as equal.
@@ -290,8 +291,8 @@ pub struct Detectable {
 /// Experiment that would separate the names of a set, or make an effect testable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextExperiment {
-    /// Its primitive.
-    pub kind: String,
+    /// Its kind.
+    pub kind: ExperimentKind,
     /// Names that it separates, or the effect that it makes testable.
     pub separates: Vec<String>,
     /// Instructions, sentences.

@@ -73,17 +73,4 @@ impl Hands {
             Self::BaseOnItsSide => &[[1.0, 1.0], [1.0, 0.0]],
         }
     }
-
-    /// Returns sentences: the work, and how to use the recordings.
-    pub(crate) fn text(self) -> &'static str {
-        match self {
-            Self::None => "Give what it records with --data beside the others.",
-            Self::Payload => {
-                "Record it twice: as the robot is, and with a payload of about half the link's mass fixed to it. Diagnose each by itself, the second with the payload in its description."
-            }
-            Self::BaseOnItsSide => {
-                "Record it twice: as the robot stands, and with the base turned on its side so that the joint's axis is vertical. Diagnose each by itself, the second with `gravity` along that axis in its description."
-            }
-        }
-    }
 }

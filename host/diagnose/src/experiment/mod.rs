@@ -11,6 +11,7 @@
 mod choice;
 mod criterion;
 mod family;
+mod kind;
 mod lookup;
 mod next;
 mod nominal;
@@ -18,14 +19,16 @@ mod pairs;
 mod place;
 mod primitives;
 mod proposal;
+mod sentences;
 pub mod testable;
 #[cfg(test)]
 mod tests;
 
 pub use criterion::FLOOR_RATE;
 pub use family::{Family, Hands};
-pub use lookup::{OFF_LOG, PULLS_OFF};
+pub use kind::ExperimentKind;
 pub use next::next;
 pub use nominal::{Held, Nominal};
 pub(crate) use pairs::exact;
-pub use proposal::{FILE, Proposal};
+pub use proposal::Proposal;
+pub use sentences::FILE;

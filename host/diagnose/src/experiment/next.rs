@@ -40,8 +40,8 @@ pub fn next(
     }
     let by = |pair: &Pair| split(kinds(*pair));
     // Experiments without manual work come first, and before them the one without motion.
-    let alone = same.iter().find(|p| !by(p).hands);
-    if apart.is_empty() || alone.is_some_and(|p| by(p).kind == Remedy::DriveOffLog) {
+    let alone = same.iter().find(|p| !by(p).needs_hands());
+    if apart.is_empty() || alone.is_some_and(|p| by(p) == Remedy::DriveOffLog) {
         return Ok(alone.or(same.first()).map(|p| lookup(*p)));
     }
     let found = place.as_ref().and_then(|place| best(place, rivals, floor));
@@ -55,7 +55,7 @@ pub fn next(
                     nearest(&course, rivals, place.revolute, floor).map(|(_, pair)| pair)
                 });
             let told = nearest.and_then(|pair| told_by_registry(&apart, rivals, pair));
-            let pulled = same.iter().find(|p| by(p).kind == Remedy::PullsOff);
+            let pulled = same.iter().find(|p| by(p) == Remedy::PullsOff);
             let pair = alone.or(pulled).copied().or(told).or(nearest);
             return Ok(pair.or(apart.first().copied()).map(lookup));
         }

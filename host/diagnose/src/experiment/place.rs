@@ -132,14 +132,6 @@ impl Place {
         Ok([zero - constant, up - constant, constant])
     }
 
-    pub(crate) fn unit(&self) -> &'static str {
-        if self.revolute { "rad" } else { "m" }
-    }
-
-    pub(crate) fn effort_unit(&self) -> &'static str {
-        if self.revolute { "N*m" } else { "N" }
-    }
-
     /// Returns position, velocity and acceleration of the coasting joint in the middle of each of `count` periods (s).
     /// A share of its dry and viscous friction acts. It stops where friction holds its weight.
     pub(crate) fn coast(

@@ -46,8 +46,44 @@ pub(crate) struct Primitive {
     pub(crate) trajectory: Trajectory<f64>,
     /// Time at which the drive is switched off, s after the start.
     pub(crate) drive_off: Option<f64>,
-    /// Figures in words.
-    pub(crate) figures: String,
+    pub(crate) figures: Figures,
+}
+
+/// Figures of a motion; lengths in rad or m.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Figures {
+    /// Constant speeds, per second, over a span.
+    Speeds {
+        slowest: f64,
+        fastest: f64,
+        span: f64,
+    },
+    /// Triangles of some amplitudes at one speed.
+    Triangles { amplitudes: Vec<f64>, speed: f64 },
+    /// A swept sine, and again at a share of its amplitude.
+    Chirp {
+        /// First and last frequency, Hz.
+        hz: [f64; 2],
+        amplitude: f64,
+        again: f64,
+    },
+    /// Steps, each in some seconds.
+    Steps { step: f64, seconds: f64 },
+    /// A pass at one speed.
+    Coast { speed: f64 },
+    /// Periods of a sine.
+    Sine {
+        periods: u16,
+        amplitude: f64,
+        hz: f64,
+    },
+    /// Levels of a clamped joint.
+    Levels {
+        /// Highest level.
+        position: f64,
+        /// Torque of the controller there, N·m or N.
+        torque: f64,
+    },
 }
 
 impl Primitive {
@@ -118,22 +154,22 @@ impl Allowance {
         by_velocity.max((QUINTIC[1] * distance / self.acceleration).sqrt())
     }
 
-    /// Returns a motion of a family within these limits, and its figures in words; `None` if there is none.
-    fn build(&self, family: Family, unit: &str) -> Option<(Trajectory<f64>, String)> {
+    /// Returns a motion of a family within these limits, and its figures; `None` if there is none.
+    fn build(&self, family: Family) -> Option<(Trajectory<f64>, Figures)> {
         match family {
-            Family::ConstantSpeeds => self.constant_speeds(unit),
-            Family::NestedReversals | Family::ReversalsUnderLoad => self.reversals(unit),
-            Family::Chirp => self.chirp(unit),
-            Family::RampsAfterRest => self.ramps(unit),
-            Family::CoastDown => self.coast_down(unit),
+            Family::ConstantSpeeds => self.constant_speeds(),
+            Family::NestedReversals | Family::ReversalsUnderLoad => self.reversals(),
+            Family::Chirp => self.chirp(),
+            Family::RampsAfterRest => self.ramps(),
+            Family::CoastDown => self.coast_down(),
             // A clamped joint has no speed.
             Family::LockedRotor => None,
-            Family::Sine => self.sine(30.0, unit),
-            Family::WarmUp => self.sine(WARM_UP, unit),
+            Family::Sine => self.sine(30.0),
+            Family::WarmUp => self.sine(WARM_UP),
         }
     }
 
-    fn constant_speeds(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+    fn constant_speeds(&self) -> Option<(Trajectory<f64>, Figures)> {
         let (a, v) = (self.distance, self.velocity);
         let slowest = v / 20.0;
         let speeds: Vec<f64> = (0..8)
@@ -143,39 +179,38 @@ impl Allowance {
         let travel = (2.0 * a - v * ramp).min(6.0 * slowest);
         let half = 0.5 * (travel + v * ramp);
         let sweep = FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half))?;
-        let text = format!(
-            "eight constant speeds from {slowest:.4} to {v:.4} {unit}/s, both ways, over {:.3} {unit} in all",
-            2.0 * sweep.half_span
-        );
-        Some((Trajectory::FrictionSweep(sweep), text))
+        let figures = Figures::Speeds {
+            slowest,
+            fastest: v,
+            span: 2.0 * sweep.half_span,
+        };
+        Some((Trajectory::FrictionSweep(sweep), figures))
     }
 
-    fn reversals(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+    fn reversals(&self) -> Option<(Trajectory<f64>, Figures)> {
         let (a, v) = (self.distance, self.velocity);
         let turn = (3.0 * v / self.acceleration).max(0.05);
         let least = 1.3 * v * turn;
         let mut amplitudes: Vec<f64> = [1.0, 0.3, 0.1].iter().map(|s| (s * a).max(least)).collect();
         amplitudes.dedup();
         let motion = SlowReversals::new(v, turn, &amplitudes, 3)?;
-        let text = format!(
-            "three slow triangles each of {} {unit} to either side at {v:.4} {unit}/s",
-            amplitudes
-                .iter()
-                .map(|a| format!("{a:.4}"))
-                .collect::<Vec<_>>()
-                .join(", ")
-        );
-        Some((Trajectory::SlowReversals(motion), text))
+        let figures = Figures::Triangles {
+            amplitudes,
+            speed: v,
+        };
+        Some((Trajectory::SlowReversals(motion), figures))
     }
 
-    fn chirp(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+    fn chirp(&self) -> Option<(Trajectory<f64>, Figures)> {
         let (a, v) = (self.distance, self.velocity);
         let start_hz = 0.25 * v / (TAU * a);
         let end_hz = (4.0 * self.acceleration / (TAU * v)).max(8.0 * start_hz);
         let duration = (5.0 * (end_hz / start_hz).log2() / start_hz).min(0.5 * LONGEST);
-        let text = format!(
-            "a swept sine from {start_hz:.3} to {end_hz:.2} Hz of up to {a:.4} {unit}, and again at {AGAIN} of its amplitude"
-        );
+        let figures = Figures::Chirp {
+            hz: [start_hz, end_hz],
+            amplitude: a,
+            again: AGAIN,
+        };
         let chirp = Chirp {
             start_hz,
             end_hz,
@@ -187,26 +222,26 @@ impl Allowance {
             acceleration: self.acceleration,
             again: AGAIN,
         };
-        Some((Trajectory::Chirp(chirp), text))
+        Some((Trajectory::Chirp(chirp), figures))
     }
 
-    fn ramps(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+    fn ramps(&self) -> Option<(Trajectory<f64>, Figures)> {
         let a = self.distance;
         let moving = self.move_time(0.5 * a);
         let levels = [1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0];
-        let text = format!(
-            "steps of {:.4} {unit} up and down in {moving:.2} s each, after rests of 4 s",
-            0.5 * a
-        );
+        let figures = Figures::Steps {
+            step: 0.5 * a,
+            seconds: moving,
+        };
         let staircase = Staircase {
             levels: levels.iter().map(|l| 0.5 * a * l).collect(),
             move_us: micros(moving)?,
             dwell_us: 4_000_000,
         };
-        Some((Trajectory::Staircase(staircase), text))
+        Some((Trajectory::Staircase(staircase), figures))
     }
 
-    fn coast_down(&self, unit: &str) -> Option<(Trajectory<f64>, String)> {
+    fn coast_down(&self) -> Option<(Trajectory<f64>, Figures)> {
         let (a, v) = (self.distance, self.velocity);
         let ramp = 1.5 * v / self.acceleration;
         let travel = (2.0 * a - v * ramp).min(4.0 * CRUISE * v);
@@ -215,24 +250,23 @@ impl Allowance {
         }
         let half = 0.5 * (travel + v * ramp);
         let sweep = FrictionSweep::new(&[v], travel, ramp, 0.2, self.move_time(half))?;
-        let text = format!(
-            "a pass at {v:.4} {unit}/s, in the middle of which the drive is switched off and the joint coasts"
-        );
-        Some((Trajectory::FrictionSweep(sweep), text))
+        let figures = Figures::Coast { speed: v };
+        Some((Trajectory::FrictionSweep(sweep), figures))
     }
 
     /// Returns a sine of about `long` seconds.
-    fn sine(&self, long: f64, unit: &str) -> Option<(Trajectory<f64>, String)> {
+    fn sine(&self, long: f64) -> Option<(Trajectory<f64>, Figures)> {
         let (a, v) = (self.distance, self.velocity);
         let omega = (v / a).min((self.acceleration / a).sqrt());
         let period = TAU / omega;
         let periods = (long / period).clamp(5.0, f64::from(u16::MAX)) as u16;
         // Leaves room for the envelope at the ends.
         let amplitude = 0.9 * a;
-        let text = format!(
-            "{periods} periods of a sine of {amplitude:.4} {unit} at {:.3} Hz",
-            1.0 / period
-        );
+        let figures = Figures::Sine {
+            periods,
+            amplitude,
+            hz: 1.0 / period,
+        };
         let sine = Fourier {
             period_us: micros(period)?,
             periods,
@@ -240,7 +274,7 @@ impl Allowance {
             sine: [amplitude].into_iter().collect(),
             cosine: core::iter::empty().collect(),
         };
-        Some((Trajectory::Fourier(sine), text))
+        Some((Trajectory::Fourier(sine), figures))
     }
 }
 
@@ -270,12 +304,10 @@ pub(crate) fn clamped(place: &Place) -> Option<Primitive> {
             dwell_us: 1_000_000,
         }),
         drive_off: None,
-        figures: format!(
-            "thirteen levels of up to {:.5} {} to either side, of which the controller makes up to {highest:.3} {} while the joint is clamped",
-            levels[2],
-            place.unit(),
-            place.effort_unit()
-        ),
+        figures: Figures::Levels {
+            position: levels[2],
+            torque: highest,
+        },
     })
 }
 
@@ -318,7 +350,7 @@ pub(crate) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Prim
                     velocity: speed * SHARE * place.velocity,
                     acceleration: brisk * SHARE * place.acceleration,
                 };
-                let (trajectory, figures) = allowance.build(family, place.unit())?;
+                let (trajectory, figures) = allowance.build(family)?;
                 // In single precision, as on the rig.
                 let runs = trajectory.to_f32().to_f64().check(&limits, start).is_ok();
                 let fits = runs && trajectory.duration() <= long;

@@ -10,13 +10,13 @@
 
 use crate::DiagnoseError;
 use crate::faults::described::{Described, columns};
+use crate::faults::finding::Fault;
 use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
+use crate::faults::misfit::Misfit;
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
-use crate::outcome::{About, FaultKind};
 use rig_model::robot::JointKind;
-use rig_output::format_significant;
 
 /// Least factor of a position by a wrong ratio.
 const LEAST: f64 = 1.5;
@@ -88,19 +88,13 @@ impl Judge<'_> {
             && inertia < ALIKE
             && three.iter().all(|s| apart(*s, factor) < RIGHT);
         Ok(alike.then(|| {
-            let fault = self.say(
-                FaultKind::Ratio,
-                About::Torque,
-                j,
-                format!(
-                    "tau{} is {} times what the description's weight, viscous friction and dry friction need alike ({}, {} and {} times), which no change of the robot makes; check the gear ratio and the torque constant.",
-                    j + 1,
-                    format_significant(factor, 3),
-                    format_significant(shares.weight, 3),
-                    format_significant(shares.viscous, 3),
-                    format_significant(shares.dry, 3),
-                ),
-            );
+            let found = Misfit::Alike {
+                factor,
+                weight: shares.weight,
+                viscous: shares.viscous,
+                dry: shares.dry,
+            };
+            let fault = Fault::of_joint(j, found);
             // A trial of masses alone cannot show four values with one factor.
             Suspicion { fault, undo: None }
         }))
@@ -139,7 +133,7 @@ impl Judge<'_> {
             .filter(|(_, shares)| better(shares))
             .map(|(factor, shares)| Suspicion {
                 undo: None,
-                ..self.scaled(j, &[factor], recorded.unexplained, shares.unexplained)
+                ..self.scaled(j, &[factor], [recorded.unexplained, shares.unexplained])
             }))
     }
 

@@ -4,17 +4,18 @@
 //! Each transformation is undone in turn and the torques of all joints are fitted again. The ones that make the data by
 //! far the likeliest are suspected; the trial ([`crate::faults::trial`]) decides.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 
 use crate::DiagnoseError;
 use crate::faults::described::{Described, friction};
+use crate::faults::finding::Fault;
 use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
 use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
+use crate::faults::misfit::{Misfit, Reversal};
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::{Columns, Undo};
-use crate::outcome::{About, DataFault, FaultKind};
 use rig_numerics::statistics::squares_about_mean;
 
 /// Least fall of the log residual variances, summed over joints, to believe a transformation: one joint's falls to a
@@ -158,50 +159,56 @@ impl Judge<'_> {
 
     /// Returns the transformation as a fault of the recording.
     pub(crate) fn said(&self, found: &Found) -> Option<Suspicion> {
+        let left = found.left;
         let fault = match &found.undo {
-            Undo::Order(which, order) => self.order_said(*which, order, found),
-            Undo::Torque(Some(j), _) => self.turned_said(About::Torque, *j, found),
-            Undo::Position(Some(j), -1.0) => self.turned_said(About::Motion, *j, found),
-            Undo::Position(Some(j), factor) => {
-                self.scaled(*j, &[*factor], found.left[0], found.left[1])
-                    .fault
+            Undo::Order(which, order) => {
+                let first = (0..order.len()).find(|j| order[*j] != *j).unwrap_or(0);
+                let order = Misfit::Order {
+                    which: *which,
+                    order: order.clone(),
+                    twin: found.twin,
+                    left,
+                };
+                Fault::of_joint(first, order)
             }
-            Undo::Position(None, factor) => self.all_scaled(*factor, found.left),
-            Undo::Both(j) => self.axis_said(*j, found),
-            Undo::Zero(j, angle) => self.zero_said(*j, *angle, found.left),
-            Undo::Gravity(other) => self.gravity_said(*other, found.left),
+            Undo::Torque(Some(j), _) => self.reversed(true, *j, found),
+            Undo::Position(Some(j), -1.0) => self.reversed(false, *j, found),
+            Undo::Position(Some(j), factor) => self.scaled(*j, &[*factor], left).fault,
+            Undo::Position(None, factor) => Fault::of_recording(Misfit::AllScaled {
+                factor: *factor,
+                left,
+            }),
+            Undo::Both(j) => Fault::of_joint(*j, Misfit::AxisReversed { left }),
+            Undo::Zero(j, angle) => Fault::of_joint(
+                *j,
+                Misfit::Zero {
+                    angle: *angle,
+                    left,
+                },
+            ),
+            Undo::Gravity(other) => {
+                let stated = Vector3::from(self.robot.gravity);
+                let angle = stated.angle(&Vector3::from(*other)).to_degrees();
+                Fault::of_recording(Misfit::GravityTurned { angle, left })
+            }
             _ => return None,
         };
         Some(Suspicion::new(fault, found.undo.clone()))
     }
 
-    fn turned_said(&self, about: About, j: usize, found: &Found) -> DataFault {
-        let n = j + 1;
-        let [column, other] = match about {
-            About::Torque => ["tau", "q"],
-            _ => ["q", "tau"],
+    fn reversed(&self, torque: bool, j: usize, found: &Found) -> Fault {
+        let other = match found.twin {
+            _ if !torque && self.reference_against(j) => Reversal::AgainstReference,
+            true => Reversal::OrOther,
+            false => Reversal::Alone,
         };
-        let or = match found.twin {
-            _ if about != About::Torque && self.reference_against(j) => {
-                format!(", against which ref{n} runs as well,")
-            }
-            true => format!(" (or {other}{n})"),
-            false => String::new(),
+        let left = found.left;
+        let reversed = Misfit::Reversed {
+            torque,
+            other,
+            left,
         };
-        let text = format!(
-            "{column}{n}{or} is counted the other way round: reversed, {}; reverse it.",
-            found.compared()
-        );
-        self.say(FaultKind::Sign, about, j, text)
-    }
-
-    fn axis_said(&self, j: usize, found: &Found) -> DataFault {
-        let (n, name) = (j + 1, self.name(j));
-        let text = format!(
-            "q{n} and tau{n} are both counted the other way round, so the axis of joint {name} points the other way than the description says: with both reversed {}; reverse the joint's axis in the description, or both columns.",
-            found.compared()
-        );
-        self.say(FaultKind::Sign, About::Motion, j, text)
+        Fault::of_joint(j, reversed)
     }
 
     /// Returns the residual share of each torque's variance: by the description, which has few free numbers, if it
@@ -294,19 +301,6 @@ impl Found {
     /// Returns true if it is a joint's zero.
     pub(crate) fn is_zero(&self) -> bool {
         matches!(self.undo, Undo::Zero(..))
-    }
-
-    /// Returns true if the other columns of the same joints explain it too.
-    pub(crate) fn has_twin(&self) -> bool {
-        self.twin
-    }
-
-    /// Returns how much better the fit is without it, a clause.
-    pub(crate) fn compared(&self) -> String {
-        let [recorded, without] = self.left.map(|share| 100.0 * share);
-        format!(
-            "the model leaves {without:.1} % of the torque's variance, as recorded {recorded:.1} %"
-        )
     }
 
     /// Returns true if both mean the same for torque and position of the same joints.

@@ -1,14 +1,13 @@
 //! Factors between recording and description that no change of the robot causes.
 
 use crate::DiagnoseError;
-use crate::faults::columns::fault;
 use crate::faults::described::Described;
+use crate::faults::finding::Fault;
 use crate::faults::judge::Judge;
+use crate::faults::misfit::{Misfit, Needs};
 use crate::faults::names;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, FaultKind};
-use rig_output::{format_significant, format_unit};
 
 /// Largest factor of a parameter change; units and ratios change more.
 const CHANGE: f64 = 5.0;
@@ -34,35 +33,21 @@ impl Judge<'_> {
         if shown.len() < 2 || !weighed {
             return None;
         }
-        let (_, unit) = self.robot.joints[shown[0].0].kind.units();
-        let unit = format_unit(unit);
-        let what = match (near(1000.0), near(1e-3)) {
-            (true, _) => format!("as m{unit} for {unit} or mA for A would be"),
-            (_, true) => format!(
-                "as k{unit} for {unit}, A for mA, or masses of the description in g would make it"
-            ),
-            _ => return None,
-        };
+        let large = near(1000.0);
+        if !large && !near(1e-3) {
+            return None;
+        }
         let least = shown
             .iter()
             .map(|(_, f)| f.abs())
             .fold(f64::INFINITY, f64::min);
         let most = shown.iter().map(|(_, f)| f.abs()).fold(0.0, f64::max);
-        let columns: Vec<String> = shown.iter().map(|(j, _)| format!("tau{}", j + 1)).collect();
-        let (last, others) = columns.split_last()?;
-        let factor = if near(1000.0) { 1e-3 } else { 1000.0 };
-        let fault = fault(
-            self.runs,
-            FaultKind::Unit,
-            About::Torque,
-            "",
-            format!(
-                "{} and {last} are {} to {} times what the description's gravity and inertia need, {what}; give torques in {unit}, at the joints.",
-                others.join(", "),
-                format_significant(least, 4),
-                format_significant(most, 4)
-            ),
-        );
+        let factor = if large { 1e-3 } else { 1000.0 };
+        let fault = Fault::of_recording(Misfit::Thousandfold {
+            joints: shown.iter().map(|(j, _)| *j).collect(),
+            factors: [least, most],
+            large,
+        });
         Some(Suspicion::new(fault, Undo::Torque(None, factor)))
     }
 
@@ -85,11 +70,9 @@ impl Judge<'_> {
         let large = |s: f64| !(1.0 / CHANGE..CHANGE).contains(&s.abs());
         let apart = |a: f64, b: f64| (a / b).abs().ln().abs() > f64::ln(2.5);
         Ok(match (gravity.map(|m| m.value), inertia) {
-            (Some(g), Some(i)) if large(g) && !apart(g, i) => {
-                self.torque_times(j, g, "gravity and inertia need")
-            }
-            (Some(g), None) if large(g) => self.torque_times(j, g, "gravity needs"),
-            (None, Some(i)) if large(i) => self.torque_times(j, i, "inertia needs"),
+            (Some(g), Some(i)) if large(g) && !apart(g, i) => self.torque_times(j, g, Needs::Both),
+            (Some(g), None) if large(g) => self.torque_times(j, g, Needs::Gravity),
+            (None, Some(i)) if large(i) => self.torque_times(j, i, Needs::Inertia),
             (Some(g), Some(i)) if !large(g) && !(0.05..20.0).contains(&(i / g).abs()) => {
                 Some(self.clock_times(j, i / g))
             }
@@ -102,54 +85,30 @@ impl Judge<'_> {
 
     /// Suspects a torque that is `factor` times the described, which `needs` less; `None` if an unusual robot may be the
     /// reason.
-    fn torque_times(&self, j: usize, factor: f64, needs: &str) -> Option<Suspicion> {
+    fn torque_times(&self, j: usize, factor: f64, needs: Needs) -> Option<Suspicion> {
         let name = names::of_torque(&self.robot.joints[j], factor);
         // Between a parameter change and a named factor an unusual robot is possible.
         if name.is_none() && (0.125..8.0).contains(&factor.abs()) {
             return None;
         }
-        // On a light last link a tool may weigh many times the link.
-        let tool = match factor {
-            1.0..100.0 => {
-                ", or as a tool or payload that the description does not state would make it"
-            }
-            _ => "",
+        let found = Misfit::TorqueTimes {
+            factor,
+            needs,
+            name,
         };
-        let (kind, what) = name.map_or_else(
-            || (FaultKind::Unit, "more than a change of the robot makes; check the torque constant, the ratio and the unit (mA for A, or mN·m for N·m, make it a thousand times as large)".to_owned()),
-            |name| (name.kind(), name.text),
-        );
-        let fault = self.say(
-            kind,
-            About::Torque,
-            j,
-            format!(
-                "tau{} is {} times what the description's {needs}, {what}{tool}.",
-                j + 1,
-                format_significant(factor, 4)
-            ),
-        );
+        let fault = Fault::of_joint(j, found);
         Some(Suspicion::new(fault, Undo::Torque(Some(j), 1.0 / factor)))
     }
 
     /// Suspects a clock that makes the inertia `times` the described, where gravity is as described.
     fn clock_times(&self, j: usize, times: f64) -> Suspicion {
         let clock = times.abs().sqrt();
-        let fault = self.say(
-            FaultKind::Clock,
-            About::Recording,
-            j,
-            format!(
-                "Gravity fits the description, but the inertia seen in the motion is {times:.4} times what it states: t looks like {}, {clock:.4} of them a second, unless the inertia described is wrong, the rotor's by the square of the gear ratio among it.",
-                names::of_clock(clock)
-            ),
-        );
+        let fault = Fault::of_joint(j, Misfit::InertiaTimes { times });
         Suspicion::new(fault, Undo::Clock(1.0 / clock))
     }
 
     /// Suspects a wrong sense or zero of a joint on which gravity acts `times` as described, below zero.
     fn gravity_reversed(&self, j: usize, times: f64) -> Result<Suspicion, DiagnoseError> {
-        let n = j + 1;
         let held = match self.fits[j].as_ref() {
             Some(fit) => {
                 let (loss, _, own) = self.senses(j, fit)?;
@@ -157,23 +116,11 @@ impl Judge<'_> {
             }
             None => false,
         };
-        let which = if held {
-            format!(
-                "friction and inertia have the right sense: q{n} and tau{n} are both counted the other way round, or the zero of q{n} is half a turn off"
-            )
-        } else {
-            format!("reverse tau{n} or q{n}, unless the zero of q{n} is half a turn off")
-        };
         let undo = match held {
             true => Undo::Both(j),
             false => Undo::Torque(Some(j), -1.0),
         };
-        let fault = self.say(
-            FaultKind::Sign,
-            About::Motion,
-            j,
-            format!("Gravity acts on joint {n} {times:.2} times as the description says; {which}."),
-        );
+        let fault = Fault::of_joint(j, Misfit::GravityReversed { times, held });
         Ok(Suspicion::new(fault, undo))
     }
 }

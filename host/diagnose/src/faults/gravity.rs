@@ -5,22 +5,21 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::DiagnoseError;
-use crate::faults::columns::fault;
 use crate::faults::described::friction;
+use crate::faults::finding::Fault;
 use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
 use crate::faults::levels::GOOD;
+use crate::faults::misfit::Misfit;
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
-use crate::outcome::{About, DataFault, FaultKind};
 use rig_model::robot::JointKind;
 use rig_numerics::statistics::squares_about_mean;
-use rig_output::format_significant;
 
 /// Least angle to the described gravity, degrees; less is left to the search for a tilted base.
 const LEAST: f64 = 45.0;
 /// Angle above which gravity is said to point the other way, degrees.
-const OTHER_WAY: f64 = 135.0;
+pub(crate) const OTHER_WAY: f64 = 135.0;
 /// Squared share of the strongest direction below which gravity's component is not identifiable.
 const DETERMINED: f64 = 1e-3;
 /// Largest factor between found and described strength of gravity.
@@ -30,11 +29,6 @@ const STRENGTH: f64 = 2.0;
 const UPRIGHT: f64 = 0.3;
 /// Standard deviation of gravity's direction, rad, above which it is undecided.
 const OPEN: f64 = 0.1;
-
-/// Formats an angle with the resolution of such a fit.
-fn hundredths(angle: f64) -> String {
-    format_significant((100.0 * angle).round() / 100.0, 3)
-}
 
 impl Judge<'_> {
     /// Suspects a wrong zero or axis of a single revolute joint, by the direction of gravity on it. The link's weight
@@ -92,23 +86,15 @@ impl Judge<'_> {
         if !shown || !(upright || far) {
             return Ok(None);
         }
-        let name = &joint.name;
-        let [strength, stated] = [strength, stated].map(|x| format_significant(x, 3));
-        let text = if upright {
-            format!(
-                "Gravity acts on joint {name} by up to {strength} N·m, as on an axis that lies level; by the description its axis stands upright and gravity does {stated} N·m at most: is its `alpha` right (in a URDF its `axis` and the `rpy` of its origin), and `gravity`?"
-            )
-        } else {
-            let theta = joint.theta + off;
-            format!(
-                "Gravity on joint {name} is strongest at q1 = {} rad, where the description has {} rad: the joint's zero in this recording (`--home`), or the base, is turned by about {:.0} degrees against the description. With theta near {} it fits (in a URDF turn the joint's origin by its `rpy`).",
-                hundredths(strongest[0]),
-                hundredths(strongest[1]),
-                off.to_degrees(),
-                hundredths((theta + PI).rem_euclid(TAU) - PI),
-            )
+        let found = match upright {
+            true => Misfit::LevelAxis { strength, stated },
+            false => Misfit::StrongestElsewhere {
+                at: strongest[0],
+                stated: strongest[1],
+                off,
+            },
         };
-        let fault = self.say(FaultKind::Gravity, About::Recording, 0, text);
+        let fault = Fault::of_joint(0, found);
         // The wave's direction shows it; a trial of masses does not.
         Ok(Some(Suspicion { fault, undo: None }))
     }
@@ -159,29 +145,5 @@ impl Judge<'_> {
         let alike =
             (1.0 / STRENGTH..STRENGTH).contains(&strength) && seen.norm() > 0.5 * stated.norm();
         Ok((far && alike).then(|| (shown * (stated.norm() / shown.norm())).into()))
-    }
-
-    /// Returns another direction of gravity as a fault; `left` are residual variance shares as recorded and with it.
-    pub(crate) fn gravity_said(&self, gravity: [f64; 3], left: [f64; 2]) -> DataFault {
-        let stated = Vector3::from(self.robot.gravity);
-        let angle = stated.angle(&Vector3::from(gravity)).to_degrees();
-        let [recorded, without] = left.map(|share| 100.0 * share);
-        let (points, asked) = if angle > OTHER_WAY {
-            (
-                "the other way",
-                "does the arm hang upside down, or are all joints counted the other way round",
-            )
-        } else {
-            ("elsewhere", "is the arm mounted on a wall or a slope")
-        };
-        fault(
-            self.runs,
-            FaultKind::Gravity,
-            About::Recording,
-            "",
-            format!(
-                "Gravity points {points} than the description says, by {angle:.0} degrees: turned by that the description leaves {without:.1} % of the torque's variance at the joints that carry weight, as it stands {recorded:.1} %; {asked}? Turn the arm by a fixed joint at the root of the URDF (`rpy` of its origin), or state `gravity` in the TOML."
-            ),
-        )
     }
 }

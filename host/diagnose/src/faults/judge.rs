@@ -3,10 +3,8 @@
 use nalgebra::DMatrix;
 
 use crate::DiagnoseError;
-use crate::faults::columns::fault;
 use crate::faults::fit::Fit;
 use crate::faults::rows::{Form, Rows};
-use crate::outcome::{About, DataFault, FaultKind};
 use rig_data::runs::Run;
 use rig_identify::preference;
 use rig_model::robot::{JointKind, Robot};
@@ -53,21 +51,5 @@ impl<'a> Judge<'a> {
             matrices,
             fits,
         })
-    }
-
-    /// Returns the name of a joint.
-    pub(crate) fn name(&self, joint: usize) -> &str {
-        &self.robot.joints[joint].name
-    }
-
-    /// Returns a certain fault of a joint.
-    pub(crate) fn say(
-        &self,
-        kind: FaultKind,
-        about: About,
-        joint: usize,
-        text: String,
-    ) -> DataFault {
-        fault(self.runs, kind, about, self.name(joint), text)
     }
 }

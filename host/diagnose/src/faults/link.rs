@@ -1,34 +1,25 @@
 //! Faults of a link encoder.
 
+use crate::faults::finding::{Fault, Finding};
 use crate::faults::{columns, names};
-use crate::outcome::{About, DataFault, FaultKind};
 use rig_data::has_position_jump;
 use rig_data::runs::Run;
-use rig_model::robot::{JointKind, Robot};
+use rig_model::robot::Robot;
 use rig_numerics::statistics::mean_or_zero;
 
 /// Range of link motion per joint encoder motion; backlash and twist take at most a part of a small motion.
 const TOGETHER: [f64; 2] = [0.8, 1.25];
 
 /// Returns a fault of joint `k`'s link encoder; the joint's own position is right.
-pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault> {
+pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<Fault> {
     let joint = robot.joints.get(k)?;
-    let n = k + 1;
-    let named = |kind: FaultKind, text: String| {
-        Some(columns::fault(runs, kind, About::Motion, &joint.name, text))
-    };
     for run in runs {
         let Some(reading) = run.joints.get(k).and_then(|j| j.link_raw.as_ref()) else {
             continue;
         };
         // Its zero is free, so only a jump is a fault.
         if has_position_jump(&run.t, reading) {
-            return named(
-                FaultKind::Jump,
-                format!(
-                    "ql{n} jumps from one row to the next, as where counts are lost or an angle begins again after a turn; give it unwrapped."
-                ),
-            );
+            return Some(Fault::of_joint(k, Finding::LinkJumps));
         }
     }
     let factor = moves_by(runs, k)?;
@@ -36,35 +27,15 @@ pub(crate) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
     if (least..most).contains(&factor) {
         return None;
     }
-    if factor.abs() < 1e-4 {
-        return named(
-            FaultKind::NotMoving,
-            format!(
-                "ql{n} stands still while q{n} moves; check that the encoder on the link is alive."
-            ),
-        );
-    }
-    let unit = match joint.kind {
-        JointKind::Revolute => "rad",
-        JointKind::Prismatic => "m",
+    let found = if factor.abs() < 1e-4 {
+        Finding::LinkStill
+    } else if (-most..-least).contains(&factor) {
+        Finding::LinkReversed
+    } else {
+        let name = names::of_position(joint, 1.0 / factor);
+        Finding::LinkScaled { factor, name }
     };
-    if (-most..-least).contains(&factor) {
-        return named(
-            FaultKind::Sign,
-            format!("ql{n} moves against q{n}; reverse its sense."),
-        );
-    }
-    let (kind, what) = names::of_position(joint, 1.0 / factor).map_or_else(
-        || {
-            let unnamed = format!("give it in {unit} of the joint, and check its counts");
-            (FaultKind::Unit, unnamed)
-        },
-        |name| (name.kind(), name.text),
-    );
-    named(
-        kind,
-        format!("ql{n} moves {factor:.4} times as far as q{n}; {what}."),
-    )
+    Some(Fault::of_joint(k, found))
 }
 
 /// Returns the link encoder's motion per motion of the joint's own; `None` if either is missing or does not move.

@@ -7,11 +7,12 @@
 //! Leaves out: a sign that is lost only above a level.
 
 use crate::faults::described::Described;
+use crate::faults::finding::Fault;
 use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
+use crate::faults::misfit::Misfit;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, FaultKind};
 
 /// Least share of the moving rows in each direction.
 const BOTH_WAYS: f64 = 0.1;
@@ -50,16 +51,8 @@ impl Judge<'_> {
         if turned == 0 || left > LESS * recorded {
             return None;
         }
-        let n = j + 1;
-        let share = 100.0 * turned as f64 / senses.len() as f64;
-        let fault = self.say(
-            FaultKind::Magnitude,
-            About::Torque,
-            j,
-            format!(
-                "tau{n} is never negative though the joint turns both ways: it is a magnitude whose sign was lost (by the motion it should be negative for about {share:.0} % of the time). Record the signed torque or current; a register of load or current that is read as unsigned has the sign in its highest bit or in the two's complement.",
-            ),
-        );
+        let percent = 100.0 * turned as f64 / senses.len() as f64;
+        let fault = Fault::of_joint(j, Misfit::Magnitude { percent });
         Some(Suspicion::new(fault, Undo::Magnitude(j, senses)))
     }
 

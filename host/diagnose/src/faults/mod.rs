@@ -13,12 +13,14 @@ mod candidates;
 mod columns;
 mod described;
 mod factors;
+mod finding;
 mod fit;
 mod gravity;
 mod judge;
 mod levels;
 mod link;
 mod magnitude;
+mod misfit;
 mod model;
 pub(crate) mod names;
 mod order;
@@ -29,6 +31,7 @@ mod rotor;
 mod rows;
 mod search;
 mod senses;
+pub(crate) mod sentences;
 mod suspicion;
 mod trial;
 mod undo;
@@ -37,9 +40,10 @@ mod wave;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use columns::{moves, spoilt_columns, too_short_to_judge, too_short_to_learn};
+pub(crate) use columns::moves;
 
 use crate::DiagnoseError;
+use crate::faults::finding::{Fault, Finding, Short};
 use crate::outcome::{About, DataFault, FaultKind};
 use rig_data::Source;
 use rig_data::prepare::{Beginning, LowPass, Recording, Resampled};
@@ -68,24 +72,15 @@ pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseErr
         if own.is_empty() {
             continue;
         }
+        let tell = |fault: Fault| told(robot, columns::label(&own), &fault);
         // The clock determines the length of a recording.
         if let Some(fault) = columns::clock(robot, &own).or_else(|| columns::too_short(&own)) {
-            found.push(fault);
-            continue;
+            found.push(tell(fault));
+        } else if own.iter().any(|run| moves(run)) {
+            found.extend(of_one(robot, &own)?.into_iter().map(tell));
+        } else if !any {
+            found.push(tell(Fault::of_recording(Finding::NoMotion)));
         }
-        if !own.iter().any(|run| moves(run)) {
-            if !any {
-                found.push(columns::fault(
-                    &own,
-                    FaultKind::NotMoving,
-                    About::Recording,
-                    "",
-                    "No joint moves by more than the noise of its encoder; record a motion, or check that the position column is alive.".to_owned(),
-                ));
-            }
-            continue;
-        }
-        found.extend(of_one(robot, &own)?);
     }
     Ok(found)
 }
@@ -125,48 +120,102 @@ pub fn faults_at_start(
     Ok(found)
 }
 
-fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError> {
+/// Returns columns of uneven recordings without a derivative or a size, which resampling would hide.
+///
+/// # Errors
+/// Errors of reading.
+pub(crate) fn spoilt_columns(
+    robot: &Robot,
+    recordings: &[&dyn Recording],
+) -> Result<Vec<DataFault>, DiagnoseError> {
+    let mut found = Vec::new();
+    for recording in recordings {
+        let spoilt = columns::spoilt(robot, *recording)?;
+        found.extend((spoilt.iter()).map(|fault| told(robot, recording.label(), fault)));
+    }
+    Ok(found)
+}
+
+/// Returns a fault if the training data, or those without external loads, hold too little motion for names.
+pub(crate) fn too_short_to_learn(runs: &[Run]) -> Option<DataFault> {
+    columns::too_short_to_learn(runs).map(told_short)
+}
+
+/// Returns a fault if the hold-out holds too little motion to judge by.
+pub(crate) fn too_short_to_judge(runs: &[Run]) -> Option<DataFault> {
+    columns::too_short_to_judge(runs).map(told_short)
+}
+
+/// Returns a fault in words.
+fn told(robot: &Robot, recording: String, fault: &Fault) -> DataFault {
+    let joint = fault.joint.and_then(|j| robot.joints.get(j));
+    DataFault {
+        kind: fault.finding.kind(),
+        about: fault.finding.about(),
+        recording,
+        joint: joint.map_or_else(String::new, |joint| joint.name.clone()),
+        certain: fault.is_certain(),
+        text: sentences::of(robot, fault),
+    }
+}
+
+fn told_short((found, recording): (Short, String)) -> DataFault {
+    DataFault {
+        text: sentences::short(&found),
+        kind: Finding::Short(found).kind(),
+        about: About::Recording,
+        recording,
+        joint: String::new(),
+        certain: true,
+    }
+}
+
+/// Returns the faults of one moving recording.
+fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<Fault>, DiagnoseError> {
     let n = robot.joints.len();
     let units = columns::units(robot, runs);
-    if units
-        .iter()
-        .any(|(_, fault)| columns::spoils_the_model(fault))
-    {
-        return Ok(units.into_iter().map(|(_, fault)| fault).collect());
+    if units.iter().any(columns::spoils_the_model) {
+        return Ok(units);
     }
     let torque = runs
         .iter()
         .all(|run| run.joints.len() == n && run.joints.iter().all(|j| j.tau.len() == j.q.len()));
-    let mut judged = if torque {
-        judge::Judge::new(robot, runs)?.faults()?
-    } else {
-        Vec::new()
-    };
-    let (doubts, units): (Vec<_>, Vec<_>) =
-        units.into_iter().partition(|(_, fault)| !fault.certain);
+    let mut judged = Vec::new();
+    if torque {
+        for round in judge::Judge::new(robot, runs)?.faults()? {
+            judged.extend(unsaid(robot, &judged, round));
+        }
+    }
+    let (units, doubts): (Vec<_>, Vec<_>) = units.into_iter().partition(Fault::is_certain);
     if !units.is_empty() {
         // Drops consequences: faults of other joints from a wrong unit, and torque faults from a wrong position.
-        let own = |f: &DataFault| units.iter().find(|(_, fault)| fault.joint == f.joint);
-        let of_torque = |f: &DataFault| f.about == About::Torque;
-        judged.retain(|f| own(f).is_some_and(|(_, unit)| of_torque(unit) || !of_torque(f)));
+        let own = |f: &Fault| units.iter().find(|fault| fault.joint == f.joint);
+        let of_torque = |f: &Fault| f.finding.about() == About::Torque;
+        judged.retain(|f| own(f).is_some_and(|unit| of_torque(unit) || !of_torque(f)));
     }
     // Faults by the model are more precise than those by plausibility limits.
-    let mut found: Vec<DataFault> = units
-        .into_iter()
-        .map(|(_, fault)| fault)
-        .filter(|fault| judged.iter().all(|f| f.joint != fault.joint))
-        .collect();
+    let mut found = units;
+    found.retain(|fault| judged.iter().all(|f| f.joint != fault.joint));
     found.extend(judged);
-    found.extend(doubts.into_iter().map(|(_, fault)| fault));
+    found.extend(doubts);
     for j in 0..n {
+        let sound = |found: &[Fault]| found.iter().all(|f| f.joint != Some(j));
         // A wrong position also contradicts the measured velocity.
-        if found.iter().all(|f| f.joint != robot.joints[j].name) {
+        if sound(&found) {
             found.extend(columns::velocity(robot, runs, j));
         }
-        if found.iter().all(|f| f.joint != robot.joints[j].name) {
+        if sound(&found) {
             found.extend(link::fault(robot, runs, j));
         }
         found.extend(columns::at_limit(robot, runs, j));
     }
     Ok(found)
+}
+
+/// Returns the faults of `more` that differ in words from all `known`.
+fn unsaid(robot: &Robot, known: &[Fault], mut more: Vec<Fault>) -> Vec<Fault> {
+    let said = |fault: &Fault| told(robot, String::new(), fault);
+    let known: Vec<DataFault> = known.iter().map(said).collect();
+    more.retain(|fault| !known.contains(&said(fault)));
+    more
 }

@@ -1,17 +1,17 @@
 //! Faults of clocks, torque cuts and position scales, by a refitted simple model.
 
 use crate::DiagnoseError;
+use crate::faults::finding::Fault;
 use crate::faults::fit::{Fit, Measured};
 use crate::faults::judge::Judge;
 use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
+use crate::faults::misfit::Misfit;
 use crate::faults::names;
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, DataFault, FaultKind};
 use rig_model::robot::JointKind;
 use rig_numerics::statistics;
-use rig_output::format_trimmed;
 
 /// Residual share of the torque's variance above which other units or times are tried for a single joint, whose few
 /// parameters cannot compensate them; and for a shift in time of any robot, as many parameters of a slow arm compensate
@@ -39,12 +39,10 @@ const IN_MOTION: f64 = 0.05;
 const STIRS: f64 = 0.01;
 /// Share of a joint's range by which a position may lie outside it: limits are described with some care.
 const OUTSIDE: f64 = 0.2;
-/// Relative difference below which two factors are the same.
-const SAME: f64 = 0.1;
 
 impl Judge<'_> {
     /// Returns a fault if a torque was cut where the motion needs more: a fit to the other rows exceeds the cut.
-    pub(crate) fn clipped(&self, j: usize) -> Option<DataFault> {
+    pub(crate) fn clipped(&self, j: usize) -> Option<Fault> {
         let cut = &self.rows.cut[j];
         let (at, free): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
         if at.len() < 10 || 50 * at.len() < cut.len() {
@@ -65,20 +63,13 @@ impl Judge<'_> {
             .sum::<f64>()
             / at.len() as f64;
         let level = at.iter().map(|k| tau[*k].abs()).sum::<f64>() / at.len() as f64;
-        (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level)).then(
-            || {
-                self.say(
-                    FaultKind::Saturation,
-                    About::Torque,
-                    j,
-                    format!(
-                        "tau{} is cut at {level:.4} for {:.0} % of the time, where the motion needs {excess:.4} more on average; record without the limit, or a motion that needs less.",
-                        j + 1,
-                        100.0 * at.len() as f64 / cut.len() as f64
-                    ),
-                )
-            },
-        )
+        let found = Misfit::Clipped {
+            level,
+            excess,
+            percent: 100.0 * at.len() as f64 / cut.len() as f64,
+        };
+        (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level))
+            .then(|| Fault::of_joint(j, found))
     }
 
     /// Suspects a torque that is shifted in time against the motion.
@@ -107,20 +98,8 @@ impl Judge<'_> {
         let moving = speed.iter().filter(|v| v.abs() > IN_MOTION * fastest);
         let shown = moving.count() as f64 * self.rows.period > SHOWN_BY * shift.abs();
         (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
-            let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
-            let fault = self.say(
-                FaultKind::Clock,
-                About::Torque,
-                j,
-                format!(
-                    "tau{} is {:.2} s {word} q{}: moved that much {mend}, the model leaves {:.1} % of its variance, as recorded {:.1} %; give both by one clock.",
-                    j + 1,
-                    shift.abs(),
-                    j + 1,
-                    100.0 * least,
-                    100.0 * left[reach]
-                ),
-            );
+            let left = [left[reach], least];
+            let fault = Fault::of_joint(j, Misfit::Shifted { shift, left });
             Suspicion::new(fault, Undo::Earlier(j, at as i64 - reach as i64))
         })
     }
@@ -153,7 +132,7 @@ impl Judge<'_> {
             let all = mean(&try_out(None, factor)?);
             if all < BETTER * mean(&left) && all < GOOD {
                 return Ok((0..n)
-                    .map(|j| self.scaled(j, &[factor], mean(&left), all))
+                    .map(|j| self.scaled(j, &[factor], [mean(&left), all]))
                     .collect());
             }
         }
@@ -200,7 +179,7 @@ impl Judge<'_> {
             misses.sort_by(|a, b| a.2.total_cmp(&b.2));
             if let Some((.., own)) = misses.first() {
                 let factors: Vec<f64> = misses.iter().map(|(_, factor, _)| *factor).collect();
-                found.push(self.scaled(j, &factors, left[j], *own));
+                found.push(self.scaled(j, &factors, [left[j], *own]));
             }
         }
         Ok(found)
@@ -242,37 +221,25 @@ impl Judge<'_> {
         list
     }
 
-    /// Suspects a scaled position and names it by the best factor with a name.
-    pub(crate) fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> Suspicion {
+    /// Suspects a scaled position and names it by the best factor with a name. `left` are residual variance shares as
+    /// recorded and without the fault.
+    pub(crate) fn scaled(&self, j: usize, factors: &[f64], left: [f64; 2]) -> Suspicion {
         let named = factors
             .iter()
             .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));
         let best = factors.first().copied().unwrap_or(1.0);
-        let (kind, factor, what) = match named {
-            Some((_, name)) if best < 0.0 => (FaultKind::Sign, best, format!("reverse it; {}", name.text)),
-            None if (best + 1.0).abs() < SAME => (FaultKind::Sign, best, "reverse it".to_owned()),
-            None if best < 0.0 => {
-                (FaultKind::Sign, best, "reverse it, and check its factor".to_owned())
-            }
-            Some((factor, name)) => (name.kind(), factor, name.text),
-            None => (
-                FaultKind::Ratio,
-                best,
-                "check the gear ratio, the counts of the encoder and the unit (turns for rad ask for 6.28)".to_owned(),
-            ),
+        let reversed = best < 0.0;
+        let (factor, name) = match named {
+            Some((factor, name)) if !reversed => (factor, Some(name)),
+            other => (best, other.map(|(_, name)| name)),
         };
-        let fault = self.say(
-            kind,
-            About::Motion,
-            j,
-            format!(
-                "q{} fits its torque {} times as large (the model then leaves {:.1} % of the torque's variance, as recorded {:.1} %): {what}.",
-                j + 1,
-                format_trimmed(factor, 4),
-                100.0 * after,
-                100.0 * before
-            ),
-        );
+        let found = Misfit::Scaled {
+            factor,
+            reversed,
+            name,
+            left,
+        };
+        let fault = Fault::of_joint(j, found);
         Suspicion::new(fault, Undo::Position(Some(j), factor))
     }
 }

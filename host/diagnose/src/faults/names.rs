@@ -2,25 +2,72 @@
 
 use crate::outcome::FaultKind;
 use rig_model::robot::{Joint, JointKind};
-use rig_output::format_trimmed;
 
-/// A cause of a factor.
+/// A cause of a factor between a column and its right value; `f64` are described motor turns per joint turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Cause {
+    /// A torque in a thousandth of its unit, or a current in mA.
+    TorqueInMilli(JointKind),
+    /// A torque in a thousand of its unit, or a current in A for mA.
+    TorqueInKilo(JointKind),
+    /// A torque constant per degree.
+    PerDegree,
+    /// A motor constant per rpm, or kgf·cm.
+    PerRpmOrKgf,
+    /// A motor constant per rpm.
+    PerRpm,
+    /// A torque before the gear.
+    BeforeGear(f64),
+    /// A torque with the ratio applied twice.
+    TorqueThroughGearTwice(f64),
+    /// A described ratio that is inverted.
+    UpsideDown(f64),
+    /// A position in degrees.
+    Degrees,
+    /// A position converted from degrees to rad twice.
+    DegreesTwice,
+    /// A position in turns.
+    Turns,
+    /// A position in mm.
+    Millimetres,
+    /// A position converted from mm to m twice.
+    MillimetresTwice,
+    /// A position of twice its size.
+    Double,
+    /// A position of half its size.
+    Half,
+    /// A position of the motor.
+    MotorAngle(f64),
+    /// A position with the ratio applied twice.
+    AngleThroughGearTwice(f64),
+    /// A velocity in revolutions per minute.
+    Rpm,
+    /// A velocity in degrees per second.
+    DegreesPerSecond,
+    /// A velocity in turns per second.
+    TurnsPerSecond,
+    /// A velocity in mm/s.
+    MillimetresPerSecond,
+    /// A velocity of the motor.
+    MotorSpeed,
+    /// A velocity of the motor in revolutions per minute.
+    MotorRpm,
+}
+
+/// A cause with its factor.
 struct Named {
     factor: f64,
     /// Relative frequency of the cause.
     weight: f64,
-    name: String,
-    /// True if it concerns the gear ratio.
-    ratio: bool,
+    cause: Cause,
 }
 
 impl Named {
-    fn new(factor: f64, name: impl Into<String>) -> Self {
+    fn new(factor: f64, cause: Cause) -> Self {
         Self {
             factor,
             weight: 1.0,
-            name: name.into(),
-            ratio: false,
+            cause,
         }
     }
 
@@ -31,31 +78,30 @@ impl Named {
             ..self
         }
     }
-
-    fn of_ratio(self) -> Self {
-        Self {
-            ratio: true,
-            ..self
-        }
-    }
 }
 
-/// The name of a factor.
+/// The name of a factor: all likely causes, the likeliest first.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Name {
-    /// All likely causes, the likeliest first, joined.
-    pub(crate) text: String,
-    /// True if the likeliest concerns the gear ratio.
-    pub(crate) ratio: bool,
-}
+pub(crate) struct Name(pub(crate) Vec<Cause>);
 
 impl Name {
-    /// Returns the kind of the fault.
+    /// Returns the kind of the fault, by the likeliest cause.
     pub(crate) fn kind(&self) -> FaultKind {
-        if self.ratio {
-            FaultKind::Ratio
-        } else {
-            FaultKind::Unit
+        let of_ratio = |cause: &Cause| {
+            matches!(
+                cause,
+                Cause::BeforeGear(_)
+                    | Cause::TorqueThroughGearTwice(_)
+                    | Cause::UpsideDown(_)
+                    | Cause::Double
+                    | Cause::Half
+                    | Cause::MotorAngle(_)
+                    | Cause::AngleThroughGearTwice(_)
+            )
+        };
+        match self.0.first().is_some_and(of_ratio) {
+            true => FaultKind::Ratio,
+            false => FaultKind::Unit,
         }
     }
 }
@@ -81,24 +127,11 @@ pub(crate) fn is_ratio(joint: &Joint, factor: f64) -> bool {
     ratio(joint).is_some_and(|r| apart(r) || apart(1.0 / r))
 }
 
-/// Returns the text on a ratio that seems inverted.
-fn upside_down(ratio: f64) -> String {
-    format!(
-        "as if gear_ratio stood upside down: it is {}, motor turns per joint turn are wanted, and {} fits",
-        format_trimmed(ratio, 4),
-        format_trimmed(1.0 / ratio, 4)
-    )
-}
-
-/// Joins names, the likeliest first.
+/// Joins causes, the likeliest first.
 fn joined(mut likely: Vec<(f64, Named)>) -> Option<Name> {
     likely.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-    let ratio = likely.first()?.1.ratio;
-    let names: Vec<String> = likely.into_iter().map(|(_, named)| named.name).collect();
-    Some(Name {
-        text: names.join(", or "),
-        ratio,
-    })
+    let causes: Vec<Cause> = likely.into_iter().map(|(_, named)| named.cause).collect();
+    (!causes.is_empty()).then_some(Name(causes))
 }
 
 /// Returns the names of a closely known factor, the nearest first.
@@ -112,36 +145,19 @@ fn close(factor: f64, list: Vec<Named>) -> Option<Name> {
 
 /// Returns the names of a torque factor; its uncertainty is that of the description's values.
 pub(crate) fn of_torque(joint: &Joint, factor: f64) -> Option<Name> {
-    let (small, large) = match joint.kind {
-        JointKind::Revolute => ("mN·m (N·mm)", "kN·m"),
-        JointKind::Prismatic => ("mN", "kN"),
-    };
-    let per_degree = "as a constant per degree would make it";
     let mut list = vec![
-        Named::new(
-            1000.0,
-            format!("as {small} for the joint's unit or mA for A would be (1000 times too large)"),
-        ),
-        Named::new(
-            1e-3,
-            format!("as {large} or A for mA would be (1000 times too small)"),
-        ),
-        Named::new(57.296, per_degree).seldom(),
-        Named::new(1.0 / 57.296, per_degree).seldom(),
-        Named::new(
-            9.549,
-            "as a motor constant per rpm (or kgf·cm for N·m) would make it",
-        )
-        .seldom(),
-        Named::new(1.0 / 9.549, "as a motor constant per rpm would make it").seldom(),
+        Named::new(1000.0, Cause::TorqueInMilli(joint.kind)),
+        Named::new(1e-3, Cause::TorqueInKilo(joint.kind)),
+        Named::new(57.296, Cause::PerDegree).seldom(),
+        Named::new(1.0 / 57.296, Cause::PerDegree).seldom(),
+        Named::new(9.549, Cause::PerRpmOrKgf).seldom(),
+        Named::new(1.0 / 9.549, Cause::PerRpm).seldom(),
     ];
     match ratio(joint) {
-        Some(n) if n < 1.0 => list.push(Named::new(n * n, upside_down(n)).of_ratio()),
+        Some(n) if n < 1.0 => list.push(Named::new(n * n, Cause::UpsideDown(n))),
         Some(n) => {
-            let before = format!("as the motor's torque is before its gear ({n} to 1)");
-            let twice = format!("as if the gear ratio ({n}) had been applied twice");
-            list.push(Named::new(1.0 / n, before).of_ratio());
-            list.push(Named::new(n, twice).of_ratio());
+            list.push(Named::new(1.0 / n, Cause::BeforeGear(n)));
+            list.push(Named::new(n, Cause::TorqueThroughGearTwice(n)));
         }
         None => {}
     }
@@ -160,32 +176,22 @@ pub(crate) fn of_torque(joint: &Joint, factor: f64) -> Option<Name> {
 fn positions(joint: &Joint) -> Vec<Named> {
     let mut list = match joint.kind {
         JointKind::Revolute => vec![
-            Named::new(1.0 / 57.296, "it looks like degrees; give it in rad"),
-            Named::new(57.296, "it has been turned from degrees to rad twice"),
-            Named::new(
-                core::f64::consts::TAU,
-                "it looks like turns; give it in rad",
-            ),
+            Named::new(1.0 / 57.296, Cause::Degrees),
+            Named::new(57.296, Cause::DegreesTwice),
+            Named::new(core::f64::consts::TAU, Cause::Turns),
         ],
         JointKind::Prismatic => vec![
-            Named::new(1e-3, "it looks like millimetres; give it in m"),
-            Named::new(1000.0, "it has been turned from mm to m twice"),
+            Named::new(1e-3, Cause::Millimetres),
+            Named::new(1000.0, Cause::MillimetresTwice),
         ],
     };
-    for (factor, word) in [(0.5, "twice"), (2.0, "half")] {
-        let text = format!(
-            "it is {word} what it should be; check the gear ratio and the counts of the encoder"
-        );
-        list.push(Named::new(factor, text).of_ratio());
-    }
+    list.push(Named::new(0.5, Cause::Double));
+    list.push(Named::new(2.0, Cause::Half));
     match ratio(joint) {
-        Some(n) if n < 1.0 => list.push(Named::new(n * n, upside_down(n)).of_ratio()),
+        Some(n) if n < 1.0 => list.push(Named::new(n * n, Cause::UpsideDown(n))),
         Some(n) => {
-            let motor =
-                format!("it looks like the angle of the motor; divide it by the gear ratio {n}");
-            let twice = format!("it has been divided by the gear ratio {n} twice");
-            list.push(Named::new(1.0 / n, motor).of_ratio());
-            list.push(Named::new(n, twice).of_ratio());
+            list.push(Named::new(1.0 / n, Cause::MotorAngle(n)));
+            list.push(Named::new(n, Cause::AngleThroughGearTwice(n)));
         }
         None => {}
     }
@@ -206,34 +212,18 @@ pub(crate) fn of_position(joint: &Joint, factor: f64) -> Option<Name> {
 pub(crate) fn of_velocity(joint: &Joint, factor: f64) -> Option<Name> {
     let mut list = match joint.kind {
         JointKind::Revolute => vec![
-            Named::new(core::f64::consts::PI / 30.0, "revolutions per minute"),
-            Named::new(1.0 / 57.296, "degrees per second"),
-            Named::new(core::f64::consts::TAU, "turns per second"),
+            Named::new(core::f64::consts::PI / 30.0, Cause::Rpm),
+            Named::new(1.0 / 57.296, Cause::DegreesPerSecond),
+            Named::new(core::f64::consts::TAU, Cause::TurnsPerSecond),
         ],
-        JointKind::Prismatic => vec![Named::new(1e-3, "millimetres per second")],
+        JointKind::Prismatic => vec![Named::new(1e-3, Cause::MillimetresPerSecond)],
     };
     if let Some(n) = ratio(joint) {
-        list.push(Named::new(1.0 / n, "the speed of the motor"));
+        list.push(Named::new(1.0 / n, Cause::MotorSpeed));
         list.push(Named::new(
             core::f64::consts::PI / (30.0 * n),
-            "revolutions per minute of the motor",
+            Cause::MotorRpm,
         ));
     }
     close(factor, list)
-}
-
-/// Returns the name of a clock that runs `factor` times too fast.
-pub(crate) fn of_clock(factor: f64) -> &'static str {
-    let seconds = [
-        (1e6, "microseconds; give it in s"),
-        (1000.0, "milliseconds; give it in s"),
-        (1.0 / 60.0, "minutes; give it in s"),
-        (1e-3, "thousands of seconds; give it in s"),
-    ];
-    seconds
-        .iter()
-        .find(|(f, _)| (factor / f).ln().abs() <= 0.47)
-        .map_or("something else than seconds; give it in s", |(_, name)| {
-            name
-        })
 }

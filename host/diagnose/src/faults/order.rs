@@ -1,11 +1,9 @@
 //! Joint columns in another order than the description's.
 
 use crate::DiagnoseError;
-use crate::faults::candidates::{Before, Found};
+use crate::faults::candidates::Before;
 use crate::faults::judge::Judge;
 use crate::faults::undo::{Columns, Undo};
-use crate::outcome::{About, DataFault, FaultKind};
-use rig_output::listed;
 
 impl Judge<'_> {
     /// Returns the order in which these columns explain the recording best, and the best exchange of two alone; nothing
@@ -47,57 +45,6 @@ impl Judge<'_> {
         }
         found.extend(pair.1.filter(|pair| !found.contains(pair)));
         Ok(found)
-    }
-
-    /// Returns another order as a fault of the recording.
-    pub(crate) fn order_said(&self, which: Columns, order: &[usize], found: &Found) -> DataFault {
-        let moved: Vec<usize> = (0..order.len()).filter(|j| order[*j] != *j).collect();
-        let first = moved.first().copied().unwrap_or(0);
-        let names = |column: &str, joints: &[usize]| {
-            let all: Vec<String> = joints
-                .iter()
-                .map(|j| format!("{column}{}", j + 1))
-                .collect();
-            listed(&all)
-        };
-        let stand: Vec<usize> = moved.iter().map(|j| order[*j]).collect();
-        let two = moved.len() == 2;
-        let (about, column, other) = match which {
-            Columns::Torques => (About::Torque, "tau", "q"),
-            Columns::Positions | Columns::Joints => (About::Motion, "q", "tau"),
-        };
-        let or = match found.has_twin() {
-            true => format!(" (or {})", names(other, &moved)),
-            false => String::new(),
-        };
-        let text = match which {
-            Columns::Joints if two => format!(
-                "The columns of joint {} ({}) and joint {} ({}) stand in each other's place, all of them: exchanged, {}; number them in the order of the description.",
-                moved[0] + 1,
-                self.name(moved[0]),
-                moved[1] + 1,
-                self.name(moved[1]),
-                found.compared()
-            ),
-            Columns::Joints => format!(
-                "The joints stand in another order than in the description: what belongs to joints {} stands in the columns of joints {}. In the right order {}; number them in the order of the description.",
-                names("", &moved),
-                names("", &stand),
-                found.compared()
-            ),
-            _ if two => format!(
-                "{}{or} stand in each other's columns: swapped, {}; give each its own.",
-                names(column, &moved),
-                found.compared()
-            ),
-            _ => format!(
-                "{}{or} stand in another order than the joints: what belongs there stands in {}. In the right order {}; give each its own.",
-                names(column, &moved),
-                names(column, &stand),
-                found.compared()
-            ),
-        };
-        self.say(FaultKind::Swap, about, first, text)
     }
 }
 

@@ -10,13 +10,10 @@ use core::f64::consts::{PI, TAU};
 
 use crate::DiagnoseError;
 use crate::faults::candidates::Before;
-use crate::faults::columns::fault;
 use crate::faults::judge::Judge;
 use crate::faults::names;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, DataFault, FaultKind};
 use rig_model::robot::JointKind;
-use rig_output::{format_significant, format_trimmed};
 
 /// Steps of the grid over a whole turn.
 const DIRECTIONS: u32 = 24;
@@ -98,39 +95,6 @@ impl Judge<'_> {
             .find(|own| (close / own).ln().abs() < NAMED);
         let factor = own.unwrap_or(close);
         Ok((far(&factor) && reached(&factor)).then_some(Undo::Position(j, factor)))
-    }
-
-    /// Returns another zero as a fault; `left` are residual variance shares as recorded and with it.
-    pub(crate) fn zero_said(&self, j: usize, angle: f64, left: [f64; 2]) -> DataFault {
-        let (n, name) = (j + 1, self.name(j));
-        let [recorded, without] = left.map(|share| 100.0 * share);
-        let text = format!(
-            "Gravity fits with the zero of joint {name} turned by {:.0} degrees (q{n} {} {} rad): the description then leaves {without:.1} % of the torque's variance at the joints that show it, as recorded {recorded:.1} %. Count q{n} from the description's zero, or turn the joint's origin in the description (`theta`, in a URDF the `rpy`).",
-            angle.to_degrees(),
-            if angle < 0.0 { "−" } else { "+" },
-            format_significant(angle.abs(), 3)
-        );
-        self.say(FaultKind::Zero, About::Motion, j, text)
-    }
-
-    /// Returns one factor of all positions as a fault of the recording.
-    pub(crate) fn all_scaled(&self, factor: f64, left: [f64; 2]) -> DataFault {
-        let [recorded, without] = left.map(|share| 100.0 * share);
-        let what = match factor {
-            f if f == TAU => "they look like turns; give them in rad",
-            f if f < 1.0 => "they look like degrees; give them in rad",
-            _ => "they have been turned from degrees to rad twice",
-        };
-        fault(
-            self.runs,
-            FaultKind::Unit,
-            About::Motion,
-            "",
-            format!(
-                "All positions fit the torques {} times as large (the description then leaves {without:.1} % of the torque's variance, as recorded {recorded:.1} %): {what}.",
-                format_trimmed(factor, 4)
-            ),
-        )
     }
 }
 

@@ -7,12 +7,11 @@
 //! Leaves out: motors that move several joints; ratios that are too small, which make the rotor lighter.
 
 use crate::DiagnoseError;
+use crate::faults::finding::Fault;
 use crate::faults::judge::Judge;
+use crate::faults::misfit::Misfit;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, FaultKind};
-use rig_model::robot::JointKind;
-use rig_output::format_significant;
 
 /// Least ratio of the rotor's inertia to that of the whole joint.
 const HEAVIER: f64 = 1.5;
@@ -41,22 +40,8 @@ impl Judge<'_> {
         if !seen || rotor < HEAVIER * whole.value || rotor - whole.value < CLEAR * whole.std {
             return Ok(None);
         }
-        let unit = match joint.kind {
-            JointKind::Revolute => "kg·m²",
-            JointKind::Prismatic => "kg",
-        };
-        let fault = self.say(
-            FaultKind::Ratio,
-            About::Torque,
-            j,
-            format!(
-                "The description makes the rotor of joint {} alone {} {unit} at the joint, by the square of the gear ratio {}; all that moves there was seen to have {} {unit}. Check the gear ratio, the rotor's inertia and the torque constant.",
-                joint.name,
-                format_significant(rotor, 3),
-                drive.gear_ratio,
-                format_significant(whole.value, 3),
-            ),
-        );
+        let whole = whole.value;
+        let fault = Fault::of_joint(j, Misfit::HeavyRotor { rotor, whole });
         Ok(Some(Suspicion::new(fault, Undo::Rotor(j))))
     }
 }

@@ -2,23 +2,25 @@
 
 use crate::DiagnoseError;
 use crate::faults::candidates::Found;
+use crate::faults::finding::Fault;
 use crate::faults::judge::Judge;
 use crate::faults::suspicion::Suspicion;
-use crate::outcome::{DataFault, FaultKind};
+use crate::outcome::FaultKind;
 
 impl Judge<'_> {
-    /// Returns the faults in the torque that no other explanation fits better. A certain fault is undone and the search
-    /// repeats without its consequences.
-    pub(crate) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+    /// Returns the faults in the torque that no other explanation fits better, round by round. A certain fault is undone
+    /// and the search repeats without its consequences; later rounds have certain faults only.
+    pub(crate) fn faults(&self) -> Result<Vec<Vec<Fault>>, DiagnoseError> {
         let n = self.robot.joints.len();
-        let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
-        let (mut found, mut undo) = self.tried(self.suspicions()?)?;
+        let clipped: Vec<Fault> = (0..n).filter_map(|j| self.clipped(j)).collect();
+        let (found, mut undo) = self.tried(self.suspicions()?)?;
         let lost = found
             .iter()
-            .any(|fault| fault.kind == FaultKind::Magnitude && fault.certain);
+            .any(|fault| fault.finding.kind() == FaultKind::Magnitude && fault.is_certain());
         if !clipped.is_empty() && !lost {
-            return Ok(clipped);
+            return Ok(vec![clipped]);
         }
+        let mut rounds = vec![found];
         let mut rows = self.rows.clone();
         for _ in 0..n {
             // Undoing a fault of the description gives another robot.
@@ -27,13 +29,12 @@ impl Judge<'_> {
             };
             rows = one.applied(self.robot, &rows);
             let without = Judge::of_rows(self.robot, self.runs, rows.clone())?;
-            let (more, next) = without.tried(without.suspicions()?)?;
-            let new = |fault: &DataFault| fault.certain && !found.contains(fault);
-            let more: Vec<DataFault> = more.into_iter().filter(|fault| new(fault)).collect();
-            found.extend(more);
+            let (mut more, next) = without.tried(without.suspicions()?)?;
+            more.retain(Fault::is_certain);
+            rounds.push(more);
             undo = next;
         }
-        Ok(found)
+        Ok(rounds)
     }
 
     /// Returns the faults that the torque suggests.

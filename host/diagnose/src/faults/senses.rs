@@ -6,14 +6,14 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use crate::DiagnoseError;
 use crate::faults::described::Described;
+use crate::faults::finding::Fault;
 use crate::faults::fit::{Fit, Measured};
 use crate::faults::judge::Judge;
+use crate::faults::misfit::{Misfit, Sense};
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::{About, FaultKind};
 use rig_data::reference_scale;
 use rig_numerics::statistics;
-use rig_output::format_significant;
 
 /// Least distance of a sign from zero, standard deviations.
 const CLEAR: f64 = 4.0;
@@ -79,36 +79,20 @@ impl Judge<'_> {
         if !(both || by_friction || by_inertia) || fit.unexplained() > 0.5 {
             return Ok(None);
         }
-        let n = j + 1;
         let (torque, position) = (Undo::Torque(Some(j), -1.0), Undo::Position(Some(j), -1.0));
-        let (undo, which) = match self.scales(&self.rows, j, described).0 {
+        let (undo, sense) = match self.scales(&self.rows, j, described).0 {
             // The reference is evidence without a description.
-            _ if self.reference_against(j) => (
-                position,
-                format!("ref{n} runs against q{n} as well, so reverse q{n}"),
-            ),
-            Some(gravity) if gravity.value > 0.0 => (
-                position,
-                format!("gravity has the right sense, so reverse q{n}"),
-            ),
-            Some(_) => (
-                torque,
-                format!(
-                    "gravity has the wrong sense too, so reverse tau{n} (where a current was recorded: i{n}, or the sign of gear_ratio)"
-                ),
-            ),
-            None => (torque, "reverse one of them".to_owned()),
+            _ if self.reference_against(j) => (position, Sense::Reference),
+            Some(gravity) if gravity.value > 0.0 => (position, Sense::GravityRight),
+            Some(_) => (torque, Sense::GravityWrong),
+            None => (torque, Sense::Open),
         };
-        let fault = self.say(
-            FaultKind::Sign,
-            About::Torque,
-            j,
-            format!(
-                "tau{n} and q{n} are counted in opposite senses, so one has the wrong sign: as recorded friction gives {} W and the inertia is {}, where friction takes and inertia is positive; {which}.",
-                format_significant(-loss.value, 2),
-                format_significant(inertia.value, 2)
-            ),
-        );
+        let found = Misfit::Opposed {
+            loss: loss.value,
+            inertia: inertia.value,
+            sense,
+        };
+        let fault = Fault::of_joint(j, found);
         Ok(Some(Suspicion::new(fault, undo)))
     }
 

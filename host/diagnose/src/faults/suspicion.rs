@@ -1,18 +1,18 @@
 //! Suspected faults.
 
+use crate::faults::finding::Fault;
 use crate::faults::undo::Undo;
-use crate::outcome::DataFault;
 
 /// A suspected fault.
 #[derive(Clone, Debug)]
 pub(crate) struct Suspicion {
-    pub(crate) fault: DataFault,
+    pub(crate) fault: Fault,
     /// How it is undone; `None` if columns alone show it, without a model.
     pub(crate) undo: Option<Undo>,
 }
 
 impl Suspicion {
-    pub(crate) fn new(fault: DataFault, undo: Undo) -> Self {
+    pub(crate) fn new(fault: Fault, undo: Undo) -> Self {
         Self {
             fault,
             undo: Some(undo),

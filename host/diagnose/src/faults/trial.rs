@@ -12,17 +12,16 @@
 //! Leaves out: two faults that hide each other, each without effect alone.
 
 use crate::DiagnoseError;
+use crate::faults::finding::{Beside, Explanation, Fault};
 use crate::faults::fit::Measured;
 use crate::faults::judge::Judge;
 use crate::faults::levels::GOOD;
-use crate::faults::physical::{Belief, INDEPENDENT, Load, Physical, Score};
+use crate::faults::physical::{Belief, INDEPENDENT, Physical, Score};
 use crate::faults::rows::{Form, Rows};
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::Undo;
-use crate::outcome::DataFault;
 use rig_model::robot::Robot;
 use rig_numerics::statistics;
-use rig_output::format_significant;
 
 /// Rows in the test: over all joints, and least of each.
 const ROWS: (usize, usize) = (4000, 500);
@@ -172,7 +171,7 @@ impl Judge<'_> {
     pub(crate) fn tried(
         &self,
         suspicions: Vec<Suspicion>,
-    ) -> Result<(Vec<DataFault>, Option<Undo>), DiagnoseError> {
+    ) -> Result<(Vec<Fault>, Option<Undo>), DiagnoseError> {
         let (mut left, mut found) = (Vec::new(), Vec::new());
         for suspicion in suspicions {
             match suspicion.undo {
@@ -201,15 +200,17 @@ impl Judge<'_> {
             let first = equal.next().unwrap_or(best);
             let (mut fault, undo) = left[first.0].clone();
             if let Some((other, _)) = equal.next() {
-                let other = &left[*other].0.text;
-                fault.text = format!("{} Another explanation fits as well: {other}", fault.text);
+                fault.beside = Beside::Fault(Box::new(left[*other].0.clone()));
             }
             found.push(fault);
             return Ok((found, Some(undo)));
         }
         if found.is_empty() {
-            let other = self.other(&recorded);
-            found.extend(open.into_iter().map(|k| opened(left[k].0.clone(), &other)));
+            let beside = Beside::NoFault(explanation(&recorded));
+            found.extend(open.into_iter().map(|k| Fault {
+                beside: beside.clone(),
+                ..left[k].0.clone()
+            }));
         }
         Ok((found, None))
     }
@@ -235,39 +236,17 @@ impl Judge<'_> {
             None => (self.robot.clone(), self.rows.clone(), magnitude),
         }
     }
+}
 
-    /// Returns the best explanation of the data as recorded, a clause.
-    fn other(&self, recorded: &Reading) -> String {
-        let best = best(recorded.all());
-        let is = |score: &Option<Score>| {
-            let pair = best.zip(score.as_ref());
-            pair.is_some_and(|(a, b)| std::ptr::eq(a, b))
-        };
-        if is(&recorded.described) {
-            "the description, with friction of its own, explains these data as well".to_owned()
-        } else if is(&recorded.prepared) {
-            let load = recorded.prepared.as_ref().map(|score| score.load);
-            load.map_or_else(String::new, |load| prepared(load, self.robot))
-        } else {
-            "other masses and friction than described explain these data as well".to_owned()
-        }
+/// Returns the best explanation of the data as recorded.
+fn explanation(recorded: &Reading) -> Explanation {
+    let best = best(recorded.all());
+    let is = |score: &&Score| best.is_some_and(|best| std::ptr::eq(best, *score));
+    if recorded.described.as_ref().is_some_and(|own| is(&own)) {
+        return Explanation::Description;
     }
-}
-
-fn prepared(load: Load, robot: &Robot) -> String {
-    let last = robot.joints.last().map_or("", |joint| joint.name.as_str());
-    let place = robot.last_link.inverse_transform_point(&load.place.into());
-    let [x, y, z] =
-        [place.x, place.y, place.z].map(|p| format!("{:.2}", 0.0 + (100.0 * p).round() / 100.0));
-    format!(
-        "a payload of about {} kg at ({x}, {y}, {z}) m in the frame of joint {last} explains these data as well",
-        format_significant(load.mass, 2)
-    )
-}
-
-/// Marks a fault that something else explains as well.
-fn opened(mut fault: DataFault, other: &str) -> DataFault {
-    fault.certain = false;
-    fault.text = format!("{} This is not certain: {other}.", fault.text);
-    fault
+    let prepared = recorded.prepared.as_ref().filter(is);
+    prepared.map_or(Explanation::OtherMasses, |own| {
+        Explanation::Payload(own.load)
+    })
 }

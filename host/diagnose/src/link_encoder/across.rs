@@ -13,7 +13,6 @@ use crate::link_encoder::contact::contact;
 use crate::link_encoder::equation::Equation;
 use crate::link_encoder::law::{Found, Law, beside, laws};
 use crate::link_encoder::result::Across;
-use crate::outcome::Place;
 use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
 use crate::result::places::locate;
@@ -120,7 +119,7 @@ impl TransmissionAnalysis<'_, '_> {
             floor,
             self.options.seed,
         );
-        let words = self.words(&fitted, gear.as_ref());
+        let reading = self.reading(&fitted, gear.as_ref());
         let detectable = self.detectable(&fitted);
         Some(Across {
             joint: self.joint,
@@ -128,15 +127,11 @@ impl TransmissionAnalysis<'_, '_> {
             places: (places.into_iter())
                 .filter(|p| p.p_value < SIGNIFICANT && !named.is_empty())
                 .take(1)
-                .map(|p| Place {
-                    text: format!("Of what the two encoders read apart: {}", p.text),
-                    ..p
-                })
                 .collect(),
             named,
             detectable,
             tried: laws.tried,
-            words,
+            reading,
         })
     }
 }

@@ -69,11 +69,40 @@ pub(crate) struct Found {
     pub(crate) evidence: Evidence,
 }
 
+/// Reason why a law is rejected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Refusal {
+    /// It may be chance.
+    Chance {
+        /// Corrected for the trials.
+        p_value: f64,
+        trials: usize,
+    },
+    /// It takes a share of the residual, less than the least.
+    LittleGain { gain: f64, least: f64 },
+    /// Its gain is small against its standard deviation.
+    Uncertain { sigmas: f64 },
+    /// It is as small as the error of another law.
+    Shadow,
+    /// It is smaller than the encoders resolve, rad or m.
+    Unresolved { size: f64, least: f64 },
+    /// Another law is accepted.
+    Another,
+}
+
+/// A tried law.
+#[derive(Clone, Debug)]
+pub(crate) struct TriedLaw {
+    /// Its entry in the result, without the reason for its refusal.
+    pub(crate) tried: Tried,
+    pub(crate) refused: Option<Refusal>,
+}
+
 /// Tried and found laws.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Laws {
     pub(crate) found: Vec<Found>,
-    pub(crate) tried: Vec<Tried>,
+    pub(crate) tried: Vec<TriedLaw>,
     pub(crate) trials: usize,
 }
 
@@ -91,7 +120,7 @@ pub(crate) fn laws(equation: &Equation, base: &Fit, name: &str, without: &[Kind]
     };
     for step in 0..MOST {
         let fit = beside(equation, base, &laws.found, None);
-        let mut best: Vec<(Found, Option<String>)> = Vec::new();
+        let mut best: Vec<(Found, Option<Refusal>)> = Vec::new();
         for law in &all {
             if laws.found.iter().any(|f| f.law.excludes(law)) {
                 continue;
@@ -116,19 +145,17 @@ pub(crate) fn laws(equation: &Equation, base: &Fit, name: &str, without: &[Kind]
         best.sort_by(|a, b| b.0.evidence.explained.total_cmp(&a.0.evidence.explained));
         let taken = best.iter().position(|(_, why)| why.is_none());
         for (k, (found, why)) in best.iter().enumerate() {
-            laws.tried.push(Tried {
+            let tried = Tried {
                 effect: title_of(found.law.kind(equation)),
                 joint: name.to_owned(),
                 step,
                 gain: found.evidence.gain,
                 gain_sigmas: found.evidence.gain_sigmas,
                 p_value: found.evidence.corrected(trials),
-                refused: match why {
-                    Some(why) => format!("across the transmission {why}"),
-                    None if Some(k) == taken => String::new(),
-                    None => "another takes away more across the transmission".to_owned(),
-                },
-            });
+                refused: String::new(),
+            };
+            let refused = why.or((Some(k) != taken).then_some(Refusal::Another));
+            laws.tried.push(TriedLaw { tried, refused });
         }
         let Some(taken) = taken else { break };
         laws.found.push(best.swap_remove(taken).0);
@@ -194,11 +221,11 @@ fn evidence(equation: &Equation, fit: &Fit, law: Law) -> Option<Evidence> {
 }
 
 /// Returns the reason why a law is rejected beside others.
-fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) -> Option<String> {
+fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) -> Option<Refusal> {
     let e = &found.evidence;
     let p = e.corrected(trials);
     if p > SIGNIFICANT {
-        return Some(format!("p = {p:.2}, corrected for {trials} trials"));
+        return Some(Refusal::Chance { p_value: p, trials });
     }
     // Gravity has the same waves over the joint's turn.
     let least_share = match found.law {
@@ -208,21 +235,19 @@ fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) 
         _ => LEAST_SHARE,
     };
     if e.gain < least_share {
-        return Some(format!(
-            "it takes away {:.1} % of what is left, less than {:.0} %",
-            100.0 * e.gain,
-            100.0 * least_share
-        ));
+        return Some(Refusal::LittleGain {
+            gain: e.gain,
+            least: least_share,
+        });
     }
     if e.gain_sigmas < LEAST_SIGMAS {
-        return Some(format!(
-            "its gain is only {:.1} of its standard deviations",
-            e.gain_sigmas
-        ));
+        return Some(Refusal::Uncertain {
+            sigmas: e.gain_sigmas,
+        });
     }
     let squares = |e: &Evidence| -> f64 { e.taken().sum() };
     if (others.iter()).any(|o| squares(e) < SHADOW * SHADOW * squares(&o.evidence)) {
-        return Some("it is no more than what another law is off by".to_owned());
+        return Some(Refusal::Shadow);
     }
     let size = match found.law {
         Law::Play(_) => e.gains[0],
@@ -231,8 +256,7 @@ fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) 
         Law::Wave(_) => return None,
     };
     let least = least(equation);
-    (size < least)
-        .then(|| format!("its {size:.1e} are less than two steps of the encoders, {least:.1e}"))
+    (size < least).then_some(Refusal::Unresolved { size, least })
 }
 
 impl Laws {

@@ -18,12 +18,13 @@ mod equation;
 mod gear;
 mod law;
 mod naming;
+mod reading;
 mod result;
+mod sentences;
 mod sizes;
 mod tell;
 #[cfg(test)]
 mod tests;
-mod words;
 
 pub(crate) use across::across;
 pub(crate) use result::{Across, gears, names_something, refutes};

@@ -86,8 +86,10 @@ impl TransmissionAnalysis<'_, '_> {
                 holdout_rms: unseen,
                 motion_rms: None,
                 gap_closed: closed(unseen.unwrap_or(train), fitted.floor),
-                why: self.why(found, train, unseen, fitted.floor),
+                why: String::new(),
             },
+            law: found.law,
+            floor: fitted.floor,
             map: Map {
                 joint: joint.name.clone(),
                 residual_unit: joint.kind.units().0.to_owned(),

@@ -4,7 +4,9 @@ use rig_shared::effects::{Kind, SHAPES};
 
 use crate::columns::candidate::Candidate;
 use crate::columns::kinds::is_gear;
-use crate::outcome::{Detectable, Map, Place, Step, Tried};
+use crate::link_encoder::law::{Law, TriedLaw};
+use crate::link_encoder::reading::Reading;
+use crate::outcome::{Detectable, Map, Place, Step};
 
 /// Results from the link encoder of one joint.
 pub(crate) struct Across {
@@ -15,15 +17,19 @@ pub(crate) struct Across {
     /// Shapes of the gear, if it has backlash or elasticity.
     pub(crate) gear: Option<(Kind, [f64; SHAPES])>,
     pub(crate) places: Vec<Place>,
-    pub(crate) tried: Vec<Tried>,
+    pub(crate) tried: Vec<TriedLaw>,
     pub(crate) detectable: Vec<Detectable>,
-    pub(crate) words: Vec<String>,
+    pub(crate) reading: Reading,
 }
 
 /// A named effect with its entries in the result.
 pub(crate) struct Named {
     pub(crate) kind: Kind,
+    /// Its entry in the result, without the reason.
     pub(crate) step: Step,
+    pub(crate) law: Law,
+    /// Noise floor of q − ql, rad or m.
+    pub(crate) floor: f64,
     pub(crate) map: Map,
 }
 

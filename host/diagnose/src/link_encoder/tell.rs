@@ -4,16 +4,23 @@ use rig_shared::effects::{Effect, Kind};
 
 use crate::columns::kinds::is_gear;
 use crate::link_encoder::result::{Across, Named};
-use crate::outcome::{Described, Diagnosis, Fate, Map, Step};
+use crate::link_encoder::sentences;
+use crate::outcome::{Described, Diagnosis, Fate, Map, Place, Step, Tried};
 use rig_model::robot::{Robot, RobotEffect};
 
 /// Adds the results of the link encoders to a result and to its description.
 pub(crate) fn tell(across: Vec<Across>, diagnosis: &mut Diagnosis, model: &mut Robot) {
     for own in across {
-        let name = model.joints[own.joint].name.clone();
-        diagnosis.tried.extend(own.tried);
+        let joint = model.joints[own.joint].clone();
+        diagnosis
+            .tried
+            .extend(own.tried.into_iter().map(|law| Tried {
+                refused: law.refused.map_or_else(String::new, sentences::refusal),
+                ..law.tried
+            }));
         diagnosis.detectable.extend(own.detectable);
-        diagnosis.words.extend(own.words);
+        let words = sentences::reading(&joint, own.joint + 1, &own.reading);
+        diagnosis.words.extend(words);
         if let Some((kind, shapes)) = own.gear
             && own.named.iter().any(|n| n.kind == kind)
         {
@@ -23,10 +30,18 @@ pub(crate) fn tell(across: Vec<Across>, diagnosis: &mut Diagnosis, model: &mut R
         }
         let mut shown = false;
         for found in own.named {
-            shown |= one(found, &name, own.joint, diagnosis, model);
+            let why = sentences::why(&joint, &found);
+            let step = Step { why, ..found.step };
+            let found = Named { step, ..found };
+            shown |= one(found, &joint.name, own.joint, diagnosis, model);
         }
         if shown {
-            diagnosis.places.extend(own.places);
+            diagnosis
+                .places
+                .extend(own.places.into_iter().map(|p| Place {
+                    text: sentences::place(&p),
+                    ..p
+                }));
             diagnosis.places.sort_by(|a, b| b.share.total_cmp(&a.share));
         }
     }
@@ -40,7 +55,9 @@ fn one(
     diagnosis: &mut Diagnosis,
     model: &mut Robot,
 ) -> bool {
-    let Named { kind, step, map } = found;
+    let Named {
+        kind, step, map, ..
+    } = found;
     if kind == Kind::EncoderEccentricityMotor {
         let of = |key: &str| step.parameters.get(key).map_or(0.0, |v| v.value);
         let wave = Effect::new(kind, &[of("cosine"), of("sine")], &[of("order")]);
@@ -51,10 +68,7 @@ fn one(
     if let Some(known) = diagnosis.described.iter_mut().find(is_it) {
         known.fate = Fate::FittedAgain;
         known.parameters = step.parameters;
-        known.text = format!(
-            "The description's {} of joint {name} stays, fitted again to what the encoder on the link reads.",
-            known.effect
-        );
+        known.text = sentences::fitted_again(&known.effect, name);
         return false;
     }
     let by_torque = |s: &Step| s.joint == name && s.effect == step.effect;

@@ -10,27 +10,25 @@ use crate::fit::systematic_uncertainty::inflated;
 use crate::gap::closed;
 use crate::levels::SIGNIFICANT;
 use crate::motor_voltage::equation::{ACROSS, CONSTANT, CURRENT, Equation, FADES, SPEED};
-use crate::motor_voltage::left::{Rest, of_the_voltage};
+use crate::motor_voltage::left::Rest;
 use crate::motor_voltage::remarks::{constant_off, resistance_off};
-use crate::motor_voltage::winding::{DeadZone, Winding};
-use crate::outcome::{Absorbed, Detectable, Map, Place, Remainder, Step, Tried, Value};
+use crate::motor_voltage::winding::{DeadZone, Lack, Left, Moved, Part, Refusal, Winding};
+use crate::outcome::{Detectable, Map, Place, Step, Tried, Value};
 use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
 use crate::result::places::locate;
-use crate::result::sentences::refusal::refusal;
 use crate::rows::regression::Column;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::{DiagnoseError, Options};
-use rig_output::{format_significant, format_value};
 
 /// Share of the voltage's squares in the residual above which the winding's equation does not fit.
 const EXPLAINED: f64 = 0.1;
 /// Least RMS reduction of the voltage residual by a dead zone.
-const LEAST_SHARE: f64 = 0.1;
+pub(crate) const LEAST_SHARE: f64 = 0.1;
 
-/// Analyses the recorded voltages, joint by joint. Also returns sentences on those without a result.
+/// Analyses the recorded voltages, joint by joint. Also returns the joints without a result, and why.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -39,15 +37,12 @@ pub(crate) fn windings(
     prepared: &PreparedData,
     held_out: Option<&PreparedData>,
     options: &Options,
-) -> Result<(Vec<Winding>, Vec<String>), DiagnoseError> {
+) -> Result<(Vec<Winding>, Vec<(usize, Lack)>), DiagnoseError> {
     let (mut found, mut silent) = (Vec::new(), Vec::new());
     for joint in 0..context.robot.joints.len() {
         let Some(training) = Equation::of(context.robot, joint, prepared, &options.clamped)? else {
-            let name = &context.robot.joints[joint].name;
             if (options.clamped.iter()).any(|run| run.joints[joint].voltage.is_some()) {
-                silent.push(format!(
-                    "The motor voltage of joint {name} with the joints clamped is not used: it takes that of all other recordings beside it, and a drive of its own."
-                ));
+                silent.push((joint, Lack::ClampedAlone));
             }
             continue;
         };
@@ -58,10 +53,7 @@ pub(crate) fn windings(
         let analysis = Analysis::of(context, joint, prepared, &training, held.as_ref(), options);
         match analysis.and_then(|analysis| analysis.winding()) {
             Ok(winding) => found.push(winding),
-            Err(why) => silent.push(format!(
-                "Nothing is concluded from the motor voltage of joint {}: {why}.",
-                context.robot.joints[joint].name
-            )),
+            Err(why) => silent.push((joint, why)),
         }
     }
     Ok((found, silent))
@@ -102,15 +94,11 @@ struct Fitted<'a> {
     repeated: Option<f64>,
 }
 
-fn lacking() -> String {
-    "the motion does not tell resistance and back-EMF apart".to_owned()
-}
-
 impl<'a> Analysis<'a> {
     /// Fits the nominal columns.
     ///
     /// # Errors
-    /// Reason, a clause, why nothing follows from the voltage.
+    /// Reason why nothing follows from the voltage.
     fn of(
         context: &'a DiagnosisContext<'a>,
         joint: usize,
@@ -118,7 +106,7 @@ impl<'a> Analysis<'a> {
         training: &'a Equation,
         held: Option<&'a Equation>,
         options: &'a Options,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Lack> {
         let rows = &training.rows;
         let columns: Vec<_> = rows.nominal.iter().collect();
         let first = Fit::new(rows, vec![1.0], 0.1).taking(columns.iter().copied());
@@ -129,17 +117,14 @@ impl<'a> Analysis<'a> {
             noise_floor::memory(rows, &[first.residual(0)]),
         );
         let base = plain.clone().taking(columns.iter().copied());
-        let before = solve(&plain, &columns, &[]).ok_or_else(lacking)?;
+        let before = solve(&plain, &columns, &[]).ok_or(Lack::Inseparable)?;
         let left = (base.rms(0) / plain.rms(0)).powi(2);
         if left > EXPLAINED {
-            return Err(format!(
-                "resistance and back-EMF leave {} % of its squares unexplained",
-                format_significant(100.0 * left, 2)
-            ));
+            return Err(Lack::Unexplained(left));
         }
-        for (place, name) in [(CURRENT, "resistance"), (SPEED, "back-EMF")] {
+        for (place, part) in [(CURRENT, Part::Resistance), (SPEED, Part::BackEmf)] {
             if before.values[place] <= 0.0 {
-                return Err(format!("by it the {name} would not be positive"));
+                return Err(Lack::NotPositive(part));
             }
         }
         Ok(Self {
@@ -161,10 +146,10 @@ impl<'a> Analysis<'a> {
     ///
     /// # Errors
     /// As [`Self::of`].
-    fn winding(&self) -> Result<Winding, String> {
+    fn winding(&self) -> Result<Winding, Lack> {
         let (fade, likeliest) = self.likeliest();
         let refused = self.refused(likeliest.as_ref());
-        let tried = self.tried(likeliest.as_ref(), refused.as_deref());
+        let tried = self.tried(likeliest.as_ref());
         let fitted = self.fitted(fade, likeliest.filter(|_| refused.is_none()))?;
         let after = &fitted.after;
         let left = self.left(&fitted);
@@ -179,10 +164,9 @@ impl<'a> Analysis<'a> {
             ],
             // If the equation does not hold, its coefficients are wrong.
             constant: constant_off(robot, self.joint, after).filter(|_| left.is_none()),
-            remarks: (resistance_off(robot, self.joint, after).filter(|_| left.is_none()))
-                .into_iter()
-                .collect(),
+            resistance: resistance_off(robot, self.joint, after).filter(|_| left.is_none()),
             tried,
+            refused,
             detectable: self.detectable(&fitted),
             dead_zone: (fitted.accepted.as_ref()).map(|accepted| self.dead_zone(accepted, &fitted)),
             left,
@@ -229,17 +213,18 @@ impl<'a> Analysis<'a> {
     }
 
     /// Returns the reason why the likeliest dead zone is rejected.
-    fn refused(&self, likeliest: Option<&FittedCandidate>) -> Option<String> {
+    fn refused(&self, likeliest: Option<&FittedCandidate>) -> Option<Refusal> {
         match likeliest {
-            _ if self.left_out() => Some("it was left out".to_owned()),
+            _ if self.left_out() => Some(Refusal::LeftOut),
             Some(profile) => {
-                (profile.refused(self.trials).as_ref().map(refusal)).or_else(|| too_small(profile))
+                (profile.refused(self.trials).map(Refusal::Evidence)).or_else(|| too_small(profile))
             }
-            None => Some("it takes no voltage along the current".to_owned()),
+            None => Some(Refusal::NoVoltage),
         }
     }
 
-    fn tried(&self, likeliest: Option<&FittedCandidate>, refused: Option<&str>) -> Tried {
+    /// Returns the tried dead zone, without the reason for its refusal.
+    fn tried(&self, likeliest: Option<&FittedCandidate>) -> Tried {
         let evidence = likeliest.map(|p| &p.evidence);
         Tried {
             effect: Kind::DriveDeadzone.about().name.to_owned(),
@@ -248,12 +233,12 @@ impl<'a> Analysis<'a> {
             gain: evidence.map_or(0.0, |e| e.gain),
             gain_sigmas: evidence.map_or(0.0, |e| e.gain_sigmas),
             p_value: evidence.map_or(1.0, |e| e.corrected(self.trials)),
-            refused: refused.unwrap_or_default().to_owned(),
+            refused: String::new(),
         }
     }
 
     /// Fits the equation with the dead zone, if it is accepted.
-    fn fitted(&self, fade: usize, accepted: Option<FittedCandidate>) -> Result<Fitted<'a>, String> {
+    fn fitted(&self, fade: usize, accepted: Option<FittedCandidate>) -> Result<Fitted<'a>, Lack> {
         let rows = &self.training.rows;
         let mut last = self.base.clone();
         if accepted.is_some() {
@@ -264,7 +249,8 @@ impl<'a> Analysis<'a> {
                 let memory = noise_floor::memory(rows, &[last.residual(0)]);
                 let plain = self.plain.clone().clustered(memory, &self.pairs);
                 let all: Vec<_> = rows.nominal.iter().chain(self.dead(fade)).collect();
-                jackknifed(&plain, &[], &all, &self.training.fading(fade)).ok_or_else(lacking)?
+                jackknifed(&plain, &[], &all, &self.training.fading(fade))
+                    .ok_or(Lack::Inseparable)?
             }
             None => self.before.clone(),
         };
@@ -317,7 +303,7 @@ impl<'a> Analysis<'a> {
     }
 
     /// Returns the unexplained remainder of the voltage.
-    fn left(&self, fitted: &Fitted<'a>) -> Option<Remainder> {
+    fn left(&self, fitted: &Fitted<'a>) -> Option<Left> {
         // A dead zone too small for a name still explains its part.
         let mut known = fitted.last.clone();
         if fitted.accepted.is_none() && !self.left_out() {
@@ -329,7 +315,7 @@ impl<'a> Analysis<'a> {
             rms: [self.base.rms(0), known.rms(0)],
             floor: fitted.repeated,
         }
-        .remainder(|| self.places(&known, fitted.repeated.unwrap_or(0.0)).next())
+        .left(|| self.places(&known, fitted.repeated.unwrap_or(0.0)).next())
     }
 
     /// Returns the accepted dead zone with its entries in the result.
@@ -365,12 +351,18 @@ impl<'a> Analysis<'a> {
                 holdout_rms: unseen,
                 motion_rms: None,
                 gap_closed: closed(unseen.unwrap_or(train), floor),
-                why: why(before, after, FADES[fitted.fade], floor),
+                why: String::new(),
             },
-            places: (self.places(&self.base, floor).take(1))
-                .map(of_the_voltage)
-                .collect(),
-            absorbed: absorbed(self.name(), before, after),
+            fade: FADES[fitted.fade],
+            floor,
+            places: self.places(&self.base, floor).take(1).collect(),
+            moved: [(CURRENT, Part::Resistance), (SPEED, Part::BackEmf)].map(|(place, part)| {
+                Moved {
+                    part,
+                    before: before.values[place],
+                    after: [after.values[place], after.std(place)],
+                }
+            }),
             map: Map {
                 joint: self.name().to_owned(),
                 residual_unit: "V".to_owned(),
@@ -386,18 +378,15 @@ impl<'a> Analysis<'a> {
 }
 
 /// Returns the reason why a small voltage step is not an inverter's: other errors of the equation are as large.
-fn too_small(profile: &FittedCandidate) -> Option<String> {
+fn too_small(profile: &FittedCandidate) -> Option<Refusal> {
     let volts = profile.evidence.gains[0];
-    let least = Kind::DriveDeadzone.about().gains[0].range[0];
     let share = profile.evidence.gain;
-    (volts < least || share < LEAST_SHARE).then(|| {
-        format!(
-            "{} V, which take {} % of what is left; at least {least} V and {} % would be a dead zone",
-            format_significant(volts, 2),
-            format_significant(100.0 * share, 2),
-            100.0 * LEAST_SHARE
-        )
-    })
+    (volts < least_volts() || share < LEAST_SHARE).then_some(Refusal::Small { volts, share })
+}
+
+/// Returns the least voltage step of an inverter, V.
+pub(crate) fn least_volts() -> f64 {
+    Kind::DriveDeadzone.about().gains[0].range[0]
 }
 
 fn value(solution: &Solution, k: usize, volts: &Parameter) -> Value {
@@ -407,36 +396,4 @@ fn value(solution: &Solution, k: usize, volts: &Parameter) -> Value {
         std: inflated(Kind::DriveDeadzone, volts, value, solution.std(k), 0.0),
         unit: volts.unit.to_owned(),
     }
-}
-
-/// Returns the changes of resistance and back-EMF by a dead zone.
-fn absorbed(joint: &str, before: &Solution, after: &Solution) -> Vec<Absorbed> {
-    let moved = |(place, name, unit): (usize, &str, &str)| Absorbed {
-        parameter: format!("{name} of the motor of {joint}"),
-        unit: unit.to_owned(),
-        before: before.values[place],
-        after: after.values[place],
-        sigmas: (after.values[place] - before.values[place]).abs()
-            / after.std(place).max(f64::MIN_POSITIVE),
-    };
-    [
-        (CURRENT, "resistance", "Ohm"),
-        (SPEED, "back-EMF", "V*s/rad"),
-    ]
-    .map(moved)
-    .into()
-}
-
-/// Returns the reason to believe a dead zone, one sentence.
-fn why(before: &Solution, after: &Solution, fade: f64, floor: f64) -> String {
-    format!(
-        "The voltage follows R·i + L·di/dt + k·ω but for a step where the current changes its sign{}, down to a floor of {} V; without the step the resistance had come out as {} Ω instead of {}.",
-        match fade {
-            0.0 => String::new(),
-            fade => format!(", which fades below {fade} A"),
-        },
-        format_significant(floor, 3),
-        format_significant(before.values[CURRENT], 3),
-        format_value(after.values[CURRENT], after.std(CURRENT)),
-    )
 }

@@ -48,6 +48,14 @@ pub(crate) struct Equation {
     speed: Vec<f64>,
 }
 
+/// A recording of clamped joints with another sample rate, Hz, than the others.
+#[derive(Debug, thiserror::Error)]
+#[error("it is sampled at {own:.1} Hz and the others at {rate:.1} Hz; record it as them")]
+struct OtherRate {
+    own: f64,
+    rate: f64,
+}
+
 impl Equation {
     /// Builds the rows of a joint from runs in motion and clamped ones. `None` without a complete voltage record, or if
     /// the torque does not represent a current.
@@ -76,12 +84,10 @@ impl Equation {
         let rate = prepared.runs[0].rate;
         for run in prepared.runs.iter().chain(clamped) {
             if (run.rate / rate - 1.0).abs() > SAME_RATE {
+                let own = run.rate;
                 return Err(DiagnoseError::Clamped {
                     label: run.label.clone(),
-                    what: format!(
-                        "it is sampled at {:.1} Hz and the others at {rate:.1} Hz; record it as them",
-                        run.rate
-                    ),
+                    what: OtherRate { own, rate }.to_string(),
                 });
             }
             collected.push(&prepared.rows.thinning, run, &run.joints[joint], drive);

@@ -1,8 +1,8 @@
 //! Unexplained remainder of a motor's voltage.
 
 use crate::levels::BEYOND_FLOOR;
-use crate::outcome::{Place, Remainder};
-use rig_output::format_significant;
+use crate::motor_voltage::winding::Left;
+use crate::outcome::Place;
 
 /// Least share of the residual that a coordinate must explain; an inverter's own noise explains less …
 const LEFT: f64 = 0.2;
@@ -26,8 +26,8 @@ pub(crate) struct Rest<'a> {
 }
 
 impl Rest<'_> {
-    /// Returns the remainder above the noise, unless negligible. `place` is the residual's strongest dependence.
-    pub(crate) fn remainder(self, place: impl FnOnce() -> Option<Place>) -> Option<Remainder> {
+    /// Returns what is above the noise, unless negligible. `place` is the residual's strongest dependence.
+    pub(crate) fn left(self, place: impl FnOnce() -> Option<Place>) -> Option<Left> {
         let [before, rms] = self.rms;
         if rms <= LEAST * self.voltage {
             return None;
@@ -44,31 +44,12 @@ impl Rest<'_> {
             None => place.as_ref().map_or(1.0, |p| 1.0 - p.share) * rms * rms,
         };
         let left = (rms * rms - noise).max(0.0).sqrt();
-        let where_to = place.as_ref().map_or_else(
-            || "It goes with neither current nor speed alone.".to_owned(),
-            |place| place.text.clone(),
-        );
-        (left > LEAST * self.voltage).then(|| Remainder {
+        (left > LEAST * self.voltage).then(|| Left {
             joint: self.joint.to_owned(),
             rms: left,
-            unit: "V".to_owned(),
             ratio: rms / noise.sqrt().max(f64::MIN_POSITIVE),
-            text: format!(
-                "Of the motor's voltage at joint {} {} V RMS are left that are no noise, and no effect of the library explains them. {where_to} The inverter may be the cause, or a sensor whose current stands for the torque: then the torque is bent as well. Nothing else is concluded from this voltage.",
-                self.joint,
-                format_significant(left, 3),
-            ),
-            places: (place.into_iter()).map(of_the_voltage).collect(),
-            doubt: true,
+            place,
         })
-    }
-}
-
-/// Adds to a place that it concerns the voltage.
-pub(crate) fn of_the_voltage(place: Place) -> Place {
-    Place {
-        text: format!("Of the motor's voltage: {}", place.text),
-        ..place
     }
 }
 
@@ -76,7 +57,7 @@ pub(crate) fn of_the_voltage(place: Place) -> Place {
 mod tests {
     use super::*;
 
-    fn left(rms: [f64; 2], floor: Option<f64>, share: f64) -> Option<Remainder> {
+    fn left(rms: [f64; 2], floor: Option<f64>, share: f64) -> Option<Left> {
         let place = Place {
             joint: "link".into(),
             coordinate: "current of the motor".into(),
@@ -92,7 +73,7 @@ mod tests {
             rms,
             floor,
         }
-        .remainder(|| Some(place))
+        .left(|| Some(place))
     }
 
     #[test]

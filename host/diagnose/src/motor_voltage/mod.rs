@@ -13,13 +13,13 @@ mod analysis;
 mod equation;
 mod left;
 mod remarks;
+mod sentences;
 mod settle;
 mod tell;
 #[cfg(test)]
 mod tests;
 mod winding;
 
-pub(crate) use analysis::windings;
 pub(crate) use settle::{Word, settled, zeros};
-pub(crate) use tell::tell;
-pub(crate) use winding::{Winding, contradict, left_of_voltage, name_something};
+pub(crate) use tell::{left_of_voltage, tell, windings};
+pub(crate) use winding::{Winding, contradict, name_something};

@@ -164,7 +164,10 @@ fn with_the_drive_off_a_sensor_s_constant_is_told_from_a_torque() {
         assert!(set.iter().any(|n| n == "current_offset"), "{set:?}");
         assert!(set.iter().any(|n| n == "torque_offset"), "{set:?}");
         let next = before.next_experiment.unwrap();
-        assert_eq!((next.kind.as_str(), next.hands), ("drive-off-log", false));
+        assert_eq!(
+            (next.kind.to_string().as_str(), next.hands),
+            ("drive-off-log", false)
+        );
         let log = scenario.drive_off(&made).unwrap();
         let options = Options {
             sensor_zeros: sensor_zeros(&log).unwrap(),
@@ -309,7 +312,7 @@ fn a_clamped_shaft_shows_a_dead_zone() {
     let found = next(&made.robot, 0, &rivals, Held::default(), 0.05)
         .unwrap()
         .unwrap();
-    assert_eq!(found.experiment.kind, "locked-rotor-staircase");
+    assert_eq!(found.experiment.kind.to_string(), "locked-rotor-staircase");
     let sure = |options: &Options| {
         let (found, _) = made.diagnosed(&made.robot, options);
         let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();

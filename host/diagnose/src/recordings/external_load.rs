@@ -52,7 +52,7 @@ pub(crate) fn step(
 mod tests {
     use std::path::Path;
 
-    use crate::experiment::{FILE, PULLS_OFF};
+    use crate::experiment::{ExperimentKind, FILE};
     use crate::outcome::Verdict;
     use crate::tests::made::Diagnosed as _;
     use crate::{Diagnosis, Options};
@@ -66,7 +66,7 @@ mod tests {
         let options = Options::default();
         let (before, _) = made.diagnosed(&made.robot, &options);
         let next = before.next_experiment.clone().unwrap();
-        assert_eq!((next.kind.as_str(), next.hands), (PULLS_OFF, true));
+        assert_eq!((next.kind, next.hands), (ExperimentKind::PullsOff, true));
         let file = TrajectoryFile::from_toml(&next.trajectory.unwrap(), Path::new(FILE)).unwrap();
         let free = scenario.unburdened().proposed(&made, &file).unwrap();
         made.unburdened.push(free);

@@ -8,14 +8,14 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use crate::columns::candidate::Candidate;
 use crate::columns::kinds::{is_first_law, is_gear, rivals};
-use crate::experiment::{Held, Nominal, OFF_LOG, PULLS_OFF, testable};
+use crate::experiment::{ExperimentKind, Held, Nominal, testable};
 use crate::fit::least_squares::Fit;
 use crate::levels::{LEAST_GAIN, SIGNIFICANT};
 use crate::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
 use crate::recordings::external_load::told_apart;
 use crate::result::found::Found;
 use crate::result::sentences::limits::{
-    COLLINEAR, GivenAlready, NOT_TESTABLE_YET, RICHER_MOTION, given_already, to_test,
+    COLLINEAR, GivenAlready, RICHER_MOTION, given_already, to_test,
 };
 use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
@@ -226,7 +226,7 @@ pub(crate) fn next(
         let floor = found.floors[joint];
         if let Some(proposal) = experiment::next(found.robot, joint, &list, held, floor)? {
             let mut experiment = proposal.experiment;
-            if let Some(given) = given(found, joint, &experiment.kind) {
+            if let Some(given) = given(found, joint, experiment.kind) {
                 experiment.text.insert_str(0, &given_already(given));
             }
             return Ok(Some(NextExperiment {
@@ -239,7 +239,7 @@ pub(crate) fn next(
         .not_testable
         .first()
         .map(|lacking| NextExperiment {
-            kind: NOT_TESTABLE_YET.to_owned(),
+            kind: ExperimentKind::NotTestableYet,
             separates: vec![lacking.effect.clone()],
             text: to_test(lacking),
             file: None,
@@ -251,14 +251,17 @@ pub(crate) fn next(
 }
 
 /// Returns the data of an experiment of this kind, if they were given and were not sufficient.
-fn given(found: &Found, joint: usize, kind: &str) -> Option<GivenAlready> {
-    if kind == OFF_LOG {
-        return Some(GivenAlready::DriveOff {
+fn given(found: &Found, joint: usize, kind: ExperimentKind) -> Option<GivenAlready> {
+    match kind {
+        ExperimentKind::DriveOffLog => Some(GivenAlready::DriveOff {
             zero: *found.sensor_zeros.get(joint)?,
             unit: found.robot.joints[joint].kind.units().1,
-        });
+        }),
+        ExperimentKind::PullsOff => {
+            told_apart(found.search.source.runs).then_some(GivenAlready::PullsOff)
+        }
+        _ => None,
     }
-    (kind == PULLS_OFF && told_apart(found.search.source.runs)).then_some(GivenAlready::PullsOff)
 }
 
 /// Returns an effect with its estimate. A tilt is fitted as an angle, which turns gravity's torque.

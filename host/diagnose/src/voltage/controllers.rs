@@ -2,7 +2,6 @@
 
 use crate::voltage::log::Log;
 use rig_model::robot::{AntiWindup, VoltageController};
-use rig_output::format_significant;
 
 /// Largest relative difference between proportional gains of one controller. 10 %: on the XL330 recordings gains of one
 /// setting differed by 1 %, settings by 100 % (November 2026).
@@ -15,6 +14,15 @@ pub(crate) struct Shown {
     pub controller: VoltageController,
     /// Number of recordings.
     pub count: usize,
+}
+
+/// Recordings whose controller drives the model in the closed loop, instead of the recorded voltage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Driven {
+    /// Number of these recordings.
+    pub closed: usize,
+    /// Number of all.
+    pub all: usize,
 }
 
 /// Returns the controllers of recordings, by number of recordings; among equals the stiffer first.
@@ -72,60 +80,4 @@ fn merged(group: &[VoltageController]) -> VoltageController {
         },
         supply: [mean(|c| c.supply[0]), mean(|c| c.supply[1])],
     }
-}
-
-/// Returns a controller in words: its terms with their gains. `unit` is rad or m.
-pub fn terms(c: &VoltageController, unit: &str) -> String {
-    let mut list = vec![format!(
-        "proportional {} 1/{unit}",
-        format_significant(c.proportional, 3)
-    )];
-    for (name, gain, per) in [
-        ("integral", c.integral, format!("1/({unit}·s)")),
-        ("derivative", c.derivative, format!("s/{unit}")),
-        (
-            "velocity feed-forward",
-            c.velocity_feedforward,
-            format!("s/{unit}"),
-        ),
-        (
-            "acceleration feed-forward",
-            c.acceleration_feedforward,
-            format!("s²/{unit}"),
-        ),
-    ] {
-        if gain != 0.0 {
-            list.push(format!("{name} {} {per}", format_significant(gain, 3)));
-        }
-    }
-    list.join(", ")
-}
-
-/// Returns sentences on the recordings' controllers and supply; empty if they show none.
-pub(crate) fn sentences(list: &[Shown], unit: &str) -> Vec<String> {
-    let Some(first) = list.first() else {
-        return Vec::new();
-    };
-    let each: Vec<String> = (list.iter())
-        .map(|shown| {
-            let s = if shown.count == 1 { "" } else { "s" };
-            format!(
-                "{} ({} recording{s})",
-                terms(&shown.controller, unit),
-                shown.count
-            )
-        })
-        .collect();
-    let [none, slope] = first.controller.supply.map(|x| format_significant(x, 3));
-    let mut words = vec![format!(
-        "The recordings show this controller, its output a share of the supply: {}. The supply is {none} V without load and changes by {slope} V up to a share of one.",
-        each.join("; ")
-    )];
-    if list.len() > 1 {
-        words.push(format!(
-            "model.toml has the controller with {}; change [joint.voltage_controller] to simulate another.",
-            terms(&first.controller, unit)
-        ));
-    }
-    words
 }

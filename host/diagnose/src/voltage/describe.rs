@@ -8,13 +8,12 @@ use crate::outcome::{
     Absorbed, Before, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value,
     Verdict, Waterfall,
 };
-use crate::voltage::controllers;
-use crate::voltage::controllers::Shown;
+use crate::voltage::controllers::{Driven, Shown};
 use crate::voltage::free_run::FreeRun;
 use crate::voltage::plant::{NAMES, NOMINAL, Plant};
 use crate::voltage::search::{EQUAL, Model, Trial, on_the_voltage};
+use crate::voltage::sentences;
 use rig_model::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
-use rig_output::format_significant;
 use rig_shared::effects::Effect;
 
 /// Multiple of the noise floor above which a residual is unexplained.
@@ -40,8 +39,8 @@ pub(crate) struct Told<'a> {
     pub rounds: Vec<Vec<Trial>>,
     /// RMS on left-out recordings before each round.
     pub unseen: Vec<f64>,
-    /// The driving voltage, in words.
-    pub driven: String,
+    /// The driving voltage.
+    pub driven: Driven,
 }
 
 impl Told<'_> {
@@ -71,10 +70,9 @@ impl Told<'_> {
         self.stated.told(now.collect())
     }
 
-    /// Formats a position error.
-    fn thousandths(&self, error: f64) -> String {
-        let unit = self.stated.robot.joints[0].kind.units().0;
-        format!("{:.2} m{unit}", 1e3 * error)
+    /// Returns the unit of the position, ASCII.
+    fn unit(&self) -> &'static str {
+        self.stated.robot.joints[0].kind.units().0
     }
 
     fn judged(&self) -> &[FreeRun] {
@@ -113,11 +111,8 @@ impl Told<'_> {
             noise_floor_rms: vec![self.floor],
             noise_floor_from: Vec::new(),
             left: Vec::new(),
-            noise_floor_how: "The encoder's smallest step over √12, of the position: a lower bound, as no repeated runs are compared here.".into(),
-            motion_how: format!(
-                "The motor voltage drives each model, {}.",
-                self.driven
-            ),
+            noise_floor_how: sentences::FLOOR.to_owned(),
+            motion_how: sentences::motion(self.driven),
             treatment: None,
             torque_lead: Vec::new(),
             places: Vec::new(),
@@ -142,23 +137,19 @@ impl Told<'_> {
 
     /// Returns the sentences of the result.
     fn words(&self, described: &[Described]) -> Vec<String> {
-        let on = if self.holdout.is_empty() {
-            "the recordings it was fitted to"
-        } else {
-            "the recordings held back"
-        };
-        let mut words = vec![format!(
-            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. {}",
+        let judged = self.judged();
+        let runs = [&judged[0], &judged[judged.len() - 1]];
+        let mut words = vec![sentences::summary(
             self.driven,
-            self.on_the_whole(on)
+            runs,
+            !self.holdout.is_empty(),
+            !self.controllers.is_empty(),
+            self.unit(),
         )];
-        words.extend(controllers::sentences(
-            &self.controllers,
-            self.stated.robot.joints[0].kind.units().0,
-        ));
+        words.extend(sentences::controllers(&self.controllers, self.unit()));
         let mut effects = self.models.iter().flat_map(|m| &m.effects);
         if effects.any(|k| on_the_voltage(*k)) {
-            words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
+            words.push(sentences::VOLTAGE_OR_FRICTION.to_owned());
         }
         words.extend(self.rotor_remark());
         words.extend(described.iter().map(|d| d.text.clone()));
@@ -172,7 +163,7 @@ impl Told<'_> {
         let effects = last.flat_map(|m| m.effects[self.described()..].iter().map(|k| title_of(*k)));
         Waterfall {
             joint: self.joint(),
-            unit: self.stated.robot.joints[0].kind.units().0.into(),
+            unit: self.unit().into(),
             models: std::iter::once("refitted".to_owned())
                 .chain(effects)
                 .collect(),
@@ -183,49 +174,6 @@ impl Told<'_> {
         }
     }
 
-    /// Returns a sentence on the free runs of the last model `on` the recordings that judge it.
-    fn on_the_whole(&self, on: &str) -> String {
-        let judged = self.judged();
-        let (first, last) = (&judged[0], &judged[judged.len() - 1]);
-        match last {
-            FreeRun::Diverged { .. } => self.diverged(last),
-            FreeRun::Followed {
-                rms, mean_absolute, ..
-            } => format!(
-                "On {on} it is off by {} (RMS; {} in the mean of the absolute error); before any effect {}.",
-                self.thousandths(*rms),
-                self.thousandths(*mean_absolute),
-                match first.rms() {
-                    Some(rms) => format!("it was off by {}", self.thousandths(rms)),
-                    None => "the free run diverged".to_owned(),
-                }
-            ),
-        }
-    }
-
-    /// Returns a sentence on where and why a run diverged; empty if it did not.
-    fn diverged(&self, run: &FreeRun) -> String {
-        let FreeRun::Diverged {
-            recording,
-            time,
-            why,
-        } = run
-        else {
-            return String::new();
-        };
-        let mend = match self.controllers.is_empty() {
-            true => {
-                "Record the reference (ref1) as well, so that the loop can be closed, or give shorter recordings."
-            }
-            false => {
-                "The motion asks more of the drive than the training recordings; give a recording of such a motion to learn from."
-            }
-        };
-        format!(
-            "The free run diverges in {recording} at {time:.2} s: {why}. It says nothing of the model. {mend}"
-        )
-    }
-
     /// Returns the remainder of the last model; a diverged run has no number.
     fn remainder(&self) -> Remainder {
         let last = &self.judged()[self.judged().len() - 1];
@@ -233,24 +181,11 @@ impl Told<'_> {
         Remainder {
             joint: self.joint(),
             rms: last.rms().map_or(f64::NAN, excess),
-            unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
+            unit: self.unit().to_owned(),
             ratio: last.number() / self.floor.max(f64::MIN_POSITIVE),
             places: Vec::new(),
-            text: self.left_over(),
+            text: sentences::left_over(last, self.floor, !self.controllers.is_empty(), self.unit()),
             doubt: false,
-        }
-    }
-
-    /// Returns a sentence on the residual of the last model.
-    fn left_over(&self) -> String {
-        let last = &self.judged()[self.judged().len() - 1];
-        match last.rms() {
-            None => self.diverged(last),
-            Some(rms) => format!(
-                "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
-                self.thousandths(rms),
-                rms / self.floor.max(f64::MIN_POSITIVE)
-            ),
         }
     }
 
@@ -258,12 +193,7 @@ impl Told<'_> {
     fn rotor_remark(&self) -> Option<String> {
         let drive = self.stated.robot.joints[0].drive.as_ref()?;
         let found = self.models.last()?.theta[0] / drive.gear_ratio.powi(2);
-        (found < drive.rotor_inertia).then(|| {
-            let [stated, found] = [drive.rotor_inertia, found].map(|x| format_significant(x, 3));
-            format!(
-                "The rotor's inertia of {stated} kg·m² in the description is more than the motion shows of the drive, {found} kg·m², which stands in model.toml."
-            )
-        })
+        (found < drive.rotor_inertia).then(|| sentences::rotor(drive.rotor_inertia, found))
     }
 
     fn step(&self, k: usize) -> Step {
@@ -302,16 +232,12 @@ impl Told<'_> {
             runner_up: other.map(|(t, _)| title_of(t.kind)),
             runner_up_gap_closed: other
                 .map(|(_, rms)| closed([self.train[k - 1].number(), rms], self.floor)),
-            rms_unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
+            rms_unit: self.unit().to_owned(),
             train_rms: pair(&self.train),
             holdout_rms: holdout,
             motion_rms: Some(judged),
             gap_closed: closed(judged, self.floor),
-            why: format!(
-                "The simulated position of recordings that it was not fitted to is off by {} with it, {} before.",
-                self.thousandths(best),
-                self.thousandths(self.unseen[k - 1])
-            ),
+            why: sentences::why(best, self.unseen[k - 1], self.unit()),
         }
     }
 
@@ -365,7 +291,7 @@ impl Told<'_> {
                 gain: 1.0 - t.unseen.unwrap_or(before) / before,
                 gain_sigmas: 0.0,
                 p_value: t.p_value,
-                refused: t.refused.clone(),
+                refused: t.refused.map_or_else(String::new, sentences::refusal),
             };
             round.iter().map(one).collect::<Vec<_>>()
         };

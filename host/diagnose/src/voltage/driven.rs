@@ -24,8 +24,8 @@ pub(crate) struct VoltageModel {
     effects: Vec<Kind>,
     theta: Vec<f64>,
     controller: Option<VoltageController>,
-    /// Described effects that the simulation lacks, sentences.
-    pub(crate) remarks: Vec<String>,
+    /// Described effects that the simulation lacks.
+    pub(crate) left_out: Vec<Kind>,
 }
 
 /// A recording and its simulated motion.
@@ -84,8 +84,8 @@ pub enum DrivenError {
         joint: String,
         /// s
         time: f64,
-        /// A clause.
-        why: String,
+        /// Reason.
+        why: Cause,
     },
 }
 
@@ -110,19 +110,10 @@ impl VoltageModel {
             theta.extend(&effect.shapes[..about.shapes.len()]);
         }
         let kinds: Vec<Kind> = parts.iter().map(|(effect, _)| effect.kind).collect();
-        let left_out = |effect: &&rig_model::robot::RobotEffect| {
-            let kind = effect.effect.kind;
-            !kinds.contains(&kind) && kind != Kind::Payload
-        };
+        let stated = robot.effects.iter().map(|effect| effect.effect.kind);
+        let left_out = |kind: &Kind| !kinds.contains(kind) && *kind != Kind::Payload;
         Ok(Self {
-            remarks: (robot.effects.iter().filter(left_out))
-                .map(|effect| {
-                    format!(
-                        "{} of the description is not part of the simulation of a joint under voltage.",
-                        effect.effect.kind.about().title
-                    )
-                })
-                .collect(),
+            left_out: stated.filter(left_out).collect(),
             plant,
             effects: kinds,
             theta,
@@ -228,7 +219,7 @@ impl VoltageModel {
             .map_err(|Halt { time, cause }| DrivenError::Halted {
                 joint: joint.to_owned(),
                 time,
-                why: cause.clause().to_owned(),
+                why: cause,
             })?;
         Ok(states)
     }

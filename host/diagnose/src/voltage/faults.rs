@@ -2,7 +2,8 @@
 
 use crate::DiagnoseError;
 use crate::faults::names;
-use crate::outcome::{About, DataFault, FaultKind};
+use crate::faults::names::Name;
+use crate::outcome::FaultKind;
 use crate::voltage::fit::WINDOW;
 use crate::voltage::free_run::travel;
 use crate::voltage::log::{Log, floor};
@@ -11,12 +12,11 @@ use crate::voltage::start::{left_of_voltage, start};
 use rig_data::prepare::{Recording, first_block};
 use rig_data::{Implausible, JUDGED_ROWS, plausibility};
 use rig_model::robot::{Joint, JointKind, Robot};
-use rig_output::{format_significant, format_trimmed};
 
 /// Least length of the training recordings, in windows of a fit.
-const FEWEST_WINDOWS: f64 = 5.0;
+pub(crate) const FEWEST_WINDOWS: f64 = 5.0;
 /// Least travel of the joint, in encoder steps.
-const FEWEST_STEPS: f64 = 20.0;
+pub(crate) const FEWEST_STEPS: f64 = 20.0;
 
 /// Least share of the travel in each direction for a joint that turns both ways.
 const BOTH_WAYS: f64 = 0.1;
@@ -27,10 +27,56 @@ const BETTER: f64 = 0.35;
 /// Ratio within which a factor is a thousand: friction adds to the back-EMF, the torque constant is uncertain.
 const THOUSAND: f64 = 5.0;
 
-/// A fault's kind and text.
-type Wrong = (FaultKind, String);
+/// A fault of a recording, or of all.
+#[derive(Clone, Debug)]
+pub(crate) enum Wrong {
+    /// An implausible column.
+    Implausible(Implausible),
+    /// Recordings of too few seconds.
+    TooShort { duration: f64 },
+    /// A joint at rest.
+    Still,
+    /// A voltage of the other sense.
+    Turned,
+    /// A voltage of zero.
+    Dead,
+    /// A voltage that stays within limits, V, while the joint turns both ways.
+    Supply { low: f64, high: f64 },
+    /// A position that fits the voltage if multiplied by `factor`.
+    PositionScaled {
+        factor: f64,
+        name: Name,
+        /// Residual shares of the voltage's squares, as recorded and with the factor.
+        left: [f64; 2],
+    },
+    /// A voltage in mV, else in kV.
+    VoltageScaled {
+        milli: bool,
+        /// Back-EMF, V·s/rad, found and described.
+        emf: [f64; 2],
+    },
+}
 
-/// Returns the faults of the recordings `given` (training, hold-out) with their rows `read`; empty if there are none.
+impl Wrong {
+    /// Returns the kind of the fault.
+    pub(crate) fn kind(&self) -> FaultKind {
+        match self {
+            Self::Implausible(Implausible::NotSeconds { .. }) => FaultKind::Clock,
+            Self::Implausible(Implausible::Jump { .. }) => FaultKind::Jump,
+            Self::TooShort { .. } => FaultKind::TooShort,
+            Self::Still => FaultKind::NotMoving,
+            Self::Turned => FaultKind::Sign,
+            Self::PositionScaled { name, .. } => name.kind(),
+            Self::Implausible(_)
+            | Self::Dead
+            | Self::Supply { .. }
+            | Self::VoltageScaled { .. } => FaultKind::Unit,
+        }
+    }
+}
+
+/// Returns the faults of the recordings `given` (training, hold-out) with their rows `read`, each with the names of its
+/// recordings; empty if there are none.
 ///
 /// # Errors
 /// Errors of reading.
@@ -39,20 +85,14 @@ pub(crate) fn faults(
     plant: &Plant,
     given: &[&[&dyn Recording]; 2],
     read: &[&[Log]; 2],
-) -> Result<Vec<DataFault>, DiagnoseError> {
+) -> Result<Vec<(Wrong, String)>, DiagnoseError> {
     let joint = &robot.joints[0];
-    let fault = |(kind, text): Wrong, recording: String| DataFault {
-        kind,
-        about: About::Recording,
-        recording,
-        joint: joint.name.clone(),
-        certain: true,
-        text,
-    };
     let mut found = Vec::new();
     for source in given.iter().copied().flatten() {
-        let wrong = implausible(robot, *source)?.into_iter();
-        found.extend(wrong.map(|wrong| fault(wrong, source.label())));
+        let first = first_block(*source, JUDGED_ROWS)?;
+        let wrong = first.map(|block| plausibility(&block, robot));
+        let wrong = wrong.into_iter().flatten().map(Wrong::Implausible);
+        found.extend(wrong.map(|wrong| (wrong, source.label())));
     }
     if !found.is_empty() {
         return Ok(found);
@@ -65,52 +105,21 @@ pub(crate) fn faults(
         .or_else(|| voltage_scale(joint, plant, train));
     found.extend(wrong.map(|wrong| {
         let labels = given[0].iter().map(|source| source.label());
-        fault(wrong, labels.collect::<Vec<_>>().join(", "))
+        (wrong, labels.collect::<Vec<_>>().join(", "))
     }));
     Ok(found)
-}
-
-/// Returns what cannot be in the first rows of a recording.
-///
-/// # Errors
-/// Errors of reading.
-fn implausible(robot: &Robot, source: &dyn Recording) -> Result<Vec<Wrong>, DiagnoseError> {
-    let first = first_block(source, JUDGED_ROWS)?;
-    let wrong = first.map(|block| plausibility(&block, robot));
-    let named = wrong.into_iter().flatten().map(|what| {
-        let kind = match what {
-            Implausible::NotSeconds { .. } => FaultKind::Clock,
-            Implausible::Jump { .. } => FaultKind::Jump,
-            _ => FaultKind::Unit,
-        };
-        (kind, format!("{what}."))
-    });
-    Ok(named.collect())
 }
 
 /// Returns a fault if the recordings are too short to learn from.
 fn too_short(logs: &[Log]) -> Option<Wrong> {
     let duration: f64 = logs.iter().map(Log::duration).sum();
-    (duration < FEWEST_WINDOWS * WINDOW).then(|| {
-        (
-            FaultKind::TooShort,
-            format!(
-                "The recordings give {duration:.2} s of motion; without torque or current at least {} s are needed.",
-                FEWEST_WINDOWS * WINDOW
-            ),
-        )
-    })
+    (duration < FEWEST_WINDOWS * WINDOW).then_some(Wrong::TooShort { duration })
 }
 
 /// Returns a fault if the joint stands still.
 fn still(logs: &[Log]) -> Option<Wrong> {
     let least = FEWEST_STEPS * 12.0_f64.sqrt() * floor(logs);
-    (!(travel(logs) > least)).then(|| {
-        (
-            FaultKind::NotMoving,
-            format!("The joint does not move by {FEWEST_STEPS} steps of its encoder; record a motion, or check that the position column is alive."),
-        )
-    })
+    (!(travel(logs) > least)).then_some(Wrong::Still)
 }
 
 /// Returns a fault if the voltage drives the joint against its sense.
@@ -122,12 +131,8 @@ fn turned(plant: &Plant, logs: &[Log]) -> Option<Wrong> {
         })
         .collect();
     // A voltage that drives nothing has no wrong sense.
-    (start(plant, logs, true).is_none() && start(plant, &turned, true).is_some()).then(|| {
-        (
-            FaultKind::Sign,
-            "u1 drives the joint against its sense: the torque per volt comes out negative. Turn the sign of u1 (or of the duty cycle), or that of q1.".into(),
-        )
-    })
+    (start(plant, logs, true).is_none() && start(plant, &turned, true).is_some())
+        .then_some(Wrong::Turned)
 }
 
 /// Returns a fault if a voltage is always zero, or constant while the joint turns both ways.
@@ -135,10 +140,7 @@ fn dead(logs: &[Log]) -> Option<Wrong> {
     let all = || logs.iter().flat_map(|log| &log.u);
     let most = all().fold(0.0_f64, |most, u| most.max(u.abs()));
     if most == 0.0 {
-        return Some((
-            FaultKind::Unit,
-            "u1 is 0 in every row while the joint moves; check that the column is the motor's voltage and was recorded.".into(),
-        ));
+        return Some(Wrong::Dead);
     }
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| {
         (low.min(*u), high.max(*u))
@@ -149,17 +151,7 @@ fn dead(logs: &[Log]) -> Option<Wrong> {
     };
     let (forth, back) = (travel(1.0), travel(-1.0));
     let both = forth.min(back) > BOTH_WAYS * (forth + back);
-    let text = || {
-        let number = |x: f64| format_trimmed(x, 4);
-        let stays = match number(low) == number(high) {
-            true => format!("at {} V", number(low)),
-            false => format!("between {} and {} V", number(low), number(high)),
-        };
-        format!(
-            "u1 stays {stays} while the joint turns both ways: it looks like the supply. Give the voltage at the motor, or the duty cycle as duty1 with the supply as supply."
-        )
-    };
-    (both && high - low < STEADY * most).then(|| (FaultKind::Unit, text()))
+    (both && high - low < STEADY * most).then_some(Wrong::Supply { low, high })
 }
 
 /// Returns a fault if gravity's period shows a multiple of the joint's position.
@@ -172,16 +164,10 @@ fn position_scale(joint: &Joint, logs: &[Log]) -> Option<Wrong> {
         .filter_map(|factor| Some((factor, left_of_voltage(logs, factor)?)))
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let name = names::of_position(joint, factor)?;
-    (own < BETTER * recorded).then(|| {
-        let percent = |share: f64| format_significant(100.0 * share, 2);
-        let text = format!(
-            "q1 fits its voltage {} times as large (the model then leaves {} % of the voltage's squares, as recorded {} %): {}.",
-            format_trimmed(factor, 4),
-            percent(own),
-            percent(recorded),
-            name.text
-        );
-        (name.kind(), text)
+    (own < BETTER * recorded).then_some(Wrong::PositionScaled {
+        factor,
+        name,
+        left: [recorded, own],
     })
 }
 
@@ -190,18 +176,13 @@ fn voltage_scale(joint: &Joint, plant: &Plant, logs: &[Log]) -> Option<Wrong> {
     let emf = joint.drive.as_ref()?.torque_constant * plant.ratio.abs();
     let found = start(plant, logs, false)?[2];
     let factor = found / emf;
-    let what = match factor {
-        f if (f / 1e3).ln().abs() < THOUSAND.ln() => "mV",
-        f if (f * 1e3).ln().abs() < THOUSAND.ln() => "kV",
+    let milli = match factor {
+        f if (f / 1e3).ln().abs() < THOUSAND.ln() => true,
+        f if (f * 1e3).ln().abs() < THOUSAND.ln() => false,
         _ => return None,
     };
-    let number = |x: f64| format_significant(x, 3);
-    Some((
-        FaultKind::Unit,
-        format!(
-            "u1 looks like {what}: the back-EMF comes out at {} V·s/rad, where the description's torque constant and gear ratio make {}; give it in V.",
-            number(found),
-            number(emf)
-        ),
-    ))
+    Some(Wrong::VoltageScaled {
+        milli,
+        emf: [found, emf],
+    })
 }

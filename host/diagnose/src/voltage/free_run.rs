@@ -25,8 +25,8 @@ pub enum FreeRun {
         recording: String,
         /// Start of the divergence in the recording, s.
         time: f64,
-        /// Reason, a clause.
-        why: String,
+        /// Reason.
+        why: Cause,
     },
 }
 
@@ -42,11 +42,11 @@ impl FreeRun {
     }
 
     /// Builds the result of a run over `recording` that ends at `time`, s.
-    pub(crate) fn diverged(recording: &str, time: f64, cause: Cause) -> Self {
+    pub(crate) fn diverged(recording: &str, time: f64, why: Cause) -> Self {
         Self::Diverged {
             recording: recording.to_owned(),
             time,
-            why: cause.clause().to_owned(),
+            why,
         }
     }
 

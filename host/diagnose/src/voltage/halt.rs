@@ -1,5 +1,7 @@
 //! Reasons why a simulation under voltage ends.
 
+use serde::Serialize;
+
 /// The end of a simulation before the end of its rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Halt {
@@ -9,28 +11,16 @@ pub(crate) struct Halt {
     pub(crate) cause: Cause,
 }
 
-/// Reasons why a free run cannot be compared with its recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Cause {
+/// Reasons why a free run cannot be compared with its recording; serialises to a clause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "&'static str")]
+pub enum Cause {
     /// The position error exceeds the joint's travel in the recordings.
     LeftTravel,
     /// Position or velocity grows without bounds.
     Unbounded,
     /// The friction with its effects would drive the joint.
     DrivingFriction,
-}
-
-impl Cause {
-    /// Returns the cause as a clause.
-    pub(crate) fn clause(self) -> &'static str {
-        match self {
-            Self::LeftTravel => {
-                "the simulated position is further from the recorded one than the joint travels in the recordings"
-            }
-            Self::Unbounded => "the simulated motion grows without bounds",
-            Self::DrivingFriction => "the friction with its effects would drive the joint",
-        }
-    }
 }
 
 impl Halt {

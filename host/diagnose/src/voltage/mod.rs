@@ -32,6 +32,7 @@ mod plant;
 mod reading;
 mod replay;
 mod search;
+mod sentences;
 #[cfg(test)]
 mod servo;
 mod significance;
@@ -43,9 +44,10 @@ mod tests;
 mod validation;
 mod workflow;
 
-pub use controllers::terms as controller_terms;
 pub use driven::DrivenError;
 pub use free_run::FreeRun;
+pub use halt::Cause;
 pub use replay::{ReplayError, VoltageReplay, replay_voltage};
+pub use sentences::terms as controller_terms;
 pub use validation::{DrivenBy, VoltageChecked, VoltageValidation, validate_voltage};
 pub use workflow::diagnose_voltage;

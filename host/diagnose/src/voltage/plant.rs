@@ -17,6 +17,37 @@ pub(crate) const NAMES: [(&str, &str); NOMINAL] = [
     ("off1", "N*m"),
 ];
 
+/// Reasons why a robot or its recordings give no model under voltage.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+pub(crate) enum Unfit {
+    /// A number of joints other than one.
+    #[error(
+        "without torque or current only a robot of one joint is diagnosed, and this one has {0}; record the current as well."
+    )]
+    Joints(usize),
+    /// A link without inertia.
+    #[error(
+        "without torque or current the link's own inertia is the scale of everything else; state it in [joint.inertial]."
+    )]
+    NoInertia,
+    /// A voltage that does not drive the joint.
+    #[error(
+        "the voltage does not move this joint as a motor's would; check the sign of the voltage, or record a livelier motion."
+    )]
+    NotDriven,
+    /// Described effects that cannot be simulated.
+    #[error(
+        "with its effects the description cannot be simulated under these voltages; look at the values of its [[effect]] tables."
+    )]
+    NotSimulated,
+}
+
+impl From<Unfit> for DiagnoseError {
+    fn from(unfit: Unfit) -> Self {
+        Self::Model(unfit.to_string())
+    }
+}
+
 /// Known values of the joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Plant {
@@ -39,10 +70,7 @@ impl Plant {
     /// [`DiagnoseError::Model`]: more than one joint, a link without inertia, a geometry that is no chain.
     pub(crate) fn of(robot: &Robot) -> Result<Self, DiagnoseError> {
         let [joint] = robot.joints.as_slice() else {
-            return Err(DiagnoseError::Model(format!(
-                "without torque or current only a robot of one joint is diagnosed, and this one has {}; record the current as well.",
-                robot.joints.len()
-            )));
+            return Err(Unfit::Joints(robot.joints.len()).into());
         };
         let wrong = |error: &dyn std::fmt::Display| DiagnoseError::Model(error.to_string());
         let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
@@ -57,9 +85,7 @@ impl Plant {
             JointKind::Prismatic => row[column::MASS],
         };
         if !(inertia > 0.0) {
-            return Err(DiagnoseError::Model(
-                "without torque or current the link's own inertia is the scale of everything else; state it in [joint.inertial].".into(),
-            ));
+            return Err(Unfit::NoInertia.into());
         }
         let weight = |row: [f64; COLUMNS]| -> Result<[f64; 3], DiagnoseError> {
             let mut at = [0.0; 3];

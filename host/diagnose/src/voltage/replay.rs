@@ -64,7 +64,11 @@ pub fn replay_voltage(
     let mut random = Pcg64::seed_from_u64(seed);
     let mut disturbed = |value: f64, deviation: f64| value + drawn(&mut random, deviation);
     let mut done = VoltageReplay {
-        notes: model.remarks,
+        notes: model
+            .left_out
+            .into_iter()
+            .map(crate::voltage::sentences::left_out)
+            .collect(),
         ..VoltageReplay::default()
     };
     let rows = reference.t.iter().zip(&reference.position).zip(&states);

@@ -55,8 +55,25 @@ pub(crate) struct Trial {
     pub unseen: Option<f64>,
     /// Signed-rank test; the fixed test sequence needs no correction for the number of candidates.
     pub p_value: f64,
-    /// Reason for rejection; empty if accepted.
-    pub refused: String,
+    /// Reason for rejection; `None` if accepted.
+    pub refused: Option<Refusal>,
+}
+
+/// Reason why a tried effect is rejected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// It cannot be simulated.
+    NotSimulated,
+    /// Others fit better, so that it was not cross-validated.
+    FitsWorse,
+    /// Another one is accepted.
+    Another,
+    /// It helps in too few pieces of left-out recordings.
+    Chance { wins: usize, pieces: usize },
+    /// It reduces the error on left-out recordings by too little.
+    Small,
+    /// A better fitting one may be chance.
+    AfterChance,
 }
 
 /// Inputs of the search.
@@ -382,8 +399,8 @@ impl Search<'_> {
             in_sequence(&mut trials[..count]);
             let best = taken(&trials);
             for (k, trial) in trials.iter_mut().enumerate() {
-                if trial.refused.is_empty() && Some(k) != best {
-                    trial.refused = "another takes away more".into();
+                if trial.refused.is_none() && Some(k) != best {
+                    trial.refused = Some(Refusal::Another);
                 }
             }
             report(models.len() - 1, whole, &trials);
@@ -409,14 +426,14 @@ impl Search<'_> {
                 train: f64::INFINITY,
                 unseen: None,
                 p_value: 1.0,
-                refused: "cannot be simulated with these parameters".into(),
+                refused: Some(Refusal::NotSimulated),
             })
             .collect();
         each_of(self.threads, &mut trials, &|_, trial| {
             trial.model = self.with(model, trial.kind);
             if let Some(found) = &trial.model {
                 trial.train = self.rms(found);
-                trial.refused = "others take away more".into();
+                trial.refused = Some(Refusal::FitsWorse);
             }
         });
         trials.sort_by(|a, b| a.train.total_cmp(&b.train));
@@ -442,14 +459,14 @@ impl Search<'_> {
             trial.unseen = Some(rms);
             trial.p_value = signed_rank(&gains);
             trial.refused = if trial.p_value > LEVEL {
-                format!(
-                    "helps in {wins} of {} pieces of recordings not fitted to, which may be chance",
-                    gains.len()
-                )
+                Some(Refusal::Chance {
+                    wins,
+                    pieces: gains.len(),
+                })
             } else if !(rms <= (1.0 - LEAST_GAIN) * whole) {
-                "takes less than 3 % off the motion of recordings it was not fitted to".into()
+                Some(Refusal::Small)
             } else {
-                String::new()
+                None
             };
         }
         whole
@@ -492,15 +509,15 @@ pub(crate) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta
 pub(crate) fn in_sequence(trials: &mut [Trial]) {
     let chance = trials.iter().position(|trial| trial.p_value > LEVEL);
     for trial in trials.iter_mut().skip(chance.map_or(usize::MAX, |k| k + 1)) {
-        if trial.refused.is_empty() {
-            trial.refused = "one that fits better may be chance".into();
+        if trial.refused.is_none() {
+            trial.refused = Some(Refusal::AfterChance);
         }
     }
 }
 
 /// Returns the accepted candidate: the best fit among those that are about equal on left-out data.
 pub(crate) fn taken(trials: &[Trial]) -> Option<usize> {
-    let passed = || (trials.iter().enumerate()).filter(|(_, t)| t.refused.is_empty());
+    let passed = || (trials.iter().enumerate()).filter(|(_, t)| t.refused.is_none());
     let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
     let least = passed().map(|(_, t)| of(t)).fold(f64::INFINITY, f64::min);
     let near = passed().filter(|(_, t)| of(t) <= (1.0 + EQUAL) * least);

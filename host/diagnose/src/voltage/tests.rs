@@ -145,11 +145,7 @@ fn candidates_pass_until_the_first_that_may_be_chance_and_the_best_fitting_of_eq
             train: *train,
             unseen: Some(*unseen),
             p_value: *p_value,
-            refused: if *p_value > 0.05 {
-                "chance".into()
-            } else {
-                String::new()
-            },
+            refused: (*p_value > 0.05).then_some(search::Refusal::Small),
         };
         let mut all: Vec<search::Trial> = list.iter().map(one).collect();
         search::in_sequence(&mut all);

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::voltage::driven::{DrivenError, Followed, VoltageModel};
 use crate::voltage::free_run::FreeRun;
+use crate::voltage::sentences;
 use rig_data::prepare::Recording;
 use rig_model::robot::{Robot, VoltageController};
 
@@ -93,8 +94,8 @@ pub fn validate_voltage(
     let model = VoltageModel::of(robot)?;
     let (followed, motion) = model.follow(recordings)?;
     let recordings: Vec<VoltageChecked> = followed.into_iter().map(VoltageChecked::from).collect();
-    let mut warnings = model.remarks;
-    warnings.extend(recordings.iter().filter_map(diverged));
+    let left_out = model.left_out.into_iter().map(sentences::left_out);
+    let diverged = (recordings.iter()).filter_map(|own| sentences::diverged_alone(&own.motion));
     let joint = &robot.joints[0];
     Ok(VoltageValidation {
         schema: "rig-validation/1".into(),
@@ -102,22 +103,7 @@ pub fn validate_voltage(
         joint: joint.name.clone(),
         position_unit: joint.kind.units().0.to_owned(),
         motion,
+        warnings: left_out.chain(diverged).collect(),
         recordings,
-        warnings,
     })
-}
-
-/// Returns a sentence on where and why a run diverged, if it did.
-fn diverged(checked: &VoltageChecked) -> Option<String> {
-    let FreeRun::Diverged {
-        recording,
-        time,
-        why,
-    } = &checked.motion
-    else {
-        return None;
-    };
-    Some(format!(
-        "{recording}: the free run diverges at {time:.2} s: {why}. Its errors say nothing of the model."
-    ))
 }

@@ -2,16 +2,18 @@
 
 use crate::description::described_effects::DescribedEffects;
 use crate::faults::refusal::faulty;
-use crate::outcome::{Curves, Diagnosis};
+use crate::outcome::{About, Curves, DataFault, Diagnosis};
 use crate::voltage::controllers;
+use crate::voltage::controllers::Driven;
 use crate::voltage::describe::Told;
 use crate::voltage::faults::faults;
 use crate::voltage::free_run::FreeRun;
 use crate::voltage::law::Supply;
 use crate::voltage::log::{Log, floor};
-use crate::voltage::plant::Plant;
+use crate::voltage::plant::{Plant, Unfit};
 use crate::voltage::reading::logs;
 use crate::voltage::search::{Model, Search, library};
+use crate::voltage::sentences;
 use crate::{DiagnoseError, Options};
 use rig_data::prepare::Recording;
 use rig_model::robot::Robot;
@@ -42,7 +44,17 @@ pub fn diagnose_voltage(
     let supply = Supply::of(&train);
     supply.give(&mut train);
     supply.give(&mut held_out);
-    let wrong = faults(robot, &plant, &[training, holdout], &[&train, &held_out])?;
+    let wrong: Vec<DataFault> = faults(robot, &plant, &[training, holdout], &[&train, &held_out])?
+        .into_iter()
+        .map(|(wrong, recording)| DataFault {
+            kind: wrong.kind(),
+            about: About::Recording,
+            recording,
+            joint: robot.joints[0].name.clone(),
+            certain: true,
+            text: sentences::fault(&wrong),
+        })
+        .collect();
     if !options.fits(&wrong) {
         return Ok((faulty(robot, wrong), robot.clone()));
     }
@@ -92,17 +104,9 @@ pub fn diagnose_voltage(
 /// Fits the model of the description's structure, with the description's effects.
 fn nominal(bench: &Search<'_>, stated: &mut DescribedEffects) -> Result<Model, DiagnoseError> {
     let parts = stated.driven(&bench.library);
-    let nominal = bench.nominal().ok_or_else(|| {
-        DiagnoseError::Model(
-            "the voltage does not move this joint as a motor's would; check the sign of the voltage, or record a livelier motion.".into(),
-        )
-    })?;
+    let nominal = bench.nominal().ok_or(Unfit::NotDriven)?;
     let whole = bench.with_described(nominal, &parts, &stated.robot);
-    whole.ok_or_else(|| {
-        DiagnoseError::Model(
-            "with its effects the description cannot be simulated under these voltages; look at the values of its [[effect]] tables.".into(),
-        )
-    })
+    Ok(whole.ok_or(Unfit::NotSimulated)?)
 }
 
 /// Returns the motion of the recordings that effects change most, without effects and with all.
@@ -138,18 +142,11 @@ fn curves(joint: &str, search: &Search<'_>, models: &[Model]) -> Vec<Curves> {
     list.into_iter().map(|(_, curves)| curves).collect()
 }
 
-/// Returns the voltage that drives the model, in words.
-fn driven(train: &[Log], held_out: &[Log]) -> String {
-    let all = train.len() + held_out.len();
-    let closed = train
-        .iter()
-        .chain(held_out)
-        .filter(|log| log.law.is_some())
-        .count();
-    let law = "given by the controller that each recording shows, within the supply";
-    match closed {
-        0 => "as it was recorded".into(),
-        _ if closed == all => law.into(),
-        _ => format!("{law} in {closed} of {all} recordings and as it was recorded in the others"),
+/// Returns the number of recordings whose controller drives the model.
+fn driven(train: &[Log], held_out: &[Log]) -> Driven {
+    let all = || train.iter().chain(held_out);
+    Driven {
+        closed: all().filter(|log| log.law.is_some()).count(),
+        all: all().count(),
     }
 }

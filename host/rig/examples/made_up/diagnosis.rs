@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rig_diagnose::experiment::ExperimentKind;
+
 use super::outcome::{
     About, Absorbed, Before, ByMotion, Curves, DataFault, Detectable, Diagnosis, FaultKind, Map,
     NextExperiment, NotTestable, Place, Remainder, Residual, Step, Tried, Twice, Value, Verdict,
@@ -257,7 +259,7 @@ pub(super) fn explained() -> Diagnosis {
             Detectable { effect: "asymmetric_coulomb".into(), joint: "link".into(), parameter: "asymmetry".into(), size: 0.012, size_at_worst: Some(0.02), unit: "N*m".into() },
         ],
         next_experiment: Some(NextExperiment {
-            kind: "slow turn at two loads".into(),
+            kind: ExperimentKind::PayloadSwap,
             separates: vec!["cogging".into(), "torque_ripple".into()],
             text: "Turn slowly through the top and through the side, so that the motor passes the same angles at two currents: ripple grows with the current, cogging does not.".into(),
             file: Some("next_experiment.toml".into()),
@@ -344,7 +346,7 @@ pub(super) fn remainder() -> Diagnosis {
     found.steps.truncate(1);
     found.maps.retain(|m| m.step != Some(1));
     found.next_experiment = Some(NextExperiment {
-        kind: "spline turned by 90°".into(),
+        kind: ExperimentKind::NotTestableYet,
         separates: vec!["gear_eccentricity".into()],
         text: "Turn the link on its spline by 90° and repeat the motion: what belongs to the gear moves with it.".into(),
         file: None,

@@ -10,9 +10,6 @@ pub(crate) const COLLINEAR: &str =
 /// Experiment for a collinear effect of which no other one is known.
 pub(crate) const RICHER_MOTION: &str = "state the friction, mass and first moments in the description, or record a motion with more positions, speeds and loads";
 
-/// Kind of an experiment for an effect that the recordings cannot show.
-pub(crate) const NOT_TESTABLE_YET: &str = "what is not testable yet";
-
 /// Names the experiment that would show an untestable effect.
 pub(crate) fn to_test(lacking: &NotTestable) -> String {
     format!(

@@ -39,7 +39,7 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
     )
     .with(parts::info(format!(
         "{}. {}",
-        words::capital(&next.kind),
+        words::capital(&next.kind.to_string()),
         next.text
     )));
     if !items.is_empty() {
