@@ -1,9 +1,10 @@
 //! The control application of the rig, independent of hardware.
 //!
-//! One pure function, [`step`](step::step), is the whole control tick. It takes the raw [`Sample`](sample::Sample) of
+//! One pure function, [`step`](step::step), is the control part of the tick. It takes the raw [`Sample`](sample::Sample) of
 //! one trigger and returns the [`Command`](sample::Command) that acts from the next trigger on. A board calls it from
 //! its converter interrupt; the emulated rig and the tests call it in a loop. [`session::Session`] turns bytes from the
-//! host into changes of [`State`](state::State), and the output of a tick into bytes for the host.
+//! host into requests and the output of a tick into bytes for the host. After each step,
+//! [`tick_session::TickSession`] serves the requests: they change [`State`](state::State).
 //!
 //! No code here depends on a pin, a clock or a buffer. It never allocates, blocks or panics.
 #![no_std]

@@ -29,6 +29,12 @@ pub(crate) struct BridgePins {
     fault: Peri<'static, PB12>,
 }
 
+/// Drives the bridge's enable (PB5) low, from anywhere, with one store.
+#[inline(always)]
+pub(crate) fn disable_bridge() {
+    GPIOB.bsrr().write(|w| w.set_br(5, true));
+}
+
 /// The serial line to the ST-LINK.
 pub(crate) struct LinkPins {
     pub(crate) uart: Peri<'static, LPUART1>,

@@ -21,7 +21,7 @@ use rig_firmware::sample::Command;
 use super::adc::SAMPLING_LEAD;
 use super::clock::CORE_HZ;
 use super::comparator;
-use super::pins::{BridgePins, is_fault_line_low};
+use super::pins::{BridgePins, disable_bridge, is_fault_line_low};
 
 /// Pulses a second.
 pub(crate) const PWM_HZ: u32 = 20_000;
@@ -212,7 +212,5 @@ fn start_sample_trigger(control_hz: u32) {
 #[inline(always)]
 pub(crate) fn switch_off() {
     TIM1.bdtr().modify(|w| w.set_moe(false));
-    embassy_stm32::pac::GPIOB
-        .bsrr()
-        .write(|w| w.set_br(5, true));
+    disable_bridge();
 }

@@ -38,11 +38,15 @@ use crate::{DiagnoseError, Options};
 use rig_data::prepare::{Recording, as_recordings};
 use rig_model::robot::Robot;
 
-/// Finds effects that the model lacks. The second result is the description with the effects and the refitted
-/// parameters.
+/// Finds effects that the model lacks, on the `training` recordings. The `holdout` chooses none: it is evaluated once,
+/// at the end. `progress` receives the share that is done, from 0 to 1; a restart begins anew.
+///
+/// The second result is the description with the effects and the refitted parameters; the given one if the recordings
+/// are faulty.
 ///
 /// # Errors
-/// [`DiagnoseError`].
+/// [`DiagnoseError`]: no recording, one that cannot be read or prepared, or a model that cannot be fitted. A fault of
+/// the data is a result and no error.
 pub fn diagnose(
     robot: &Robot,
     training: &[&dyn Recording],
@@ -54,33 +58,33 @@ pub fn diagnose(
         return Err(DiagnoseError::NoRecording);
     }
     let mut stated = DescribedEffects::of(robot);
-    // A constant gets a name if sensor readings with the drive off were given, or if some recordings have all external
-    // loads removed. Then it is searched for.
-    let unburdened = training.iter().filter(|r| r.unburdened()).count();
-    stated.pulls_told = (1..training.len()).contains(&unburdened);
-    let told = !options.sensor_zeros.is_empty() || stated.pulls_told;
-    stated.no_offsets = options.no_offsets && !told;
+    // A constant torque is searched for only if the data can tell where it comes from: by sensor readings with the
+    // drive off, or because some but not all recordings have the external loads removed.
+    let unloaded = training.iter().filter(|r| r.unburdened()).count();
+    stated.loads_separable = unloaded > 0 && unloaded < training.len();
+    let constants_searched = !options.sensor_zeros.is_empty() || stated.loads_separable;
+    stated.no_offsets = options.no_offsets && !constants_searched;
     let given = [training, holdout].concat();
     let mut uneven = Uneven::default();
-    let mut spoilt = Vec::new();
+    let mut hidden = Vec::new();
     loop {
-        // Each pass holds more described effects, ignores more limits, or resamples another recording to an even step.
+        // Each attempt keeps more described effects fixed, ignores more limits, or resamples one more recording.
         let [training, holdout] = [training, holdout].map(|recordings| uneven.even(recordings));
         let [training, holdout] = [&training, &holdout].map(|recordings| as_recordings(recordings));
         match attempt(robot, &stated, &training, &holdout, options, progress) {
             Ok(Attempt::Done(mut result)) => {
                 result.0.words.extend(uneven.told());
-                result.0.data_faults.splice(0..0, spoilt);
+                result.0.data_faults.splice(0..0, hidden);
                 return Ok(*result);
             }
-            Ok(Attempt::Hold(more)) => stated = *more,
+            Ok(Attempt::Restart(revised)) => stated = *revised,
             Err(DiagnoseError::Prepare(error)) if uneven.takes(&error) => {
-                // Interpolated rows no longer show columns without derivative: check before.
+                // Interpolation hides columns that do not change smoothly: look for them before.
                 let found = spoilt_columns(robot, &of_error(&error, &given))?;
                 if !options.fits(&found) {
                     return Ok((faulty(robot, found), robot.clone()));
                 }
-                spoilt.extend(found);
+                hidden.extend(found);
             }
             Err(DiagnoseError::Prepare(error)) => {
                 let Some(fault) = of_preparing(&error) else {
@@ -96,8 +100,8 @@ pub fn diagnose(
 /// Outcome of one treatment of the description's effects.
 enum Attempt {
     Done(Box<(Diagnosis, Robot)>),
-    /// Start again with more effects held, or with limits ignored.
-    Hold(Box<DescribedEffects>),
+    /// Start again with more described effects fixed or given up, or with limits ignored.
+    Restart(Box<DescribedEffects>),
 }
 
 /// Runs the stages once, with the description's effects treated as `stated` says.
@@ -111,7 +115,7 @@ fn attempt(
 ) -> Result<Attempt, DiagnoseError> {
     let material = match intake(stated, training, holdout, options)? {
         Intake::Fit(material) => *material,
-        Intake::Hold(more) => return Ok(Attempt::Hold(more)),
+        Intake::Restart(revised) => return Ok(Attempt::Restart(revised)),
         Intake::Faulty(wrong) => {
             let fault = (faulty(robot, wrong), robot.clone());
             return Ok(Attempt::Done(Box::new(fault)));
@@ -137,19 +141,20 @@ fn attempt(
     let first = Pass::over(&context, &prepared, options, progress)?;
     let better = lead_beside(&first, &lead)?;
     let again;
+    // Beside the effects found, another lead may fit better: shift the torque by the difference and search once more.
     let (prepared, lead, pass) = if differ(&better, &lead, &prepared.runs) {
-        let more: Vec<f64> = better.iter().zip(&lead).map(|(b, l)| b - l).collect();
+        let change: Vec<f64> = better.iter().zip(&lead).map(|(b, l)| b - l).collect();
         let runs = prepared.runs.clone();
         drop(first);
         drop(prepared.rows);
-        again = moved(&context, context.rows(runs, &prepared.treatment)?, &more)?;
+        again = moved(&context, context.rows(runs, &prepared.treatment)?, &change)?;
         let pass = Pass::over(&context, &again, options, progress)?;
         (&again, better, pass)
     } else {
         (&prepared, lead, first)
     };
-    if let Some(more) = more_held(stated, &pass)? {
-        return Ok(Attempt::Hold(Box::new(more)));
+    if let Some(revised) = revised_description(stated, &pass)? {
+        return Ok(Attempt::Restart(Box::new(revised)));
     }
     let held_out = held_out
         .map(|held_out| moved(&context, held_out, &lead))
@@ -182,7 +187,8 @@ fn attempt(
     Ok(Attempt::Done(Box::new(result)))
 }
 
-/// Returns the torque lead of each joint beside the nominal model, s.
+/// Returns the torque lead of each joint, s: the time by which its torque was recorded before it acts. Estimated with
+/// the nominal model.
 fn first_lead(
     context: &DiagnosisContext,
     prepared: &PreparedData,
@@ -192,8 +198,8 @@ fn first_lead(
     leads(&source, &refit.base, &vec![0.0; context.robot.joints.len()])
 }
 
-/// Returns the torque lead of each joint beside the effects found, s. A missing effect may look like a torque lead, or hide
-/// one. A delay may compensate a wrong lead.
+/// Returns the torque lead of each joint, s, estimated with the effects found in the model: a missing effect may look
+/// like a lead, or hide one. A delay could compensate a wrong lead, so a delay that was found is left out.
 fn lead_beside(pass: &Pass, lead: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
     let found: Vec<FittedCandidate> = (pass.found.iter())
         .filter(|p| p.candidate.kind != Kind::MeasurementDelay)
@@ -203,21 +209,21 @@ fn lead_beside(pass: &Pass, lead: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
     leads(&pass.search.source, &beside, lead)
 }
 
-/// Returns the described effects with more of them held or given up, if the search requires it.
-fn more_held(
+/// Returns the described effects with more of them fixed or given up, if the search requires it.
+fn revised_description(
     stated: &DescribedEffects,
     pass: &Pass,
 ) -> Result<Option<DescribedEffects>, DiagnoseError> {
     let refuted = |c: &_| refutes(&pass.across, c);
-    let mut more = stated.clone();
-    let changed = more.give_up_tilts(&pass.found)
-        || more.hold_what_is_not_refuted(
+    let mut revised = stated.clone();
+    let changed = revised.give_up_tilts(&pass.found)
+        || revised.hold_what_is_not_refuted(
             &pass.search.source,
             &pass.refit.base,
             &pass.found,
             &refuted,
         )?;
-    Ok(changed.then_some(more))
+    Ok(changed.then_some(revised))
 }
 
 /// Judges the effects of the search, checks them and composes the result.

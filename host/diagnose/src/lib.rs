@@ -19,7 +19,7 @@
 //! # }
 //! ```
 
-// The stages, in the order of a diagnosis.
+// The stages; docs/architecture.md has them in the order of a diagnosis.
 mod acceptance;
 mod columns;
 mod description;

@@ -67,7 +67,7 @@ pub(crate) struct DescribedEffects {
     /// True if the format of the description has no constant torque.
     pub(crate) no_offsets: bool,
     /// True if the recordings tell which part of a described constant torque is external.
-    pub(crate) pulls_told: bool,
+    pub(crate) loads_separable: bool,
     /// The ignored torque limits.
     pub(crate) lifted: Vec<LiftedLimit>,
     effects: Vec<(RobotEffect, Placed, Way)>,
@@ -98,7 +98,7 @@ impl DescribedEffects {
         Self {
             robot: plain,
             no_offsets: false,
-            pulls_told: false,
+            loads_separable: false,
             lifted: Vec::new(),
             effects,
         }

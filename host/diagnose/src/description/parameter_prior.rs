@@ -72,7 +72,7 @@ impl ParameterPrior {
             if offset.is_some() && stated.no_offsets {
                 unstated.push(k);
                 free.push(vec![(k, 1.0)]);
-            } else if offset.is_some_and(|f| f.offset != 0.0 && stated.pulls_told) {
+            } else if offset.is_some_and(|f| f.offset != 0.0 && stated.loads_separable) {
                 // Some of it, or all, may be external.
                 free.push(vec![(k, 1.0)]);
             } else if offset.is_some() {

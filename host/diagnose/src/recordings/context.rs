@@ -190,7 +190,7 @@ impl<'a> DiagnosisContext<'a> {
         let states_spring = (self.stated.free().iter())
             .map(candidate)
             .any(|c| c.kind == Kind::Spring && c.joint == joint);
-        !self.stated.pulls_told
+        !self.stated.loads_separable
             && !states_spring
             && !self.anchor.holds_constant(joint, &self.nominal)
     }

@@ -24,8 +24,8 @@ pub(crate) enum Intake<'a> {
     Fit(Box<Material<'a>>),
     /// The recordings have faults.
     Faulty(Vec<DataFault>),
-    /// Start again with more described effects held, or with limits ignored.
-    Hold(Box<DescribedEffects>),
+    /// Start again with more described effects fixed, or with limits ignored.
+    Restart(Box<DescribedEffects>),
 }
 
 /// Recordings that can be fitted.
@@ -109,7 +109,7 @@ pub(crate) fn intake<'a>(
     let nameless = too_short_to_learn(&readings.training.runs);
     let without = without(options, nameless.is_some());
     if let Some(more) = held_in_addition(&context, &readings.training.runs, &without) {
-        return Ok(Intake::Hold(Box::new(more)));
+        return Ok(Intake::Restart(Box::new(more)));
     }
     let readings = one_way_held(&mut context, readings)?;
     let (readings, open, alike) = undetermined_held(&mut context, readings)?;
