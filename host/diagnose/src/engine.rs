@@ -26,7 +26,7 @@ use crate::models::observer_models::ObserverModels;
 use crate::models::simulated_motion::Replay;
 use crate::outcome::{DataFault, Diagnosis};
 use crate::recordings::context::{DiagnosisContext, PreparedData};
-use crate::recordings::intake::{Intake, Material, intake, without};
+use crate::recordings::intake::{Intake, Material, allowed, intake};
 use crate::recordings::noise_floor;
 use crate::recordings::position_reading::PositionReading;
 use crate::recordings::resampling::{Uneven, of_error};
@@ -131,10 +131,7 @@ fn attempt(
         alike,
         faults,
     } = material;
-    let options = &Options {
-        without: without(options, nameless.is_some()),
-        ..options.clone()
-    };
+    let options = &allowed(options, nameless.is_some());
     progress(0.1);
     let lead = first_lead(&context, &prepared)?;
     let prepared = moved(&context, prepared, &lead)?;

@@ -107,7 +107,7 @@ pub(crate) fn intake<'a>(
     }
     // A short motion allows parameters but no effects: both need blocks outside the fit.
     let nameless = too_short_to_learn(&readings.training.runs);
-    let without = without(options, nameless.is_some());
+    let without = allowed(options, nameless.is_some()).without;
     if let Some(more) = held_in_addition(&context, &readings.training.runs, &without) {
         return Ok(Intake::Restart(Box::new(more)));
     }
@@ -207,12 +207,13 @@ fn without_touches(
     Ok(touched(&left, prepared))
 }
 
-/// Returns the kinds left out of the search: all of them if the recordings are too short (`nameless`).
-pub(crate) fn without(options: &Options, nameless: bool) -> Vec<Kind> {
-    match nameless {
-        true => Kind::ALL.to_vec(),
-        false => options.without.clone(),
+/// Returns the options with the kinds left out of the search: all of them if the recordings are too short (`nameless`).
+pub(crate) fn allowed(options: &Options, nameless: bool) -> Options {
+    let mut options = options.clone();
+    if nameless {
+        options.without = Kind::ALL.to_vec();
     }
+    options
 }
 
 /// Returns the data faults of all recordings.
