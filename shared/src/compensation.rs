@@ -113,8 +113,8 @@ impl<T: Real> TorqueHistory<T> {
         self.torques[next & LAST] = torque;
         self.next = self.next.wrapping_add(1);
         let at = |ago: usize| self.torques[next.wrapping_sub(ago) & LAST];
-        let (future_motor_angle, earlier) = (at(usize::from(ticks)), at(usize::from(ticks) + 1));
-        future_motor_angle + share * (earlier - future_motor_angle)
+        let (newer, older) = (at(usize::from(ticks)), at(usize::from(ticks) + 1));
+        newer + share * (older - newer)
     }
 }
 

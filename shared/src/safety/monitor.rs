@@ -115,12 +115,66 @@ pub fn step(
     now: &Readings,
 ) -> Option<(Fault, f32)> {
     update_heat(config, limits, state, now);
-    let failed = check(config, limits, state, now);
+    let n = config.persistence;
+    // All counters are updated before any is judged: an early return must not stop the others.
+    let current_limit = limits.peak_current * config.current_margin;
+    let over_current = persists(
+        &mut state.over_current,
+        !(now.current.abs() <= current_limit),
+        n,
+    );
+    let at_rail = persists(&mut state.at_rail, now.current_at_rail, n);
+    let supply_right = config.supply[0] <= now.supply && now.supply <= config.supply[1];
+    let bad_supply = persists(&mut state.bad_supply, !supply_right, n);
+    let hot = persists(&mut state.hot, !(now.temperature <= config.temperature), n);
+    let velocity_limit = limits.velocity * config.velocity_margin;
+    let over_speed = persists(
+        &mut state.over_speed,
+        !(now.velocity.abs() <= velocity_limit),
+        n,
+    );
+    let lost = voltage_is_unexplained(config, state, now);
+    let stuck = converter_is_stuck(config, state, now);
+    // A constant current does not count against the encoder until the converter is known not to be stuck.
+    let converter_suspect = (CODE_NOISE_TICKS..config.stuck_ticks).contains(&state.same_code);
+    let outside = now.driving
+        && !(limits.position_low - config.position_margin <= now.position
+            && now.position <= limits.position_high + config.position_margin);
+    let jumped = now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs();
+    let lost = now.encoder_open || lost && !converter_suspect;
+    let late = now.overrun && now.driving;
+    let current_failed = at_rail | stuck | over_current | now.comparator;
+    let motion_failed = jumped | lost | over_speed | outside;
+    let rest_failed = now.driver_fault | bad_supply | hot | state.overloaded | late;
     // A fault is rare, and building the list costs more than this test.
-    if !failed.any(state, now) {
+    if !(current_failed | motion_failed | rest_failed) {
         return None;
     }
-    failed.first(state, now)
+    let code = f32::from(now.current_code);
+    let faults = [
+        (now.driver_fault, Fault::Driver, 0.0),
+        // Before over-current: a code at the rail is no measurement, although it reads as a large current.
+        (at_rail || stuck, Fault::AdcStuck, code),
+        (
+            over_current || now.comparator,
+            Fault::OverCurrent,
+            now.current,
+        ),
+        (jumped, Fault::EncoderJump, now.encoder_step as f32),
+        (lost, Fault::EncoderLost, state.voltage.unexplained),
+        (over_speed, Fault::OverSpeed, now.velocity),
+        (outside, Fault::Position, now.position),
+        (bad_supply, Fault::Supply, now.supply),
+        (hot, Fault::Temperature, now.temperature),
+        (state.overloaded, Fault::Overload, state.heat),
+        (late, Fault::Deadline, 0.0),
+    ];
+    let (_, fault, value) = faults.into_iter().find(|(failing, _, _)| *failing)?;
+    Some(match fault {
+        // Computed only for a report: a square root in each tick is too expensive.
+        Fault::Overload => (fault, libm::sqrtf(value)),
+        _ => (fault, value),
+    })
 }
 
 /// Updates the heat of the winding, and whether the motor is overloaded.
@@ -148,135 +202,26 @@ fn update_heat(
         });
 }
 
-/// Which checks of a tick fail, beside those that [`Readings`] and [`MonitorState`] tell directly.
-struct FailedChecks {
-    over_current: bool,
-    at_rail: bool,
-    bad_supply: bool,
-    hot: bool,
-    over_speed: bool,
-    stuck: bool,
-    outside: bool,
-    jumped: bool,
-    lost: bool,
-    late: bool,
-}
-
-/// Updates all counters, and returns the checks that fail.
+/// Returns true if motion and current do not explain the voltage, as without an encoder. With the bridge off the voltage
+/// over the motor is undefined.
 #[inline(always)]
-fn check(
+fn voltage_is_unexplained(
     config: &MonitorConfig,
-    limits: &Limits<f32>,
     state: &mut MonitorState,
     now: &Readings,
-) -> FailedChecks {
-    let magnitude = now.current.abs();
-    let n = config.persistence;
-    // All counters are updated before any is judged: an early return must not stop the others.
-    let over_current = persists(
-        &mut state.over_current,
-        !(magnitude <= limits.peak_current * config.current_margin),
-        n,
-    );
-    let at_rail = persists(&mut state.at_rail, now.current_at_rail, n);
-    let bad_supply = persists(
-        &mut state.bad_supply,
-        !(config.supply[0] <= now.supply && now.supply <= config.supply[1]),
-        n,
-    );
-    let hot = persists(&mut state.hot, !(now.temperature <= config.temperature), n);
-    let over_speed = persists(
-        &mut state.over_speed,
-        !(now.velocity.abs() <= limits.velocity * config.velocity_margin),
-        n,
-    );
-    // With the bridge off the voltage over the motor is undefined.
-    let lost = if now.driving {
-        let applied = now.duty * now.supply - now.lost_voltage;
-        voltage::step(
-            &config.voltage,
-            &mut state.voltage,
-            applied,
-            now.current,
-            now.encoder_step,
-        )
-    } else {
+) -> bool {
+    if !now.driving {
         state.voltage = VoltageState::default();
-        false
-    };
-    let stuck = converter_is_stuck(config, state, now);
-    // A constant current does not count against the encoder until the converter is known not to be stuck.
-    let converter_suspect = (CODE_NOISE_TICKS..config.stuck_ticks).contains(&state.same_code);
-    let outside = now.driving
-        && !(limits.position_low - config.position_margin <= now.position
-            && now.position <= limits.position_high + config.position_margin);
-    FailedChecks {
-        over_current,
-        at_rail,
-        bad_supply,
-        hot,
-        over_speed,
-        stuck,
-        outside,
-        jumped: now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs(),
-        lost: now.encoder_open || lost && !converter_suspect,
-        late: now.overrun && now.driving,
+        return false;
     }
-}
-
-impl FailedChecks {
-    /// Returns true if any check fails.
-    #[inline(always)]
-    fn any(&self, state: &MonitorState, now: &Readings) -> bool {
-        now.driver_fault
-            | self.at_rail
-            | self.stuck
-            | self.over_current
-            | now.comparator
-            | self.jumped
-            | self.lost
-            | self.over_speed
-            | self.outside
-            | self.bad_supply
-            | self.hot
-            | state.overloaded
-            | self.late
-    }
-
-    /// Returns the gravest fault, with the value that was out of range.
-    #[inline(always)]
-    fn first(&self, state: &MonitorState, now: &Readings) -> Option<(Fault, f32)> {
-        let faults = [
-            (now.driver_fault, Fault::Driver, 0.0),
-            // Before over-current: a code at the rail is no measurement, although it reads as a large current.
-            (
-                self.at_rail || self.stuck,
-                Fault::AdcStuck,
-                f32::from(now.current_code),
-            ),
-            (
-                self.over_current || now.comparator,
-                Fault::OverCurrent,
-                now.current,
-            ),
-            (self.jumped, Fault::EncoderJump, now.encoder_step as f32),
-            (self.lost, Fault::EncoderLost, state.voltage.unexplained),
-            (self.over_speed, Fault::OverSpeed, now.velocity),
-            (self.outside, Fault::Position, now.position),
-            (self.bad_supply, Fault::Supply, now.supply),
-            (self.hot, Fault::Temperature, now.temperature),
-            (state.overloaded, Fault::Overload, state.heat),
-            (self.late, Fault::Deadline, 0.0),
-        ];
-        faults
-            .into_iter()
-            .find(|(failing, _, _)| *failing)
-            .map(|(_, fault, value)| match fault {
-                // Computed only for a report: a square root in each tick is too expensive.
-                Fault::Overload => (fault, libm::sqrtf(value)),
-                _ => (fault, value),
-            })
-    }
+    let applied = now.duty * now.supply - now.lost_voltage;
+    voltage::step(
+        &config.voltage,
+        &mut state.voltage,
+        applied,
+        now.current,
+        now.encoder_step,
+    )
 }
 
 /// Returns true if the converter is stuck: a live one follows the duty, a stuck one keeps its code.
