@@ -31,10 +31,10 @@ const ALL: u8 = DEADLINE_TASKS | Task::Commands as u8 | Task::Storage as u8;
 
 static CHECKED_IN: AtomicU8 = AtomicU8::new(0);
 
-/// Reports that a part is alive.
+/// Reports that a task is alive.
 #[inline(always)]
-pub(crate) fn check_in(part: Task) {
-    CHECKED_IN.fetch_or(part as u8, Ordering::Relaxed);
+pub(crate) fn check_in(task: Task) {
+    CHECKED_IN.fetch_or(task as u8, Ordering::Relaxed);
 }
 
 /// The watchdog.

@@ -81,21 +81,20 @@ fn update_estimate(config: &Config, state: &mut State, previous: &Window, window
 /// Returns the estimate in wire format.
 fn estimate_report(state: &State) -> Estimate {
     let report = state.estimator.report();
-    let mut feed_estimator = Estimate {
+    let mut estimate = Estimate {
         tick: state.tick,
         value: [0.0; PARAMETER_COUNT],
         std: [0.0; PARAMETER_COUNT],
         trusted: [false; PARAMETER_COUNT],
         residual_rms: report.residual_rms,
     };
-    feed_estimator.value = report.value;
-    feed_estimator.std = report.std;
+    estimate.value = report.value;
+    estimate.std = report.std;
     // The current offset was measured from finitely many samples. Its error is a constant torque that no motion shows,
     // and enters only `off`.
     let measured = state.calibration.std * state.derived.torque_per_ampere;
-    feed_estimator.std[OFFSET_INDEX] = libm::sqrtf(
-        feed_estimator.std[OFFSET_INDEX] * feed_estimator.std[OFFSET_INDEX] + measured * measured,
-    );
-    feed_estimator.trusted = report.trusted;
-    feed_estimator
+    estimate.std[OFFSET_INDEX] =
+        libm::sqrtf(estimate.std[OFFSET_INDEX] * estimate.std[OFFSET_INDEX] + measured * measured);
+    estimate.trusted = report.trusted;
+    estimate
 }

@@ -439,15 +439,15 @@ fn choose_cutoff(spectra: &[PositionSpectrum], motion: f64, nyquist: f64) -> (f6
         .iter()
         .map(|s| s.clean)
         .fold(f64::INFINITY, f64::min);
-    let max_decimation = MAX_CUTOFF_SHARE * nyquist;
-    let least = (MIN_HEADROOM * motion).min(max_decimation);
+    let max_cutoff = MAX_CUTOFF_SHARE * nyquist;
+    let least = (MIN_HEADROOM * motion).min(max_cutoff);
     let wish = crossing.min(clean);
-    let cutoff = wish.clamp(least, max_decimation);
+    let cutoff = wish.clamp(least, max_cutoff);
     let reason = if wish < least {
         format!(
             "{cutoff:.3} Hz, five times the highest frequency of the motion ({motion:.3} Hz), although noise outweighs the signal from {crossing:.3} Hz on: a lower cut-off would bend the motion itself."
         )
-    } else if wish > max_decimation {
+    } else if wish > max_cutoff {
         format!(
             "{cutoff:.3} Hz, 80 % of the Nyquist frequency: the position stands above its noise over the whole band."
         )

@@ -175,9 +175,14 @@ impl Judge<'_, '_> {
             let others: Vec<FittedCandidate> = others.map(|(_, p)| p.clone()).collect();
             let [before, after] = [with(self.base, &others, None).rms(j), fit.rms(j)];
             let taken = before * before - after * after;
-            let gain = |k: &usize| chosen[*k].evidence.joint_gain;
+            // Each order of a wave takes only a part.
+            let gain = |k: &usize| -> f64 {
+                let sort = chosen[*k].candidate.sort();
+                let same = own.iter().filter(|i| chosen[**i].candidate.sort() == sort);
+                same.map(|i| chosen[*i].evidence.joint_gain).sum()
+            };
             (free.taken(after) > taken)
-                .then(|| own.into_iter().min_by(|a, b| gain(a).total_cmp(&gain(b))))
+                .then(|| (own.iter().copied()).min_by(|a, b| gain(a).total_cmp(&gain(b))))
                 .flatten()
         })
     }

@@ -42,18 +42,30 @@ impl Trial<'_, '_> {
         tried: &mut [TriedCandidate],
     ) -> Result<Accepted, DiagnoseError> {
         let Self { judge, refit, .. } = self;
-        let search = judge.search;
         let judged = judge.judged(found)?;
         refuse_guesses(tried, &judged.guesses);
         let judged = by_description(judge, refit, self.fitting.context, judged)?;
         refuse_guesses(tried, &judged.guesses);
-        let mut left = Accepted {
+        let left = Accepted {
             judged,
             fallen: Vec::new(),
         };
+        self.tested(left, tried)
+    }
+
+    /// Drops effects that degrade the simulated motion or are not credible beside the others.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn tested(
+        &self,
+        left: Accepted,
+        tried: &mut [TriedCandidate],
+    ) -> Result<Accepted, DiagnoseError> {
+        let Self { judge, refit, .. } = self;
         // An effect that increases the simulated error replaces another one.
-        left = self.unspoilt(left, tried)?;
-        while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
+        let mut left = self.unspoilt(left, tried)?;
+        while let Some((k, why)) = unbelieved(refit, judge.search, judge, &left.judged.chosen)? {
             left = self.without(left, k, why, tried)?;
         }
         Ok(left)

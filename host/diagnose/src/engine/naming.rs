@@ -67,12 +67,13 @@ impl Named {
             let said = settled_names(work, &windings, &mut accepted.judged)?;
             let (joint, again) = fitted(work, learnt, &mut accepted.judged)?;
             // The fit to the motion sees the motion itself: what it takes for nothing stands in for another effect.
-            match again.as_ref().and_then(Again::first_of_nothing) {
-                Some(k) if k >= search.count_given(&accepted.judged.chosen) => {
-                    accepted = trial.without(accepted, k, Refusal::NothingByMotion, tried)?;
-                }
-                _ => break (said, joint, again),
-            }
+            let first = search.count_given(&accepted.judged.chosen);
+            let nothing = again.as_ref().and_then(|a| a.most_likely_nothing(first));
+            let Some(k) = nothing else {
+                break (said, joint, again);
+            };
+            accepted = trial.without(accepted, k, Refusal::NothingByMotion, tried)?;
+            accepted = trial.tested(accepted, tried)?;
         };
         let Accepted { mut judged, fallen } = accepted;
         let described = search.count_described(&judged.chosen);

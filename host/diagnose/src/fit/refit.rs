@@ -415,7 +415,7 @@ impl Joint {
     ) -> f64 {
         let gains = self.gains(chosen, free, k);
         let gains = &gains[..count.min(gains.len())];
-        wald(gains, &self.solution.covariance, place(chosen, free, k))
+        wald(gains, &self.solution.covariance, place(chosen, free, k)).unwrap_or(1.0)
     }
 
     /// Returns the gains of the `k`-th effect.
@@ -486,14 +486,15 @@ impl Joint {
     }
 }
 
-/// Returns the p-value of `values` being zero (Wald 1943), from the rows of their `covariance` that begin with `at`; 1
-/// if it is not positive definite.
-pub(crate) fn wald(values: &[f64], covariance: &DMatrix<f64>, at: usize) -> f64 {
+/// Returns the p-value of `values` being zero (Wald 1943), from the rows of their `covariance` that begin with `at`;
+/// `None` if it is not positive definite.
+pub(crate) fn wald(values: &[f64], covariance: &DMatrix<f64>, at: usize) -> Option<f64> {
     let values = DVector::from_column_slice(values);
     let count = values.len();
     let own = covariance.view((at, at), (count, count)).into_owned();
-    let wald = own.cholesky().map(|c| values.dot(&c.solve(&values)));
-    (wald.zip(ChiSquared::new(count as f64).ok())).map_or(1.0, |(wald, law)| law.sf(wald))
+    let wald = values.dot(&own.cholesky()?.solve(&values));
+    let law = ChiSquared::new(count as f64).ok()?;
+    wald.is_finite().then(|| law.sf(wald))
 }
 
 /// Returns the index of the first coefficient of the `k`-th effect, after the `free` nominal directions.

@@ -114,15 +114,19 @@ pub(crate) struct Again {
     pub(crate) told: ByMotion,
     /// Model and effects to adopt, if any.
     pub(crate) adopted: Option<(FittedModel, Vec<FittedCandidate>)>,
-    /// p-values of each effect's gains being zero by the motion (Wald 1943).
-    of_nothing: Vec<f64>,
+    /// p-values of each effect's gains being zero by the motion (Wald 1943); `None` if the motion is too short to say.
+    of_nothing: Vec<Option<f64>>,
 }
 
 impl Again {
-    /// Returns the first effect whose adopted gains do not differ from zero: their 95 % region contains it.
-    pub(crate) fn first_of_nothing(&self) -> Option<usize> {
+    /// Returns the effect from `first` on whose adopted gains are most likely zero; `None` if no 95 % region contains it.
+    pub(crate) fn most_likely_nothing(&self, first: usize) -> Option<usize> {
         self.adopted.as_ref()?;
-        self.of_nothing.iter().position(|p| *p > NOTHING)
+        let p_values = self.of_nothing.iter().enumerate().skip(first);
+        p_values
+            .filter_map(|(k, p)| p.filter(|p| *p > NOTHING).map(|p| (k, p)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(k, _)| k)
     }
 }
 
@@ -243,7 +247,7 @@ fn of_nothing(
     free: usize,
     by_motion: &Estimate,
     covariance: &DMatrix<f64>,
-) -> Vec<f64> {
+) -> Vec<Option<f64>> {
     let mut at = free;
     (chosen.iter())
         .map(|p| {
