@@ -2,6 +2,7 @@
 
 use rig_shared::effects::Kind;
 
+use crate::acceptance::residual_dependence::locate;
 use crate::columns::effect_columns::Source;
 use crate::columns::kinds::is_gear;
 use crate::description::parameter_prior::ParameterPrior;
@@ -15,7 +16,7 @@ use crate::link_encoder::law::{Found, Law, beside, laws};
 use crate::link_encoder::result::Across;
 use crate::recordings::context::PreparedData;
 use crate::recordings::noise_floor;
-use crate::result::places::locate;
+use crate::result::places::place;
 use crate::rows::regression::Column;
 use crate::{DiagnoseError, Options};
 
@@ -127,6 +128,7 @@ impl TransmissionAnalysis<'_, '_> {
             places: (places.into_iter())
                 .filter(|p| p.p_value < SIGNIFICANT && !named.is_empty())
                 .take(1)
+                .map(|p| place(&p))
                 .collect(),
             named,
             detectable,

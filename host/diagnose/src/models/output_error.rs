@@ -122,12 +122,16 @@ impl Again {
     /// Returns the effect from `first` on whose adopted gains are most likely zero; `None` if no 95 % region contains it.
     pub(crate) fn most_likely_nothing(&self, first: usize) -> Option<usize> {
         self.adopted.as_ref()?;
-        let p_values = self.of_nothing.iter().enumerate().skip(first);
-        p_values
-            .filter_map(|(k, p)| p.filter(|p| *p > NOTHING).map(|p| (k, p)))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(k, _)| k)
+        most_likely_zero(&self.of_nothing, first)
     }
+}
+
+/// Returns the index, from `first` on, of the largest p-value above the level of [`NOTHING`].
+fn most_likely_zero(p_values: &[Option<f64>], first: usize) -> Option<usize> {
+    (p_values.iter().enumerate().skip(first))
+        .filter_map(|(k, p)| p.filter(|p| *p > NOTHING).map(|p| (k, p)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(k, _)| k)
 }
 
 /// Fits `joint`'s values of the effects `chosen` to the simulated training motion; `None` if that is not possible.

@@ -3,6 +3,7 @@
 use rig_shared::effects::{Kind, Parameter, SHAPES};
 
 use crate::acceptance::coordinates::Coordinate;
+use crate::acceptance::residual_dependence::locate;
 use crate::columns::candidate::Candidate;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::{Solution, jackknifed, solve};
@@ -18,7 +19,7 @@ use crate::recordings::context::{DiagnosisContext, PreparedData};
 use crate::recordings::noise_floor;
 use crate::result::limits::smallest;
 use crate::result::pictures::map;
-use crate::result::places::locate;
+use crate::result::places::place;
 use crate::rows::regression::Column;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::{DiagnoseError, Options};
@@ -299,7 +300,7 @@ impl<'a> Analysis<'a> {
             floor,
             self.options.seed,
         );
-        places.into_iter().filter(|p| p.p_value < SIGNIFICANT)
+        (places.into_iter().filter(|p| p.p_value < SIGNIFICANT)).map(|p| place(&p))
     }
 
     /// Returns the unexplained remainder of the voltage.

@@ -125,3 +125,13 @@ fn values_that_are_off_are_mended_by_the_motion() {
         .unwrap();
     assert!(same.adopted.is_none());
 }
+
+/// A described effect is never refused; a motion that is too short to say refuses nothing.
+#[test]
+fn the_likeliest_nothing_among_the_found_effects_is_told() {
+    let p_values = [Some(0.9), Some(0.3), None, Some(0.7), Some(0.01)];
+    assert_eq!(most_likely_zero(&p_values, 0), Some(0));
+    assert_eq!(most_likely_zero(&p_values, 1), Some(3));
+    assert_eq!(most_likely_zero(&p_values, 4), None);
+    assert_eq!(most_likely_zero(&[Some(0.9), None], 1), None);
+}
