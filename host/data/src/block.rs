@@ -26,6 +26,9 @@ pub struct JointColumns {
     pub effects: Option<Vec<f64>>,
 }
 
+/// Columns of the wrist sensor: force, N, and moment, N·m, in the sensor's axes.
+pub const WRENCH_COLUMNS: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
+
 /// A stretch of consecutive, evenly sampled rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Block {

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
+use super::block::WRENCH_COLUMNS;
 use super::columns::{EffortNeed, FileColumn, Layout, Role, Signal, shown};
 use super::efforts::{Efforts, efforts};
 use super::error::{DataError, Warning};
@@ -10,9 +11,6 @@ use super::header::Header;
 use super::motors::MotorSide;
 use super::place::Place;
 use rig_model::robot::Robot;
-
-/// Columns with a meaning that belong to no joint: wrist sensor and supply.
-const NUMERIC_EXTRAS: [&str; 7] = ["fx", "fy", "fz", "mx", "my", "mz", "supply"];
 
 /// Returns the columns of a file for `robot`.
 ///
@@ -55,8 +53,7 @@ pub(super) fn layout(
             Some((signal, joint)) => roles.of(name, signal, joint, &mut warnings),
         };
         let keep = matches!(role, Role::None | Role::Duty(..));
-        let strict =
-            role != Role::None || signal.is_some() || NUMERIC_EXTRAS.contains(&name.as_str());
+        let strict = role != Role::None || signal.is_some() || is_numeric_extra(name);
         columns.push(FileColumn {
             name: name.clone(),
             label: label.clone(),
@@ -78,6 +75,11 @@ pub(super) fn layout(
         movers,
         warnings,
     })
+}
+
+/// Returns true for a column with a meaning that belongs to no joint: wrist sensor or supply.
+fn is_numeric_extra(name: &str) -> bool {
+    name == "supply" || WRENCH_COLUMNS.contains(&name)
 }
 
 /// Returns the index of the column with this name.

@@ -59,7 +59,7 @@ mod torque_spike;
 mod unsigned;
 mod writer;
 
-pub use block::{Block, JointColumns};
+pub use block::{Block, JointColumns, WRENCH_COLUMNS};
 pub use columns::EffortNeed;
 pub use compensated::Compensated;
 pub use error::{DataError, Warning};

@@ -62,6 +62,19 @@ pub enum ExciteError {
         /// Reason and remedy.
         why: String,
     },
+    /// Poses without a wrist sensor.
+    #[error(
+        "poses are for the readings of a wrist sensor, and robot \"{robot}\" has no [wrist_sensor]; describe the sensor, or design a motion (without the number of poses), which finds the load by the joint torques"
+    )]
+    NoSensor {
+        /// Name of the robot.
+        robot: String,
+    },
+    /// Poses that do not turn gravity enough.
+    #[error(
+        "within the limits, gravity turns too little in the frame of the wrist sensor, so poses at rest cannot tell the centre of mass from the biases of the moments; widen the limits of the joints that tilt the flange, or design a motion (without the number of poses)"
+    )]
+    NoTilt,
     /// The base parameters cannot be found.
     #[error(transparent)]
     Base(#[from] IdentifyError),

@@ -3,7 +3,8 @@
 //! [`design`] finds Fourier series (Swevers et al. 1997) that are optimal for the base parameters within the limits on
 //! position, velocity, acceleration and torque, and within the regions of the base frame that points of the links must
 //! not leave. [`staged`] makes chirps, staircases, slow reversals and friction sweeps from the same limits of the
-//! joints. [`TrajectoryFile`] stores both; [`replay`] runs one through the simulated closed loop.
+//! joints. [`poses()`] finds poses at rest for mass and centre of mass of a load at the flange, by a wrist sensor.
+//! [`TrajectoryFile`] stores them all; [`replay`] runs one through the simulated closed loop.
 //!
 //! # Scaling
 //! The columns of the regressor have different units, so its condition number alone has no meaning. With
@@ -38,20 +39,28 @@ mod drives;
 mod error;
 mod fit;
 mod frame;
+mod identified;
 mod interval;
 mod lanes;
 mod optimise;
 mod optimum;
 mod options;
 mod period;
+mod poses;
 mod problem;
+mod quintic_move;
+mod random;
 mod replay;
 mod schedule;
 mod search;
+mod setup;
 mod sign;
 mod stages;
+mod torque_share;
 mod trajectory_file;
 mod workspace;
+mod wrist_chain;
+mod wrist_readings;
 
 #[cfg(test)]
 mod tests;
@@ -62,9 +71,12 @@ pub use error::ExciteError;
 pub use optimum::{Clearance, Design, design};
 pub use options::{Options, Parameters, Scaling};
 pub use period::default_period;
+pub use poses::{PoseOptions, Poses, poses};
+pub use random::drawn;
 pub use replay::STEP as REPLAY_STEP;
-pub use replay::{Noise, Replay, SETTLING, drawn, replay};
+pub use replay::{Noise, Replay, SETTLING, replay, replay_carrying};
 pub use stages::{StagedKind, StagedOptions, staged};
 pub use trajectory_file::{
     COASTING, DesignRecord, JointTrajectory, SampledReference, TrajectoryFile, load_reference,
 };
+pub use wrist_readings::Carried;

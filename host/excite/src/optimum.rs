@@ -1,8 +1,8 @@
 //! The optimal motion of a robot.
 
 use crate::certificate::Reach;
-use crate::frame::frame_of;
 use crate::search::search;
+use crate::setup::frame_of;
 use crate::{DesignRecord, ExciteError, JointTrajectory, Options, TrajectoryFile, Values};
 use rig_model::robot::Robot;
 
@@ -24,7 +24,7 @@ pub struct Design {
     pub file: TrajectoryFile,
     /// Its quality.
     pub values: Values,
-    /// The base parameters for which it is optimal, in the notation of the literature.
+    /// The parameters for which it is optimal: base parameters in the notation of the literature, or those of a load.
     pub base_parameters: Vec<String>,
     /// Upper bounds of each joint's motion.
     pub reach: Vec<Reach>,
@@ -51,7 +51,7 @@ pub fn design(
     options: &Options,
     progress: impl FnMut(u64, u64),
 ) -> Result<Design, ExciteError> {
-    let (frame, base, notes) = frame_of(robot, options)?;
+    let (frame, names, notes) = frame_of(robot, options)?;
     let (best, reached) = search(robot, &frame, options, progress)?;
     Ok(Design {
         file: TrajectoryFile {
@@ -75,7 +75,7 @@ pub fn design(
                 .collect(),
         },
         values: best.values,
-        base_parameters: (0..base.len()).map(|k| base.expression(k)).collect(),
+        base_parameters: names,
         clearances: frame
             .planes
             .iter()

@@ -10,6 +10,10 @@ pub enum Parameters {
     All,
     /// Inertial parameters of the links alone, as in papers without friction.
     Links,
+    /// The ten inertial parameters of a load at the flange. If the robot has a wrist sensor: by its readings with unknown
+    /// constant biases, in the axes of the last joint about the sensor's origin. Otherwise by the joint torques of the
+    /// known robot, as additional parameters of the last link.
+    Load,
 }
 
 /// The scaling of the regressor's columns.
@@ -33,6 +37,9 @@ pub struct Options {
     pub scaling: Scaling,
     /// Standard deviation of each joint's torque, N·m or N: the rows are divided by it.
     pub torque_noise: Option<Vec<f64>>,
+    /// Standard deviations of a wrist sensor's forces, N, and moments, N·m: its rows are divided by them. If absent, they
+    /// are in proportion to its ranges; without ranges 1 N and 0.05 N·m.
+    pub sensor_noise: Option<[f64; 2]>,
     /// Harmonics per joint, 1 to [`HARMONICS`](rig_shared::trajectory::HARMONICS).
     pub harmonics: usize,
     /// Period of the fundamental, s; if absent, chosen from the limits, see [`default_period`](crate::default_period).
@@ -63,6 +70,7 @@ impl Default for Options {
             parameters: Parameters::default(),
             scaling: Scaling::default(),
             torque_noise: None,
+            sensor_noise: None,
             harmonics: 5,
             period: None,
             periods: 5,

@@ -4,13 +4,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
+use super::random::drawn;
+use super::wrist_readings::{Carried, WristReadings, wrench_columns};
 use super::{ExciteError, SampledReference};
 use rig_data::{Column, RecordingWriter};
 use rig_model::robot::Robot;
-use rig_model::simulate::{Inputs, Model, Motion, STAND_IN_BANDWIDTH, closed_loop, controllers};
+use rig_model::simulate::{
+    Inputs, Model, Motion, STAND_IN_BANDWIDTH, Since, closed_loop_watched, controllers,
+};
 use rig_numerics::statistics;
 
 /// Time that the controlled model stands before the recording begins, so that gravity is balanced, s.
@@ -42,6 +45,8 @@ pub struct Replay {
     pub reference: Vec<Vec<f64>>,
     /// Position, velocity and torque as measured, noise included.
     pub motion: Motion,
+    /// Readings of the wrist sensor, fx fy fz, N, mx my mz, N·m, noise included; none without a sensor.
+    pub wrench: Option<[Vec<f64>; 6]>,
     /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
@@ -61,9 +66,38 @@ pub fn replay(
     reference: &SampledReference,
     noise: Noise,
     seed: u64,
+    progress: impl FnMut(u64, u64),
+) -> Result<Replay, ExciteError> {
+    replay_carrying(robot, &Carried::default(), reference, noise, seed, progress)
+}
+
+/// Same as [`replay`], with a load at the flange.
+///
+/// The load is a part of the last link, also in the torque that a substitute controller gets. If the robot has a wrist
+/// sensor, it reads the load's wrench of the simulated motion before any noise, with the mean acceleration of the
+/// simulation steps before and after the sample ([`LinkMotion`](rig_model::simulate::LinkMotion)). Bias and noise are
+/// added, and readings are clipped at the sensor's ranges. [`LoadWrench`] says what is left out; filters and delays of
+/// the sensor's electronics are left out too.
+///
+/// The noise of the sensor is drawn after that of the joints, so that a sensor does not change the joints' columns.
+///
+/// # Errors
+/// Same as [`replay`]; a load with a first moment, but no mass.
+///
+/// [`LoadWrench`]: rig_model::simulate::LoadWrench
+pub fn replay_carrying(
+    robot: &Robot,
+    carried: &Carried,
+    reference: &SampledReference,
+    noise: Noise,
+    seed: u64,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Replay, ExciteError> {
     check_noise(noise)?;
+    carried.check()?;
+    let mut readings = WristReadings::of(robot, carried)?;
+    let carrying = carried.load.as_ref().map(|load| robot.with_load(load));
+    let robot = carrying.as_ref().unwrap_or(robot);
     let model = Model::from_robot(robot)?;
     let start: Vec<f64> = reference
         .position
@@ -93,9 +127,20 @@ pub fn replay(
         substeps: (step / STEP).ceil().max(1.0) as u32,
         held: false,
     };
-    let mut motion = closed_loop(robot, &model, &controllers, &inputs, |done| {
-        progress(done as u64, total as u64);
-    })?;
+    let is_recorded = |k: usize| k >= settling && (k - settling).is_multiple_of(cells);
+    let mut motion = closed_loop_watched(
+        robot,
+        &model,
+        &controllers,
+        &inputs,
+        &Since::default(),
+        |k, links| {
+            if let Some(readings) = readings.as_mut().filter(|_| is_recorded(k)) {
+                readings.push(links);
+            }
+            progress(k as u64 + 1, total as u64);
+        },
+    )?;
     notes.extend(saturation_notes(robot, &motion, step, total));
     notes.extend(tracking_notes(robot, &motion, &asked));
     for series in [&mut motion.q, &mut motion.qd, &mut motion.tau] {
@@ -103,11 +148,16 @@ pub fn replay(
             *list = list.iter().skip(settling).step_by(cells).copied().collect();
         }
     }
-    disturb(&mut motion, noise, seed);
+    let mut random = Pcg64::seed_from_u64(seed);
+    disturb(&mut motion, noise, &mut random);
+    if let Some(readings) = &mut readings {
+        notes.extend(readings.disturb(carried, &mut random));
+    }
     Ok(Replay {
         period: reference.period,
         reference: reference.position.clone(),
         motion,
+        wrench: readings.map(|readings| readings.rows),
         notes,
     })
 }
@@ -195,8 +245,7 @@ fn tracking_notes(robot: &Robot, motion: &Motion, asked: &[Vec<f64>]) -> Vec<Str
 }
 
 /// Adds noise to the measured columns.
-fn disturb(motion: &mut Motion, noise: Noise, seed: u64) {
-    let mut random = Pcg64::seed_from_u64(seed);
+fn disturb(motion: &mut Motion, noise: Noise, random: &mut Pcg64) {
     for (series, deviation) in [
         (&mut motion.q, noise.position),
         (&mut motion.qd, noise.velocity),
@@ -204,16 +253,10 @@ fn disturb(motion: &mut Motion, noise: Noise, seed: u64) {
     ] {
         for list in series {
             for value in list.iter_mut() {
-                *value += drawn(&mut random, deviation);
+                *value += drawn(random, deviation);
             }
         }
     }
-}
-
-/// Draws noise of a deviation, also for 0, so that one noise does not change the numbers of another.
-pub fn drawn(random: &mut Pcg64, deviation: f64) -> f64 {
-    let unit: f64 = StandardNormal.sample(random);
-    deviation * unit
 }
 
 /// Returns the RMS deviation of a joint, and the RMS of its reference about the mean.
@@ -293,7 +336,7 @@ fn feed_forward(
 }
 
 impl Replay {
-    /// Writes the recording: t, and per joint q, qd, tau and ref. The file is written completely or not at all.
+    /// Writes the recording: t, per joint q, qd, tau and ref, and the wrist sensor's readings if there are any. The file is written completely or not at all.
     ///
     /// # Errors
     /// [`ExciteError::Data`].
@@ -311,6 +354,9 @@ impl Replay {
                 columns.push(Column::new(&format!("{name}{}", k + 1), unit));
             }
         }
+        if self.wrench.is_some() {
+            columns.extend(wrench_columns());
+        }
         let metadata = BTreeMap::from([
             ("robot".to_owned(), robot.name.clone()),
             ("source".to_owned(), "simulation".to_owned()),
@@ -326,6 +372,7 @@ impl Replay {
                     self.reference[j][row],
                 ]);
             }
+            values.extend(self.wrench.iter().flatten().map(|axis| axis[row]));
             writer.push_row(&values)?;
         }
         Ok(writer.finish()?)

@@ -2,18 +2,18 @@
 
 use core::f64::consts::TAU;
 
-use rig_shared::multibody::{column, inverse_dynamics};
 use rig_shared::safety::Limits;
 use rig_shared::trajectory::{
     Chirp, Extremes, FrictionSweep, SPEEDS, SlowReversals, Staircase, Sweep, Trajectory,
 };
-use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use crate::bounds::{Bounds, Room, bounds_of, prior};
 use crate::drives::{Combined, into_cranks};
+use crate::quintic_move::{micros, move_time};
+use crate::torque_share::torque_share;
 use crate::{ExciteError, JointTrajectory, TrajectoryFile};
 use rig_model::robot::{JointKind, Robot};
-use rig_model::simulate::{Model, SimulateError};
+use rig_model::simulate::Model;
 
 /// Ratio of a sweep's fastest speed to its slowest. Friction of gears weakens below 0.01 to 0.3 rad/s
 /// (Armstrong-Hélouvry, Dupont & Canudas de Wit 1994), and joints reach some rad/s: the slowest passes must lie below
@@ -28,11 +28,6 @@ const SHARE: f64 = 0.8;
 /// Factor by which velocity and acceleration are lowered until the torque fits, and number of attempts.
 const SLOWER: f64 = 0.85;
 const ATTEMPTS: usize = 30;
-/// Number of instants at which the torque is checked; [`SHARE`] leaves a margin between them.
-const TORQUE_SAMPLES: usize = 50_000;
-/// Peaks of the quintic's velocity and acceleration, in units of distance over time and over time squared.
-const QUINTIC: [f64; 2] = [1.875, 5.773_502_691_896_26];
-
 /// Purpose of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StagedKind {
@@ -167,17 +162,10 @@ struct Allowance<'a> {
     asked: &'a StagedOptions,
 }
 
-/// Rounds a time up to whole microseconds; none if it exceeds 32 bits.
-fn micros(seconds: f64) -> Option<u32> {
-    let whole = (seconds * 1e6).ceil();
-    (whole >= 1.0 && whole <= f64::from(u32::MAX)).then_some(whole as u32)
-}
-
 impl Allowance<'_> {
     /// Returns the duration of a quintic move.
     fn move_time(&self, distance: f64) -> f64 {
-        let by_velocity = QUINTIC[0] * distance / self.velocity;
-        by_velocity.max((QUINTIC[1] * distance / self.acceleration).sqrt())
+        move_time(distance, self.velocity, self.acceleration)
     }
 
     fn build(&self, kind: StagedKind) -> Option<Trajectory<f64>> {
@@ -261,63 +249,6 @@ impl Allowance<'_> {
         FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half_span))
             .map(Trajectory::FrictionSweep)
     }
-}
-
-/// Returns the largest used share of a torque limit, with full Coulomb friction; none if the torque is unknown.
-fn torque_share(
-    model: &Model,
-    bounds: &[Bounds],
-    start: &[f64],
-    moving: usize,
-    trajectory: &Trajectory<f64>,
-) -> Result<f64, ExciteError> {
-    let n = bounds.len();
-    let (mut q, mut qd, mut qdd) = (start.to_vec(), vec![0.0; n], vec![0.0; n]);
-    let mut rows = model.parameters.clone();
-    for row in &mut rows {
-        row[column::COULOMB] = 0.0;
-    }
-    let mut tau = vec![0.0; n];
-    let mut share = 0.0_f64;
-    // Coulomb friction of the motors also counts in full.
-    let width = n * MOTOR_COLUMNS;
-    let mut motors = vec![0.0; n * width];
-    let duration = trajectory.duration();
-    for k in 0..=TORQUE_SAMPLES {
-        let at = trajectory.at(duration * k as f64 / TORQUE_SAMPLES as f64);
-        q[moving] = start[moving] + at.position;
-        (qd[moving], qdd[moving]) = (at.velocity, at.acceleration);
-        inverse_dynamics(&model.chain, &rows, &q, &qd, &qdd, &mut tau)?;
-        let mut coulomb: Vec<f64> = model
-            .parameters
-            .iter()
-            .map(|row| row[column::COULOMB].abs())
-            .collect();
-        if let Some(drives) = &model.motors {
-            let at = |e| ExciteError::from(SimulateError::from(e));
-            let t = &drives.transmission;
-            t.motor_columns(&q, &qd, &qdd, &mut motors).map_err(at)?;
-            for (c, value) in drives.parameters.as_flattened().iter().enumerate() {
-                if c % MOTOR_COLUMNS != motor_column::COULOMB {
-                    for (j, torque) in tau.iter_mut().enumerate() {
-                        *torque += motors[j * width + c] * value;
-                    }
-                }
-            }
-            t.motor_directions(&q, &mut motors[..n * n]).map_err(at)?;
-            for (row, own) in motors[..n * n].chunks_exact(n).zip(&drives.parameters) {
-                for (sum, along) in coulomb.iter_mut().zip(row) {
-                    *sum += (along * own[motor_column::COULOMB]).abs();
-                }
-            }
-        }
-        for j in 0..n {
-            if let Some(limit) = bounds[j].torque {
-                share = share.max((tau[j].abs() + coulomb[j]) / limit);
-            }
-        }
-    }
-    Ok(share)
 }
 
 /// Duration above which a motion gets a note, s.
@@ -461,7 +392,7 @@ pub fn staged(
         start: &start,
     };
     let trajectory = within.fastest(kind, options, distance, &mut notes)?;
-    let file = file_of(robot, moving, &start, trajectory);
+    let file = file_of(robot, moving, &start, &trajectory);
     if file.duration() > LONG {
         notes.push(format!(
             "The motion lasts {:.0} s, as long as slow motion over this range takes; --amplitude{} it.",
@@ -543,8 +474,8 @@ impl Within<'_> {
                 continue;
             }
             if known.is_ok() && limited {
-                let share =
-                    torque_share(&model, self.bounds, self.start, self.moving, &trajectory)?;
+                let joints = joints_of(self.robot, self.moving, self.start, &trajectory);
+                let share = torque_share(&model, self.bounds, &joints)?;
                 if share.is_nan() || share > 1.0 {
                     why = format!(
                         "even slowly it needs {:.0} % of a torque limit; start it where gravity is weaker",
@@ -568,10 +499,25 @@ fn file_of(
     robot: &Robot,
     moving: usize,
     start: &[f64],
-    trajectory: Trajectory<f64>,
+    trajectory: &Trajectory<f64>,
 ) -> TrajectoryFile {
+    TrajectoryFile {
+        robot: robot.name.clone(),
+        design: None,
+        drive_off: None,
+        joints: joints_of(robot, moving, start, trajectory),
+    }
+}
+
+/// Returns the motions of one moving joint and of others at rest.
+fn joints_of(
+    robot: &Robot,
+    moving: usize,
+    start: &[f64],
+    trajectory: &Trajectory<f64>,
+) -> Vec<JointTrajectory> {
     let hold = trajectory.duration_micros().min(u64::from(u32::MAX)) as u32;
-    let joints = robot
+    robot
         .joints
         .iter()
         .enumerate()
@@ -583,11 +529,6 @@ fn file_of(
             } else {
                 Trajectory::Hold(hold)
             },
-        });
-    TrajectoryFile {
-        robot: robot.name.clone(),
-        design: None,
-        drive_off: None,
-        joints: joints.collect(),
-    }
+        })
+        .collect()
 }

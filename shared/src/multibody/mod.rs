@@ -46,6 +46,7 @@ mod structure;
 mod textbook;
 #[cfg(test)]
 mod timing;
+mod wrench;
 
 pub use adjoint::regressor_gradient;
 pub use articulated::articulated_forward_dynamics;
@@ -63,3 +64,4 @@ pub use kinematics::point_position;
 pub use momentum::{momentum_loss_regressor, momentum_regressor};
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;
+pub use wrench::{INERTIAL_PARAMETERS, wrench_regressor};

@@ -30,6 +30,8 @@ pub struct Motion {
     pub t: Vec<f64>,
     /// One entry per joint.
     pub joints: Vec<JointMotion>,
+    /// Columns without a meaning for the joints, by name and as recorded (for instance those of a wrist sensor).
+    pub extra: Vec<(String, Vec<f64>)>,
     /// First row and one past the last row that belong to this piece; ends of the segment are trimmed.
     pub usable: (usize, usize),
     /// First row and one past the last row that an end of the segment does not affect: windows and filters may use
@@ -145,6 +147,7 @@ fn motion_of(
     Ok(Motion {
         t: piece.rows.t,
         joints,
+        extra: piece.rows.extra,
         usable: (start, piece.core_end.min(rows - back).max(start)),
         sound: (front, rows - back),
         offset: piece.offset,

@@ -12,5 +12,6 @@ mod penalty;
 mod rows;
 mod state;
 mod torque;
+mod wrench;
 
 pub(super) use state::Problem;

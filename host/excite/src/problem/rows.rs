@@ -22,6 +22,13 @@ impl Problem<'_> {
 
     /// Computes the regressor rows of the whole period.
     pub(super) fn fill_rows(&mut self) -> Result<(), ExciteError> {
+        match &self.frame.wrist {
+            Some(wrist) => self.fill_wrench_rows(wrist),
+            None => self.fill_torque_rows(),
+        }
+    }
+
+    fn fill_torque_rows(&mut self) -> Result<(), ExciteError> {
         let n = self.joints();
         let frame = self.frame;
         let width = n * COLUMNS;

@@ -8,7 +8,7 @@ use rig_shared::transmission::MOTOR_COLUMNS;
 
 use crate::criterion::Smoothing;
 use crate::frame::Frame;
-use crate::lanes::L;
+use crate::lanes::{L, LANES};
 use crate::schedule::Basis;
 
 /// The optimisation problem of one start.
@@ -27,11 +27,11 @@ pub(crate) struct Problem<'a> {
     pub(super) motion: [DMatrix<f64>; 3],
     /// Derivative of the objective by each of them.
     pub(super) adjoint: [DMatrix<f64>; 3],
-    /// Per joint the scaled rows of the whole period, one per column; only columns of links that load the joint.
+    /// Per reading the scaled rows of the whole period, one per column. Of a joint: only columns of links that load it.
     pub(super) rows: Vec<DMatrix<f64>>,
     /// Derivative of the criterion by each of these entries.
     pub(super) pulls: Vec<DMatrix<f64>>,
-    /// First base column of each joint's rows.
+    /// First column of each reading's rows.
     pub(super) first: Vec<usize>,
     pub(super) out: Vec<L>,
     /// The same for the motors, n × 3n.
@@ -44,9 +44,12 @@ impl<'a> Problem<'a> {
         let basis = Basis::new(&frame.schedule, density);
         let n = frame.bounds.len();
         let (p, samples) = (frame.columns.len(), basis.samples());
-        let first: Vec<usize> = (0..n)
-            .map(|j| frame.columns.partition_point(|c| *c < j * COLUMNS))
-            .collect();
+        let first: Vec<usize> = match &frame.wrist {
+            Some(_) => vec![0; frame.readings()],
+            None => (0..n)
+                .map(|j| frame.columns.partition_point(|c| *c < j * COLUMNS))
+                .collect(),
+        };
         let rows: Vec<_> = first
             .iter()
             .map(|f| DMatrix::zeros(p - f, basis.whole))
@@ -99,5 +102,16 @@ impl<'a> Problem<'a> {
         (0..self.joints())
             .map(|j| Lanes(core::array::from_fn(|k| self.motion[order][(s + k, j)])))
             .collect()
+    }
+
+    /// Adds derivatives of the objective by position, velocity and acceleration at the samples from `first` on.
+    pub(super) fn add_derivatives(&mut self, first: usize, by: &[Vec<L>; 3]) {
+        for (adjoint, by) in self.adjoint.iter_mut().zip(by) {
+            for (j, own) in by.iter().enumerate() {
+                for k in 0..LANES {
+                    adjoint[(first + k, j)] += own.0[k];
+                }
+            }
+        }
     }
 }

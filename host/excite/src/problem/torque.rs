@@ -65,6 +65,10 @@ impl Problem<'_> {
                     .map(|forces| (prior, forces)),
                 None => None,
             };
+            if let (Some(wrist), true) = (&self.frame.wrist, within) {
+                self.sweep_wrench_back(wrist, first, &group.state)?;
+            }
+            let within = within && self.frame.wrist.is_none();
             if !within && pushed.is_none() {
                 continue;
             }
@@ -186,13 +190,7 @@ impl Problem<'_> {
         if let Some(drives) = &frame.drives {
             drives.add_gradient([q, qd, qdd], &self.motors, &mut by)?;
         }
-        for (adjoint, by) in self.adjoint.iter_mut().zip(&by) {
-            for j in 0..n {
-                for k in 0..LANES {
-                    adjoint[(group.first + k, j)] += by[j].0[k];
-                }
-            }
-        }
+        self.add_derivatives(group.first, &by);
         Ok(())
     }
 }

@@ -3,21 +3,24 @@
 
 mod design;
 mod files;
+mod load_motion;
+mod load_poses;
 mod room;
 mod runs;
 mod six_joints;
+mod wrist;
 
 use std::path::Path;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector, Isometry3, UnitQuaternion};
 use rig_shared::multibody::inverse_dynamics;
 
 use super::*;
-use crate::frame::frame_of;
 use crate::optimise::Objective;
 use crate::problem::Problem;
-use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
-use rig_model::simulate::Model;
+use crate::setup::frame_of;
+use rig_model::robot::{Load, ONE_LINK_TEMPLATE, Robot, WristSensor};
+use rig_model::simulate::{LinkMotion, LoadWrench, Model};
 
 pub(super) fn one_link() -> Robot {
     Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
@@ -101,4 +104,32 @@ pub(super) fn gradient_is_that_of_differences(
             gradient[k]
         );
     }
+}
+
+/// The robot with a sensor beside and turned from its flange.
+pub(super) fn with_sensor(mut robot: Robot) -> Robot {
+    robot.wrist_sensor = Some(WristSensor {
+        position: [0.02, -0.03, 0.08],
+        rotation: [0.3, -0.2, 1.1],
+        ..WristSensor::default()
+    });
+    robot
+}
+
+/// Returns the regressor of a load's ten parameters about the sensor's origin, in the flange's axes, by Newton's laws
+/// for bodies with one parameter changed. Six rows, for moments about the sensor's origin in its axes.
+pub(super) fn newton_rows(robot: &Robot, links: &LinkMotion) -> DMatrix<f64> {
+    let sensor = robot.wrist_sensor.as_ref().unwrap();
+    let at = Isometry3::from_parts(sensor.pose().translation, UnitQuaternion::identity());
+    let read = |parameters: [f64; 10]| {
+        let load = Load::of(parameters).seen_from(&at);
+        LoadWrench::new(robot, &load).unwrap().at(links)
+    };
+    let body = [1.0, 0.1, 0.2, -0.1, 0.4, 0.0, 0.0, 0.5, 0.0, 0.3];
+    let before = read(body);
+    DMatrix::from_fn(6, 10, |row, k| {
+        let mut other = body;
+        other[k] += 1.0;
+        read(other)[row] - before[row]
+    })
 }

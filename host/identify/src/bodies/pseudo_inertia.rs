@@ -69,7 +69,7 @@ fn direction(k: usize) -> Matrix4<f64> {
 /// convex in the parameters, zero at the prior, infinite where J stops being positive definite, and independent of
 /// frame and units.
 #[derive(Clone, Debug)]
-pub(crate) struct Divergence {
+pub struct Divergence {
     inverse: Matrix4<f64>,
     log_det: f64,
     linear: [f64; INERTIAL],
@@ -78,7 +78,7 @@ pub(crate) struct Divergence {
 
 impl Divergence {
     /// Builds it from the prior's ten parameters; `None` if they are not consistent.
-    pub(crate) fn new(prior: &[f64]) -> Option<Self> {
+    pub fn new(prior: &[f64]) -> Option<Self> {
         if least_eigenvalue(prior) <= 1e-9 {
             return None;
         }
@@ -94,14 +94,14 @@ impl Divergence {
     }
 
     /// Returns the value at `p`; `None` outside the cone.
-    pub(crate) fn value(&self, p: &[f64]) -> Option<f64> {
+    pub fn value(&self, p: &[f64]) -> Option<f64> {
         let j = pseudo_inertia(p);
         let cholesky = j.cholesky()?;
         Some((self.inverse * j).trace() - log_det(&cholesky.l()) + self.log_det - 4.0)
     }
 
     /// Returns gradient and Hessian at `p`; `None` outside the cone.
-    pub(crate) fn derivatives(
+    pub fn derivatives(
         &self,
         p: &[f64],
     ) -> Option<(SVector<f64, INERTIAL>, SMatrix<f64, INERTIAL, INERTIAL>)> {

@@ -131,6 +131,7 @@ fn halves(motion: &Motion) -> (Motion, Motion) {
     let part = |joints: &[rig_data::prepare::JointMotion]| Motion {
         joints: joints.to_vec(),
         t: motion.t.clone(),
+        extra: motion.extra.clone(),
         ..*motion
     };
     (part(&motion.joints[..n]), part(&motion.joints[n..]))

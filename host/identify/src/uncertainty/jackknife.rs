@@ -42,7 +42,7 @@ pub(crate) fn joined(parts: Vec<TriangularFactor>, count: usize) -> Vec<Triangul
 }
 
 /// Factor of all segments, and of all but each one.
-pub(crate) struct LeaveOut {
+pub struct LeaveOut {
     /// All segments.
     pub whole: TriangularFactor,
     /// All but the segment of this index.
@@ -51,7 +51,7 @@ pub(crate) struct LeaveOut {
 
 impl LeaveOut {
     /// Merges from both ends: three merges per segment.
-    pub(crate) fn of(parts: &[TriangularFactor]) -> Self {
+    pub fn of(parts: &[TriangularFactor]) -> Self {
         let columns = parts.first().map_or(0, TriangularFactor::columns);
         let empty = TriangularFactor::new(columns);
         let mut before = vec![empty.clone()];
@@ -76,7 +76,7 @@ impl LeaveOut {
     }
 
     /// Repeats a fit on all segments and on each remainder.
-    pub(crate) fn refit(
+    pub fn refit(
         &self,
         fit: &dyn Fn(&TriangularFactor) -> Result<Vec<f64>, IdentifyError>,
     ) -> Result<Refit, IdentifyError> {
@@ -89,7 +89,7 @@ impl LeaveOut {
 
 /// Values from all data and with each segment left out.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Refit {
+pub struct Refit {
     /// From all data.
     pub whole: Vec<f64>,
     /// Without one segment.
@@ -98,7 +98,7 @@ pub(crate) struct Refit {
 
 impl Refit {
     /// Applies a function to every set of values.
-    pub(crate) fn map(&self, of: &dyn Fn(&[f64]) -> Vec<f64>) -> Self {
+    pub fn map(&self, of: &dyn Fn(&[f64]) -> Vec<f64>) -> Self {
         Self {
             whole: of(&self.whole),
             without: self.without.iter().map(|v| of(v)).collect(),
@@ -106,7 +106,7 @@ impl Refit {
     }
 
     /// Returns the delete-group jackknife covariance.
-    pub(crate) fn covariance(&self) -> DMatrix<f64> {
+    pub fn covariance(&self) -> DMatrix<f64> {
         let (size, groups) = (self.whole.len(), self.without.len() as f64);
         let mut mean = DVector::zeros(size);
         for v in &self.without {

@@ -81,6 +81,9 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
         return Err(fault);
     }
     check_workspace(robot)?;
+    if let Some(sensor) = &robot.wrist_sensor {
+        sensor.check()?;
+    }
     if let Some(band) = &robot.identified {
         band.check(robot.joints.len())?;
     }

@@ -32,6 +32,7 @@ impl Robot {
             name: name.to_owned(),
             gravity: [0.0, 0.0, -GRAVITY],
             joints,
+            wrist_sensor: None,
             workspace: Vec::new(),
             effects: Vec::new(),
             identified: None,

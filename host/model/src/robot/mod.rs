@@ -30,7 +30,10 @@ mod geometry_only;
 mod implausible;
 mod inertia;
 mod joint;
+mod joint_pose;
 mod link_size;
+mod load;
+mod load_body;
 mod numbers;
 mod placed;
 mod right_angle;
@@ -43,6 +46,7 @@ mod urdf;
 mod voltage_controller;
 mod workspace;
 mod worth;
+mod wrist_sensor;
 mod written;
 
 pub use ball_screw_crank::BallScrewCrank;
@@ -53,6 +57,8 @@ pub use effects::{EFFECT_NAMES, RobotEffect, plausible_range, title_of, unit_of}
 pub use error::{MAX_BYTES, Place, RobotError};
 pub use fault::{is_safe_magnitude, written};
 pub use joint::{Controller, Inertial, Joint, JointFriction, JointKind, JointLimits};
+pub use load::Load;
+pub use load_body::CentredBody;
 pub use placed::Placed;
 pub use serial_robot::Robot;
 pub use templates::{
@@ -62,6 +68,7 @@ pub use urdf::{Original, Urdf, is_placeholder};
 pub use voltage_controller::{AntiWindup, Demand, VoltageController};
 pub use workspace::Region;
 pub use worth::{CONTRADICTED, DESCRIBED, Origin, Quantity, STAND_IN, Worth, worth};
+pub use wrist_sensor::{Reads, WristSensor};
 
 #[cfg(test)]
 mod drives_test;

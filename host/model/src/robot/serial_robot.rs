@@ -8,6 +8,7 @@ use super::effects::RobotEffect;
 use super::joint::Joint;
 use super::workspace::Region;
 use super::worth::Origin;
+use super::wrist_sensor::WristSensor;
 
 /// A serial robot as a file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,6 +22,9 @@ pub struct Robot {
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
+    /// Force and torque sensor at the wrist, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wrist_sensor: Option<WristSensor>,
     /// Regions that points of the links must not leave.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub workspace: Vec<Region>,

@@ -3,6 +3,7 @@
 use super::controllers::wish;
 use super::error::SimulateError;
 use super::history::Since;
+use super::link_motion::{LinkMotion, LinkTrace};
 use super::model::Model;
 use super::step::Stepper;
 use crate::robot::{Controller, Robot};
@@ -89,6 +90,24 @@ pub fn closed_loop_since(
     since: &Since,
     mut progress: impl FnMut(usize),
 ) -> Result<Motion, SimulateError> {
+    closed_loop_watched(robot, model, controllers, inputs, since, |k, _| {
+        progress(k + 1);
+    })
+}
+
+/// Same as [`closed_loop_since`]; calls `watch` with the number of each finished sample, from 0, and the true motion of
+/// the links at it.
+///
+/// # Errors
+/// Same as [`closed_loop`].
+pub fn closed_loop_watched(
+    robot: &Robot,
+    model: &Model,
+    controllers: &[Controller],
+    inputs: &Inputs<'_>,
+    since: &Since,
+    mut watch: impl FnMut(usize, &LinkMotion),
+) -> Result<Motion, SimulateError> {
     let n = robot.joints.len();
     let samples = inputs.reference.iter().map(Vec::len).min().unwrap_or(0);
     let mut stepper = Stepper::new(model)?;
@@ -104,6 +123,7 @@ pub fn closed_loop_since(
     let mut torque = vec![0.0; n];
     let mut cut = vec![false; n];
     let mut errors = vec![[0.0; 2]; n];
+    let mut links = LinkTrace::new(n);
     let substeps = inputs.substeps.max(1);
     let dt = inputs.period / f64::from(substeps);
     // Controller updates within one sample, and steps for each update.
@@ -139,14 +159,17 @@ pub fn closed_loop_since(
                     });
                 }
             }
-            for _ in 0..steps {
+            for step in 0..steps {
+                let at_sample = answer == 0 && step == 0;
+                links.before_step(&stepper, &q, &v, at_sample);
                 stepper.step(&mut q, &mut v, &torque, dt)?;
+                links.after_step(&stepper, &v, dt, at_sample);
             }
         }
         for (count, cut) in motion.saturated.iter_mut().zip(&mut cut) {
             *count += usize::from(std::mem::take(cut));
         }
-        progress(k + 1);
+        watch(k, &links.at);
     }
     for (i, torque) in motion.tau.iter_mut().enumerate() {
         model.effects.read_effort(i, torque, inputs.period);

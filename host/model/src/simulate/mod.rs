@@ -7,15 +7,19 @@ mod elastic;
 mod error;
 mod friction;
 mod history;
+mod link_motion;
+mod load_wrench;
 mod model;
 mod solve;
 mod step;
 #[cfg(test)]
 mod tests;
 
-pub use closed_loop::{Inputs, Motion, closed_loop, closed_loop_since};
+pub use closed_loop::{Inputs, Motion, closed_loop, closed_loop_since, closed_loop_watched};
 pub use controllers::{STAND_IN_BANDWIDTH, controllers};
 pub use error::SimulateError;
 pub use history::Since;
+pub use link_motion::LinkMotion;
+pub use load_wrench::LoadWrench;
 pub use model::{Model, Motors};
 pub use step::Stepper;

@@ -443,3 +443,50 @@ fn friction_that_differs_by_direction_is_a_constant_however_much_is_remembered()
     let [less, more] = [end(0.2999), end(0.3001)];
     assert!((less - more).abs() < 5e-3 * less.abs(), "{less} {more}");
 }
+
+/// Inverse dynamics of the links' motion gives the recorded torque: accelerations and torques belong together.
+#[test]
+fn accelerations_of_the_links_fit_the_torques() {
+    let robot = double_pendulum(0.0);
+    let model = Model::from_robot(&robot).unwrap();
+    let controller = Controller {
+        position_gain: 20.0,
+        velocity_gain: 2.0,
+        torque_gain: 1.0,
+    };
+    let reference: Vec<f64> = (0..800)
+        .map(|k| 0.6 * (f64::from(k) * 0.01).sin())
+        .collect();
+    let inputs = Inputs {
+        period: 2e-3,
+        reference: &[reference.clone(), reference],
+        feed_forward: &[],
+        added: &[],
+        q: &[0.0; 2],
+        v: &[0.0; 2],
+        substeps: 8,
+        held: false,
+    };
+    let mut needed = Vec::new();
+    let motion = closed_loop_watched(
+        &robot,
+        &model,
+        &[controller.clone(), controller],
+        &inputs,
+        &Since::default(),
+        |k, links| {
+            assert_eq!(k, needed.len());
+            let mut tau = [0.0; 2];
+            model
+                .inverse_dynamics(&links.q, &links.qd, &links.qdd, &mut tau)
+                .unwrap();
+            needed.push(tau);
+        },
+    )
+    .unwrap();
+    for (k, needed) in needed.iter().enumerate().skip(1) {
+        for (own, needed) in motion.tau.iter().zip(needed) {
+            assert!((own[k] - needed).abs() < 2e-3, "{k}: {} {needed}", own[k]);
+        }
+    }
+}

@@ -7,6 +7,7 @@ use thiserror::Error;
 use rig_data::DataError;
 use rig_identify::IdentifyError;
 use rig_link::LinkError;
+use rig_load::LoadError;
 use rig_model::robot::RobotError;
 use rig_model::simulate::SimulateError;
 use rig_output::WriteError;
@@ -36,6 +37,9 @@ pub enum CommandError {
     /// A recording.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// Identification of a load.
+    #[error(transparent)]
+    Load(#[from] LoadError),
     /// Identification.
     #[error(transparent)]
     Identify(#[from] IdentifyError),

@@ -9,7 +9,8 @@ use super::input::described;
 use super::overwrite::refuse_file;
 use super::ui::Ui;
 use rig_excite::{
-    Criterion, Design, Options, Parameters, Scaling, StagedKind, StagedOptions, design, staged,
+    Criterion, Design, Options, Parameters, PoseOptions, Poses, Scaling, StagedKind, StagedOptions,
+    design, poses, staged,
 };
 use rig_model::robot::Robot;
 
@@ -116,6 +117,23 @@ pub(crate) struct Args {
     /// torque limit for all joints] (fourier)
     #[arg(long, value_delimiter = ',')]
     pub(crate) torque_noise: Option<Vec<f64>>,
+    /// Identify a load at the flange instead of the robot: by the readings of the [wrist_sensor], with unknown biases,
+    /// or by the joint torques if the description has no sensor (fourier)
+    #[arg(long, conflicts_with = "parameters")]
+    pub(crate) load: bool,
+    /// Instead of a periodic motion: rest at this number of poses, 3 to 16, which identify mass and centre of mass of
+    /// the load by the [wrist_sensor]
+    #[arg(long, requires = "load", allow_negative_numbers = true)]
+    pub(crate) poses: Option<usize>,
+    /// Standard deviations of the forces and of the moments of the [wrist_sensor], separated by a comma, N and N*m
+    /// [default: in proportion to its ranges, else 1,0.05] (--load)
+    #[arg(
+        long,
+        value_delimiter = ',',
+        requires = "load",
+        conflicts_with = "poses"
+    )]
+    pub(crate) sensor_noise: Option<Vec<f64>>,
     /// Harmonics per joint, 1 to 8 [default: 5] (fourier)
     #[arg(long)]
     pub(crate) harmonics: Option<usize>,
@@ -189,7 +207,16 @@ impl Args {
             ("--periods", self.periods.is_some()),
             ("--starts", self.starts.is_some()),
             ("--seed", self.seed.is_some()),
+            ("--load", self.load),
         ];
+        // All before --seed, which also draws poses.
+        if let (Some(count), Some((option, _))) =
+            (self.poses, of_fourier[..9].iter().find(|(_, given)| *given))
+        {
+            return Err(CommandError::Sentence(format!(
+                "{option} belongs to a periodic motion, but --poses {count} asks for poses at rest; leave one of them out."
+            )));
+        }
         let unused = of_fourier.iter().find(|(_, given)| *given);
         let staged = [
             (
@@ -228,6 +255,36 @@ impl Args {
                 kind.name()
             ))),
             _ => Ok(()),
+        }
+    }
+
+    /// Refuses options on noise that the rows of this robot do not have.
+    fn refuse_other_noise(&self, robot: &Robot) -> Result<(), CommandError> {
+        let sensor = self.load && robot.wrist_sensor.is_some();
+        let unused = match (&self.torque_noise, &self.sensor_noise) {
+            (Some(_), _) if sensor => {
+                "--torque-noise has no effect: the load is identified by the [wrist_sensor]; give --sensor-noise instead, or leave it out."
+            }
+            (_, Some(_)) if !sensor => {
+                "--sensor-noise has no effect: the description has no [wrist_sensor], so the load is identified by the joint torques; give --torque-noise instead, or leave it out."
+            }
+            _ => return Ok(()),
+        };
+        Err(CommandError::Sentence(unused.to_owned()))
+    }
+
+    /// Standard deviations of force and moment.
+    ///
+    /// # Errors
+    /// `--sensor-noise` has not exactly two numbers.
+    fn sensor_noise(&self) -> Result<Option<[f64; 2]>, CommandError> {
+        match self.sensor_noise.as_deref() {
+            None => Ok(None),
+            Some(&[force, moment]) => Ok(Some([force, moment])),
+            Some(other) => Err(CommandError::Sentence(format!(
+                "--sensor-noise has {} numbers; give two, that of the forces in N and that of the moments in N·m, such as 0.5,0.02.",
+                other.len()
+            ))),
         }
     }
 
@@ -282,6 +339,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             "A motion sized by limits that look like degrees may break the robot, so none was designed; correct the limits, or give --even-if-wrong if they are right.".to_owned(),
         ));
     }
+    args.refuse_other_noise(&robot)?;
+    if let Some(count) = args.poses {
+        return at_rest(args, count, &robot, ui);
+    }
     let Some(kind) = args.kind.staged() else {
         return optimal(args, &robot, ui);
     };
@@ -300,6 +361,59 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
+/// Designs poses at rest.
+fn at_rest(args: &Args, count: usize, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
+    let options = PoseOptions {
+        count,
+        start: args.start.clone(),
+        margin: args.margin.unwrap_or(MARGIN),
+        speed_share: args.speed_share.unwrap_or(SPEED_SHARE),
+        seed: args.seed.unwrap_or(1),
+    };
+    let found = poses(robot, &options)?;
+    for note in &found.notes {
+        ui.remark(note);
+    }
+    found.file.save(&args.out, robot, args.rate)?;
+    for line in summary_of_poses(&found) {
+        ui.say(&line);
+    }
+    ui.say(&format!(
+        "{}: the motion, {:.1} s, with a rest of {:.1} s at each pose.",
+        args.out.display(),
+        found.file.duration(),
+        found.dwell
+    ));
+    ui.say(NOT_LOOKED_AT);
+    Ok(())
+}
+
+/// Describes poses, line by line.
+fn summary_of_poses(found: &Poses) -> Vec<String> {
+    let mut lines = vec![
+        format!(
+            "For mass and first moment of a load, with six unknown biases: D-optimal value {:.3} of at most {:.3}, condition number {}.",
+            found.value,
+            found.best_value,
+            number(found.condition_number)
+        ),
+        format!(
+            "Standard deviations for a noise of 1 in the mean reading of each pose: mass {:.4} kg per N; first moment {:.4} kg·m per N·m, in its least certain direction (divided by the load's mass: its centre of mass, in m per N·m).",
+            found.mass_deviation, found.first_moment_deviation
+        ),
+    ];
+    let poses = found.positions.iter().zip(&found.gravity).enumerate();
+    lines.extend(poses.map(|(k, (q, [x, y, z]))| {
+        let q: Vec<String> = q.iter().map(|q| format!("{q:.3}")).collect();
+        format!(
+            "Pose {}: gravity along {x:.2}, {y:.2}, {z:.2} of the sensor; joints at {}.",
+            k + 1,
+            q.join(", ")
+        )
+    }));
+    lines
+}
+
 fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     let default = Options::default();
     let options = Options {
@@ -310,6 +424,7 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
             Some(CriterionArg::DOptimal) => Criterion::Determinant,
         },
         parameters: match args.parameters {
+            None if args.load => Parameters::Load,
             None => default.parameters,
             Some(ParametersArg::All) => Parameters::All,
             Some(ParametersArg::Links) => Parameters::Links,
@@ -320,6 +435,7 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
             Some(ScalingArg::None) => Scaling::None,
         },
         torque_noise: args.torque_noise.clone(),
+        sensor_noise: args.sensor_noise()?,
         harmonics: args.harmonics.unwrap_or(default.harmonics),
         period: args.period,
         periods: args.periods.unwrap_or(default.periods),
@@ -340,12 +456,17 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     let condition = found.values.condition_number;
     if condition > TELLS_NOTHING {
         return Err(CommandError::Sentence(format!(
-            "This motion identifies nothing: its condition number is {}, so one combination of parameters changes the torque that many times less than the others. Nothing was written; {MORE_MOTION}.",
-            number(condition)
+            "This motion identifies nothing: its condition number is {}, so one combination of parameters changes the {} that many times less than the others. Nothing was written; {MORE_MOTION}.",
+            number(condition),
+            if args.load && robot.wrist_sensor.is_some() {
+                "readings"
+            } else {
+                "torque"
+            }
         )));
     }
     found.file.save(&args.out, robot, args.rate)?;
-    for line in summary(&found, robot) {
+    for line in summary(args.load, &found, robot) {
         ui.say(&line);
     }
     ui.say(&format!(
@@ -376,17 +497,22 @@ fn verdict(condition: f64) -> String {
         "usable (100 to 1000)".into()
     } else {
         format!(
-            "poor: one combination of parameters changes the torque {condition:.0e} times less than the others and will not be identified; {MORE_MOTION}"
+            "poor: one combination of parameters shows {condition:.0e} times less than the others and will not be identified; {MORE_MOTION}"
         )
     }
 }
 
 /// Describes the designed motion, line by line.
-fn summary(found: &Design, robot: &Robot) -> Vec<String> {
+fn summary(load: bool, found: &Design, robot: &Robot) -> Vec<String> {
     let values = &found.values;
+    let kind = match (load, &robot.wrist_sensor) {
+        (false, _) => "base parameters",
+        (true, Some(_)) => "parameters of a load at the sensor, with six unknown biases:",
+        (true, None) => "parameters of a load, by the joint torques:",
+    };
     let mut lines = vec![
         format!(
-            "For the {} base parameters {}:",
+            "For the {} {kind} {}:",
             found.base_parameters.len(),
             found.base_parameters.join(", ")
         ),

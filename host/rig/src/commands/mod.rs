@@ -12,6 +12,7 @@ mod identify;
 mod init;
 mod input;
 mod interrupts;
+mod load;
 mod overwrite;
 mod pictures;
 mod record;
@@ -50,6 +51,7 @@ enum Command {
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
     Diagnose(diagnose::Args),
+    Load(load::Args),
 }
 
 impl Cli {
@@ -74,6 +76,7 @@ impl Cli {
             Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
             Some(Command::Validate(args)) => validate::run(&args, &ui),
             Some(Command::Diagnose(args)) => diagnose::run(&args, &ui),
+            Some(Command::Load(args)) => load::run(&args, &ui),
         }
     }
 }

@@ -8,7 +8,7 @@ use super::error::CommandError;
 ///
 /// All commands refuse a folder that holds any of these files. Two commands would both write report.html, and a user
 /// could take a file of an earlier run for a result of the later one.
-const RESULTS: [&str; 10] = [
+const RESULTS: [&str; 13] = [
     "report.html",
     "identified.toml",
     "identified.urdf",
@@ -19,6 +19,9 @@ const RESULTS: [&str; 10] = [
     "diagnosis.html",
     "next_experiment.toml",
     "friction-map.json",
+    "load.toml",
+    "load.urdf",
+    "load.json",
 ];
 
 /// Further files that the demonstration writes. Other commands ignore them: they may be the user's own recordings.

@@ -7,8 +7,8 @@ use super::input::{described, real};
 use super::overwrite::refuse_file;
 use super::ui::Ui;
 use rig_diagnose::voltage::replay_voltage;
-use rig_excite::{Noise, load_reference, replay};
-use rig_model::robot::Robot;
+use rig_excite::{Carried, Noise, load_reference, replay_carrying};
+use rig_model::robot::{Load, Robot};
 
 /// Simulates the robot following a trajectory, with its own friction, drives and controller.
 ///
@@ -19,6 +19,11 @@ use rig_model::robot::Robot;
 /// If the description has a single joint with a [joint.voltage_controller], as `rig diagnose` writes it for recordings
 /// of a motor voltage, that controller closes the loop. The recording then has the columns t, q1, qd1, u1, supply and
 /// ref1.
+///
+/// If the description has a [wrist_sensor], the recording also has the columns fx, fy, fz, mx, my and mz: the wrench
+/// between the robot and the load of --load, in the sensor's axes about its origin. `reads` in the description gives
+/// its sense; without `reads` it is the load's wrench on the robot, whose force at rest is the weight, downwards.
+/// Readings beyond `force_range` and `moment_range` are clipped. Without --load they are bias and noise.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Robot description (.toml or .urdf) with inertia and friction
@@ -42,6 +47,23 @@ pub(crate) struct Args {
     /// Standard deviation of the noise on torques, N·m or N
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) noise_torque: f64,
+    /// Load at the flange (.toml with mass, first_moment and inertia in the flange frame)
+    #[arg(long)]
+    pub(crate) load: Option<PathBuf>,
+    /// Standard deviation of the noise on the wrist sensor's forces, N
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) noise_force: f64,
+    /// Standard deviation of the noise on the wrist sensor's moments, N·m
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) noise_moment: f64,
+    /// Constant part of the wrist sensor's readings, N and N·m [default: 0]
+    #[arg(
+        long,
+        num_args = 6,
+        value_names = ["FX", "FY", "FZ", "MX", "MY", "MZ"],
+        allow_negative_numbers = true
+    )]
+    pub(crate) sensor_bias: Option<Vec<f64>>,
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -66,6 +88,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ("position", args.noise_position),
         ("velocity", args.noise_velocity),
         ("torque", args.noise_torque),
+        ("force", args.noise_force),
+        ("moment", args.noise_moment),
     ] {
         if !(deviation >= 0.0 && deviation.is_finite()) {
             return Err(CommandError::Sentence(format!(
@@ -80,6 +104,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     {
         return under_voltage(args, ui, &robot);
     }
+    let carried = carried(args, &robot, ui)?;
     let reference = load_reference(&args.trajectory, &robot, args.rate)?;
     let noise = Noise {
         position: args.noise_position,
@@ -87,9 +112,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         torque: args.noise_torque,
     };
     let mut progress = ui.progress("simulating", 1);
-    let done = replay(&robot, &reference, noise, args.seed, |done, total| {
-        progress.at_of(done, total);
-    })?;
+    let tell = |done, total| progress.at_of(done, total);
+    let done = replay_carrying(&robot, &carried, &reference, noise, args.seed, tell)?;
     drop(progress);
     done.save(&args.out, &robot)?;
     for note in &done.notes {
@@ -104,6 +128,62 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
+impl Args {
+    /// Returns the first given option of the wrist sensor.
+    fn sensor_option(&self) -> Option<&'static str> {
+        [
+            ("--noise-force", self.noise_force > 0.0),
+            ("--noise-moment", self.noise_moment > 0.0),
+            ("--sensor-bias", self.sensor_bias.is_some()),
+        ]
+        .into_iter()
+        .find_map(|(option, given)| given.then_some(option))
+    }
+}
+
+/// Returns the load and the errors of the wrist sensor.
+fn carried(args: &Args, robot: &Robot, ui: &Ui) -> Result<Carried, CommandError> {
+    let option = args.sensor_option();
+    if let (Some(option), None) = (option, &robot.wrist_sensor) {
+        return Err(CommandError::Sentence(format!(
+            "{option} has no effect: {} has no [wrist_sensor]; describe the sensor there, or leave the option out.",
+            args.robot.display()
+        )));
+    }
+    let load = args.load.as_deref().map(Load::read).transpose()?;
+    if let (Some(load), Some(path)) = (&load, &args.load) {
+        if let Some(why) = load.implausibility() {
+            ui.remark(&format!(
+                "The load of {} {why}. It is simulated with the values of the file.",
+                path.display()
+            ));
+        }
+        if robot.wrist_sensor.is_none() {
+            ui.remark(&format!(
+                "{} has no [wrist_sensor], so the load changes only the torques.",
+                args.robot.display()
+            ));
+        }
+    }
+    if robot
+        .wrist_sensor
+        .as_ref()
+        .is_some_and(|sensor| sensor.reads.is_none())
+    {
+        ui.remark("[wrist_sensor] has no `reads`; the readings are the load's wrench on the robot, as with reads = \"load\".");
+    }
+    let mut bias = [0.0; 6];
+    for (own, given) in bias.iter_mut().zip(args.sensor_bias.iter().flatten()) {
+        *own = *given;
+    }
+    Ok(Carried {
+        load,
+        force_noise: args.noise_force,
+        moment_noise: args.noise_moment,
+        bias,
+    })
+}
+
 /// Simulates a joint under motor voltage.
 fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError> {
     if args.noise_torque > 0.0 {
@@ -111,6 +191,18 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError
             "--noise-torque {} has no effect on joint {}, which is simulated under voltage and has no torque column; leave it out.",
             args.noise_torque, robot.joints[0].name
         )));
+    }
+    let of_the_load = args.load.as_ref().map(|_| "--load");
+    if let Some(option) = of_the_load.or(args.sensor_option()) {
+        return Err(CommandError::Sentence(format!(
+            "{option} has no effect on joint {}, which is simulated under voltage, without a load and a wrist sensor; leave it out.",
+            robot.joints[0].name
+        )));
+    }
+    if robot.wrist_sensor.is_some() {
+        ui.remark(
+            "The wrist sensor is not simulated: the joint runs under voltage, without a load.",
+        );
     }
     let noise = Noise {
         position: args.noise_position,

@@ -10,6 +10,7 @@ mod estimators;
 mod friction;
 mod friction_map;
 mod identification;
+mod load;
 mod parts;
 mod residuals;
 #[cfg(test)]
@@ -25,5 +26,6 @@ pub use demo::{
 pub use diagnosis::{PICTURE_NAMES, diagnosis, pictures, verdict};
 pub use friction_map::friction_map;
 pub use identification::identification;
+pub use load::load;
 pub use validation::validation;
 pub use validation_voltage::validation_voltage;

@@ -52,7 +52,7 @@ impl SpatialInertia {
         }
     }
 
-    pub(super) fn plus(&self, other: &Self) -> Self {
+    pub(in crate::robot) fn plus(&self, other: &Self) -> Self {
         Self {
             mass: self.mass + other.mass,
             first_moment: self.first_moment + other.first_moment,

@@ -1,0 +1,99 @@
+//! The numbers that robot controllers ask for.
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde::Serialize;
+
+use crate::result::{LoadIdentification, principal};
+
+/// The load as the controllers of three makers take it; the flange frame of the description must be the controller's.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ControllerNumbers {
+    /// Universal Robots: `set_target_payload(m, cog, inertia)` with the centre of gravity in m in the tool flange and
+    /// Ixx Iyy Izz Ixy Ixz Iyz about it in kg·m² (URScript manual).
+    pub universal_robots: String,
+    /// KUKA: `LOAD_DATA` with M in kg, CM in mm and degrees (axes of the principal moments, ZYX), J in kg·m².
+    pub kuka: String,
+    /// Franka: mass in kg, centre of mass in m and inertia about it in kg·m², column by column (`setLoad` of libfranka).
+    pub franka: String,
+}
+
+/// Returns the numbers of the identified body for controllers. Inertias that the data do not show are zero, which these
+/// controllers take as "a point": no number is invented.
+pub fn controller_numbers(load: &LoadIdentification) -> ControllerNumbers {
+    let list = |values: &[f64]| {
+        values
+            .iter()
+            .map(|v| number(*v))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let mass = load.body.mass;
+    let centre = Vector3::from(load.body.first_moment) / mass;
+    let about = about_centre(load, &centre);
+    let inertia = if load.inertia_shown {
+        about
+    } else {
+        Matrix3::zeros()
+    };
+    let (moments, turn) = match load.inertia_shown {
+        true => {
+            let (moments, axes) = principal(&inertia);
+            let axes = Matrix3::from_columns(&axes.map(Vector3::from));
+            (moments, Rotation3::from_matrix_unchecked(axes))
+        }
+        false => ([0.0; 3], Rotation3::identity()),
+    };
+    // A about z, B about y, C about x.
+    let (c, b, a) = turn.euler_angles();
+    ControllerNumbers {
+        universal_robots: format!(
+            "set_target_payload({}, [{}], [{}])",
+            number(mass),
+            list(centre.as_slice()),
+            list(&[
+                inertia.m11,
+                inertia.m22,
+                inertia.m33,
+                inertia.m12,
+                inertia.m13,
+                inertia.m23
+            ])
+        ),
+        kuka: format!(
+            "{{M {}, CM {{X {}, Y {}, Z {}, A {}, B {}, C {}}}, J {{X {}, Y {}, Z {}}}}}",
+            number(mass),
+            number(1e3 * centre.x),
+            number(1e3 * centre.y),
+            number(1e3 * centre.z),
+            number(a.to_degrees()),
+            number(b.to_degrees()),
+            number(c.to_degrees()),
+            number(moments[0]),
+            number(moments[1]),
+            number(moments[2])
+        ),
+        franka: format!(
+            "mass {}, F_x_Cload [{}], load_inertia [{}]",
+            number(mass),
+            list(centre.as_slice()),
+            list(inertia.as_slice())
+        ),
+    }
+}
+
+/// Returns six significant digits as a controller reads them: ASCII, without an exponent.
+fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let scale = 10f64.powf(5.0 - value.abs().log10().floor());
+    format!("{}", (value * scale).round() / scale)
+}
+
+/// Returns the inertia of the body about its centre of mass.
+pub(crate) fn about_centre(load: &LoadIdentification, centre: &Vector3<f64>) -> Matrix3<f64> {
+    let [xx, xy, xz, yy, yz, zz] = load.body.inertia;
+    let about_origin = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let steiner = Matrix3::identity() * centre.norm_squared() - centre * centre.transpose();
+    about_origin - steiner * load.body.mass
+}

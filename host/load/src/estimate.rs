@@ -1,0 +1,216 @@
+//! Least squares for the ten parameters beside unknowns of no interest, in the directions that the data show.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use rig_identify::{LeaveOut, Refit, TriangularFactor};
+use rig_shared::multibody::INERTIAL_PARAMETERS;
+
+/// Distance from the flange at which the mass of a load plausibly lies, m. It decides which directions count as shown,
+/// and limits what is not shown.
+pub(crate) const PLAUSIBLE_DISTANCE: f64 = 0.1;
+/// Relative singular value below which a direction is rounding.
+const ROUNDING: f64 = 1e-9;
+/// A parameter is shown if its standard deviation is below this share of its plausible size.
+const SHOWN: f64 = 0.5;
+
+/// The ten parameters, in the order m mx my mz Ixx Ixy Ixz Iyy Iyz Izz.
+pub(crate) type Parameters = SVector<f64, INERTIAL_PARAMETERS>;
+/// A matrix of these.
+pub(crate) type Square = SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>;
+
+/// The ten parameters with their uncertainty.
+#[derive(Clone, Debug)]
+pub(crate) struct Estimate {
+    /// Values; 0 along directions that the data do not show.
+    pub values: Parameters,
+    /// Covariance of what the data show.
+    pub covariance: Square,
+    /// Covariance of what they do not show: plausible sizes along these directions.
+    pub beyond: Square,
+    /// Inverse of the covariance along the shown directions; 0 along the others.
+    pub information: Square,
+    /// Plausible size of each parameter.
+    pub sizes: Parameters,
+    /// Degrees of freedom of the covariance.
+    pub degrees_of_freedom: usize,
+}
+
+impl Estimate {
+    /// Returns the standard deviations; a direction that is not shown has its plausible size.
+    pub(crate) fn std(&self) -> Parameters {
+        (self.covariance + self.beyond)
+            .diagonal()
+            .map(|v| v.max(0.0).sqrt())
+    }
+
+    /// Returns for each parameter if the data show it.
+    pub(crate) fn shown(&self) -> [bool; INERTIAL_PARAMETERS] {
+        let std = self.std();
+        std::array::from_fn(|k| std[k] < SHOWN * self.sizes[k])
+    }
+}
+
+/// Returns the plausible sizes of the parameters of a load of about `mass` kg.
+pub(crate) fn sizes_of(mass: f64) -> Parameters {
+    Parameters::from_fn(|k, _| match k {
+        0 => mass,
+        1..=3 => mass * PLAUSIBLE_DISTANCE,
+        _ => mass * PLAUSIBLE_DISTANCE.powi(2),
+    })
+}
+
+/// Where the uncertainty comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Spread {
+    /// Refits with one segment of time left out: allows for correlated noise and errors of the model.
+    Segments,
+    /// The residuals, which are independent: poses that were approached one by one. Holds the degrees of freedom.
+    Residuals(usize),
+}
+
+/// Estimates the parameters from segments, one factor each, in units of the noise. The first ten columns are those of
+/// the parameters.
+pub(crate) fn estimate(segments: &[TriangularFactor], mass: f64, spread: Spread) -> Estimate {
+    let sizes = sizes_of(mass);
+    let all = LeaveOut::of(segments);
+    let (r, z) = all.whole.system();
+    let shown = shown_directions(&r, &sizes);
+    let lift = DMatrix::from_fn(INERTIAL_PARAMETERS, shown.along.ncols(), |k, c| {
+        sizes[k] * shown.along[(k, c)]
+    });
+    let fit = |factor: &TriangularFactor| {
+        let (r, z) = factor.system();
+        solved(&reduced(&r, &lift), &z)
+    };
+    let whole = solved(&reduced(&r, &lift), &z);
+    let count = lift.ncols();
+    let (covariance, degrees_of_freedom) = match spread {
+        Spread::Segments => {
+            let without = all.without.iter().map(fit);
+            let refit = Refit {
+                whole: whole.as_slice()[..count].to_vec(),
+                without: without.map(|x| x.as_slice()[..count].to_vec()).collect(),
+            };
+            (refit.covariance(), segments.len().saturating_sub(1))
+        }
+        Spread::Residuals(freedom) => {
+            let squares = shown.strength.map(|s| 1.0 / (s * s));
+            (DMatrix::from_diagonal(&squares), freedom)
+        }
+    };
+    let of = |m: &DMatrix<f64>| Square::from_iterator(m.iter().copied());
+    let inverse = match count {
+        0 => DMatrix::zeros(0, 0),
+        _ => (covariance.clone().pseudo_inverse(0.0))
+            .unwrap_or_else(|_| DMatrix::zeros(count, count)),
+    };
+    let down = DMatrix::from_fn(count, INERTIAL_PARAMETERS, |c, k| {
+        shown.along[(k, c)] / sizes[k]
+    });
+    let hidden = DMatrix::from_fn(INERTIAL_PARAMETERS, shown.hidden.ncols(), |k, c| {
+        sizes[k] * shown.hidden[(k, c)]
+    });
+    let values = &lift * whole.rows(0, count);
+    Estimate {
+        values: Parameters::from_iterator(values.iter().copied()),
+        covariance: of(&(&lift * &covariance * lift.transpose())),
+        beyond: of(&(&hidden * hidden.transpose())),
+        information: of(&(down.transpose() * inverse * down)),
+        sizes,
+        degrees_of_freedom,
+    }
+}
+
+/// Orthonormal directions in the space of the parameters over their sizes.
+struct Directions {
+    /// Shown by the data.
+    along: DMatrix<f64>,
+    /// Singular value of each of them: the inverse of its standard deviation.
+    strength: DVector<f64>,
+    /// Not shown by the data.
+    hidden: DMatrix<f64>,
+}
+
+/// Finds the directions whose standard deviation is below their plausible size, whatever the other unknowns are.
+fn shown_directions(r: &DMatrix<f64>, sizes: &Parameters) -> Directions {
+    let p = r.ncols();
+    let mut own = r.columns(0, INERTIAL_PARAMETERS).into_owned();
+    for (k, mut column) in own.column_iter_mut().enumerate() {
+        column *= sizes[k];
+    }
+    let others = scaled(
+        &r.columns(INERTIAL_PARAMETERS, p - INERTIAL_PARAMETERS)
+            .into_owned(),
+    )
+    .0;
+    if others.ncols() > 0 {
+        let svd = others.svd(true, false);
+        let largest = svd.singular_values.max();
+        if let Some(u) = svd.u {
+            for (c, s) in svd.singular_values.iter().enumerate() {
+                if *s > ROUNDING * largest {
+                    let column = u.column(c).into_owned();
+                    let along = column.transpose() * &own;
+                    own -= &column * along;
+                }
+            }
+        }
+    }
+    let svd = own.svd(false, true);
+    let right = (svd.v_t).map_or_else(
+        || DMatrix::identity(INERTIAL_PARAMETERS, INERTIAL_PARAMETERS),
+        |v| v.transpose(),
+    );
+    let largest = svd.singular_values.max();
+    let is_shown = |s: f64| s > 1.0 && s > ROUNDING * largest;
+    let (shown, hidden): (Vec<usize>, Vec<usize>) =
+        (0..INERTIAL_PARAMETERS).partition(|k| is_shown(svd.singular_values[*k]));
+    Directions {
+        along: right.select_columns(&shown),
+        strength: DVector::from_iterator(
+            shown.len(),
+            shown.iter().map(|k| svd.singular_values[*k]),
+        ),
+        hidden: right.select_columns(&hidden),
+    }
+}
+
+/// Replaces the columns of the parameters by those of their shown directions.
+fn reduced(r: &DMatrix<f64>, lift: &DMatrix<f64>) -> DMatrix<f64> {
+    let others = r.ncols() - INERTIAL_PARAMETERS;
+    let mut out = DMatrix::zeros(r.nrows(), lift.ncols() + others);
+    out.columns_mut(0, lift.ncols())
+        .copy_from(&(r.columns(0, INERTIAL_PARAMETERS) * lift));
+    out.columns_mut(lift.ncols(), others)
+        .copy_from(&r.columns(INERTIAL_PARAMETERS, others));
+    out
+}
+
+/// Returns the matrix with columns of length one, and their lengths.
+fn scaled(matrix: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
+    let mut matrix = matrix.clone();
+    let lengths = matrix
+        .column_iter_mut()
+        .map(|mut column| {
+            let length = column.norm();
+            if length > 0.0 {
+                column /= length;
+            }
+            length
+        })
+        .collect();
+    (matrix, lengths)
+}
+
+/// Solves a least-squares problem; unknowns that the equations do not determine get the smallest values.
+pub(crate) fn solved(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    let (matrix, lengths) = scaled(matrix);
+    let svd = matrix.svd(true, true);
+    let tolerance = ROUNDING * svd.singular_values.max();
+    let mut x = svd
+        .solve(right, tolerance)
+        .unwrap_or_else(|_| DVector::zeros(lengths.len()));
+    for (value, length) in x.iter_mut().zip(lengths) {
+        *value = if length > 0.0 { *value / length } else { 0.0 };
+    }
+    x
+}

@@ -1,0 +1,261 @@
+//! The whole identification of a load: sensor, torques, or both.
+
+use nalgebra::{Isometry3, SMatrix, SymmetricEigen};
+use rig_data::prepare::Recording;
+use rig_identify::{chain_of, least_eigenvalue};
+use rig_model::robot::{Load, Robot};
+use rig_output::{format_significant, listed};
+use rig_shared::multibody::INERTIAL_PARAMETERS;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::body::body;
+use crate::error::LoadError;
+use crate::estimate::{Estimate, Parameters, Spread, Square, estimate};
+use crate::missing::missing;
+use crate::options::{By, LoadOptions};
+use crate::result::{Agreement, LoadIdentification, NAMES, TorqueFindings, numbers};
+use crate::sensor::{Sensing, by_sensor};
+use crate::torque::{Driven, equations};
+
+/// Probability by chance below which sensor and torques contradict each other.
+const CONTRADICTS: f64 = 1e-3;
+/// Standard deviation along a direction, relative to the plausible size, up to which two estimates are compared.
+const COMPARED: f64 = 0.5;
+
+/// Identifies the load at the flange from recordings with it, and recordings without it if there are any.
+///
+/// The sensor's equations are linear in the ten parameters (Atkeson, An & Hollerbach 1986; Swevers et al. 2007); the
+/// bias of the sensor, its drift and its rotation are estimated with them. By torque the ten columns of the last link
+/// explain what the recordings with the load show beyond those without it (Khalil, Gautier & Lemoine 2007).
+///
+/// Leaves out: elasticity between flange and load, a delay between sensor and encoders, a base that is not level.
+///
+/// # Errors
+/// [`LoadError`].
+pub fn identify_load(
+    robot: &Robot,
+    with: &[&dyn Recording],
+    without: &[&dyn Recording],
+    options: &LoadOptions,
+) -> Result<LoadIdentification, LoadError> {
+    let to_joint = transform(&robot.last_link);
+    let chain = chain_of(robot)?;
+    let mut warnings = Vec::new();
+    let sensed = match options.by {
+        By::Torque => None,
+        By::Sensor | By::Both => {
+            let loaded = with.iter().map(|r| (*r, true));
+            let all: Vec<(&dyn Recording, bool)> =
+                loaded.chain(without.iter().map(|r| (*r, false))).collect();
+            Some(by_sensor(&Sensing {
+                robot,
+                chain: &chain,
+                recordings: &all,
+                to_joint: &to_joint,
+                prepare: &options.prepare,
+                poses: options.poses,
+                even_if_wrong: options.even_if_wrong,
+            })?)
+        }
+    };
+    let driven = match options.by {
+        By::Sensor => None,
+        By::Torque | By::Both => Some(by_torque(
+            &Driven {
+                robot,
+                with,
+                without,
+                to_joint: &to_joint,
+                prepare: &options.prepare,
+            },
+            sensed.as_ref().map(|(found, _)| found.values[0]),
+        )?),
+    };
+    let (sensed, sensor) = sensed.unzip();
+    let (driven, torque) = driven.unzip();
+    if let Some(sensor) = &sensor {
+        warnings.extend(sensor.warnings.iter().cloned());
+    }
+    let agreement = (sensed.as_ref().zip(driven.as_ref())).map(|(a, b)| agreement(a, b));
+    warnings.extend(agreement.as_ref().and_then(contradiction));
+    let mut found = match (sensed, driven) {
+        (Some(a), Some(b)) => fused(&a, &b),
+        (Some(one), None) | (None, Some(one)) => one,
+        (None, None) => return Err(LoadError::TooFew { rows: 0, least: 1 }),
+    };
+    if let Some(tool) = &options.tool {
+        found.values -= Parameters::from(tool.parameters());
+    }
+    let numbers = numbers(&found);
+    let body = body(&found).ok_or_else(|| LoadError::NoMass {
+        why: format!(
+            "it is {} kg, and a load weighs more than nothing",
+            format_significant(found.values[0], 3)
+        ),
+    })?;
+    let all_shown = found.shown().iter().all(|s| *s);
+    let consistent = least_eigenvalue(found.values.as_slice()) > 0.0;
+    if all_shown && !consistent {
+        warnings.push(inconsistent(&found, &body));
+    }
+    let not_shown = missing(robot, &chain, &to_joint, &found, options.by);
+    Ok(LoadIdentification {
+        schema: "rig-load/1",
+        robot: robot.name.clone(),
+        by: options.by,
+        parameters: numbers.parameters,
+        covariance: numbers.covariance,
+        mass: numbers.mass,
+        centre: numbers.centre,
+        inertia: numbers.inertia,
+        inertia_shown: numbers.inertia_shown,
+        principal_moments: numbers.principal_moments,
+        principal_axes: numbers.principal_axes,
+        body: Load::of(body.into()),
+        consistent,
+        degrees_of_freedom: found.degrees_of_freedom,
+        sensor,
+        torque,
+        agreement,
+        not_shown,
+        warnings,
+    })
+}
+
+/// Returns the matrix that turns the ten parameters in the flange frame to those in the frame of the last joint.
+fn transform(flange: &Isometry3<f64>) -> SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS> {
+    let mut matrix = Square::zeros();
+    for k in 0..INERTIAL_PARAMETERS {
+        let mut unit = [0.0; INERTIAL_PARAMETERS];
+        unit[k] = 1.0;
+        let column = Load::of(unit).seen_from(flange).parameters();
+        matrix.column_mut(k).copy_from_slice(&column);
+    }
+    matrix
+}
+
+/// Identifies the load from joint torques. `mass` is a first guess for the plausible sizes.
+fn by_torque(driven: &Driven, mass: Option<f64>) -> Result<(Estimate, TorqueFindings), LoadError> {
+    let equations = equations(driven)?;
+    let mut mass = mass.unwrap_or(1.0);
+    let mut found = estimate(&equations.segments, mass, Spread::Segments);
+    // The plausible sizes follow the mass; where torques show no mass they stay those of a kilogram.
+    if found.shown()[0] && found.values[0] > 0.0 {
+        mass = found.values[0];
+        found = estimate(&equations.segments, mass, Spread::Segments);
+    }
+    if !found.shown().iter().any(|s| *s) {
+        return Err(LoadError::NoMass {
+            why: "the joint torques show none of its parameters; record a livelier motion, or a heavier load".to_owned(),
+        });
+    }
+    let names = driven.robot.joints.iter().map(|j| j.name.clone());
+    Ok((
+        found,
+        TorqueFindings {
+            joints: names.collect(),
+            residual: equations.noise,
+            with_unloaded: !driven.without.is_empty(),
+            prepared: equations.plan,
+        },
+    ))
+}
+
+/// Combines two estimates, each weighted by its information.
+fn fused(a: &Estimate, b: &Estimate) -> Estimate {
+    let sizes = a.sizes;
+    let information = a.information + b.information;
+    // In plausible sizes: directions that neither shows have no information.
+    let scale = Square::from_diagonal(&sizes);
+    let eigen = SymmetricEigen::new(scale * information * scale);
+    let right = scale * (a.information * a.values + b.information * b.values);
+    let (mut covariance, mut beyond) = (Square::zeros(), Square::zeros());
+    for (k, value) in eigen.eigenvalues.iter().enumerate() {
+        let axis = eigen.eigenvectors.column(k);
+        if *value > 1.0 {
+            covariance += axis * axis.transpose() / *value;
+        } else {
+            beyond += axis * axis.transpose();
+        }
+    }
+    Estimate {
+        values: scale * (covariance * right),
+        covariance: scale * covariance * scale,
+        beyond: scale * beyond * scale,
+        information,
+        sizes,
+        degrees_of_freedom: a.degrees_of_freedom.max(b.degrees_of_freedom),
+    }
+}
+
+/// Compares two estimates along the directions that both show.
+fn agreement(a: &Estimate, b: &Estimate) -> Agreement {
+    let scale = Square::from_diagonal(&a.sizes.map(|s| 1.0 / s));
+    let difference = scale * (a.values - b.values);
+    let spread = scale * (a.covariance + b.covariance) * scale;
+    let hidden = scale * (a.beyond + b.beyond) * scale;
+    let eigen = SymmetricEigen::new(spread + hidden);
+    let (mut squares, mut directions) = (0.0, 0);
+    for (k, value) in eigen.eigenvalues.iter().enumerate() {
+        let axis = eigen.eigenvectors.column(k);
+        let is_hidden = axis.dot(&(hidden * axis)) > COMPARED.powi(2);
+        if *value > 0.0 && *value < COMPARED.powi(2) && !is_hidden {
+            squares += axis.dot(&difference).powi(2) / value;
+            directions += 1;
+        }
+    }
+    let chance = match directions {
+        0 => 1.0,
+        _ => ChiSquared::new(f64::from(directions)).map_or(1.0, |d| d.sf(squares)),
+    };
+    Agreement {
+        chance,
+        directions: directions as usize,
+        by_sensor: a.values.into(),
+        by_sensor_std: a.std().into(),
+        by_torque: b.values.into(),
+        by_torque_std: b.std().into(),
+    }
+}
+
+/// Says that sensor and torques contradict each other.
+fn contradiction(agreement: &Agreement) -> Option<String> {
+    (agreement.chance < CONTRADICTS).then(|| {
+        let parameters: Vec<String> = (0..4)
+            .map(|k| {
+                format!(
+                    "{} {} ± {} by the sensor, {} ± {} by the torques",
+                    NAMES[k],
+                    format_significant(agreement.by_sensor[k], 4),
+                    format_significant(agreement.by_sensor_std[k], 2),
+                    format_significant(agreement.by_torque[k], 4),
+                    format_significant(agreement.by_torque_std[k], 2)
+                )
+            })
+            .collect();
+        format!(
+            "Sensor and joint torques contradict each other (probability by chance {:.1e}): {}. Check the units and scales of both; a torque constant that is 5 % wrong makes a mass by torque 5 % wrong.",
+            agreement.chance,
+            listed(&parameters)
+        )
+    })
+}
+
+/// Says that no body has the estimated parameters.
+fn inconsistent(found: &Estimate, body: &Parameters) -> String {
+    let off = body - found.values;
+    let std = found.std();
+    let (worst, size) = (0..INERTIAL_PARAMETERS)
+        .map(|k| (k, off[k].abs() / std[k].max(f64::MIN_POSITIVE)))
+        .fold(
+            (0, 0.0),
+            |best, own| if own.1 > best.1 { own } else { best },
+        );
+    format!(
+        "No rigid body has exactly these ten values. The nearest body, in load.toml, differs most in {} ({} instead of {} in SI units, {:.1} standard deviations).",
+        NAMES[worst],
+        format_significant(body[worst], 4),
+        format_significant(found.values[worst], 4),
+        size
+    )
+}

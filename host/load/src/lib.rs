@@ -1,0 +1,73 @@
+//! The ten inertial parameters of a load at the flange: from a six-axis wrist sensor, from joint torques, or from both.
+//!
+//! [`identify_load`] estimates mass, centre of mass and inertia with their standard deviations. With a sensor it also
+//! estimates its bias, drift and rotation, and finds exchanged, reversed, dead and saturated channels. What the data do
+//! not show is named, with the pose or motion that would show it.
+//!
+//! A load of 2 kg on a one-link arm, from three poses:
+//!
+//! ```
+//! use rig_data::prepare::InMemory;
+//! use rig_data::{Block, JointColumns, WRENCH_COLUMNS};
+//! use rig_load::{LoadOptions, identify_load};
+//! use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let robot = Robot::from_toml(ONE_LINK_TEMPLATE, "one-link.toml".as_ref())?;
+//! let q: Vec<f64> = vec![-1.5, -0.4, 0.6, 1.4];
+//! // The weight in the axes of the link, which turns in the vertical plane; the load's centre is 0.1 m along x.
+//! let weight = |q: &f64| [-19.62 * q.sin(), -19.62 * q.cos(), 0.0];
+//! let read = |column: usize| -> Vec<f64> {
+//!     q.iter()
+//!         .map(|q| match column {
+//!             0..=2 => weight(q)[column],
+//!             5 => 0.1 * weight(q)[1],
+//!             _ => 1e-6 * q,
+//!         })
+//!         .collect()
+//! };
+//! let block = Block {
+//!     t: vec![0.0, 1.0, 2.0, 3.0],
+//!     joints: vec![JointColumns { q: q.clone(), ..JointColumns::default() }],
+//!     extra: (0..6).map(|c| (WRENCH_COLUMNS[c].to_owned(), read(c))).collect(),
+//!     first_line: 2,
+//!     ..Block::default()
+//! };
+//! let poses = InMemory { label: "poses".into(), blocks: vec![block] };
+//! let load = identify_load(&robot, &[&poses], &[], &LoadOptions::default())?;
+//! assert!((load.mass.value - 2.0).abs() < 1e-3);
+//! assert!((load.centre[0].value - 0.1).abs() < 1e-3);
+//! # Ok(())
+//! # }
+//! ```
+
+mod body;
+mod channels;
+mod controllers;
+mod convention;
+mod drift;
+mod error;
+mod estimate;
+mod identify;
+mod missing;
+mod mounting;
+mod options;
+mod result;
+mod rows;
+mod sensor;
+mod statistics;
+mod system;
+#[cfg(test)]
+mod tests;
+mod torque;
+mod torqueless;
+mod urdf_link;
+mod wrench_row;
+
+pub use controllers::{ControllerNumbers, controller_numbers};
+pub use error::LoadError;
+pub use identify::identify_load;
+pub use options::{By, LoadOptions};
+pub use result::{Agreement, LoadIdentification, LoadParameter, NotShown, TorqueFindings, Value};
+pub use sensor::{Bias, SensorFindings, Trace};
+pub use urdf_link::urdf_link;

@@ -1,0 +1,244 @@
+//! The identified load.
+
+use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
+use rig_data::prepare::PreprocessingPlan;
+use rig_identify::t_quantile;
+use rig_model::robot::Load;
+use rig_shared::multibody::INERTIAL_PARAMETERS;
+use serde::Serialize;
+
+use crate::estimate::{Estimate, Parameters};
+use crate::options::By;
+use crate::sensor::SensorFindings;
+
+/// A value with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Value {
+    /// The value.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// Half of the 95 % interval (Student's t).
+    pub half_interval: f64,
+}
+
+/// A parameter of the load in the flange frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoadParameter {
+    /// m mx my mz Ixx Ixy Ixz Iyy Iyz Izz.
+    pub name: &'static str,
+    /// Unit, ASCII.
+    pub unit: &'static str,
+    /// Value and uncertainty.
+    #[serde(flatten)]
+    pub value: Value,
+    /// True if the data show it: its standard deviation is below half of its plausible size.
+    pub shown: bool,
+}
+
+/// What the joint torques tell beside the load.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TorqueFindings {
+    /// Joints.
+    pub joints: Vec<String>,
+    /// Per joint, RMS of the torque residual with the load, N·m or N.
+    pub residual: Vec<f64>,
+    /// True if recordings without the load gave the parameters of the robot; false if its description did.
+    pub with_unloaded: bool,
+    /// Preparation of the recordings.
+    pub prepared: PreprocessingPlan,
+}
+
+/// Comparison of the load by sensor and by torque.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Agreement {
+    /// Probability that both differ by chance as much as they do (χ² test over the directions that both show).
+    pub chance: f64,
+    /// Number of these directions.
+    pub directions: usize,
+    /// The ten parameters by the sensor.
+    pub by_sensor: [f64; INERTIAL_PARAMETERS],
+    /// Their standard deviations.
+    pub by_sensor_std: [f64; INERTIAL_PARAMETERS],
+    /// The ten parameters by the joint torques.
+    pub by_torque: [f64; INERTIAL_PARAMETERS],
+    /// Their standard deviations.
+    pub by_torque_std: [f64; INERTIAL_PARAMETERS],
+}
+
+/// The identified load.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoadIdentification {
+    /// `rig-load/1`.
+    pub schema: &'static str,
+    /// Name of the robot.
+    pub robot: String,
+    /// What the load was measured by.
+    pub by: By,
+    /// The ten parameters in the flange frame, inertia about its origin.
+    pub parameters: Vec<LoadParameter>,
+    /// Covariance of the parameters, row by row.
+    pub covariance: Vec<Vec<f64>>,
+    /// Mass, kg.
+    pub mass: Value,
+    /// Centre of mass in the flange frame, m.
+    pub centre: [Value; 3],
+    /// Ixx Ixy Ixz Iyy Iyz Izz about the centre of mass, axes of the flange, kg·m².
+    pub inertia: [Value; 6],
+    /// True if the data show all six entries of the inertia.
+    pub inertia_shown: bool,
+    /// Principal moments about the centre of mass, smallest first, kg·m².
+    pub principal_moments: [f64; 3],
+    /// Principal axes in the flange frame, one unit vector each, right-handed.
+    pub principal_axes: [[f64; 3]; 3],
+    /// The load as a body that can exist: the parameters, or the nearest body if no body has them. What the data do not
+    /// show is that of a sphere about the centre of mass.
+    pub body: Load,
+    /// True if the parameters themselves are those of a body.
+    pub consistent: bool,
+    /// Degrees of freedom of the standard deviations.
+    pub degrees_of_freedom: usize,
+    /// Findings of the wrist sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<SensorFindings>,
+    /// Findings of the joint torques.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque: Option<TorqueFindings>,
+    /// Comparison of both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<Agreement>,
+    /// What the data do not show, and what would.
+    pub not_shown: Vec<NotShown>,
+    /// Warnings, the most important first.
+    pub warnings: Vec<String>,
+}
+
+/// Parameters that the data do not show.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotShown {
+    /// Names of the parameters.
+    pub parameters: Vec<&'static str>,
+    /// What to record, a sentence.
+    pub experiment: String,
+    /// A pose that would help most, rad or m a joint, if poses help.
+    pub pose: Option<Vec<f64>>,
+}
+
+/// Names of the ten parameters.
+pub(crate) const NAMES: [&str; INERTIAL_PARAMETERS] = [
+    "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
+];
+
+/// Returns the unit of a parameter.
+fn unit(k: usize) -> &'static str {
+    match k {
+        0 => "kg",
+        1..=3 => "kg*m",
+        _ => "kg*m^2",
+    }
+}
+
+/// Mass, centre of mass and inertia about it.
+type Central = SVector<f64, INERTIAL_PARAMETERS>;
+
+/// Returns mass, centre of mass and Ixx Ixy Ixz Iyy Iyz Izz about it.
+fn central(p: &Parameters) -> Central {
+    let mass = p[0];
+    let [x, y, z] = [p[1] / mass, p[2] / mass, p[3] / mass];
+    Central::from([
+        mass,
+        x,
+        y,
+        z,
+        p[4] - mass * (y * y + z * z),
+        p[5] + mass * x * y,
+        p[6] + mass * x * z,
+        p[7] - mass * (x * x + z * z),
+        p[8] + mass * y * z,
+        p[9] - mass * (x * x + y * y),
+    ])
+}
+
+/// Returns the derivatives of [`central`], by differences of a thousandth of the plausible sizes.
+fn slopes(found: &Estimate) -> DMatrix<f64> {
+    let mut slopes = DMatrix::zeros(INERTIAL_PARAMETERS, INERTIAL_PARAMETERS);
+    for k in 0..INERTIAL_PARAMETERS {
+        let step = 1e-3 * found.sizes[k];
+        let moved = |by: f64| {
+            let mut p = found.values;
+            p[k] += by;
+            central(&p)
+        };
+        let slope = (moved(step) - moved(-step)) / (2.0 * step);
+        slopes.column_mut(k).copy_from(&slope);
+    }
+    slopes
+}
+
+/// The numbers of a load.
+pub(crate) struct Numbers {
+    pub parameters: Vec<LoadParameter>,
+    pub covariance: Vec<Vec<f64>>,
+    pub mass: Value,
+    pub centre: [Value; 3],
+    pub inertia: [Value; 6],
+    pub inertia_shown: bool,
+    pub principal_moments: [f64; 3],
+    pub principal_axes: [[f64; 3]; 3],
+}
+
+/// Returns the numbers of an estimate.
+pub(crate) fn numbers(found: &Estimate) -> Numbers {
+    let quantile = t_quantile(found.degrees_of_freedom);
+    let value = |value: f64, std: f64| Value {
+        value,
+        std,
+        half_interval: quantile * std,
+    };
+    let shown = found.shown();
+    let all = found.covariance + found.beyond;
+    let std = found.std();
+    let parameters = (0..INERTIAL_PARAMETERS).map(|k| LoadParameter {
+        name: NAMES[k],
+        unit: unit(k),
+        value: value(found.values[k], std[k]),
+        shown: shown[k],
+    });
+    let middle = central(&found.values);
+    let slopes = slopes(found);
+    let spread = &slopes * all * slopes.transpose();
+    let of = |k: usize| value(middle[k], spread[(k, k)].max(0.0).sqrt());
+    let [xx, xy, xz, yy, yz, zz] = [4, 5, 6, 7, 8, 9].map(|k| middle[k]);
+    let (principal_moments, principal_axes) =
+        principal(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
+    Numbers {
+        parameters: parameters.collect(),
+        covariance: (0..INERTIAL_PARAMETERS)
+            .map(|r| (0..INERTIAL_PARAMETERS).map(|c| all[(r, c)]).collect())
+            .collect(),
+        mass: of(0),
+        centre: [of(1), of(2), of(3)],
+        inertia: std::array::from_fn(|k| of(4 + k)),
+        inertia_shown: shown[4..].iter().all(|s| *s),
+        principal_moments,
+        principal_axes,
+    }
+}
+
+/// Returns the principal moments, smallest first, and the axes, right-handed.
+pub(crate) fn principal(inertia: &Matrix3<f64>) -> ([f64; 3], [[f64; 3]; 3]) {
+    let eigen = inertia.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let mut axes: [Vector3<f64>; 3] = order.map(|k| {
+        let axis = eigen.eigenvectors.column(k).into_owned();
+        // The largest component is positive: the same data give the same axes.
+        if axis[axis.iamax()] < 0.0 {
+            -axis
+        } else {
+            axis
+        }
+    });
+    axes[2] = axes[0].cross(&axes[1]);
+    (order.map(|k| eigen.eigenvalues[k]), axes.map(Into::into))
+}

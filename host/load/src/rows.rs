@@ -1,0 +1,245 @@
+//! Rows of a recording: regressor of the wrench and readings of the sensor, in one band.
+
+use nalgebra::Isometry3;
+use rig_data::prepare::{LowPass, Motion, PrepareError, PreprocessingPlan, Recording, each_motion};
+use rig_data::{Block, WRENCH_COLUMNS};
+use rig_shared::multibody::{Chain, INERTIAL_PARAMETERS, wrench_regressor};
+
+use crate::error::LoadError;
+use crate::wrench_row::{ENTRIES, WrenchRow, about};
+
+/// Name of the column with the sensor's temperature.
+const TEMPERATURE: &str = "temp";
+
+/// Readings beyond which a channel counts as saturated, lowest and highest, by column.
+pub(crate) type Ends = [[f64; 2]; 6];
+
+/// Streams the rows of a recording of motion. Position, regressor and readings pass the same low-pass, so that they
+/// are compared in the same band. Rows beside a reading outside of `ends` are left out; returns their number.
+///
+/// # Errors
+/// [`LoadError`]: a recording that cannot be read or has no sensor.
+pub(crate) fn each_row(
+    chain: &Chain<f64>,
+    sensor: &Isometry3<f64>,
+    recording: &dyn Recording,
+    plan: &PreprocessingPlan,
+    ends: &Ends,
+    take: &mut dyn FnMut(&WrenchRow),
+) -> Result<u64, LoadError> {
+    let low_pass = plan
+        .parallel_low_pass()
+        .ok_or_else(|| PrepareError::Cutoff {
+            cutoff: plan.cutoff,
+            rate: plan.sample_rate,
+            nyquist: plan.sample_rate / 2.0,
+        })?;
+    let label = recording.label();
+    let mut left_out = 0;
+    let mut start = None;
+    let mut missing = None;
+    each_motion(recording, plan, 0, &mut |motion| {
+        let begin = *start.get_or_insert(motion.t.first().copied().unwrap_or(0.0));
+        let readings = match readings(&motion.extra) {
+            Ok(readings) => readings,
+            Err(column) => {
+                missing = Some(column);
+                return Err(PrepareError::Stopped("no sensor".to_owned()));
+            }
+        };
+        let piece = Piece {
+            chain,
+            sensor,
+            plan,
+            low_pass: &low_pass,
+            motion,
+            readings,
+            begin,
+            ends,
+        };
+        left_out += piece
+            .rows(take)
+            .map_err(|e| PrepareError::Read(e.to_string()))?;
+        Ok(())
+    })
+    .map_err(|error| match missing {
+        Some(column) => LoadError::NoColumn {
+            label: label.clone(),
+            column,
+        },
+        None => error.into(),
+    })?;
+    Ok(left_out)
+}
+
+/// Streams the rows of a recording of poses: each row of the file is one pose at rest.
+///
+/// # Errors
+/// As [`each_row`].
+pub(crate) fn each_pose(
+    chain: &Chain<f64>,
+    sensor: &Isometry3<f64>,
+    recording: &dyn Recording,
+    ends: &Ends,
+    take: &mut dyn FnMut(&WrenchRow),
+) -> Result<u64, LoadError> {
+    let still = vec![0.0; chain.joint_count()];
+    let mut left_out = 0;
+    each_readings(recording, &mut |block, readings| {
+        for k in 0..block.len() {
+            let now: [f64; 6] = std::array::from_fn(|c| readings[c][k]);
+            if beyond(&now, ends) {
+                left_out += 1;
+                continue;
+            }
+            let q: Vec<f64> = block.joints.iter().map(|joint| joint.q[k]).collect();
+            let mut regressor = [0.0; ENTRIES];
+            wrench_regressor(chain, &q, &still, &still, &mut regressor)
+                .map_err(|e| PrepareError::Read(e.to_string()))?;
+            about(&sensor.translation.vector, &mut regressor);
+            take(&WrenchRow {
+                time: block.t[k],
+                temperature: temperature(&block.extra).map_or(0.0, |list| list[k]),
+                regressor,
+                readings: now,
+            });
+        }
+        Ok(())
+    })?;
+    Ok(left_out)
+}
+
+/// Calls `take` with each block of a recording and its readings.
+///
+/// # Errors
+/// As [`each_row`].
+pub(crate) fn each_readings(
+    recording: &dyn Recording,
+    take: &mut dyn FnMut(&Block, [&[f64]; 6]) -> Result<(), PrepareError>,
+) -> Result<(), LoadError> {
+    let mut missing = None;
+    let read = recording.each_block(1 << 14, &mut |block| match readings(&block.extra) {
+        Ok(readings) => take(&block, readings),
+        Err(column) => {
+            missing = Some(column);
+            Err(PrepareError::Stopped("no sensor".to_owned()))
+        }
+    });
+    match (read, missing) {
+        (_, Some(column)) => Err(LoadError::NoColumn {
+            label: recording.label(),
+            column,
+        }),
+        (read, None) => Ok(read?),
+    }
+}
+
+/// Returns the six columns of the sensor; the name of the first that is missing otherwise.
+fn readings(extra: &[(String, Vec<f64>)]) -> Result<[&[f64]; 6], &'static str> {
+    let mut found: [&[f64]; 6] = [&[]; 6];
+    for (to, name) in found.iter_mut().zip(WRENCH_COLUMNS) {
+        *to = extra
+            .iter()
+            .find_map(|(own, list)| (own == name).then_some(list.as_slice()))
+            .ok_or(name)?;
+    }
+    Ok(found)
+}
+
+/// Returns the column of the sensor's temperature.
+fn temperature(extra: &[(String, Vec<f64>)]) -> Option<&[f64]> {
+    let column = extra.iter().find(|(name, _)| name == TEMPERATURE);
+    column.map(|(_, list)| list.as_slice())
+}
+
+/// Returns true if a reading lies outside of the range that its channel measures.
+fn beyond(readings: &[f64; 6], ends: &Ends) -> bool {
+    (readings.iter().zip(ends)).any(|(value, [low, high])| value <= low || value >= high)
+}
+
+/// A piece of a recording of motion.
+struct Piece<'a> {
+    chain: &'a Chain<f64>,
+    sensor: &'a Isometry3<f64>,
+    plan: &'a PreprocessingPlan,
+    low_pass: &'a LowPass,
+    motion: &'a Motion,
+    readings: [&'a [f64]; 6],
+    begin: f64,
+    ends: &'a Ends,
+}
+
+impl Piece<'_> {
+    /// Streams the rows of the piece; returns the number of saturated ones.
+    fn rows(
+        &self,
+        take: &mut dyn FnMut(&WrenchRow),
+    ) -> Result<u64, rig_shared::multibody::MultibodyError> {
+        let motion = self.motion;
+        let (low, high) = motion.sound;
+        let columns = self.regressors(low, high)?;
+        let filtered: Vec<Vec<f64>> = (columns.iter())
+            .map(|column| {
+                // Forces do not depend on the inertias; such columns are zero.
+                if column.iter().all(|v| *v == 0.0) {
+                    column.clone()
+                } else {
+                    self.low_pass.zero_phase(column)
+                }
+            })
+            .collect();
+        let readings: Vec<Vec<f64>> = (self.readings.iter())
+            .map(|column| self.low_pass.zero_phase(&column[low..high]))
+            .collect();
+        let temperature = temperature(&motion.extra);
+        let step = self.plan.decimation;
+        let mut left_out = 0;
+        for k in motion.usable.0.max(low)..motion.usable.1.min(high) {
+            if !(motion.offset + k as u64).is_multiple_of(step as u64) {
+                continue;
+            }
+            let around = k.saturating_sub(step).max(low)..(k + step + 1).min(high);
+            let saturated = around.into_iter().any(|row| {
+                let now: [f64; 6] = std::array::from_fn(|c| self.readings[c][row]);
+                beyond(&now, self.ends)
+            });
+            if saturated {
+                left_out += 1;
+                continue;
+            }
+            let mut regressor: [f64; ENTRIES] = std::array::from_fn(|c| filtered[c][k - low]);
+            about(&self.sensor.translation.vector, &mut regressor);
+            take(&WrenchRow {
+                time: motion.t[k] - self.begin,
+                temperature: temperature.map_or(0.0, |list| list[k]),
+                regressor,
+                readings: std::array::from_fn(|c| readings[c][k - low]),
+            });
+        }
+        Ok(left_out)
+    }
+
+    /// Returns the entries of the regressor over the rows `low .. high`, one column each.
+    fn regressors(
+        &self,
+        low: usize,
+        high: usize,
+    ) -> Result<Vec<Vec<f64>>, rig_shared::multibody::MultibodyError> {
+        let joints = &self.motion.joints;
+        let mut columns: Vec<Vec<f64>> = (0..ENTRIES)
+            .map(|_| Vec::with_capacity(high - low))
+            .collect();
+        let [mut q, mut qd, mut qdd] = [(); 3].map(|()| vec![0.0; joints.len()]);
+        let mut entries = [0.0; 6 * INERTIAL_PARAMETERS];
+        for k in low..high {
+            for (j, joint) in joints.iter().enumerate() {
+                (q[j], qd[j], qdd[j]) = (joint.q[k], joint.qd[k], joint.qdd[k]);
+            }
+            wrench_regressor(self.chain, &q, &qd, &qdd, &mut entries)?;
+            for (column, entry) in columns.iter_mut().zip(entries) {
+                column.push(entry);
+            }
+        }
+        Ok(columns)
+    }
+}

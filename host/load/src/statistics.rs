@@ -1,0 +1,179 @@
+//! What the readings of a recording hold, reduced to one triangle a channel and segment: the memory does not grow with
+//! the recording, and any mounting of the sensor can be tried without reading it again.
+//!
+//! The readings enter as columns, so a rotation of the sensor or another order of its axes is a combination of columns.
+
+use nalgebra::DMatrix;
+use rig_identify::TriangularFactor;
+use rig_shared::multibody::INERTIAL_PARAMETERS;
+
+use crate::wrench_row::WrenchRow;
+
+/// Number of segments of a recording.
+pub(crate) const SEGMENTS: usize = 20;
+
+/// Number of rows that are kept for figures.
+const SAMPLED: u64 = 600;
+
+/// Columns of a channel's triangle: ten parameters, then these.
+pub(crate) mod column {
+    /// One.
+    pub(crate) const ONE: usize = 10;
+    /// Time, −½ to ½ over the recording.
+    pub(crate) const TIME: usize = 11;
+    /// Temperature, °C.
+    pub(crate) const TEMPERATURE: usize = 12;
+    /// The first of the three readings of the channel's kind.
+    pub(crate) const READINGS: usize = 13;
+    /// Number of columns.
+    pub(crate) const COUNT: usize = 16;
+}
+
+/// A segment of a recording.
+#[derive(Clone, Debug)]
+pub(crate) struct Segment {
+    /// One triangle a channel, rows × [`column::COUNT`].
+    pub channels: [DMatrix<f64>; 6],
+    /// Rows in it.
+    pub rows: u64,
+}
+
+/// A recording of the sensor.
+#[derive(Clone, Debug)]
+pub(crate) struct Recorded {
+    /// Name for messages.
+    pub label: String,
+    /// True if the load was mounted.
+    pub loaded: bool,
+    /// True if each row is a pose at rest.
+    pub poses: bool,
+    /// Segments in the order of time.
+    pub segments: Vec<Segment>,
+    /// Length, s.
+    pub length: f64,
+    /// True if the sensor's temperature was recorded and changes.
+    pub warms: bool,
+    /// Rows that were left out because a channel was saturated.
+    pub saturated: u64,
+    /// Temperature of the first row, °C.
+    pub reference: f64,
+    /// Rows spread evenly over the recording, at most about [`SAMPLED`].
+    pub sample: Vec<WrenchRow>,
+}
+
+impl Recorded {
+    /// Returns the number of rows.
+    pub(crate) fn rows(&self) -> u64 {
+        self.segments.iter().map(|s| s.rows).sum()
+    }
+
+    /// Returns the recording with all segments in one, for comparisons that need no segments.
+    pub(crate) fn in_one(&self) -> Self {
+        let merged = |channel: usize| {
+            let mut factor = TriangularFactor::new(column::COUNT - 1);
+            for row in self
+                .segments
+                .iter()
+                .flat_map(|s| s.channels[channel].row_iter())
+            {
+                let x: Vec<f64> = row.iter().copied().collect();
+                factor.push(&x[..column::COUNT - 1], x[column::COUNT - 1], 1.0);
+            }
+            DMatrix::from_vec(column::COUNT, column::COUNT, factor.triangle())
+        };
+        Self {
+            segments: vec![Segment {
+                channels: std::array::from_fn(merged),
+                rows: self.rows(),
+            }],
+            ..self.clone()
+        }
+    }
+}
+
+/// Collects rows into segments.
+pub(crate) struct Collector {
+    factors: Vec<[TriangularFactor; 6]>,
+    counts: Vec<u64>,
+    expected: u64,
+    seen: u64,
+    length: f64,
+    reference: Option<f64>,
+    warms: bool,
+    sample: Vec<WrenchRow>,
+}
+
+impl Collector {
+    /// Creates a collector for about `expected` rows over `length` seconds.
+    pub(crate) fn new(expected: u64, length: f64) -> Self {
+        let empty = || std::array::from_fn(|_| TriangularFactor::new(column::COUNT - 1));
+        Self {
+            factors: (0..SEGMENTS).map(|_| empty()).collect(),
+            counts: vec![0; SEGMENTS],
+            expected: expected.max(1),
+            seen: 0,
+            length: length.max(f64::MIN_POSITIVE),
+            reference: None,
+            warms: false,
+            sample: Vec::new(),
+        }
+    }
+
+    /// Adds a row.
+    pub(crate) fn push(&mut self, row: &WrenchRow) {
+        let place = (u128::from(self.seen) * SEGMENTS as u128 / u128::from(self.expected)) as usize;
+        let segment = place.min(SEGMENTS - 1);
+        if self.seen.is_multiple_of(self.expected.div_ceil(SAMPLED)) {
+            self.sample.push(row.clone());
+        }
+        self.seen += 1;
+        self.counts[segment] += 1;
+        let reference = *self.reference.get_or_insert(row.temperature);
+        let warmer = row.temperature - reference;
+        self.warms |= warmer != 0.0;
+        for (channel, factor) in self.factors[segment].iter_mut().enumerate() {
+            let first = channel / 3 * 3;
+            let mut x = [0.0; column::COUNT - 1];
+            let own = channel * INERTIAL_PARAMETERS;
+            x[..INERTIAL_PARAMETERS]
+                .copy_from_slice(&row.regressor[own..own + INERTIAL_PARAMETERS]);
+            x[column::ONE] = 1.0;
+            x[column::TIME] = row.time / self.length - 0.5;
+            x[column::TEMPERATURE] = warmer;
+            x[column::READINGS] = row.readings[first];
+            x[column::READINGS + 1] = row.readings[first + 1];
+            factor.push(&x, row.readings[first + 2], 1.0);
+        }
+    }
+
+    /// Returns the recording; segments without rows are left out.
+    pub(crate) fn finish(
+        self,
+        label: String,
+        loaded: bool,
+        poses: bool,
+        saturated: u64,
+    ) -> Recorded {
+        let segments = self.factors.iter().zip(&self.counts);
+        Recorded {
+            label,
+            loaded,
+            poses,
+            segments: segments
+                .filter(|(_, rows)| **rows > 0)
+                .map(|(factors, rows)| Segment {
+                    channels: std::array::from_fn(|c| {
+                        let width = column::COUNT;
+                        DMatrix::from_vec(width, width, factors[c].triangle())
+                    }),
+                    rows: *rows,
+                })
+                .collect(),
+            length: self.length,
+            warms: self.warms,
+            saturated,
+            reference: self.reference.unwrap_or(0.0),
+            sample: self.sample,
+        }
+    }
+}

@@ -1,0 +1,449 @@
+//! The load by the wrist sensor: accuracy, flaws of sensors that are found, and what the data do not show.
+
+use super::made::{Moving, Points, Sensor, parameters, poses, recorded, tool};
+use crate::{LoadError, LoadIdentification, LoadOptions, identify_load};
+use rand::{RngExt, SeedableRng};
+use rig_model::robot::{IRP6_TEMPLATE, Reads, Robot, TX40, WristSensor};
+
+fn irp6() -> Robot {
+    let mut robot = Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap();
+    robot.wrist_sensor = Some(WristSensor {
+        position: [0.0, 0.0, 0.03],
+        rotation: [0.0, 0.0, 0.4],
+        reads: Some(Reads::Load),
+        ..WristSensor::default()
+    });
+    robot
+}
+
+fn tx40() -> Robot {
+    let mut robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    robot.wrist_sensor = Some(WristSensor::default());
+    robot
+}
+
+const NO_FLAW: &dyn Fn(f64, [f64; 6]) -> [f64; 6] = &|_, read| read;
+
+/// Errors of mass (share) and centre of mass (m).
+fn errors(load: &LoadIdentification, points: &Points) -> [f64; 2] {
+    let truth = parameters(points);
+    let centre = (0..3)
+        .map(|k| (load.centre[k].value - truth[k + 1] / truth[0]).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    [(load.mass.value / truth[0] - 1.0).abs(), centre]
+}
+
+/// A sensor of 200 N and 20 N·m with noise of 0.1 % of its range (the class of JR3), on the IRp-6.
+#[test]
+fn mass_and_centre_are_exact_to_a_per_cent_and_five_millimetres_and_better_than_by_four_poses() {
+    let points = tool();
+    let sensor = Sensor {
+        noise: [0.2, 0.02],
+        ..Sensor::default()
+    };
+    let (mut by_motion, mut by_poses) = ([0.0f64; 2], [0.0f64; 2]);
+    for seed in 0..4 {
+        let moving = Moving::new(irp6(), 0.8, seed);
+        let motion = recorded(&moving, &points, &sensor, [30.0, 100.0], seed, NO_FLAW);
+        let load = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+        let found = errors(&load, &points);
+        assert!(
+            found[0] < 0.01 && found[1] < 0.005,
+            "seed {seed}: {found:?}"
+        );
+        assert!(load.warnings.is_empty(), "{:?}", load.warnings);
+        let four: Vec<Vec<f64>> = (0..4)
+            .map(|k| moving.position(7.0 * f64::from(k)))
+            .collect();
+        let still = poses(&moving, &points, &sensor, &four, seed);
+        let load = identify_load(&moving.robot, &[&still], &[], &LoadOptions::default()).unwrap();
+        for (k, error) in errors(&load, &points).into_iter().enumerate() {
+            by_motion[k] += found[k] / 4.0;
+            by_poses[k] += error / 4.0;
+        }
+    }
+    println!("motion {by_motion:?}, four poses {by_poses:?}");
+    assert!(by_poses[0] > 3.0 * by_motion[0] && by_poses[1] > 3.0 * by_motion[1]);
+}
+
+#[test]
+fn all_ten_parameters_of_a_lively_motion_are_those_of_the_points() {
+    let moving = Moving::new(tx40(), 0.7, 5);
+    let points = tool();
+    let motion = recorded(
+        &moving,
+        &points,
+        &Sensor::default(),
+        [40.0, 200.0],
+        1,
+        NO_FLAW,
+    );
+    let load = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+    for (found, truth) in load.parameters.iter().zip(parameters(&points)) {
+        let off = (found.value.value - truth) / found.value.std;
+        assert!(found.shown, "{found:?}");
+        assert!(off.abs() < 4.0, "{found:?}, truth {truth}");
+    }
+    assert!(load.not_shown.is_empty());
+    let sensor = load.sensor.as_ref().unwrap();
+    for (found, truth) in sensor.biases[0].bias.iter().zip(Sensor::default().bias) {
+        assert!((found - truth).abs() < 0.02, "{found} {truth}");
+    }
+    assert_eq!(sensor.reads, Reads::Load);
+}
+
+/// The 95 % intervals of 200 random loads, each with its own noise, bias and motion.
+#[test]
+fn intervals_contain_the_truth() {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(17);
+    let mut inside = [0usize; 10];
+    let mut centre_inside = [0usize; 3];
+    const LOADS: usize = 200;
+    for load in 0..LOADS {
+        let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+        let points: Points = (0..6)
+            .map(|_| {
+                let place = [draw(-0.1, 0.1), draw(-0.1, 0.1), draw(0.0, 0.2)];
+                (draw(0.1, 0.6), place)
+            })
+            .collect();
+        let sensor = Sensor {
+            noise: [draw(0.05, 0.4), draw(0.005, 0.04)],
+            bias: std::array::from_fn(|_| draw(-5.0, 5.0)),
+            sign: -1.0,
+        };
+        let moving = Moving::new(tx40(), 0.7, load as u64);
+        let motion = recorded(
+            &moving,
+            &points,
+            &sensor,
+            [12.0, 100.0],
+            load as u64,
+            NO_FLAW,
+        );
+        let found = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+        let truth = parameters(&points);
+        for (k, parameter) in found.parameters.iter().enumerate() {
+            let off = (parameter.value.value - truth[k]).abs();
+            inside[k] += usize::from(off <= parameter.value.half_interval);
+        }
+        for k in 0..3 {
+            let off = (found.centre[k].value - truth[k + 1] / truth[0]).abs();
+            centre_inside[k] += usize::from(off <= found.centre[k].half_interval);
+        }
+    }
+    println!(
+        "of {LOADS} intervals {inside:?} of the parameters and {centre_inside:?} of the centre contain the truth"
+    );
+    // 95 % ± 1.5 %: three deviations of a binomial of 200.
+    for count in inside.into_iter().chain(centre_inside) {
+        let share = count as f64 / LOADS as f64;
+        assert!(
+            (0.90..=0.995).contains(&share),
+            "{inside:?} {centre_inside:?}"
+        );
+    }
+}
+
+#[test]
+fn loads_are_the_same_by_either_convention_and_a_stated_one_is_checked() {
+    let points = tool();
+    for (sign, is) in [(1.0, Reads::Robot), (-1.0, Reads::Load)] {
+        let sensor = Sensor {
+            sign,
+            ..Sensor::default()
+        };
+        for stated in [None, Some(Reads::Robot), Some(Reads::Load)] {
+            let mut robot = irp6();
+            robot.wrist_sensor.as_mut().unwrap().reads = stated;
+            let moving = Moving::new(robot, 0.8, 3);
+            let motion = recorded(&moving, &points, &sensor, [20.0, 100.0], 2, NO_FLAW);
+            let found = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default());
+            if stated.is_some_and(|stated| stated != is) {
+                let text = found.unwrap_err().to_string();
+                assert!(text.contains("reads = "), "{text}");
+                continue;
+            }
+            let found = found.unwrap();
+            assert!(errors(&found, &points)[0] < 0.01);
+            assert_eq!(found.sensor.as_ref().unwrap().reads, is);
+            assert_eq!(
+                found.warnings.is_empty(),
+                stated.is_some(),
+                "{:?}",
+                found.warnings
+            );
+        }
+    }
+}
+
+#[test]
+fn exchanged_and_reversed_channels_are_named_and_put_right() {
+    let moving = Moving::new(irp6(), 0.8, 4);
+    let points = tool();
+    let sensor = Sensor::default();
+    type Flaw = fn([f64; 6]) -> [f64; 6];
+    let flaws: [(&str, Flaw); 6] = [
+        ("fx and fy are exchanged", |[a, b, c, d, e, f]| {
+            [b, a, c, d, e, f]
+        }),
+        ("my has the opposite sign", |[a, b, c, d, e, f]| {
+            [a, b, c, d, -e, f]
+        }),
+        ("fz has the opposite sign", |[a, b, c, d, e, f]| {
+            [a, b, -c, d, e, f]
+        }),
+        (
+            "mx, my and mz have the opposite sign",
+            |[a, b, c, d, e, f]| [a, b, c, -d, -e, -f],
+        ),
+        (
+            "mx, my, mz are recorded in the columns",
+            |[a, b, c, d, e, f]| [a, b, c, e, f, d],
+        ),
+        ("mx and mz are exchanged", |[a, b, c, d, e, f]| {
+            [c, b, a, f, e, d]
+        }),
+    ];
+    for (said, flaw) in flaws {
+        let motion = recorded(&moving, &points, &sensor, [20.0, 100.0], 2, &|_, read| {
+            flaw(read)
+        });
+        let refused = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default());
+        let text = refused.unwrap_err().to_string();
+        assert!(text.contains(said), "wanted {said}: {text}");
+        let options = LoadOptions {
+            even_if_wrong: true,
+            ..LoadOptions::default()
+        };
+        let found = identify_load(&moving.robot, &[&motion], &[], &options).unwrap();
+        let off = errors(&found, &points);
+        assert!(off[0] < 0.01 && off[1] < 0.005, "{said}: {off:?}");
+    }
+}
+
+#[test]
+fn a_turned_sensor_is_found_whatever_the_angle() {
+    let points = tool();
+    for rotation in [
+        [0.0, 0.0, 0.03],
+        [0.1, -0.2, 0.9],
+        [3.1, 0.2, 0.4],
+        [0.0, 1.5, 0.0],
+    ] {
+        let moving = Moving::new(irp6(), 0.8, 6);
+        let mut turned = irp6();
+        turned.wrist_sensor.as_mut().unwrap().rotation = rotation;
+        let read_by = Moving::new(turned, 0.8, 6);
+        let motion = recorded(
+            &read_by,
+            &points,
+            &Sensor::default(),
+            [20.0, 100.0],
+            2,
+            NO_FLAW,
+        );
+        let found = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+        let off = errors(&found, &points);
+        assert!(off[0] < 0.01 && off[1] < 0.005, "{rotation:?}: {off:?}");
+        let sensor = found.sensor.as_ref().unwrap();
+        let is = read_by.robot.wrist_sensor.as_ref().unwrap().pose().rotation;
+        let [roll, pitch, yaw] = sensor.rotation;
+        let told = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        assert!(is.angle_to(&told) < 3e-3, "{} rad", is.angle_to(&told));
+        let against = moving.robot.wrist_sensor.as_ref().unwrap().pose().rotation;
+        assert!((sensor.turned.unwrap() - is.angle_to(&against)).abs() < 3e-3);
+        assert!(
+            found.warnings[0].contains("turned by"),
+            "{:?}",
+            found.warnings
+        );
+    }
+}
+
+#[test]
+fn saturated_rows_are_left_out_and_a_saturated_recording_is_refused() {
+    let moving = Moving::new(irp6(), 0.8, 7);
+    let points = tool();
+    let sensor = Sensor::default();
+    for (most, fails) in [(24.0, false), (9.0, true)] {
+        let cut = move |_: f64, mut read: [f64; 6]| {
+            read[0] = read[0].min(most);
+            read[2] = read[2].min(most);
+            read
+        };
+        let motion = recorded(&moving, &points, &sensor, [30.0, 100.0], 2, &cut);
+        let found = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default());
+        match found {
+            Ok(found) => {
+                assert!(!fails);
+                let said = &found.warnings[0];
+                assert!(
+                    said.contains("saturated") && said.contains("at 24"),
+                    "{said}"
+                );
+                assert!(errors(&found, &points)[0] < 0.01);
+            }
+            Err(error) => assert!(fails && error.to_string().contains("saturated"), "{error}"),
+        }
+    }
+}
+
+#[test]
+fn a_bias_that_jumps_or_drifts_is_told_and_does_not_bend_the_load() {
+    let moving = Moving::new(irp6(), 0.8, 8);
+    let points = tool();
+    let sensor = Sensor::default();
+    let jump = |t: f64, mut read: [f64; 6]| {
+        if t > 17.3 {
+            read[2] += 4.0;
+            read[3] -= 0.2;
+        }
+        read
+    };
+    let drift = |t: f64, mut read: [f64; 6]| {
+        read[0] += 0.1 * t;
+        read[5] += 0.01 * t;
+        read
+    };
+    let options = LoadOptions::default();
+    let jumped = recorded(&moving, &points, &sensor, [40.0, 100.0], 2, &jump);
+    let found = identify_load(&moving.robot, &[&jumped], &[], &options).unwrap();
+    let bias = &found.sensor.as_ref().unwrap().biases[0];
+    let (time, after) = bias.jump.unwrap();
+    assert!((time - 17.3).abs() < 2.5, "{time}");
+    assert!((after[2] - bias.bias[2] - 4.0).abs() < 0.1, "{bias:?}");
+    assert!(errors(&found, &points)[0] < 0.01);
+    assert!(found.warnings.iter().any(|w| w.contains("jumps")));
+    let drifted = recorded(&moving, &points, &sensor, [40.0, 100.0], 2, &drift);
+    let found = identify_load(&moving.robot, &[&drifted], &[], &options).unwrap();
+    let bias = &found.sensor.as_ref().unwrap().biases[0];
+    assert_eq!(bias.jump, None);
+    let drift = bias.drift.unwrap();
+    assert!(
+        (drift[0] - 4.0).abs() < 0.1 && (drift[5] - 0.4).abs() < 0.02,
+        "{drift:?}"
+    );
+    assert!(errors(&found, &points)[0] < 0.01);
+    // Neither is told where neither is.
+    for seed in 0..20 {
+        let sound = recorded(&moving, &points, &sensor, [40.0, 100.0], seed, NO_FLAW);
+        let found = identify_load(&moving.robot, &[&sound], &[], &options).unwrap();
+        assert_eq!(found.sensor.as_ref().unwrap().biases[0].jump, None);
+    }
+}
+
+#[test]
+fn what_poses_cannot_show_is_named_with_a_pose_that_would() {
+    let moving = Moving::new(irp6(), 0.8, 9);
+    let points = tool();
+    let sensor = Sensor {
+        noise: [0.02, 0.002],
+        ..Sensor::default()
+    };
+    let all: Vec<Vec<f64>> = (0..6)
+        .map(|k| moving.position(5.3 * f64::from(k)))
+        .collect();
+    let found = |list: &[Vec<f64>]| {
+        let still = poses(&moving, &points, &sensor, list, 3);
+        identify_load(&moving.robot, &[&still], &[], &LoadOptions::default())
+    };
+    let six = found(&all).unwrap();
+    assert!(errors(&six, &points)[1] < 0.005);
+    // Poses at rest show no inertia.
+    let [inertia] = six.not_shown.as_slice() else {
+        panic!("{:?}", six.not_shown)
+    };
+    assert_eq!(
+        inertia.parameters,
+        ["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
+    );
+    assert!(!six.inertia_shown && six.body.mass > 0.0);
+    assert!(six.parameters[..4].iter().all(|p| p.shown));
+    // Two poses leave a direction of the centre of mass open; the named pose closes it.
+    let two = found(&all[..2]).unwrap();
+    let missing = &two.not_shown[0];
+    assert!(
+        missing.parameters.iter().all(|p| p.starts_with('m')),
+        "{missing:?}"
+    );
+    let mut three = all[..2].to_vec();
+    three.push(missing.pose.clone().unwrap());
+    let three = found(&three).unwrap();
+    assert!(
+        three.parameters[..4].iter().all(|p| p.shown),
+        "{:?}",
+        three.parameters
+    );
+    // The same pose again and again shows no mass beside the bias.
+    let one = vec![all[0].clone(); 5];
+    assert!(matches!(found(&one), Err(LoadError::NoMass { .. })));
+}
+
+/// What is mounted beyond the sensor is subtracted: by a recording without the load, or by its known parameters.
+#[test]
+fn what_is_mounted_beyond_the_sensor_is_subtracted() {
+    let moving = Moving::new(irp6(), 0.8, 10);
+    let gripper: Points = vec![
+        (0.5, [0.0, 0.02, 0.05]),
+        (0.3, [0.03, 0.0, 0.08]),
+        (0.2, [-0.02, -0.01, 0.1]),
+    ];
+    let part = tool();
+    let both: Points = gripper.iter().chain(&part).copied().collect();
+    let with = recorded(
+        &moving,
+        &both,
+        &Sensor::default(),
+        [30.0, 100.0],
+        2,
+        NO_FLAW,
+    );
+    let empty = Sensor {
+        bias: [0.5, 0.4, -3.0, 0.0, 0.2, 0.1],
+        ..Sensor::default()
+    };
+    let without = recorded(&moving, &gripper, &empty, [30.0, 100.0], 5, NO_FLAW);
+    let robot = &moving.robot;
+    let found = identify_load(robot, &[&with], &[&without], &LoadOptions::default()).unwrap();
+    let off = errors(&found, &part);
+    assert!(off[0] < 0.01 && off[1] < 0.005, "{off:?}");
+    let options = LoadOptions {
+        tool: Some(rig_model::robot::Load::of(parameters(&gripper))),
+        ..LoadOptions::default()
+    };
+    let found = identify_load(robot, &[&with], &[], &options).unwrap();
+    let off = errors(&found, &part);
+    assert!(off[0] < 0.01 && off[1] < 0.005, "{off:?}");
+}
+
+#[test]
+fn readings_that_no_load_gives_are_refused() {
+    let moving = Moving::new(irp6(), 0.8, 11);
+    let points = tool();
+    let refused = |flaw: &dyn Fn(f64, [f64; 6]) -> [f64; 6]| {
+        let motion = recorded(&moving, &points, &Sensor::default(), [20.0, 100.0], 2, flaw);
+        identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default())
+            .unwrap_err()
+            .to_string()
+    };
+    let text = refused(&|_, [a, b, c, d, e, f]| [a, b, c, 1e3 * d, 1e3 * e, 1e3 * f]);
+    assert!(text.contains("N·mm"), "{text}");
+    let text = refused(&|_, [a, b, c, d, _, f]| [a, b, c, d, 0.0, f]);
+    assert!(text.contains("my of made 2 is 0"), "{text}");
+    // A sensor that nothing hangs on.
+    let nothing: Points = vec![(1e-9, [0.0; 3])];
+    let motion = recorded(
+        &moving,
+        &nothing,
+        &Sensor::default(),
+        [20.0, 100.0],
+        2,
+        NO_FLAW,
+    );
+    let text = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(text.contains("do not show the mass"), "{text}");
+}

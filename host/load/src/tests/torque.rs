@@ -1,0 +1,168 @@
+//! The load by joint torques: with and without it, and together with the sensor.
+
+use super::made::{Moving, Points, Sensor, parameters, recorded, tool};
+use crate::{By, LoadOptions, identify_load};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rig_data::prepare::InMemory;
+use rig_model::robot::{Drive, JointFriction, Robot, TX40};
+
+/// The bare arm: a hand with friction in each joint, all of it points on the last link and friction of the joints.
+fn hand() -> Points {
+    vec![
+        (1.2, [0.03, 0.0, 0.02]),
+        (0.8, [-0.02, 0.04, 0.01]),
+        (0.9, [0.0, -0.03, 0.06]),
+    ]
+}
+
+fn arm() -> Robot {
+    let text = TX40.to_owned();
+    let mut robot = Robot::from_toml(&text, "tx40.toml".as_ref()).unwrap();
+    for joint in &mut robot.joints {
+        joint.drive = None;
+        joint.inertial = None;
+        joint.friction = None;
+        if let Some(limits) = &mut joint.limits {
+            limits.torque = None;
+        }
+    }
+    robot
+}
+
+/// Adds torques by virtual work, with Coulomb and viscous friction and noise.
+fn driven(moving: &Moving, points: &Points, rubs: f64, seed: u64) -> InMemory {
+    let sensor = Sensor::default();
+    let mut recording = recorded(moving, points, &sensor, [30.0, 100.0], seed, &|_, r| r);
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed + 100);
+    let block = &mut recording.blocks[0];
+    for k in 0..block.t.len() {
+        let t = block.t[k];
+        let torques = moving.torques(points, t);
+        let [before, after] = [-1e-3, 1e-3].map(|by| moving.position(t + by));
+        for (j, torque) in torques.iter().enumerate() {
+            let velocity = (after[j] - before[j]) / 2e-3;
+            let friction = rubs * velocity.signum() + 0.3 * velocity + 0.1;
+            let noise: f64 = StandardNormal.sample(&mut random);
+            block.joints[j].tau.push(torque + friction + 0.02 * noise);
+        }
+    }
+    recording
+}
+
+#[test]
+fn load_is_what_the_torques_with_it_show_beyond_those_without_it() {
+    let moving = Moving::new(arm(), 0.7, 21);
+    let part = tool();
+    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
+    let without = driven(&moving, &hand(), 0.8, 1);
+    // The gears rub more under load.
+    let with = driven(&moving, &both, 0.9, 2);
+    let options = LoadOptions {
+        by: By::Torque,
+        ..LoadOptions::default()
+    };
+    let found = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+    let truth = parameters(&part);
+    for (parameter, truth) in found.parameters.iter().zip(truth) {
+        let off = (parameter.value.value - truth) / parameter.value.std;
+        assert!(off.abs() < 4.0, "{parameter:?}, truth {truth}");
+    }
+    assert!(
+        (found.mass.value / truth[0] - 1.0).abs() < 0.03,
+        "{:?}",
+        found.mass
+    );
+    // With the sensor the torques do not contradict, and the result is at least as exact.
+    let options = LoadOptions {
+        by: By::Both,
+        ..LoadOptions::default()
+    };
+    let fused = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+    let agreement = fused.agreement.as_ref().unwrap();
+    assert!(
+        agreement.chance > 1e-3 && agreement.directions >= 4,
+        "{agreement:?}"
+    );
+    assert!(fused.mass.std <= agreement.by_sensor_std[0]);
+    assert!(fused.mass.std <= agreement.by_torque_std[0]);
+    assert!((fused.mass.value / truth[0] - 1.0).abs() < 0.01);
+}
+
+/// The description gives the torque of the unloaded arm; the position is noisy, and heavy rotors multiply its noise.
+#[test]
+fn load_is_found_against_a_description_that_was_identified() {
+    let mut robot = arm();
+    for joint in &mut robot.joints {
+        joint.friction = Some(JointFriction {
+            coulomb: 0.8,
+            viscous: 0.3,
+            offset: 0.1,
+        });
+        joint.drive = Some(Drive {
+            gear_ratio: 100.0,
+            rotor_inertia: 2e-4,
+            ..Drive::default()
+        });
+    }
+    let hand = rig_model::robot::Load::of(parameters(&hand()));
+    let robot = robot.with_load(&hand);
+    let moving = Moving::new(robot, 0.7, 23);
+    let part = tool();
+    let both: Points = super::torque::hand()
+        .into_iter()
+        .chain(part.iter().copied())
+        .collect();
+    let mut with = driven(&moving, &both, 0.8, 4);
+    let block = &mut with.blocks[0];
+    let mut random = rand_pcg::Pcg64::seed_from_u64(9);
+    for (k, t) in block.t.iter().enumerate() {
+        let [before, here, after] = [-1e-3, 0.0, 1e-3].map(|by| moving.position(t + by));
+        for (j, joint) in block.joints.iter_mut().enumerate() {
+            // The rotor: ratio² · inertia · acceleration.
+            joint.tau[k] += 2.0 * (before[j] - 2.0 * here[j] + after[j]) / 1e-6;
+            let noise: f64 = StandardNormal.sample(&mut random);
+            joint.q[k] += 1e-4 * noise;
+        }
+    }
+    let options = LoadOptions {
+        by: By::Torque,
+        ..LoadOptions::default()
+    };
+    let found = identify_load(&moving.robot, &[&with], &[], &options).unwrap();
+    let truth = parameters(&part);
+    for (parameter, truth) in found.parameters.iter().zip(truth).filter(|(p, _)| p.shown) {
+        let off = (parameter.value.value - truth) / parameter.value.std;
+        assert!(off.abs() < 4.0, "{parameter:?}, truth {truth}");
+    }
+    assert!(
+        (found.mass.value / truth[0] - 1.0).abs() < 0.05,
+        "{:?}",
+        found.mass
+    );
+}
+
+#[test]
+fn a_torque_scale_that_is_wrong_contradicts_the_sensor() {
+    let moving = Moving::new(arm(), 0.7, 22);
+    let part = tool();
+    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
+    let scaled = |mut recording: InMemory| {
+        for joint in &mut recording.blocks[0].joints {
+            joint.tau.iter_mut().for_each(|tau| *tau *= 1.3);
+        }
+        recording
+    };
+    let without = scaled(driven(&moving, &hand(), 0.8, 1));
+    let with = scaled(driven(&moving, &both, 0.8, 2));
+    let options = LoadOptions {
+        by: By::Both,
+        ..LoadOptions::default()
+    };
+    let found = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+    assert!(
+        found.warnings.iter().any(|w| w.contains("contradict")),
+        "{:?}",
+        found.warnings
+    );
+}

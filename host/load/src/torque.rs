@@ -1,0 +1,262 @@
+//! The load from joint torques: with and without the load, or with it against an identified model.
+//!
+//! With recordings of both, one set of base parameters explains all of them, and the load explains the rest of those
+//! with it. Coulomb and viscous friction may differ between the two, because gears rub more under load. Without
+//! recordings of the unloaded robot its description gives the torque, and friction, offsets and drive inertia may differ
+//! from it. The drive inertia also takes up the noise of the acceleration, which a geared joint multiplies.
+//!
+//! Leaves out: the uncertainty of the description, if it gives the torque of the unloaded robot.
+
+use nalgebra::SMatrix;
+use rig_data::Compensated;
+use rig_data::prepare::{PrepareOptions, PreprocessingPlan, Recording, as_recordings, surveyed};
+use rig_identify::{
+    Base, ModelKind, Plan, RowCache, TriangularFactor, chain_of, described, each_rows,
+    transmission_of, treatment_for,
+};
+use rig_model::effects::Effects;
+use rig_model::robot::Robot;
+use rig_shared::multibody::{COLUMNS, INERTIAL_PARAMETERS, column};
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
+
+use crate::error::LoadError;
+use crate::estimate::solved;
+use crate::statistics::SEGMENTS;
+
+/// Rounds in which the noise of each joint is estimated from its residuals.
+const ROUNDS: usize = 3;
+
+/// Recordings of joint torques.
+pub(crate) struct Driven<'a> {
+    /// The robot without the load.
+    pub robot: &'a Robot,
+    /// Recordings with the load.
+    pub with: &'a [&'a dyn Recording],
+    /// Recordings without it; may be empty.
+    pub without: &'a [&'a dyn Recording],
+    /// From the parameters in the flange frame to those in the frame of the last joint.
+    pub to_joint: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
+    /// How the recordings are prepared.
+    pub prepare: &'a PrepareOptions,
+}
+
+/// Equations of the joints, in units of their noise.
+pub(crate) struct Equations {
+    /// One factor a segment, the load's columns first.
+    pub segments: Vec<TriangularFactor>,
+    /// Per joint, RMS of the residual, N·m or N.
+    pub noise: Vec<f64>,
+    /// Preparation.
+    pub plan: PreprocessingPlan,
+}
+
+/// Places of the unknowns beside the load.
+struct Columns {
+    /// Number of base parameters of the unloaded robot that are estimated: all or none.
+    robot: usize,
+    /// Columns that may differ with the load.
+    changed: Vec<usize>,
+}
+
+/// Returns true for a column that may differ with the load: Coulomb and viscous friction. If the description gives the
+/// torque of the unloaded robot (`described`), constant torques and drive inertia may differ from it, too.
+fn may_differ(c: usize, joints: usize, described: bool) -> bool {
+    match c.checked_sub(COLUMNS * joints) {
+        Some(motor) => described || motor % MOTOR_COLUMNS != motor_column::INERTIA,
+        None => match c % COLUMNS {
+            column::VISCOUS | column::COULOMB => true,
+            column::OFFSET | column::DRIVE_INERTIA => described,
+            _ => false,
+        },
+    }
+}
+
+/// Collects the equations of all recordings.
+///
+/// # Errors
+/// [`LoadError`]: recordings that cannot be prepared, a robot without a model.
+pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
+    let robot = driven.robot;
+    let joints = robot.joints.len();
+    let all: Vec<&dyn Recording> = driven.with.iter().chain(driven.without).copied().collect();
+    let (surveys, usable) = surveyed(&all, joints)?;
+    let usable = as_recordings(&usable);
+    let (surveys, treatment) = treatment_for(robot, &usable, surveys, driven.prepare)?;
+    let (chain, transmission) = (chain_of(robot)?, transmission_of(robot)?);
+    let base = Base::structural(robot, ModelKind::Differential, 1)?;
+    let estimated = !driven.without.is_empty();
+    // Drive inertia may be regrouped with that of the links, and is then no base parameter of its own.
+    let mut own = base.columns.clone();
+    let all = 0..base.combination.ncols();
+    let changed: Vec<usize> = all.filter(|c| may_differ(*c, joints, !estimated)).collect();
+    own.extend(changed.iter().filter(|c| !base.columns.contains(c)));
+    let unknowns = Columns {
+        robot: if estimated { base.len() } else { 0 },
+        changed,
+    };
+    // All columns of the rows: those of the robot, then the ten of a body on the last link.
+    let last = COLUMNS * (joints - 1);
+    let mut columns = own.clone();
+    columns.extend(last..last + INERTIAL_PARAMETERS);
+    let plan = Plan {
+        chain: &chain,
+        transmission: &transmission,
+        columns: &columns,
+        treatment: &treatment,
+        window: 1,
+        stride: 1,
+        loudness: vec![1.0; joints],
+        one_way: Vec::new(),
+        cache: RowCache::default(),
+    };
+    let known = match estimated {
+        true => Vec::new(),
+        false => {
+            let all = described(robot, base.combination.ncols());
+            (&base.combination * all).as_slice().to_vec()
+        }
+    };
+    let assembly = Assembly {
+        driven,
+        unknowns: &unknowns,
+        robot: &own,
+        known: &known,
+        width: columns.len(),
+    };
+    let effects = Effects::of(robot).map_err(|e| LoadError::Model(e.to_string()))?;
+    let mut parts: Vec<Vec<TriangularFactor>> = Vec::new();
+    for (recording, (source, survey)) in usable.iter().zip(&surveys).enumerate() {
+        let loaded = recording < driven.with.len();
+        let expected = survey.rows / treatment.decimation as u64;
+        // Without the torque of the described effects.
+        let freed = Compensated::new(*source, &effects, &chain, &treatment, true)?;
+        parts.extend(assembly.segments(&freed, &plan, loaded, expected)?);
+    }
+    let noise = noise_of(&parts);
+    let segments = (parts.iter())
+        .map(|joints| {
+            let mut whole = TriangularFactor::new(joints[0].columns());
+            for (factor, noise) in joints.iter().zip(&noise) {
+                whole.merge(factor, 1.0 / noise);
+            }
+            whole
+        })
+        .collect();
+    Ok(Equations {
+        segments,
+        noise,
+        plan: treatment,
+    })
+}
+
+/// What the rows of a recording are made of.
+struct Assembly<'a> {
+    driven: &'a Driven<'a>,
+    unknowns: &'a Columns,
+    /// Columns of the robot in each row, those of the base parameters first.
+    robot: &'a [usize],
+    /// Values of the base parameters, if they are known beforehand.
+    known: &'a [f64],
+    /// Number of columns in each row.
+    width: usize,
+}
+
+impl Assembly<'_> {
+    fn count(&self) -> usize {
+        INERTIAL_PARAMETERS + self.unknowns.robot + self.unknowns.changed.len()
+    }
+
+    /// Returns one factor a segment and joint; segments without rows are left out.
+    fn segments(
+        &self,
+        recording: &dyn Recording,
+        plan: &Plan,
+        loaded: bool,
+        expected: u64,
+    ) -> Result<Vec<Vec<TriangularFactor>>, LoadError> {
+        let joints = self.driven.robot.joints.len();
+        let empty = || vec![TriangularFactor::new(self.count()); joints];
+        let mut segments: Vec<Vec<TriangularFactor>> = (0..SEGMENTS).map(|_| empty()).collect();
+        let mut seen = 0u64;
+        let mut row = vec![0.0; self.count()];
+        each_rows(recording, plan, ModelKind::Differential, &mut |rows| {
+            for k in 0..rows.t.len() {
+                let place = u128::from(seen) * SEGMENTS as u128 / u128::from(expected.max(1));
+                let segment = &mut segments[(place as usize).min(SEGMENTS - 1)];
+                seen += 1;
+                for (factor, equation) in segment.iter_mut().zip(&rows.equations) {
+                    if equation.keep[k] {
+                        let x = &equation.x[k * self.width..(k + 1) * self.width];
+                        let known = self.compose(x, loaded, &mut row);
+                        factor.push(&row, equation.y[k] - known, 1.0);
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        segments.retain(|own| own.iter().any(|factor| factor.rows() > 0));
+        Ok(segments)
+    }
+
+    /// Composes a row from that of the model; returns the torque that is known.
+    fn compose(&self, x: &[f64], loaded: bool, row: &mut [f64]) -> f64 {
+        row.fill(0.0);
+        let (own, load) = x.split_at(self.robot.len());
+        if loaded {
+            for (k, to) in row[..INERTIAL_PARAMETERS].iter_mut().enumerate() {
+                *to = (0..INERTIAL_PARAMETERS)
+                    .map(|c| load[c] * self.driven.to_joint[(c, k)])
+                    .sum();
+            }
+        }
+        let base = self.unknowns.robot;
+        row[INERTIAL_PARAMETERS..][..base].copy_from_slice(&own[..base]);
+        if loaded {
+            for (to, changed) in
+                (row[INERTIAL_PARAMETERS + base..].iter_mut()).zip(&self.unknowns.changed)
+            {
+                if let Some(place) = self.robot.iter().position(|c| c == changed) {
+                    *to = own[place];
+                }
+            }
+        }
+        own.iter().zip(self.known).map(|(x, value)| x * value).sum()
+    }
+}
+
+/// Returns the RMS residual of each joint, all joints weighted by it.
+fn noise_of(parts: &[Vec<TriangularFactor>]) -> Vec<f64> {
+    let joints = parts.first().map_or(0, Vec::len);
+    let columns = parts.first().map_or(0, |own| own[0].columns());
+    let whole: Vec<TriangularFactor> = (0..joints)
+        .map(|j| {
+            let mut sum = TriangularFactor::new(columns);
+            for own in parts {
+                sum.merge(&own[j], 1.0);
+            }
+            sum
+        })
+        .collect();
+    let size = |factor: &TriangularFactor| {
+        let rows = factor.rows().max(1) as f64;
+        (factor.right_side_squares() / rows)
+            .sqrt()
+            .max(f64::MIN_POSITIVE)
+    };
+    let mut noise: Vec<f64> = whole.iter().map(size).collect();
+    let least: Vec<f64> = noise.iter().map(|n| 1e-9 * n).collect();
+    for _ in 0..ROUNDS {
+        let mut all = TriangularFactor::new(columns);
+        for (factor, noise) in whole.iter().zip(&noise) {
+            all.merge(factor, 1.0 / noise);
+        }
+        let (r, z) = all.system();
+        let x = solved(&r, &z);
+        for ((noise, factor), least) in noise.iter_mut().zip(&whole).zip(&least) {
+            let rows = factor.rows().max(1) as f64;
+            let rms = (factor.residual_squares(x.as_slice()) / rows).sqrt();
+            *noise = rms.max(*least);
+        }
+    }
+    noise
+}

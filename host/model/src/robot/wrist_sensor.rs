@@ -1,0 +1,141 @@
+//! A six-axis force and torque sensor between the last link and the load.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+use super::array::exact;
+use super::fault::{Fault, Step, written};
+
+/// The sensor at the wrist. The flange frame is that of the last joint (TOML) or of the last link (URDF).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WristSensor {
+    /// Origin of its axes in the flange frame, m.
+    #[serde(default, deserialize_with = "exact")]
+    pub position: [f64; 3],
+    /// Roll, pitch and yaw of its axes in the flange frame, rad: RotZ(yaw)·RotY(pitch)·RotX(roll), as in a URDF.
+    #[serde(default, deserialize_with = "exact")]
+    pub rotation: [f64; 3],
+    /// Which of the two opposite wrenches it reads; `None` if unknown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reads: Option<Reads>,
+    /// Largest force that an axis reads, N.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_range: Option<f64>,
+    /// Largest moment that an axis reads, N·m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moment_range: Option<f64>,
+}
+
+/// The wrench that a sensor reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reads {
+    /// The wrench of the load on the robot: a load at rest reads its weight, downwards.
+    Load,
+    /// The wrench of the robot on the load: a load at rest reads what carries it, upwards.
+    Robot,
+}
+
+impl Reads {
+    /// Returns 1 for the wrench of the robot on the load, −1 for its opposite.
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Robot => 1.0,
+            Self::Load => -1.0,
+        }
+    }
+}
+
+impl WristSensor {
+    /// Returns the pose of its axes in the flange frame.
+    pub fn pose(&self) -> Isometry3<f64> {
+        let [roll, pitch, yaw] = self.rotation;
+        Isometry3::from_parts(
+            Translation3::from(self.position),
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        )
+    }
+
+    /// Returns the first value that no sensor can have.
+    pub(super) fn check(&self) -> Result<(), Fault> {
+        let fault = |key: &'static str, found: f64, advice: &str| Fault {
+            key_path: vec![Step::Key("wrist_sensor"), Step::Key(key)],
+            what: format!("`{key}` of the wrist sensor"),
+            found: written(found),
+            advice: advice.to_owned(),
+        };
+        for (key, values, most, advice) in [
+            (
+                "position",
+                self.position,
+                10.0,
+                "it must be at most 10 m from the flange",
+            ),
+            (
+                "rotation",
+                self.rotation,
+                7.0,
+                "it must be an angle in rad, at most one turn",
+            ),
+        ] {
+            if let Some(found) = values.iter().find(|v| !(v.abs() <= most)) {
+                return Err(fault(key, *found, advice));
+            }
+        }
+        for (key, range, unit) in [
+            ("force_range", self.force_range, "N"),
+            ("moment_range", self.moment_range, "N·m"),
+        ] {
+            if let Some(found) = range.filter(|r| !(*r > 0.0 && r.is_finite())) {
+                return Err(fault(
+                    key,
+                    found,
+                    &format!("it must be greater than 0, in {unit}"),
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::robot::{ONE_LINK_TEMPLATE, Robot};
+
+    fn read(table: &str) -> Result<Robot, String> {
+        let text = format!("{ONE_LINK_TEMPLATE}\n[wrist_sensor]\n{table}\n");
+        Robot::from_toml(&text, "r.toml".as_ref()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn sensor_survives_the_file() {
+        let table = "position = [0.0, 0.01, 0.05]\nrotation = [0.0, 0.0, 0.785]\nreads = \"load\"\nforce_range = 100.0";
+        let robot = read(table).unwrap();
+        let sensor = robot.wrist_sensor.as_ref().unwrap();
+        assert_eq!(sensor.reads, Some(Reads::Load));
+        // The sensor's x axis lies between those of the flange.
+        let x = sensor.pose().rotation * nalgebra::Vector3::x();
+        assert!((x.x - x.y).abs() < 1e-3 && x.x > 0.7);
+        let text = robot.to_toml().unwrap();
+        assert_eq!(Robot::from_toml(&text, "r.toml".as_ref()).unwrap(), robot);
+    }
+
+    #[test]
+    fn values_that_no_sensor_has_are_named() {
+        for (table, said) in [
+            ("position = [0.0, 0.0, 50.0]", "at most 10 m"),
+            ("rotation = [0.0, 0.0, 90.0]", "in rad"),
+            ("force_range = -1.0", "greater than 0, in N"),
+            ("moment_range = nan", "NaN"),
+            ("reads = \"up\"", "load"),
+            ("rotaton = [0.0, 0.0, 0.0]", "rotaton"),
+            ("position = [0.0, 0.0]", "3 numbers"),
+        ] {
+            let message = read(table).unwrap_err();
+            assert!(message.contains(said), "{message}");
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! `rig load`: the inertial parameters of a load at the flange.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ValueEnum};
+use serde::Serialize;
+
+use super::error::CommandError;
+use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared, refuse_twice};
+use super::overwrite::refuse_folder;
+use super::ui::Ui;
+use crate::pages;
+use crate::pages::Context;
+use rig_data::EffortNeed;
+use rig_data::prepare::{Choice, PrepareOptions};
+use rig_load::{
+    By, ControllerNumbers, LoadIdentification, LoadOptions, Value, controller_numbers,
+    identify_load, urdf_link,
+};
+use rig_model::robot::{Load, Reads, Robot, WristSensor};
+use rig_output::{can_take, folder, format_value, write_whole};
+
+/// Files that the command writes.
+const FILES: [&str; 4] = ["load.toml", "load.urdf", "load.json", "report.html"];
+
+/// Identifies a load at the flange: mass, centre of mass and inertia, with standard deviations.
+///
+/// By the wrist sensor (columns fx fy fz in N and mx my mz in N·m, in the axes of the sensor): record poses at rest, or a
+/// motion, which also shows the inertia. `rig excite --load` designs both. The pose of the sensor is [wrist_sensor] in
+/// the description, or --sensor-position and --sensor-rotation. Bias, drift and rotation of the sensor are estimated.
+/// Exchanged, reversed, dead or saturated channels are named.
+///
+/// By joint torques: record the same motion with the load (--data) and without it (--without). Without --without the
+/// description must be an identified one (`rig identify`).
+///
+/// All results are in the flange frame: the frame of the last joint (TOML) or of the last link (URDF). Writes load.toml,
+/// load.urdf, load.json and report.html into the folder given with --out.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    robot: RobotArg,
+    /// Recording with the load, CSV or MCAP; one or more
+    #[arg(long, required = true, num_args = 1..)]
+    data: Vec<PathBuf>,
+    /// Recording without the load: what is mounted beyond the sensor, or the bare robot, is subtracted
+    #[arg(long, num_args = 1..)]
+    without: Vec<PathBuf>,
+    /// What the load is measured by
+    #[arg(long, value_enum, default_value_t = Measured::Sensor)]
+    by: Measured,
+    /// Every row of the recordings is a pose at rest (assumed for fewer than 256 rows)
+    #[arg(long)]
+    poses: bool,
+    /// A known load (load.toml) that is mounted as well, and is subtracted
+    #[arg(long, value_name = "FILE", conflicts_with = "without")]
+    tool: Option<PathBuf>,
+    /// Origin of the sensor in the flange frame, m
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    sensor_position: Option<Vec<f64>>,
+    /// Roll, pitch and yaw of the sensor's axes in the flange frame, rad
+    #[arg(long, num_args = 3, value_names = ["R", "P", "Y"], allow_negative_numbers = true)]
+    sensor_rotation: Option<Vec<f64>>,
+    /// The wrench that the sensor reads: that of the load on the robot (weight, downwards), or that of the robot on it
+    #[arg(long, value_enum)]
+    reads: Option<ReadsArg>,
+    /// Cut-off of the low-pass on the position, Hz [default: from the recording]
+    #[arg(long)]
+    cutoff: Option<f64>,
+    /// Go on with the best explanation if channels look wrong; prints what is wrong
+    #[arg(long)]
+    even_if_wrong: bool,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+    /// Replace results that the folder already holds
+    #[arg(long)]
+    force: bool,
+}
+
+/// What the load is measured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Measured {
+    /// The wrist sensor
+    Sensor,
+    /// The joint torques
+    Torque,
+    /// Both, weighted by their uncertainty
+    Both,
+}
+
+/// The wrench that the sensor reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ReadsArg {
+    /// That of the load on the robot
+    Load,
+    /// That of the robot on the load
+    Robot,
+}
+
+/// The result with the numbers for controllers, as written to load.json.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    found: &'a LoadIdentification,
+    controllers: &'a ControllerNumbers,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence that names the wrong file, line or value.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    can_take(&args.out, &FILES)?;
+    refuse_folder(&args.out, &[], args.force)?;
+    refuse_twice(&args.data, "give every recording once")?;
+    refuse_shared(&args.data, &args.without)?;
+    let mut robot = args.robot.load(ui)?;
+    sensor(args, &mut robot)?;
+    let need = match args.by {
+        Measured::Sensor => EffortNeed::Optional,
+        Measured::Torque | Measured::Both => EffortNeed::Required,
+    };
+    let with = Inputs::read_with(&robot, &args.data, need)?;
+    let without = Inputs::read_with(&robot, &args.without, need)?;
+    for warning in with.warnings().chain(without.warnings()) {
+        ui.remark(&warning);
+    }
+    let options = LoadOptions {
+        by: match args.by {
+            Measured::Sensor => By::Sensor,
+            Measured::Torque => By::Torque,
+            Measured::Both => By::Both,
+        },
+        poses: args.poses,
+        tool: args.tool.as_deref().map(Load::read).transpose()?,
+        prepare: PrepareOptions {
+            cutoff: args.cutoff.map_or(Choice::Auto, Choice::Fixed),
+            ..PrepareOptions::default()
+        },
+        even_if_wrong: args.even_if_wrong,
+    };
+    let mut found = identify_load(
+        &robot,
+        &recordings(&with.listened()),
+        &recordings(&without.listened()),
+        &options,
+    )?;
+    found.warnings.extend(with.heard());
+    found.warnings.extend(without.heard());
+    let numbers = controller_numbers(&found);
+    let context = Context {
+        command: command_line(),
+        warnings: with.warnings().chain(without.warnings()).collect(),
+        ..Context::default()
+    };
+    write(args, &found, &numbers, &context)?;
+    for warning in &found.warnings {
+        ui.remark(warning);
+    }
+    for line in lines(&robot, &found, &numbers) {
+        ui.say(&line);
+    }
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
+    Ok(())
+}
+
+/// Puts the sensor of the options into the description.
+fn sensor(args: &Args, robot: &mut Robot) -> Result<(), CommandError> {
+    let mut sensor = robot.wrist_sensor.clone().unwrap_or_default();
+    let three = |name: &str,
+                 list: &[f64],
+                 most: f64,
+                 unit: &str|
+     -> Result<[f64; 3], CommandError> {
+        match list {
+            [a, b, c] if list.iter().all(|v| v.abs() <= most) => Ok([*a, *b, *c]),
+            _ => Err(CommandError::Sentence(format!(
+                "--{name} {list:?} is not possible: give three numbers of at most {most} {unit}."
+            ))),
+        }
+    };
+    if let Some(list) = &args.sensor_position {
+        sensor.position = three("sensor-position", list, 10.0, "m")?;
+    }
+    if let Some(list) = &args.sensor_rotation {
+        sensor.rotation = three("sensor-rotation", list, 7.0, "rad")?;
+    }
+    if let Some(reads) = args.reads {
+        sensor.reads = Some(match reads {
+            ReadsArg::Load => Reads::Load,
+            ReadsArg::Robot => Reads::Robot,
+        });
+    }
+    if args.by != Measured::Torque || sensor != WristSensor::default() {
+        robot.wrist_sensor = Some(sensor);
+    }
+    Ok(())
+}
+
+/// Writes all files of the result.
+///
+/// # Errors
+/// A file cannot be written.
+fn write(
+    args: &Args,
+    found: &LoadIdentification,
+    controllers: &ControllerNumbers,
+    context: &Context,
+) -> Result<(), CommandError> {
+    folder(&args.out)?;
+    let json = serde_json::to_string_pretty(&Written { found, controllers }).map_err(|error| {
+        CommandError::Sentence(format!("The load cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&args.out.join("load.json"), (json + "\n").as_bytes())?;
+    write_whole(
+        &args.out.join("load.toml"),
+        found.body.to_toml()?.as_bytes(),
+    )?;
+    write_whole(&args.out.join("load.urdf"), urdf_link(found).as_bytes())?;
+    rig_report::write(
+        &args.out.join("report.html"),
+        &pages::load(found, controllers, context),
+    )?;
+    Ok(())
+}
+
+/// Returns the printed answer.
+fn lines(robot: &Robot, found: &LoadIdentification, numbers: &ControllerNumbers) -> Vec<String> {
+    let value = |v: &Value| format_value(v.value, v.std);
+    let mut lines = vec![
+        format!("mass {} kg", value(&found.mass)),
+        format!(
+            "centre of mass {}, {}, {} m in the flange frame",
+            value(&found.centre[0]),
+            value(&found.centre[1]),
+            value(&found.centre[2])
+        ),
+    ];
+    if found.inertia_shown {
+        let [xx, xy, xz, yy, yz, zz] = found.inertia.each_ref().map(value);
+        lines.push(format!(
+            "inertia about the centre of mass Ixx {xx}, Ixy {xy}, Ixz {xz}, Iyy {yy}, Iyz {yz}, Izz {zz} kg·m²"
+        ));
+    }
+    for missing in &found.not_shown {
+        let mut line = format!(
+            "not shown by these data: {}. {}",
+            missing.parameters.join(" "),
+            missing.experiment
+        );
+        if let Some(pose) = &missing.pose {
+            let joints = robot.joints.iter().zip(pose);
+            let list: Vec<String> = joints
+                .map(|(joint, q)| format!("{} {q:.3} {}", joint.name, joint.kind.units().0))
+                .collect();
+            line.push_str(&format!(" A pose that would help: {}.", list.join(", ")));
+        }
+        lines.push(line);
+    }
+    lines.push(format!("Universal Robots: {}", numbers.universal_robots));
+    lines.push(format!("KUKA: {}", numbers.kuka));
+    lines.push(format!("Franka: {}", numbers.franka));
+    lines
+}

@@ -1,0 +1,313 @@
+//! The page of an identified load.
+
+use super::context::Context;
+use super::parts;
+use rig_load::{ControllerNumbers, LoadIdentification, SensorFindings, Trace, Value};
+use rig_output::{format_significant, format_unit, format_value};
+use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
+
+/// Names of the channels of the wrist sensor.
+const CHANNELS: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
+
+/// Composes the page of an identified load.
+pub fn load(
+    found: &LoadIdentification,
+    controllers: &ControllerNumbers,
+    context: &Context,
+) -> Document {
+    let mut sections: Vec<Section> = parts::warnings(&[&found.warnings, &context.warnings])
+        .into_iter()
+        .collect();
+    sections.push(body(found));
+    sections.extend(not_shown(found));
+    if let Some(sensor) = &found.sensor {
+        sections.push(readings(sensor));
+        sections.push(biases(sensor));
+    }
+    sections.extend(torques(found));
+    sections.extend(agreement(found));
+    sections.push(for_controllers(found, controllers));
+    sections.push(parts::repeat(context));
+    Document {
+        title: format!("{}: the load at the flange", found.robot),
+        subtitle:
+            "Mass, centre of mass and inertia of what the flange carries, in the flange frame."
+                .into(),
+        summary: summary(found, context),
+        sections,
+        footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
+    }
+}
+
+fn half(value: &Value) -> String {
+    format_value(value.value, value.half_interval)
+}
+
+fn summary(found: &LoadIdentification, context: &Context) -> Vec<Fact> {
+    let note = "± half the 95 % interval";
+    let [x, y, z] = &found.centre;
+    let mut facts = vec![
+        Fact::new("Mass", half(&found.mass))
+            .unit("kg")
+            .note(note)
+            .tone(Tone::Good),
+        Fact::new("Centre of mass x", half(x)).unit("m").note(note),
+        Fact::new("Centre of mass y", half(y)).unit("m").note(note),
+        Fact::new("Centre of mass z", half(z)).unit("m").note(note),
+    ];
+    if !found.inertia_shown {
+        facts.push(
+            Fact::new("Inertia", "not shown")
+                .note("poses at rest, or too little motion of the wrist")
+                .tone(Tone::Notice),
+        );
+    }
+    facts.push(parts::warning_count(
+        found.warnings.len() + context.warnings.len(),
+    ));
+    facts
+}
+
+/// The ten parameters, and the body about its centre of mass.
+fn body(found: &LoadIdentification) -> Section {
+    let parameters = found.parameters.iter().map(|p| {
+        let shown = if p.shown { "yes" } else { "no" };
+        vec![
+            p.name.to_owned(),
+            half(&p.value),
+            format_significant(p.value.std, 2),
+            format_unit(p.unit),
+            shown.to_owned(),
+        ]
+    });
+    let names = ["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+    let central = names.iter().zip(&found.inertia).map(|(name, value)| {
+        vec![
+            (*name).to_owned(),
+            half(value),
+            format_significant(value.std, 2),
+        ]
+    });
+    let principal = found.principal_moments.iter().zip(&found.principal_axes);
+    let principal = principal.map(|(moment, axis)| {
+        vec![
+            format_significant(*moment, 4),
+            axis.map(|v| format!("{v:.4}")).join(", "),
+        ]
+    });
+    let mut section = Section::new(
+        "load",
+        "The load",
+        "The flange frame is the frame of the last joint (TOML) or of the last link (URDF).",
+    )
+    .with(Block::Table(Table {
+        caption: "The ten inertial parameters, inertia about the origin of the flange frame".into(),
+        columns: vec![
+            Column::text("Parameter"),
+            Column::number("Value ± half the 95 % interval", ""),
+            Column::number("Standard deviation", ""),
+            Column::text("Unit"),
+            Column::text("Shown by the data"),
+        ],
+        rows: parameters.collect(),
+        note: "A parameter is shown if its standard deviation is below half of the size that a load of this mass within 0.1 m of the flange has.".into(),
+    }));
+    if found.inertia_shown {
+        section = section
+            .with(Block::Table(Table {
+                caption: "Inertia about the centre of mass, axes of the flange".into(),
+                columns: vec![
+                    Column::text("Entry"),
+                    Column::number("Value ± half the 95 % interval", "kg·m²"),
+                    Column::number("Standard deviation", "kg·m²"),
+                ],
+                rows: central.collect(),
+                note: String::new(),
+            }))
+            .with(Block::Table(Table {
+                caption: "Principal moments about the centre of mass".into(),
+                columns: vec![
+                    Column::number("Moment", "kg·m²"),
+                    Column::text("Axis in the flange frame"),
+                ],
+                rows: principal.collect(),
+                note: String::new(),
+            }));
+    }
+    section
+}
+
+fn not_shown(found: &LoadIdentification) -> Option<Section> {
+    if found.not_shown.is_empty() {
+        return None;
+    }
+    let items = found.not_shown.iter().map(|missing| {
+        let pose = missing.pose.as_ref().map_or_else(String::new, |pose| {
+            let list: Vec<String> = pose.iter().map(|q| format!("{q:.3}")).collect();
+            format!(
+                " A pose that would help most: {} (rad or m by joint).",
+                list.join(", ")
+            )
+        });
+        format!(
+            "{}: {}{pose}",
+            missing.parameters.join(", "),
+            missing.experiment
+        )
+    });
+    Some(
+        Section::new("not-shown", "What these data do not show", "")
+            .with(Block::List(items.collect())),
+    )
+}
+
+/// Readings over time beside the fit.
+fn readings(sensor: &SensorFindings) -> Section {
+    let mut section = Section::new(
+        "readings",
+        "Readings and fit",
+        "What the sensor read, and what the identified load with the estimated bias gives.",
+    );
+    for trace in &sensor.traces {
+        for (kind, unit, first) in [("Force", "N", 0), ("Moment", "N·m", 3)] {
+            section = section.with(Block::Plot(curves(trace, kind, unit, first)));
+        }
+    }
+    section.with(Block::Text(format!(
+        "RMS of the residual: {} N and {} N·m over {} rows.",
+        format_significant(sensor.residual[0], 3),
+        format_significant(sensor.residual[1], 3),
+        parts::count(sensor.rows)
+    )))
+}
+
+fn curves(trace: &Trace, kind: &str, unit: &str, first: usize) -> Plot {
+    const ROLES: [Role; 3] = [Role::Measured, Role::Model, Role::After];
+    let mut plot = Plot::new(
+        format!("{kind}: {}", trace.recording),
+        Axis::new("time", "s"),
+        Axis::new(kind.to_lowercase(), unit),
+    )
+    .note("Dots: readings. Lines: identified load with bias.");
+    for k in 0..3 {
+        let channel = CHANNELS[first + k];
+        let role = ROLES[k];
+        plot = plot
+            .with(Series::points(
+                channel,
+                role,
+                trace.time.clone(),
+                trace.read[first + k].clone(),
+            ))
+            .with(Series::line(
+                format!("{channel}, fit"),
+                role,
+                trace.time.clone(),
+                trace.predicted[first + k].clone(),
+            ));
+    }
+    plot
+}
+
+/// Bias of the sensor by recording.
+fn biases(sensor: &SensorFindings) -> Section {
+    let row = |name: String, values: &[f64; 6]| {
+        let mut cells = vec![name];
+        cells.extend(values.iter().map(|v| format_significant(*v, 4)));
+        cells
+    };
+    let mut rows = Vec::new();
+    for bias in &sensor.biases {
+        rows.push(row(bias.recording.clone(), &bias.bias));
+        if let Some(drift) = &bias.drift {
+            rows.push(row("change from begin to end".into(), drift));
+        }
+        if let Some((time, after)) = &bias.jump {
+            rows.push(row(format!("after a jump near {time:.1} s"), after));
+        }
+    }
+    if let Some(warming) = &sensor.warming {
+        rows.push(row("per °C".into(), warming));
+    }
+    let mut columns = vec![Column::text("Recording")];
+    columns.extend(
+        CHANNELS
+            .iter()
+            .enumerate()
+            .map(|(k, name)| Column::number(*name, if k < 3 { "N" } else { "N·m" })),
+    );
+    let [roll, pitch, yaw] = sensor.rotation.map(|v| format!("{v:.4}"));
+    Section::new("bias", "The sensor", "")
+        .with(Block::Table(Table {
+            caption: "Bias, as read without a load".into(),
+            columns,
+            rows,
+            note: String::new(),
+        }))
+        .with(Block::Text(format!(
+            "Axes of the sensor in the flange frame: roll {roll}, pitch {pitch}, yaw {yaw} rad."
+        )))
+}
+
+fn torques(found: &LoadIdentification) -> Option<Section> {
+    let torque = found.torque.as_ref()?;
+    let rows = torque.joints.iter().zip(&torque.residual);
+    let source = match torque.with_unloaded {
+        true => "The recordings without the load gave the parameters of the robot.",
+        false => {
+            "The description gave the torque of the robot without the load. Its own uncertainty is not in the standard deviations."
+        }
+    };
+    Some(
+        Section::new("torques", "Joint torques", source).with(Block::Table(Table {
+            caption: "Residual of the torques with the load".into(),
+            columns: vec![Column::text("Joint"), Column::number("RMS", "N·m or N")],
+            rows: rows
+                .map(|(name, rms)| vec![name.clone(), format_significant(*rms, 3)])
+                .collect(),
+            note: String::new(),
+        })),
+    )
+}
+
+fn agreement(found: &LoadIdentification) -> Option<Section> {
+    let both = found.agreement.as_ref()?;
+    let rows = found.parameters.iter().enumerate().map(|(k, p)| {
+        vec![
+            p.name.to_owned(),
+            format_value(both.by_sensor[k], both.by_sensor_std[k]),
+            format_value(both.by_torque[k], both.by_torque_std[k]),
+            format_unit(p.unit),
+        ]
+    });
+    Some(
+        Section::new("agreement", "Sensor and torques", "").with(Block::Table(Table {
+            caption: "The load by each, ± one standard deviation".into(),
+            columns: vec![
+                Column::text("Parameter"),
+                Column::number("By the sensor", ""),
+                Column::number("By the torques", ""),
+                Column::text("Unit"),
+            ],
+            rows: rows.collect(),
+            note: format!(
+                "Probability that they differ by chance as much: {} (χ² over {} directions that both show).",
+                format_significant(both.chance, 2),
+                both.directions
+            ),
+        })),
+    )
+}
+
+fn for_controllers(found: &LoadIdentification, numbers: &ControllerNumbers) -> Section {
+    let lead = match found.inertia_shown {
+        true => "The flange frame of the description must be that of the controller.",
+        false => {
+            "The flange frame of the description must be that of the controller. The inertia is not shown by the data and is given as zero."
+        }
+    };
+    Section::new("controllers", "For the controller", lead).with(Block::Code(format!(
+        "Universal Robots  {}\nKUKA              {}\nFranka            {}",
+        numbers.universal_robots, numbers.kuka, numbers.franka
+    )))
+}
