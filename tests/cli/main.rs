@@ -6,6 +6,7 @@ mod cases;
 mod diagnose;
 mod excite;
 mod friction_map;
+mod live;
 mod load;
 mod memory;
 mod overwrite;

@@ -132,6 +132,17 @@ pub enum ExciteError {
         /// The robot's joints.
         expected: String,
     },
+    /// A trajectory file of several joints for the rig, which has one.
+    #[error(
+        "{} moves {joints} joints, but the rig has one; design the motion with `rig excite` from the rig's description",
+        path.display()
+    )]
+    SeveralJoints {
+        /// The file.
+        path: PathBuf,
+        /// Number of joints.
+        joints: usize,
+    },
     /// A sampled trajectory with uneven sampling.
     #[error("{}, row {row}: the samples of a trajectory must be evenly spaced in time, without gaps; sample it at one rate", path.display())]
     Uneven {

@@ -35,19 +35,19 @@ pub struct Experiment {
     pub rest: f64,
 }
 
-impl Experiment {
-    /// Returns the maximum time of a controlled stop.
-    fn stop_time(&self) -> Duration {
-        let limits = self.settings.iter().rev().find_map(|body| match body {
-            RequestBody::SetLimits(limits) => Some(limits),
-            _ => None,
-        });
-        let seconds = limits.map(|l| STOP_MARGIN * l.velocity / l.acceleration);
-        seconds
-            .and_then(|seconds| Duration::try_from_secs_f32(seconds).ok())
-            .map_or(STOP_PATIENCE, |time| time.max(STOP_PATIENCE))
-    }
+/// Returns the maximum time of a controlled stop after these settings.
+pub fn stop_time(settings: &[RequestBody]) -> Duration {
+    let limits = settings.iter().rev().find_map(|body| match body {
+        RequestBody::SetLimits(limits) => Some(limits),
+        _ => None,
+    });
+    let seconds = limits.map(|l| STOP_MARGIN * l.velocity / l.acceleration);
+    seconds
+        .and_then(|seconds| Duration::try_from_secs_f32(seconds).ok())
+        .map_or(STOP_PATIENCE, |time| time.max(STOP_PATIENCE))
+}
 
+impl Experiment {
     /// Returns the number of telemetry samples of the experiment.
     pub fn samples(&self, sample_rate: f64) -> u64 {
         let whole = self
@@ -96,7 +96,7 @@ pub fn run<P: Port>(
     });
     let stops = (broken_off || recorded.is_err()) && session.request(RequestBody::Stop).is_ok();
     let rested = if stops {
-        rest(session, experiment.stop_time())
+        rest(session, stop_time(&experiment.settings))
     } else {
         Ok(())
     };

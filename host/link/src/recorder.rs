@@ -1,5 +1,6 @@
 //! Runs a stream and detects its missing parts.
 
+use std::cell::Cell;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -8,7 +9,7 @@ use rig_shared::safety::FaultRecord;
 use rig_shared::wire::message::{
     Estimate, Health, Report, RequestBody, SnapshotPart, StateSample, StreamEnd,
 };
-use rig_shared::wire::{FrameCounts, Gap, Reassembly};
+use rig_shared::wire::{FrameCounts, Gap, LossCounts, Reassembly};
 
 use super::error::LinkError;
 use super::port::Port;
@@ -124,24 +125,29 @@ impl fmt::Display for LossReport {
 pub fn record<P: Port>(
     session: &mut Session<P>,
     settings: &RecordSettings,
-    on_event: impl FnMut(Event<'_>) -> ControlFlow<()>,
+    mut on_event: impl FnMut(Event<'_>) -> ControlFlow<()>,
 ) -> Result<LossReport, LinkError> {
-    let frames_before = session.frames();
-    let mut run = Run {
-        reassembly: Reassembly::new(session.greeting().telemetry_decimation),
-        gaps: 0,
-        broken_off: false,
-        on_event,
+    let broken_off = Cell::new(false);
+    let mut emit = |event: Event<'_>| {
+        let ends = on_event(event).is_break();
+        broken_off.set(broken_off.get() || ends);
     };
-    // On a line that keeps the order, no sample of an old stream arrives after its end.
-    run.end(session, Phase::Before)?;
-    session.request(RequestBody::StartStream)?;
+    let mut stream = Stream::start(session, &mut emit)?;
     for body in &settings.at_start {
         session.request(body.clone())?;
     }
-    run.stream(session, settings)?;
-    let end = run.end(session, Phase::After)?;
-    Ok(run.report(&end, frames_before, session.frames()))
+    let mut later = settings.later.as_ref();
+    while !broken_off.get() && settings.samples.is_none_or(|all| stream.so_far() < all) {
+        if let Some((_, body)) = later.take_if(|(after, _)| stream.so_far() >= *after) {
+            session.request(body.clone())?;
+        }
+        let Some(report) = session.next_report(settings.silence)? else {
+            return Err(LinkError::Silent(settings.silence));
+        };
+        // An end before the request for it is a repeated end of the old stream.
+        stream.take(&report, &mut emit);
+    }
+    stream.end(session, emit)
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -152,31 +158,81 @@ enum Phase {
     After,
 }
 
-struct Run<F> {
+/// A running stream. It numbers the samples and finds the missing ones, and passes everything to a callback.
+pub struct Stream {
     reassembly: Reassembly,
     gaps: u64,
-    broken_off: bool,
-    on_event: F,
+    frames_before: FrameCounts,
 }
 
-impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
-    fn stream<P: Port>(
-        &mut self,
+impl Stream {
+    /// Ends the stream that may run, and starts a new one.
+    ///
+    /// # Errors
+    /// A refused request, a missing answer, or a failed line.
+    pub fn start<P: Port>(
         session: &mut Session<P>,
-        settings: &RecordSettings,
-    ) -> Result<(), LinkError> {
-        let mut later = settings.later.as_ref();
-        while !self.is_complete(settings) {
-            if let Some((_, body)) = later.take_if(|(after, _)| self.so_far() >= *after) {
-                session.request(body.clone())?;
+        mut on_event: impl FnMut(Event<'_>),
+    ) -> Result<Self, LinkError> {
+        let mut stream = Self {
+            reassembly: Reassembly::new(session.greeting().telemetry_decimation),
+            gaps: 0,
+            frames_before: session.frames(),
+        };
+        // On a line that keeps the order, no sample of an old stream arrives after its end.
+        stream.ask_end(session, Phase::Before, &mut on_event)?;
+        session.request(RequestBody::StartStream)?;
+        Ok(stream)
+    }
+
+    /// Returns the counts of samples and batches so far.
+    pub fn counts(&self) -> LossCounts {
+        self.reassembly.counts()
+    }
+
+    /// Returns the number of gaps so far.
+    pub fn gaps(&self) -> u64 {
+        self.gaps
+    }
+
+    /// Returns the number of frames since the start that the line damaged; `now` are the session's frames.
+    pub fn bad_frames(&self, now: FrameCounts) -> u64 {
+        now.bad() - self.frames_before.bad()
+    }
+
+    /// Takes the next report of the session.
+    pub fn take(&mut self, report: &Report, mut on_event: impl FnMut(Event<'_>)) {
+        match report {
+            Report::Batch(batch) => {
+                // The reassembly counts a refused batch.
+                if let Ok(gap) = self.reassembly.accept(batch) {
+                    self.gap(gap, &mut on_event);
+                    on_event(Event::Samples {
+                        first_tick: batch.first_tick,
+                        samples: &batch.samples,
+                    });
+                }
             }
-            let Some(report) = session.next_report(settings.silence)? else {
-                return Err(LinkError::Silent(settings.silence));
-            };
-            // An end before the request for it is a repeated end of the old stream.
-            self.take(&report);
+            Report::Estimate(estimate) => on_event(Event::Estimate(estimate)),
+            Report::Fault(fault) => on_event(Event::Fault(fault)),
+            Report::Snapshot(part) => on_event(Event::Snapshot(part)),
+            Report::Capture(part) => on_event(Event::Capture(part)),
+            Report::Health(health) => on_event(Event::Health(health)),
+            Report::Greeting(_) | Report::Acknowledge(_) | Report::StreamEnd(_) => {}
         }
-        Ok(())
+    }
+
+    /// Ends the stream and counts what is missing at its end.
+    ///
+    /// # Errors
+    /// A refused request, a missing answer, or a failed line.
+    pub fn end<P: Port>(
+        mut self,
+        session: &mut Session<P>,
+        mut on_event: impl FnMut(Event<'_>),
+    ) -> Result<LossReport, LinkError> {
+        let end = self.ask_end(session, Phase::After, &mut on_event)?;
+        Ok(self.report(&end, session.frames()))
     }
 
     /// Returns the number of samples received or known to be missing.
@@ -185,16 +241,12 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
         counts.received + counts.missing
     }
 
-    fn is_complete(&self, settings: &RecordSettings) -> bool {
-        let so_far = self.so_far();
-        self.broken_off || settings.samples.is_some_and(|wanted| so_far >= wanted)
-    }
-
     /// Ends the stream and returns its totals. They come once per request, so a new request asks again.
-    fn end<P: Port>(
+    fn ask_end<P: Port>(
         &mut self,
         session: &mut Session<P>,
         phase: Phase,
+        on_event: &mut impl FnMut(Event<'_>),
     ) -> Result<StreamEnd, LinkError> {
         let patience = session.settings();
         let mut mismatch = None;
@@ -210,12 +262,12 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
                     (Report::Batch(_), Phase::Before) => {}
                     (Report::StreamEnd(end), Phase::After) => match self.reassembly.finish(end) {
                         Ok(gap) => {
-                            self.gap(gap);
+                            self.gap(gap, on_event);
                             return Ok(*end);
                         }
                         Err(error) => mismatch = Some(error),
                     },
-                    _ => self.take(&report),
+                    _ => self.take(&report, &mut *on_event),
                 }
             }
         }
@@ -227,46 +279,22 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
         ))
     }
 
-    fn take(&mut self, report: &Report) {
-        match report {
-            Report::Batch(batch) => {
-                // The reassembly counts a refused batch.
-                if let Ok(gap) = self.reassembly.accept(batch) {
-                    self.gap(gap);
-                    self.emit(Event::Samples {
-                        first_tick: batch.first_tick,
-                        samples: &batch.samples,
-                    });
-                }
-            }
-            Report::Estimate(estimate) => self.emit(Event::Estimate(estimate)),
-            Report::Fault(fault) => self.emit(Event::Fault(fault)),
-            Report::Snapshot(part) => self.emit(Event::Snapshot(part)),
-            Report::Capture(part) => self.emit(Event::Capture(part)),
-            Report::Health(health) => self.emit(Event::Health(health)),
-            Report::Greeting(_) | Report::Acknowledge(_) | Report::StreamEnd(_) => {}
-        }
-    }
-
-    fn gap(&mut self, gap: Option<Gap>) {
+    fn gap(&mut self, gap: Option<Gap>, on_event: &mut impl FnMut(Event<'_>)) {
         if let Some(Gap {
             first_tick,
             missing,
         }) = gap
         {
             self.gaps += 1;
-            self.emit(Event::Gap {
+            on_event(Event::Gap {
                 first_tick,
                 missing,
             });
         }
     }
 
-    fn emit(&mut self, event: Event<'_>) {
-        self.broken_off |= (self.on_event)(event).is_break();
-    }
-
-    fn report(&self, end: &StreamEnd, before: FrameCounts, after: FrameCounts) -> LossReport {
+    fn report(&self, end: &StreamEnd, after: FrameCounts) -> LossReport {
+        let before = self.frames_before;
         let counts = self.reassembly.counts();
         let frames = FrameCounts {
             good: after.good - before.good,

@@ -40,6 +40,9 @@ impl Default for SessionSettings {
     }
 }
 
+/// Longest wait for bytes while an answer is awaited, after which the wait may be abandoned.
+const PUMP: Duration = Duration::from_millis(10);
+
 /// A conversation with a rig after its greeting.
 pub struct Session<P> {
     port: P,
@@ -121,17 +124,37 @@ impl<P: Port> Session<P> {
     /// # Errors
     /// [`LinkError::Refused`], [`LinkError::NoAnswer`], or a failed line.
     pub fn request(&mut self, body: RequestBody) -> Result<(), LinkError> {
+        self.request_unless(body, || false).map(|_| ())
+    }
+
+    /// As [`Session::request`], but stops waiting as soon as `abandon` returns true, and then returns false: the rig
+    /// may carry the request out, or not. A later request is carried out after it.
+    ///
+    /// # Errors
+    /// [`LinkError::Refused`], [`LinkError::NoAnswer`], or a failed line.
+    pub fn request_unless(
+        &mut self,
+        body: RequestBody,
+        abandon: impl Fn() -> bool,
+    ) -> Result<bool, LinkError> {
         let name = name_of(&body);
         let (id, frame) = self.frame(body)?;
         self.acknowledgements.clear();
         let answer = self.exchange(&name, &frame, |session| {
             let found = session.acknowledgements.iter().find(|one| one.id == id);
-            found.map(|one| one.result)
+            match found {
+                Some(one) => Some(Some(one.result)),
+                None => abandon().then_some(None),
+            }
         })?;
-        answer.map_err(|refusal| LinkError::Refused {
-            request: name,
-            refusal,
-        })
+        match answer {
+            None => Ok(false),
+            Some(Ok(())) => Ok(true),
+            Some(Err(refusal)) => Err(LinkError::Refused {
+                request: name,
+                refusal,
+            }),
+        }
     }
 
     /// Returns the next report other than greeting and acknowledgement, or `None` after `timeout`. Sends keep-alive
@@ -224,7 +247,7 @@ impl<P: Port> Session<P> {
                 if left.is_zero() {
                     break;
                 }
-                self.pump(left)?;
+                self.pump(left.min(PUMP))?;
             }
         }
         Err(LinkError::NoAnswer {

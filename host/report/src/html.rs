@@ -3,18 +3,16 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use super::assets::{PLOT_LICENCE, PLOT_SCRIPT, PLOT_STYLE, THEME, palette};
 use super::document::{Alignment, Block, Document, Fact, NoteKind, Section, Table, Tone};
 use super::error::ReportError;
 use super::escape::text;
-use super::plot::{Plot, Role};
+use super::plot::Plot;
 use super::scene::Scene;
 use super::svg;
 
 const STYLE: &str = include_str!("../assets/report.css");
 const SCRIPT: &str = include_str!("../assets/report.js");
-const PLOT_STYLE: &str = include_str!("../assets/uplot/uPlot.min.css");
-const PLOT_SCRIPT: &str = include_str!("../assets/uplot/uPlot.iife.min.js");
-const PLOT_LICENCE: &str = include_str!("../assets/uplot/LICENSE");
 
 /// Returns the page of a document. The same document gives the same bytes.
 ///
@@ -35,7 +33,7 @@ pub fn render(document: &Document) -> Result<String, ReportError> {
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
          style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n\
-         <title>{}</title>\n<style>\n{}{STYLE}</style>",
+         <title>{}</title>\n<style>\n{}{THEME}{STYLE}</style>",
         text(&document.title),
         palette()
     );
@@ -62,18 +60,6 @@ pub fn render(document: &Document) -> Result<String, ReportError> {
     }
     let _ = writeln!(out, "<script>\n{SCRIPT}</script>\n</body>\n</html>");
     Ok(out)
-}
-
-/// Returns the colours of the roles as style-sheet variables: light, dark, and light again for print.
-fn palette() -> String {
-    let list = |colour: fn(Role) -> &'static str| -> String {
-        Role::ALL
-            .iter()
-            .map(|role| format!("--{}:{};", role.name(), colour(*role)))
-            .collect()
-    };
-    let (light, dark) = (list(Role::light), list(Role::dark));
-    format!(":root{{{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n")
 }
 
 fn check_ids(sections: &[Section]) -> Result<(), ReportError> {

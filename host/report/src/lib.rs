@@ -4,7 +4,7 @@
 //! every plot is a still picture; with JavaScript it can be zoomed. In print, everything is unfolded. The same document
 //! gives the same bytes. Every text is escaped: a name from a file cannot become mark-up.
 //!
-//! [`svg`] and [`write_svg`] return one plot as a separate picture.
+//! [`svg`] and [`write_svg`] return one plot as a separate picture. [`assets`] holds what other pages share with these.
 //!
 //! ```
 //! use rig_report::{Axis, Plot, Role, Series, svg};
@@ -16,6 +16,7 @@
 //! assert!(svg(&plot).unwrap().contains("<svg"));
 //! ```
 
+pub mod assets;
 mod axis;
 mod document;
 mod error;

@@ -56,6 +56,20 @@ impl TrajectoryFile {
             .fold(0.0, f64::max)
     }
 
+    /// Returns the motion of the only joint.
+    ///
+    /// # Errors
+    /// [`ExciteError::SeveralJoints`]; `path` names the file in it.
+    pub fn only_joint(&self, path: &Path) -> Result<&JointTrajectory, ExciteError> {
+        match self.joints.as_slice() {
+            [joint] => Ok(joint),
+            several => Err(ExciteError::SeveralJoints {
+                path: path.into(),
+                joints: several.len(),
+            }),
+        }
+    }
+
     /// Checks that the file's joints are the robot's, by name and in order.
     ///
     /// # Errors

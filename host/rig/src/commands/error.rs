@@ -49,6 +49,9 @@ pub enum CommandError {
     /// The rig.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// The live view.
+    #[error(transparent)]
+    Live(#[from] rig_live::LiveError),
     /// The rig's nameplate.
     #[error(transparent)]
     Nameplate(#[from] NameplateError),

@@ -17,10 +17,10 @@ static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 ///
 /// # Errors
 /// [`CommandError::Sentence`] if the system does not allow a handler.
-pub(super) fn listen(unfinished: &Path) -> Result<(), CommandError> {
+pub(super) fn listen(unfinished: Option<&Path>) -> Result<(), CommandError> {
     // A process has one handler, but a process that uses this library may record more than once.
     static LISTENING: OnceLock<Result<(), String>> = OnceLock::new();
-    *UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner) = Some(unfinished.to_path_buf());
+    writing(unfinished);
     ASKED.store(false, Ordering::Relaxed);
     let listening = LISTENING.get_or_init(|| {
         ctrlc::set_handler(|| {
@@ -38,6 +38,11 @@ pub(super) fn listen(unfinished: &Path) -> Result<(), CommandError> {
     });
     (listening.clone())
         .map_err(|error| CommandError::Sentence(format!("Ctrl-C cannot be caught: {error}.")))
+}
+
+/// Replaces the file that is being written.
+pub(super) fn writing(unfinished: Option<&Path>) {
+    *UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner) = unfinished.map(Path::to_path_buf);
 }
 
 /// Returns true if the program has been asked to end since [`listen`].

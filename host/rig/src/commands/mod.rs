@@ -12,6 +12,7 @@ mod identify;
 mod init;
 mod input;
 mod interrupts;
+mod live;
 mod load;
 mod overwrite;
 mod pictures;
@@ -41,6 +42,7 @@ enum Command {
     Demo(demo::Args),
     Init(init::Args),
     Record(record::Args),
+    Live(live::Args),
     Board(board::Args),
     Flash(flash::Args),
     Excite(excite::Args),
@@ -66,6 +68,7 @@ impl Cli {
             Some(Command::Demo(args)) => demo::run(&args, &ui),
             Some(Command::Init(args)) => init::run(&args, &ui),
             Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Live(args)) => live::run(&args, &ui),
             Some(Command::Board(args)) => board::run(&args, &ui),
             Some(Command::Flash(args)) => flash::run(&args, &ui),
             Some(Command::Excite(args)) => excite::run(&args, &ui),

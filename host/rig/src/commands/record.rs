@@ -153,7 +153,7 @@ pub(crate) fn emulated(robot: Option<Robot>, seed: u64) -> Result<EmulatedRig, C
     emulated_at(&described_or_template(robot)?, [seed, 1], None)
 }
 
-fn described_or_template(robot: Option<Robot>) -> Result<Robot, CommandError> {
+pub(crate) fn described_or_template(robot: Option<Robot>) -> Result<Robot, CommandError> {
     match robot {
         Some(robot) => Ok(robot),
         None => Ok(Robot::from_toml(
@@ -164,7 +164,7 @@ fn described_or_template(robot: Option<Robot>) -> Result<Robot, CommandError> {
 }
 
 /// As [`emulated`], for recording `run` (from 1). A link with `home` away from the hanging position is held.
-fn emulated_at(
+pub(crate) fn emulated_at(
     described: &Robot,
     [seed, run]: [u64; 2],
     home: Option<f32>,
@@ -192,7 +192,7 @@ fn emulated_at(
 ///
 /// # Errors
 /// Values that the description lacks.
-fn doubt(
+pub(crate) fn doubt(
     rig: &EmulatedRig,
     robot: &Robot,
     motion: Option<&JointTrajectory>,
@@ -234,13 +234,7 @@ fn single<'a>(
     path: &Path,
     home: Option<f32>,
 ) -> Result<&'a JointTrajectory, CommandError> {
-    let [joint] = file.joints.as_slice() else {
-        return Err(CommandError::Sentence(format!(
-            "{} moves {} joints, but the rig has one; design the motion with `rig excite` from the rig's description.",
-            path.display(),
-            file.joints.len()
-        )));
-    };
+    let joint = file.only_joint(path)?;
     let stands = f64::from(home.unwrap_or(0.0));
     if (joint.start - stands).abs() > START_TOLERANCE {
         return Err(CommandError::Sentence(format!(
@@ -304,7 +298,7 @@ fn record<P: Port>(
     let mut progress = ui.progress("recording", total);
     let mut failed = None;
     let mut ending = Ending::default();
-    interrupts::listen(writer.temporary())?;
+    interrupts::listen(Some(writer.temporary()))?;
     let recorded = run_experiment(&mut session, experiment, |event| {
         match event {
             Event::Samples {
