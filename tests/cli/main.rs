@@ -10,5 +10,6 @@ mod live;
 mod load;
 mod memory;
 mod overwrite;
+mod robots;
 mod run;
 mod workflow;

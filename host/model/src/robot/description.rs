@@ -7,7 +7,7 @@ use std::path::Path;
 use super::encoding::{Decoded, decoded};
 use super::error::{MAX_BYTES, RobotError};
 use super::serial_robot::Robot;
-use super::urdf::{self, Original};
+use super::urdf::{self, Audit, ChainChoice, Original};
 use super::{dh, text, written};
 
 impl Robot {
@@ -26,7 +26,7 @@ impl Robot {
     ///
     /// Every joint keeps the URDF's zero and positive sense: z of its frame is the URDF axis.
     pub fn from_urdf(text: &str, path: &Path) -> Result<Self, RobotError> {
-        let chain = urdf::read(text, path)?;
+        let chain = urdf::read(text, path, &ChainChoice::default())?;
         let robot = dh::convert(&chain).robot;
         urdf::check_units(&chain, &robot, path)?;
         Ok(robot)
@@ -55,6 +55,14 @@ impl Description {
     /// # Errors
     /// [`RobotError`] with the fault of the file and its line.
     pub fn load(path: &Path) -> Result<Self, RobotError> {
+        Self::load_chain(path, &ChainChoice::default())
+    }
+
+    /// As [`Self::load`], for the chain that `choice` selects in the tree of a URDF file.
+    ///
+    /// # Errors
+    /// [`RobotError`] with the fault of the file and its line, or of the choice.
+    pub fn load_chain(path: &Path, choice: &ChainChoice) -> Result<Self, RobotError> {
         let (text, from) = read_text(path)?;
         let extension = path
             .extension()
@@ -65,6 +73,12 @@ impl Description {
             Some("urdf") => true,
             _ => text.trim_start().starts_with('<'),
         };
+        if !urdf && *choice != ChainChoice::default() {
+            return Err(RobotError::Chain {
+                path: path.into(),
+                message: "--base, --tip and --lock choose a chain of a URDF file, but this file is TOML; leave them out".into(),
+            });
+        }
         if !urdf {
             let (robot, mut remarks) = text::read(&text, path)?;
             remarks.extend(robot.implausible_bodies(None));
@@ -76,7 +90,7 @@ impl Description {
                 urdf: None,
             });
         }
-        let original = Original::read(text, path)?;
+        let original = Original::read_chain(text, path, choice)?;
         let robot = original.robot().clone();
         let mut remarks = original.remarks().to_vec();
         remarks.extend(from.map(|name| {
@@ -94,6 +108,15 @@ impl Description {
             remarks,
         })
     }
+}
+
+/// Checks the values of a URDF file. `choice` selects the chain whose inertia matrix is checked, at poses drawn with `seed`.
+///
+/// # Errors
+/// [`RobotError`] if the file cannot be read or is no URDF.
+pub fn audit_file(path: &Path, choice: &ChainChoice, seed: u64) -> Result<Audit, RobotError> {
+    let (text, _) = read_text(path)?;
+    urdf::audit(&text, path, choice, seed)
 }
 
 /// Reads the whole file as text. Returns its encoding too if that is not UTF-8. Refuses a directory, and a file that is

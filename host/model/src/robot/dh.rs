@@ -175,12 +175,18 @@ fn joint(body: &Body, geometry: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joi
         inertial: Some(body.inertia.seen_from(link_in_frame).inertial()),
         limits: body.limits.clone(),
         friction: body.friction.clone(),
-        drive: body.reduction.map(|gear_ratio| Drive {
-            gear_ratio,
-            ..Drive::default()
-        }),
+        drive: drive(body),
         ..Joint::new(&body.joint, body.kind, geometry)
     }
+}
+
+/// Returns the drive that the file states. Without a gear the motor turns with the joint.
+fn drive(body: &Body) -> Option<Drive> {
+    (body.reduction.is_some() || body.rotor_inertia.is_some()).then(|| Drive {
+        gear_ratio: body.reduction.unwrap_or(1.0),
+        rotor_inertia: body.rotor_inertia.unwrap_or(0.0),
+        ..Drive::default()
+    })
 }
 
 /// Pose of frame i in frame i−1 at joint coordinate `q`.

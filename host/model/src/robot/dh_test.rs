@@ -161,7 +161,7 @@ fn direct(text: &str, q: &HashMap<String, f64>) -> HashMap<String, Seen> {
 
 /// Returns the largest difference between both evaluations over `draws` random configurations, relative to the scale.
 fn worst(text: &str, seed: u64, draws: usize) -> (Robot, f64) {
-    let chain = urdf::read(text, Path::new("test.urdf")).unwrap();
+    let chain = urdf::read(text, Path::new("test.urdf"), &urdf::ChainChoice::default()).unwrap();
     let converted = convert(&chain);
     let robot = converted.robot;
     let mut rng = Pcg64::seed_from_u64(seed);

@@ -110,17 +110,13 @@ pub enum RobotError {
         /// One sentence: the text found and the correction.
         message: String,
     },
-    /// A link that a joint moves has no inertial parameters.
-    #[error("{}:{place}: link `{link}` is moved by joint `{joint}` but has no <inertial>; give its mass, centre of mass and inertia, or describe the robot in TOML, where inertial parameters may be left out", path.display())]
-    NoInertial {
+    /// The chain that was chosen in a URDF file does not exist.
+    #[error("{}: {message}", path.display())]
+    Chain {
         /// The file.
         path: PathBuf,
-        /// Where the link begins.
-        place: Place,
-        /// The link.
-        link: String,
-        /// The joint that moves it.
-        joint: String,
+        /// One sentence: the choice and the correction.
+        message: String,
     },
     /// The description holds an effect that could not be read back.
     #[error("robot `{robot}` cannot be written: {message}")]

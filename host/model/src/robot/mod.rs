@@ -19,6 +19,7 @@ mod check_workspace;
 mod degrees;
 mod description;
 mod dh;
+mod draft;
 mod drive;
 mod drives;
 mod effects;
@@ -51,7 +52,7 @@ mod written;
 
 pub use ball_screw_crank::BallScrewCrank;
 pub use band::{IdentifiedBand, MOST_LEAD};
-pub use description::Description;
+pub use description::{Description, audit_file};
 pub use drive::Drive;
 pub use effects::{EFFECT_NAMES, RobotEffect, plausible_range, title_of, unit_of};
 pub use error::{MAX_BYTES, Place, RobotError};
@@ -64,7 +65,9 @@ pub use serial_robot::Robot;
 pub use templates::{
     DOUBLE_PENDULUM, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, TX40, XL330, template,
 };
-pub use urdf::{Original, Urdf, is_placeholder};
+pub use urdf::{
+    Audit, AuditCheck, AuditFinding, ChainChoice, Original, Urdf, audit, is_placeholder,
+};
 pub use voltage_controller::{AntiWindup, Demand, VoltageController};
 pub use workspace::Region;
 pub use worth::{CONTRADICTED, DESCRIBED, Origin, Quantity, STAND_IN, Worth, worth};

@@ -80,7 +80,7 @@ fn leave_out(table: &mut Table) {
 }
 
 /// Returns the comments by table and key, with the units of a joint of that kind.
-fn comments(kind: JointKind) -> DocumentMut {
+pub(super) fn comments(kind: JointKind) -> DocumentMut {
     let (angle, force) = kind.units();
     let text = include_str!("comments.toml");
     let text = text.replace("{angle}", angle).replace("{force}", force);

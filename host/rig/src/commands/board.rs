@@ -9,6 +9,7 @@ use std::time::Duration;
 use clap::{Args as ClapArgs, Subcommand};
 use rig_shared::wire::message::{Refusal, Report, RequestBody};
 
+use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
 use super::record::{emulated, open_probe, uploaded};
@@ -104,7 +105,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let sent = match &args.action {
         Action::Upload {
             model, leave_out, ..
-        } => uploaded(&described(model, ui)?.robot, *leave_out, ui)?,
+        } => uploaded(
+            &described(model, &ChainArg::default(), ui)?.robot,
+            *leave_out,
+            ui,
+        )?,
         Action::Capture { out, force, .. }
         | Action::Fault {
             out: Some(out),

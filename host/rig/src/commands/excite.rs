@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
+use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
 use super::overwrite::refuse_file;
@@ -98,6 +99,8 @@ pub(crate) struct Args {
     /// Robot description (.toml or .urdf)
     #[arg(long)]
     pub(crate) robot: PathBuf,
+    #[command(flatten)]
+    pub(crate) chain: ChainArg,
     /// File to write: .toml holds the motion's parameters (for the rig), .csv its samples
     #[arg(long)]
     pub(crate) out: PathBuf,
@@ -333,7 +336,7 @@ const NOT_LOOKED_AT: &str = "Not checked: self-collision, collisions with the ta
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     args.refuse_unused()?;
     refuse_file(&args.out, args.force)?;
-    let robot = described(&args.robot, ui)?.robot;
+    let robot = described(&args.robot, &args.chain, ui)?.robot;
     if !args.even_if_wrong && !robot.limits_in_degrees().is_empty() {
         return Err(CommandError::Implausible(
             "A motion sized by limits that look like degrees may break the robot, so none was designed; correct the limits, or give --even-if-wrong if they are right.".to_owned(),

@@ -1,13 +1,15 @@
 //! `rig init`: writes a commented robot description to start from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args as ClapArgs, ValueEnum};
 
+use super::chain_arg::ChainArg;
 use super::error::CommandError;
+use super::input::described;
 use super::overwrite::refuse_file;
 use super::ui::Ui;
-use rig_model::robot;
+use rig_model::robot::{self, ChainChoice};
 use rig_output::write_whole;
 
 /// Robots with a prepared description.
@@ -29,13 +31,21 @@ pub(crate) enum Kind {
     Xl330,
 }
 
-/// Writes a commented robot description to start from.
+/// Writes a commented robot description to start from: an example, or the chain of a URDF file.
+///
+/// A description from a URDF has the same dynamics as the file. Acceleration limits, drives and controllers, which a URDF
+/// does not state, are commented lines to fill in.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     /// Which robot
-    #[arg(value_enum)]
-    pub(crate) kind: Kind,
-    /// File to write [default: the robot's name with .toml]
+    #[arg(value_enum, required_unless_present = "from", conflicts_with = "from")]
+    pub(crate) kind: Option<Kind>,
+    /// URDF file whose values the description gets
+    #[arg(long, value_name = "FILE")]
+    pub(crate) from: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) chain: ChainArg,
+    /// File to write [default: the robot's name, or that of the URDF file, with .toml]
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,
     /// Replace the file if it exists
@@ -48,7 +58,21 @@ pub(crate) struct Args {
 /// # Errors
 /// The file exists already or cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let (name, text) = match args.kind {
+    let Some(kind) = args.kind else {
+        return match &args.from {
+            Some(from) => from_urdf(from, args, ui),
+            None => Err(CommandError::Sentence(
+                "Name a robot, or a URDF file with --from.".to_owned(),
+            )),
+        };
+    };
+    if args.chain.choice() != ChainChoice::default() {
+        return Err(CommandError::Sentence(
+            "--base, --tip and --lock choose a chain of a URDF file; give one with --from."
+                .to_owned(),
+        ));
+    }
+    let (name, text) = match kind {
         Kind::OneLink => ("one-link.toml", robot::ONE_LINK_TEMPLATE),
         Kind::Edda => ("edda.toml", robot::EDDA_TEMPLATE),
         Kind::Irp6 => ("irp6.toml", robot::IRP6_TEMPLATE),
@@ -63,6 +87,42 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     ui.say(&format!(
         "{}: change the values that differ on your rig, then give the file to the other commands with --robot.",
         path.display()
+    ));
+    Ok(())
+}
+
+/// Writes the chain of a URDF file as TOML.
+fn from_urdf(from: &Path, args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let name = from.with_extension("toml");
+    let name = name
+        .file_name()
+        .map_or_else(|| PathBuf::from("robot.toml"), PathBuf::from);
+    let path = args.out.clone().unwrap_or(name);
+    refuse_file(&path, args.force)?;
+    let description = described(from, &args.chain, ui)?;
+    if description.urdf.is_none() {
+        return Err(CommandError::Sentence(format!(
+            "{} is a TOML description already; --from takes a URDF file.",
+            from.display()
+        )));
+    }
+    let source = from
+        .file_name()
+        .unwrap_or(from.as_os_str())
+        .to_string_lossy();
+    let mut head = vec![
+        format!(
+            "The chain of {source} with its dynamics. Lines that begin with # hold what a URDF does not state:"
+        ),
+        "remove the # and write a value behind the = to use one.".to_owned(),
+    ];
+    head.extend(description.remarks.iter().cloned());
+    let text = description.robot.to_toml_draft(&head)?;
+    write_whole(&path, text.as_bytes())?;
+    ui.say(&format!(
+        "{}: {} joints; fill in the commented lines that you know, then give the file to the other commands with --robot.",
+        path.display(),
+        description.robot.joints.len()
     ));
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
 
+use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
 use rig_data::prepare::{PrepareError, Recording};
@@ -22,9 +23,21 @@ pub(crate) struct RobotArg {
     /// Robot description, TOML or URDF (`rig init` writes one to start from)
     #[arg(long = "robot", value_name = "FILE")]
     path: PathBuf,
+    #[command(flatten)]
+    chain: ChainArg,
 }
 
 impl RobotArg {
+    /// Returns the file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns the chain that the options select.
+    pub(crate) fn chain(&self) -> &ChainArg {
+        &self.chain
+    }
+
     /// Returns a remark if the robot is a URDF file and a TOML description of the same name exists beside it.
     pub(crate) fn fuller(&self) -> Option<String> {
         let urdf = self.path.extension().is_some_and(|end| end == "urdf");
@@ -45,12 +58,22 @@ impl RobotArg {
         Ok(self.describe(ui)?.robot)
     }
 
+    /// Loads the robot whose values go into another URDF file, which the options on the chain concern: a TOML has one.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub(crate) fn describe_for_another(&self, ui: &Ui) -> Result<Description, CommandError> {
+        let toml = self.path.extension().is_some_and(|end| end == "toml");
+        let none = ChainArg::default();
+        described(&self.path, if toml { &none } else { &self.chain }, ui)
+    }
+
     /// Loads the robot together with the file that it was read from.
     ///
     /// # Errors
     /// As [`Self::load`].
     pub(crate) fn describe(&self, ui: &Ui) -> Result<Description, CommandError> {
-        described(&self.path, ui)
+        described(&self.path, &self.chain, ui)
     }
 }
 
@@ -58,8 +81,12 @@ impl RobotArg {
 ///
 /// # Errors
 /// Names the error in the file and its line.
-pub(crate) fn described(path: &Path, ui: &Ui) -> Result<Description, CommandError> {
-    let description = Description::load(path)?;
+pub(crate) fn described(
+    path: &Path,
+    chain: &ChainArg,
+    ui: &Ui,
+) -> Result<Description, CommandError> {
+    let description = Description::load_chain(path, &chain.choice())?;
     for remark in &description.remarks {
         ui.remark(remark);
     }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 use rig_shared::wire::message::RequestBody;
 
+use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
 use super::interrupts;
@@ -46,6 +47,8 @@ pub(crate) struct Args {
     /// Robot description; its model, friction and limits are sent to the rig first
     #[arg(long)]
     robot: Option<PathBuf>,
+    #[command(flatten)]
+    chain: ChainArg,
     /// Trajectory to load (`rig excite` writes one); the page can load another
     #[arg(long)]
     trajectory: Option<PathBuf>,
@@ -89,7 +92,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         )));
     }
     let robot = match &args.robot {
-        Some(path) => Some(described(path, ui)?.robot),
+        Some(path) => Some(described(path, &args.chain, ui)?.robot),
         None => None,
     };
     let hardware = args.port.is_some() || args.probe;

@@ -1,7 +1,9 @@
 //! The commands of the program, one file each: read the arguments, call the library, report the results.
 
+mod audit;
 mod base;
 mod board;
+mod chain_arg;
 mod demo;
 mod diagnose;
 mod error;

@@ -9,6 +9,7 @@ use clap::{ArgGroup, Args as ClapArgs};
 use rig_shared::safety::{FaultRecord, Limit, Mode};
 use rig_shared::wire::message::RequestBody;
 
+use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
 use super::interrupts;
@@ -45,6 +46,8 @@ pub(crate) struct Args {
     /// Robot description; its model, friction and limits are sent to the rig first
     #[arg(long)]
     robot: Option<PathBuf>,
+    #[command(flatten)]
+    chain: ChainArg,
     /// Trajectory to run (`rig excite` writes one); without it the rig stays disarmed
     #[arg(long)]
     trajectory: Option<PathBuf>,
@@ -84,7 +87,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     refuse_file(&args.out, args.force)?;
     let robot = match &args.robot {
-        Some(path) => Some(described(path, ui)?.robot),
+        Some(path) => Some(described(path, &args.chain, ui)?.robot),
         None => None,
     };
     let mut settings: Vec<RequestBody> = args

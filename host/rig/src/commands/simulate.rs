@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::{described, real};
 use super::overwrite::refuse_file;
@@ -29,6 +30,8 @@ pub(crate) struct Args {
     /// Robot description (.toml or .urdf) with inertia and friction
     #[arg(long)]
     pub(crate) robot: PathBuf,
+    #[command(flatten)]
+    pub(crate) chain: ChainArg,
     /// Trajectory written by `rig excite` (.toml or .csv), or a recording whose reference is repeated
     #[arg(long)]
     pub(crate) trajectory: PathBuf,
@@ -77,7 +80,7 @@ pub(crate) struct Args {
 /// # Errors
 /// A file cannot be read or written, or the model cannot be simulated.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = described(&args.robot, ui)?.robot;
+    let robot = described(&args.robot, &args.chain, ui)?.robot;
     if real(&args.out) == real(&args.trajectory) {
         return Err(CommandError::Sentence(format!(
             "--out {} is the trajectory itself; give another file.",

@@ -4,13 +4,16 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
+use super::audit;
 use super::error::CommandError;
 use super::input::{RobotArg, described};
 use super::overwrite::refuse_file;
 use super::ui::Ui;
 use rig_output::write_whole;
 
-/// Writes a robot description as URDF for simulators and other libraries, and names the values that URDF cannot hold.
+/// Writes a robot description as URDF for simulators and other libraries, or checks the values of a URDF (--audit).
+///
+/// Values that URDF cannot hold are named.
 ///
 /// A TOML description becomes a file of links without meshes. With --into its values are written into a copy of another
 /// URDF of the same robot; names, frames, meshes and comments of that file stay unchanged.
@@ -22,8 +25,17 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     into: Option<PathBuf>,
     /// File to write (.urdf)
-    #[arg(long)]
-    out: PathBuf,
+    #[arg(long, required_unless_present = "audit", conflicts_with = "audit")]
+    out: Option<PathBuf>,
+    /// Check the values of the URDF instead: masses, inertias, shapes, limits, the inertia matrix; writes nothing
+    #[arg(long, conflicts_with = "into")]
+    audit: bool,
+    /// Print the findings as JSON (--audit)
+    #[arg(long, requires = "audit")]
+    json: bool,
+    /// Seed of the poses at which the inertia matrix is checked (--audit)
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Replace the file if it exists
     #[arg(long)]
     force: bool,
@@ -34,13 +46,20 @@ pub(crate) struct Args {
 /// # Errors
 /// The description is wrong, a link has no inertial parameters, or the file cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    refuse_file(&args.out, args.force)?;
-    let description = args.robot.describe(ui)?;
+    let (false, Some(out)) = (args.audit, &args.out) else {
+        let choice = args.robot.chain().choice();
+        return audit::run(args.robot.path(), &choice, args.seed, args.json, ui);
+    };
+    refuse_file(out, args.force)?;
+    let description = match args.into {
+        Some(_) => args.robot.describe_for_another(ui)?,
+        None => args.robot.describe(ui)?,
+    };
     let robot = &description.robot;
     let into = args
         .into
         .as_deref()
-        .map(|path| described(path, ui))
+        .map(|path| described(path, args.robot.chain(), ui))
         .transpose()?;
     let original = match (&args.into, into) {
         (Some(path), Some(into)) => Some(into.urdf.ok_or_else(|| {
@@ -55,7 +74,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         Some(original) => original.with_values(robot)?,
         None => robot.to_urdf()?,
     };
-    write_whole(&args.out, urdf.text.as_bytes())?;
+    write_whole(out, urdf.text.as_bytes())?;
     for remark in &urdf.remarks {
         ui.remark(remark);
     }
@@ -66,7 +85,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     ui.say(&format!(
         "{}: {} joints; {what}.",
-        args.out.display(),
+        out.display(),
         robot.joints.len()
     ));
     Ok(())

@@ -14,7 +14,8 @@ pub(in crate::robot) struct Body {
     pub place: Place,
     /// The link that the joint moves.
     pub link: String,
-    /// Links of this body with an `<inertial>`: the link that the joint moves, and links fixed to it.
+    /// Links of this body with an `<inertial>`: the link that the joint moves, and links fixed to it. Links behind locked
+    /// joints are not among them.
     pub heavy: Vec<String>,
     pub kind: JointKind,
     /// Frame of this joint (its child link) in the frame of the previous body at q = 0.
@@ -23,9 +24,13 @@ pub(in crate::robot) struct Body {
     pub axis: Vector3<f64>,
     /// Inertia in the joint's frame, including everything fixed to the link.
     pub inertia: SpatialInertia,
+    /// The part of `inertia` that is behind locked joints.
+    pub locked: SpatialInertia,
     pub limits: Option<JointLimits>,
     pub friction: Option<JointFriction>,
     pub reduction: Option<f64>,
+    /// Inertia of the rotor on the motor side, kg·m².
+    pub rotor_inertia: Option<f64>,
 }
 
 /// The movable bodies from the base outwards; gravity points along −z of the base link.
@@ -34,7 +39,7 @@ pub(in crate::robot) struct Chain {
     pub name: String,
     /// Name of the file.
     pub file: String,
-    /// The base link.
+    /// The link in whose frame gravity points along −z: the root of the tree.
     pub base: String,
     pub bodies: Vec<Body>,
     /// Remarks for the user, one sentence each.

@@ -161,3 +161,16 @@ pub(super) fn spliced(text: &str, mut edits: Vec<Edit>) -> String {
     out.push_str(text.get(done..).unwrap_or_default());
     out
 }
+
+/// Writes the rotor inertia (kg·m², motor side) into the elements of the file that state it.
+pub(super) fn put_rotor(places: &[Xml<'_>], inertia: f64, edits: &mut Vec<Edit>) {
+    for value in places
+        .iter()
+        .filter_map(|node| node.attribute_node("value"))
+    {
+        edits.push(Edit {
+            range: value.range_value(),
+            text: format!("{inertia:?}"),
+        });
+    }
+}

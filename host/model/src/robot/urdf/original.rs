@@ -11,10 +11,12 @@ use rig_shared::multibody::{COLUMNS, column};
 use roxmltree::Document;
 
 use super::chain::Chain;
-use super::edits::{Edit, at, put_friction, put_inertia, spliced};
+use super::choice::ChainChoice;
+use super::edits::{Edit, at, put_friction, put_inertia, put_rotor, spliced};
+use super::read::read;
 use super::reader::{Xml, parsed};
 use super::spatial::SpatialInertia;
-use super::tree::read;
+use super::transmissions::rotor_of;
 use super::unit_check::check_units;
 use super::write::{Urdf, comment, escaped, levelled, rpy};
 use crate::robot::dh::convert;
@@ -45,7 +47,15 @@ impl Original {
     /// # Errors
     /// [`RobotError`], as [`Robot::from_urdf`].
     pub fn read(text: String, path: &Path) -> Result<Self, RobotError> {
-        let mut chain = read(&text, path)?;
+        Self::read_chain(text, path, &ChainChoice::default())
+    }
+
+    /// As [`Self::read`], for the chain that `choice` selects.
+    ///
+    /// # Errors
+    /// [`RobotError`], as [`Robot::from_urdf`], also if the choice does not fit the file.
+    pub fn read_chain(text: String, path: &Path, choice: &ChainChoice) -> Result<Self, RobotError> {
+        let mut chain = read(&text, path, choice)?;
         let converted = convert(&chain);
         check_units(&chain, &converted.robot, path)?;
         chain.remarks.extend(converted.remarks);
@@ -66,6 +76,12 @@ impl Original {
     /// Returns the remarks on the file, one sentence each.
     pub fn remarks(&self) -> &[String] {
         &self.chain.remarks
+    }
+
+    /// Returns the chain as it was read.
+    #[cfg(test)]
+    pub(super) fn chain_for_tests(&self) -> &Chain {
+        &self.chain
     }
 
     /// Returns the link that joint `joint` (from 0) moves.
@@ -90,7 +106,10 @@ impl Original {
             remarks.insert(0, remark);
         }
         self.level(&document, robot, &mut edits, &mut remarks);
-        robot.left_out(&rows, &mut remarks);
+        let rotors: Vec<bool> = (self.chain.bodies.iter())
+            .map(|body| body.rotor_inertia.is_some())
+            .collect();
+        robot.left_out(&rows, &rotors, &mut remarks);
         if edits.is_empty() {
             return Ok(Urdf {
                 text: self.text.clone(),
@@ -137,7 +156,10 @@ impl Original {
                     .as_ref()
                     .is_none_or(|own| !same(own, inertial))
             {
-                let seen = SpatialInertia::of(written).seen_from(&self.links[k].inverse());
+                // What is behind locked joints stays in its own links.
+                let seen = SpatialInertia::of(written)
+                    .seen_from(&self.links[k].inverse())
+                    .minus(&body.locked);
                 let (link, merged) = put_inertia(document, body, &seen, edits).map_err(|why| {
                     RobotError::NotUrdf {
                         joint: joint.name.clone(),
@@ -151,6 +173,16 @@ impl Original {
             let [new, old] = [rows, &before].map(|rows| places.map(|place| rows[k][place]));
             if new != old && put_friction(document, &joint.name, new, edits) {
                 replaced.frictions.push(joint.name.as_str());
+            }
+            let [new, old] = [rows, &before].map(|rows| rows[k][column::DRIVE_INERTIA]);
+            if body.rotor_inertia.is_some() && new != old {
+                let rotor = new / joint.gear_ratio().powi(2);
+                put_rotor(
+                    &rotor_of(document.root_element(), &joint.name),
+                    rotor,
+                    edits,
+                );
+                replaced.rotors.push(joint.name.as_str());
             }
         }
         if !replaced.inertias.is_empty() {
@@ -254,6 +286,8 @@ struct Replaced<'a> {
     inertias: Vec<&'a str>,
     /// Joints with another friction.
     frictions: Vec<&'a str>,
+    /// Joints with another rotor.
+    rotors: Vec<&'a str>,
 }
 
 impl Replaced<'_> {
@@ -265,6 +299,7 @@ impl Replaced<'_> {
         let replaced: Vec<String> = [
             listed(&self.inertias, "the inertial values"),
             listed(&self.frictions, "damping and friction"),
+            listed(&self.rotors, "the rotor inertia"),
         ]
         .into_iter()
         .flatten()

@@ -88,7 +88,12 @@ fn torques(robot: &Robot, gravity: [f64; 3], q: &[f64], qd: &[f64], qdd: &[f64])
 /// Checks that the written file has the dynamics of `robot`: body by body in the author's base frame, and as torques.
 fn same_dynamics(original: &Original, robot: &Robot, rng: &mut Pcg64) {
     let text = original.with_values(robot).unwrap().text;
-    let chain = crate::robot::urdf::read(&text, Path::new("r.urdf")).unwrap();
+    let chain = crate::robot::urdf::read(
+        &text,
+        Path::new("r.urdf"),
+        &crate::robot::ChainChoice::default(),
+    )
+    .unwrap();
     let back = convert(&chain).robot;
     let tilted = robot.gravity != original.robot().gravity;
     for _ in 0..5 {

@@ -20,7 +20,8 @@ pub(super) struct Reader<'a> {
 }
 
 /// Correction for a macro.
-const EXPAND: &str = "which is an unexpanded macro; run xacro over the file first";
+const EXPAND: &str =
+    "which is an unexpanded macro; run xacro over the file first: xacro FILE -o arm.urdf";
 
 /// Elements whose contents do not enter the dynamics and may hold text of other programs.
 const FOREIGN: [&str; 5] = ["visual", "collision", "gazebo", "sensor", "ros2_control"];

@@ -10,15 +10,22 @@ use crate::robot::serial_robot::Robot;
 use rig_output::format_significant;
 
 impl Robot {
-    /// Adds remarks on values that the file does not hold.
-    pub(super) fn left_out(&self, parameters: &[[f64; COLUMNS]], remarks: &mut Vec<String>) {
+    /// Adds remarks on values that the file does not hold. `rotors`: for each joint, whether the file holds its rotor.
+    pub(super) fn left_out(
+        &self,
+        parameters: &[[f64; COLUMNS]],
+        rotors: &[bool],
+        remarks: &mut Vec<String>,
+    ) {
         let list = |place: usize, unit: fn(JointKind) -> &'static str| {
+            let held = |k: usize| place == column::DRIVE_INERTIA && rotors.get(k) == Some(&true);
             let entries: Vec<String> = self
                 .joints
                 .iter()
                 .zip(parameters)
-                .filter(|(_, row)| row[place] != 0.0)
-                .map(|(joint, row)| {
+                .enumerate()
+                .filter(|(k, (_, row))| row[place] != 0.0 && !held(*k))
+                .map(|(_, (joint, row))| {
                     let value = format_significant(row[place], 4);
                     format!("{} {value} {}", joint.name, unit(joint.kind))
                 })

@@ -4,6 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::names::nearest;
 use super::reader::{Reader, Xml};
 use crate::robot::error::{Place, RobotError};
 use rig_output::listed;
@@ -18,7 +19,10 @@ struct Element {
 
 /// The elements that enter a robot's dynamics (https://wiki.ros.org/urdf/XML).
 const ELEMENTS: [Element; 14] = [
-    element("robot", &[], &["name", "version"]),
+    Element {
+        often: &["link", "joint", "transmission", "material", "gazebo"],
+        ..element("robot", &[], &["name", "version"])
+    },
     Element {
         often: &["visual", "collision"],
         ..element("link", &["inertial"], &["name", "type"])
@@ -150,8 +154,9 @@ impl<'a> Reader<'a> {
             }
             let names = known.once.iter().chain(known.often);
             let is_known = names.clone().any(|other| *other == tag);
-            let missing =
-                names.filter(|other| !children.iter().any(|own| own.has_tag_name(**other)));
+            let missing = (names.copied()).filter(|other| {
+                known.often.contains(other) || !children.iter().any(|own| own.has_tag_name(*other))
+            });
             if let (Some(suggestion), false) = (nearest(tag, missing), is_known) {
                 return Err(self.error(
                     *child,
@@ -175,10 +180,8 @@ impl<'a> Reader<'a> {
         let mut counted = false;
         for attribute in own.filter(|own| !known.attributes.contains(&own.name())) {
             let (name, tag) = (attribute.name(), known.name);
-            let missing = known
-                .attributes
-                .iter()
-                .filter(|other| !node.has_attribute(**other));
+            let missing =
+                (known.attributes.iter().copied()).filter(|other| !node.has_attribute(*other));
             if let Some(suggestion) = nearest(name, missing) {
                 return Err(self.error(
                     node,
@@ -202,36 +205,6 @@ impl<'a> Reader<'a> {
             None => format!("<{tag}>"),
         }
     }
-}
-
-/// Returns the known name within two typing errors of `written`: missing, added or exchanged letters, or another case.
-/// Names of up to four letters allow one error.
-fn nearest<'n>(
-    written: &str,
-    names: impl Iterator<Item = &'n &'static str>,
-) -> Option<&'static str> {
-    let apart = |name: &str| slips(&written.to_lowercase(), name);
-    let near = names.map(|name| (apart(name), *name));
-    let most = if written.len() <= 4 { 1 } else { 2 };
-    near.filter(|(slips, _)| *slips <= most)
-        .min_by_key(|(slips, _)| *slips)
-        .map(|(_, name)| name)
-}
-
-/// Returns the number of letters to insert, delete or exchange to turn `a` into `b` (Levenshtein 1966).
-fn slips(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut corner = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let exchanged = corner + usize::from(x != *y);
-            corner = row[j + 1];
-            row[j + 1] = exchanged.min(row[j] + 1).min(corner + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]

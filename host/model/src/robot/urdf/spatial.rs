@@ -60,6 +60,14 @@ impl SpatialInertia {
         }
     }
 
+    pub(super) fn minus(&self, other: &Self) -> Self {
+        Self {
+            mass: self.mass - other.mass,
+            first_moment: self.first_moment - other.first_moment,
+            inertia: self.inertia - other.inertia,
+        }
+    }
+
     /// Builds the body from a description's values, in the frame of its joint.
     pub(in crate::robot) fn of(inertial: &Inertial) -> Self {
         let [xx, xy, xz, yy, yz, zz] = inertial.inertia;

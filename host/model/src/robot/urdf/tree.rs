@@ -1,62 +1,126 @@
-//! Converts the tree of links to a chain of bodies, each moved by one joint.
+//! The tree of links and joints of a URDF file.
 
-use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::Path;
 
-use nalgebra::{Isometry3, Vector3};
-use rig_shared::multibody::MAX_JOINTS;
-
-use super::chain::{Body, Chain};
-use super::reader::{Reader, Xml, child, parsed};
-use super::spatial::SpatialInertia;
+use super::reader::{Reader, Xml, child};
 use crate::robot::error::{Place, RobotError};
-use crate::robot::joint::JointKind;
 
-/// Reads the text of a file; `path` only names it in messages.
-pub(in crate::robot) fn read(text: &str, path: &Path) -> Result<Chain, RobotError> {
-    let document = parsed(text, path)?;
-    Reader {
-        path,
-        document: &document,
-        remarks: RefCell::default(),
+/// How a joint lets its link move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Motion {
+    Fixed,
+    Revolute,
+    /// A revolute joint that turns without end.
+    Continuous,
+    Prismatic,
+    /// Several degrees of freedom.
+    Floating,
+    /// Several degrees of freedom in a plane.
+    Planar,
+}
+
+impl Motion {
+    /// Returns true if the joint has one coordinate.
+    pub(super) fn is_single(self) -> bool {
+        matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)
     }
-    .chain()
-}
 
-/// A movable joint with the pose of its parent link in the frame of the body before it.
-type Outgoing<'a> = (Xml<'a>, Isometry3<f64>);
-
-/// The joint and the parent of a link.
-struct Above<'a> {
-    joint: &'a str,
-    parent: &'a str,
-}
-
-/// Returns the joints of the closed loop above `link` on the path to the base; `None` if the path ends at a base.
-fn loop_above(link: &str, above: &HashMap<&str, Above>) -> Option<String> {
-    let mut way: Vec<&Above> = Vec::new();
-    let mut link = link;
-    while let Some(next) = above.get(link) {
-        if let Some(first) = way.iter().position(|seen| seen.joint == next.joint) {
-            let names = way[first..].iter().rev();
-            let names: Vec<String> = names.map(|own| format!("`{}`", own.joint)).collect();
-            return Some(names.join(", "));
+    /// Returns the unit of the joint's coordinate.
+    pub(super) fn unit(self) -> &'static str {
+        match self {
+            Self::Prismatic => "m",
+            _ => "rad",
         }
-        way.push(next);
-        link = next.parent;
     }
-    None
 }
 
-/// A link with all links fixed to it.
-struct Rigid<'a> {
-    /// In the frame of the link; `None` if no part has an inertia.
-    inertia: Option<SpatialInertia>,
-    /// Links that have an inertia.
-    heavy: Vec<String>,
-    /// The only movable joint after it.
-    outgoing: Option<Outgoing<'a>>,
+/// `<mimic>`: q = multiplier · q of the master + offset.
+pub(super) struct Mimic<'a> {
+    pub node: Xml<'a>,
+    pub master: &'a str,
+    pub multiplier: f64,
+    pub offset: f64,
+}
+
+/// A joint of the file.
+pub(super) struct TreeJoint<'a> {
+    pub name: &'a str,
+    pub node: Xml<'a>,
+    pub motion: Motion,
+    pub parent: &'a str,
+    pub child: &'a str,
+    pub mimic: Option<Mimic<'a>>,
+}
+
+/// All links and joints of the file. Every link has one joint above it at most, and no loop exists.
+pub(super) struct Tree<'a> {
+    /// Links in the order of the file.
+    pub links: Vec<(&'a str, Xml<'a>)>,
+    pub by_name: HashMap<&'a str, Xml<'a>>,
+    pub joints: Vec<TreeJoint<'a>>,
+    /// Joints that leave a link.
+    below: HashMap<&'a str, Vec<usize>>,
+    /// The joint that moves a link.
+    above: HashMap<&'a str, usize>,
+}
+
+impl<'a> Tree<'a> {
+    /// Returns the joints (their indices) that leave `link`.
+    pub(super) fn below(&self, link: &str) -> impl Iterator<Item = usize> + '_ {
+        self.below.get(link).into_iter().flatten().copied()
+    }
+
+    /// Returns the links that no joint moves.
+    pub(super) fn roots(&self) -> Vec<(&'a str, Xml<'a>)> {
+        let is_root = |(name, _): &&(&'a str, Xml<'a>)| !self.above.contains_key(name);
+        self.links.iter().filter(is_root).copied().collect()
+    }
+
+    /// Returns the joints (their indices) from the root of the tree to `link`.
+    pub(super) fn path_to(&self, link: &str) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut link = link;
+        while let Some(&joint) = self.above.get(link) {
+            path.push(joint);
+            link = self.joints[joint].parent;
+        }
+        path.reverse();
+        path
+    }
+
+    /// Returns the index of the joint called `name`.
+    pub(super) fn joint(&self, name: &str) -> Option<usize> {
+        self.joints.iter().position(|joint| joint.name == name)
+    }
+
+    /// Returns all links, each one after the link that carries it.
+    pub(super) fn outwards(&self) -> Vec<&'a str> {
+        let mut order: Vec<&'a str> = self.roots().into_iter().map(|(name, _)| name).collect();
+        let mut next = 0;
+        while let Some(&link) = order.get(next) {
+            order.extend(self.below(link).map(|joint| self.joints[joint].child));
+            next += 1;
+        }
+        order
+    }
+
+    /// Returns the joints of the closed loop above `link` on the path to the base; `None` if the path ends at a base.
+    fn loop_above(&self, link: &str) -> Option<String> {
+        let mut way: Vec<usize> = Vec::new();
+        let mut link = link;
+        while let Some(&next) = self.above.get(link) {
+            if let Some(first) = way.iter().position(|seen| *seen == next) {
+                let names = way[first..].iter().rev();
+                let names: Vec<String> = names
+                    .map(|own| format!("`{}`", self.joints[*own].name))
+                    .collect();
+                return Some(names.join(", "));
+            }
+            way.push(next);
+            link = self.joints[next].parent;
+        }
+        None
+    }
 }
 
 impl<'a> Reader<'a> {
@@ -94,7 +158,42 @@ impl<'a> Reader<'a> {
         self.attribute(node, "link")
     }
 
-    pub(super) fn chain(&self) -> Result<Chain, RobotError> {
+    fn tree_joint(&self, name: &'a str, node: Xml<'a>) -> Result<TreeJoint<'a>, RobotError> {
+        let motion = match self.attribute(node, "type")? {
+            "fixed" => Motion::Fixed,
+            "revolute" => Motion::Revolute,
+            "continuous" => Motion::Continuous,
+            "prismatic" => Motion::Prismatic,
+            "floating" => Motion::Floating,
+            "planar" => Motion::Planar,
+            other => {
+                return Err(self.error(node, format!("joint `{name}` is of type \"{other}\", but only revolute, continuous, prismatic and fixed joints can be read")));
+            }
+        };
+        let mimic = match child(node, "mimic") {
+            Some(own) => Some(Mimic {
+                node: own,
+                master: self.attribute(own, "joint")?,
+                multiplier: self.optional_number(own, "multiplier")?.unwrap_or(1.0),
+                offset: self.optional_number(own, "offset")?.unwrap_or(0.0),
+            }),
+            None => None,
+        };
+        Ok(TreeJoint {
+            name,
+            node,
+            motion,
+            parent: self.end(node, "parent")?,
+            child: self.end(node, "child")?,
+            mimic,
+        })
+    }
+
+    /// Reads the links and joints of the file and how they hang together.
+    ///
+    /// # Errors
+    /// The file is no URDF, or its links do not form trees.
+    pub(super) fn tree(&self) -> Result<Tree<'a>, RobotError> {
         let root = self.document.root_element();
         if root.tag_name().name() != "robot" {
             return Err(self.error(
@@ -107,171 +206,33 @@ impl<'a> Reader<'a> {
         }
         self.expanded()?;
         self.as_described()?;
-        let links: HashMap<&str, Xml<'a>> = self.named("link")?.into_iter().collect();
-        let joints = self.named("joint")?;
-        let reductions = self.reductions(&joints)?;
-        let mut children: HashMap<&str, Vec<Xml<'a>>> = HashMap::new();
-        let mut above: HashMap<&str, Above<'a>> = HashMap::new();
-        for &(name, node) in &joints {
-            let (parent, moved) = (self.end(node, "parent")?, self.end(node, "child")?);
-            for link in [parent, moved] {
-                if !links.contains_key(link) {
+        let links = self.named("link")?;
+        let mut tree = Tree {
+            by_name: links.iter().copied().collect(),
+            links,
+            joints: Vec::new(),
+            below: HashMap::new(),
+            above: HashMap::new(),
+        };
+        for (index, (name, node)) in self.named("joint")?.into_iter().enumerate() {
+            let joint = self.tree_joint(name, node)?;
+            for link in [joint.parent, joint.child] {
+                if !tree.by_name.contains_key(link) {
                     return Err(self.error(node, format!("joint `{name}` names link `{link}`, which the file does not describe; add <link name=\"{link}\"> or correct the name")));
                 }
             }
-            if let Some(first) = above.insert(
-                moved,
-                Above {
-                    joint: name,
-                    parent,
-                },
-            ) {
-                let first = first.joint;
+            if let Some(first) = tree.above.insert(joint.child, index) {
+                let (moved, first) = (joint.child, tree.joints[first].name);
                 return Err(self.error(node, format!("link `{moved}` is the child of joint `{first}` and of joint `{name}`, a closed loop; only a serial chain from base to tip can be read")));
             }
-            children.entry(parent).or_default().push(node);
+            tree.below.entry(joint.parent).or_default().push(index);
+            tree.joints.push(joint);
         }
-        for &(_, node) in &joints {
-            if let Some(names) = loop_above(self.end(node, "child")?, &above) {
-                return Err(self.error(node, format!("joints {names} form a closed loop; only a serial chain from base to tip can be read, so let one of them leave a link outside of it")));
+        for joint in &tree.joints {
+            if let Some(names) = tree.loop_above(joint.child) {
+                return Err(self.error(joint.node, format!("joints {names} form a closed loop; only a serial chain from base to tip can be read, so let one of them leave a link outside of it")));
             }
         }
-        let base = self.base(root, &above)?;
-        let mut bodies = Vec::new();
-        let mut outgoing = self.rigid_body(base, &links, &children)?.outgoing;
-        while let Some((joint, to_joint)) = outgoing {
-            if bodies.len() == MAX_JOINTS {
-                return Err(self.error(joint, format!("this is movable joint {} of the chain, but a robot has at most {MAX_JOINTS}", MAX_JOINTS + 1)));
-            }
-            let (body, next) = self.body(joint, to_joint, &links, &children, &reductions)?;
-            bodies.push(body);
-            outgoing = next;
-        }
-        if bodies.is_empty() {
-            return Err(self.error(root, "the robot has no movable joint; it needs at least one revolute, continuous or prismatic joint".into()));
-        }
-        let moving = joints
-            .iter()
-            .filter(|(_, n)| n.attribute("type") != Some("fixed"))
-            .count();
-        if moving != bodies.len() {
-            return Err(self.error(root, format!("{} of the {moving} movable joints are not connected to base link `{base}`; every joint must belong to one chain", moving - bodies.len())));
-        }
-        Ok(Chain {
-            name: root.attribute("name").unwrap_or("robot").to_owned(),
-            file: self.path.display().to_string(),
-            base: base.to_owned(),
-            bodies,
-            remarks: self.remarks.take(),
-        })
-    }
-
-    fn base(&self, root: Xml<'a>, above: &HashMap<&str, Above>) -> Result<&'a str, RobotError> {
-        let mut roots = Vec::new();
-        for (name, node) in self.named("link")? {
-            if !above.contains_key(name) {
-                roots.push((name, node));
-            }
-        }
-        match roots.as_slice() {
-            [] => Err(self.error(root, "the robot has no link; it needs a base link and one for each joint to move".into())),
-            [(name, _)] => Ok(name),
-            [(first, _), (second, node), ..] => Err(self.error(*node, format!("links `{first}` and `{second}` are both no joint's child; connect them by a fixed joint so that there is one base"))),
-        }
-    }
-
-    /// Joins `link` with all links fixed to it.
-    fn rigid_body(
-        &self,
-        link: &'a str,
-        links: &HashMap<&str, Xml<'a>>,
-        children: &HashMap<&str, Vec<Xml<'a>>>,
-    ) -> Result<Rigid<'a>, RobotError> {
-        let mut total: Option<SpatialInertia> = None;
-        let mut heavy = Vec::new();
-        let mut outgoing: Option<Outgoing<'a>> = None;
-        let mut pending = vec![(link, Isometry3::identity())];
-        while let Some((name, pose)) = pending.pop() {
-            if let Some(&node) = links.get(name)
-                && let Some(part) = self.inertial(node)?
-            {
-                heavy.push(name.to_owned());
-                total = Some(
-                    total
-                        .unwrap_or_else(SpatialInertia::zero)
-                        .plus(&part.seen_from(&pose)),
-                );
-            }
-            for &joint in children.get(name).into_iter().flatten() {
-                if self.attribute(joint, "type")? == "fixed" {
-                    pending.push((self.end(joint, "child")?, pose * self.origin(joint)?));
-                } else if let Some((other, _)) = outgoing {
-                    let of = |n: Xml<'a>| n.attribute("name").unwrap_or_default();
-                    return Err(self.error(joint, format!(
-                        "the robot branches at link `{name}`: joints `{}` and `{}` both leave it or what is fixed to it; only a serial chain from base to tip can be read, so remove one branch or make its joint fixed",
-                        of(other), of(joint)
-                    )));
-                } else {
-                    outgoing = Some((joint, pose));
-                }
-            }
-        }
-        Ok(Rigid {
-            inertia: total,
-            heavy,
-            outgoing,
-        })
-    }
-
-    fn body(
-        &self,
-        node: Xml<'a>,
-        to_parent: Isometry3<f64>,
-        links: &HashMap<&str, Xml<'a>>,
-        children: &HashMap<&str, Vec<Xml<'a>>>,
-        reductions: &HashMap<&str, f64>,
-    ) -> Result<(Body, Option<Outgoing<'a>>), RobotError> {
-        let name = self.attribute(node, "name")?;
-        let kind_name = self.attribute(node, "type")?;
-        let kind = match kind_name {
-            "revolute" | "continuous" => JointKind::Revolute,
-            "prismatic" => JointKind::Prismatic,
-            other => return Err(self.error(node, format!("joint `{name}` is of type \"{other}\", but only revolute, continuous, prismatic and fixed joints can be read"))),
-        };
-        if let Some(mimic) = child(node, "mimic") {
-            return Err(self.error(mimic, format!("joint `{name}` mimics another joint, but only independent joints can be read; make it fixed or remove <mimic>")));
-        }
-        let axis = match child(node, "axis") {
-            // The default of the URDF definition.
-            None => Vector3::x(),
-            Some(axis_node) => {
-                let axis = self.vector(axis_node, "xyz")?.unwrap_or_else(Vector3::x);
-                axis.try_normalize(1e-9).ok_or_else(|| self.error(axis_node, format!("the axis of joint `{name}` is the zero vector, but it must be a direction such as \"0 0 1\"")))?
-            }
-        };
-        let link = self.end(node, "child")?;
-        let rigid = self.rigid_body(link, links, children)?;
-        let inertia = rigid.inertia.ok_or_else(|| RobotError::NoInertial {
-            path: self.path.into(),
-            place: links
-                .get(link)
-                .map_or_else(|| self.place(node), |n| self.place(*n)),
-            link: link.to_owned(),
-            joint: name.to_owned(),
-        })?;
-        let body = Body {
-            joint: name.to_owned(),
-            place: self.place(node),
-            link: link.to_owned(),
-            heavy: rigid.heavy,
-            kind,
-            origin: to_parent * self.origin(node)?,
-            axis,
-            inertia,
-            limits: self.limits(node, name, kind_name == "continuous")?,
-            friction: self.friction(node)?,
-            reduction: reductions.get(name).copied(),
-        };
-        Ok((body, rigid.outgoing))
+        Ok(tree)
     }
 }

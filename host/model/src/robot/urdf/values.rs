@@ -1,6 +1,4 @@
-//! Values of links and joints in a URDF file: inertia, limits, friction, gear ratios.
-
-use std::collections::HashMap;
+//! Values of links and joints in a URDF file: inertia, limits, friction.
 
 use nalgebra::Matrix3;
 
@@ -96,6 +94,10 @@ impl<'a> Reader<'a> {
             let place = format!("{}:{}", self.path.display(), self.place(node));
             self.remarks.borrow_mut().push(format!("{place}: {text}"));
         };
+        if node.attribute("velocity").is_none() {
+            let unit = joint_unit(joint);
+            return Err(self.error(node, format!("<limit> has no `velocity`; add velocity=\"…\", the highest speed of joint `{name}` in {unit}, or remove <limit> where the limits are not known")));
+        }
         let velocity = self.number(node, "velocity")?;
         let stated = self.optional_number(node, "effort")?;
         if stated.is_none() {
@@ -104,7 +106,7 @@ impl<'a> Reader<'a> {
             ));
         }
         let effort = stated.unwrap_or(0.0);
-        if velocity == 0.0 && effort == 0.0 && position[0] == position[1] {
+        if velocity == 0.0 && effort == 0.0 && (endless || position[0] == position[1]) {
             // CAD exporters write this if the user entered nothing.
             remark(format!(
                 "<limit> of joint `{name}` is zero throughout, a placeholder; its limits count as not known."
@@ -184,95 +186,14 @@ impl<'a> Reader<'a> {
             offset: 0.0,
         }))
     }
-
-    /// Returns the gear ratio by joint name. 1 is the usual placeholder for "none" and is ignored.
-    pub(super) fn reductions(
-        &self,
-        known: &[(&'a str, Xml<'a>)],
-    ) -> Result<HashMap<&'a str, f64>, RobotError> {
-        let mut found: HashMap<&str, (f64, Xml<'a>)> = HashMap::new();
-        // ROS 1 and Drake place them beside the joints, ROS 2 within <ros2_control>.
-        for transmission in self
-            .document
-            .root_element()
-            .descendants()
-            .filter(|n| n.has_tag_name("transmission"))
-        {
-            let joints: Vec<Xml<'a>> = transmission
-                .children()
-                .filter(|n| n.has_tag_name("joint"))
-                .collect();
-            let of_ros_2 = (transmission.ancestors()).any(|n| n.has_tag_name("ros2_control"));
-            for joint in &joints {
-                let name = self.attribute(*joint, "name")?;
-                // Controllers of ROS 2 may move joints of another file.
-                if !of_ros_2 && known.iter().all(|(other, _)| *other != name) {
-                    return Err(self.error(*joint, format!("this <transmission> names joint `{name}`, which the file does not describe; correct the name or remove the transmission")));
-                }
-            }
-            for (reduction, what, text) in reductions(transmission) {
-                let value = self.parse_number(reduction, &what, text)?;
-                if value == 0.0 {
-                    return Err(self.error(
-                        reduction,
-                        format!(
-                            "{what} is 0, but it must be motor turns per joint turn, different from 0"
-                        ),
-                    ));
-                }
-                match joints.as_slice() {
-                    [joint] if value != 1.0 => {
-                        let name = self.attribute(*joint, "name")?;
-                        let first = found.insert(name, (value, reduction));
-                        if let Some((other, first)) = first.filter(|(other, _)| *other != value) {
-                            return Err(self.error(
-                                reduction,
-                                format!(
-                                    "{what} of joint `{name}` is {value}, and {other} at {}; give a joint one reduction",
-                                    self.place(first)
-                                ),
-                            ));
-                        }
-                    }
-                    [_] => {}
-                    // Controllers of ROS 2 may couple joints that are independent in this file.
-                    _ if of_ros_2 => {
-                        let place = format!("{}:{}", self.path.display(), self.place(transmission));
-                        self.remarks.borrow_mut().push(format!(
-                            "{place}: this <transmission> names {} joints; only those of one joint each are read.",
-                            joints.len()
-                        ));
-                        break;
-                    }
-                    _ => return Err(self.error(transmission, format!("this <transmission> names {} joints, but only transmissions of one joint each can be read", joints.len()))),
-                }
-            }
-        }
-        Ok(found
-            .into_iter()
-            .map(|(name, (value, _))| (name, value))
-            .collect())
-    }
 }
 
-/// Returns the reductions of a transmission: element, name and text. ROS 1 has `<mechanicalReduction>`, ROS 2
-/// `<mechanical_reduction>`, Drake `<drake:gear_ratio value>`.
-fn reductions<'a>(transmission: Xml<'a>) -> impl Iterator<Item = (Xml<'a>, String, &'a str)> {
-    let is_name = |name: &str| ["mechanicalReduction", "mechanical_reduction"].contains(&name);
-    (transmission.descendants().filter(Xml::is_element)).filter_map(move |node| {
-        let tag = node.tag_name().name();
-        let text = node.text().unwrap_or_default();
-        let name = node.attribute("name").unwrap_or_default();
-        match tag {
-            _ if is_name(tag) => Some((node, format!("<{tag}>"), text)),
-            "param" if is_name(name) => Some((node, format!("`{name}`"), text)),
-            "gear_ratio" => {
-                let value = node.attribute("value")?;
-                Some((node, "<drake:gear_ratio>".to_owned(), value))
-            }
-            _ => None,
-        }
-    })
+/// Returns the unit of a joint's speed.
+fn joint_unit(joint: Xml<'_>) -> &'static str {
+    match joint.attribute("type") {
+        Some("prismatic") => "m/s",
+        _ => "rad/s",
+    }
 }
 
 /// Returns true if an effort limit means "none": 0, a million or more, and from `least` (N·m or N) on powers of ten and

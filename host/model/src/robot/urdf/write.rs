@@ -87,7 +87,7 @@ impl Robot {
             parent = link;
         }
         self.write_transmissions(&mut body);
-        self.left_out(&parameters, &mut remarks);
+        self.left_out(&parameters, &[], &mut remarks);
         let mut text = String::from("<?xml version=\"1.0\"?>\n");
         for remark in &remarks {
             let _ = writeln!(text, "{}", comment(remark));

@@ -1,0 +1,40 @@
+//! Similar names: what a misspelt word was meant to be.
+
+/// Returns the known name within two typing errors of `written`: missing, added or exchanged letters, or another case.
+/// Names of up to four letters allow one error.
+pub(super) fn nearest<'n>(written: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+    let most = if written.len() <= 4 { 1 } else { 2 };
+    within(written, names, most)
+}
+
+/// As [`nearest`], for the long names of links and joints: an error in four letters is allowed.
+pub(super) fn nearest_long<'n>(
+    written: &str,
+    names: impl Iterator<Item = &'n str>,
+) -> Option<&'n str> {
+    within(written, names, written.chars().count().div_ceil(4).max(2))
+}
+
+fn within<'n>(written: &str, names: impl Iterator<Item = &'n str>, most: usize) -> Option<&'n str> {
+    let written = written.to_lowercase();
+    let near = names.map(|name| (slips(&written, &name.to_lowercase()), name));
+    near.filter(|(slips, _)| *slips <= most)
+        .min_by_key(|(slips, _)| *slips)
+        .map(|(_, name)| name)
+}
+
+/// Returns the number of letters to insert, delete or exchange to turn `a` into `b` (Levenshtein 1966).
+fn slips(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut corner = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let exchanged = corner + usize::from(x != *y);
+            corner = row[j + 1];
+            row[j + 1] = exchanged.min(row[j] + 1).min(corner + 1);
+        }
+    }
+    row[b.len()]
+}

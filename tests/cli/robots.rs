@@ -1,0 +1,228 @@
+//! URDF files as people have them: grippers, two arms, wrong names, doubtful values.
+
+use std::fs;
+use std::path::Path;
+
+use crate::run::{refuse, rig, succeed};
+
+/// An arm of `n` joints from `base`, named with `prefix`.
+fn arm(prefix: &str, base: &str, n: usize) -> String {
+    (1..=n)
+        .map(|k| {
+            let parent = match k {
+                1 => base.to_owned(),
+                _ => format!("{prefix}link{}", k - 1),
+            };
+            let axis = if k % 2 == 1 { "0 0 1" } else { "0 1 0" };
+            format!(
+                "<link name='{prefix}link{k}'><inertial><origin xyz='0.02 0.01 0.1'/><mass value='2'/><inertia ixx='0.02' ixy='0' ixz='0' iyy='0.02' iyz='0' izz='0.01'/></inertial></link>
+<joint name='{prefix}joint{k}' type='revolute'><parent link='{parent}'/><child link='{prefix}link{k}'/><origin xyz='0 0 0.2'/><axis xyz='{axis}'/><limit lower='-2' upper='2' velocity='2' effort='60'/><dynamics damping='0.5' friction='0.3'/></joint>\n"
+            )
+        })
+        .collect()
+}
+
+fn finger(name: &str, y: f64, more: &str) -> String {
+    format!(
+        "<link name='{name}_pad'><inertial><mass value='0.05'/><inertia ixx='1e-5' ixy='0' ixz='0' iyy='1e-5' iyz='0' izz='1e-5'/></inertial></link>
+<joint name='{name}' type='prismatic'><parent link='link3'/><child link='{name}_pad'/><origin xyz='0 {y} 0.1'/><axis xyz='0 1 0'/><limit lower='0' upper='0.04' velocity='0.1' effort='20'/>{more}</joint>\n"
+    )
+}
+
+fn written(folder: &Path, name: &str, body: &str) {
+    let text = format!("<robot name='r'>\n<link name='base'/>\n{body}</robot>\n");
+    fs::write(folder.join(name), text).unwrap();
+}
+
+/// An arm with a gripper, as `gripper.urdf`, and one with two arms, as `dual.urdf`.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let fingers = finger("left", 0.02, "") + &finger("right", -0.02, "<mimic joint='left'/>");
+    written(
+        folder.path(),
+        "gripper.urdf",
+        &(arm("", "base", 3) + &fingers),
+    );
+    written(
+        folder.path(),
+        "dual.urdf",
+        &(arm("l_", "base", 3) + &arm("r_", "base", 3)),
+    );
+    folder
+}
+
+#[test]
+fn an_arm_with_a_gripper_needs_no_option_and_says_once_what_was_assumed() {
+    let folder = folder();
+    let output = rig()
+        .args(["base", "--robot", "gripper.urdf"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let said = String::from_utf8(output.stderr).unwrap();
+    let notes: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains("Locked"))
+        .collect();
+    let [note] = notes[..] else {
+        panic!("said once: {said}")
+    };
+    for part in [
+        "left at 0 m",
+        "right at 0 m (mimics left)",
+        "0.1000 kg into link `link3`",
+        "3 joints, joint1 to joint3",
+    ] {
+        assert!(note.contains(part), "{part}: {note}");
+    }
+}
+
+#[test]
+fn two_arms_are_refused_with_the_options_and_read_with_one() {
+    let folder = folder();
+    let run = |words: &[&str]| {
+        let mut command = rig();
+        command.args(words).current_dir(folder.path());
+        command
+    };
+    let message = refuse(&mut run(&["base", "--robot", "dual.urdf"]));
+    assert!(
+        message.contains("--tip l_link3 (3 joints)")
+            && message.contains("--tip r_link3 (3 joints)"),
+        "{message}"
+    );
+    succeed(&mut run(&[
+        "base",
+        "--robot",
+        "dual.urdf",
+        "--tip",
+        "r_link3",
+    ]));
+    for (options, parts) in [
+        (
+            ["--tip", "r_lnk3"],
+            ["no link `r_lnk3`", "is `r_link3` meant?"],
+        ),
+        (["--base", "r_link9x"], ["which --base names", "`r_link"]),
+        (
+            ["--lock", "r_jont3=0"],
+            ["no joint `r_jont3`", "is `r_joint3` meant?"],
+        ),
+        (
+            ["--lock", "r_joint3=2.5"],
+            ["outside of the joint's limits", "-2 to 2 rad"],
+        ),
+    ] {
+        let mut words = vec!["base", "--robot", "dual.urdf"];
+        words.extend(options);
+        let message = refuse(&mut run(&words));
+        for part in parts {
+            assert!(message.contains(part), "{message}");
+        }
+    }
+    succeed(&mut run(&["init", "one-link", "--out", "rig.toml"]));
+    let message = refuse(&mut run(&["base", "--robot", "rig.toml", "--tip", "x"]));
+    assert!(message.contains("this file is TOML"), "{message}");
+}
+
+/// The motion of the description that `rig init --from` writes is that of the URDF, sample by sample.
+#[test]
+fn a_description_from_a_urdf_moves_as_the_urdf_does() {
+    let folder = folder();
+    let run = |words: &[&str]| succeed(rig().args(words).current_dir(folder.path()));
+    let options = ["--lock", "left=0.03", "--lock", "joint2=0.5"];
+    let with = |words: &[&str]| run(&[words, &options[..]].concat());
+    with(&["init", "--from", "gripper.urdf", "--out", "arm.toml"]);
+    let text = fs::read_to_string(folder.path().join("arm.toml")).unwrap();
+    for part in [
+        "# acceleration =   # rad/s^2",
+        "# [joint.drive]",
+        "# [joint.controller]",
+        "joint2 at 0.5 rad",
+    ] {
+        assert!(text.contains(part), "{part}");
+    }
+    with(&[
+        "excite",
+        "--robot",
+        "gripper.urdf",
+        "--starts",
+        "1",
+        "--out",
+        "m.toml",
+    ]);
+    let motion = ["--trajectory", "m.toml", "--rate", "100", "--out"];
+    with(
+        &[
+            &["simulate", "--robot", "gripper.urdf"],
+            &motion[..],
+            &["urdf.csv"],
+        ]
+        .concat(),
+    );
+    run(&[
+        &["simulate", "--robot", "arm.toml"],
+        &motion[..],
+        &["toml.csv"],
+    ]
+    .concat());
+    let [urdf, toml] =
+        ["urdf.csv", "toml.csv"].map(|name| fs::read_to_string(folder.path().join(name)).unwrap());
+    assert_eq!(urdf, toml);
+    // Written back beside the gripper, the file is the same.
+    with(&[
+        "urdf",
+        "--robot",
+        "arm.toml",
+        "--into",
+        "gripper.urdf",
+        "--out",
+        "back.urdf",
+    ]);
+    let [before, after] =
+        ["gripper.urdf", "back.urdf"].map(|name| fs::read(folder.path().join(name)).unwrap());
+    assert!(before == after);
+}
+
+#[test]
+fn an_audit_names_link_and_line_and_succeeds() {
+    let folder = folder();
+    let path = folder.path().join("gripper.urdf");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("izz='0.01'", "izz='0.3'", 1)).unwrap();
+    let run = |words: &[&str]| {
+        let mut command = rig();
+        command.args(words).current_dir(folder.path());
+        command
+    };
+    let said = succeed(&mut run(&["urdf", "--audit", "--robot", "gripper.urdf"]));
+    assert!(
+        said.contains("gripper.urdf:3:") && said.contains("link `link1` has principal moments"),
+        "{said}"
+    );
+    let last = said.lines().last().unwrap();
+    assert!(
+        last.contains("Checked: ") && last.contains("200 poses"),
+        "{last}"
+    );
+    let json = succeed(&mut run(&[
+        "urdf",
+        "--audit",
+        "--json",
+        "--robot",
+        "gripper.urdf",
+    ]));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["schema"], "rig-urdf-audit/1");
+    assert!(
+        json["findings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|own| own["name"] == "link1" && own["line"] == 3)
+    );
+    // Two arms are audited as well; only the inertia matrix needs a choice.
+    let said = succeed(&mut run(&["urdf", "--audit", "--robot", "dual.urdf"]));
+    assert!(said.contains("6 masses of links"), "{said}");
+}
