@@ -73,7 +73,7 @@ pub use reference::reference_scale;
 pub use reference::{StrangeReference, strange_references};
 pub use remark::Remark;
 pub use sampling::Sampling;
-pub use source::{Blocks, KEPT_WARNINGS, Source};
+pub use source::{Blocks, KEPT_WARNINGS, Source, column_names};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 
 #[cfg(test)]

@@ -111,29 +111,7 @@ impl Source {
 
     /// Opens a recording like [`Source::open`]; `need` says whether the torque may be missing.
     pub fn open_with(path: &Path, robot: &Robot, need: EffortNeed) -> Result<Self, DataError> {
-        let failed = |source| DataError::Read {
-            path: path.into(),
-            source,
-        };
-        let metadata = std::fs::metadata(path).map_err(failed)?;
-        if metadata.is_dir() {
-            return Err(DataError::Directory { path: path.into() });
-        }
-        // Opening a pipe without a writer would block forever.
-        if !metadata.is_file() {
-            return Err(DataError::NotAFile { path: path.into() });
-        }
-        let mut start = Vec::new();
-        let mut head = File::open(path).map_err(failed)?.take(HEAD as u64);
-        head.read_to_end(&mut start).map_err(failed)?;
-        // By content, because file extensions are often wrong.
-        let is_mcap = start.starts_with(&MAGIC[..5]);
-        if !is_mcap && let Some(format) = ForeignFormat::of(&start) {
-            return Err(DataError::Foreign {
-                path: path.into(),
-                format,
-            });
-        }
+        let (is_mcap, bytes) = checked(path)?;
         let joints: Vec<String> = robot.joints.iter().map(|j| j.name.clone()).collect();
         let (mut rows, header) = Rows::open(path, is_mcap, &joints)?;
         let mut layout = layout(path, &header, robot, need)?;
@@ -169,7 +147,7 @@ impl Source {
             layout,
             sampling,
             is_mcap,
-            bytes: metadata.len(),
+            bytes,
         })
     }
 
@@ -265,6 +243,46 @@ impl Source {
         let warnings = [self.warnings(), blocks.warnings()].concat();
         Ok((all, warnings))
     }
+}
+
+/// Checks that a path names a regular file of a known format. Returns true for MCAP (CSV otherwise), and the length in
+/// bytes.
+fn checked(path: &Path) -> Result<(bool, u64), DataError> {
+    let failed = |source| DataError::Read {
+        path: path.into(),
+        source,
+    };
+    let metadata = std::fs::metadata(path).map_err(failed)?;
+    if metadata.is_dir() {
+        return Err(DataError::Directory { path: path.into() });
+    }
+    // Opening a pipe without a writer would block forever.
+    if !metadata.is_file() {
+        return Err(DataError::NotAFile { path: path.into() });
+    }
+    let mut start = Vec::new();
+    let mut head = File::open(path).map_err(failed)?.take(HEAD as u64);
+    head.read_to_end(&mut start).map_err(failed)?;
+    // By content, because file extensions are often wrong.
+    let is_mcap = start.starts_with(&MAGIC[..5]);
+    if !is_mcap && let Some(format) = ForeignFormat::of(&start) {
+        return Err(DataError::Foreign {
+            path: path.into(),
+            format,
+        });
+    }
+    Ok((is_mcap, metadata.len()))
+}
+
+/// Returns the names of a recording's columns in order, without a robot: those of the header line, or of the first
+/// message of an MCAP file. For a ROS 2 recording it is `t` alone, because its other columns are joints of a robot.
+///
+/// # Errors
+/// [`DataError`]: a file that cannot be read or is not a recording.
+pub fn column_names(path: &Path) -> Result<Vec<String>, DataError> {
+    let (is_mcap, _) = checked(path)?;
+    let (_, header) = Rows::open(path, is_mcap, &[])?;
+    Ok(header.names)
 }
 
 /// One pass over a recording; see [`Source::blocks`].

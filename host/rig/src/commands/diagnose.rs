@@ -3,7 +3,7 @@
 mod printed;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
 use rig_shared::effects::Kind;
@@ -132,7 +132,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         let names = args.without.join(", ");
         (found.words).push(format!("Left out of the library, as asked: {names}."));
     }
-    write(args, &found, &model, warnings)?;
+    write_diagnosis(&args.out, &found, &model, command_line(), warnings)?;
     printed::print(ui, &found, &args.out.join(REPORT));
     Ok(())
 }
@@ -238,16 +238,21 @@ impl Logs {
     }
 }
 
-/// Writes all files of the result.
-fn write(
-    args: &Args,
+/// Writes model.toml, diagnosis.json, report.html, the figures and, if there is one, next_experiment.toml into the folder
+/// `out`. `command`: what repeats the result, for the report. `warnings`: from the recordings.
+///
+/// # Errors
+/// Values that cannot be written as a description, or a file that cannot be written.
+pub fn write_diagnosis(
+    out: &Path,
     found: &Diagnosis,
     model: &Robot,
+    command: String,
     warnings: Vec<String>,
 ) -> Result<(), CommandError> {
     let text = model.to_toml()?;
     let context = Context {
-        command: command_line(),
+        command,
         identified: Some((MODEL.into(), text.clone())),
         remarks: Vec::new(),
         warnings,
@@ -256,16 +261,16 @@ fn write(
     let json = serde_json::to_string_pretty(found).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
-    folder(&args.out)?;
+    folder(out)?;
     let next = found.next_experiment.as_ref();
     match next.and_then(|n| n.file.as_ref().zip(n.trajectory.as_ref())) {
-        Some((name, motion)) => write_whole(&args.out.join(name), motion.as_bytes())?,
-        None => forget(&args.out.join(FILE))?,
+        Some((name, motion)) => write_whole(&out.join(name), motion.as_bytes())?,
+        None => forget(&out.join(FILE))?,
     }
-    write_whole(&args.out.join(MODEL), text.as_bytes())?;
-    write_whole(&args.out.join(DIAGNOSIS), (json + "\n").as_bytes())?;
-    write_whole(&args.out.join(REPORT), page.as_bytes())?;
-    pictures::write(&args.out, found)
+    write_whole(&out.join(MODEL), text.as_bytes())?;
+    write_whole(&out.join(DIAGNOSIS), (json + "\n").as_bytes())?;
+    write_whole(&out.join(REPORT), page.as_bytes())?;
+    pictures::write(out, found)
 }
 
 /// Parses the name of an effect.

@@ -5,11 +5,11 @@ mod printed;
 mod urdf;
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args as ClapArgs, ValueEnum};
 
-use self::impossible::Impossible;
+pub use self::impossible::Impossible;
 use super::error::CommandError;
 use super::input::{
     Inputs, RobotArg, command_line, recordings, refuse_faults, refuse_shared, refuse_twice,
@@ -94,7 +94,7 @@ impl From<Fit> for Estimator {
 
 /// Estimators to compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Compare {
+pub enum Compare {
     /// weighted, iv and consistent, if the recordings are small (32 MiB at most)
     Auto,
     /// All estimators that the recordings and the description allow
@@ -107,7 +107,8 @@ pub(crate) enum Compare {
 const COMPARED_BYTES: u64 = 32 << 20;
 
 impl Compare {
-    fn list(self, bytes: u64) -> Vec<Estimator> {
+    /// Returns the estimators to compare on recordings of `bytes` bytes.
+    pub fn list(self, bytes: u64) -> Vec<Estimator> {
         match self {
             Self::All => Estimator::ALL.to_vec(),
             Self::Auto if bytes <= COMPARED_BYTES => {
@@ -261,7 +262,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_faults(robot, &[&training, &holdout], wrong, args.even_if_wrong, ui)?;
     let found = identified(robot, args, [&training, &holdout], ui)?;
     folder(&args.out)?;
-    let said = write(args, &description, &found, warnings)?;
+    let said = write_identification(&args.out, &description, &found, command_line(), warnings)?;
     printed::print(ui, &found);
     if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
         ui.say(&format!(
@@ -353,11 +354,17 @@ fn identified(
     Ok(found)
 }
 
-/// Writes all files of the result. Returns the remarks on the written URDF. `warnings`: from the recordings.
-fn write(
-    args: &Args,
+/// Writes identified.toml, identification.json, report.html and, with a full set of parameters, identified.urdf into
+/// the folder `out`. Returns the remarks on the written URDF. `command`: what repeats the result, for the report.
+/// `warnings`: from the recordings.
+///
+/// # Errors
+/// Values that cannot be written as a description, or a file that cannot be written.
+pub fn write_identification(
+    out: &Path,
     description: &Description,
     found: &Identification,
+    command: String,
     warnings: Vec<String>,
 ) -> Result<Vec<String>, CommandError> {
     let robot = &description.robot;
@@ -374,7 +381,7 @@ fn write(
     let (urdf, said) = urdf.map_or((None, Vec::new()), |urdf| (Some(urdf.text), urdf.remarks));
     remarks.extend(said.iter().map(|sentence| format!("{URDF}: {sentence}")));
     let context = Context {
-        command: command_line(),
+        command,
         identified: Some((TOML.into(), text.clone())),
         remarks,
         warnings,
@@ -383,11 +390,11 @@ fn write(
     let json = serde_json::to_string_pretty(found).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
-    write_whole(&args.out.join(TOML), text.as_bytes())?;
+    write_whole(&out.join(TOML), text.as_bytes())?;
     if let Some(urdf) = urdf {
-        write_whole(&args.out.join(URDF), urdf.as_bytes())?;
+        write_whole(&out.join(URDF), urdf.as_bytes())?;
     }
-    write_whole(&args.out.join(JSON), (json + "\n").as_bytes())?;
-    rig_report::write(&args.out.join(REPORT), &page)?;
+    write_whole(&out.join(JSON), (json + "\n").as_bytes())?;
+    rig_report::write(&out.join(REPORT), &page)?;
     Ok(said)
 }

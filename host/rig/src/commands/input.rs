@@ -94,15 +94,15 @@ pub(crate) fn described(
 }
 
 /// Faults found in the columns of recordings, one sentence each.
-pub(crate) struct Faults {
+pub struct Faults {
     /// Certain faults: the columns cannot be right.
-    pub(crate) wrong: Vec<String>,
+    pub wrong: Vec<String>,
     /// Possible faults: the description may be wrong instead, or the motion is too short to decide.
-    pub(crate) doubtful: Vec<String>,
+    pub doubtful: Vec<String>,
 }
 
 /// Recordings that fit the robot.
-pub(crate) struct Inputs {
+pub struct Inputs {
     sources: Vec<Source>,
     /// Warnings about the rows of each recording, from the pass that read the most.
     heard: Vec<RefCell<Vec<Warning>>>,
@@ -188,7 +188,7 @@ impl Inputs {
     ///
     /// # Errors
     /// Names the error, its file and its line.
-    pub(crate) fn read(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
+    pub fn read(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
         Self::read_with(robot, paths, EffortNeed::Required)
     }
 
@@ -196,7 +196,7 @@ impl Inputs {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub(crate) fn read_with(
+    pub fn read_with(
         robot: &Robot,
         paths: &[PathBuf],
         need: EffortNeed,
@@ -249,7 +249,7 @@ impl Inputs {
     ///
     /// # Errors
     /// Names the error in a file and its line.
-    pub(crate) fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
+    pub fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
         let mut faults = Faults {
             wrong: Vec::new(),
             doubtful: Vec::new(),
@@ -286,7 +286,7 @@ impl Inputs {
     }
 
     /// Replaces column names in a message about `recording` by the names that its file uses.
-    pub(crate) fn in_its_names(&self, recording: &str, text: &mut String) {
+    pub fn in_its_names(&self, recording: &str, text: &mut String) {
         let of = |source: &&Source| source.label() == recording;
         if let Some(source) = self.sources.iter().find(of) {
             *text = source.in_its_names(text);
@@ -298,7 +298,7 @@ impl Inputs {
     ///
     /// # Errors
     /// Names the error in a file and its line.
-    pub(crate) fn strange_rates(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
+    pub fn strange_rates(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut strange = Vec::new();
         for source in &self.sources {
             let found = at_start(source, robot, strange_rates)?;
@@ -314,7 +314,7 @@ impl Inputs {
     ///
     /// # Errors
     /// Names the error in a file and its line.
-    pub(crate) fn strange_references(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
+    pub fn strange_references(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut strange = Vec::new();
         for source in &self.sources {
             let found = at_start(source, robot, strange_references)?;
@@ -332,7 +332,7 @@ impl Inputs {
     }
 
     /// Warnings from the headers of the recordings.
-    pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.sources.iter().flat_map(|source| {
             source
                 .warnings()
@@ -342,7 +342,7 @@ impl Inputs {
     }
 
     /// Warnings about the rows: for each recording and kind one line, with the worst row and the number of others.
-    pub(crate) fn heard(&self) -> Vec<String> {
+    pub fn heard(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, heard) in self.sources.iter().zip(&self.heard) {
             let (path, heard) = (source.path().display(), heard.borrow());
@@ -364,7 +364,7 @@ impl Inputs {
     }
 
     /// Positions beyond `[joint.limits]` in the rows, first the recording and joint with the largest excess.
-    pub(crate) fn outside(&self) -> Vec<String> {
+    pub fn outside(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, outside) in self.sources.iter().zip(&self.outside) {
             let outside = outside.borrow();
@@ -389,7 +389,7 @@ impl Inputs {
     }
 
     /// Returns true if any recording has a torque or a current.
-    pub(crate) fn any_effort(&self) -> bool {
+    pub fn any_effort(&self) -> bool {
         self.sources.iter().any(Source::has_effort)
     }
 
@@ -404,12 +404,12 @@ impl Inputs {
     }
 
     /// Size of all files, bytes.
-    pub(crate) fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         self.sources.iter().map(Source::bytes).sum()
     }
 
     /// The recordings; reading one collects the warnings about its rows.
-    pub(crate) fn listened(&self) -> Vec<Watched<'_>> {
+    pub fn listened(&self) -> Vec<Watched<'_>> {
         self.with_progress(None)
     }
 
@@ -432,7 +432,7 @@ impl Inputs {
 }
 
 /// A recording that collects warnings while it is read and may advance a progress bar.
-pub(crate) struct Watched<'a> {
+pub struct Watched<'a> {
     source: &'a Source,
     heard: &'a RefCell<Vec<Warning>>,
     progress: Option<&'a RefCell<Progress>>,
@@ -487,7 +487,7 @@ impl Recording for Watched<'_> {
 }
 
 /// Converts recordings to the list type that the library takes.
-pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
+pub fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
     watched
         .iter()
         .map(|recording| recording as &dyn Recording)
@@ -537,7 +537,7 @@ pub(crate) fn real(path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// A sentence that names the recording.
-pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
+pub fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
     match holdout
         .iter()
         .find(|held| data.iter().any(|path| real(path) == real(held)))
@@ -566,7 +566,7 @@ pub(crate) fn refuse_as_rest(
 }
 
 /// Refuses a training recording that is given twice: it would make every interval too narrow.
-pub(crate) fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError> {
+pub fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError> {
     for (k, path) in data.iter().enumerate() {
         if data[..k].iter().any(|before| real(before) == real(path)) {
             return Err(CommandError::Sentence(format!(

@@ -1,4 +1,6 @@
 //! The commands of the program, one file each: read the arguments, call the library, report the results.
+//!
+//! The Python package (`host/python`) shares their checks of recordings and the writing of results.
 
 mod audit;
 mod base;
@@ -26,7 +28,11 @@ mod validate;
 
 use clap::{Parser, Subcommand};
 
+pub use diagnose::write_diagnosis;
 pub use error::CommandError;
+pub use identify::{Compare, Impossible, write_identification};
+pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
+pub use overwrite::{refuse_file, refuse_folder};
 use ui::Ui;
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.

@@ -39,7 +39,7 @@ pub(crate) const DEMONSTRATION: [&str; 7] = [
 ///
 /// # Errors
 /// [`CommandError::Exists`].
-pub(crate) fn refuse_file(path: &Path, force: bool) -> Result<(), CommandError> {
+pub fn refuse_file(path: &Path, force: bool) -> Result<(), CommandError> {
     // A symbolic link without a target exists, too.
     if path.symlink_metadata().is_ok() && !force {
         return Err(CommandError::Exists { path: path.into() });
@@ -51,7 +51,7 @@ pub(crate) fn refuse_file(path: &Path, force: bool) -> Result<(), CommandError> 
 ///
 /// # Errors
 /// [`CommandError::Results`].
-pub(crate) fn refuse_folder(
+pub fn refuse_folder(
     path: &Path,
     besides: &[&'static str],
     force: bool,

@@ -20,16 +20,16 @@ const ROUNDING: f64 = 1e-9;
 /// A base parameter that is a sum of masses, moments of inertia and friction with positive factors cannot be negative.
 /// In an arm, inertias compensate each other: a negative one may be a model error that others cancel, so it is a
 /// warning.
-pub(super) struct Impossible {
+pub struct Impossible {
     /// Those that refuse the result.
-    pub(super) refused: Vec<String>,
+    pub refused: Vec<String>,
     /// Those that are only warnings.
-    pub(super) doubtful: Vec<String>,
+    pub doubtful: Vec<String>,
 }
 
 impl Impossible {
     /// Judges the values of an identification.
-    pub(super) fn of(robot: &Robot, found: &Identification) -> Self {
+    pub fn of(robot: &Robot, found: &Identification) -> Self {
         let details = &found.details;
         let below_zero = |row: usize| {
             let [value, _, high] = details.free[row];

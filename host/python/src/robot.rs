@@ -1,0 +1,332 @@
+//! The robot: description, names, parameters and dynamics.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+use rig::commands::{CommandError, refuse_file};
+use rig_identify::{chain_of, column_name, unit};
+use rig_model::batch::{BatchError, ChainBatch, ModelBatch};
+use rig_model::robot::{self, Description, JointKind};
+use rig_output::write_whole;
+use rig_shared::multibody::COLUMNS;
+
+use crate::array::{Signal, array, same_shape, shaped, signal};
+use crate::dynamics;
+use crate::error::{Error, refused, warn};
+
+/// A robot description with its dynamics.
+///
+/// The dynamics are those of the rigid links with drive inertia, viscous and Coulomb friction and a constant torque:
+///
+///     tau = A(q) qdd + C(q, qd) qd + g(q) + Ia qdd + fv qd + fc sgn(qd) + off
+///
+/// They leave out the effects of the description (:attr:`effects`), and the torques by which coupled drives and ball
+/// screws act between joints; :func:`simulate` has both.
+///
+/// Arrays have the shape (n, joints), or (joints,) for one sample. The unit of a position is rad for a revolute joint and
+/// m for a prismatic one; the unit of a torque is N*m or N. An aligned float64 array of any strides is read in place,
+/// without a copy. Lists and arrays of other real numbers are copied to float64. Other Python threads run during the
+/// computation. ``threads`` is the number of threads; 0 uses all processors, and the result does not depend on it.
+#[pyclass(frozen, module = "rig_dynamics")]
+pub(crate) struct Robot {
+    description: Arc<Description>,
+    model: ModelBatch,
+    batch: ChainBatch,
+}
+
+impl Robot {
+    /// Prepares the dynamics of a description.
+    ///
+    /// # Errors
+    /// Geometry that is not a chain.
+    pub(crate) fn of(description: Description) -> PyResult<Self> {
+        let chain = chain_of(&description.robot).map_err(refused)?;
+        let model = ModelBatch::new(&chain, &description.robot.standard_parameters());
+        Ok(Self {
+            model: model.map_err(failed)?,
+            batch: ChainBatch::new(&chain),
+            description: Arc::new(description),
+        })
+    }
+
+    /// Prepares the dynamics of a robot that is a result.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn of_result(robot: robot::Robot) -> PyResult<Self> {
+        Self::of(Description {
+            robot,
+            urdf: None,
+            remarks: Vec::new(),
+        })
+    }
+
+    /// Returns the description, shared with work that runs without Python.
+    pub(crate) fn description(&self) -> Arc<Description> {
+        Arc::clone(&self.description)
+    }
+
+    fn robot(&self) -> &robot::Robot {
+        &self.description.robot
+    }
+
+    fn joint_count(&self) -> usize {
+        self.robot().joints.len()
+    }
+
+    fn signal<'py>(&self, name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Signal<'py>> {
+        signal(name, value, self.joint_count())
+    }
+}
+
+/// Makes the exception of a batch.
+fn failed(error: BatchError) -> PyErr {
+    Error::new_err(error.to_string())
+}
+
+/// Makes a robot of text and issues the remarks about it.
+fn from_text(py: Python<'_>, robot: Result<robot::Robot, robot::RobotError>) -> PyResult<Robot> {
+    let robot = robot.map_err(refused)?;
+    let mut remarks = robot.implausible_bodies(None);
+    remarks.extend(robot.limits_in_degrees());
+    remarks.extend(robot.unlikely_values());
+    warn(py, &remarks)?;
+    Robot::of(Description {
+        robot,
+        urdf: None,
+        remarks,
+    })
+}
+
+#[pymethods]
+impl Robot {
+    /// Read a description, TOML or URDF. Its remarks are issued as :class:`Remark`.
+    ///
+    /// Raises ``Error`` with the line of the fault, or ``OSError``.
+    #[classmethod]
+    fn load(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let description = Description::load(&path).map_err(refused)?;
+        warn(py, &description.remarks)?;
+        Self::of(description)
+    }
+
+    /// Read a description from TOML text.
+    #[classmethod]
+    fn from_toml(_class: &Bound<'_, PyType>, py: Python<'_>, text: &str) -> PyResult<Self> {
+        from_text(py, robot::Robot::from_toml(text, Path::new("text")))
+    }
+
+    /// Read a description from URDF text.
+    #[classmethod]
+    fn from_urdf(_class: &Bound<'_, PyType>, py: Python<'_>, text: &str) -> PyResult<Self> {
+        from_text(py, robot::Robot::from_urdf(text, Path::new("text")))
+    }
+
+    /// Return a description that ``rig init`` writes: one-link, edda, irp6, emps, tx40, double-pendulum or xl330.
+    #[classmethod]
+    fn template(_class: &Bound<'_, PyType>, py: Python<'_>, name: &str) -> PyResult<Self> {
+        let Some(text) = robot::template(name) else {
+            return Err(Error::new_err(format!(
+                "\"{name}\" is no template; give one-link, edda, irp6, emps, tx40, double-pendulum or xl330."
+            )));
+        };
+        from_text(py, robot::Robot::from_toml(text, Path::new(name)))
+    }
+
+    /// Name of the robot.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.robot().name
+    }
+
+    /// Names of the joints, from the base outwards.
+    #[getter]
+    fn joints(&self) -> Vec<&str> {
+        (self.robot().joints.iter())
+            .map(|joint| joint.name.as_str())
+            .collect()
+    }
+
+    /// What looks unlikely in the description, one sentence each.
+    #[getter]
+    fn remarks(&self) -> Vec<String> {
+        self.description.remarks.clone()
+    }
+
+    /// Names of the effects beyond the standard model. The dynamics of this class leave them out.
+    #[getter]
+    fn effects(&self) -> Vec<String> {
+        let effects = self.robot().effects.iter();
+        effects.map(robot::RobotEffect::title).collect()
+    }
+
+    /// The standard parameters, shape (joints, 14): m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz, Ia, fv, fc, off.
+    ///
+    /// Inertia is about the origin of the joint's frame (modified Denavit-Hartenberg); 0 for values that are not stated.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.robot().standard_parameters();
+        shaped(py, rows.concat(), vec![rows.len(), COLUMNS])
+    }
+
+    /// Names of the columns of :meth:`regressor`, with the number of the joint: 14 * joints names.
+    #[getter]
+    fn parameter_names(&self) -> Vec<String> {
+        let n = self.joint_count();
+        (0..n * COLUMNS).map(|c| column_name(c, n)).collect()
+    }
+
+    /// Units of the columns of :meth:`regressor`, ASCII: 14 * joints units.
+    #[getter]
+    fn parameter_units(&self) -> Vec<&'static str> {
+        let kinds: Vec<JointKind> = self.robot().joints.iter().map(|joint| joint.kind).collect();
+        let drives = self.robot().drive_kinds();
+        (0..kinds.len() * COLUMNS)
+            .map(|c| unit(c, &kinds, &drives))
+            .collect()
+    }
+
+    /// Return the description as TOML with units in comments.
+    fn to_toml(&self) -> PyResult<String> {
+        self.robot().to_toml().map_err(refused)
+    }
+
+    /// Write the description as .toml or .urdf. An existing file is replaced only with ``force``.
+    #[pyo3(signature = (path, *, force = false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        refuse_file(&path, force).map_err(refused)?;
+        let extension = path.extension().and_then(|end| end.to_str());
+        let text = match extension {
+            Some("toml") => self.to_toml()?,
+            Some("urdf") => {
+                let urdf = match &self.description.urdf {
+                    Some(original) => original.with_values(self.robot()),
+                    None => self.robot().to_urdf(),
+                };
+                let urdf = urdf.map_err(refused)?;
+                warn(py, &urdf.remarks)?;
+                urdf.text
+            }
+            _ => {
+                return Err(refused(CommandError::Sentence(format!(
+                    "{} has another extension; a description is written as .toml or .urdf.",
+                    path.display()
+                ))));
+            }
+        };
+        write_whole(&path, text.as_bytes()).map_err(refused)
+    }
+
+    /// Return the torques of a motion, shape (n, joints), N*m or N.
+    ///
+    /// ``q``, ``qd``, ``qdd``: position, velocity and acceleration, (n, joints) or (joints,).
+    #[pyo3(signature = (q, qd, qdd, *, threads = 0))]
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        qdd: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let [q, qd, qdd] = [
+            self.signal("q", q)?,
+            self.signal("qd", qd)?,
+            self.signal("qdd", qdd)?,
+        ];
+        same_shape(&[&q, &qd, &qdd])?;
+        let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
+        let out = py
+            .detach(|| dynamics::inverse(&self.model, signals, threads))
+            .map_err(failed)?;
+        array(py, out, &q, &[q.joints()])
+    }
+
+    /// Return the accelerations under the torques ``tau``, shape (n, joints), rad/s^2 or m/s^2.
+    ///
+    /// Raises ``Error`` with the first sample (from 0) whose mass matrix is not positive definite.
+    #[pyo3(signature = (q, qd, tau, *, threads = 0))]
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        tau: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let [q, qd, tau] = [
+            self.signal("q", q)?,
+            self.signal("qd", qd)?,
+            self.signal("tau", tau)?,
+        ];
+        same_shape(&[&q, &qd, &tau])?;
+        let signals = [q.rows()?, qd.rows()?, tau.rows()?];
+        let out = py
+            .detach(|| dynamics::forward(&self.model, signals, threads))
+            .map_err(failed)?;
+        array(py, out, &q, &[q.joints()])
+    }
+
+    /// Return the mass matrices with drive inertias on the diagonal, shape (n, joints, joints), kg*m^2, kg*m or kg.
+    #[pyo3(signature = (q, *, threads = 0))]
+    fn mass_matrix<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let q = self.signal("q", q)?;
+        let rows = q.rows()?;
+        let out = py
+            .detach(|| dynamics::mass_matrix(&self.model, rows, threads))
+            .map_err(failed)?;
+        array(py, out, &q, &[q.joints(), q.joints()])
+    }
+
+    /// Return the torques that hold the links against gravity, shape (n, joints), N*m or N.
+    #[pyo3(signature = (q, *, threads = 0))]
+    fn gravity<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let q = self.signal("q", q)?;
+        let rows = q.rows()?;
+        let out = py
+            .detach(|| dynamics::gravity(&self.model, rows, threads))
+            .map_err(failed)?;
+        array(py, out, &q, &[q.joints()])
+    }
+
+    /// Return the regressor Y with tau = Y @ parameters.ravel(), shape (n, joints, 14 * joints).
+    ///
+    /// :attr:`parameter_names` and :attr:`parameter_units` describe the columns.
+    #[pyo3(signature = (q, qd, qdd, *, threads = 0))]
+    fn regressor<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        qdd: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let [q, qd, qdd] = [
+            self.signal("q", q)?,
+            self.signal("qd", qd)?,
+            self.signal("qdd", qdd)?,
+        ];
+        same_shape(&[&q, &qd, &qdd])?;
+        let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
+        let out = py
+            .detach(|| dynamics::regressor(&self.batch, signals, threads))
+            .map_err(failed)?;
+        array(py, out, &q, &[q.joints(), q.joints() * COLUMNS])
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Robot {:?}: {}>", self.name(), self.joints().join(", "))
+    }
+}
