@@ -197,7 +197,7 @@ fn a_description_with_a_fault_is_named_by_line() {
 }
 
 #[test]
-fn a_urdf_without_inertia_names_the_link() {
+fn a_urdf_whose_last_link_has_no_mass_is_told_with_link_and_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("arm.urdf");
     fs::write(
@@ -208,8 +208,12 @@ fn a_urdf_without_inertia_names_the_link() {
     )
     .unwrap();
     let data = recording(folder.path(), |_, _| ());
-    let text = refuse(&mut identify(&path, &data, &folder.path().join("out")));
-    names(&text, &["arm.urdf", "upper", "inertia"]);
+    let output = identify(&path, &data, &folder.path().join("out"))
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stderr).unwrap();
+    names(&text, &["arm.urdf:2:1: ", "last link `upper` has no mass"]);
 }
 
 #[test]

@@ -468,7 +468,10 @@ fn foxglove_clients_of_both_protocols_decode_the_samples() {
             assert_eq!(values.len(), fields.len());
             times.push(values[0]);
             // The emulated link hangs.
-            assert!((values[1] + 1.5708).abs() < 0.01, "{values:?}");
+            assert!(
+                (values[1] + std::f64::consts::FRAC_PI_2).abs() < 0.01,
+                "{values:?}"
+            );
         }
         for (time, stamp) in times.windows(2).zip(stamps.windows(2)) {
             assert!((time[1] - time[0] - 1e-3).abs() < 1e-9);

@@ -1,6 +1,5 @@
 //! CSV reader that works line by line without an allocation per line.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -13,6 +12,7 @@ use super::header::Header;
 use super::number::{decimal, number};
 use super::place::Place;
 use super::remark::Remark;
+use super::text_file::TextFile;
 
 /// Maximum length of a line, bytes: hundreds of joints fit; a file without line ends does not.
 const LONGEST_LINE: usize = 1 << 20;
@@ -26,7 +26,7 @@ const BUFFER: usize = 1 << 17;
 /// Lines of a text file.
 pub(super) struct TextLines {
     path: PathBuf,
-    reader: BufReader<File>,
+    reader: BufReader<TextFile>,
     /// The last line, without its end.
     line: Vec<u8>,
     number: u64,
@@ -41,7 +41,7 @@ impl TextLines {
             path: path.into(),
             source,
         };
-        let file = File::open(path).map_err(failed)?;
+        let file = TextFile::open(path).map_err(failed)?;
         let mut reader = BufReader::with_capacity(BUFFER, file);
         let start = reader.fill_buf().map_err(failed)?;
         let first = start.iter().position(|b| matches!(b, b'\n' | b'\r'));
@@ -74,7 +74,7 @@ impl Lines for TextLines {
             return Ok(false);
         }
         self.number += 1;
-        self.bytes += read as u64;
+        self.bytes += read as u64 * self.reader.get_ref().bytes_a_character();
         if self.line.last() == Some(&self.end) {
             self.line.pop();
         } else if read == LONGEST_LINE {

@@ -158,6 +158,27 @@ fn separators_and_decimal_commas_are_read_where_they_are_unambiguous() {
 }
 
 #[test]
+fn wide_text_is_read_by_its_byte_order_mark() {
+    // As a spreadsheet program saves "Unicode text" where decimals have a comma.
+    let text = "t\tq1\ttau1\r\n0\t0,5\t-12,5\r\n0,001\t0,25\t3\r\n";
+    for big in [false, true] {
+        let units = std::iter::once(0xfeff).chain(text.encode_utf16());
+        let bytes: Vec<u8> = units
+            .flat_map(|u: u16| {
+                if big {
+                    u.to_be_bytes()
+                } else {
+                    u.to_le_bytes()
+                }
+            })
+            .collect();
+        holds(&bytes, 2, &["tabs"]);
+        let cut = read(&bytes[..bytes.len() - 11]).unwrap_err();
+        assert!(cut.contains("a.csv:3:"), "{cut}");
+    }
+}
+
+#[test]
 fn what_stands_before_the_header_is_passed_over() {
     let rows = "0,0.5,-12.5\n0.001,0.25,3\n";
     holds(
@@ -272,8 +293,11 @@ fn files_of_other_programs_are_named_by_their_first_bytes() {
         (b"\x89HDF\r\n\x1a\n\0\0".to_vec(), "HDF5"),
         (b"PAR1\x15\x04".to_vec(), "pandas.read_parquet"),
         (b"\x80\x04\x95\x00".to_vec(), "pickle"),
-        (b"\xff\xfet\0,\0".to_vec(), "UTF-16"),
-        (wide, "save it as UTF-8"),
+        (
+            wide,
+            "UTF-16 (little-endian, without a byte order mark) text; save it as UTF-8",
+        ),
+        (b"\xff\xfe\0\0t\0\0\0".to_vec(), "UTF-32 text"),
         (b"[{\"t\":0,\"q1\":0}]".to_vec(), "JSON"),
         (b"<?xml version=\"1.0\"?><robot/>".to_vec(), "XML"),
     ] {

@@ -3,6 +3,10 @@
 /// Number of bytes used for the detection.
 pub(super) const HEAD: usize = 4096;
 
+/// UTF-16 that nothing marks as such.
+const BIG: &str = "UTF-16 (big-endian, without a byte order mark)";
+const LITTLE: &str = "UTF-16 (little-endian, without a byte order mark)";
+
 /// A format that is not supported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ForeignFormat {
@@ -60,11 +64,9 @@ pub enum ForeignFormat {
     /// Measurement data of vehicles and test benches.
     #[error("{0} file; export its channels on one time base as CSV")]
     Bench(&'static str),
-    /// UTF-16.
-    #[error(
-        "UTF-16 text, as spreadsheet programs write \"Unicode text\"; save it as UTF-8 (\"CSV UTF-8\")"
-    )]
-    Utf16,
+    /// UTF-16 without a byte order mark, or UTF-32.
+    #[error("{0} text; save it as UTF-8 (\"CSV UTF-8\" of spreadsheet programs)")]
+    Wide(&'static str),
     /// JSON outside MCAP.
     #[error("JSON text; write one line per sample as CSV, with a header line such as `t,q1,tau1`")]
     Json,
@@ -104,8 +106,8 @@ impl ForeignFormat {
             (b"TDSm", ForeignFormat::Bench("a TDMS")),
             (b"MDF     ", ForeignFormat::Bench("an MDF4")),
             (b"LOGG", ForeignFormat::Bench("a BLF")),
-            (b"\xff\xfe", ForeignFormat::Utf16),
-            (b"\xfe\xff", ForeignFormat::Utf16),
+            (b"\xff\xfe\0\0", ForeignFormat::Wide("UTF-32")),
+            (b"\0\0\xfe\xff", ForeignFormat::Wide("UTF-32")),
             (b"<", ForeignFormat::Xml),
         ];
         if is(b"PK\x03\x04") {
@@ -137,6 +139,7 @@ impl ForeignFormat {
         known
             .map(|(_, format)| *format)
             .or_else(|| begins_json().then_some(Self::Json))
-            .or_else(|| (wide(0) || wide(1)).then_some(Self::Utf16))
+            .or_else(|| wide(0).then_some(Self::Wide(BIG)))
+            .or_else(|| wide(1).then_some(Self::Wide(LITTLE)))
     }
 }

@@ -54,6 +54,7 @@ mod sample_hold;
 mod sampling;
 pub mod sessions;
 mod source;
+mod text_file;
 mod thermal_history;
 mod torque_spike;
 mod unsigned;

@@ -352,6 +352,9 @@ pub struct DataFault {
     pub joint: String,
     /// True if nothing else explains the data. An uncertain fault does not stop the diagnosis.
     pub certain: bool,
+    /// True if it names an error of the description: gravity, an axis, a zero, a gear ratio, a rotor.
+    #[serde(skip)]
+    pub of_description: bool,
     /// The fault and its correction, a sentence.
     pub text: String,
 }

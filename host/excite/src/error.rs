@@ -64,7 +64,7 @@ pub enum ExciteError {
     },
     /// Poses without a wrist sensor.
     #[error(
-        "poses are for the readings of a wrist sensor, and robot \"{robot}\" has no [wrist_sensor]; describe the sensor, or design a motion (without the number of poses), which finds the load by the joint torques"
+        "poses are for the readings of a wrist sensor, and robot \"{robot}\" has no [wrist_sensor]; add this table to the TOML description (of a URDF, `rig init --from` writes one), or design a motion (without the number of poses), which finds the load by the joint torques"
     )]
     NoSensor {
         /// Name of the robot.

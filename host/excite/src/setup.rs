@@ -199,7 +199,7 @@ fn torque_notes(
             "The torque limit was not checked: joint \"{joint}\" has no [joint.inertial], so that its torque is not known beforehand."
         )),
         Ok(_) if limited && options.parameters == Parameters::Load => notes.push(
-            "The torque limit is kept for the robot as described, without the load that is to be identified; give [joint.inertial] of the last link a part of it, or a lower --speed-share, if the load is heavy.".to_owned(),
+            "The torque limit is kept for the robot as described, without the load that is to be identified; for a heavy load, add a part of its mass to [joint.inertial] of the last joint, or give a lower --speed-share.".to_owned(),
         ),
         _ => {}
     }

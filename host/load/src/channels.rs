@@ -3,12 +3,15 @@
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::Recording;
 use rig_model::robot::WristSensor;
+use rig_output::{format_short, format_significant};
 
 use crate::error::LoadError;
-use crate::rows::{Ends, each_readings};
+use crate::rows::{Ends, FEWEST_ROWS, each_readings};
 
 /// Consecutive rows at an extreme value that a cut reading shows at least.
 const RUN: usize = 5;
+/// Ratio to the described range that no sensor reads.
+const BEYOND: f64 = 1.1;
 /// Width of the neighbourhood of an extreme value, as a share of the channel's range.
 const NEIGHBOURHOOD: f64 = 0.02;
 
@@ -28,24 +31,34 @@ struct End {
     at: usize,
     near: usize,
     run: usize,
-    longest: usize,
+    /// Distance of the row before the run.
+    before: f64,
+    /// Runs of [`RUN`] rows or more, and those of them that are entered or left by more than a step of the sensor.
+    runs: [usize; 2],
 }
 
 impl End {
-    /// Returns true if more rows lie exactly at the end than near it, several of them in a row: a limit was reached.
+    /// Returns true if more rows lie exactly at the end than near it, and most runs of such rows begin or end abruptly: a
+    /// limit was reached. A coarse reading that turns at its highest value comes and goes by single steps.
     fn is_cut(&self) -> bool {
-        self.longest >= RUN && self.at > self.near
+        let [runs, abrupt] = self.runs;
+        runs > 0 && 2 * abrupt > runs && self.at > self.near
     }
 
-    fn push(&mut self, distance: f64, near: f64) {
+    fn push(&mut self, distance: f64, near: f64, step: f64) {
         if distance == 0.0 {
             self.at += 1;
             self.run += 1;
-            self.longest = self.longest.max(self.run);
-        } else {
-            self.run = 0;
-            self.near += usize::from(distance <= near);
+            return;
         }
+        if self.run >= RUN {
+            let is_abrupt = self.before.max(distance) > 1.5 * step;
+            self.runs[0] += 1;
+            self.runs[1] += usize::from(is_abrupt);
+        }
+        self.run = 0;
+        self.before = distance;
+        self.near += usize::from(distance <= near);
     }
 }
 
@@ -65,8 +78,19 @@ pub(crate) struct Judged {
 ///
 /// # Errors
 /// [`LoadError::Dead`], [`LoadError::NoColumn`].
-pub(crate) fn judge(recording: &dyn Recording, sensor: &WristSensor) -> Result<Judged, LoadError> {
+pub(crate) fn judge(
+    recording: &dyn Recording,
+    sensor: &WristSensor,
+    poses: bool,
+) -> Result<Judged, LoadError> {
     let (rows, length, channels) = ranges(recording)?;
+    if rows < 2 {
+        return Err(LoadError::TooFew {
+            rows: rows as usize,
+            least: 2,
+        });
+    }
+    let poses = poses || rows < FEWEST_ROWS as u64;
     for (channel, column) in channels.iter().zip(WRENCH_COLUMNS) {
         if channel.low == channel.high {
             return Err(LoadError::Dead {
@@ -81,8 +105,8 @@ pub(crate) fn judge(recording: &dyn Recording, sensor: &WristSensor) -> Result<J
         for k in 0..block.len() {
             for ((end, channel), list) in found.iter_mut().zip(&channels).zip(readings) {
                 let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
-                end[0].push(list[k] - channel.low, near);
-                end[1].push(channel.high - list[k], near);
+                end[0].push(list[k] - channel.low, near, channel.step);
+                end[1].push(channel.high - list[k], near, channel.step);
             }
         }
         Ok(())
@@ -100,11 +124,16 @@ pub(crate) fn judge(recording: &dyn Recording, sensor: &WristSensor) -> Result<J
         }
         let seen = [channels[c].low, channels[c].high];
         for side in 0..2 {
-            let described = range.is_some_and(|range| seen[side].abs() >= range);
-            if found[c][side].is_cut() || described {
+            let reached = |range: f64| seen[side].abs() >= range;
+            if let Some(range) = range.filter(|range| seen[side].abs() > BEYOND * range) {
+                return Err(beyond(recording, c, seen[side], range));
+            }
+            // Rows of one pose repeat a reading, and a reading well inside of the range is none of its ends.
+            let is_cut = !poses && found[c][side].is_cut() && range.is_none_or(reached);
+            if is_cut || range.is_some_and(reached) {
                 cut.push((WRENCH_COLUMNS[c], seen[side]));
             }
-            if found[c][side].is_cut() {
+            if is_cut {
                 end[side] = if side == 0 {
                     end[0].max(seen[0])
                 } else {
@@ -119,6 +148,22 @@ pub(crate) fn judge(recording: &dyn Recording, sensor: &WristSensor) -> Result<J
         ends,
         cut,
     })
+}
+
+/// Says that a reading is outside of what the sensor measures.
+fn beyond(recording: &dyn Recording, c: usize, value: f64, range: f64) -> LoadError {
+    let (unit, other) = if c < 3 {
+        ("N", "kgf or mN")
+    } else {
+        ("N·m", "N·mm or N·cm")
+    };
+    LoadError::Fault(format!(
+        "{} reaches {} in {}, but the range of the sensor is {} {unit}: the column looks like {other}, or the range in [wrist_sensor] is wrong.",
+        WRENCH_COLUMNS[c],
+        format_significant(value, 4),
+        recording.label(),
+        format_short(range)
+    ))
 }
 
 /// Returns the number of rows, the length in s and the range of each channel.

@@ -27,8 +27,14 @@ pub fn controller_numbers(load: &LoadIdentification) -> ControllerNumbers {
             .collect::<Vec<_>>()
             .join(", ")
     };
-    let mass = load.body.mass;
-    let centre = Vector3::from(load.body.first_moment) / mass;
+    let (mass, centre) = match load.inertia_shown {
+        true => (
+            load.body.mass,
+            Vector3::from(load.body.first_moment) / load.body.mass,
+        ),
+        // The body holds an assumed inertia, which must not move the centre of mass.
+        false => (load.mass.value, Vector3::from(load.centre.map(|c| c.value))),
+    };
     let about = about_centre(load, &centre);
     let inertia = if load.inertia_shown {
         about

@@ -155,6 +155,9 @@ const UNITS: [Unit; 4] = [
 /// tells: poses at rest fit every unit, with another centre of mass.
 pub(crate) fn other_unit(sensed: &Sensed, compared: &Compared) -> Option<&'static str> {
     let fit = &compared.stated;
+    if sensed.recordings.iter().all(|r| r.poses) || sensed.is_exact(fit) {
+        return None;
+    }
     let better = compared
         .better
         .as_ref()

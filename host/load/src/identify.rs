@@ -3,22 +3,24 @@
 use nalgebra::{Isometry3, SMatrix, SymmetricEigen};
 use rig_data::prepare::Recording;
 use rig_identify::{chain_of, least_eigenvalue};
-use rig_model::robot::{Load, Robot};
+use rig_model::robot::{Joint, Load, Robot};
 use rig_output::{format_significant, listed};
 use rig_shared::multibody::INERTIAL_PARAMETERS;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::body::body;
 use crate::error::LoadError;
-use crate::estimate::{Estimate, Parameters, Spread, Square, estimate};
+use crate::estimate::{Estimate, Parameters, Spread, Square, estimate, sizes_of};
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
-use crate::result::{Agreement, LoadIdentification, NAMES, TorqueFindings, numbers};
-use crate::sensor::{Sensing, by_sensor};
+use crate::result::{Agreement, LoadIdentification, NAMES, NotShown, TorqueFindings, numbers};
+use crate::sensor::{Sensing, SensorFindings, by_sensor};
 use crate::torque::{Driven, equations};
 
 /// Probability by chance below which sensor and torques contradict each other.
 const CONTRADICTS: f64 = 1e-3;
+/// Standard deviations by which a mass differs certainly from none.
+const CERTAIN: f64 = 5.0;
 /// Standard deviation along a direction, relative to the plausible size, up to which two estimates are compared.
 const COMPARED: f64 = 0.5;
 
@@ -28,7 +30,8 @@ const COMPARED: f64 = 0.5;
 /// bias of the sensor, its drift and its rotation are estimated with them. By torque the ten columns of the last link
 /// explain what the recordings with the load show beyond those without it (Khalil, Gautier & Lemoine 2007).
 ///
-/// Leaves out: elasticity between flange and load, a delay between sensor and encoders, a base that is not level.
+/// Leaves out: elasticity between flange and load, a delay between sensor and encoders, a base that is not level, an error
+/// of the sensor's position, its gain and crosstalk, cables that pull.
 ///
 /// # Errors
 /// [`LoadError`].
@@ -76,33 +79,77 @@ pub fn identify_load(
     if let Some(sensor) = &sensor {
         warnings.extend(sensor.warnings.iter().cloned());
     }
+    if torque.as_ref().is_some_and(|torque| !torque.with_unloaded) {
+        warnings.push(by_description(robot)?);
+    }
     let agreement = (sensed.as_ref().zip(driven.as_ref())).map(|(a, b)| agreement(a, b));
-    warnings.extend(agreement.as_ref().and_then(contradiction));
+    let contradicts = agreement.as_ref().and_then(contradiction);
     let mut found = match (sensed, driven) {
+        // What contradicts each other has no mean.
+        (Some(sensed), Some(_)) if contradicts.is_some() => sensed,
         (Some(a), Some(b)) => fused(&a, &b),
         (Some(one), None) | (None, Some(one)) => one,
         (None, None) => return Err(LoadError::TooFew { rows: 0, least: 1 }),
     };
+    warnings.extend(contradicts);
     if let Some(tool) = &options.tool {
-        found.values -= Parameters::from(tool.parameters());
+        found = without_tool(found, tool)?;
     }
-    let numbers = numbers(&found);
-    let body = body(&found).ok_or_else(|| LoadError::NoMass {
+    let not_shown = missing(robot, &chain, &to_joint, &found, options.by);
+    described(
+        robot,
+        options.by,
+        &found,
+        Parts {
+            sensor,
+            torque,
+            agreement,
+            not_shown,
+            warnings,
+        },
+    )
+}
+
+/// What is told beside the load.
+struct Parts {
+    sensor: Option<SensorFindings>,
+    torque: Option<TorqueFindings>,
+    agreement: Option<Agreement>,
+    not_shown: Vec<NotShown>,
+    warnings: Vec<String>,
+}
+
+/// Composes the result.
+fn described(
+    robot: &Robot,
+    by: By,
+    found: &Estimate,
+    parts: Parts,
+) -> Result<LoadIdentification, LoadError> {
+    let Parts {
+        sensor,
+        torque,
+        agreement,
+        not_shown,
+        mut warnings,
+    } = parts;
+    let numbers = numbers(found);
+    let body = body(found).ok_or_else(|| LoadError::NoMass {
         why: format!(
-            "it is {} kg, and a load weighs more than nothing",
-            format_significant(found.values[0], 3)
+            "it is {} ± {} kg; record a livelier motion, or more poses",
+            format_significant(found.values[0], 3),
+            format_significant(found.std()[0], 2)
         ),
     })?;
     let all_shown = found.shown().iter().all(|s| *s);
     let consistent = least_eigenvalue(found.values.as_slice()) > 0.0;
     if all_shown && !consistent {
-        warnings.push(inconsistent(&found, &body));
+        warnings.push(inconsistent(found, &body));
     }
-    let not_shown = missing(robot, &chain, &to_joint, &found, options.by);
     Ok(LoadIdentification {
         schema: "rig-load/1",
         robot: robot.name.clone(),
-        by: options.by,
+        by,
         parameters: numbers.parameters,
         covariance: numbers.covariance,
         mass: numbers.mass,
@@ -111,7 +158,10 @@ pub fn identify_load(
         inertia_shown: numbers.inertia_shown,
         principal_moments: numbers.principal_moments,
         principal_axes: numbers.principal_axes,
-        body: Load::of(body.into()),
+        body: Load {
+            inertia_known: numbers.inertia_shown,
+            ..Load::of(body.into())
+        },
         consistent,
         degrees_of_freedom: found.degrees_of_freedom,
         sensor,
@@ -120,6 +170,52 @@ pub fn identify_load(
         not_shown,
         warnings,
     })
+}
+
+/// Subtracts a known load. Where its inertia was assumed, that of the rest is not shown either.
+fn without_tool(mut found: Estimate, tool: &Load) -> Result<Estimate, LoadError> {
+    found.values -= Parameters::from(tool.parameters());
+    let (mass, std) = (found.values[0], found.std()[0]);
+    if mass < CERTAIN * std {
+        return Err(LoadError::NoMass {
+            why: format!(
+                "beside --tool it is {} ± {} kg",
+                format_significant(mass, 3),
+                format_significant(std, 2)
+            ),
+        });
+    }
+    found.sizes = sizes_of(mass);
+    if !tool.inertia_known {
+        let assumed = sizes_of(tool.mass.max(mass));
+        for k in 4..INERTIAL_PARAMETERS {
+            found.beyond[(k, k)] += assumed[k].powi(2);
+        }
+    }
+    Ok(found)
+}
+
+/// Says what the torques by a description are worth.
+///
+/// # Errors
+/// [`LoadError::Model`]: no link of the description has a mass.
+fn by_description(robot: &Robot) -> Result<String, LoadError> {
+    let weighs = |joint: &Joint| joint.inertial.as_ref().is_some_and(|own| own.mass != 0.0);
+    if !robot.joints.iter().any(weighs) {
+        return Err(LoadError::Model(format!(
+            "{} describes no link with a mass, so the torque of the robot without the load is unknown; record it (--without), or identify the robot first (`rig identify`)",
+            robot.name
+        )));
+    }
+    let doubt = match robot.identified {
+        Some(_) => "its errors are not in the standard deviations",
+        None => {
+            "it was not identified (`rig identify`), and its errors are not in the standard deviations"
+        }
+    };
+    Ok(format!(
+        "The description gave the torque of the robot without the load; {doubt}. A recording without the load (--without) avoids this."
+    ))
 }
 
 /// Returns the matrix that turns the ten parameters in the flange frame to those in the frame of the last joint.
@@ -206,7 +302,13 @@ fn agreement(a: &Estimate, b: &Estimate) -> Agreement {
     }
     let chance = match directions {
         0 => 1.0,
-        _ => ChiSquared::new(f64::from(directions)).map_or(1.0, |d| d.sf(squares)),
+        // Hotelling's T²: both covariances come from few segments.
+        _ => {
+            let count = f64::from(directions);
+            let freedom = a.degrees_of_freedom.min(b.degrees_of_freedom) as f64 - count + 1.0;
+            let ratio = squares * freedom / (count * (freedom + count - 1.0));
+            FisherSnedecor::new(count, freedom.max(1.0)).map_or(1.0, |d| d.sf(ratio))
+        }
     };
     Agreement {
         chance,
@@ -234,7 +336,7 @@ fn contradiction(agreement: &Agreement) -> Option<String> {
             })
             .collect();
         format!(
-            "Sensor and joint torques contradict each other (probability by chance {:.1e}): {}. Check the units and scales of both; a torque constant that is 5 % wrong makes a mass by torque 5 % wrong.",
+            "Sensor and joint torques contradict each other (probability by chance {:.1e}): {}. The result is that of the sensor alone. Check the units and scales of both: a torque constant that is 5 % wrong makes a mass by torque 5 % wrong.",
             agreement.chance,
             listed(&parameters)
         )

@@ -69,5 +69,6 @@ pub use error::LoadError;
 pub use identify::identify_load;
 pub use options::{By, LoadOptions};
 pub use result::{Agreement, LoadIdentification, LoadParameter, NotShown, TorqueFindings, Value};
+pub use rows::FEWEST_ROWS;
 pub use sensor::{Bias, SensorFindings, Trace};
 pub use urdf_link::urdf_link;

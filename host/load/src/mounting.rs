@@ -63,6 +63,14 @@ pub(crate) struct Channels {
 }
 
 impl Channels {
+    /// Returns the channels as they are in the file.
+    pub(crate) fn as_recorded() -> Self {
+        Self {
+            force: Matrix3::identity(),
+            moment: Matrix3::identity(),
+        }
+    }
+
     /// Returns true if forces and moments are exchanged alike and the axes stay right-handed: the sensor is turned.
     pub(crate) fn is_rotation(&self) -> bool {
         self.force == self.moment && self.force.determinant() > 0.0

@@ -52,7 +52,7 @@ pub struct TorqueFindings {
 /// Comparison of the load by sensor and by torque.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Agreement {
-    /// Probability that both differ by chance as much as they do (χ² test over the directions that both show).
+    /// Probability that both differ by chance as much as they do (F test over the directions that both show).
     pub chance: f64,
     /// Number of these directions.
     pub directions: usize,

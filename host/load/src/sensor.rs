@@ -13,15 +13,15 @@ use crate::drift::{is_better, with_changes};
 use crate::error::LoadError;
 use crate::estimate::{Estimate, Spread, estimate};
 use crate::mounting::{Channels, Mounting};
-use crate::rows::{each_pose, each_row};
+use crate::rows::{FEWEST_ROWS, each_pose, each_row};
 use crate::statistics::{Collector, Recorded};
 use crate::system::{Fit, Sensed, Unknowns};
 use crate::torqueless::Torqueless;
 
-/// Rows below which a recording is taken as a list of poses at rest: no derivative can be formed of fewer.
-pub(crate) const FEWEST_ROWS: u64 = 256;
 /// Least number of poses or rows: with two the mass and one component of the centre are known.
 const LEAST_ROWS: usize = 2;
+/// Angle below which the axes of the sensor are those described, rad: rounding.
+const LEAST_TURN: f64 = 1e-6;
 /// Share of the rows that may be left out because of saturation.
 const MOST_SATURATED: f64 = 0.5;
 /// Distance of the centre of mass from the sensor that no load has, m.
@@ -135,7 +135,7 @@ pub(crate) fn by_sensor(sensing: &Sensing) -> Result<(Estimate, SensorFindings),
         }
         warnings.push(text);
     }
-    let fit = believed(
+    let (fit, channels) = believed(
         &sensed,
         &mounting,
         compared,
@@ -161,6 +161,7 @@ pub(crate) fn by_sensor(sensing: &Sensing) -> Result<(Estimate, SensorFindings),
         robot,
         described: &described,
         sensor: &sensor,
+        channels,
     };
     warnings.extend(findings.implausible(&found, &pose, sensing.even_if_wrong)?);
     let findings = findings.findings(prepared, warnings);
@@ -181,9 +182,9 @@ fn collected(
     let joints = sensing.robot.joints.len();
     let mut judged = Vec::new();
     for (recording, _) in sensing.recordings {
-        judged.push(judge(*recording, sensor)?);
+        judged.push(judge(*recording, sensor, sensing.poses)?);
     }
-    let is_poses = |judged: &Judged| sensing.poses || judged.rows < FEWEST_ROWS;
+    let is_poses = |judged: &Judged| sensing.poses || judged.rows < FEWEST_ROWS as u64;
     let moving: Vec<Torqueless> = (sensing.recordings.iter().zip(&judged))
         .filter(|(_, judged)| !is_poses(judged))
         .map(|((recording, _), _)| Torqueless(*recording))
@@ -282,9 +283,10 @@ fn believed(
     sensing: &Sensing,
     sensor: &WristSensor,
     warnings: &mut Vec<String>,
-) -> Result<Fit, LoadError> {
+) -> Result<(Fit, Channels), LoadError> {
     let Compared { stated, better } = compared;
     let mut fit = stated;
+    let mut exchanged = Channels::as_recorded();
     if let Some((channels, own)) = better {
         // Which of the two opposite wrenches is read need not be stated: the sign of the mass tells.
         let may_be_opposite = sensor.reads.is_none() || is_opposite(&channels);
@@ -298,6 +300,7 @@ fn believed(
             warnings.push(format!(
                 "{text} The load was identified with them put right."
             ));
+            exchanged = channels;
         }
         fit = own;
     } else {
@@ -332,7 +335,7 @@ fn believed(
         }
         fit = sensed.fit(&opposite, &unknowns);
     }
-    Ok(fit)
+    Ok((fit, exchanged))
 }
 
 /// Refuses readings in which nothing weighs.
@@ -388,12 +391,14 @@ struct Told<'a> {
     robot: &'a Robot,
     described: &'a Matrix3<f64>,
     sensor: &'a WristSensor,
+    /// Exchange of channels that was put right.
+    channels: Channels,
 }
 
 impl Told<'_> {
     /// Returns the estimated rotation of the sensor in the frame of the last joint, and the sign of its readings.
     fn rotation(&self) -> (Matrix3<f64>, Reads) {
-        let force = self.fit.mounting.force;
+        let force = self.fit.mounting.force * self.channels.force.transpose();
         match force.determinant() > 0.0 {
             true => (force, Reads::Robot),
             false => (-force, Reads::Load),
@@ -411,7 +416,7 @@ impl Told<'_> {
         let flange = self.robot.last_link.rotation.to_rotation_matrix().inverse();
         let own = flange * Rotation3::from_matrix_unchecked(rotation);
         let (roll, pitch, yaw) = own.euler_angles();
-        let is_turned = angle > 1e-9;
+        let is_turned = angle > LEAST_TURN;
         if is_turned {
             let axis = against
                 .axis()
@@ -448,7 +453,7 @@ impl Told<'_> {
 
     fn turned(&self, angle: f64, axis: &Vector3<f64>, [roll, pitch, yaw]: [f64; 3]) -> String {
         format!(
-            "The axes of the sensor are turned by {} degrees about [{:.2}, {:.2}, {:.2}] against the description; the load was identified with the estimated axes. If they are right, write rotation = [{:.4}, {:.4}, {:.4}] into [wrist_sensor].",
+            "The axes of the sensor are turned by {} degrees about [{:.2}, {:.2}, {:.2}] against the description; the load was identified with the estimated axes. A base that is not level, a wrong sensor position, cables that pull, or sensor and encoders recorded at unlike times look alike: look for these first. If the sensor is turned, write rotation = [{:.4}, {:.4}, {:.4}] into [wrist_sensor].",
             format_significant(angle.to_degrees(), 3),
             axis.x,
             axis.y,

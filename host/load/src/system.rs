@@ -265,6 +265,12 @@ impl Sensed<'_> {
         fit
     }
 
+    /// Returns true if the fit leaves nothing but rounding: likelihoods of other units cannot be compared then.
+    pub(crate) fn is_exact(&self, fit: &Fit) -> bool {
+        let sizes = self.sizes(&fit.unknowns);
+        (fit.noise.iter().zip(sizes)).any(|(noise, size)| *noise < 1e3 * ROUNDING * size)
+    }
+
     /// Returns the number of rows that are used.
     pub(crate) fn used_rows(&self, unknowns: &Unknowns) -> u64 {
         let mut rows = 0;

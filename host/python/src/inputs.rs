@@ -48,7 +48,7 @@ pub(crate) fn checked(
     for recordings in inputs {
         let found = recordings.faults(robot)?;
         remarks.extend(found.doubtful);
-        wrong.extend(found.wrong);
+        wrong.extend(found.wrong.into_iter().chain(found.described));
     }
     wrong.extend(more);
     if even_if_wrong {

@@ -142,8 +142,8 @@ mod tests {
                 let own: [f64; 3] = core::array::from_fn(|k| {
                     m * (second_derivative(|t| place(t, point)[k], t) - chain.gravity()[k])
                 });
-                force = force + Vector3(own);
-                moment = moment + (Vector3(place(t, point)) - Vector3(origin)).cross(Vector3(own));
+                force += Vector3(own);
+                moment += (Vector3(place(t, point)) - Vector3(origin)).cross(Vector3(own));
             }
             let q = positions(t);
             let qd: [f64; 3] = core::array::from_fn(|k| derivative(|t| positions(t)[k], t));

@@ -150,6 +150,11 @@ impl Finding {
         }
     }
 
+    /// Returns true if it names an error of the description.
+    pub(crate) fn is_of_description(&self) -> bool {
+        matches!(self, Self::Fit(misfit) if misfit.is_of_description())
+    }
+
     /// Returns the columns that it concerns.
     pub(crate) fn about(&self) -> About {
         match self {

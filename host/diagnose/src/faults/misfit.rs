@@ -176,6 +176,23 @@ impl Misfit {
         }
     }
 
+    /// Returns true if it names an error of the description.
+    pub(crate) fn is_of_description(&self) -> bool {
+        match self {
+            Self::AxisReversed { .. }
+            | Self::Zero { .. }
+            | Self::GravityTurned { .. }
+            | Self::LevelAxis { .. }
+            | Self::StrongestElsewhere { .. }
+            | Self::GravityReversed { .. }
+            | Self::HeavyRotor { .. } => true,
+            Self::Scaled { name, .. } | Self::TorqueTimes { name, .. } => {
+                name.as_ref().is_some_and(Name::is_of_description)
+            }
+            _ => false,
+        }
+    }
+
     /// Returns the columns that it concerns.
     pub(crate) fn about(&self) -> About {
         match self {

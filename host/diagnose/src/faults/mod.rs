@@ -155,6 +155,7 @@ fn told(robot: &Robot, recording: String, fault: &Fault) -> DataFault {
         recording,
         joint: joint.map_or_else(String::new, |joint| joint.name.clone()),
         certain: fault.is_certain(),
+        of_description: fault.finding.is_of_description(),
         text: sentences::of(robot, fault),
     }
 }
@@ -167,6 +168,7 @@ fn told_short((found, recording): (Short, String)) -> DataFault {
         recording,
         joint: String::new(),
         certain: true,
+        of_description: false,
     }
 }
 

@@ -85,6 +85,11 @@ impl Named {
 pub(crate) struct Name(pub(crate) Vec<Cause>);
 
 impl Name {
+    /// Returns true if the likeliest cause is an error of the description.
+    pub(crate) fn is_of_description(&self) -> bool {
+        matches!(self.0.first(), Some(Cause::UpsideDown(_)))
+    }
+
     /// Returns the kind of the fault, by the likeliest cause.
     pub(crate) fn kind(&self) -> FaultKind {
         let of_ratio = |cause: &Cause| {

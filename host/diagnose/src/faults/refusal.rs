@@ -21,6 +21,7 @@ pub(crate) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
         recording: label.clone(),
         joint: String::new(),
         certain: true,
+        of_description: false,
         text: error.to_string(),
     })
 }

@@ -52,6 +52,7 @@ pub fn diagnose_voltage(
             recording,
             joint: robot.joints[0].name.clone(),
             certain: true,
+            of_description: false,
             text: sentences::fault(&wrong),
         })
         .collect();

@@ -220,7 +220,96 @@ fn exchanged_and_reversed_channels_are_named_and_put_right() {
         let found = identify_load(&moving.robot, &[&motion], &[], &options).unwrap();
         let off = errors(&found, &points);
         assert!(off[0] < 0.01 && off[1] < 0.005, "{said}: {off:?}");
+        // The sensor itself is not turned.
+        assert!(
+            !found.warnings.iter().any(|w| w.contains("turned by")),
+            "{:?}",
+            found.warnings
+        );
     }
+}
+
+/// Three poses with noise are enough for mass and centre of mass, and no unit is suspected of them.
+#[test]
+fn three_poses_show_mass_and_centre() {
+    let points = tool();
+    let truth = parameters(&points);
+    let mut worst = 0.0f64;
+    for seed in 0..20 {
+        let moving = Moving::new(irp6(), 0.9, seed);
+        let three: Vec<Vec<f64>> = [1.0, 14.0, 29.0].map(|t| moving.position(t)).to_vec();
+        let still = poses(&moving, &points, &Sensor::default(), &three, seed);
+        let found = identify_load(&moving.robot, &[&still], &[], &LoadOptions::default()).unwrap();
+        let mass = &found.parameters[0];
+        worst = worst.max((mass.value.value - truth[0]).abs() / mass.value.half_interval);
+    }
+    // Of twenty 95 % intervals one or two may miss, by little.
+    assert!(worst < 3.0, "{worst}");
+}
+
+#[test]
+fn coarse_readings_are_not_taken_for_saturated_ones() {
+    let points = tool();
+    for seed in 0..6 {
+        let moving = Moving::new(irp6(), 0.6, seed);
+        let coarse = |_: f64, read: [f64; 6]| -> [f64; 6] {
+            let step = |c: usize| if c < 3 { 0.2 } else { 0.005 };
+            std::array::from_fn(|c| (read[c] / step(c)).round() * step(c))
+        };
+        let sensor = Sensor {
+            noise: [0.05, 0.001],
+            ..Sensor::default()
+        };
+        let motion = recorded(&moving, &points, &sensor, [30.0, 200.0], seed, &coarse);
+        let found = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+        assert!(
+            !found.warnings.iter().any(|w| w.contains("saturated")),
+            "{:?}",
+            found.warnings
+        );
+        assert!(errors(&found, &points)[0] < 0.01);
+    }
+}
+
+/// An error that stays the same while the robot stands still (a cable) is one error, however many rows a pose has.
+#[test]
+fn rows_of_one_pose_are_one_reading_and_a_motion_is_no_list_of_poses() {
+    let moving = Moving::new(irp6(), 0.8, 12);
+    let points = tool();
+    let once: Vec<Vec<f64>> = (0..6)
+        .map(|k| moving.position(4.7 * f64::from(k)))
+        .collect();
+    let often: Vec<Vec<f64>> = once.iter().flat_map(|q| vec![q.clone(); 40]).collect();
+    let std = |list: &[Vec<f64>], rows: usize| {
+        let mut still = poses(&moving, &points, &Sensor::default(), list, 3);
+        let block = &mut still.blocks[0];
+        for (c, (_, column)) in block.extra.iter_mut().enumerate() {
+            let size = if c < 3 { 0.3 } else { 0.03 };
+            for (k, value) in column.iter_mut().enumerate() {
+                *value += size * (2.0 * (k / rows) as f64 + c as f64).sin();
+            }
+        }
+        let found = identify_load(&moving.robot, &[&still], &[], &LoadOptions::default()).unwrap();
+        found.mass.std
+    };
+    let [one, forty] = [std(&once, 1), std(&often, 40)];
+    assert!(forty > 0.5 * one, "{one} {forty}");
+    let motion = recorded(
+        &moving,
+        &points,
+        &Sensor::default(),
+        [10.0, 100.0],
+        2,
+        NO_FLAW,
+    );
+    let options = LoadOptions {
+        poses: true,
+        ..LoadOptions::default()
+    };
+    let text = identify_load(&moving.robot, &[&motion], &[], &options)
+        .unwrap_err()
+        .to_string();
+    assert!(text.contains("moves all the time"), "{text}");
 }
 
 #[test]
@@ -376,9 +465,9 @@ fn what_poses_cannot_show_is_named_with_a_pose_that_would() {
         "{:?}",
         three.parameters
     );
-    // The same pose again and again shows no mass beside the bias.
+    // The same pose again and again is one pose.
     let one = vec![all[0].clone(); 5];
-    assert!(matches!(found(&one), Err(LoadError::NoMass { .. })));
+    assert!(matches!(found(&one), Err(LoadError::TooFew { .. })));
 }
 
 /// What is mounted beyond the sensor is subtracted: by a recording without the load, or by its known parameters.
@@ -416,6 +505,12 @@ fn what_is_mounted_beyond_the_sensor_is_subtracted() {
     let found = identify_load(robot, &[&with], &[], &options).unwrap();
     let off = errors(&found, &part);
     assert!(off[0] < 0.01 && off[1] < 0.005, "{off:?}");
+    assert!(found.inertia_shown);
+    // An inertia that was assumed for the tool leaves that of the part unknown.
+    let mut options = options;
+    options.tool.as_mut().unwrap().inertia_known = false;
+    let found = identify_load(robot, &[&with], &[], &options).unwrap();
+    assert!(!found.inertia_shown && !found.body.inertia_known);
 }
 
 #[test]
@@ -430,6 +525,22 @@ fn readings_that_no_load_gives_are_refused() {
     };
     let text = refused(&|_, [a, b, c, d, e, f]| [a, b, c, 1e3 * d, 1e3 * e, 1e3 * f]);
     assert!(text.contains("N·mm"), "{text}");
+    let mut ranged = Moving::new(irp6(), 0.8, 11);
+    ranged.robot.wrist_sensor.as_mut().unwrap().moment_range = Some(20.0);
+    let millimetres: &dyn Fn(f64, [f64; 6]) -> [f64; 6] =
+        &|_, [a, b, c, d, e, f]| [a, b, c, 1e3 * d, 1e3 * e, 1e3 * f];
+    let motion = recorded(
+        &ranged,
+        &points,
+        &Sensor::default(),
+        [20.0, 100.0],
+        2,
+        millimetres,
+    );
+    let text = identify_load(&ranged.robot, &[&motion], &[], &LoadOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(text.contains("looks like N·mm"), "{text}");
     let text = refused(&|_, [a, b, c, d, _, f]| [a, b, c, d, 0.0, f]);
     assert!(text.contains("my of made 2 is 0"), "{text}");
     // A sensor that nothing hangs on.

@@ -16,8 +16,7 @@ use super::inertia::negative_inertia;
 use super::serial_robot::Robot;
 use super::unit_check::oversized;
 
-/// Returns the first fault of `robot`, if any.
-pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
+fn check_gravity(robot: &Robot) -> Result<(), Fault> {
     use Step::{At, Key};
     for (i, g) in robot.gravity.iter().enumerate() {
         if !is_safe_magnitude(*g) {
@@ -29,6 +28,13 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             ));
         }
     }
+    Ok(())
+}
+
+/// Returns the first fault of `robot`, if any.
+pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
+    use Step::{At, Key};
+    check_gravity(robot)?;
     if robot.joints.is_empty() {
         return Err(Fault {
             key_path: vec![Key("joint")],

@@ -159,7 +159,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
     }
     let robot = Robot {
         origin: Origin::Urdf,
-        last_link: links.last().copied().unwrap_or_default(),
+        last_link: links.last().copied().unwrap_or_default() * chain.tip,
         ..Robot::new(&chain.name, joints)
     };
     Converted {

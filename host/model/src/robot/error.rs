@@ -48,6 +48,14 @@ pub enum RobotError {
         /// Message of the operating system.
         source: std::io::Error,
     },
+    /// The file of a load cannot be opened or read.
+    #[error("cannot read the load {}: {source}; give a TOML file with mass, first_moment and inertia", path.display())]
+    ReadLoad {
+        /// The file.
+        path: PathBuf,
+        /// Message of the operating system.
+        source: std::io::Error,
+    },
     /// The path is a directory.
     #[error("{} is a directory, but a robot description is one .toml or .urdf file", path.display())]
     Directory {

@@ -13,7 +13,7 @@ use super::serial_robot::Robot;
 use super::urdf::SpatialInertia;
 use rig_output::{comment_toml, toml_document};
 
-/// A rigid body that the flange carries, in the flange frame: the frame of the last joint (TOML) or link (URDF).
+/// A rigid body that the flange carries, in the flange frame: the frame of the last joint (TOML) or of the link that the chain ends at (URDF).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
@@ -25,6 +25,17 @@ pub struct Load {
     /// Ixx Ixy Ixz Iyy Iyz Izz about the origin of the flange frame, kg·m²
     #[serde(deserialize_with = "exact")]
     pub inertia: [f64; 6],
+    /// False if the inertia was assumed, because the data of an identification do not show it.
+    #[serde(default = "yes", skip_serializing_if = "is_true")]
+    pub inertia_known: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 /// Comments of the written file, by key.
@@ -32,6 +43,7 @@ const COMMENTS: &str = "
 mass = 'kg'
 first_moment = 'kg*m, mass times centre of mass, in the flange frame'
 inertia = 'kg*m^2, Ixx Ixy Ixz Iyy Iyz Izz about the origin of the flange frame'
+inertia_known = 'false: the data do not show the inertia; it is that of a sphere'
 ";
 
 impl Load {
@@ -40,7 +52,7 @@ impl Load {
     /// # Errors
     /// [`RobotError`] with the line of what is wrong.
     pub fn read(path: &Path) -> Result<Self, RobotError> {
-        let text = std::fs::read_to_string(path).map_err(|source| RobotError::Read {
+        let text = std::fs::read_to_string(path).map_err(|source| RobotError::ReadLoad {
             path: path.into(),
             source,
         })?;
@@ -81,6 +93,7 @@ impl Load {
             mass: m,
             first_moment: [x, y, z],
             inertia: [xx, xy, xz, yy, yz, zz],
+            inertia_known: true,
         }
     }
 

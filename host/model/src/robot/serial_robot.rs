@@ -37,7 +37,7 @@ pub struct Robot {
     /// Source of the values. It decides how far they are trusted ([`worth`](fn@super::worth)). Not stored in the file.
     #[serde(skip)]
     pub origin: Origin,
-    /// Frame of the last URDF link in the frame of the last joint. Identity if no URDF was read. Not stored in the
+    /// Frame of the URDF link that the chain ends at (its tip), in the frame of the last joint. Identity if no URDF was read. Not stored in the
     /// file.
     #[serde(skip)]
     pub last_link: nalgebra::Isometry3<f64>,

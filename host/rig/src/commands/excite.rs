@@ -107,7 +107,7 @@ pub(crate) struct Args {
     /// Kind of motion; all but fourier move one joint
     #[arg(long, value_enum, default_value_t = KindArg::Fourier)]
     pub(crate) kind: KindArg,
-    /// Criterion that is optimised [default: cond] (fourier)
+    /// Criterion that is optimised [default: cond; d-optimal with --load] (fourier)
     #[arg(long, value_enum)]
     pub(crate) criterion: Option<CriterionArg>,
     /// Parameters that the motion should make identifiable [default: all] (fourier)
@@ -421,6 +421,8 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     let default = Options::default();
     let options = Options {
         criterion: match args.criterion {
+            // The condition number does not see that a motion is small.
+            None if args.load => Criterion::Determinant,
             None => default.criterion,
             Some(CriterionArg::Cond) => Criterion::ConditionNumber,
             Some(CriterionArg::MinSingular) => Criterion::SmallestSingularValue,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings, refuse_faults};
+use super::input::{Inputs, RobotArg, Use, command_line, recordings, refuse_faults};
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_faults(
         &robot,
         &[&training, &sweep],
-        sweep.strange_references(&robot)?,
+        (Use::Fit, sweep.strange_references(&robot)?),
         args.even_if_wrong,
         ui,
     )?;

@@ -12,7 +12,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 pub use self::impossible::Impossible;
 use super::error::CommandError;
 use super::input::{
-    Inputs, RobotArg, command_line, recordings, refuse_faults, refuse_shared, refuse_twice,
+    Inputs, RobotArg, Use, command_line, recordings, refuse_faults, refuse_shared, refuse_twice,
 };
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
@@ -259,7 +259,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     refuse_repeated(args)?;
     let wrong = strange_columns(robot, args, [&training, &holdout], ui)?;
-    refuse_faults(robot, &[&training, &holdout], wrong, args.even_if_wrong, ui)?;
+    refuse_faults(
+        robot,
+        &[&training, &holdout],
+        (Use::Fit, wrong),
+        args.even_if_wrong,
+        ui,
+    )?;
     let found = identified(robot, args, [&training, &holdout], ui)?;
     folder(&args.out)?;
     let said = write_identification(&args.out, &description, &found, command_line(), warnings)?;

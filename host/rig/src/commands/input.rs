@@ -94,9 +94,12 @@ pub(crate) fn described(
 }
 
 /// Faults found in the columns of recordings, one sentence each.
+#[derive(Default)]
 pub struct Faults {
     /// Certain faults: the columns cannot be right.
     pub wrong: Vec<String>,
+    /// Certain faults of the description.
+    pub described: Vec<String>,
     /// Possible faults: the description may be wrong instead, or the motion is too short to decide.
     pub doubtful: Vec<String>,
 }
@@ -215,33 +218,28 @@ impl Inputs {
         })
     }
 
-    /// Opens recordings and checks their columns and units.
+    /// Refuses columns whose units look wrong. Recordings of fewer than `least` rows are not checked: rows of single
+    /// poses are no motion.
     ///
     /// # Errors
-    /// Names the error, its file and its line. One sentence lists all units that look wrong.
-    pub(crate) fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
-        Self::open_with(robot, paths, EffortNeed::Required)
-    }
-
-    /// As [`Self::open`]; `need` tells whether the torque may be missing.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
-    pub(crate) fn open_with(
-        robot: &Robot,
-        paths: &[PathBuf],
-        need: EffortNeed,
-    ) -> Result<Self, CommandError> {
-        let inputs = Self::read_with(robot, paths, need)?;
-        for source in &inputs.sources {
-            let wrong: Vec<Implausible> = (at_start(source, robot, plausibility)?.into_iter())
+    /// Names the error in a file and its line. One sentence lists all units that look wrong.
+    pub(crate) fn refuse_units(&self, robot: &Robot, least: usize) -> Result<(), CommandError> {
+        for source in &self.sources {
+            let Some(block) = source.blocks(JUDGED_ROWS).next() else {
+                continue;
+            };
+            let block = block?;
+            if block.len() < least {
+                continue;
+            }
+            let wrong: Vec<Implausible> = (plausibility(&block, robot).into_iter())
                 .filter(|problem| !problem.is_doubt())
                 .collect();
             if !wrong.is_empty() {
                 return Err(CommandError::Implausible(sentence(source, &wrong)));
             }
         }
-        Ok(inputs)
+        Ok(())
     }
 
     /// Returns one sentence for each recording whose columns look wrong. Units are checked first. If they are right,
@@ -250,10 +248,7 @@ impl Inputs {
     /// # Errors
     /// Names the error in a file and its line.
     pub fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
-        let mut faults = Faults {
-            wrong: Vec::new(),
-            doubtful: Vec::new(),
-        };
+        let mut faults = Faults::default();
         for source in &self.sources {
             let (doubts, wrong): (Vec<_>, Vec<_>) = (at_start(source, robot, plausibility)?
                 .into_iter())
@@ -262,7 +257,8 @@ impl Inputs {
                 faults.doubtful.push(sentence(source, &doubts));
             }
             // A comparison with the model names a wrong unit more precisely, if the columns allow the comparison.
-            let judged = match wrong.iter().any(Implausible::spoils) {
+            let spoilt = wrong.iter().any(Implausible::spoils);
+            let judged = match spoilt || !source.has_effort() {
                 true => Vec::new(),
                 false => faults_at_start(robot, source, JUDGED_ROWS)?,
             };
@@ -271,9 +267,10 @@ impl Inputs {
                 continue;
             }
             for fault in judged {
-                let list = match fault.certain {
-                    true => &mut faults.wrong,
-                    false => &mut faults.doubtful,
+                let list = match (fault.certain, fault.of_description) {
+                    (true, true) => &mut faults.described,
+                    (true, false) => &mut faults.wrong,
+                    (false, _) => &mut faults.doubtful,
                 };
                 let text = source.in_its_names(&fault.text);
                 let text = format!("{}: {text}", source.path().display());
@@ -494,7 +491,16 @@ pub fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
         .collect()
 }
 
-/// Checks the columns of recordings before a fit: signs, units, ratios, clocks and swapped columns. Prints possible
+/// Use of recordings, which decides what a wrong description means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Use {
+    /// Parameters are fitted: a wrong description is refused like a wrong recording.
+    Fit,
+    /// The description is compared with the recordings: a wrong description is a result, not a reason to refuse.
+    Compare,
+}
+
+/// Checks the columns of recordings before their use: signs, units, ratios, clocks and swapped columns. Prints possible
 /// faults. Refuses certain faults and the sentences in `more`; with `even_if_wrong` it prints them instead.
 ///
 /// # Errors
@@ -502,17 +508,21 @@ pub fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
 pub(crate) fn refuse_faults(
     robot: &Robot,
     inputs: &[&Inputs],
-    more: Vec<String>,
+    (purpose, more): (Use, Vec<String>),
     even_if_wrong: bool,
     ui: &Ui,
 ) -> Result<(), CommandError> {
     let mut wrong = Vec::new();
     for recordings in inputs {
         let found = recordings.faults(robot)?;
-        for sentence in &found.doubtful {
+        let (refused, told) = match purpose {
+            Use::Fit => (found.described, Vec::new()),
+            Use::Compare => (Vec::new(), found.described),
+        };
+        for sentence in told.iter().chain(&found.doubtful) {
             ui.remark(sentence);
         }
-        wrong.extend(found.wrong);
+        wrong.extend(found.wrong.into_iter().chain(refused));
     }
     wrong.extend(more);
     if even_if_wrong {
@@ -521,8 +531,14 @@ pub(crate) fn refuse_faults(
     } else if wrong.is_empty() {
         Ok(())
     } else {
+        let what = match purpose {
+            Use::Fit => "Nothing was fitted; give --even-if-wrong to fit in spite of this.",
+            Use::Compare => {
+                "Nothing was compared; give --even-if-wrong to compare in spite of this."
+            }
+        };
         Err(CommandError::Implausible(format!(
-            "{} Nothing was fitted; give --even-if-wrong to fit in spite of this.",
+            "{} {what}",
             wrong.join(" ")
         )))
     }

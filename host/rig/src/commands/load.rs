@@ -6,7 +6,9 @@ use clap::{Args as ClapArgs, ValueEnum};
 use serde::Serialize;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared, refuse_twice};
+use super::input::{
+    Inputs, RobotArg, Use, command_line, real, recordings, refuse_faults, refuse_twice,
+};
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
@@ -14,11 +16,11 @@ use crate::pages::Context;
 use rig_data::EffortNeed;
 use rig_data::prepare::{Choice, PrepareOptions};
 use rig_load::{
-    By, ControllerNumbers, LoadIdentification, LoadOptions, Value, controller_numbers,
+    By, ControllerNumbers, FEWEST_ROWS, LoadIdentification, LoadOptions, Value, controller_numbers,
     identify_load, urdf_link,
 };
 use rig_model::robot::{Load, Reads, Robot, WristSensor};
-use rig_output::{can_take, folder, format_value, write_whole};
+use rig_output::{can_take, folder, format_significant, format_value, write_whole};
 
 /// Files that the command writes.
 const FILES: [&str; 4] = ["load.toml", "load.urdf", "load.json", "report.html"];
@@ -33,8 +35,8 @@ const FILES: [&str; 4] = ["load.toml", "load.urdf", "load.json", "report.html"];
 /// By joint torques: record the same motion with the load (--data) and without it (--without). Without --without the
 /// description must be an identified one (`rig identify`).
 ///
-/// All results are in the flange frame: the frame of the last joint (TOML) or of the last link (URDF). Writes load.toml,
-/// load.urdf, load.json and report.html into the folder given with --out.
+/// All results are in the flange frame: the frame of the last joint (TOML), or of the link that the chain ends at (URDF;
+/// --tip names it). Writes load.toml, load.urdf, load.json and report.html into the folder given with --out.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -113,7 +115,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &FILES)?;
     refuse_folder(&args.out, &[], args.force)?;
     refuse_twice(&args.data, "give every recording once")?;
-    refuse_shared(&args.data, &args.without)?;
+    refuse_both(&args.data, &args.without)?;
     let mut robot = args.robot.load(ui)?;
     sensor(args, &mut robot)?;
     let need = match args.by {
@@ -124,6 +126,20 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let without = Inputs::read_with(&robot, &args.without, need)?;
     for warning in with.warnings().chain(without.warnings()) {
         ui.remark(&warning);
+    }
+    match args.by {
+        Measured::Sensor if args.poses => {}
+        Measured::Sensor => {
+            with.refuse_units(&robot, FEWEST_ROWS)?;
+            without.refuse_units(&robot, FEWEST_ROWS)?;
+        }
+        Measured::Torque | Measured::Both => refuse_faults(
+            &robot,
+            &[&with, &without],
+            (Use::Compare, Vec::new()),
+            args.even_if_wrong,
+            ui,
+        )?,
     }
     let options = LoadOptions {
         by: match args.by {
@@ -165,6 +181,20 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         args.out.join("report.html").display()
     ));
     Ok(())
+}
+
+/// Refuses a recording that is given both with and without the load.
+fn refuse_both(with: &[PathBuf], without: &[PathBuf]) -> Result<(), CommandError> {
+    match without
+        .iter()
+        .find(|path| with.iter().any(|own| real(own) == real(path)))
+    {
+        Some(path) => Err(CommandError::Sentence(format!(
+            "{} is given both as --data and as --without; give a recording with the load, and another one without it.",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Puts the sensor of the options into the description.
@@ -243,6 +273,13 @@ fn lines(robot: &Robot, found: &LoadIdentification, numbers: &ControllerNumbers)
         let [xx, xy, xz, yy, yz, zz] = found.inertia.each_ref().map(value);
         lines.push(format!(
             "inertia about the centre of mass Ixx {xx}, Ixy {xy}, Ixz {xz}, Iyy {yy}, Iyz {yz}, Izz {zz} kg·m²"
+        ));
+    }
+    if let Some(sensor) = &found.sensor {
+        lines.push(format!(
+            "left of the readings: {} N and {} N·m RMS",
+            format_significant(sensor.residual[0], 3),
+            format_significant(sensor.residual[1], 3)
         ));
     }
     for missing in &found.not_shown {

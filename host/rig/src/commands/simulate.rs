@@ -149,7 +149,7 @@ fn carried(args: &Args, robot: &Robot, ui: &Ui) -> Result<Carried, CommandError>
     let option = args.sensor_option();
     if let (Some(option), None) = (option, &robot.wrist_sensor) {
         return Err(CommandError::Sentence(format!(
-            "{option} has no effect: {} has no [wrist_sensor]; describe the sensor there, or leave the option out.",
+            "{option} has no effect: {} has no [wrist_sensor]; add this table to the TOML description (of a URDF, `rig init --from` writes one), or leave the option out.",
             args.robot.display()
         )));
     }

@@ -6,7 +6,7 @@ use clap::Args as ClapArgs;
 use serde::Serialize;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings};
+use super::input::{Inputs, RobotArg, Use, command_line, recordings, refuse_faults};
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
@@ -37,6 +37,9 @@ pub(crate) struct Args {
     /// Recording to compare with, CSV or MCAP; one or more
     #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
+    /// Compare although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); prints the faults
+    #[arg(long)]
+    even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -63,8 +66,22 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
                 "{sentence} These references were used to identify the controller that moved the joint."
             ));
         }
+        refuse_faults(
+            &robot,
+            &[&inputs],
+            (Use::Compare, Vec::new()),
+            args.even_if_wrong,
+            ui,
+        )?;
         return under_voltage(args, ui, &robot, &inputs);
     }
+    refuse_faults(
+        &robot,
+        &[&inputs],
+        (Use::Compare, Vec::new()),
+        args.even_if_wrong,
+        ui,
+    )?;
     if let Some(fuller) = args.robot.fuller() {
         ui.remark(&fuller);
     }
@@ -96,16 +113,16 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 /// Opens the recordings. Returns true with them if the robot has one joint and only its motor voltage was recorded.
 fn opened(robot: &Robot, paths: &[PathBuf]) -> Result<(Inputs, bool), CommandError> {
     if robot.joints.len() != 1 {
-        return Ok((Inputs::open(robot, paths)?, false));
+        return Ok((Inputs::read(robot, paths)?, false));
     }
-    let inputs = Inputs::open_with(robot, paths, EffortNeed::Optional)?;
+    let inputs = Inputs::read_with(robot, paths, EffortNeed::Optional)?;
     if inputs.all_effort() {
         return Ok((inputs, false));
     }
     match !inputs.any_effort() && inputs.any_voltage() {
         true => Ok((inputs, true)),
         // This call fails with an error that names the missing column and the file.
-        false => Ok((Inputs::open(robot, paths)?, false)),
+        false => Ok((Inputs::read(robot, paths)?, false)),
     }
 }
 

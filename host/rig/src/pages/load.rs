@@ -58,7 +58,7 @@ fn summary(found: &LoadIdentification, context: &Context) -> Vec<Fact> {
     if !found.inertia_shown {
         facts.push(
             Fact::new("Inertia", "not shown")
-                .note("poses at rest, or too little motion of the wrist")
+                .note("the load turns too little for its size")
                 .tone(Tone::Notice),
         );
     }
@@ -174,7 +174,7 @@ fn readings(sensor: &SensorFindings) -> Section {
         }
     }
     section.with(Block::Text(format!(
-        "RMS of the residual: {} N and {} N·m over {} rows.",
+        "RMS of the residual: {} N and {} N·m over {} rows. Not modelled: a base that is not level, an error of the sensor's position, cables that pull, elasticity, a delay between sensor and encoders.",
         format_significant(sensor.residual[0], 3),
         format_significant(sensor.residual[1], 3),
         parts::count(sensor.rows)
@@ -291,7 +291,7 @@ fn agreement(found: &LoadIdentification) -> Option<Section> {
             ],
             rows: rows.collect(),
             note: format!(
-                "Probability that they differ by chance as much: {} (χ² over {} directions that both show).",
+                "Probability that they differ by chance as much: {} (F test over {} directions that both show).",
                 format_significant(both.chance, 2),
                 both.directions
             ),

@@ -42,6 +42,8 @@ pub(in crate::robot) struct Chain {
     /// The link in whose frame gravity points along −z: the root of the tree.
     pub base: String,
     pub bodies: Vec<Body>,
+    /// Frame of the link that the chain ends at, in that of the link that the last joint moves.
+    pub tip: Isometry3<f64>,
     /// Remarks for the user, one sentence each.
     pub remarks: Vec<String>,
 }

@@ -54,6 +54,8 @@ struct Rigid<'a> {
     outgoing: Option<Outgoing>,
     /// Joints in it that are locked.
     joints: Vec<LockedJoint>,
+    /// Pose of the link that the chain ends at, if it is a part of this body.
+    tip: Option<Isometry3<f64>>,
 }
 
 /// A place in a rigid body: a link, its pose, and whether a locked joint lies before it.
@@ -74,9 +76,13 @@ impl<'a> Selected<'_, 'a> {
             heavy: Vec::new(),
             outgoing: None,
             joints: Vec::new(),
+            tip: None,
         };
         let mut pending: Vec<Part<'a>> = vec![(link, Isometry3::identity(), false)];
         while let Some((name, pose, behind)) = pending.pop() {
+            if name == self.selection.tip {
+                rigid.tip = Some(pose);
+            }
             if let Some(&node) = self.tree.by_name.get(name)
                 && let Some(part) = reader.inertial(node)?
             {
@@ -210,6 +216,7 @@ impl<'a> Reader<'a> {
         let mut used: Vec<usize> = locked.iter().map(|own| own.joint).collect();
         let mut merged = Vec::new();
         let mut bodies: Vec<Body> = Vec::new();
+        let mut tip = Isometry3::identity();
         while let Some(next) = outgoing {
             if bodies.len() == MAX_JOINTS {
                 let node = tree.joints[next.0].node;
@@ -223,6 +230,7 @@ impl<'a> Reader<'a> {
                 merged.push(format!("{kilograms} kg into link `{}`", body.link));
             }
             outgoing = rigid.outgoing;
+            tip = rigid.tip.unwrap_or_default();
             bodies.push(body);
         }
         self.last_link(&bodies);
@@ -232,6 +240,7 @@ impl<'a> Reader<'a> {
             file: self.path.display().to_string(),
             base: selection.root.to_owned(),
             bodies,
+            tip,
             remarks: self.remarks.take(),
         })
     }
