@@ -13,10 +13,10 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use axum::Router;
+use axum::extract::State;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Request, State};
 use axum::http::StatusCode;
-use axum::middleware::{Next, from_fn_with_state};
+use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use futures_util::stream::{SplitSink, SplitStream};
@@ -28,6 +28,7 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::mpsc;
 
 use super::access::Access;
+use super::guarded::{Guarded, guard};
 use super::hub::Hub;
 use super::packet::Packet;
 
@@ -40,29 +41,16 @@ const ESTIMATE: u64 = 2;
 /// Largest message of a client, bytes.
 const MAX_MESSAGE: usize = 1 << 16;
 
-#[derive(Clone)]
-struct App {
-    hub: Arc<Hub>,
-    access: Access,
-}
-
 /// Returns the server.
 pub(crate) fn app(hub: Arc<Hub>, access: Access) -> Router {
-    let app = App { hub, access };
+    let app = Guarded { hub, access };
     Router::new()
         .route("/", get(upgrade))
         .layer(from_fn_with_state(app.clone(), guard))
         .with_state(app)
 }
 
-async fn guard(State(app): State<App>, request: Request, next: Next) -> Response {
-    match app.access.check(request.uri(), request.headers()) {
-        Ok(()) => next.run(request).await,
-        Err(refusal) => refusal.into_response(),
-    }
-}
-
-async fn upgrade(State(app): State<App>, socket: WebSocketUpgrade) -> Response {
+async fn upgrade(State(app): State<Guarded>, socket: WebSocketUpgrade) -> Response {
     let socket = socket.protocols(SUBPROTOCOLS);
     if socket.selected_protocol().is_none() {
         let said = format!(

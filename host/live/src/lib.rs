@@ -11,6 +11,7 @@
 mod access;
 mod error;
 mod foxglove;
+mod guarded;
 mod hub;
 mod live_rig;
 mod motion;

@@ -22,6 +22,7 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::mpsc;
 
 use super::access::Access;
+use super::guarded::{Guarded, guard};
 use super::hub::{Action, Answer, Hub};
 use super::packet::Packet;
 use super::page;
@@ -33,31 +34,22 @@ const MAX_ORDER: usize = 1 << 14;
 /// Answers that wait for a slow client.
 const ANSWERS: usize = 16;
 
-#[derive(Clone)]
-struct App {
-    hub: Arc<Hub>,
-    access: Access,
-}
-
 /// Returns the server of the page.
 pub(crate) fn app(hub: Arc<Hub>, access: Access) -> Router {
-    let app = App { hub, access };
+    let app = Guarded { hub, access };
     Router::new()
         .route("/", get(show))
         .route("/live", get(upgrade))
         .route("/motion", post(load))
         .route("/stop", post(stop))
         .layer(DefaultBodyLimit::max(MAX_UPLOAD))
-        .layer(from_fn_with_state(app.clone(), guard))
+        .layer(from_fn_with_state(app.clone(), page_guard))
         .with_state(app)
 }
 
-/// Refuses requests that [`Access`] does not allow, and adds the headers that keep the page to itself.
-async fn guard(State(app): State<App>, request: Request, next: Next) -> Response {
-    let mut response = match app.access.check(request.uri(), request.headers()) {
-        Ok(()) => next.run(request).await,
-        Err(refusal) => refusal.into_response(),
-    };
+/// [`guard`], and the headers that keep the page to itself.
+async fn page_guard(app: State<Guarded>, request: Request, next: Next) -> Response {
+    let mut response = guard(app, request, next).await;
     let headers = response.headers_mut();
     let fixed = [
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -71,7 +63,7 @@ async fn guard(State(app): State<App>, request: Request, next: Next) -> Response
     response
 }
 
-async fn show(State(app): State<App>) -> Response {
+async fn show(State(app): State<Guarded>) -> Response {
     let mut response = Html(page::page()).into_response();
     let cookie = app.access.cookie();
     if let Some(cookie) = cookie.and_then(|text| HeaderValue::from_str(&text).ok()) {
@@ -80,13 +72,13 @@ async fn show(State(app): State<App>) -> Response {
     response
 }
 
-async fn stop(State(app): State<App>) -> &'static str {
+async fn stop(State(app): State<Guarded>) -> &'static str {
     app.hub.stop();
     "Stop was sent; the page and the mode of the rig tell when the board has confirmed it.\n"
 }
 
 /// Loads a trajectory file; its name stands in the query, percent-encoded.
-async fn load(State(app): State<App>, uri: Uri, body: Bytes) -> Response {
+async fn load(State(app): State<Guarded>, uri: Uri, body: Bytes) -> Response {
     let name = (uri.query().unwrap_or_default().split('&'))
         .find_map(|pair| pair.strip_prefix("name="))
         .map_or_else(|| "motion.toml".to_owned(), decoded);
@@ -126,7 +118,7 @@ fn decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-async fn upgrade(State(app): State<App>, socket: WebSocketUpgrade) -> Response {
+async fn upgrade(State(app): State<Guarded>, socket: WebSocketUpgrade) -> Response {
     socket
         .max_message_size(MAX_ORDER)
         .on_upgrade(move |socket| converse(app.hub, socket))

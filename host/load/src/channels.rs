@@ -6,7 +6,7 @@ use rig_model::robot::WristSensor;
 use rig_output::{format_short, format_significant};
 
 use crate::error::LoadError;
-use crate::rows::{Ends, FEWEST_ROWS, each_readings};
+use crate::rows::{Ends, FEWEST_ROWS, LEAST_ROWS, each_readings};
 
 /// Consecutive rows at an extreme value that a cut reading shows at least.
 const RUN: usize = 5;
@@ -84,10 +84,10 @@ pub(crate) fn judge(
     poses: bool,
 ) -> Result<Judged, LoadError> {
     let (rows, length, channels) = ranges(recording)?;
-    if rows < 2 {
+    if rows < LEAST_ROWS as u64 {
         return Err(LoadError::TooFew {
             rows: rows as usize,
-            least: 2,
+            least: LEAST_ROWS,
         });
     }
     let poses = poses || rows < FEWEST_ROWS as u64;

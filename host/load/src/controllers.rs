@@ -27,19 +27,15 @@ pub fn controller_numbers(load: &LoadIdentification) -> ControllerNumbers {
             .collect::<Vec<_>>()
             .join(", ")
     };
-    let (mass, centre) = match load.inertia_shown {
-        true => (
-            load.body.mass,
-            Vector3::from(load.body.first_moment) / load.body.mass,
+    // Beside an assumed inertia the body has another centre of mass than the data show.
+    let body = load.body.about_centre().filter(|_| load.inertia_shown);
+    let (mass, centre, inertia) = match body {
+        Some((centre, inertia)) => (load.body.mass, centre, inertia),
+        None => (
+            load.mass.value,
+            Vector3::from(load.centre.map(|c| c.value)),
+            Matrix3::zeros(),
         ),
-        // The body holds an assumed inertia, which must not move the centre of mass.
-        false => (load.mass.value, Vector3::from(load.centre.map(|c| c.value))),
-    };
-    let about = about_centre(load, &centre);
-    let inertia = if load.inertia_shown {
-        about
-    } else {
-        Matrix3::zeros()
     };
     let (moments, turn) = match load.inertia_shown {
         true => {
@@ -94,12 +90,4 @@ fn number(value: f64) -> String {
     }
     let scale = 10f64.powf(5.0 - value.abs().log10().floor());
     format!("{}", (value * scale).round() / scale)
-}
-
-/// Returns the inertia of the body about its centre of mass.
-pub(crate) fn about_centre(load: &LoadIdentification, centre: &Vector3<f64>) -> Matrix3<f64> {
-    let [xx, xy, xz, yy, yz, zz] = load.body.inertia;
-    let about_origin = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    let steiner = Matrix3::identity() * centre.norm_squared() - centre * centre.transpose();
-    about_origin - steiner * load.body.mass
 }

@@ -9,6 +9,8 @@ use rig_shared::multibody::INERTIAL_PARAMETERS;
 pub(crate) const PLAUSIBLE_DISTANCE: f64 = 0.1;
 /// Relative singular value below which a direction is rounding.
 const ROUNDING: f64 = 1e-9;
+/// Standard deviations by which a mass differs certainly from none.
+pub(crate) const CERTAIN: f64 = 5.0;
 /// A parameter is shown if its standard deviation is below this share of its plausible size.
 const SHOWN: f64 = 0.5;
 
@@ -40,6 +42,38 @@ impl Estimate {
         (self.covariance + self.beyond)
             .diagonal()
             .map(|v| v.max(0.0).sqrt())
+    }
+
+    /// Takes away what the data show of the inertia, whatever it is: mass and first moments keep what they are known by.
+    pub(crate) fn hide_inertia(&mut self) {
+        const FIRST: usize = 4;
+        const COUNT: usize = INERTIAL_PARAMETERS - FIRST;
+        let own = self
+            .information
+            .fixed_view::<FIRST, FIRST>(0, 0)
+            .into_owned();
+        let mixed = self
+            .information
+            .fixed_view::<FIRST, COUNT>(0, FIRST)
+            .into_owned();
+        let hidden = self
+            .information
+            .fixed_view::<COUNT, COUNT>(FIRST, FIRST)
+            .into_owned();
+        let inverse = hidden.pseudo_inverse(0.0).unwrap_or_default();
+        let left = own - mixed * inverse * mixed.transpose();
+        self.information.fill(0.0);
+        self.information
+            .fixed_view_mut::<FIRST, FIRST>(0, 0)
+            .copy_from(&left);
+        for matrix in [&mut self.covariance, &mut self.beyond] {
+            matrix.fixed_rows_mut::<COUNT>(FIRST).fill(0.0);
+            matrix.fixed_columns_mut::<COUNT>(FIRST).fill(0.0);
+        }
+        for k in FIRST..INERTIAL_PARAMETERS {
+            self.values[k] = 0.0;
+            self.beyond[(k, k)] = self.sizes[k].powi(2);
+        }
     }
 
     /// Returns for each parameter if the data show it.

@@ -5,22 +5,20 @@ use rig_data::prepare::Recording;
 use rig_identify::{chain_of, least_eigenvalue};
 use rig_model::robot::{Joint, Load, Robot};
 use rig_output::{format_significant, listed};
-use rig_shared::multibody::INERTIAL_PARAMETERS;
+use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::body::body;
 use crate::error::LoadError;
-use crate::estimate::{Estimate, Parameters, Spread, Square, estimate, sizes_of};
+use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, sizes_of};
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
-use crate::result::{Agreement, LoadIdentification, NAMES, NotShown, TorqueFindings, numbers};
+use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers};
 use crate::sensor::{Sensing, SensorFindings, by_sensor};
 use crate::torque::{Driven, equations};
 
 /// Probability by chance below which sensor and torques contradict each other.
 const CONTRADICTS: f64 = 1e-3;
-/// Standard deviations by which a mass differs certainly from none.
-const CERTAIN: f64 = 5.0;
 /// Standard deviation along a direction, relative to the plausible size, up to which two estimates are compared.
 const COMPARED: f64 = 0.5;
 
@@ -50,15 +48,18 @@ pub fn identify_load(
             let loaded = with.iter().map(|r| (*r, true));
             let all: Vec<(&dyn Recording, bool)> =
                 loaded.chain(without.iter().map(|r| (*r, false))).collect();
-            Some(by_sensor(&Sensing {
-                robot,
-                chain: &chain,
-                recordings: &all,
-                to_joint: &to_joint,
-                prepare: &options.prepare,
-                poses: options.poses,
-                even_if_wrong: options.even_if_wrong,
-            })?)
+            Some(by_sensor(
+                &Sensing {
+                    robot,
+                    chain: &chain,
+                    recordings: &all,
+                    to_joint: &to_joint,
+                    prepare: &options.prepare,
+                    poses: options.poses,
+                    even_if_wrong: options.even_if_wrong,
+                },
+                &mut warnings,
+            )?)
         }
     };
     let driven = match options.by {
@@ -76,9 +77,6 @@ pub fn identify_load(
     };
     let (sensed, sensor) = sensed.unzip();
     let (driven, torque) = driven.unzip();
-    if let Some(sensor) = &sensor {
-        warnings.extend(sensor.warnings.iter().cloned());
-    }
     if torque.as_ref().is_some_and(|torque| !torque.with_unloaded) {
         warnings.push(by_description(robot)?);
     }
@@ -187,10 +185,7 @@ fn without_tool(mut found: Estimate, tool: &Load) -> Result<Estimate, LoadError>
     }
     found.sizes = sizes_of(mass);
     if !tool.inertia_known {
-        let assumed = sizes_of(tool.mass.max(mass));
-        for k in 4..INERTIAL_PARAMETERS {
-            found.beyond[(k, k)] += assumed[k].powi(2);
-        }
+        found.hide_inertia();
     }
     Ok(found)
 }
@@ -208,9 +203,9 @@ fn by_description(robot: &Robot) -> Result<String, LoadError> {
         )));
     }
     let doubt = match robot.identified {
-        Some(_) => "its errors are not in the standard deviations",
+        Some(_) => "its errors, as of friction near reversals, are not in the standard deviations",
         None => {
-            "it was not identified (`rig identify`), and its errors are not in the standard deviations"
+            "it was not identified (`rig identify`), and its errors, as of friction near reversals, are not in the standard deviations"
         }
     };
     Ok(format!(
@@ -327,7 +322,7 @@ fn contradiction(agreement: &Agreement) -> Option<String> {
             .map(|k| {
                 format!(
                     "{} {} ± {} by the sensor, {} ± {} by the torques",
-                    NAMES[k],
+                    COLUMN_NAMES[k],
                     format_significant(agreement.by_sensor[k], 4),
                     format_significant(agreement.by_sensor_std[k], 2),
                     format_significant(agreement.by_torque[k], 4),
@@ -355,7 +350,7 @@ fn inconsistent(found: &Estimate, body: &Parameters) -> String {
         );
     format!(
         "No rigid body has exactly these ten values. The nearest body, in load.toml, differs most in {} ({} instead of {} in SI units, {:.1} standard deviations).",
-        NAMES[worst],
+        COLUMN_NAMES[worst],
         format_significant(body[worst], 4),
         format_significant(found.values[worst], 4),
         size

@@ -3,11 +3,11 @@
 use nalgebra::SMatrix;
 use rand::{RngExt, SeedableRng};
 use rig_model::robot::Robot;
-use rig_shared::multibody::{Chain, INERTIAL_PARAMETERS, wrench_regressor};
+use rig_shared::multibody::{COLUMN_NAMES, Chain, INERTIAL_PARAMETERS, wrench_regressor};
 
 use crate::estimate::{Estimate, Square};
 use crate::options::By;
-use crate::result::{NAMES, NotShown};
+use crate::result::NotShown;
 use crate::wrench_row::{ENTRIES, about};
 
 /// Poses that are compared.
@@ -28,7 +28,10 @@ pub(crate) fn missing(
 ) -> Vec<NotShown> {
     let shown = found.shown();
     let of = |range: std::ops::Range<usize>| -> Vec<&'static str> {
-        range.filter(|k| !shown[*k]).map(|k| NAMES[k]).collect()
+        range
+            .filter(|k| !shown[*k])
+            .map(|k| COLUMN_NAMES[k])
+            .collect()
     };
     let mut all = Vec::new();
     let still = of(0..4);

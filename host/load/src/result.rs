@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use rig_data::prepare::PreprocessingPlan;
-use rig_identify::t_quantile;
-use rig_model::robot::Load;
-use rig_shared::multibody::INERTIAL_PARAMETERS;
+use rig_identify::{t_quantile, unit};
+use rig_model::robot::{JointKind, Load};
+use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
 use serde::Serialize;
 
 use crate::estimate::{Estimate, Parameters};
@@ -124,20 +124,6 @@ pub struct NotShown {
     pub pose: Option<Vec<f64>>,
 }
 
-/// Names of the ten parameters.
-pub(crate) const NAMES: [&str; INERTIAL_PARAMETERS] = [
-    "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
-];
-
-/// Returns the unit of a parameter.
-fn unit(k: usize) -> &'static str {
-    match k {
-        0 => "kg",
-        1..=3 => "kg*m",
-        _ => "kg*m^2",
-    }
-}
-
 /// Mass, centre of mass and inertia about it.
 type Central = SVector<f64, INERTIAL_PARAMETERS>;
 
@@ -199,8 +185,9 @@ pub(crate) fn numbers(found: &Estimate) -> Numbers {
     let all = found.covariance + found.beyond;
     let std = found.std();
     let parameters = (0..INERTIAL_PARAMETERS).map(|k| LoadParameter {
-        name: NAMES[k],
-        unit: unit(k),
+        name: COLUMN_NAMES[k],
+        // The unit of a body's parameter is the same at every joint.
+        unit: unit(k, &[JointKind::Revolute], &[]),
         value: value(found.values[k], std[k]),
         shown: shown[k],
     });

@@ -11,6 +11,8 @@ use crate::wrench_row::{ENTRIES, WrenchRow, about};
 /// Name of the column with the sensor's temperature.
 const TEMPERATURE: &str = "temp";
 
+/// Least number of poses or rows: with two the mass and a part of the centre are known.
+pub(crate) const LEAST_ROWS: usize = 2;
 /// Rows below which a recording is taken as a list of poses at rest: no derivative can be formed of fewer.
 pub const FEWEST_ROWS: usize = 256;
 /// Largest movement of a joint within a pose, rad or m: above the noise of encoders, below the distance of poses.

@@ -11,23 +11,20 @@ use crate::channels::{Judged, judge};
 use crate::convention::{Compared, compare, other_unit, turned};
 use crate::drift::{is_better, with_changes};
 use crate::error::LoadError;
-use crate::estimate::{Estimate, Spread, estimate};
+use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
 use crate::mounting::{Channels, Mounting};
-use crate::rows::{FEWEST_ROWS, each_pose, each_row};
+use crate::rows::{FEWEST_ROWS, LEAST_ROWS, each_pose, each_row};
 use crate::statistics::{Collector, Recorded};
 use crate::system::{Fit, Sensed, Unknowns};
 use crate::torqueless::Torqueless;
+use crate::wrench_row::WrenchRow;
 
-/// Least number of poses or rows: with two the mass and one component of the centre are known.
-const LEAST_ROWS: usize = 2;
 /// Angle below which the axes of the sensor are those described, rad: rounding.
 const LEAST_TURN: f64 = 1e-6;
 /// Share of the rows that may be left out because of saturation.
 const MOST_SATURATED: f64 = 0.5;
 /// Distance of the centre of mass from the sensor that no load has, m.
 const FARTHEST: f64 = 3.0;
-/// Standard deviations by which a value differs certainly.
-const CERTAIN: f64 = 5.0;
 
 /// Recordings of the wrist sensor.
 pub(crate) struct Sensing<'a> {
@@ -93,19 +90,19 @@ pub struct SensorFindings {
     pub saturated: u64,
     /// Preparation of the recordings; `None` for poses.
     pub prepared: Option<PreprocessingPlan>,
-    /// Warnings, one sentence each.
-    pub warnings: Vec<String>,
 }
 
-/// Identifies the load from the wrist sensor.
+/// Identifies the load from the wrist sensor; adds sentences to `warnings`.
 ///
 /// # Errors
 /// [`LoadError`].
-pub(crate) fn by_sensor(sensing: &Sensing) -> Result<(Estimate, SensorFindings), LoadError> {
+pub(crate) fn by_sensor(
+    sensing: &Sensing,
+    warnings: &mut Vec<String>,
+) -> Result<(Estimate, SensorFindings), LoadError> {
     let robot = sensing.robot;
     let sensor = robot.wrist_sensor.clone().unwrap_or_default();
-    let mut warnings = Vec::new();
-    let (recordings, prepared) = collected(sensing, &sensor, &mut warnings)?;
+    let (recordings, prepared) = collected(sensing, &sensor, warnings)?;
     let sensed = Sensed {
         recordings: &recordings,
         to_joint: sensing.to_joint,
@@ -135,14 +132,7 @@ pub(crate) fn by_sensor(sensing: &Sensing) -> Result<(Estimate, SensorFindings),
         }
         warnings.push(text);
     }
-    let (fit, channels) = believed(
-        &sensed,
-        &mounting,
-        compared,
-        sensing,
-        &sensor,
-        &mut warnings,
-    )?;
+    let (fit, channels) = believed(&sensed, &mounting, compared, sensing, &sensor, warnings)?;
     let refit = |fit: &Fit, unknowns: &Unknowns| match unknowns.rotation {
         true => turned(&sensed, &fit.mounting, unknowns),
         false => sensed.fit(&fit.mounting, unknowns),
@@ -207,19 +197,15 @@ fn collected(
         let label = recording.label();
         let poses = is_poses(judged);
         let next = if poses { None } else { prepared.next() };
-        let (collector, saturated) = match (&plan, next) {
-            (Some(plan), Some((survey, usable))) => {
-                let mut collector =
-                    Collector::new(survey.rows / plan.decimation as u64, judged.length);
-                let saturated = each_row(
-                    sensing.chain,
-                    &pose,
-                    usable,
-                    plan,
-                    &judged.ends,
-                    &mut |row| collector.push(row),
-                )?;
-                (collector, saturated)
+        let rows = match (&plan, &next) {
+            (Some(plan), Some((survey, _))) => survey.rows / plan.decimation as u64,
+            _ => judged.rows,
+        };
+        let mut collector = Collector::new(rows, judged.length);
+        let mut take = |row: &WrenchRow| collector.push(row);
+        let saturated = match (&plan, next) {
+            (Some(plan), Some((_, usable))) => {
+                each_row(sensing.chain, &pose, usable, plan, &judged.ends, &mut take)?
             }
             _ => {
                 if !sensing.poses {
@@ -228,12 +214,7 @@ fn collected(
                         judged.rows
                     ));
                 }
-                let mut collector = Collector::new(judged.rows, judged.length);
-                let saturated =
-                    each_pose(sensing.chain, &pose, *recording, &judged.ends, &mut |row| {
-                        collector.push(row)
-                    })?;
-                (collector, saturated)
+                each_pose(sensing.chain, &pose, *recording, &judged.ends, &mut take)?
             }
         };
         let recorded = collector.finish(label, *loaded, poses, saturated);
@@ -408,7 +389,7 @@ impl Told<'_> {
     fn findings(
         &self,
         prepared: Option<PreprocessingPlan>,
-        mut warnings: Vec<String>,
+        warnings: &mut Vec<String>,
     ) -> SensorFindings {
         let (rotation, reads) = self.rotation();
         let against = Rotation3::from_matrix_unchecked(self.described.transpose() * rotation);
@@ -424,10 +405,13 @@ impl Told<'_> {
             warnings.push(self.turned(angle, &axis, [roll, pitch, yaw]));
         }
         if self.sensor.reads.is_none() {
-            warnings.push(match reads {
-                Reads::Load => "The readings are the wrench of the load on the robot, because its mass must be positive; write reads = \"load\" into [wrist_sensor] to have this checked.".to_owned(),
-                Reads::Robot => "The readings are the wrench of the robot on the load, because its mass must be positive; write reads = \"robot\" into [wrist_sensor] to have this checked.".to_owned(),
-            });
+            let [whose, key] = match reads {
+                Reads::Load => ["load on the robot", "load"],
+                Reads::Robot => ["robot on the load", "robot"],
+            };
+            warnings.push(format!(
+                "The readings are the wrench of the {whose}, because the mass must be positive; write reads = \"{key}\" into [wrist_sensor] to have this checked."
+            ));
         }
         let biases = self.biases();
         for bias in &biases {
@@ -447,7 +431,6 @@ impl Told<'_> {
             rows: self.sensed.used_rows(&self.fit.unknowns),
             saturated: self.sensed.recordings.iter().map(|r| r.saturated).sum(),
             prepared,
-            warnings,
         }
     }
 

@@ -1,14 +1,11 @@
 //! The load as a link of a URDF.
 
-use nalgebra::Vector3;
-
-use crate::controllers::about_centre;
 use crate::result::LoadIdentification;
 
 /// Returns a URDF link with the identified body, in the flange frame, to be fixed to the flange.
 pub fn urdf_link(load: &LoadIdentification) -> String {
-    let centre = Vector3::from(load.body.first_moment) / load.body.mass;
-    let inertia = about_centre(load, &centre);
+    // A body has a mass.
+    let (centre, inertia) = load.body.about_centre().unwrap_or_default();
     let note = match load.inertia_shown {
         true => String::new(),
         false => "    <!-- The recordings do not show the inertia: it is that of a sphere. -->\n"

@@ -79,6 +79,20 @@ impl Robot {
     fn signal<'py>(&self, name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Signal<'py>> {
         signal(name, value, self.joint_count())
     }
+
+    /// Reads three signals of the same samples.
+    fn signals<'py>(
+        &self,
+        [a, b, c]: [(&'static str, &Bound<'py, PyAny>); 3],
+    ) -> PyResult<[Signal<'py>; 3]> {
+        let all = [
+            self.signal(a.0, a.1)?,
+            self.signal(b.0, b.1)?,
+            self.signal(c.0, c.1)?,
+        ];
+        same_shape(&all.each_ref())?;
+        Ok(all)
+    }
 }
 
 /// Makes the exception of a batch.
@@ -231,12 +245,7 @@ impl Robot {
         qdd: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let [q, qd, qdd] = [
-            self.signal("q", q)?,
-            self.signal("qd", qd)?,
-            self.signal("qdd", qdd)?,
-        ];
-        same_shape(&[&q, &qd, &qdd])?;
+        let [q, qd, qdd] = self.signals([("q", q), ("qd", qd), ("qdd", qdd)])?;
         let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
         let out = py
             .detach(|| dynamics::inverse(&self.model, signals, threads))
@@ -256,12 +265,7 @@ impl Robot {
         tau: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let [q, qd, tau] = [
-            self.signal("q", q)?,
-            self.signal("qd", qd)?,
-            self.signal("tau", tau)?,
-        ];
-        same_shape(&[&q, &qd, &tau])?;
+        let [q, qd, tau] = self.signals([("q", q), ("qd", qd), ("tau", tau)])?;
         let signals = [q.rows()?, qd.rows()?, tau.rows()?];
         let out = py
             .detach(|| dynamics::forward(&self.model, signals, threads))
@@ -313,12 +317,7 @@ impl Robot {
         qdd: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let [q, qd, qdd] = [
-            self.signal("q", q)?,
-            self.signal("qd", qd)?,
-            self.signal("qdd", qdd)?,
-        ];
-        same_shape(&[&q, &qd, &qdd])?;
+        let [q, qd, qdd] = self.signals([("q", q), ("qd", qd), ("qdd", qdd)])?;
         let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
         let out = py
             .detach(|| dynamics::regressor(&self.batch, signals, threads))

@@ -8,6 +8,12 @@ use rand_pcg::Pcg64;
 
 use super::{COLUMNS, Chain, JointGeometry, JointKind, column};
 
+/// Returns the ten inertial parameters of one kilogram at a point, m.
+pub(super) fn unit_point([x, y, z]: [f64; 3]) -> [f64; 10] {
+    let [xx, yy, zz] = [y * y + z * z, x * x + z * z, x * x + y * y];
+    [1.0, x, y, z, xx, -x * y, -x * z, yy, -y * z, zz]
+}
+
 /// A chain in a state of motion.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
@@ -47,19 +53,7 @@ impl Sample {
                 for _ in 0..8 {
                     let m = uniform(0.05, 1.0);
                     let (x, y, z) = (uniform(-0.4, 0.5), uniform(-0.3, 0.3), uniform(-0.2, 0.4));
-                    let point = [
-                        1.0,
-                        x,
-                        y,
-                        z,
-                        y * y + z * z,
-                        -x * y,
-                        -x * z,
-                        x * x + z * z,
-                        -y * z,
-                        x * x + y * y,
-                    ];
-                    for (entry, value) in row.iter_mut().zip(point) {
+                    for (entry, value) in row.iter_mut().zip(unit_point([x, y, z])) {
                         *entry += m * value;
                     }
                 }

@@ -60,7 +60,7 @@ pub fn wrench_regressor<T: Real>(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::multibody::samples::Sample;
+    use crate::multibody::samples::{Sample, unit_point};
     use crate::multibody::{JointGeometry, JointKind, differential_regressor, point_position};
     use std::vec;
 
@@ -113,20 +113,8 @@ mod tests {
             (0.2, [0.15, 0.1, -0.04]),
         ];
         let mut phi = [0.0; INERTIAL_PARAMETERS];
-        for (m, [x, y, z]) in points {
-            let own = [
-                1.0,
-                x,
-                y,
-                z,
-                y * y + z * z,
-                -x * y,
-                -x * z,
-                x * x + z * z,
-                -y * z,
-                x * x + y * y,
-            ];
-            for (sum, value) in phi.iter_mut().zip(own) {
+        for (m, point) in points {
+            for (sum, value) in phi.iter_mut().zip(unit_point(point)) {
                 *sum += m * value;
             }
         }

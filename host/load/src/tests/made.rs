@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use rig_data::prepare::InMemory;
 use rig_data::{Block, JointColumns, WRENCH_COLUMNS};
 use rig_identify::chain_of;
-use rig_model::robot::Robot;
+use rig_model::robot::{Inertial, Robot};
 use rig_shared::multibody::{Chain, point_position};
 
 /// Mass points in the flange frame: kg, m.
@@ -17,20 +17,8 @@ pub(super) type Points = Vec<(f64, [f64; 3])>;
 /// Returns the ten parameters of mass points.
 pub(super) fn parameters(points: &Points) -> [f64; 10] {
     let mut sum = [0.0; 10];
-    for (m, [x, y, z]) in points {
-        let own = [
-            1.0,
-            *x,
-            *y,
-            *z,
-            y * y + z * z,
-            -x * y,
-            -x * z,
-            x * x + z * z,
-            -y * z,
-            x * x + y * y,
-        ];
-        for (to, value) in sum.iter_mut().zip(own) {
+    for (m, point) in points {
+        for (to, value) in sum.iter_mut().zip(Inertial::point(*point).parameters()) {
             *to += m * value;
         }
     }

@@ -511,6 +511,21 @@ fn what_is_mounted_beyond_the_sensor_is_subtracted() {
     options.tool.as_mut().unwrap().inertia_known = false;
     let found = identify_load(robot, &[&with], &[], &options).unwrap();
     assert!(!found.inertia_shown && !found.body.inertia_known);
+    let off = errors(&found, &part);
+    assert!(off[0] < 0.01 && off[1] < 0.005, "{off:?}");
+    let (centre, inertia) = found.body.about_centre().unwrap();
+    let truth = parameters(&part);
+    for k in 0..3 {
+        assert!(
+            (centre[k] - truth[k + 1] / truth[0]).abs() < 0.005,
+            "{centre}"
+        );
+        // A sphere of radius 0.1 m.
+        assert!(
+            (inertia[(k, k)] / (0.004 * truth[0]) - 1.0).abs() < 0.05,
+            "{inertia}"
+        );
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::array::exact;
@@ -127,6 +127,12 @@ impl Load {
             .seen_from(pose)
             .inertial();
         Self::of(body.parameters())
+    }
+
+    /// Returns the centre of mass, m in the flange frame, and the inertia about it, kg·m²; `None` for a first moment without
+    /// a mass.
+    pub fn about_centre(&self) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+        SpatialInertia::of(&self.inertial()).about_centre()
     }
 
     fn inertial(&self) -> Inertial {
