@@ -16,7 +16,8 @@
 //! let robot = Robot::from_toml(ONE_LINK_TEMPLATE, "one-link.toml".as_ref())?;
 //! let q: Vec<f64> = vec![-1.5, -0.4, 0.6, 1.4];
 //! // The weight in the axes of the link, which turns in the vertical plane; the load's centre is 0.1 m along x.
-//! let weight = |q: &f64| [-19.62 * q.sin(), -19.62 * q.cos(), 0.0];
+//! // A channel that the load does not act on still reads some noise: one that never changes is refused as dead.
+//! let weight = |q: &f64| [-19.62 * q.sin(), -19.62 * q.cos(), 1e-6 * q];
 //! let read = |column: usize| -> Vec<f64> {
 //!     q.iter()
 //!         .map(|q| match column {
