@@ -1,4 +1,4 @@
-//! Position of a point of a link, and its derivatives by the joint positions.
+//! Pose of a frame of a link, and its derivatives by the joint positions.
 
 use super::chain::{Chain, JointKind, MultibodyError, check};
 use super::spatial::Vector3;
@@ -45,6 +45,76 @@ pub fn point_position<T: Real>(
         place = transform.origin + transform.direction_to_parent(place);
     }
     Ok(place.0)
+}
+
+/// Position and orientation of a frame in another one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose<T> {
+    /// Origin, m.
+    pub position: [T; 3],
+    /// Rotation matrix, row-major: its columns are the axes of the frame.
+    pub rotation: [[T; 3]; 3],
+}
+
+/// Computes the pose in the base frame of a frame that is fixed in link `link` (from 0), and its Jacobian.
+///
+/// `fixed` is the pose of the frame in the frame of the link. `jacobian` has length n: entry j is the twist of the frame
+/// for a unit velocity of joint j, linear velocity of its origin (m) before angular velocity (rad), both in the base frame
+/// (Khalil & Dombre 2002, eq. 5.9). It is zero for the joints beyond the link.
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`], also for a `link` that the chain does not have.
+pub fn frame_pose<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    link: usize,
+    fixed: &Pose<T>,
+    jacobian: &mut [[T; 6]],
+) -> Result<Pose<T>, MultibodyError> {
+    let n = chain.joint_count();
+    check("q", n, q.len())?;
+    check("jacobian", n, jacobian.len())?;
+    if link >= n {
+        return Err(MultibodyError::WrongLength {
+            argument: "q",
+            expected: link + 1,
+            found: n,
+        });
+    }
+    jacobian.fill([T::ZERO; 6]);
+    let z = Vector3([T::ZERO, T::ZERO, T::ONE]);
+    let mut place = Vector3(fixed.position);
+    let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = fixed.rotation;
+    let mut axes = [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]].map(Vector3);
+    // Inwards: values in frame i are transformed to frame i − 1.
+    for i in (0..=link).rev() {
+        let joint = &chain.joints[i];
+        let transform = joint.transform(q[i]);
+        let (linear, angular) = match joint.kind {
+            JointKind::Revolute => (z.cross(place), z),
+            JointKind::Prismatic => (z, Vector3::ZERO),
+        };
+        jacobian[i] = six(linear, angular);
+        for column in &mut jacobian[i..=link] {
+            let [x, y, z, a, b, c] = *column;
+            *column = six(
+                transform.direction_to_parent(Vector3([x, y, z])),
+                transform.direction_to_parent(Vector3([a, b, c])),
+            );
+        }
+        place = transform.origin + transform.direction_to_parent(place);
+        axes = axes.map(|axis| transform.direction_to_parent(axis));
+    }
+    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = axes.map(|axis| axis.0);
+    Ok(Pose {
+        position: place.0,
+        rotation: [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]],
+    })
+}
+
+fn six<T: Copy>(linear: Vector3<T>, angular: Vector3<T>) -> [T; 6] {
+    let ([x, y, z], [a, b, c]) = (linear.0, angular.0);
+    [x, y, z, a, b, c]
 }
 
 #[cfg(test)]
@@ -110,6 +180,53 @@ mod tests {
                 let moved = point_position(&chain, &q, link, point.map(D::constant), &mut unused);
                 for (found, dual) in jacobian[k].iter().zip(moved.unwrap()) {
                     assert!((found - dual.derivative[0]).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pose_of_a_frame_is_that_of_its_points_and_its_rotation_stays_one() {
+        for seed in 0..40 {
+            let n = 1 + seed as usize % 7;
+            let s = Sample::random(n, seed);
+            let link = seed as usize % n;
+            let (sin, cos) = 0.7_f64.sin_cos();
+            let fixed = Pose {
+                position: [0.1, -0.2, 0.3],
+                rotation: [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]],
+            };
+            let mut jacobian = vec![[f64::NAN; 6]; n];
+            let pose = frame_pose(&s.chain(), &s.q, link, &fixed, &mut jacobian).unwrap();
+            // Points at the origin and at one metre along each axis of the frame.
+            let mut columns = vec![[f64::NAN; 3]; n];
+            let origin =
+                point_position(&s.chain(), &s.q, link, fixed.position, &mut columns).unwrap();
+            for k in 0..3 {
+                assert!((pose.position[k] - origin[k]).abs() < 1e-12);
+            }
+            for axis in 0..3 {
+                let mut tip = fixed.position;
+                for (k, coordinate) in tip.iter_mut().enumerate() {
+                    *coordinate += fixed.rotation[k][axis];
+                }
+                let mut moved = vec![[f64::NAN; 3]; n];
+                let at = point_position(&s.chain(), &s.q, link, tip, &mut moved).unwrap();
+                let arm: [f64; 3] = core::array::from_fn(|k| at[k] - origin[k]);
+                for k in 0..3 {
+                    assert!((pose.rotation[k][axis] - arm[k]).abs() < 1e-12);
+                }
+                // A rigid body: v(tip) = v(origin) + ω × arm.
+                for j in 0..n {
+                    let [vx, vy, vz, a, b, c] = jacobian[j];
+                    let expected = [
+                        vx + b * arm[2] - c * arm[1],
+                        vy + c * arm[0] - a * arm[2],
+                        vz + a * arm[1] - b * arm[0],
+                    ];
+                    for k in 0..3 {
+                        assert!((moved[j][k] - expected[k]).abs() < 1e-12);
+                    }
                 }
             }
         }

@@ -60,7 +60,7 @@ pub use energy::{
 pub use forward::forward_dynamics;
 pub use inertia_matrix::inertia_matrix;
 pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
-pub use kinematics::point_position;
+pub use kinematics::{Pose, frame_pose, point_position};
 pub use momentum::{momentum_loss_regressor, momentum_regressor};
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;
