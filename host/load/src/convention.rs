@@ -4,10 +4,10 @@ use nalgebra::Matrix3;
 
 use crate::mounting::{Channels, Mounting, signed_permutations};
 use crate::statistics::Recorded;
-use crate::system::{Fit, Sensed, Unknowns};
+use crate::system::{Fit, Nuisance, Sensed, Unknowns};
 
-/// Gain of −2·ln of the likelihood from which other channels are believed: odds of 3 million to one.
-const DECISIVE: f64 = 30.0;
+/// Gain of −2·ln of the likelihood from which one explanation is believed before another: odds of 3 million to one.
+pub(crate) const DECISIVE: f64 = 30.0;
 /// Share of the segments in which the better channels must leave less.
 const NEARLY_ALL: f64 = 0.9;
 /// Orders of the force channels that are kept for the comparison with the moments.
@@ -17,26 +17,23 @@ const TRIED: usize = 3;
 /// Largest number of steps of the rotation.
 const MOST_TURNS: usize = 40;
 
-/// Turns the sensor until its equations fit best (Gauss–Newton over the rotation).
-pub(crate) fn turned(sensed: &Sensed, start: &Mounting, unknowns: &Unknowns) -> Fit {
-    let unknowns = Unknowns {
-        rotation: true,
-        ..unknowns.clone()
-    };
-    let mut fit = sensed.fit(start, &unknowns);
+/// Turns sensor and gravity, as far as they are among the unknowns, until the equations fit best (Gauss–Newton).
+pub(crate) fn settled(sensed: &Sensed, start: &Mounting, unknowns: &Unknowns) -> Fit {
+    let mut fit = sensed.fit(start, unknowns);
     for _ in 0..MOST_TURNS {
-        let Some(by) = sensed.rotation(&fit) else {
+        let turns = sensed.rotations(&fit);
+        let size = turns[0].norm().max(turns[1].norm());
+        if size == 0.0 {
             break;
-        };
+        }
         // A linear step of more than a third of a turn points nowhere.
-        let by = by * (1.0 / by.norm()).min(1.0);
-        let next = sensed.fit(&fit.mounting.turned(&by), &unknowns);
+        let [sensor, gravity] = turns.map(|by| by * (1.0 / size).min(1.0));
+        let next = sensed.fit(&fit.mounting.turned(&sensor, &gravity), unknowns);
         if !next.misfit().is_finite() || next.misfit() > fit.misfit() + 1e-9 {
             break;
         }
-        let settled = by.norm() < 1e-9;
         fit = next;
-        if settled {
+        if size < 1e-9 {
             break;
         }
     }
@@ -60,11 +57,13 @@ pub(crate) fn compare(
     unknowns: &Unknowns,
     sign_stated: bool,
 ) -> Compared {
-    let stated = turned(sensed, mounting, unknowns);
+    let turning = unknowns.with(Nuisance::Rotation);
+    let stated = settled(sensed, mounting, &turning);
     let recordings: Vec<Recorded> = sensed.recordings.iter().map(Recorded::in_one).collect();
     let whole = Sensed {
         recordings: &recordings,
         to_joint: sensed.to_joint,
+        gravity: sensed.gravity,
     };
     let found = nearest_of_the_best(&whole, mounting, unknowns, sign_stated);
     if found.iter().any(|channels| channels.changes() == 0) {
@@ -74,7 +73,7 @@ pub(crate) fn compare(
         };
     }
     let better = found.into_iter().take(TRIED).find_map(|channels| {
-        let fit = turned(sensed, &mounting.after(&channels), unknowns);
+        let fit = settled(sensed, &mounting.after(&channels), &turning);
         let gain = stated.misfit() - fit.misfit();
         (gain > DECISIVE && leaves_less(sensed, &fit, &stated)).then_some((channels, fit))
     });
@@ -167,6 +166,7 @@ pub(crate) fn other_unit(sensed: &Sensed, compared: &Compared) -> Option<&'stati
         let mounting = Mounting {
             force: fit.mounting.force,
             moment: fit.mounting.moment / unit.factor,
+            gravity: fit.mounting.gravity,
         };
         // The residual of the moments in the unit of the file.
         sensed.fit(&mounting, &fit.unknowns).misfit() + 2.0 * each * unit.factor.ln()

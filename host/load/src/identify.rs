@@ -11,10 +11,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::body::body;
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, sizes_of};
+use crate::findings::SensorFindings;
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
 use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers};
-use crate::sensor::{Sensing, SensorFindings, by_sensor};
+use crate::sensor::{Sensing, by_sensor};
 use crate::torque::{Driven, equations};
 
 /// Probability by chance below which sensor and torques contradict each other.
@@ -25,11 +26,12 @@ const COMPARED: f64 = 0.5;
 /// Identifies the load at the flange from recordings with it, and recordings without it if there are any.
 ///
 /// The sensor's equations are linear in the ten parameters (Atkeson, An & Hollerbach 1986; Swevers et al. 2007); the
-/// bias of the sensor, its drift and its rotation are estimated with them. By torque the ten columns of the last link
+/// bias of the sensor, its drift, rotation, position and delay, and a base that leans are estimated with them where the
+/// data show them. By torque the ten columns of the last link
 /// explain what the recordings with the load show beyond those without it (Khalil, Gautier & Lemoine 2007).
 ///
-/// Leaves out: elasticity between flange and load, a delay between sensor and encoders, a base that is not level, an error
-/// of the sensor's position, its gain and crosstalk, cables that pull.
+/// Leaves out: elasticity between flange and load, gain and crosstalk of the sensor, cables that pull. At rest an error of
+/// the sensor's position is an error of the centre of mass, and neither is seen.
 ///
 /// # Errors
 /// [`LoadError`].

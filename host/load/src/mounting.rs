@@ -1,14 +1,16 @@
-//! How the axes of the sensor lie, and which of the two opposite wrenches it reads.
+//! How the axes of the sensor lie, which of the two opposite wrenches it reads, and how the base stands.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-/// From the readings to the wrench of the robot on the load, in the axes of the last joint.
+/// From the readings to the wrench of the robot on the load, in the axes of the last joint; and where gravity points.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Mounting {
     /// Applied to the force.
     pub force: Matrix3<f64>,
     /// Applied to the moment; equal to `force` for a sensor whose channels are what they claim to be.
     pub moment: Matrix3<f64>,
+    /// Turns the described gravity to the true one, in the base frame.
+    pub gravity: Rotation3<f64>,
 }
 
 impl Mounting {
@@ -17,6 +19,7 @@ impl Mounting {
         Self {
             force: rotation * sign,
             moment: rotation * sign,
+            gravity: Rotation3::identity(),
         }
     }
 
@@ -29,12 +32,14 @@ impl Mounting {
         }
     }
 
-    /// Returns the mounting turned by a rotation vector in the axes of the joint.
-    pub(crate) fn turned(&self, by: &Vector3<f64>) -> Self {
-        let turn = Rotation3::from_scaled_axis(*by).into_inner();
+    /// Returns the mounting with the sensor turned by a rotation vector in the axes of the joint, and gravity by one in the
+    /// base frame.
+    pub(crate) fn turned(&self, sensor: &Vector3<f64>, gravity: &Vector3<f64>) -> Self {
+        let turn = Rotation3::from_scaled_axis(*sensor).into_inner();
         Self {
             force: turn * self.force,
             moment: turn * self.moment,
+            gravity: Rotation3::from_scaled_axis(*gravity) * self.gravity,
         }
     }
 
@@ -43,6 +48,7 @@ impl Mounting {
         Self {
             force: -self.force,
             moment: -self.moment,
+            gravity: self.gravity,
         }
     }
 
@@ -51,6 +57,7 @@ impl Mounting {
         Self {
             force: self.force * channels.force,
             moment: self.moment * channels.moment,
+            gravity: self.gravity,
         }
     }
 }

@@ -8,8 +8,8 @@ use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
 use serde::Serialize;
 
 use crate::estimate::{Estimate, Parameters};
+use crate::findings::SensorFindings;
 use crate::options::By;
-use crate::sensor::SensorFindings;
 
 /// A value with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,12 +1,15 @@
 //! Rows of a recording: regressor of the wrench and readings of the sensor, in one band.
 
 use nalgebra::Isometry3;
+use nalgebra::{Matrix3, Vector3};
 use rig_data::prepare::{LowPass, Motion, PrepareError, PreprocessingPlan, Recording, each_motion};
 use rig_data::{Block, WRENCH_COLUMNS};
-use rig_shared::multibody::{Chain, INERTIAL_PARAMETERS, wrench_regressor};
+use rig_shared::multibody::{
+    Chain, INERTIAL_PARAMETERS, MultibodyError, Pose as Frame, frame_pose, wrench_regressor,
+};
 
 use crate::error::LoadError;
-use crate::wrench_row::{ENTRIES, WrenchRow, about};
+use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
 
 /// Name of the column with the sensor's temperature.
 const TEMPERATURE: &str = "temp";
@@ -136,14 +139,29 @@ pub(crate) fn each_pose(
         wrench_regressor(chain, &q, &still, &still, &mut regressor)
             .map_err(|e| LoadError::Model(e.to_string()))?;
         about(&sensor.translation.vector, &mut regressor);
+        let axes = base_axes(chain, &q).map_err(|e| LoadError::Model(e.to_string()))?;
         take(&WrenchRow {
             time: pose.others[0] / count,
             temperature: pose.others[1] / count,
             regressor,
+            rate: [0.0; ENTRIES],
+            weights: axes.map(|axis| weight(&axis, &sensor.translation.vector)),
             readings: pose.readings.map(|sum| sum / count),
         });
     }
     Ok(left_out)
+}
+
+/// Returns the axes of the base in the axes of the last joint.
+fn base_axes(chain: &Chain<f64>, q: &[f64]) -> Result<[Vector3<f64>; 3], MultibodyError> {
+    let own = Frame {
+        position: [0.0; 3],
+        rotation: Matrix3::identity().into(),
+    };
+    let mut unused = vec![[0.0; 6]; q.len()];
+    let link = q.len().saturating_sub(1);
+    let pose = frame_pose(chain, q, link, &own, &mut unused)?;
+    Ok(pose.rotation.map(Vector3::from))
 }
 
 /// Sums over the rows of one pose.
@@ -253,13 +271,11 @@ struct Piece<'a> {
 
 impl Piece<'_> {
     /// Streams the rows of the piece; returns the number of saturated ones.
-    fn rows(
-        &self,
-        take: &mut dyn FnMut(&WrenchRow),
-    ) -> Result<u64, rig_shared::multibody::MultibodyError> {
+    fn rows(&self, take: &mut dyn FnMut(&WrenchRow)) -> Result<u64, MultibodyError> {
         let motion = self.motion;
         let (low, high) = motion.sound;
-        let columns = self.regressors(low, high)?;
+        let [columns, axes] = self.regressors(low, high)?;
+        let axes: Vec<Vec<f64>> = axes.iter().map(|c| self.low_pass.zero_phase(c)).collect();
         let filtered: Vec<Vec<f64>> = (columns.iter())
             .map(|column| {
                 // Forces do not depend on the inertias; such columns are zero.
@@ -289,28 +305,36 @@ impl Piece<'_> {
                 left_out += 1;
                 continue;
             }
-            let mut regressor: [f64; ENTRIES] = std::array::from_fn(|c| filtered[c][k - low]);
-            about(&self.sensor.translation.vector, &mut regressor);
+            let at = k - low;
+            let mut regressor: [f64; ENTRIES] = std::array::from_fn(|c| filtered[c][at]);
+            let [before, after] = [at.saturating_sub(1), (at + 1).min(high - low - 1)];
+            let span = (after - before) as f64 / self.plan.sample_rate;
+            let mut rate: [f64; ENTRIES] =
+                std::array::from_fn(|c| (filtered[c][after] - filtered[c][before]) / span);
+            let origin = &self.sensor.translation.vector;
+            about(origin, &mut regressor);
+            about(origin, &mut rate);
             take(&WrenchRow {
                 time: motion.t[k] - self.begin,
                 temperature: temperature.map_or(0.0, |list| list[k]),
                 regressor,
-                readings: std::array::from_fn(|c| readings[c][k - low]),
+                rate,
+                weights: std::array::from_fn(|axis| {
+                    let direction = Vector3::from_fn(|c, _| axes[3 * axis + c][at]);
+                    weight(&direction, origin)
+                }),
+                readings: std::array::from_fn(|c| readings[c][at]),
             });
         }
         Ok(left_out)
     }
 
-    /// Returns the entries of the regressor over the rows `low .. high`, one column each.
-    fn regressors(
-        &self,
-        low: usize,
-        high: usize,
-    ) -> Result<Vec<Vec<f64>>, rig_shared::multibody::MultibodyError> {
+    /// Returns the entries of the regressor over the rows `low .. high`, and the axes of the base in the axes of the last
+    /// joint, one column each.
+    fn regressors(&self, low: usize, high: usize) -> Result<[Vec<Vec<f64>>; 2], MultibodyError> {
         let joints = &self.motion.joints;
-        let mut columns: Vec<Vec<f64>> = (0..ENTRIES)
-            .map(|_| Vec::with_capacity(high - low))
-            .collect();
+        let empty = |count: usize| vec![Vec::with_capacity(high - low); count];
+        let [mut columns, mut axes] = [empty(ENTRIES), empty(9)];
         let [mut q, mut qd, mut qdd] = [(); 3].map(|()| vec![0.0; joints.len()]);
         let mut entries = [0.0; 6 * INERTIAL_PARAMETERS];
         for k in low..high {
@@ -321,7 +345,12 @@ impl Piece<'_> {
             for (column, entry) in columns.iter_mut().zip(entries) {
                 column.push(entry);
             }
+            let now = base_axes(self.chain, &q)?;
+            let entries = now.iter().flat_map(|axis| axis.iter());
+            for (column, entry) in axes.iter_mut().zip(entries) {
+                column.push(*entry);
+            }
         }
-        Ok(columns)
+        Ok([columns, axes])
     }
 }

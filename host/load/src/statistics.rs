@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use rig_identify::TriangularFactor;
 use rig_shared::multibody::INERTIAL_PARAMETERS;
 
-use crate::wrench_row::WrenchRow;
+use crate::wrench_row::{WEIGHED, WrenchRow};
 
 /// Number of segments of a recording.
 pub(crate) const SEGMENTS: usize = 20;
@@ -15,7 +15,8 @@ pub(crate) const SEGMENTS: usize = 20;
 /// Number of rows that are kept for figures.
 const SAMPLED: u64 = 600;
 
-/// Columns of a channel's triangle: ten parameters, then these.
+/// Columns of a channel's triangle: ten parameters, then these. The first columns have zeros below as many rows, so what
+/// is seldom needed comes last.
 pub(crate) mod column {
     /// One.
     pub(crate) const ONE: usize = 10;
@@ -25,8 +26,14 @@ pub(crate) mod column {
     pub(crate) const TEMPERATURE: usize = 12;
     /// The first of the three readings of the channel's kind.
     pub(crate) const READINGS: usize = 13;
+    /// The three forces as read, for a moment; zero for a force.
+    pub(crate) const FORCES: usize = 16;
+    /// Regressor of the weight for a unit of gravity along each axis of the base: three times four parameters.
+    pub(crate) const WEIGHTS: usize = 19;
+    /// Derivative of the regressor by time.
+    pub(crate) const RATE: usize = 31;
     /// Number of columns.
-    pub(crate) const COUNT: usize = 16;
+    pub(crate) const COUNT: usize = 41;
 }
 
 /// A segment of a recording.
@@ -140,9 +147,19 @@ impl Collector {
             x[column::ONE] = 1.0;
             x[column::TIME] = row.time / self.length - 0.5;
             x[column::TEMPERATURE] = warmer;
-            x[column::READINGS] = row.readings[first];
-            x[column::READINGS + 1] = row.readings[first + 1];
-            factor.push(&x, row.readings[first + 2], 1.0);
+            x[column::READINGS..column::FORCES].copy_from_slice(&row.readings[first..first + 3]);
+            if first > 0 {
+                x[column::FORCES..column::WEIGHTS].copy_from_slice(&row.readings[..3]);
+            }
+            for (weight, entries) in x[column::WEIGHTS..column::RATE]
+                .chunks_exact_mut(WEIGHED)
+                .zip(&row.weights)
+            {
+                weight.copy_from_slice(&entries[channel * WEIGHED..(channel + 1) * WEIGHED]);
+            }
+            let rate = &row.rate[own..own + INERTIAL_PARAMETERS];
+            x[column::RATE..].copy_from_slice(&rate[..INERTIAL_PARAMETERS - 1]);
+            factor.push(&x, rate[INERTIAL_PARAMETERS - 1], 1.0);
         }
     }
 

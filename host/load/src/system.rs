@@ -1,17 +1,22 @@
 //! The equations of the wrist sensor for one mounting: which unknowns there are, and their least squares.
 //!
-//! s·R·y = W·φ + b + d·t + δ × (s·R·y): y are the readings, R the rotation from the sensor to the last joint, s the sign
-//! convention, W the regressor of the wrench, φ the load, b the bias of a recording, d its drift, δ a small rotation of
-//! the sensor.
+//! s·R·y = (W + ε × g)·φ − T·Ẇ·φ + b + d·t + δ × (s·R·y) − p × f: y are the readings, R the rotation from the sensor to the
+//! last joint, s the sign convention, W the regressor of the wrench, φ the load, b the bias of a recording. Further
+//! unknowns are a drift d of the bias, a small rotation δ of the sensor, a small rotation ε of gravity, a delay T of the
+//! sensor against the encoders, and an error p of the sensor's position.
 
-use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
+use std::ops::Range;
+
+use nalgebra::{
+    DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, OMatrix, Rotation3, SMatrix, U3, Vector3,
+};
 use rig_identify::TriangularFactor;
 use rig_shared::multibody::INERTIAL_PARAMETERS;
 
 use crate::estimate::{Parameters, solved};
 use crate::mounting::Mounting;
 use crate::statistics::{Recorded, Segment, column};
-use crate::wrench_row::WrenchRow;
+use crate::wrench_row::{WEIGHED, WrenchRow};
 
 /// Ratio of the readings' size to the smallest noise that is told apart from rounding.
 const ROUNDING: f64 = 1e-9;
@@ -27,19 +32,78 @@ pub(crate) struct Jump {
     pub segment: usize,
 }
 
+/// A property of sensor, recorder or base that is an unknown beside the load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Nuisance {
+    /// A small rotation of the sensor's axes.
+    Rotation,
+    /// A small rotation of gravity in the base frame: the base leans.
+    Lean,
+    /// A delay of the sensor against the encoders.
+    Delay,
+    /// An error of the sensor's position.
+    Origin,
+    /// A drift of the bias with time, in every recording.
+    Drift,
+    /// A drift of the bias with temperature, one for all recordings.
+    Warming,
+}
+
+impl Nuisance {
+    /// All of them.
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Rotation,
+        Self::Lean,
+        Self::Delay,
+        Self::Origin,
+        Self::Drift,
+        Self::Warming,
+    ];
+
+    /// Returns the number of its unknowns.
+    fn count(self, recordings: usize) -> usize {
+        match self {
+            Self::Delay => 1,
+            Self::Lean => 2,
+            Self::Rotation | Self::Origin => 3,
+            Self::Warming => 6,
+            Self::Drift => 6 * recordings,
+        }
+    }
+}
+
 /// Which unknowns there are beside the load.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Unknowns {
-    /// A small rotation of the sensor.
-    pub rotation: bool,
-    /// A drift of the bias with time, in every recording.
-    pub drift: bool,
-    /// A drift of the bias with temperature, one for all recordings.
-    pub warming: bool,
     /// What is mounted beyond the sensor without the load: there are recordings without the load.
     pub tool: bool,
     /// Jumps of the bias.
     pub jumps: Vec<Jump>,
+    /// The others.
+    pub nuisances: Vec<Nuisance>,
+}
+
+impl Unknowns {
+    /// Returns true if `nuisance` is among them.
+    pub(crate) fn has(&self, nuisance: Nuisance) -> bool {
+        self.nuisances.contains(&nuisance)
+    }
+
+    /// Returns them with another one.
+    pub(crate) fn with(&self, nuisance: Nuisance) -> Self {
+        let mut more = self.clone();
+        if !more.has(nuisance) {
+            more.nuisances.push(nuisance);
+        }
+        more
+    }
+
+    /// Returns them without one.
+    pub(crate) fn without(&self, nuisance: Nuisance) -> Self {
+        let mut fewer = self.clone();
+        fewer.nuisances.retain(|own| *own != nuisance);
+        fewer
+    }
 }
 
 /// Places of the unknowns.
@@ -64,21 +128,22 @@ impl Layout<'_> {
     fn after_jump(&self, jump: usize) -> usize {
         self.bias(self.recordings) + 6 * jump
     }
-    fn drift(&self, recording: usize) -> usize {
-        self.after_jump(self.unknowns.jumps.len()) + 6 * recording
-    }
-    fn warming(&self) -> usize {
-        self.drift(if self.unknowns.drift {
-            self.recordings
-        } else {
-            0
-        })
-    }
-    fn rotation(&self) -> usize {
-        self.warming() + if self.unknowns.warming { 6 } else { 0 }
+    /// Returns the places of a nuisance.
+    fn place(&self, nuisance: Nuisance) -> Option<Range<usize>> {
+        let mut at = self.after_jump(self.unknowns.jumps.len());
+        for own in &self.unknowns.nuisances {
+            let next = at + own.count(self.recordings);
+            if *own == nuisance {
+                return Some(at..next);
+            }
+            at = next;
+        }
+        None
     }
     fn count(&self) -> usize {
-        self.rotation() + if self.unknowns.rotation { 3 } else { 0 }
+        let nuisances = self.unknowns.nuisances.iter();
+        let others: usize = nuisances.map(|own| own.count(self.recordings)).sum();
+        self.after_jump(self.unknowns.jumps.len()) + others
     }
 }
 
@@ -88,12 +153,14 @@ pub(crate) struct Sensed<'a> {
     pub recordings: &'a [Recorded],
     /// From the ten parameters in the flange frame to those in the frame of the last joint.
     pub to_joint: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
+    /// Gravity as described, in the base frame, m/s².
+    pub gravity: Vector3<f64>,
 }
 
 /// A fit of the sensor's equations.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
-    /// The mounting with which it was made; the rotation among the unknowns is relative to it.
+    /// The mounting with which it was made; rotations among the unknowns are relative to it.
     pub mounting: Mounting,
     /// The unknowns.
     pub unknowns: Unknowns,
@@ -160,71 +227,84 @@ impl Sensed<'_> {
         }
     }
 
-    /// Returns the rows of a channel of a segment, one column an unknown, and their right-hand sides.
+    /// Returns the rows of a channel of a segment, one column an unknown, and their right-hand sides. Products of unknowns
+    /// are linearised about the values of `fit`.
     fn rows(
         &self,
         [recording, channel, bias]: [usize; 3],
         segment: &Segment,
-        mounting: &Mounting,
-        unknowns: &Unknowns,
+        fit: &Fit,
     ) -> (DMatrix<f64>, Vec<f64>) {
+        let unknowns = &fit.unknowns;
         let layout = self.layout(unknowns);
-        let triangle = &segment.channels[channel];
+        let height = height(fit);
+        let triangle = segment.channels[channel].rows(0, height);
         let axis = channel % 3;
-        let readings = triangle.columns(column::READINGS, 3);
+        let readings = triangle.fixed_columns::<3>(column::READINGS);
         // The wrench of the robot on the load by these readings, three components.
-        let wrench = readings * mounting.matrix(channel).transpose();
-        let own = triangle.columns(0, INERTIAL_PARAMETERS) * self.to_joint;
-        let mut rows = DMatrix::zeros(column::COUNT, layout.count());
-        if self.recordings[recording].loaded {
-            rows.columns_mut(0, INERTIAL_PARAMETERS).copy_from(&own);
-        }
-        if unknowns.tool {
-            rows.columns_mut(layout.tool(), INERTIAL_PARAMETERS)
-                .copy_from(&own);
+        let wrench = readings * fit.mounting.matrix(channel).transpose();
+        let mut own = triangle.columns(0, INERTIAL_PARAMETERS).into_owned();
+        let change = fit.mounting.gravity * self.gravity - self.gravity;
+        add_weight(&triangle, &change, &mut own);
+        let mut rows = DMatrix::zeros(height, layout.count());
+        let loaded = self.recordings[recording].loaded;
+        let parts = [(loaded, 0), (unknowns.tool, layout.tool())];
+        // What moves here, in the frame of the last joint.
+        let mut body = Parameters::zeros();
+        for (_, at) in parts.iter().filter(|(is_here, _)| *is_here) {
+            rows.columns_mut(*at, INERTIAL_PARAMETERS)
+                .copy_from(&(&own * self.to_joint));
+            let values = &fit.values[*at..at + INERTIAL_PARAMETERS];
+            body += self.to_joint * Parameters::from_column_slice(values);
         }
         rows.column_mut(bias + channel)
             .copy_from(&triangle.column(column::ONE));
-        if unknowns.drift {
-            rows.column_mut(layout.drift(recording) + channel)
-                .copy_from(&triangle.column(column::TIME));
-        }
-        if unknowns.warming {
-            rows.column_mut(layout.warming() + channel)
-                .copy_from(&triangle.column(column::TEMPERATURE));
-        }
-        if unknowns.rotation {
-            // −(δ × w) of component `axis` for a rotation about each axis.
-            for k in 0..3 {
-                let mut unit = Vector3::zeros();
-                unit[k] = 1.0;
-                let mut column = rows.column_mut(layout.rotation() + k);
-                for (row, value) in column.iter_mut().enumerate() {
-                    let w = Vector3::new(wrench[(row, 0)], wrench[(row, 1)], wrench[(row, 2)]);
-                    *value = -unit.cross(&w)[axis];
+        for nuisance in &unknowns.nuisances {
+            let Some(place) = layout.place(*nuisance) else {
+                continue;
+            };
+            let mut to = rows.columns_mut(place.start, place.len());
+            match nuisance {
+                Nuisance::Drift => to
+                    .column_mut(6 * recording + channel)
+                    .copy_from(&triangle.column(column::TIME)),
+                Nuisance::Warming => to
+                    .column_mut(channel)
+                    .copy_from(&triangle.column(column::TEMPERATURE)),
+                Nuisance::Delay => {
+                    let rate = triangle.columns(column::RATE, INERTIAL_PARAMETERS);
+                    to.copy_from(&-(rate * body));
                 }
+                Nuisance::Lean => {
+                    let gravity = fit.mounting.gravity * self.gravity;
+                    for (k, about) in self.level_axes(fit).iter().enumerate() {
+                        let mut lean = DMatrix::zeros(height, INERTIAL_PARAMETERS);
+                        add_weight(&triangle, &about.cross(&gravity), &mut lean);
+                        to.column_mut(k).copy_from(&(lean * body));
+                    }
+                }
+                Nuisance::Rotation => turn(&wrench, axis, &mut to),
+                Nuisance::Origin if channel >= 3 => {
+                    let force = triangle.fixed_columns::<3>(column::FORCES);
+                    turn(&(force * fit.mounting.force.transpose()), axis, &mut to);
+                }
+                Nuisance::Origin => {}
             }
         }
         (rows, wrench.column(axis).iter().copied().collect())
     }
 
     /// Returns one factor a segment, in units of the noise, the load's columns first.
-    pub(crate) fn factors(
-        &self,
-        mounting: &Mounting,
-        unknowns: &Unknowns,
-        noise: [f64; 2],
-    ) -> Vec<TriangularFactor> {
-        let count = self.layout(unknowns).count();
+    pub(crate) fn factors(&self, fit: &Fit) -> Vec<TriangularFactor> {
+        let count = self.layout(&fit.unknowns).count();
         let mut factors = Vec::new();
-        self.each_segment(unknowns, &mut |recording, _, segment, bias| {
+        self.each_segment(&fit.unknowns, &mut |recording, _, segment, bias| {
             let mut factor = TriangularFactor::new(count);
             for channel in 0..6 {
-                let (rows, right) =
-                    self.rows([recording, channel, bias], segment, mounting, unknowns);
+                let (rows, right) = self.rows([recording, channel, bias], segment, fit);
                 for (row, y) in rows.row_iter().zip(right) {
                     let x: Vec<f64> = row.iter().copied().collect();
-                    factor.push(&x, y, 1.0 / noise[channel / 3]);
+                    factor.push(&x, y, 1.0 / fit.noise[channel / 3]);
                 }
             }
             factors.push(factor);
@@ -236,19 +316,18 @@ impl Sensed<'_> {
     pub(crate) fn fit(&self, mounting: &Mounting, unknowns: &Unknowns) -> Fit {
         let rows = self.used_rows(unknowns);
         let count = self.layout(unknowns).count();
-        let mut noise = [1.0, 0.1];
         let least = self.sizes(unknowns).map(|size| ROUNDING * size);
         let mut fit = Fit {
             mounting: mounting.clone(),
             unknowns: unknowns.clone(),
             values: vec![0.0; count],
-            noise,
+            noise: [1.0, 0.1],
             squares: [0.0; 2],
             equations: 6 * rows,
         };
         for _ in 0..ROUNDS {
             let mut whole = TriangularFactor::new(count);
-            for factor in self.factors(mounting, unknowns, noise) {
+            for factor in self.factors(&fit) {
                 whole.merge(&factor, 1.0);
             }
             let (r, z) = whole.system();
@@ -258,9 +337,8 @@ impl Sensed<'_> {
             let freedom = (0.5 * fit.freedom()).max(1.0);
             for kind in 0..2 {
                 fit.squares[kind] = fit.squares[kind].max(least[kind].powi(2) * freedom);
-                noise[kind] = (fit.squares[kind] / freedom).sqrt();
+                fit.noise[kind] = (fit.squares[kind] / freedom).sqrt();
             }
-            fit.noise = noise;
         }
         fit
     }
@@ -292,6 +370,15 @@ impl Sensed<'_> {
         sums.map(|sum| (sum / equations).sqrt().max(f64::MIN_POSITIVE))
     }
 
+    /// Returns the residual of forces and of moments as a share of what they read beside the bias.
+    pub(crate) fn share(&self, fit: &Fit) -> [f64; 2] {
+        let mut unloaded = fit.clone();
+        let bodies = self.layout(&fit.unknowns).bias(0);
+        unloaded.values[..bodies].fill(0.0);
+        let read = self.squares(&unloaded);
+        std::array::from_fn(|kind| (fit.squares[kind] / read[kind].max(f64::MIN_POSITIVE)).sqrt())
+    }
+
     /// Returns the squared residuals of forces and of moments.
     fn squares(&self, fit: &Fit) -> [f64; 2] {
         self.squares_by_segment(fit)
@@ -316,7 +403,7 @@ impl Sensed<'_> {
 
     /// Returns the residual of the triangle's rows of a channel.
     fn residual(&self, place: [usize; 3], segment: &Segment, fit: &Fit) -> DVector<f64> {
-        let (rows, right) = self.rows(place, segment, &fit.mounting, &fit.unknowns);
+        let (rows, right) = self.rows(place, segment, fit);
         DVector::from_vec(right) - rows * DVector::from_column_slice(&fit.values)
     }
 
@@ -327,17 +414,51 @@ impl Sensed<'_> {
             means[recording].push(std::array::from_fn(|channel| {
                 let residual = self.residual([recording, channel, bias], segment, fit);
                 let ones = segment.channels[channel].column(column::ONE);
-                ones.dot(&residual) / segment.rows as f64
+                ones.rows(0, residual.len()).dot(&residual) / segment.rows as f64
             }));
         });
         means
     }
 
-    /// Returns the rotation among the unknowns, rad in the axes of the last joint.
-    pub(crate) fn rotation(&self, fit: &Fit) -> Option<Vector3<f64>> {
-        let at = self.layout(&fit.unknowns).rotation();
-        (fit.unknowns.rotation)
-            .then(|| Vector3::new(fit.values[at], fit.values[at + 1], fit.values[at + 2]))
+    /// Returns the places of a nuisance among the unknowns.
+    pub(crate) fn place(&self, unknowns: &Unknowns, nuisance: Nuisance) -> Option<Range<usize>> {
+        self.layout(unknowns).place(nuisance)
+    }
+
+    /// Returns the values of a nuisance.
+    fn values<'f>(&self, fit: &'f Fit, nuisance: Nuisance) -> Option<&'f [f64]> {
+        let place = self.place(&fit.unknowns, nuisance)?;
+        fit.values.get(place)
+    }
+
+    /// Returns the rotations among the unknowns, rad: of the sensor in the axes of the last joint, of gravity in the base
+    /// frame.
+    pub(crate) fn rotations(&self, fit: &Fit) -> [Vector3<f64>; 2] {
+        let sensor = self.values(fit, Nuisance::Rotation);
+        let gravity = self.values(fit, Nuisance::Lean).map(|values| {
+            let axes = self.level_axes(fit);
+            axes[0] * values[0] + axes[1] * values[1]
+        });
+        [
+            sensor.map(Vector3::from_column_slice).unwrap_or_default(),
+            gravity.unwrap_or_default(),
+        ]
+    }
+
+    /// Returns the two axes of the base frame about which gravity is turned.
+    pub(crate) fn level_axes(&self, fit: &Fit) -> [Vector3<f64>; 2] {
+        level_axes(&(fit.mounting.gravity * self.gravity))
+    }
+
+    /// Returns the delay of the sensor against the encoders, s.
+    pub(crate) fn delay(&self, fit: &Fit) -> Option<f64> {
+        self.values(fit, Nuisance::Delay).map(|values| values[0])
+    }
+
+    /// Returns the error of the sensor's position in the axes of the last joint, m.
+    pub(crate) fn origin(&self, fit: &Fit) -> Option<Vector3<f64>> {
+        self.values(fit, Nuisance::Origin)
+            .map(Vector3::from_column_slice)
     }
 
     /// Returns the bias of a recording, as the sensor reads it: force and moment in its own axes.
@@ -352,14 +473,14 @@ impl Sensed<'_> {
 
     /// Returns the drift of a recording from its begin to its end, as the sensor reads it.
     pub(crate) fn drift(&self, fit: &Fit, recording: usize) -> Option<[f64; 6]> {
-        let at = self.layout(&fit.unknowns).drift(recording);
-        fit.unknowns.drift.then(|| self.read(fit, at))
+        let place = self.place(&fit.unknowns, Nuisance::Drift)?;
+        Some(self.read(fit, place.start + 6 * recording))
     }
 
     /// Returns the drift with temperature, per °C, as the sensor reads it.
     pub(crate) fn warming(&self, fit: &Fit) -> Option<[f64; 6]> {
-        let at = self.layout(&fit.unknowns).warming();
-        fit.unknowns.warming.then(|| self.read(fit, at))
+        let place = self.place(&fit.unknowns, Nuisance::Warming)?;
+        Some(self.read(fit, place.start))
     }
 
     /// Returns what the sensor would read at a row of a recording by the fit.
@@ -385,20 +506,33 @@ impl Sensed<'_> {
             load += part(layout.tool());
         }
         let load = self.to_joint * load;
-        let wrench: [f64; 6] = std::array::from_fn(|channel| {
-            let own = &row.regressor[channel * INERTIAL_PARAMETERS..][..INERTIAL_PARAMETERS];
-            let mut sum = fit.values[bias + channel];
-            sum += own.iter().zip(load.iter()).map(|(w, p)| w * p).sum::<f64>();
-            if fit.unknowns.drift {
-                let share = row.time / recorded.length - 0.5;
-                sum += share * fit.values[layout.drift(recording) + channel];
+        let change = fit.mounting.gravity * self.gravity - self.gravity;
+        let delay = self.delay(fit).unwrap_or(0.0);
+        let of = |nuisance| self.values(fit, nuisance);
+        let mut wrench: [f64; 6] = std::array::from_fn(|channel| {
+            let own = channel * INERTIAL_PARAMETERS..(channel + 1) * INERTIAL_PARAMETERS;
+            let along = |entries: &[f64]| -> f64 {
+                entries.iter().zip(load.iter()).map(|(w, p)| w * p).sum()
+            };
+            let mut sum = fit.values[bias + channel] + along(&row.regressor[own.clone()]);
+            sum -= delay * along(&row.rate[own]);
+            for (entries, change) in row.weights.iter().zip(change.iter()) {
+                sum += change * along(&entries[channel * WEIGHED..(channel + 1) * WEIGHED]);
             }
-            if fit.unknowns.warming {
-                let warmer = row.temperature - recorded.reference;
-                sum += warmer * fit.values[layout.warming() + channel];
+            if let Some(drift) = of(Nuisance::Drift) {
+                sum += (row.time / recorded.length - 0.5) * drift[6 * recording + channel];
+            }
+            if let Some(warming) = of(Nuisance::Warming) {
+                sum += (row.temperature - recorded.reference) * warming[channel];
             }
             sum
         });
+        if let Some(origin) = self.origin(fit) {
+            let lever = origin.cross(&Vector3::new(wrench[0], wrench[1], wrench[2]));
+            for axis in 0..3 {
+                wrench[3 + axis] -= lever[axis];
+            }
+        }
         self.as_read(fit, &wrench)
     }
 
@@ -415,5 +549,46 @@ impl Sensed<'_> {
         };
         let (force, moment) = (of(0), of(3));
         [force.x, force.y, force.z, moment.x, moment.y, moment.z]
+    }
+}
+
+/// Returns the number of rows of a triangle that its columns in use have.
+fn height(fit: &Fit) -> usize {
+    let has = |nuisance| fit.unknowns.has(nuisance);
+    let leans = has(Nuisance::Lean) || fit.mounting.gravity != Rotation3::identity();
+    match (has(Nuisance::Delay), leans, has(Nuisance::Origin)) {
+        (true, _, _) => column::COUNT,
+        (false, true, _) => column::RATE,
+        (false, false, true) => column::WEIGHTS,
+        (false, false, false) => column::FORCES,
+    }
+}
+
+/// Adds what `gravity` (base frame, m/s²) adds to the regressor of a channel.
+fn add_weight(triangle: &DMatrixView<'_, f64>, gravity: &Vector3<f64>, to: &mut DMatrix<f64>) {
+    for (k, along) in gravity.iter().enumerate() {
+        let own = triangle.columns(column::WEIGHTS + k * WEIGHED, WEIGHED);
+        let mut weighed = to.columns_mut(0, WEIGHED);
+        weighed += own * *along;
+    }
+}
+
+/// Returns two unit vectors at right angles to gravity.
+fn level_axes(gravity: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let mut unit = Vector3::zeros();
+    unit[gravity.iamin()] = 1.0;
+    let first = gravity.cross(&unit).try_normalize(0.0).unwrap_or(unit);
+    let second = gravity.cross(&first).try_normalize(0.0).unwrap_or(unit);
+    [first, second]
+}
+
+/// Writes −(e × w) of component `axis` for a unit vector e along each axis; `vectors` has one w a row.
+fn turn(vectors: &OMatrix<f64, Dyn, U3>, axis: usize, to: &mut DMatrixViewMut<'_, f64>) {
+    for k in 0..3 {
+        let mut unit = Vector3::zeros();
+        unit[k] = 1.0;
+        for (row, w) in vectors.row_iter().enumerate() {
+            to[(row, k)] = -unit.cross(&Vector3::new(w[0], w[1], w[2]))[axis];
+        }
     }
 }

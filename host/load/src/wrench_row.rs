@@ -6,6 +6,11 @@ use rig_shared::multibody::INERTIAL_PARAMETERS;
 /// Entries of the regressor of a wrench: six components by ten parameters, row-major.
 pub(crate) const ENTRIES: usize = 6 * INERTIAL_PARAMETERS;
 
+/// Parameters that gravity acts on: mass and first moments.
+pub(crate) const WEIGHED: usize = 4;
+/// Entries of the regressor of a weight, row-major.
+pub(crate) const WEIGHT_ENTRIES: usize = 6 * WEIGHED;
+
 /// The regressor and the readings at one instant.
 #[derive(Clone, Debug)]
 pub(crate) struct WrenchRow {
@@ -15,6 +20,10 @@ pub(crate) struct WrenchRow {
     pub temperature: f64,
     /// Regressor of the wrench of the robot on the load, about the sensor's origin, in the axes of the last joint.
     pub regressor: [f64; ENTRIES],
+    /// Its derivative by time, 1/s; zero at rest.
+    pub rate: [f64; ENTRIES],
+    /// What a unit of gravity along each axis of the base, m/s², adds to it.
+    pub weights: [[f64; WEIGHT_ENTRIES]; 3],
     /// Readings in the axes of the sensor.
     pub readings: [f64; 6],
 }
@@ -28,4 +37,24 @@ pub(crate) fn about(point: &Vector3<f64>, regressor: &mut [f64; ENTRIES]) {
             regressor[(3 + axis) * INERTIAL_PARAMETERS + column] -= moved[axis];
         }
     }
+}
+
+/// Returns the regressor of a weight about a point, for gravity along `direction`, all in the axes of the last joint.
+pub(crate) fn weight(direction: &Vector3<f64>, point: &Vector3<f64>) -> [f64; WEIGHT_ENTRIES] {
+    let mut entries = [0.0; WEIGHT_ENTRIES];
+    // The robot bears the weight: f = −m·g, n = −(m·c) × g.
+    let of_mass = point.cross(direction);
+    for axis in 0..3 {
+        entries[axis * WEIGHED] = -direction[axis];
+        entries[(3 + axis) * WEIGHED] = of_mass[axis];
+    }
+    for k in 0..3 {
+        let mut unit = Vector3::zeros();
+        unit[k] = 1.0;
+        let moment = -unit.cross(direction);
+        for axis in 0..3 {
+            entries[(3 + axis) * WEIGHED + 1 + k] = moment[axis];
+        }
+    }
+    entries
 }

@@ -573,3 +573,195 @@ fn readings_that_no_load_gives_are_refused() {
         .to_string();
     assert!(text.contains("do not show the mass"), "{text}");
 }
+
+/// Gravity of a base that is turned by `angle` about a level axis.
+fn leaning(robot: &Robot, angle: f64) -> Robot {
+    let axis = nalgebra::Vector3::new(0.6, -0.8, 0.0);
+    let turn = nalgebra::Rotation3::from_scaled_axis(axis * angle);
+    let gravity = turn * nalgebra::Vector3::from(robot.gravity);
+    Robot {
+        gravity: gravity.into(),
+        ..robot.clone()
+    }
+}
+
+#[test]
+fn a_leaning_base_is_no_turned_sensor_and_both_are_told_together() {
+    let points = tool();
+    for (robot, angle) in [(irp6(), 0.05), (tx40(), 0.15)] {
+        let truth = leaning(&robot, angle);
+        let moving = Moving::new(truth.clone(), 0.7, 3);
+        let motion = recorded(
+            &moving,
+            &points,
+            &Sensor::default(),
+            [30.0, 100.0],
+            4,
+            NO_FLAW,
+        );
+        let list: Vec<Vec<f64>> = (0..12)
+            .map(|k| moving.position(3.1 * f64::from(k)))
+            .collect();
+        let still = poses(&moving, &points, &Sensor::default(), &list, 5);
+        let turned = nalgebra::Rotation3::from_euler_angles(0.02, -0.06, 0.04);
+        let flaw = |_: f64, read: [f64; 6]| {
+            let [fx, fy, fz, mx, my, mz] = read;
+            let f = turned * nalgebra::Vector3::new(fx, fy, fz);
+            let m = turned * nalgebra::Vector3::new(mx, my, mz);
+            [f.x, f.y, f.z, m.x, m.y, m.z]
+        };
+        let both = recorded(
+            &moving,
+            &points,
+            &Sensor::default(),
+            [30.0, 100.0],
+            6,
+            &flaw,
+        );
+        for (recording, is_turned) in [(&motion, false), (&still, false), (&both, true)] {
+            let load = identify_load(&robot, &[recording], &[], &LoadOptions::default()).unwrap();
+            let sensor = load.sensor.as_ref().unwrap();
+            let gravity = sensor.gravity.expect("a base that leans");
+            for (found, true_) in gravity.iter().zip(truth.gravity) {
+                assert!(
+                    (found - true_).abs() < 0.05,
+                    "{gravity:?} {:?}",
+                    truth.gravity
+                );
+            }
+            assert_eq!(sensor.turned.is_some(), is_turned, "{:?}", load.warnings);
+            if let Some(found) = sensor.turned {
+                assert!((found - turned.angle()).abs() < 0.005, "{found}");
+            }
+            assert!(sensor.delay.is_none() && sensor.position.is_none());
+            let [mass, centre] = errors(&load, &points);
+            assert!(mass < 0.01 && centre < 0.005, "{mass} {centre}");
+            assert!(
+                load.warnings
+                    .iter()
+                    .any(|w| w.contains("The base leans by"))
+            );
+        }
+    }
+}
+
+#[test]
+fn a_sensor_that_is_late_or_early_is_no_turned_one() {
+    let points = tool();
+    let moving = Moving::new(tx40(), 0.7, 8);
+    let on_time = recorded(
+        &moving,
+        &points,
+        &Sensor::default(),
+        [40.0, 200.0],
+        9,
+        NO_FLAW,
+    );
+    for rows in [-5i32, 4] {
+        // Readings of another time beside the positions.
+        let mut recording = on_time.clone();
+        let late = rows.unsigned_abs() as usize;
+        let block = &mut recording.blocks[0];
+        let cut = |list: &mut Vec<f64>, is_late: bool| match is_late {
+            true => list.truncate(list.len() - late),
+            false => drop(list.drain(..late)),
+        };
+        cut(&mut block.t, true);
+        block
+            .joints
+            .iter_mut()
+            .for_each(|j| cut(&mut j.q, rows < 0));
+        block
+            .extra
+            .iter_mut()
+            .for_each(|(_, list)| cut(list, rows > 0));
+        let load =
+            identify_load(&moving.robot, &[&recording], &[], &LoadOptions::default()).unwrap();
+        let sensor = load.sensor.as_ref().unwrap();
+        let delay = sensor.delay.expect("a delay");
+        assert!((delay - f64::from(rows) / 200.0).abs() < 1e-3, "{delay}");
+        assert!(
+            sensor.turned.is_none() && sensor.gravity.is_none(),
+            "{:?}",
+            load.warnings
+        );
+        let [mass, centre] = errors(&load, &points);
+        assert!(mass < 0.01 && centre < 0.005, "{mass} {centre}");
+    }
+}
+
+#[test]
+fn another_origin_of_the_sensor_is_found_in_a_lively_motion() {
+    let points = tool();
+    let mut robot = tx40();
+    robot.wrist_sensor = Some(WristSensor {
+        position: [0.01, -0.02, 0.04],
+        rotation: [0.0, 0.0, 0.7],
+        ..WristSensor::default()
+    });
+    let moving = Moving::new(robot, 0.8, 8);
+    let motion = recorded(
+        &moving,
+        &points,
+        &Sensor::default(),
+        [40.0, 200.0],
+        9,
+        NO_FLAW,
+    );
+    let mut described = moving.robot.clone();
+    described.wrist_sensor.as_mut().unwrap().position = [0.01, 0.02, 0.0];
+    let load = identify_load(&described, &[&motion], &[], &LoadOptions::default()).unwrap();
+    let sensor = load.sensor.as_ref().unwrap();
+    let position = sensor.position.expect("another origin");
+    for (found, truth) in position.iter().zip([0.01, -0.02, 0.04]) {
+        assert!((found - truth).abs() < 0.01, "{position:?}");
+    }
+    assert!(sensor.turned.is_none(), "{:?}", load.warnings);
+    let [mass, centre] = errors(&load, &points);
+    assert!(mass < 0.01 && centre < 0.01, "{mass} {centre}");
+}
+
+/// Noise that is correlated over half a second looks like a slow change to a test that takes rows for independent.
+#[test]
+fn correlated_noise_turns_no_sensor_and_leans_no_base() {
+    let points = tool();
+    let mut invented = 0;
+    for seed in 0..30 {
+        let moving = Moving::new(tx40(), 0.6, seed);
+        let state = std::cell::RefCell::new(([0.0; 6], rand_pcg::Pcg64::seed_from_u64(seed)));
+        let flaw = |_: f64, read: [f64; 6]| {
+            let (wander, random) = &mut *state.borrow_mut();
+            std::array::from_fn(|c| {
+                let keeps: f64 = (-0.02f64 / 0.5).exp();
+                let size = if c < 3 { 0.4 } else { 0.04 };
+                let noise = 2.0 * random.random::<f64>() - 1.0;
+                let drive = 3f64.sqrt() * size * (1.0 - keeps * keeps).sqrt();
+                wander[c] = keeps * wander[c] + drive * noise;
+                read[c] + wander[c]
+            })
+        };
+        let motion = recorded(
+            &moving,
+            &points,
+            &Sensor::default(),
+            [30.0, 50.0],
+            seed,
+            &flaw,
+        );
+        let load = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+        let sensor = load.sensor.as_ref().unwrap();
+        let drifts = sensor.biases[0].drift.is_some();
+        let found = [
+            sensor.turned.is_some(),
+            sensor.gravity.is_some(),
+            sensor.delay.is_some(),
+            sensor.position.is_some(),
+            drifts,
+        ];
+        invented += usize::from(found.contains(&true));
+        if found.contains(&true) {
+            println!("seed {seed}: {found:?} {:?}", load.warnings);
+        }
+    }
+    assert!(invented <= 1, "{invented} of 30");
+}

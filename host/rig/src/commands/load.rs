@@ -116,6 +116,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_folder(&args.out, &[], args.force)?;
     refuse_twice(&args.data, "give every recording once")?;
     refuse_both(&args.data, &args.without)?;
+    if args.poses && args.by != Measured::Sensor {
+        return Err(CommandError::Sentence(
+            "--poses is for the wrist sensor alone: joint torques at rest are hidden by friction. Leave it out, or use --by sensor."
+                .to_owned(),
+        ));
+    }
     let mut robot = args.robot.load(ui)?;
     sensor(args, &mut robot)?;
     let need = match args.by {

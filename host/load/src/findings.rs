@@ -1,0 +1,319 @@
+//! What the readings of the wrist sensor tell beside the load, and its sentences.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Vector3};
+use rig_data::WRENCH_COLUMNS;
+use rig_data::prepare::PreprocessingPlan;
+use rig_model::robot::{Reads, Robot, WristSensor};
+use rig_output::format_significant;
+
+use crate::error::LoadError;
+use crate::estimate::Estimate;
+use crate::mounting::Channels;
+use crate::system::{Fit, Nuisance, Sensed};
+
+/// Angle below which the axes of the sensor are those described, rad: rounding.
+const LEAST_TURN: f64 = 1e-6;
+/// Distance of the centre of mass from the sensor that no load has, m.
+const FARTHEST: f64 = 3.0;
+
+/// Readings of one recording beside the load's.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Bias {
+    /// Name of the recording.
+    pub recording: String,
+    /// Bias of fx fy fz (N) mx my mz (N·m), as read.
+    pub bias: [f64; 6],
+    /// Change from the begin to the end of the recording, if the data show one.
+    pub drift: Option<[f64; 6]>,
+    /// Time of a jump, s after the begin, and the bias after it.
+    pub jump: Option<(f64, [f64; 6])>,
+}
+
+/// Readings of a recording over time, thinned for a figure, and what the fit gives for them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// Name of the recording.
+    pub recording: String,
+    /// s
+    pub time: Vec<f64>,
+    /// fx fy fz (N) mx my mz (N·m), in the band of the fit.
+    pub read: [Vec<f64>; 6],
+    /// The same by the fit.
+    pub predicted: [Vec<f64>; 6],
+}
+
+/// What the sensor's readings tell beside the load.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct SensorFindings {
+    /// Which of the two opposite wrenches is read.
+    pub reads: Reads,
+    /// Roll, pitch and yaw of the sensor in the flange frame, rad: estimated, or as described.
+    pub rotation: [f64; 3],
+    /// Angle between described and estimated axes, rad; `None` if the data show no difference.
+    pub turned: Option<f64>,
+    /// Gravity in the base frame, m/s², if the data show another direction than the described one.
+    pub gravity: Option<[f64; 3]>,
+    /// Delay of the readings against the positions, s, if the data show one.
+    pub delay: Option<f64>,
+    /// Origin of the sensor in the flange frame, m, if the data show another than the described one.
+    pub position: Option<[f64; 3]>,
+    /// RMS residual of the forces, N, and of the moments, N·m.
+    pub residual: [f64; 2],
+    /// Residual of forces and of moments as a share of what they read beside bias and drift.
+    pub share: [f64; 2],
+    /// Bias by recording.
+    pub biases: Vec<Bias>,
+    /// Change of the bias per °C, if the data show one.
+    pub warming: Option<[f64; 6]>,
+    /// Readings over time.
+    #[serde(skip)]
+    pub traces: Vec<Trace>,
+    /// Rows or poses.
+    pub rows: u64,
+    /// Rows left out because a channel was cut.
+    pub saturated: u64,
+    /// Preparation of the recordings; `None` for poses.
+    pub prepared: Option<PreprocessingPlan>,
+}
+
+/// A fit, with what is needed to tell it.
+pub(crate) struct Told<'a> {
+    pub sensed: &'a Sensed<'a>,
+    pub fit: &'a Fit,
+    pub robot: &'a Robot,
+    pub described: &'a Matrix3<f64>,
+    pub sensor: &'a WristSensor,
+    /// Exchange of channels that was put right.
+    pub channels: Channels,
+    /// Pairs of a property that was found, and another that explains the readings as well.
+    pub alternatives: Vec<[Nuisance; 2]>,
+}
+
+impl Told<'_> {
+    /// Returns the estimated rotation of the sensor in the frame of the last joint, and the sign of its readings.
+    fn rotation(&self) -> (Matrix3<f64>, Reads) {
+        let force = self.fit.mounting.force * self.channels.force.transpose();
+        match force.determinant() > 0.0 {
+            true => (force, Reads::Robot),
+            false => (-force, Reads::Load),
+        }
+    }
+
+    /// Returns what is told; adds sentences to `warnings`.
+    pub(crate) fn findings(
+        &self,
+        prepared: Option<PreprocessingPlan>,
+        warnings: &mut Vec<String>,
+    ) -> SensorFindings {
+        let (rotation, reads) = self.rotation();
+        let against = Rotation3::from_matrix_unchecked(self.described.transpose() * rotation);
+        let angle = against.angle();
+        let flange = self.robot.last_link.rotation.to_rotation_matrix().inverse();
+        let own = flange * Rotation3::from_matrix_unchecked(rotation);
+        let (roll, pitch, yaw) = own.euler_angles();
+        let is_turned = angle > LEAST_TURN;
+        if is_turned {
+            let axis = against
+                .axis()
+                .map_or(Vector3::z(), |axis| axis.into_inner());
+            warnings.push(self.turned(angle, &axis, [roll, pitch, yaw]));
+        }
+        let gravity = self.gravity(warnings);
+        let delay = self.delay(warnings);
+        let position = self.position(warnings);
+        for [found, other] in &self.alternatives {
+            warnings.push(format!(
+                "{} explains the readings as well as {}: poses in more directions, or a livelier motion, tell them apart.",
+                capital(words(*other)),
+                words(*found)
+            ));
+        }
+        if self.sensor.reads.is_none() {
+            let [whose, key] = match reads {
+                Reads::Load => ["load on the robot", "load"],
+                Reads::Robot => ["robot on the load", "robot"],
+            };
+            warnings.push(format!(
+                "The readings are the wrench of the {whose}, because the mass must be positive; write reads = \"{key}\" into [wrist_sensor] to have this checked."
+            ));
+        }
+        let biases = self.biases();
+        for bias in &biases {
+            warnings.extend(jump_words(bias));
+        }
+        SensorFindings {
+            reads,
+            rotation: match is_turned {
+                true => [roll, pitch, yaw],
+                false => self.sensor.rotation,
+            },
+            turned: is_turned.then_some(angle),
+            gravity,
+            delay,
+            position,
+            residual: self.fit.noise,
+            share: self.sensed.share(self.fit),
+            biases,
+            warming: self.sensed.warming(self.fit),
+            traces: self.traces(),
+            rows: self.sensed.used_rows(&self.fit.unknowns),
+            saturated: self.sensed.recordings.iter().map(|r| r.saturated).sum(),
+            prepared,
+        }
+    }
+
+    fn turned(&self, angle: f64, axis: &Vector3<f64>, [roll, pitch, yaw]: [f64; 3]) -> String {
+        format!(
+            "The axes of the sensor are turned by {} degrees about [{:.2}, {:.2}, {:.2}] against the description; the load was identified with the estimated axes. If the sensor is turned, write rotation = [{:.4}, {:.4}, {:.4}] into [wrist_sensor]. A cable that pulls can look alike.",
+            format_significant(angle.to_degrees(), 3),
+            axis.x,
+            axis.y,
+            axis.z,
+            roll,
+            pitch,
+            yaw
+        )
+    }
+
+    /// Returns the direction of gravity if it is not the described one.
+    fn gravity(&self, warnings: &mut Vec<String>) -> Option<[f64; 3]> {
+        let turn = self.fit.mounting.gravity;
+        if !self.fit.unknowns.has(Nuisance::Lean) {
+            return None;
+        }
+        let gravity = turn * self.sensed.gravity;
+        warnings.push(format!(
+            "The base leans by {} degrees against the description; the load was identified with the estimated gravity. Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into the description.",
+            format_significant(turn.angle().to_degrees(), 3),
+            gravity.x,
+            gravity.y,
+            gravity.z
+        ));
+        Some(gravity.into())
+    }
+
+    /// Returns the delay of the sensor against the encoders, s.
+    fn delay(&self, warnings: &mut Vec<String>) -> Option<f64> {
+        let delay = self.sensed.delay(self.fit)?;
+        let sense = if delay > 0.0 { "late" } else { "early" };
+        warnings.push(format!(
+            "The readings are {} ms {sense} against the positions; the load was identified with this delay. Record both by one clock.",
+            format_significant(1e3 * delay.abs(), 3)
+        ));
+        Some(delay)
+    }
+
+    /// Returns the estimated origin of the sensor in the flange frame if it is not the described one, m.
+    fn position(&self, warnings: &mut Vec<String>) -> Option<[f64; 3]> {
+        let error = self.sensed.origin(self.fit)?;
+        let flange = self.robot.last_link.rotation.inverse();
+        let origin = Vector3::from(self.sensor.position) + flange * error;
+        warnings.push(format!(
+            "The sensor's origin lies {} mm from the described one; the load was identified with the estimated origin. Measure it, or write position = [{:.4}, {:.4}, {:.4}] into [wrist_sensor].",
+            format_significant(1e3 * error.norm(), 3),
+            origin.x,
+            origin.y,
+            origin.z
+        ));
+        Some(origin.into())
+    }
+
+    fn traces(&self) -> Vec<Trace> {
+        let recordings = self.sensed.recordings.iter().enumerate();
+        recordings
+            .map(|(r, recorded)| {
+                let rows = &recorded.sample;
+                let predicted: Vec<[f64; 6]> = (rows.iter())
+                    .map(|row| self.sensed.predicted(self.fit, r, row))
+                    .collect();
+                Trace {
+                    recording: recorded.label.clone(),
+                    time: rows.iter().map(|row| row.time).collect(),
+                    read: std::array::from_fn(|c| rows.iter().map(|row| row.readings[c]).collect()),
+                    predicted: std::array::from_fn(|c| predicted.iter().map(|p| p[c]).collect()),
+                }
+            })
+            .collect()
+    }
+
+    fn biases(&self) -> Vec<Bias> {
+        let jumps = &self.fit.unknowns.jumps;
+        let recordings = self.sensed.recordings.iter().enumerate();
+        recordings
+            .map(|(r, recorded)| Bias {
+                recording: recorded.label.clone(),
+                bias: self.sensed.bias(self.fit, r),
+                drift: self.sensed.drift(self.fit, r),
+                jump: jumps.iter().position(|jump| jump.recording == r).map(|at| {
+                    let share = jumps[at].segment as f64 / recorded.segments.len() as f64;
+                    (
+                        share * recorded.length,
+                        self.sensed.bias_after(self.fit, at),
+                    )
+                }),
+            })
+            .collect()
+    }
+
+    /// Returns warnings about values that no load has.
+    ///
+    /// # Errors
+    /// [`LoadError::Fault`] with such a value, unless the user goes on.
+    pub(crate) fn implausible(
+        &self,
+        found: &Estimate,
+        sensor: &Isometry3<f64>,
+        even_if_wrong: bool,
+    ) -> Result<Vec<String>, LoadError> {
+        let mass = found.values[0];
+        let moment = Vector3::new(found.values[1], found.values[2], found.values[3]);
+        let in_flange = self.robot.last_link.inverse() * sensor;
+        let lever = (moment / mass - in_flange.translation.vector).norm();
+        if lever <= FARTHEST {
+            return Ok(Vec::new());
+        }
+        let text = format!(
+            "The centre of mass would be {} m from the sensor: the moments look like another unit (N·mm are 1000 times N·m). They must be in N·m, the forces in N.",
+            format_significant(lever, 3)
+        );
+        match even_if_wrong {
+            true => Ok(vec![text]),
+            false => Err(LoadError::Fault(text)),
+        }
+    }
+}
+
+/// Names a property in a sentence.
+fn words(nuisance: Nuisance) -> &'static str {
+    match nuisance {
+        Nuisance::Rotation => "a turned sensor",
+        Nuisance::Lean => "a base that leans",
+        Nuisance::Delay => "a delay of the sensor",
+        Nuisance::Origin => "another position of the sensor",
+        Nuisance::Drift => "a drift of the bias",
+        Nuisance::Warming => "a bias that follows the temperature",
+    }
+}
+
+fn capital(words: &str) -> String {
+    let mut rest = words.chars();
+    rest.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(rest).collect()
+    })
+}
+
+/// Says that a bias jumps.
+fn jump_words(bias: &Bias) -> Option<String> {
+    let (time, after) = bias.jump?;
+    let change: Vec<String> = (WRENCH_COLUMNS.iter().zip(after).zip(bias.bias))
+        .map(|((name, after), before)| {
+            let unit = if name.starts_with('f') { "N" } else { "N·m" };
+            format!("{name} {} {unit}", format_significant(after - before, 2))
+        })
+        .collect();
+    Some(format!(
+        "{}: the bias of the sensor jumps near {time:.1} s ({}). It was estimated before and after, and a tenth of the recording around it was left out.",
+        bias.recording,
+        change.join(", ")
+    ))
+}

@@ -1,0 +1,190 @@
+//! Which properties of sensor, recorder and base the readings show beside the load.
+//!
+//! Properties are taken in one by one, the one that explains most first; one that a later one makes needless is dropped.
+//! A turned sensor, a base that leans, a delay and a wrong position of the sensor bend the readings in similar ways, so
+//! none of them is tested before the others have been compared with it.
+
+use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
+use rig_identify::{LeaveOut, Refit, TriangularFactor};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::convention::{DECISIVE, settled};
+use crate::estimate::solved;
+use crate::jump::jump;
+use crate::mounting::Mounting;
+use crate::system::{Fit, Nuisance, Sensed};
+
+/// Probability by chance below which a further unknown is taken in.
+const TAKEN_IN: f64 = 1e-3;
+
+/// Returns true if the larger fit leaves less than chance would have it (F test, both in the noise of the larger).
+fn is_better(larger: &Fit, smaller: &Fit) -> bool {
+    let further = larger.values.len() as f64 - smaller.values.len() as f64;
+    let freedom = larger.freedom();
+    if further <= 0.0 || freedom <= 0.0 {
+        return false;
+    }
+    let own = larger.squares_over(larger);
+    // Fits of unlike many equations are compared by equation.
+    let before = smaller.squares_over(larger) * larger.equations as f64 / smaller.equations as f64;
+    let ratio = (before - own) / further / (own / freedom);
+    let chance = FisherSnedecor::new(further, freedom).map(|f| f.sf(ratio.max(0.0)));
+    chance.is_ok_and(|p| p < TAKEN_IN)
+}
+
+/// Returns the values of a nuisance of a fit, rotations counted from the mounting of a fit without it.
+fn values(sensed: &Sensed, fit: &Fit, without: &Fit, nuisance: Nuisance) -> Option<DVector<f64>> {
+    let place = sensed.place(&fit.unknowns, nuisance)?;
+    let mut values = DVector::from_column_slice(fit.values.get(place)?);
+    match nuisance {
+        Nuisance::Rotation => {
+            let turn = fit.mounting.force * without.mounting.force.transpose();
+            values += Rotation3::from_matrix(&turn).scaled_axis();
+        }
+        Nuisance::Lean => {
+            let turn = fit.mounting.gravity * without.mounting.gravity.inverse();
+            for (value, axis) in values.iter_mut().zip(sensed.level_axes(fit)) {
+                *value += axis.dot(&turn.scaled_axis());
+            }
+        }
+        _ => {}
+    }
+    Some(values)
+}
+
+/// Returns true if the data show a nuisance of `fit`: it leaves less than `without` has it by chance, also if the noise is
+/// correlated in time. For a motion its values are compared with their spread over refits without one segment
+/// (Hotelling's T²); poses are independent of each other, so the F test holds for them.
+fn shows(sensed: &Sensed, fit: &Fit, without: &Fit, nuisance: Nuisance) -> bool {
+    if !is_better(fit, without) {
+        return false;
+    }
+    if sensed.recordings.iter().all(|r| r.poses) {
+        return true;
+    }
+    let (Some(values), Some(place)) = (
+        values(sensed, fit, without, nuisance),
+        sensed.place(&fit.unknowns, nuisance),
+    ) else {
+        return false;
+    };
+    let segments = sensed.factors(fit);
+    let count = values.len() as f64;
+    let freedom = segments.len() as f64 - count;
+    if freedom < 1.0 {
+        return false;
+    }
+    let left_out = LeaveOut::of(&segments);
+    let of = |factor: &TriangularFactor| {
+        let (r, z) = factor.system();
+        solved(&r, &z).as_slice()[place.clone()].to_vec()
+    };
+    let spread = Refit {
+        whole: of(&left_out.whole),
+        without: left_out.without.iter().map(of).collect(),
+    };
+    let Some(squares) = squares_over(&values, spread.covariance()) else {
+        return false;
+    };
+    let ratio = squares * freedom / (count * (freedom + count - 1.0));
+    FisherSnedecor::new(count, freedom).is_ok_and(|d| d.sf(ratio) < TAKEN_IN)
+}
+
+/// Returns vᵀ·C⁻¹·v; `None` if C is singular.
+fn squares_over(values: &DVector<f64>, mut covariance: DMatrix<f64>) -> Option<f64> {
+    let sizes = covariance.diagonal().map(|v| v.max(0.0).sqrt());
+    let scaled = values.component_div(&sizes);
+    for r in 0..sizes.len() {
+        for c in 0..sizes.len() {
+            covariance[(r, c)] /= sizes[r] * sizes[c];
+        }
+    }
+    let solved = covariance.cholesky()?.solve(&scaled);
+    Some(scaled.dot(&solved))
+}
+
+/// Returns the misfit by equation, each unknown counted as the information criterion of Schwarz (1978) does. A jump leaves
+/// out segments, so fits of unlike many equations are compared.
+fn score(fit: &Fit) -> f64 {
+    let penalty = fit.values.len() as f64 * (fit.equations as f64).ln();
+    fit.misfit_per_equation() + penalty / fit.equations as f64
+}
+
+/// What the readings show beside the load.
+pub(crate) struct Selected {
+    /// The fit.
+    pub fit: Fit,
+    /// Pairs of a property that was taken in, and another that explains the readings as well.
+    pub alternatives: Vec<[Nuisance; 2]>,
+}
+
+/// Takes in the properties and jumps that the data show. `start` is the mounting as described.
+pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected {
+    let mut fit = fit;
+    let mut taken: Vec<Nuisance> = fit.unknowns.nuisances.clone();
+    let mut alternatives = Vec::new();
+    loop {
+        let mut larger: Vec<(Option<Nuisance>, Fit)> = Vec::new();
+        for nuisance in Nuisance::ALL {
+            if taken.contains(&nuisance) || !can_show(sensed, nuisance) {
+                continue;
+            }
+            let own = settled(sensed, &fit.mounting, &fit.unknowns.with(nuisance));
+            if shows(sensed, &own, &fit, nuisance) {
+                larger.push((Some(nuisance), own));
+            }
+        }
+        if let Some(found) = jump(sensed, &fit) {
+            let mut unknowns = fit.unknowns.clone();
+            unknowns.jumps.push(found);
+            let own = settled(sensed, &fit.mounting, &unknowns);
+            if is_better(&own, &fit) {
+                larger.push((None, own));
+            }
+        }
+        larger.sort_by(|a, b| score(&a.1).total_cmp(&score(&b.1)));
+        let mut larger = larger.into_iter();
+        let Some((nuisance, best)) = larger.next() else {
+            return Selected { fit, alternatives };
+        };
+        if let Some(nuisance) = nuisance {
+            taken.push(nuisance);
+            let as_good = larger.filter(|(_, own)| own.misfit() < best.misfit() + DECISIVE);
+            alternatives.extend(as_good.filter_map(|(other, _)| Some([nuisance, other?])));
+        }
+        fit = without_needless(sensed, best, start, nuisance);
+    }
+}
+
+/// Drops the nuisances beside `newest` that the data do not show any more.
+fn without_needless(sensed: &Sensed, fit: Fit, start: &Mounting, newest: Option<Nuisance>) -> Fit {
+    let mut fit = fit;
+    for nuisance in fit.unknowns.nuisances.clone() {
+        if Some(nuisance) == newest {
+            continue;
+        }
+        let mut mounting = fit.mounting.clone();
+        match nuisance {
+            Nuisance::Rotation => {
+                (mounting.force, mounting.moment) = (start.force, start.moment);
+            }
+            Nuisance::Lean => mounting.gravity = start.gravity,
+            _ => {}
+        }
+        let fewer = settled(sensed, &mounting, &fit.unknowns.without(nuisance));
+        if !shows(sensed, &fit, &fewer, nuisance) {
+            fit = fewer;
+        }
+    }
+    fit
+}
+
+/// Returns true if such recordings can show a nuisance at all.
+fn can_show(sensed: &Sensed, nuisance: Nuisance) -> bool {
+    match nuisance {
+        Nuisance::Warming => sensed.recordings.iter().any(|r| r.warms),
+        Nuisance::Delay | Nuisance::Origin => sensed.recordings.iter().any(|r| !r.poses),
+        Nuisance::Lean => sensed.gravity != Vector3::zeros(),
+        Nuisance::Rotation | Nuisance::Drift => true,
+    }
+}
