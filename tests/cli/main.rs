@@ -12,4 +12,5 @@ mod memory;
 mod overwrite;
 mod robots;
 mod run;
+mod simulate;
 mod workflow;

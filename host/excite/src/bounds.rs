@@ -1,10 +1,12 @@
 //! Limits of the joints within which a motion is designed.
 
 use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::DriveKind;
 
 use crate::ExciteError;
 use crate::error::wrong;
-use rig_model::robot::{Robot, is_safe_magnitude};
+use crate::motor_limits::MotorBounds;
+use rig_model::robot::{Joint, JointLimits, Robot, is_safe_magnitude};
 use rig_model::simulate::Model;
 
 /// Highest velocity for which a motion is sized, rad/s or m/s: above that of any robot joint.
@@ -93,11 +95,16 @@ pub(super) fn bounds_of(
     let mut list = Vec::new();
     let mut boundless = Vec::new();
     let mut limitless = Vec::new();
+    let simple = robot.drive_kinds().iter().all(|k| *k == DriveKind::Simple);
     for (j, joint) in robot.joints.iter().enumerate() {
-        let Some(limits) = joint.limits.as_ref() else {
+        let Some(mut limits) = joint.limits.clone() else {
             limitless.push(joint.name.clone());
             continue;
         };
+        // Motors that move several joints have their limits in the search and in its proof.
+        if simple {
+            notes.extend(narrowed(joint, &mut limits)?);
+        }
         let [mut low, mut high] = limits.for_motions();
         if !low.is_finite() || !high.is_finite() {
             (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
@@ -110,10 +117,7 @@ pub(super) fn bounds_of(
             let at = start.and_then(|s| s.get(j).copied());
             [low, high] = room.positions(stated, at);
             if room.margin > 0.0 && (low == stated[0] || high == stated[1]) {
-                notes.push(format!(
-                    "Joint \"{}\" starts within the margin of its position limit; on that side the motion keeps the limit itself.",
-                    joint.name
-                ));
+                notes.push(starts_in_margin(&joint.name));
             }
         }
         // A value beyond any drive often means "no limit"; a row weighted by it would be lost.
@@ -136,11 +140,7 @@ pub(super) fn bounds_of(
             });
         }
         if velocity < stated {
-            notes.push(format!(
-                "Joint \"{}\" cannot reach its velocity limit within its range at its acceleration limit; the motion is \
-                 sized by the {velocity:.3} that it can reach (SI units).",
-                joint.name
-            ));
+            notes.push(sized_by(&joint.name, velocity));
         }
         list.push(Bounds {
             low,
@@ -162,6 +162,56 @@ pub(super) fn bounds_of(
     }
     drive(robot, &mut list)?;
     Ok((list, notes))
+}
+
+fn starts_in_margin(joint: &str) -> String {
+    format!(
+        "Joint \"{joint}\" starts within the margin of its position limit; on that side the motion keeps the limit itself."
+    )
+}
+
+fn sized_by(joint: &str, velocity: f64) -> String {
+    format!(
+        "Joint \"{joint}\" cannot reach its velocity limit within its range at its acceleration limit; the motion is \
+         sized by the {velocity:.3} that it can reach (SI units)."
+    )
+}
+
+/// Narrows the limits of a joint to those of its own motor at a constant ratio, and returns a note if they were wider.
+fn narrowed(joint: &Joint, limits: &mut JointLimits) -> Result<Option<String>, ExciteError> {
+    let Some(drive) = joint.drive.as_ref().filter(|d| d.limits.is_some()) else {
+        return Ok(None);
+    };
+    let motor = MotorBounds::of(joint, 1.0);
+    let ratio = drive.gear_ratio;
+    let before = limits.clone();
+    let [low, high] = limits.for_motions();
+    let [one, other] = motor.range.map(|angle| (angle - drive.zero) / ratio);
+    let range = [low.max(one.min(other)), high.min(one.max(other))];
+    if !(range[0] < range[1]) {
+        return Err(ExciteError::Infeasible {
+            joint: joint.name.clone(),
+            limit: "motor angle",
+        });
+    }
+    if range != [low, high] {
+        limits.soft_position = Some(range);
+    }
+    limits.velocity = limits.velocity.min(motor.velocity / ratio.abs());
+    let torque = motor.torque * ratio.abs();
+    if torque.is_finite() {
+        limits.torque = Some(limits.torque.map_or(torque, |own| own.min(torque)));
+    }
+    Ok((before != *limits).then(|| {
+        format!(
+            "The motor of joint \"{}\" allows less than the joint's own limits ([joint.drive.limits]); the motion keeps position {:.4} to {:.4}, velocity {:.4}{} (SI units, at the joint).",
+            joint.name,
+            range[0],
+            range[1],
+            limits.velocity,
+            limits.torque.map_or(String::new(), |t| format!(", torque {t:.4}"))
+        )
+    }))
 }
 
 /// Sets the values that torque limits allow mid-range, if links are described and acceleration limits are not.

@@ -43,10 +43,23 @@ pub struct Reach {
     pub torque: Option<f64>,
 }
 
+/// Bounds of a motor's motion, on the motor side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorReach {
+    /// Lowest and highest angle, rad.
+    pub position: [f64; 2],
+    /// Highest speed, rad/s.
+    pub velocity: f64,
+    /// Highest torque by the prior parameters, N·m; none if they are unknown.
+    pub torque: Option<f64>,
+}
+
 /// Bounds of a motion.
 pub(super) struct Reached {
     /// Per joint.
     pub joints: Vec<Reach>,
+    /// Per motor; empty if none of coupled drives has limits.
+    pub motors: Vec<MotorReach>,
     /// Per crank of the frame: lowest and highest sum of its joints' angles, rad.
     pub combined: Vec<[f64; 2]>,
     /// Per plane of the frame: smallest distance along its normal, m.
@@ -149,6 +162,15 @@ impl<'a> Proof<'a> {
                 torque: rows.as_ref().map(|_| 0.0),
             })
             .collect();
+        let limited = frame.drives.as_ref().map_or(0, |d| d.limits.len());
+        let motors = vec![
+            MotorReach {
+                position: [f64::INFINITY, f64::NEG_INFINITY],
+                velocity: 0.0,
+                torque: rows.as_ref().map(|_| 0.0),
+            };
+            limited
+        ];
         Self {
             frame,
             chain,
@@ -160,6 +182,7 @@ impl<'a> Proof<'a> {
             rows,
             reached: Reached {
                 joints,
+                motors,
                 combined: vec![[f64::INFINITY, f64::NEG_INFINITY]; frame.combined.len()],
                 heights: vec![f64::INFINITY; frame.planes.len()],
             },
@@ -181,6 +204,7 @@ impl<'a> Proof<'a> {
             self.enclose(segment, k, &slack, &mut before);
             self.cover_cranks();
             self.cover_torques()?;
+            self.cover_motors()?;
             if !self.frame.planes.is_empty() {
                 let heights_now = self.heights_at(&before)?;
                 self.cover_planes(segment.h, &heights_before, &heights_now);
@@ -288,6 +312,33 @@ impl<'a> Proof<'a> {
         }
         for (reach, t) in self.reached.joints.iter_mut().zip(&self.tau) {
             reach.torque = reach.torque.map(|most| most.max(t.magnitude()));
+        }
+        Ok(())
+    }
+
+    /// Extends the bounds of limited motors by the cell. The torques of the joints are those of the cell.
+    fn cover_motors(&mut self) -> Result<(), ExciteError> {
+        let Some(drives) = self.frame.drives.as_ref().filter(|d| !d.limits.is_empty()) else {
+            return Ok(());
+        };
+        let wrong = |e| ExciteError::from(SimulateError::from(e));
+        let [q, qd] = [0, 1].map(|d| self.state.iter().map(|s| s[d]).collect::<Vec<_>>());
+        let mut values = vec![Interval::default(); q.len()];
+        let t = &drives.enclosing;
+        t.motor_position(&q, &mut values).map_err(wrong)?;
+        for (reach, angle) in self.reached.motors.iter_mut().zip(&values) {
+            reach.position[0] = reach.position[0].min(angle.low);
+            reach.position[1] = reach.position[1].max(angle.high);
+        }
+        t.motor_velocity(&q, &qd, &mut values).map_err(wrong)?;
+        for (reach, speed) in self.reached.motors.iter_mut().zip(&values) {
+            reach.velocity = reach.velocity.max(speed.magnitude());
+        }
+        if self.rows.is_some() {
+            let torques = drives.enclosed_torques(&q, &self.tau)?;
+            for (reach, torque) in self.reached.motors.iter_mut().zip(&torques) {
+                reach.torque = reach.torque.map(|most| most.max(torque.magnitude()));
+            }
         }
         Ok(())
     }

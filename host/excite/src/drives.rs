@@ -8,6 +8,7 @@ use crate::ExciteError;
 use crate::bounds::Bounds;
 use crate::interval::Interval;
 use crate::lanes::L;
+use crate::motor_limits::MotorBounds;
 use crate::sign::SIGN_WIDTH;
 use rig_model::robot::Robot;
 use rig_model::simulate::{Motors, SimulateError};
@@ -19,13 +20,15 @@ type D = Dual<L, AT_ONCE>;
 /// Drives that move several joints or have a varying ratio, for every scalar type of a design.
 pub(super) struct Drives {
     pub plain: Transmission<f64>,
-    lanes: Transmission<L>,
+    pub lanes: Transmission<L>,
     dual: Transmission<D>,
     pub enclosing: Transmission<Interval>,
     /// Prior parameters, 3 per motor.
     pub parameters: Vec<f64>,
     /// Per motor, the speed within which the optimiser smooths the sign of its velocity.
     widths: Vec<f64>,
+    /// Limits of the motors; empty if there are none.
+    pub limits: Vec<MotorBounds>,
 }
 
 fn wrong(e: TransmissionError) -> ExciteError {
@@ -33,11 +36,13 @@ fn wrong(e: TransmissionError) -> ExciteError {
 }
 
 impl Drives {
-    /// Returns the drives of a robot; none if every drive moves its own joint at a constant ratio.
+    /// Returns the drives of a robot, with a share of their motors' speed limits; none if every drive moves its own
+    /// joint at a constant ratio.
     pub(super) fn of(
         robot: &Robot,
         motors: Option<Motors>,
         bounds: &[Bounds],
+        speed: f64,
     ) -> Result<Option<Self>, ExciteError> {
         let Some(motors) = motors else {
             return Ok(None);
@@ -60,6 +65,7 @@ impl Drives {
                 // A simple drive has no direction and no columns.
                 .map(|row| (SIGN_WIDTH * fastest(row)).max(f64::MIN_POSITIVE.sqrt()))
                 .collect(),
+            limits: MotorBounds::all(robot, speed),
             plain: motors.transmission,
             lanes: robot.transmission_of().map_err(wrong)?,
             dual: robot.transmission_of().map_err(wrong)?,
@@ -103,6 +109,74 @@ impl Drives {
             }
         }
         Ok(())
+    }
+}
+
+impl Drives {
+    /// Returns an enclosure of the motors' torques x, Jᵀ·x = τ, for positions and joint torques within intervals; all
+    /// numbers if the positions vary too much.
+    ///
+    /// With C = J⁻ᵀ at the middle position and E = 1 − C·Jᵀ, x = C·τ + E·x, so that the largest |x| is at most that of
+    /// C·τ over 1 − ‖E‖ (Neumaier 1990, section 4.1). Elimination over intervals would need a pivot that is the same
+    /// at all positions.
+    pub(super) fn enclosed_torques(
+        &self,
+        q: &[Interval],
+        tau: &[Interval],
+    ) -> Result<Vec<Interval>, ExciteError> {
+        let n = q.len();
+        let middle: Vec<f64> = q.iter().map(|x| 0.5 * (x.low + x.high)).collect();
+        let mut inverse = vec![0.0; n * n];
+        let (mut unit, mut column) = (vec![0.0; n], vec![0.0; n]);
+        for j in 0..n {
+            unit.fill(0.0);
+            unit[j] = 1.0;
+            let solved = self.plain.motor_torque(&middle, &unit, &mut column);
+            solved.map_err(wrong)?;
+            for i in 0..n {
+                inverse[i * n + j] = column[i];
+            }
+        }
+        let mut jacobian = vec![Interval::default(); n * n];
+        self.enclosing.jacobian(q, &mut jacobian).map_err(wrong)?;
+        let c = |i: usize, j: usize| Interval::from_f64(inverse[i * n + j]);
+        let mut rest = vec![Interval::default(); n * n];
+        let mut norm = 0.0_f64;
+        for i in 0..n {
+            for j in 0..n {
+                let mut entry = Interval::from_f64(f64::from(u8::from(i == j)));
+                for k in 0..n {
+                    // (Jᵀ)_kj = J_jk.
+                    entry -= c(i, k) * jacobian[j * n + k];
+                }
+                rest[i * n + j] = entry;
+            }
+            let row = &rest[i * n..(i + 1) * n];
+            norm = norm.max(row.iter().map(|e| e.magnitude()).sum());
+        }
+        // NaN fails this comparison too.
+        if !(norm < 1.0) {
+            let all = Interval::hull(f64::NEG_INFINITY, f64::INFINITY);
+            return Ok(vec![all; n]);
+        }
+        let first: Vec<Interval> = (0..n)
+            .map(|i| {
+                let mut sum = Interval::default();
+                for (j, torque) in tau.iter().enumerate() {
+                    sum += c(i, j) * *torque;
+                }
+                sum
+            })
+            .collect();
+        let largest = first.iter().map(|x| x.magnitude()).fold(0.0, f64::max);
+        let bound = largest / (1.0 - norm);
+        Ok((0..n)
+            .map(|i| {
+                let row = &rest[i * n..(i + 1) * n];
+                let slack: f64 = row.iter().map(|e| e.magnitude()).sum();
+                first[i].widened(slack * bound)
+            })
+            .collect())
     }
 }
 

@@ -49,7 +49,7 @@ pub enum ExciteError {
     Infeasible {
         /// Its name.
         joint: String,
-        /// position, velocity, acceleration, torque, crank or workspace
+        /// position, velocity, acceleration, torque, crank, motor angle, motor speed, motor torque or workspace
         limit: &'static str,
     },
     /// The limits leave no room for a staged motion.

@@ -7,6 +7,7 @@ use super::certificate::{Reach, Reached, reach};
 use super::frame::Frame;
 use super::interval::Interval;
 use super::schedule::JointMotion;
+use rig_model::simulate::SimulateError;
 
 /// Relative margin to every limit, so that a trajectory rounded to single precision still fits.
 const ROUNDING: f64 = 1e-6;
@@ -74,6 +75,7 @@ fn worst(
             ),
         ]);
     }
+    rooms.extend(of_motors(frame, reached, &base)?);
     let mut unused = vec![[0.0; 3]; base.len()];
     for (plane, lowest) in frame.planes.iter().zip(&reached.heights) {
         let at = point_position(&frame.plain, &base, plane.link, plane.point, &mut unused)?;
@@ -89,6 +91,37 @@ fn worst(
         // NaN counts as outside.
         .filter(|(factor, _)| !(*factor >= 1.0))
         .min_by(|(a, _), (b, _)| a.total_cmp(b)))
+}
+
+/// Returns the rooms of the motors' limits about the start.
+fn of_motors(
+    frame: &Frame,
+    reached: &Reached,
+    start: &[f64],
+) -> Result<Vec<(f64, Blame)>, ExciteError> {
+    let Some(drives) = &frame.drives else {
+        return Ok(Vec::new());
+    };
+    let mut angles = vec![0.0; start.len()];
+    drives
+        .plain
+        .motor_position(start, &mut angles)
+        .map_err(SimulateError::from)?;
+    let mut rooms = Vec::new();
+    for (j, (reach, limit)) in reached.motors.iter().zip(&drives.limits).enumerate() {
+        let [low, high] = limit.range;
+        let at = angles[j];
+        // An unlimited torque may be unbounded.
+        if let Some(torque) = reach.torque.filter(|_| limit.torque.is_finite()) {
+            rooms.push((share(torque, limit.torque), (j, "motor torque")));
+        }
+        rooms.extend([
+            (share(reach.position[1] - at, high - at), (j, "motor angle")),
+            (share(at - reach.position[0], at - low), (j, "motor angle")),
+            (share(reach.velocity, limit.velocity), (j, "motor speed")),
+        ]);
+    }
+    Ok(rooms)
 }
 
 /// Scales a motion down about its start until the proof succeeds; returns joint and limit at fault if it fails.

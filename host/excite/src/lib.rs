@@ -35,6 +35,7 @@ mod bounds;
 mod certificate;
 mod criterion;
 mod drives;
+mod effort;
 
 mod error;
 mod fit;
@@ -42,6 +43,7 @@ mod frame;
 mod identified;
 mod interval;
 mod lanes;
+mod motor_limits;
 mod optimise;
 mod optimum;
 mod options;
@@ -65,10 +67,11 @@ mod wrist_readings;
 #[cfg(test)]
 mod tests;
 
-pub use certificate::Reach;
+pub use certificate::{MotorReach, Reach};
 pub use criterion::{Criterion, Values};
+pub use effort::Effort;
 pub use error::ExciteError;
-pub use optimum::{Clearance, Design, design};
+pub use optimum::{Clearance, Design, design, design_measured};
 pub use options::{Options, Parameters, Scaling};
 pub use period::default_period;
 pub use poses::{PoseOptions, Poses, poses};

@@ -1,6 +1,7 @@
 //! The optimal motion of a robot.
 
-use crate::certificate::Reach;
+use crate::certificate::{MotorReach, Reach};
+use crate::effort::Effort;
 use crate::search::search;
 use crate::setup::frame_of;
 use crate::{DesignRecord, ExciteError, JointTrajectory, Options, TrajectoryFile, Values};
@@ -28,6 +29,8 @@ pub struct Design {
     pub base_parameters: Vec<String>,
     /// Upper bounds of each joint's motion.
     pub reach: Vec<Reach>,
+    /// Upper bounds of each motor's motion; empty if no motor of coupled drives has limits.
+    pub motors: Vec<MotorReach>,
     /// Lower bounds of the points' distances to the edges of their regions.
     pub clearances: Vec<Clearance>,
     /// Criterion of each start that was fully refined and is within the limits, in order of the starts.
@@ -51,9 +54,21 @@ pub fn design(
     options: &Options,
     progress: impl FnMut(u64, u64),
 ) -> Result<Design, ExciteError> {
+    design_measured(robot, options, progress).map(|(design, _)| design)
+}
+
+/// Same as [`design`], with the work of the search's threads and the time that it took. These differ from run to run.
+///
+/// # Errors
+/// Same as [`design`].
+pub fn design_measured(
+    robot: &Robot,
+    options: &Options,
+    progress: impl FnMut(u64, u64),
+) -> Result<(Design, Effort), ExciteError> {
     let (frame, names, notes) = frame_of(robot, options)?;
-    let (best, reached) = search(robot, &frame, options, progress)?;
-    Ok(Design {
+    let (best, reached, effort) = search(robot, &frame, options, progress)?;
+    let design = Design {
         file: TrajectoryFile {
             robot: robot.name.clone(),
             design: Some(DesignRecord {
@@ -87,7 +102,9 @@ pub fn design(
             })
             .collect(),
         reach: best.reached.joints,
+        motors: best.reached.motors,
         reached,
         notes,
-    })
+    };
+    Ok((design, effort))
 }

@@ -10,6 +10,7 @@ use rig_shared::multibody::Chain;
 use super::certificate::Reached;
 use super::criterion::{Smoothing, Values};
 use super::drives::into_cranks;
+use super::effort::{Effort, Meter};
 use super::fit::{Blame, fit_within};
 use super::frame::{Frame, values_of};
 use super::interval::Interval;
@@ -206,13 +207,13 @@ fn refine(
     Ok(best)
 }
 
-/// Returns the best motion and the criterion of each refined start.
+/// Returns the best motion, the criterion of each refined start, and the work that this took.
 pub(super) fn search(
     robot: &Robot,
     frame: &Frame,
     options: &Options,
     mut progress: impl FnMut(u64, u64),
-) -> Result<(Candidate, Vec<f64>), ExciteError> {
+) -> Result<(Candidate, Vec<f64>, Effort), ExciteError> {
     let enclosing =
         Chain::<Interval>::new(&robot.geometry(), robot.gravity).map_err(SimulateError::from)?;
     let starts = options.starts as usize;
@@ -226,10 +227,11 @@ pub(super) fn search(
     let fine = (FINE / COARSE) as u64;
     let total = (starts * FIRST.len()) as u64 + fine * (finalists * (LAST.len() + 1)) as u64;
     let mut done = 0;
+    let meter = Meter::new();
     let mut improved: Vec<(f64, usize, DVector<f64>)> = in_parallel(
         threads,
         starts,
-        |index, tick| improve(frame, options.seed, index, tick),
+        |index, tick| meter.measure(|| improve(frame, options.seed, index, tick)),
         || {
             done += 1;
             progress(done, total);
@@ -247,13 +249,14 @@ pub(super) fn search(
         finalists,
         |rank, tick| {
             let from = improved[rank].2.clone();
-            refine(frame, &enclosing, options.criterion, from, tick)
+            meter.measure(|| refine(frame, &enclosing, options.criterion, from, tick))
         },
         || {
             done += fine;
             progress(done, total);
         },
     );
+    let effort = meter.effort(threads.min(starts));
     let mut best: Option<Candidate> = None;
     let mut reached = Vec::new();
     let mut blame = (0, "position");
@@ -275,5 +278,5 @@ pub(super) fn search(
         joint: robot.joints[blame.0].name.clone(),
         limit: blame.1,
     })?;
-    Ok((best, reached))
+    Ok((best, reached, effort))
 }

@@ -231,9 +231,13 @@ pub(super) fn frame_of(
         check_start(robot, start, &bounds, &combined)?;
     }
     let mut model = Model::from_robot(robot)?;
-    let drives = Drives::of(robot, model.motors.take(), &bounds)?;
+    let drives = Drives::of(robot, model.motors.take(), &bounds, room.speed)?;
     let (parameters, on_torque) = torque_notes(robot, options, &bounds, prior(robot, &model));
     notes.extend(on_torque);
+    let motors = drives.as_ref().map_or(&[][..], |drives| &drives.limits);
+    if parameters.is_none() && motors.iter().any(|m| m.torque.is_finite()) {
+        notes.push("The torque limits of [joint.drive.limits] were not checked: not every joint has [joint.inertial], so the torques are not known beforehand.".to_owned());
+    }
     let mut frame = Frame {
         lanes: Chain::new(&robot.geometry(), robot.gravity).map_err(SimulateError::from)?,
         planes: planes_of(robot),

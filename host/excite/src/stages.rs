@@ -9,6 +9,7 @@ use rig_shared::trajectory::{
 
 use crate::bounds::{Bounds, Room, bounds_of, prior};
 use crate::drives::{Combined, into_cranks};
+use crate::motor_limits::exceeded;
 use crate::quintic_move::{micros, move_time};
 use crate::torque_share::torque_share;
 use crate::{ExciteError, JointTrajectory, TrajectoryFile};
@@ -473,8 +474,8 @@ impl Within<'_> {
                 why = error.to_string();
                 continue;
             }
+            let joints = joints_of(self.robot, self.moving, self.start, &trajectory);
             if known.is_ok() && limited {
-                let joints = joints_of(self.robot, self.moving, self.start, &trajectory);
                 let share = torque_share(&model, self.bounds, &joints)?;
                 if share.is_nan() || share > 1.0 {
                     why = format!(
@@ -483,6 +484,10 @@ impl Within<'_> {
                     );
                     continue;
                 }
+            }
+            if let Some(used) = exceeded(self.robot, &model, &joints, known.is_ok())? {
+                why = used.why(self.robot);
+                continue;
             }
             return Ok(trajectory);
         }

@@ -271,7 +271,7 @@ impl ArmScenario {
                 }
                 hidden.take(&q, &v, &mut applied)?;
                 hidden.before(&v);
-                stepper.step(&mut q, &mut v, &applied, dt)?;
+                stepper.step(&mut q, &mut v, &applied, &[], dt)?;
                 hidden.after(&v, dt);
                 if let Some(j) = (0..n).find(|j| !(v[*j].abs() < 1e3)) {
                     return Err(SimulateError::Diverged {

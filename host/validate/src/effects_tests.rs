@@ -11,7 +11,7 @@ use rig_data::Block;
 use rig_data::prepare::{Choice, InMemory, PrepareOptions, stretch};
 use rig_identify::identify;
 use rig_model::effects::{Effects, outruns};
-use rig_model::robot::{Controller, ONE_LINK_TEMPLATE, Robot, RobotEffect};
+use rig_model::robot::{Controller, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Robot, RobotEffect};
 use rig_model::simulate::{Inputs, Model, Stepper, closed_loop};
 
 fn rig() -> Robot {
@@ -99,7 +99,7 @@ fn books(robot: &Robot, dt: f64, seconds: f64) -> ([f64; 2], f64, f64) {
     let (mut given, mut turnover) = (0.0, 0.0);
     for k in 0..(seconds / dt).round() as usize {
         let before = (q[0], v[0]);
-        stepper.step(&mut q, &mut v, &[torque], dt).unwrap();
+        stepper.step(&mut q, &mut v, &[torque], &[], dt).unwrap();
         let mean = 0.5 * (before.1 + v[0]);
         let acceleration = (v[0] - before.1) / dt;
         let middle = before.0 + 0.5 * dt * before.1;
@@ -160,7 +160,7 @@ fn a_halved_step_converges_with_each_effect() {
             let (mut q, mut v) = ([-1.0], [1.5]);
             for k in 0..(0.8_f64 / dt).round() as usize {
                 let torque = 2.5 * (3.0 * k as f64 * dt).cos();
-                stepper.step(&mut q, &mut v, &[torque], dt).unwrap();
+                stepper.step(&mut q, &mut v, &[torque], &[], dt).unwrap();
             }
             q[0]
         };
@@ -434,14 +434,14 @@ fn two_masses_keep_their_energy_without_friction_and_never_gain_any() {
         };
         let mut stepper = Stepper::new(&model).unwrap();
         let (mut q, mut v) = ([0.3], [0.0]);
-        stepper.step(&mut q, &mut v, &[0.0], 1e-5).unwrap();
-        let start = energy(q[0], v[0], stepper.link().unwrap());
+        stepper.step(&mut q, &mut v, &[0.0], &[], 1e-5).unwrap();
+        let start = energy(q[0], v[0], stepper.link(0).unwrap());
         let mut last = start;
         for _ in 0..200 {
             for _ in 0..1000 {
-                stepper.step(&mut q, &mut v, &[0.0], 1e-5).unwrap();
+                stepper.step(&mut q, &mut v, &[0.0], &[], 1e-5).unwrap();
             }
-            let now = energy(q[0], v[0], stepper.link().unwrap());
+            let now = energy(q[0], v[0], stepper.link(0).unwrap());
             assert!(now < last + 1e-3, "{kind:?}: {now} after {last}");
             last = now;
         }
@@ -484,7 +484,7 @@ fn a_coupled_inertia_keeps_the_energy_that_belongs_to_it() {
         let (mut q, mut v) = ([0.3, 0.5], [0.0, 0.0]);
         let start = energy(&q, &v);
         for _ in 0..(1.0_f64 / dt).round() as usize {
-            stepper.step(&mut q, &mut v, &[0.0; 2], dt).unwrap();
+            stepper.step(&mut q, &mut v, &[0.0; 2], &[], dt).unwrap();
         }
         (energy(&q, &v) - start).abs()
     };
@@ -500,7 +500,7 @@ fn a_coupling_of_one_joint_alone_is_the_torque_that_its_law_states() {
     let mut stepper = Stepper::new(&model).unwrap();
     let (mut q, mut v) = ([0.3, 0.5], [0.7, -1.1]);
     let (start, dt, torque) = (v, 1e-6, [1.0, -2.0]);
-    stepper.step(&mut q, &mut v, &torque, dt).unwrap();
+    stepper.step(&mut q, &mut v, &torque, &[], dt).unwrap();
     let a = [(v[0] - start[0]) / dt, (v[1] - start[1]) / dt];
     let mut tau = [0.0; 2];
     model
@@ -511,6 +511,76 @@ fn a_coupling_of_one_joint_alone_is_the_torque_that_its_law_states() {
         (tau[0] - torque[0]).abs() < 1e-3 && (tau[1] - torque[1]).abs() < 1e-3,
         "{tau:?}"
     );
+}
+
+/// The base of the arm is held. Its second joint then is the robot of one joint, with each effect.
+#[test]
+fn an_effect_acts_at_a_joint_of_an_arm_as_on_a_robot_of_one_joint() {
+    for (kind, gains, shapes) in TORQUES.into_iter().chain(GEARS) {
+        let alone = with(rig(), kind, gains, shapes);
+        let mut arm = alone.clone();
+        let mut base = arm.joints[0].clone();
+        base.name = "base".into();
+        base.friction.as_mut().unwrap().coulomb = 1e7;
+        let own = &mut arm.joints[0];
+        (own.alpha, own.a, own.theta, own.d) = (0.0, 0.4, 0.0, 0.0);
+        arm.effects[0].joint = Some(own.name.clone());
+        arm.joints.insert(0, base);
+        let end = |robot: &Robot| {
+            let model = Model::from_robot(robot).unwrap();
+            let n = robot.joints.len();
+            let mut stepper = Stepper::new(&model).unwrap();
+            let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
+            let mut torque = vec![0.0; n];
+            (q[n - 1], v[n - 1]) = (-1.0, 1.5);
+            let mut seen = Vec::new();
+            for k in 0..800 {
+                torque[n - 1] = 2.5 * (6e-3 * f64::from(k)).cos();
+                stepper.step(&mut q, &mut v, &torque, &[], 1e-3).unwrap();
+                seen.push(q[n - 1]);
+            }
+            assert_eq!(q[..n - 1], vec![0.0; n - 1]);
+            seen
+        };
+        let off = end(&alone)
+            .iter()
+            .zip(end(&arm))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        // The gear of an arm is stepped as if the base were free, so in shorter steps.
+        let gear = kind.transmission(&[0.0; 4]).is_some();
+        let most = if gear { 1e-4 } else { 1e-8 };
+        assert!(off < most, "{kind:?}: {off}");
+    }
+}
+
+#[test]
+fn every_effect_changes_the_motion_of_every_joint_of_the_irp6() {
+    let irp6 = Robot::from_toml(IRP6_TEMPLATE, Path::new("irp6.toml")).unwrap();
+    let end = |robot: &Robot| {
+        let model = Model::from_robot(robot).unwrap();
+        let mut stepper = Stepper::new(&model).unwrap();
+        let (mut q, mut v) = (robot.middle_position(), vec![0.2; 5]);
+        for k in 0..300 {
+            let torque: Vec<f64> = [80.0, 120.0, 90.0, 25.0, 12.0]
+                .iter()
+                .enumerate()
+                .map(|(j, size)| size * (0.02 * f64::from(k) + j as f64).cos())
+                .collect();
+            stepper.step(&mut q, &mut v, &torque, &[], 1e-3).unwrap();
+        }
+        assert!(q.iter().chain(&v).all(|x| x.is_finite()));
+        q
+    };
+    let free = end(&irp6);
+    for (kind, gains, shapes) in TORQUES.into_iter().chain(GEARS) {
+        for (j, joint) in irp6.joints.iter().enumerate() {
+            let mut robot = with(irp6.clone(), kind, gains, shapes);
+            robot.effects[0].joint = Some(joint.name.clone());
+            let off = (end(&robot)[j] - free[j]).abs();
+            assert!(off > 1e-8, "{kind:?} at {}: {off}", joint.name);
+        }
+    }
 }
 
 #[test]
@@ -524,7 +594,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         let n = robot.joints.len();
         let (mut q, mut v) = (vec![0.0; n], vec![0.5; n]);
         (0..2000)
-            .find_map(|_| stepper.step(&mut q, &mut v, &vec![0.0; n], 1e-3).err())
+            .find_map(|_| stepper.step(&mut q, &mut v, &vec![0.0; n], &[], 1e-3).err())
             .unwrap()
             .to_string()
     };
@@ -551,7 +621,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
     elastic.effects[0].joint = Some("second".into());
     let said = refused(&elastic);
     assert!(
-        said.contains("joint_elasticity of joint second") && said.contains("one joint"),
+        said.contains("joint_elasticity of joint second") && said.contains("rotor_inertia"),
         "{said}"
     );
     let mut light = with(rig(), Kind::Backlash, &[], &[0.01, 3000.0, 3.0]);
@@ -572,7 +642,7 @@ fn a_stiff_gear_is_loaded_as_none_is() {
         let mut stepper = Stepper::new(&model).unwrap();
         let (mut q, mut v) = (vec![0.3], vec![2.0]);
         for _ in 0..400 {
-            stepper.step(&mut q, &mut v, &[0.5], 1e-3).unwrap();
+            stepper.step(&mut q, &mut v, &[0.5], &[], 1e-3).unwrap();
         }
         q[0]
     };
@@ -598,7 +668,7 @@ fn memory_holds_no_more_than_the_dry_friction_there_is() {
         let mut stepper = Stepper::new(&model).unwrap();
         let (mut q, mut v) = (vec![0.0], vec![2.0]);
         let at = |_| {
-            stepper.step(&mut q, &mut v, &[0.0], 1e-3).unwrap();
+            stepper.step(&mut q, &mut v, &[0.0], &[], 1e-3).unwrap();
             [q[0], v[0]]
         };
         (0..4000).map(at).collect::<Vec<[f64; 2]>>()

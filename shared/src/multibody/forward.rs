@@ -50,6 +50,21 @@ fn accelerate<T: Real, const CAPACITY: usize>(
     let matrix = square.as_flattened_mut();
     let matrix = &mut matrix[..n * n];
     inertia_matrix(chain, parameters, q, matrix)?;
+    solve_positive_definite(matrix, x)
+}
+
+/// Replaces `x` (length n) by the solution of A·y = x by Cholesky's factorisation, for a symmetric A (n × n, row-major)
+/// such as an inertia matrix with that of the motors. The factor replaces the lower triangle of A.
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`], also if a number is NaN. `x` is then
+/// untouched.
+pub fn solve_positive_definite<T: Real>(
+    matrix: &mut [T],
+    x: &mut [T],
+) -> Result<(), MultibodyError> {
+    let n = x.len();
+    check("matrix", n * n, matrix.len())?;
     factorise(matrix, n)?;
     for i in 0..n {
         let mut value = x[i];

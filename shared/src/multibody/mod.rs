@@ -57,7 +57,7 @@ pub use energy::{
     energy_regressor, friction_power_regressor, kinetic_energy, kinetic_energy_regressor,
     potential_energy, potential_energy_regressor, power_regressor,
 };
-pub use forward::forward_dynamics;
+pub use forward::{forward_dynamics, solve_positive_definite};
 pub use inertia_matrix::inertia_matrix;
 pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
 pub use kinematics::{Pose, frame_pose, point_position};

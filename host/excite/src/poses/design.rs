@@ -11,6 +11,7 @@ use super::route::Moves;
 use super::space::{Pose, Space};
 use crate::bounds::{Room, bounds_of};
 use crate::error::wrong;
+use crate::motor_limits::exceeded;
 use crate::quintic_move::micros;
 use crate::torque_share::torque_share;
 use crate::{Criterion, DesignRecord, ExciteError, JointTrajectory, TrajectoryFile};
@@ -247,6 +248,10 @@ fn motion(
                 fault = (0, "torque");
                 continue;
             }
+        }
+        if let Some(used) = exceeded(space.robot, &space.model, &joints, space.has_bodies)? {
+            fault = (used.joint, used.limit);
+            continue;
         }
         return Ok(Ok(joints));
     }

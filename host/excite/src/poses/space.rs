@@ -41,6 +41,8 @@ pub(super) struct Space<'a> {
     pub planes: Vec<Plane>,
     /// True if the torque is known and limited.
     pub knows_torque: bool,
+    /// True if every link is described.
+    pub has_bodies: bool,
 }
 
 impl<'a> Space<'a> {
@@ -55,6 +57,7 @@ impl<'a> Space<'a> {
             robot,
             sensor: robot.last_link * sensor.pose(),
             knows_torque: limited && prior(robot, &model).is_ok(),
+            has_bodies: prior(robot, &model).is_ok(),
             model,
             bounds,
             combined: Combined::of(robot),

@@ -7,6 +7,7 @@
 
 mod constraints;
 mod motion;
+mod motors;
 mod objective;
 mod penalty;
 mod rows;

@@ -10,7 +10,7 @@ use crate::optimise::{Objective, Round};
 impl Problem<'_> {
     /// Returns the sum of all penalties, and adds their derivative by the motion or renews the multipliers.
     fn penalties(&mut self, pass: Pass) -> Result<f64, ExciteError> {
-        let kinematic = self.kinematic(pass) + self.cranks(pass);
+        let kinematic = self.kinematic(pass) + self.cranks(pass) + self.motor_motion(pass)?;
         Ok(kinematic + self.torque_and_rows(pass)? + self.cartesian(pass)?)
     }
 
@@ -74,6 +74,9 @@ impl Problem<'_> {
     /// Activates every constraint, so that a test of the gradient covers all of them.
     pub(crate) fn press(&mut self, multiplier: f64) {
         for list in &mut self.multipliers {
+            list.fill([multiplier, 0.7 * multiplier]);
+        }
+        for list in &mut self.motor_multipliers {
             list.fill([multiplier, 0.7 * multiplier]);
         }
         self.plane_multipliers.fill(multiplier);

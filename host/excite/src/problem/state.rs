@@ -21,6 +21,8 @@ pub(crate) struct Problem<'a> {
     pub(super) multipliers: [Vec<[f64; 2]>; 4],
     /// By plane and sample.
     pub(super) plane_multipliers: Vec<f64>,
+    /// By order (angle, speed, torque), motor and sample: one for each side.
+    pub(super) motor_multipliers: [Vec<[f64; 2]>; 3],
     /// By crank and sample: one for each side.
     pub(super) crank_multipliers: Vec<[f64; 2]>,
     /// Position, velocity, acceleration: samples × joints.
@@ -44,6 +46,7 @@ impl<'a> Problem<'a> {
         let basis = Basis::new(&frame.schedule, density);
         let n = frame.bounds.len();
         let (p, samples) = (frame.columns.len(), basis.samples());
+        let limited = frame.drives.as_ref().map_or(0, |d| d.limits.len());
         let first: Vec<usize> = match &frame.wrist {
             Some(_) => vec![0; frame.readings()],
             None => (0..n)
@@ -59,6 +62,7 @@ impl<'a> Problem<'a> {
             smoothing,
             weight: 0.0,
             multipliers: [(); 4].map(|()| vec![[0.0; 2]; samples * n]),
+            motor_multipliers: [(); 3].map(|()| vec![[0.0; 2]; samples * limited]),
             crank_multipliers: vec![[0.0; 2]; frame.combined.len() * samples],
             plane_multipliers: vec![0.0; frame.planes.len() * samples],
             motion: [(); 3].map(|()| DMatrix::zeros(samples, n)),

@@ -21,9 +21,9 @@ struct Prior {
 }
 
 impl Prior {
-    /// Returns the prior parameters; none if they are unknown or no torque is limited.
-    fn of(frame: &Frame) -> Option<Self> {
-        let limited = frame.bounds.iter().any(|b| b.torque.is_some());
+    /// Returns the prior parameters; none if they are unknown or no torque is limited, neither of a joint nor of a motor.
+    fn of(frame: &Frame, of_motors: bool) -> Option<Self> {
+        let limited = of_motors || frame.bounds.iter().any(|b| b.torque.is_some());
         let parameters = frame.parameters.as_ref().filter(|_| limited)?;
         let sliding = |row: &[f64; COLUMNS]| {
             let mut row = row.map(L::splat);
@@ -48,7 +48,7 @@ struct Group {
 impl Problem<'_> {
     /// Returns the penalties of the torque, and adds the derivatives of penalties and criterion by the motion.
     pub(super) fn torque_and_rows(&mut self, pass: Pass) -> Result<f64, ExciteError> {
-        let prior = Prior::of(self.frame);
+        let prior = Prior::of(self.frame, self.limits_motor_torque());
         let mut sum = 0.0;
         for first in (0..self.basis.samples()).step_by(LANES) {
             let within = first < self.basis.whole && pass == Pass::Penalise;
@@ -103,18 +103,22 @@ impl Problem<'_> {
             }
         }
         for j in 0..n {
+            let sign = soft_sign(qd[j], frame.bounds[j].velocity);
+            tau[j] += L::splat(prior.coulomb[j]) * sign;
             let Some(limit) = frame.bounds[j].torque else {
                 continue;
             };
-            let sign = soft_sign(qd[j], frame.bounds[j].velocity);
-            let total = tau[j] + L::splat(prior.coulomb[j]) * sign;
             for k in 0..LANES {
                 let multipliers = &mut self.multipliers[3][j * samples + group.first + k];
-                let (value, force) = both_sides(total.0[k] / limit, multipliers, self.weight, pass);
+                let share = tau[j].0[k] / limit;
+                let (value, force) = both_sides(share, multipliers, self.weight, pass);
                 *sum += value;
                 forces[j].0[k] = force / limit;
                 pushed |= force != 0.0;
             }
+        }
+        if self.limits_motor_torque() {
+            pushed |= self.motor_torques(group.first, &tau, pass, sum, &mut forces)?;
         }
         Ok(pushed.then_some(forces))
     }

@@ -5,6 +5,7 @@ mod design;
 mod files;
 mod load_motion;
 mod load_poses;
+mod motors;
 mod room;
 mod runs;
 mod six_joints;

@@ -260,7 +260,7 @@ impl Companion for LoopMotion<'_> {
             }
             for _ in 0..SUBSTEPS {
                 self.stepper
-                    .step(&mut q, &mut v, &torque, dt)
+                    .step(&mut q, &mut v, &torque, &[], dt)
                     .map_err(stopped)?;
             }
         }

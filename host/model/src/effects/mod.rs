@@ -298,11 +298,20 @@ impl Effects {
 
     /// Returns `title of joint name` of the effects that `which` selects, joined; `None` if it selects none.
     pub fn named(&self, which: impl Fn(Kind) -> bool) -> Option<String> {
+        self.listed(|p| which(p.effect.kind))
+    }
+
+    /// Same as [`Self::named`], of one joint (from 0).
+    pub fn named_at(&self, joint: usize, which: impl Fn(Kind) -> bool) -> Option<String> {
+        self.listed(|p| p.joint == joint && which(p.effect.kind))
+    }
+
+    fn listed(&self, which: impl Fn(&Placed) -> bool) -> Option<String> {
         let names: Vec<&str> = self
             .placed
             .iter()
             .zip(&self.titles)
-            .filter(|(p, _)| which(p.effect.kind))
+            .filter(|(p, _)| which(p))
             .map(|(_, title)| title.as_str())
             .collect();
         (!names.is_empty()).then(|| names.join(", "))

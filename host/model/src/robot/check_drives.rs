@@ -3,7 +3,7 @@
 use rig_shared::transmission::TransmissionError;
 
 use super::ball_screw_crank::BallScrewCrank;
-use super::drive::Drive;
+use super::drive::{Drive, MotorLimits};
 use super::fault::{Fault, MAX_NUMBER, Requirement, Step, is_safe_magnitude, number, written};
 use super::joint::Joint;
 use super::serial_robot::Robot;
@@ -225,6 +225,9 @@ fn spread(robot: &Robot, middle: &[f64], draw: usize) -> Vec<f64> {
 pub(super) fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
     check_ratio(joint, drive)?;
     check_numbers(joint, drive)?;
+    if let Some(limits) = &drive.limits {
+        check_motor_limits(joint, limits)?;
+    }
     match &drive.screw {
         Some(screw) => check_screw(joint, screw),
         None => Ok(()),
@@ -322,6 +325,41 @@ fn check_numbers(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
         }
     }
     Ok(())
+}
+
+/// Checks the limits of a motor.
+fn check_motor_limits(joint: &Joint, limits: &MotorLimits) -> Result<(), Fault> {
+    use Step::Key;
+    let key_path = |key| [Key("drive"), Key("limits"), Key(key)];
+    for (key, what, unit, value) in [
+        (
+            "velocity",
+            "speed limit of the motor",
+            "rad/s",
+            limits.velocity,
+        ),
+        ("torque", "torque limit of the motor", "N·m", limits.torque),
+    ] {
+        if let Some(value) = value {
+            number(
+                joint,
+                &key_path(key),
+                what,
+                unit,
+                Requirement::Positive,
+                value,
+            )?;
+        }
+    }
+    match limits.position {
+        Some([low, high]) if !(low.is_finite() && high.is_finite() && low < high) => Err(Fault {
+            key_path: key_path("position").to_vec(),
+            what: format!("the range of the motor of joint `{}`", joint.name),
+            found: format!("[{low}, {high}]"),
+            advice: "it must be [lowest, highest], two finite numbers in rad of the motor".into(),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Checks the numbers of a screw.

@@ -50,7 +50,25 @@ pub struct Drive {
     /// Number of pole pairs; 0 if brushed
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pole_pairs: Option<u32>,
+    /// Limits of the motor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<MotorLimits>,
     /// A ball screw on a crank instead of a constant ratio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub screw: Option<BallScrewCrank>,
+}
+
+/// Limits of a motor, all on the motor side. They hold beside those of the joints.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotorLimits {
+    /// Lowest and highest angle of the motor, rad
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<[f64; 2]>,
+    /// rad/s
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<f64>,
+    /// N·m
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque: Option<f64>,
 }

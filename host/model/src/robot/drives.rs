@@ -33,6 +33,11 @@ impl Robot {
     /// # Errors
     /// The same as [`Self::transmission`].
     pub fn transmission_of<T: Real>(&self) -> Result<Transmission<T>, TransmissionError> {
+        self.with_drive_maps(Transmission::new)
+    }
+
+    /// Calls `act` with each motor's position as a function of the joint coordinates, base first.
+    pub fn with_drive_maps<R>(&self, act: impl FnOnce(&[DriveMap<'_>]) -> R) -> R {
         let numbers: Vec<Numbers> = (0..self.joints.len()).map(|k| self.numbers(k)).collect();
         let maps: Vec<DriveMap<'_>> = numbers
             .iter()
@@ -48,7 +53,7 @@ impl Robot {
                 joint_inertia: (joint.drive.as_ref()).is_some_and(|d| d.joint_inertia != 0.0),
             })
             .collect();
-        Transmission::new(&maps)
+        act(&maps)
     }
 
     fn numbers(&self, k: usize) -> Numbers {

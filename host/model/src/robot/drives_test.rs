@@ -270,3 +270,38 @@ fn a_description_takes_its_own_parameters_back() {
     assert!(remarks[0].contains("Coulomb friction of joint joint_2 came out as -0.2"));
     assert_eq!(changed.joints[1].friction.as_ref().unwrap().coulomb, 0.0);
 }
+
+#[test]
+fn limits_of_motors_are_read_written_and_checked() {
+    let with = |limits: &str| {
+        let text = format!(
+            "{}\n[joint.drive.limits]\n{limits}\n",
+            crate::robot::IRP6_TEMPLATE
+        );
+        Robot::from_toml(&text, std::path::Path::new("irp6.toml"))
+    };
+    let robot = with("position = [-30.0, 40.0]\nvelocity = 300.0\ntorque = 0.9").unwrap();
+    let limits = robot.joints[4]
+        .drive
+        .as_ref()
+        .unwrap()
+        .limits
+        .clone()
+        .unwrap();
+    assert_eq!(limits.position, Some([-30.0, 40.0]));
+    let text = robot.to_toml().unwrap();
+    assert!(text.contains("of the motor"), "{text}");
+    let back = Robot::from_toml(&text, std::path::Path::new("irp6.toml")).unwrap();
+    assert_eq!(back.joints[4].drive.as_ref().unwrap().limits, Some(limits));
+    let told = robot.to_urdf().unwrap().remarks.join(" ");
+    assert!(told.contains("limits of the motors") && told.contains("wrist_turn"));
+    for (wrong, word) in [
+        ("position = [40.0, -30.0]", "range of the motor"),
+        ("velocity = 0.0", "speed limit of the motor"),
+        ("torque = -1.0", "torque limit of the motor"),
+        ("current = 3.0", "current"),
+    ] {
+        let said = with(wrong).unwrap_err().to_string();
+        assert!(said.contains(word) && said.contains("irp6.toml"), "{said}");
+    }
+}

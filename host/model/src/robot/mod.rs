@@ -53,7 +53,7 @@ mod written;
 pub use ball_screw_crank::BallScrewCrank;
 pub use band::{IdentifiedBand, MOST_LEAD};
 pub use description::{Description, audit_file};
-pub use drive::Drive;
+pub use drive::{Drive, MotorLimits};
 pub use effects::{EFFECT_NAMES, RobotEffect, plausible_range, title_of, unit_of};
 pub use error::{MAX_BYTES, Place, RobotError};
 pub use fault::{is_safe_magnitude, written};

@@ -16,8 +16,8 @@ pub(super) struct Acting<'a> {
     memory: Vec<Memory<f64>>,
     motor: Vec<f64>,
     time: f64,
-    /// Index of the link's coordinate, if the link is a separate mass.
-    link: Option<usize>,
+    /// Coordinate of each joint's link: the joint's number, or another one if the link is a separate mass.
+    links: Vec<usize>,
     /// Torques that do not depend on the direction of motion, one a coordinate.
     pub torque: Vec<f64>,
     /// Dry friction that effects add, for motion backwards and forwards, one a joint.
@@ -35,14 +35,16 @@ pub(super) struct Acting<'a> {
 }
 
 impl<'a> Acting<'a> {
-    pub(super) fn new(effects: &'a Effects, joints: usize, link: Option<usize>) -> Self {
+    /// Prepares the effects for `coordinates`, with the coordinate of each joint's link.
+    pub(super) fn new(effects: &'a Effects, coordinates: usize, links: Vec<usize>) -> Self {
+        let joints = links.len();
         Self {
             effects,
             memory: vec![Memory::default(); effects.placed().len()],
             motor: vec![0.0; joints],
             time: 0.0,
-            link,
-            torque: vec![0.0; joints + usize::from(link.is_some())],
+            links,
+            torque: vec![0.0; coordinates],
             dry: vec![[0.0; 2]; joints],
             remembered: vec![[0.0; 2]; joints],
             bent: vec![None; joints],
@@ -99,10 +101,12 @@ impl<'a> Acting<'a> {
         if place.effect.kind.is_presliding() {
             instant.extra_friction_ratio = self.beside[place.joint];
         }
-        if let Some(link) = self.link
-            && place.effect.kind.acts_on_link()
-        {
+        if place.effect.kind.acts_on_link() {
+            let link = self.links[place.joint];
             (instant.position, instant.velocity) = (q[link], v[link]);
+            if let Some(other) = place.other.map(|other| self.links[other]) {
+                (instant.other[0], instant.other[1]) = (q[other], v[other]);
+            }
         }
         instant
     }
@@ -166,11 +170,11 @@ impl<'a> Acting<'a> {
                     self.warmed[p.joint] += torque / instant.velocity;
                     self.refuse_driving(p.joint)?;
                 }
-                match self.link.filter(|_| kind.acts_on_link()) {
-                    Some(link) => self.torque[link] += torque,
-                    None => self.torque[p.joint] += torque,
-                }
-                if kind.acts_on_link() && self.link.is_none() {
+                let link = self.links[p.joint];
+                let at = if kind.acts_on_link() { link } else { p.joint };
+                self.torque[at] += torque;
+                // The torque of an elastic gear contains it already.
+                if kind.acts_on_link() && link == p.joint {
                     load[p.joint] += torque;
                 }
             }

@@ -119,6 +119,7 @@ pub fn closed_loop_watched(
         saturated: vec![0; n],
     };
     let (mut q, mut v) = (inputs.q.to_vec(), inputs.v.to_vec());
+    stepper.put_links_at_rest(&q, &v)?;
     let mut applied = vec![0.0; n];
     let mut torque = vec![0.0; n];
     let mut cut = vec![false; n];
@@ -162,7 +163,7 @@ pub fn closed_loop_watched(
             for step in 0..steps {
                 let at_sample = answer == 0 && step == 0;
                 links.before_step(&stepper, &q, &v, at_sample);
-                stepper.step(&mut q, &mut v, &torque, dt)?;
+                stepper.step(&mut q, &mut v, &torque, &[], dt)?;
                 links.after_step(&stepper, &v, dt, at_sample);
             }
         }

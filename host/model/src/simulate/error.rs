@@ -82,14 +82,6 @@ pub enum SimulateError {
         /// Viscous friction at that time, N·m·s/rad or N·s/m.
         left: f64,
     },
-    /// Backlash or elasticity where it cannot be simulated.
-    #[error(
-        "{effect} is simulated for a robot of one joint with a drive of its own only; leave it out, or describe the joint alone."
-    )]
-    ElasticChain {
-        /// The effect and its joint.
-        effect: String,
-    },
     /// Backlash or elasticity without a second mass.
     #[error(
         "{effect} needs a motor with inertia on the other side of the gear, and the description has none; give rotor_inertia in [joint.drive]."

@@ -3,6 +3,7 @@
 use rig_shared::multibody::column;
 use rig_shared::transmission::{DriveKind, motor_column};
 
+use super::elastic::Elastic;
 use super::error::SimulateError;
 use super::model::Model;
 
@@ -30,7 +31,7 @@ impl DryFriction {
     pub(super) fn new(coulomb: Vec<f64>, n: usize) -> Self {
         let contacts = coulomb.len();
         let mut along = vec![0.0; contacts * n];
-        // An elastic gear has two masses, each with its own friction.
+        // A joint with an elastic gear has two coordinates, each with its own friction.
         for i in 0..n {
             along[i * n + i] = 1.0;
         }
@@ -122,8 +123,12 @@ impl DryFriction {
 }
 
 /// Refuses coupled drives that feed energy into some motion. Drives of changing ratio need only correct signs; the
-/// damping of the others is the same everywhere.
-pub(super) fn refuse_driving_friction(model: &Model, n: usize) -> Result<(), SimulateError> {
+/// damping of the others is the same everywhere. Friction behind an elastic gear does not brake the motors.
+pub(super) fn refuse_driving_friction(
+    model: &Model,
+    elastic: &Elastic,
+) -> Result<(), SimulateError> {
+    let n = model.parameters.len();
     let Some(motors) = &model.motors else {
         return Ok(());
     };
@@ -135,7 +140,7 @@ pub(super) fn refuse_driving_friction(model: &Model, n: usize) -> Result<(), Sim
     }
     let mut damping = nalgebra::DMatrix::zeros(n, n);
     for i in 0..n {
-        damping[(i, i)] = model.parameters[i][column::VISCOUS];
+        damping[(i, i)] = (1.0 - elastic.link_friction(i)) * model.parameters[i][column::VISCOUS];
     }
     let origin = vec![0.0; n];
     motors

@@ -36,7 +36,7 @@ impl LinkTrace {
         }
     }
 
-    /// Notes the state before a step. A link behind an elastic gear counts as the motor before its first step.
+    /// Notes the state before a step.
     pub(super) fn before_step(
         &mut self,
         stepper: &Stepper<'_>,
@@ -50,9 +50,10 @@ impl LinkTrace {
         }
         self.at.q.copy_from_slice(q);
         note_speeds(&mut self.at.qd, stepper, v);
-        // Only a robot of one joint has such a link.
-        if let (Some([position, _]), [own]) = (stepper.link(), self.at.q.as_mut_slice()) {
-            *own = position;
+        for (j, own) in self.at.q.iter_mut().enumerate() {
+            if let Some([position, _]) = stepper.link(j) {
+                *own = position;
+            }
         }
     }
 
@@ -67,9 +68,8 @@ impl LinkTrace {
         if !at_sample {
             return;
         }
-        let link = stepper.link();
         for (j, own) in self.at.qdd.iter_mut().enumerate() {
-            let after = link.map_or(v[j], |[_, speed]| speed);
+            let after = stepper.link(j).map_or(v[j], |[_, speed]| speed);
             *own = match self.before.get(j) {
                 Some(before) => (after - before) / (2.0 * dt),
                 None => (after - self.at.qd[j]) / dt,
@@ -82,8 +82,6 @@ impl LinkTrace {
 /// Copies the velocities of the links.
 fn note_speeds(out: &mut Vec<f64>, stepper: &Stepper<'_>, v: &[f64]) {
     out.clear();
-    match stepper.link() {
-        Some([_, speed]) => out.push(speed),
-        None => out.extend_from_slice(v),
-    }
+    let speeds = v.iter().enumerate();
+    out.extend(speeds.map(|(j, own)| stepper.link(j).map_or(*own, |[_, speed]| speed)));
 }

@@ -4,6 +4,8 @@ mod acting;
 mod closed_loop;
 mod controllers;
 mod elastic;
+#[cfg(test)]
+mod elastic_tests;
 mod error;
 mod friction;
 mod history;

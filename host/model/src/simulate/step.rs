@@ -11,11 +11,11 @@
 //! Effects beyond the standard model follow their laws. Terms that depend on the direction widen or shift the bounds of
 //! the set-valued friction ([−fc + h(−1), fc + h(1)] at the speed of the step). Presliding replaces its part of Coulomb
 //! friction. Other terms are torques in the middle of the step. A coupled inertia is part of the matrix. With backlash
-//! or elasticity the motor is a separate mass, and the steps are short enough for the gear.
+//! or elasticity the motor of a joint is a separate mass ([`super::elastic`]), and the steps are short enough for the gears.
 //!
 //! Leaves out end stops, temperatures and the electrical side.
 
-use rig_shared::multibody::{COLUMNS, bias_torque, column, inertia_matrix};
+use rig_shared::multibody::{COLUMNS, MultibodyError, bias_torque, column, inertia_matrix};
 use rig_shared::scalar::Real as _;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
@@ -49,12 +49,25 @@ pub struct Stepper<'a> {
     damping: Vec<f64>,
     friction: DryFriction,
     acting: Acting<'a>,
-    elastic: Option<Elastic>,
+    elastic: Elastic,
     acceleration: Vec<f64>,
     /// Loads of the links on the gears.
     loads: Vec<f64>,
     /// Columns of the motors at zero acceleration.
     columns: Vec<f64>,
+    /// Torques from outside on the links; empty for none.
+    external: Vec<f64>,
+    joints: JointBuffers,
+}
+
+/// Terms of the joints alone, before they are placed among all coordinates.
+struct JointBuffers {
+    /// Positions and velocities of the links.
+    q: Vec<f64>,
+    v: Vec<f64>,
+    torque: Vec<f64>,
+    /// n × n.
+    matrix: Vec<f64>,
 }
 
 impl<'a> Stepper<'a> {
@@ -70,12 +83,12 @@ impl<'a> Stepper<'a> {
     pub fn new(model: &'a Model) -> Result<Self, SimulateError> {
         let joints = model.parameters.len();
         let elastic = Elastic::of(model)?;
-        // The motor, then the link.
-        let n = joints + usize::from(elastic.is_some());
-        let smooth = without_friction(model, elastic.is_some())?;
-        let coulomb = coulomb(model, elastic.as_ref())?;
+        // The motors, then the links that are masses of their own.
+        let n = joints + elastic.gears.len();
+        let smooth = without_friction(model, &elastic)?;
+        let coulomb = coulomb(model, &elastic)?;
         let columns = match &model.motors {
-            Some(_) => vec![0.0; n * n * MOTOR_COLUMNS],
+            Some(_) => vec![0.0; joints * joints * MOTOR_COLUMNS],
             None => Vec::new(),
         };
         let stepper = Self {
@@ -91,90 +104,118 @@ impl<'a> Stepper<'a> {
             next: vec![0.0; n],
             damping: vec![0.0; n * n],
             friction: DryFriction::new(coulomb, n),
-            acting: Acting::new(&model.effects, joints, elastic.map(|_| joints)),
-            elastic,
+            acting: Acting::new(&model.effects, n, elastic.at.clone()),
             acceleration: vec![0.0; n],
             loads: vec![0.0; joints],
             columns,
+            external: Vec::with_capacity(joints),
+            joints: JointBuffers {
+                q: vec![0.0; joints],
+                v: vec![0.0; joints],
+                torque: vec![0.0; joints],
+                matrix: vec![0.0; joints * joints],
+            },
+            elastic,
         };
-        refuse_driving_friction(model, joints)?;
+        refuse_driving_friction(model, &stepper.elastic)?;
         Ok(stepper)
     }
 
     /// Computes the position-dependent terms in the middle of the step: inertia, damping and directions of friction.
     fn place(&mut self) -> Result<(), SimulateError> {
         let n = self.middle.len();
-        self.damping.fill(0.0);
-        for (i, own) in self.model.parameters.iter().enumerate() {
-            self.damping[i * n + i] = own[column::VISCOUS];
+        let own = &mut self.joints;
+        let joints = own.q.len();
+        self.elastic.links(&self.middle, &mut own.q);
+        inertia_matrix(&self.model.chain, &self.smooth, &own.q, &mut own.matrix)?;
+        self.mass.fill(0.0);
+        let at = &self.elastic.at;
+        for (i, row) in own.matrix.chunks_exact(joints).enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                self.mass[at[i] * n + at[j]] = *value;
+            }
         }
-        if let Some(elastic) = &self.elastic {
-            let (rotor, link) = self.mass.split_at_mut(3);
-            rotor.copy_from_slice(&[elastic.rotor, 0.0, 0.0]);
-            let viscous = self.damping[0];
-            self.damping[0] = (1.0 - elastic.link_friction) * viscous;
-            self.damping[3] = elastic.link_friction * viscous;
-            inertia_matrix(&self.model.chain, &self.smooth, &self.middle[1..], link)?;
-            return Ok(());
-        }
-        inertia_matrix(
-            &self.model.chain,
-            &self.smooth,
-            &self.middle,
-            &mut self.mass,
-        )?;
         for (joint, other, inertia) in self.acting.couplings() {
-            self.mass[joint * n + other] += inertia;
+            self.mass[at[joint] * n + at[other]] += inertia;
         }
-        if let Some(motors) = &self.model.motors {
-            let t = &motors.transmission;
-            t.add_motor_inertia(&motors.parameters, &self.middle, &mut self.mass)?;
-            t.add_motor_viscosity(&motors.parameters, &self.middle, &mut self.damping)?;
-            t.motor_directions(&self.middle, &mut self.friction.along[n * n..])?;
+        self.damping.fill(0.0);
+        for (i, parameters) in self.model.parameters.iter().enumerate() {
+            self.damping[i * n + i] = parameters[column::VISCOUS];
         }
+        for gear in &self.elastic.gears {
+            let (motor, link) = (gear.joint * n + gear.joint, gear.link * n + gear.link);
+            self.mass[motor] = self.model.parameters[gear.joint][column::DRIVE_INERTIA];
+            let viscous = self.damping[motor];
+            self.damping[motor] = (1.0 - gear.link_friction) * viscous;
+            self.damping[link] = gear.link_friction * viscous;
+        }
+        self.place_motors()
+    }
+
+    /// Adds inertia and viscous friction of coupled motors, and computes the directions of their Coulomb friction.
+    fn place_motors(&mut self) -> Result<(), SimulateError> {
+        let Some(motors) = &self.model.motors else {
+            return Ok(());
+        };
+        let (n, joints) = (self.middle.len(), self.joints.q.len());
+        let q = &self.middle[..joints];
+        let (t, parameters) = (&motors.transmission, &motors.parameters);
+        let matrix = &mut self.joints.matrix;
+        copy_rows(&self.mass, n, matrix, joints);
+        t.add_motor_inertia(parameters, q, matrix)?;
+        copy_rows(matrix, joints, &mut self.mass, n);
+        copy_rows(&self.damping, n, matrix, joints);
+        t.add_motor_viscosity(parameters, q, matrix)?;
+        copy_rows(matrix, joints, &mut self.damping, n);
+        t.motor_directions(q, matrix)?;
+        copy_rows(matrix, joints, &mut self.friction.along[n * n..], n);
         Ok(())
     }
 
-    /// Computes the torques at zero acceleration without friction, with the change of the motors' ratios.
+    /// Computes the torques at zero acceleration without friction, with the change of the motors' ratios and torques
+    /// from outside.
     fn bias(&mut self) -> Result<(), SimulateError> {
-        if let Some(elastic) = &self.elastic {
-            let torque = elastic.torque(&self.middle, &self.mean_velocity);
-            bias_torque(
-                &self.model.chain,
-                &self.smooth,
-                &self.middle[1..],
-                &self.mean_velocity[1..],
-                &mut self.bias[1..],
-            )?;
-            self.bias[0] = torque;
-            self.bias[1] -= torque;
-            return Ok(());
-        }
+        let own = &mut self.joints;
+        self.elastic.links(&self.middle, &mut own.q);
+        self.elastic.links(&self.mean_velocity, &mut own.v);
         bias_torque(
             &self.model.chain,
             &self.smooth,
-            &self.middle,
-            &self.mean_velocity,
-            &mut self.bias,
+            &own.q,
+            &own.v,
+            &mut own.torque,
         )?;
+        for (torque, external) in own.torque.iter_mut().zip(&self.external) {
+            *torque -= external;
+        }
+        self.bias.fill(0.0);
+        for (torque, at) in own.torque.iter().zip(&self.elastic.at) {
+            self.bias[*at] = *torque;
+        }
         if let Some(motors) = &self.model.motors
             && !motors.transmission.is_constant()
         {
-            let n = self.bias.len();
-            // Accelerations of zero; `free` gets its values after this.
-            self.free.fill(0.0);
+            let joints = own.q.len();
+            // Accelerations of zero.
+            own.torque.fill(0.0);
             motors.transmission.motor_columns(
-                &self.middle,
-                &self.mean_velocity,
-                &self.free,
+                &self.middle[..joints],
+                &self.mean_velocity[..joints],
+                &own.torque,
                 &mut self.columns,
             )?;
-            for (i, row) in self.columns.chunks_exact(n * MOTOR_COLUMNS).enumerate() {
+            let rows = self.columns.chunks_exact(joints * MOTOR_COLUMNS);
+            for (i, row) in rows.enumerate() {
                 for (k, parameters) in motors.parameters.iter().enumerate() {
                     let place = k * MOTOR_COLUMNS + motor_column::INERTIA;
                     self.bias[i] += row[place] * parameters[motor_column::INERTIA];
                 }
             }
+        }
+        for gear in &self.elastic.gears {
+            let torque = gear.torque(&self.middle, &self.mean_velocity);
+            self.bias[gear.joint] += torque;
+            self.bias[gear.link] -= torque;
         }
         Ok(())
     }
@@ -189,12 +230,12 @@ impl<'a> Stepper<'a> {
             let row = self.mass[j * n..(j + 1) * n].iter();
             let inertia: f64 = row.zip(&self.acceleration).map(|(m, a)| m * a).sum();
             let rotor = self.smooth[j][column::DRIVE_INERTIA] * self.acceleration[j];
-            *load = match self.elastic {
+            *load = match self.elastic.gear(j) {
                 // Torque of the shaft without friction on the link's side. A law adds the torque that it transmits.
-                Some(elastic) => {
-                    let speed = self.mean_velocity[1];
+                Some(gear) => {
+                    let speed = self.mean_velocity[gear.link];
                     let friction = self.model.effects.friction(j, speed, speed.sgn());
-                    self.bias[0] - elastic.link_friction * friction
+                    gear.torque(&self.middle, &self.mean_velocity) - gear.link_friction * friction
                 }
                 None => self.bias[j] + inertia - rotor,
             };
@@ -217,37 +258,80 @@ impl<'a> Stepper<'a> {
     /// Advances positions `q` and velocities `v` (length n) by `dt` under the joint torques `torque`. With backlash or
     /// elasticity they belong to the motor; the link starts at rest behind it.
     ///
+    /// `external`: torques on the links, N·m or N, length n; empty for none. A force f at a point of the arm gives Jᵀ·f.
+    /// At a rigid joint they add to `torque`; behind an elastic gear they act on the link and not on the motor.
+    ///
     /// # Errors
-    /// [`SimulateError::Multibody`] if the inertia matrix is not positive definite, [`SimulateError::DrivingEffects`].
+    /// [`SimulateError::Multibody`] on wrong lengths, [`SimulateError::NotPositiveDefinite`],
+    /// [`SimulateError::DrivingEffects`].
     pub fn step(
         &mut self,
         q: &mut [f64],
         v: &mut [f64],
         torque: &[f64],
+        external: &[f64],
         dt: f64,
     ) -> Result<(), SimulateError> {
-        let Some(elastic) = self.elastic else {
+        if !(external.is_empty() || external.len() == self.loads.len()) {
+            return Err(SimulateError::Multibody(MultibodyError::WrongLength {
+                argument: "external",
+                expected: self.loads.len(),
+                found: external.len(),
+            }));
+        }
+        self.external.clear();
+        self.external.extend_from_slice(external);
+        if self.elastic.is_empty() {
             return self.advance(q, v, torque, dt);
-        };
-        let [at, speed] = match elastic.link {
-            Some(link) => link,
-            None => [elastic.at_rest(self.model, q[0])?, v[0]],
-        };
-        let (mut both, mut speeds) = ([q[0], at], [v[0], speed]);
-        let steps = elastic.steps(dt);
+        }
+        self.put_links_at_rest(q, v)?;
+        let joints = q.len();
+        let mut both = [q.to_vec(), v.to_vec()];
+        both[0].extend_from_slice(&self.elastic.q);
+        both[1].extend_from_slice(&self.elastic.v);
+        let steps = self.elastic.steps(self.model, q, dt)?;
+        let [positions, speeds] = &mut both;
         for _ in 0..steps {
-            self.advance(&mut both, &mut speeds, torque, dt / steps as f64)?;
+            self.advance(positions, speeds, torque, dt / steps as f64)
+                .map_err(|e| self.with_joint(e))?;
         }
-        (q[0], v[0]) = (both[0], speeds[0]);
-        if let Some(elastic) = &mut self.elastic {
-            elastic.link = Some([both[1], speeds[1]]);
-        }
+        q.copy_from_slice(&positions[..joints]);
+        v.copy_from_slice(&speeds[..joints]);
+        self.elastic.q.copy_from_slice(&positions[joints..]);
+        self.elastic.v.copy_from_slice(&speeds[joints..]);
         Ok(())
     }
 
-    /// Returns position and velocity of the link if it is a separate mass and has begun to move.
-    pub fn link(&self) -> Option<[f64; 2]> {
-        self.elastic.and_then(|e| e.link)
+    /// Puts the links behind gears with backlash or elasticity at rest under gravity, with their motors at `q` and at
+    /// the motors' velocities `v`. Does nothing if they have begun to move. The first step does the same.
+    ///
+    /// # Errors
+    /// [`SimulateError::Multibody`] on wrong lengths.
+    pub fn put_links_at_rest(&mut self, q: &[f64], v: &[f64]) -> Result<(), SimulateError> {
+        if self.elastic.is_empty() || self.elastic.moving {
+            return Ok(());
+        }
+        self.elastic.put_at_rest(self.model, q, v)
+    }
+
+    /// Returns position and velocity of the link of a joint (from 0) if it is a separate mass and has a state: after
+    /// the first step, or after [`Self::put_links_at_rest`].
+    pub fn link(&self, joint: usize) -> Option<[f64; 2]> {
+        let of = |gear: &super::elastic::Gear| gear.joint == joint;
+        let place = self.elastic.gears.iter().position(of)?;
+        (self.elastic.moving).then(|| [self.elastic.q[place], self.elastic.v[place]])
+    }
+
+    /// Returns the error with the number of a joint instead of a coordinate.
+    fn with_joint(&self, error: SimulateError) -> SimulateError {
+        let SimulateError::NotPositiveDefinite { joint } = error else {
+            return error;
+        };
+        let behind = (joint - 1).checked_sub(self.loads.len());
+        let gear = behind.and_then(|k| self.elastic.gears.get(k));
+        SimulateError::NotPositiveDefinite {
+            joint: gear.map_or(joint, |gear| gear.joint + 1),
+        }
     }
 
     fn advance(
@@ -325,11 +409,22 @@ impl<'a> Stepper<'a> {
     }
 }
 
+/// Copies the first rows and columns of a matrix with rows of `width` into one with rows of `to_width`.
+fn copy_rows(from: &[f64], width: usize, to: &mut [f64], to_width: usize) {
+    let columns = width.min(to_width);
+    for (from, to) in from.chunks_exact(width).zip(to.chunks_exact_mut(to_width)) {
+        to[..columns].copy_from_slice(&from[..columns]);
+    }
+}
+
 /// Returns the parameters without friction and offset, and without the drives' inertia if the gear is elastic.
 ///
 /// # Errors
 /// [`SimulateError::NegativeFriction`].
-fn without_friction(model: &Model, elastic: bool) -> Result<Vec<[f64; COLUMNS]>, SimulateError> {
+fn without_friction(
+    model: &Model,
+    elastic: &Elastic,
+) -> Result<Vec<[f64; COLUMNS]>, SimulateError> {
     let mut smooth = model.parameters.clone();
     for (joint, row) in smooth.iter_mut().enumerate() {
         for (place, name) in [(column::VISCOUS, "fv"), (column::COULOMB, "fc")] {
@@ -338,7 +433,7 @@ fn without_friction(model: &Model, elastic: bool) -> Result<Vec<[f64; COLUMNS]>,
         row[column::VISCOUS] = 0.0;
         row[column::COULOMB] = 0.0;
         row[column::OFFSET] = 0.0;
-        if elastic {
+        if elastic.gear(joint).is_some() {
             row[column::DRIVE_INERTIA] = 0.0;
         }
     }
@@ -350,12 +445,17 @@ fn without_friction(model: &Model, elastic: bool) -> Result<Vec<[f64; COLUMNS]>,
 ///
 /// # Errors
 /// [`SimulateError::NegativeFriction`].
-fn coulomb(model: &Model, elastic: Option<&Elastic>) -> Result<Vec<f64>, SimulateError> {
+fn coulomb(model: &Model, elastic: &Elastic) -> Result<Vec<f64>, SimulateError> {
     let mut coulomb: Vec<f64> = model
         .parameters
         .iter()
         .map(|p| p[column::COULOMB])
         .collect();
+    for gear in &elastic.gears {
+        let whole = coulomb[gear.joint];
+        coulomb[gear.joint] = (1.0 - gear.link_friction) * whole;
+        coulomb.push(gear.link_friction * whole);
+    }
     if let Some(motors) = &model.motors {
         let names = [
             (motor_column::VISCOUS, "fvm"),
@@ -367,11 +467,6 @@ fn coulomb(model: &Model, elastic: Option<&Elastic>) -> Result<Vec<f64>, Simulat
             }
             coulomb.push(row[motor_column::COULOMB]);
         }
-    }
-    if let Some(elastic) = elastic {
-        let whole = coulomb[0];
-        coulomb[0] = (1.0 - elastic.link_friction) * whole;
-        coulomb.push(elastic.link_friction * whole);
     }
     Ok(coulomb)
 }

@@ -53,7 +53,7 @@ fn swing(robot: &Robot, dt: f64, seconds: f64) -> (Vec<f64>, Vec<f64>) {
     let mut stepper = Stepper::new(&model).unwrap();
     let (mut q, mut v, none) = (vec![0.3; n], vec![0.0; n], vec![0.0; n]);
     for _ in 0..(seconds / dt).round() as usize {
-        stepper.step(&mut q, &mut v, &none, dt).unwrap();
+        stepper.step(&mut q, &mut v, &none, &[], dt).unwrap();
     }
     (q, v)
 }
@@ -100,7 +100,7 @@ fn below_breakaway_nothing_creeps() {
     let mut stepper = Stepper::new(&model).unwrap();
     let (mut q, mut v) = (vec![0.0], vec![0.0]);
     for _ in 0..600_000 {
-        stepper.step(&mut q, &mut v, &[0.0], 1e-4).unwrap();
+        stepper.step(&mut q, &mut v, &[0.0], &[], 1e-4).unwrap();
     }
     assert_eq!((q[0], v[0]), (0.0, 0.0));
 }
@@ -126,7 +126,7 @@ fn viscous_friction_decays_as_the_exponential() {
     let mut stepper = Stepper::new(&model).unwrap();
     let (mut q, mut v) = (vec![0.0], vec![2.0]);
     for _ in 0..2000 {
-        stepper.step(&mut q, &mut v, &[0.0], 1e-4).unwrap();
+        stepper.step(&mut q, &mut v, &[0.0], &[], 1e-4).unwrap();
     }
     let exact = 2.0 * (-0.6_f64 / 0.12 * 0.2).exp();
     assert!((v[0] / exact - 1.0).abs() < 1e-6);
@@ -220,7 +220,7 @@ fn throw(
     let mut sum = 0.5 * power(&q, &v);
     let steps = (seconds / dt).round() as usize;
     for k in 0..steps {
-        stepper.step(&mut q, &mut v, &[0.0; 5], dt).unwrap();
+        stepper.step(&mut q, &mut v, &[0.0; 5], &[], dt).unwrap();
         sum += if k + 1 == steps { 0.5 } else { 1.0 } * power(&q, &v);
     }
     (q, v, sum * dt)
@@ -282,7 +282,7 @@ fn a_motor_that_sticks_holds_the_joints_it_moves() {
     let start = robot.middle_position();
     let (mut q, mut v) = (start.clone(), vec![0.0; 5]);
     for _ in 0..20_000 {
-        stepper.step(&mut q, &mut v, &[0.0; 5], 1e-3).unwrap();
+        stepper.step(&mut q, &mut v, &[0.0; 5], &[], 1e-3).unwrap();
     }
     assert_eq!(q, start);
 }
@@ -297,7 +297,9 @@ fn model_and_simulation_agree_on_the_irp6_with_all_its_friction() {
     let torque = [150.0, -220.0, 90.0, -40.0, 25.0];
     let dt = 1e-6;
     let (mut next_q, mut next_v) = (q.clone(), v.to_vec());
-    stepper.step(&mut next_q, &mut next_v, &torque, dt).unwrap();
+    stepper
+        .step(&mut next_q, &mut next_v, &torque, &[], dt)
+        .unwrap();
     let acceleration: Vec<f64> = next_v.iter().zip(v).map(|(a, b)| (a - b) / dt).collect();
     let mut tau = [0.0; 5];
     model
@@ -347,9 +349,9 @@ fn pushed(robot: &Robot, torque: f64, seconds: f64) -> [[f64; 2]; 2] {
     let mut stepper = Stepper::new(&model).unwrap();
     let (mut q, mut v) = (vec![0.0], vec![0.0]);
     for _ in 0..(seconds / 1e-3).round() as usize {
-        stepper.step(&mut q, &mut v, &[torque], 1e-3).unwrap();
+        stepper.step(&mut q, &mut v, &[torque], &[], 1e-3).unwrap();
     }
-    [[q[0], v[0]], stepper.link().unwrap()]
+    [[q[0], v[0]], stepper.link(0).unwrap()]
 }
 
 #[test]
@@ -436,7 +438,7 @@ fn friction_that_differs_by_direction_is_a_constant_however_much_is_remembered()
         let (mut q, mut v) = (vec![0.0], vec![0.0]);
         for k in 0..4000 {
             let torque = 0.35 * (2e-3 * f64::from(k)).sin();
-            stepper.step(&mut q, &mut v, &[torque], 1e-3).unwrap();
+            stepper.step(&mut q, &mut v, &[torque], &[], 1e-3).unwrap();
         }
         q[0]
     };

@@ -10,8 +10,8 @@ use super::input::described;
 use super::overwrite::refuse_file;
 use super::ui::Ui;
 use rig_excite::{
-    Criterion, Design, Options, Parameters, PoseOptions, Poses, Scaling, StagedKind, StagedOptions,
-    design, poses, staged,
+    Criterion, Design, Effort, Options, Parameters, PoseOptions, Poses, Scaling, StagedKind,
+    StagedOptions, design_measured, poses, staged,
 };
 use rig_model::robot::Robot;
 
@@ -453,7 +453,8 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         threads: None,
     };
     let mut progress = ui.progress("designing the motion", 1);
-    let found = design(robot, &options, |done, total| progress.at_of(done, total))?;
+    let (found, effort) =
+        design_measured(robot, &options, |done, total| progress.at_of(done, total))?;
     drop(progress);
     for note in &found.notes {
         ui.remark(note);
@@ -474,6 +475,7 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     for line in summary(args.load, &found, robot) {
         ui.say(&line);
     }
+    ui.say(&speed_up(&effort));
     ui.say(&format!(
         "{}: the motion, {:.1} s from rest to rest. Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
         args.out.display(),
@@ -483,6 +485,25 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     ));
     ui.say(NOT_LOOKED_AT);
     Ok(())
+}
+
+/// Describes what the threads saved.
+fn speed_up(effort: &Effort) -> String {
+    let threads = match effort.threads {
+        1 => "one thread".to_owned(),
+        count => format!("{count} threads"),
+    };
+    let kind = if effort.processor {
+        "processor time"
+    } else {
+        "elapsed time, waiting for a processor included,"
+    };
+    format!(
+        "Search: {:.1} s of {kind} by {threads} in {:.1} s, {:.2} at the same time on average.",
+        effort.work.as_secs_f64(),
+        effort.wall.as_secs_f64(),
+        effort.speed_up()
+    )
 }
 
 /// Formats a condition number with its significant digits.
@@ -537,6 +558,13 @@ fn summary(load: bool, found: &Design, robot: &Robot) -> Vec<String> {
         lines.push(format!(
             "Joint \"{}\" stays within position {:.3} to {:.3}, velocity {:.3}, acceleration {:.3}{torque} (SI units).",
             joint.name, reach.position[0], reach.position[1], reach.velocity, reach.acceleration
+        ));
+    }
+    for (joint, reach) in robot.joints.iter().zip(&found.motors) {
+        let torque = (reach.torque).map_or(String::new(), |t| format!(", torque {t:.4} N·m"));
+        lines.push(format!(
+            "The motor of joint \"{}\" stays within angle {:.3} to {:.3} rad, speed {:.3} rad/s{torque} (motor side).",
+            joint.name, reach.position[0], reach.position[1], reach.velocity
         ));
     }
     for edge in &found.clearances {

@@ -6,6 +6,7 @@
 mod boot;
 mod budget;
 mod circle;
+mod dynamics;
 mod faults;
 mod hardware;
 mod identification;
@@ -28,13 +29,18 @@ type BoardSession = Session<EmulatedPort<Line>>;
 
 /// The image under test.
 fn image() -> Image {
-    let path = std::env::var_os("RIG_FIRMWARE_ELF").map_or_else(
+    image_of("RIG_FIRMWARE_ELF", "rig-firmware")
+}
+
+/// An image: that of the environment variable, or `name` from where the build puts it.
+fn image_of(variable: &str, name: &str) -> Image {
+    let path = std::env::var_os(variable).map_or_else(
         || {
             let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
                 || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../target"),
                 PathBuf::from,
             );
-            target.join("thumbv7em-none-eabihf/chip/rig-firmware")
+            target.join("thumbv7em-none-eabihf/chip").join(name)
         },
         PathBuf::from,
     );

@@ -55,6 +55,18 @@ impl Robot {
         if !coupled.is_empty() {
             remarks.push(format!("URDF has no place for drives that move several joints or do so at a changing ratio: {}; inertia and friction of their motors beyond the joints' own are left out.", coupled.join(", ")));
         }
+        let limited: Vec<&str> = self
+            .joints
+            .iter()
+            .filter(|joint| joint.drive.as_ref().is_some_and(|d| d.limits.is_some()))
+            .map(|joint| joint.name.as_str())
+            .collect();
+        if !limited.is_empty() {
+            remarks.push(format!(
+                "URDF has no place for limits of the motors ([joint.drive.limits]): {}.",
+                limited.join(", ")
+            ));
+        }
         if !self.effects.is_empty() {
             let entries: Vec<String> = self.effects.iter().map(|e| self.effect_text(e)).collect();
             remarks.push(format!(

@@ -1,0 +1,176 @@
+//! Limits of the motors, on their side: the IRp-6 with screws and a coupled wrist, and a simple drive.
+
+use rand::SeedableRng;
+use rig_model::robot::{IRP6_TEMPLATE, MotorLimits};
+
+use super::*;
+use crate::criterion::Smoothing;
+use crate::optimise::Round;
+use crate::problem::Problem;
+use crate::search::random_motion;
+use crate::{StagedKind, StagedOptions, staged};
+
+fn irp6() -> Robot {
+    Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap()
+}
+
+fn options() -> Options {
+    Options {
+        harmonics: 2,
+        starts: 2,
+        criterion: Criterion::Determinant,
+        ..Options::default()
+    }
+}
+
+/// Lowest and highest angle, highest speed and highest torque of each motor at samples of a motion.
+fn of_motors(robot: &Robot, file: &TrajectoryFile) -> Vec<([f64; 2], f64, f64)> {
+    let model = Model::from_robot(robot).unwrap();
+    let transmission = robot.transmission().unwrap();
+    let n = robot.joints.len();
+    let mut found = vec![([f64::INFINITY, f64::NEG_INFINITY], 0.0_f64, 0.0_f64); n];
+    let duration = file.duration();
+    for k in 0..=4000 {
+        let t = duration * f64::from(k) / 4000.0;
+        let at = |joint: &JointTrajectory| joint.trajectory.at(t);
+        let q: Vec<f64> = file
+            .joints
+            .iter()
+            .map(|j| j.start + at(j).position)
+            .collect();
+        let qd: Vec<f64> = file.joints.iter().map(|j| at(j).velocity).collect();
+        let qdd: Vec<f64> = file.joints.iter().map(|j| at(j).acceleration).collect();
+        let [mut tau, mut psi, mut psid, mut torque] = [(); 4].map(|()| vec![0.0; n]);
+        model.inverse_dynamics(&q, &qd, &qdd, &mut tau).unwrap();
+        transmission.motor_position(&q, &mut psi).unwrap();
+        transmission.motor_velocity(&q, &qd, &mut psid).unwrap();
+        transmission.motor_torque(&q, &tau, &mut torque).unwrap();
+        for j in 0..n {
+            let (range, speed, most) = &mut found[j];
+            *range = [range[0].min(psi[j]), range[1].max(psi[j])];
+            *speed = speed.max(psid[j].abs());
+            *most = most.max(torque[j].abs());
+        }
+    }
+    found
+}
+
+/// The IRp-6 with limits of its motors: angles and speeds below what a motion without them uses, and so the torque of
+/// the column. The other torques hold gravity and friction for the most part, which no slower motion lowers.
+fn limited() -> (Robot, Vec<([f64; 2], f64, f64)>) {
+    let mut robot = irp6();
+    let free = of_motors(&robot, &designed(&robot, &options()).file);
+    let motors = robot.joints.iter_mut().zip(&free).enumerate();
+    for (k, (joint, ([low, high], speed, torque))) in motors {
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        joint.drive.as_mut().unwrap().limits = Some(MotorLimits {
+            position: Some([middle - 0.8 * half, middle + 0.8 * half]),
+            velocity: Some(0.7 * speed),
+            torque: Some(if k == 0 { 0.85 } else { 1.5 } * torque),
+        });
+    }
+    (robot, free)
+}
+
+#[test]
+fn the_irp6_keeps_the_limits_of_its_motors() {
+    let (robot, free) = limited();
+    let found = designed(&robot, &options());
+    assert_eq!(found.motors.len(), 5);
+    let sampled = of_motors(&robot, &found.file);
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let limits = joint.drive.as_ref().unwrap().limits.clone().unwrap();
+        let ([low, high], speed, torque) = sampled[j];
+        let [lowest, highest] = limits.position.unwrap();
+        let name = &joint.name;
+        assert!(lowest <= low && high <= highest, "{name}: {low} {high}");
+        assert!(speed <= limits.velocity.unwrap(), "{name}: {speed}");
+        assert!(torque <= limits.torque.unwrap(), "{name}: {torque}");
+        // What is proved encloses the samples, and closely.
+        let proved = &found.motors[j];
+        let width = 0.02 * (highest - lowest);
+        assert!(proved.position[0] <= low && low <= proved.position[0] + width);
+        assert!(high <= proved.position[1] && proved.position[1] <= high + width);
+        assert!(speed <= proved.velocity && proved.velocity <= 1.05 * speed);
+        let most = proved.torque.unwrap();
+        println!("{name}: torque {torque} N·m, proved {most} N·m");
+        assert!(torque <= most && most <= limits.torque.unwrap());
+        // Without the limits the motion exceeds them.
+        assert!(free[j].1 > limits.velocity.unwrap());
+        assert!(j > 0 || free[j].2 > limits.torque.unwrap());
+    }
+}
+
+#[test]
+fn the_gradient_of_motor_limits_is_that_of_differences() {
+    let (robot, _) = limited();
+    let (frame, _, _) = frame_of(&robot, &options()).unwrap();
+    let mut problem = Problem::new(&frame, 12, Smoothing(4));
+    let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+    let x = random_motion(&mut problem, &frame, &mut random);
+    let round = Round {
+        weight: 10.0,
+        smoothing: Smoothing(4),
+        steps: 1,
+    };
+    problem.update(&x, &round);
+    problem.press(30.0);
+    gradient_is_that_of_differences(&mut problem, &x, 1e-5);
+}
+
+#[test]
+fn a_simple_drive_narrows_the_limits_of_its_joint() {
+    let mut robot = one_link();
+    let limits = robot.joints[0].limits.clone().unwrap();
+    let drive = robot.joints[0].drive.as_mut().unwrap();
+    let ratio = drive.gear_ratio;
+    drive.limits = Some(MotorLimits {
+        velocity: Some(0.5 * limits.velocity * ratio),
+        ..MotorLimits::default()
+    });
+    let found = designed(&robot, &options());
+    assert!(found.reach[0].velocity <= 0.5 * limits.velocity);
+    let note = found
+        .notes
+        .iter()
+        .find(|n| n.contains("[joint.drive.limits]"));
+    assert!(
+        note.is_some_and(|n| n.contains("velocity")),
+        "{:?}",
+        found.notes
+    );
+    robot.joints[0].drive.as_mut().unwrap().limits = Some(MotorLimits {
+        position: Some([1e5, 2e5]),
+        ..MotorLimits::default()
+    });
+    let refused = design(&robot, &options(), |_, _| ()).unwrap_err();
+    assert!(refused.to_string().contains("motor angle"), "{refused}");
+}
+
+#[test]
+fn a_motion_of_one_joint_keeps_the_limits_of_all_motors() {
+    let mut robot = irp6();
+    let upper = robot.joint_index("upper_arm").unwrap();
+    let options = StagedOptions {
+        joint: Some("upper_arm".into()),
+        ..StagedOptions::default()
+    };
+    let made = |robot: &Robot| staged(robot, StagedKind::Staircase, &options);
+    let (file, _) = made(&robot).unwrap();
+    let free = of_motors(&robot, &file)[upper].1;
+    robot.joints[upper].drive.as_mut().unwrap().limits = Some(MotorLimits {
+        velocity: Some(0.6 * free),
+        ..MotorLimits::default()
+    });
+    let (file, _) = made(&robot).unwrap();
+    assert!(of_motors(&robot, &file)[upper].1 <= 0.6 * free);
+    robot.joints[upper].drive.as_mut().unwrap().limits = Some(MotorLimits {
+        torque: Some(1e-3),
+        ..MotorLimits::default()
+    });
+    let refused = made(&robot).unwrap_err().to_string();
+    assert!(
+        refused.contains("motor torque") && refused.contains("upper_arm"),
+        "{refused}"
+    );
+}

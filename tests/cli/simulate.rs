@@ -1,0 +1,104 @@
+//! `rig simulate` of an arm whose gears are elastic or have backlash.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::run::{refuse, rig, robot, succeed};
+
+fn simulate(robot: &Path, trajectory: &Path, out: &Path) -> Command {
+    let mut command = rig();
+    command.args(["simulate", "--rate", "200", "--robot"]);
+    command.arg(robot).arg("--trajectory").arg(trajectory);
+    command.arg("--out").arg(out);
+    command
+}
+
+/// A column of a recording.
+fn column(path: &Path, name: &str) -> Vec<f64> {
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let place = header.iter().position(|own| own.trim() == name).unwrap();
+    lines
+        .map(|line| line.split(',').nth(place).unwrap().trim().parse().unwrap())
+        .collect()
+}
+
+#[test]
+fn gears_of_an_arm_with_coupled_drives_are_simulated() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let plain = fs::read_to_string(robot("irp6.toml")).unwrap();
+    let with =
+        |joint: &str, rest: &str| format!("{plain}\n[[effect]]\njoint = \"{joint}\"\n{rest}\n");
+    let soft = "kind = \"joint_elasticity\"\nstiffness = 4.0e3\ndamping = 5.0\nlink_friction = 0.2";
+    let loose =
+        "kind = \"backlash\"\ngap = 0.01\nstiffness = 3.0e3\ndamping = 3.0\nlink_friction = 0.0";
+    fs::write(at("soft.toml"), with("upper_arm", soft)).unwrap();
+    let both = format!(
+        "{}\n[[effect]]\njoint = \"wrist_tilt\"\n{loose}\n",
+        with("upper_arm", soft)
+    );
+    fs::write(at("both.toml"), both).unwrap();
+    let mut excite = rig();
+    excite.args([
+        "excite",
+        "--kind",
+        "staircase",
+        "--joint",
+        "upper_arm",
+        "--robot",
+    ]);
+    excite
+        .arg(robot("irp6.toml"))
+        .arg("--out")
+        .arg(at("motion.toml"));
+    succeed(&mut excite);
+    let motion = at("motion.toml");
+    succeed(&mut simulate(
+        &robot("irp6.toml"),
+        &motion,
+        &at("stiff.csv"),
+    ));
+    for name in ["soft", "both"] {
+        let description = at(&format!("{name}.toml"));
+        succeed(&mut simulate(
+            &description,
+            &motion,
+            &at(&format!("{name}.csv")),
+        ));
+    }
+    let speed = |name: &str, joint: usize| column(&at(name), &format!("qd{joint}"));
+    let apart = |a: &[f64], b: &[f64]| {
+        let sum: f64 = a.iter().zip(b).map(|(x, y)| (x - y).powi(2)).sum();
+        (sum / a.len() as f64).sqrt()
+    };
+    let stiff = speed("stiff.csv", 3);
+    let off = apart(&stiff, &speed("soft.csv", 3));
+    let most = stiff.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    // The elastic gear is seen in the motor's speed, and the motor still follows.
+    assert!(off > 1e-4 * most && off < 0.2 * most, "{off} of {most}");
+    // Backlash at the wrist is seen there.
+    let [one, other] = ["soft.csv", "both.csv"].map(|name| speed(name, 4));
+    assert!(apart(&one, &other) > 1e-6, "{}", apart(&one, &other));
+    // The same input gives the same bytes.
+    succeed(&mut simulate(&at("both.toml"), &motion, &at("again.csv")));
+    assert_eq!(
+        fs::read(at("both.csv")).unwrap(),
+        fs::read(at("again.csv")).unwrap()
+    );
+    // A gear without a mass before it cannot be simulated.
+    let massless = with("column", soft).replace("rotor_inertia = 2.0e-4", "rotor_inertia = 0.0");
+    fs::write(at("massless.toml"), massless).unwrap();
+    let said = refuse(&mut simulate(
+        &at("massless.toml"),
+        &motion,
+        &at("none.csv"),
+    ));
+    assert!(
+        said.contains("rotor_inertia") && said.contains("column"),
+        "{said}"
+    );
+    assert!(!at("none.csv").exists());
+}
