@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod cases;
+mod compare;
 mod diagnose;
 mod excite;
 mod friction_map;

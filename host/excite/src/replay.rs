@@ -10,7 +10,7 @@ use super::random::drawn;
 use super::wrist_readings::{Carried, WristReadings, wrench_columns};
 use super::{ExciteError, SampledReference};
 use rig_data::{Column, RecordingWriter};
-use rig_model::robot::Robot;
+use rig_model::robot::{Joint, JointKind, Robot};
 use rig_model::simulate::{
     Inputs, Model, Motion, STAND_IN_BANDWIDTH, Since, closed_loop_watched, controllers,
 };
@@ -336,6 +336,23 @@ fn feed_forward(
 }
 
 impl Replay {
+    /// Rounds the positions to the described encoders: 2π/(counts · gear ratio) of a revolute joint. Velocities keep
+    /// their values, because no description tells how the robot derives them. Returns one note for each joint that is
+    /// not rounded: without `encoder_counts_per_rev`, prismatic, or with a drive of varying or coupled ratio.
+    pub fn quantise(&mut self, robot: &Robot) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (q, joint) in self.motion.q.iter_mut().zip(&robot.joints) {
+            match encoder_step(joint) {
+                Ok(step) => q.iter_mut().for_each(|q| *q = (*q / step).round() * step),
+                Err(why) => notes.push(format!(
+                    "The position of joint {} is not quantised: {why}.",
+                    joint.name
+                )),
+            }
+        }
+        notes
+    }
+
     /// Writes the recording: t, per joint q, qd, tau and ref, and the wrist sensor's readings if there are any. The file is written completely or not at all.
     ///
     /// # Errors
@@ -377,4 +394,15 @@ impl Replay {
         }
         Ok(writer.finish()?)
     }
+}
+
+/// Returns the step of a joint's encoder, rad, or why it has none.
+fn encoder_step(joint: &Joint) -> Result<f64, &'static str> {
+    let none = "its description has no encoder_counts_per_rev";
+    let drive = joint.drive.as_ref().ok_or(none)?;
+    let counts = drive.encoder_counts_per_rev.ok_or(none)?;
+    if joint.kind != JointKind::Revolute || drive.screw.is_some() || !drive.couples.is_empty() {
+        return Err("its drive has no constant ratio of a revolute joint");
+    }
+    Ok(core::f64::consts::TAU / (counts * drive.gear_ratio).abs())
 }

@@ -40,6 +40,12 @@ pub enum CommandError {
     /// Identification of a load.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// Comparison of results.
+    #[error(transparent)]
+    Compare(#[from] rig_compare::CompareError),
+    /// A simulated comparison.
+    #[error(transparent)]
+    SimulatedComparison(#[from] rig_compare::SimulationError),
     /// Identification.
     #[error(transparent)]
     Identify(#[from] IdentifyError),

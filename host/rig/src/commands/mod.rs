@@ -6,6 +6,7 @@ mod audit;
 mod base;
 mod board;
 mod chain_arg;
+mod compare;
 mod demo;
 mod diagnose;
 mod error;
@@ -62,6 +63,7 @@ enum Command {
     Validate(validate::Args),
     Diagnose(diagnose::Args),
     Load(load::Args),
+    Compare(compare::Args),
 }
 
 impl Cli {
@@ -88,6 +90,7 @@ impl Cli {
             Some(Command::Validate(args)) => validate::run(&args, &ui),
             Some(Command::Diagnose(args)) => diagnose::run(&args, &ui),
             Some(Command::Load(args)) => load::run(&args, &ui),
+            Some(Command::Compare(args)) => compare::run(&args, &ui),
         }
     }
 }

@@ -50,6 +50,9 @@ pub(crate) struct Args {
     /// Standard deviation of the noise on torques, N·m or N
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) noise_torque: f64,
+    /// Round the positions to the described encoders (encoder_counts_per_rev), after the noise
+    #[arg(long)]
+    pub(crate) quantised: bool,
     /// Load at the flange (.toml with mass, first_moment and inertia in the flange frame)
     #[arg(long)]
     pub(crate) load: Option<PathBuf>,
@@ -116,8 +119,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     let mut progress = ui.progress("simulating", 1);
     let tell = |done, total| progress.at_of(done, total);
-    let done = replay_carrying(&robot, &carried, &reference, noise, args.seed, tell)?;
+    let mut done = replay_carrying(&robot, &carried, &reference, noise, args.seed, tell)?;
     drop(progress);
+    if args.quantised {
+        for note in done.quantise(&robot) {
+            ui.remark(&note);
+        }
+    }
     done.save(&args.out, &robot)?;
     for note in &done.notes {
         ui.remark(note);
@@ -193,6 +201,12 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError
         return Err(CommandError::Sentence(format!(
             "--noise-torque {} has no effect on joint {}, which is simulated under voltage and has no torque column; leave it out.",
             args.noise_torque, robot.joints[0].name
+        )));
+    }
+    if args.quantised {
+        return Err(CommandError::Sentence(format!(
+            "--quantised has no effect on joint {}, which is simulated under voltage; leave it out.",
+            robot.joints[0].name
         )));
     }
     let of_the_load = args.load.as_ref().map(|_| "--load");

@@ -3,6 +3,7 @@
 //! This module only composes each page as a [`Document`](rig_report::Document). It computes no new results and uses no
 //! files or clock.
 
+mod compare;
 mod context;
 mod demo;
 mod diagnosis;
@@ -13,12 +14,14 @@ mod identification;
 mod load;
 mod parts;
 mod residuals;
+mod simulated;
 #[cfg(test)]
 mod tests;
 mod treatment;
 mod validation;
 mod validation_voltage;
 
+pub use compare::compare;
 pub use context::Context;
 pub use demo::{
     DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo, tracking_plot,
@@ -27,5 +30,6 @@ pub use diagnosis::{PICTURE_NAMES, diagnosis, pictures, verdict};
 pub use friction_map::friction_map;
 pub use identification::identification;
 pub use load::load;
+pub use simulated::{simulated_overview, simulated_robot};
 pub use validation::validation;
 pub use validation_voltage::validation_voltage;

@@ -1,0 +1,255 @@
+//! Causes of a difference, as hypotheses with their likelihoods.
+//!
+//! Each hypothesis lets a part of the parameters differ between the sets, and the rest is common: y_s = μ + D·δ_s + e_s
+//! with the full covariance of e_s, or y_s = a_s·μ + e_s for a scale of all torques. The remaining sum of squares tells
+//! whether the hypothesis explains the difference. Hypotheses are compared by Akaike's criterion (1974), χ² + 2·(number
+//! of free values); exp(difference/2) are the odds against the worse one (Burnham and Anderson 2002).
+//!
+//! Leaves out: two causes at once, and changes that depend on the motion. The errors are those within the sets. An error
+//! of the model that changes with the motion therefore looks like a difference that no hypothesis explains.
+
+use nalgebra::{DMatrix, DVector};
+use rig_shared::multibody::{COLUMNS, INERTIAL_PARAMETERS, column};
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
+
+use crate::common::Common;
+use crate::matrices::{inverse, quadratic, symmetric_pseudo_inverse};
+use crate::result::{Causes, Hypothesis};
+use crate::significance::{LEVEL, chi2_p};
+
+/// Odds against every other hypothesis from which a cause is named.
+pub const ODDS: f64 = 20.0;
+/// Largest number of steps to the scales, and their relative change at the end.
+const SCALE_STEPS: (usize, f64) = (100, 1e-10);
+
+/// Tests all hypotheses. `combination` and `columns` are those of all parameters; the robot has `joints` joints.
+pub(crate) fn causes(
+    common: &Common,
+    names: &[String],
+    combination: &DMatrix<f64>,
+    columns: &[usize],
+    joints: usize,
+) -> Option<Causes> {
+    let own: Vec<usize> = common.parameters.iter().map(|&k| columns[k]).collect();
+    let units = |of: &dyn Fn(usize) -> bool| {
+        let chosen: Vec<usize> = (0..own.len()).filter(|&k| of(own[k])).collect();
+        DMatrix::identity(own.len(), own.len()).select_columns(&chosen)
+    };
+    let motor = |c: usize| c.checked_sub(COLUMNS * joints).map(|m| m % MOTOR_COLUMNS);
+    let friction = units(&|c| match motor(c) {
+        Some(which) => which != motor_column::INERTIA,
+        None => matches!(c % COLUMNS, column::VISCOUS | column::COULOMB),
+    });
+    let offset = units(&|c| motor(c).is_none() && c % COLUMNS == column::OFFSET);
+    let gravity = units(&|c| {
+        motor(c).is_none() && (c % COLUMNS == column::OFFSET || (1..=3).contains(&(c % COLUMNS)))
+    });
+    let last = COLUMNS * (joints - 1);
+    let payload = combination
+        .select_rows(&common.parameters)
+        .columns(last, INERTIAL_PARAMETERS)
+        .into_owned();
+    let all = DMatrix::identity(own.len(), own.len());
+    let mut found = vec![
+        differing(
+            common,
+            "nothing",
+            "nothing; chance alone",
+            &DMatrix::zeros(own.len(), 0),
+        )?,
+        scaled(common)?,
+        differing(
+            common,
+            "friction",
+            "viscous and Coulomb friction",
+            &friction,
+        )?,
+        differing(common, "offset", "constant torques", &offset)?,
+        differing(
+            common,
+            "gravity",
+            "first moments and constant torques",
+            &gravity,
+        )?,
+        differing(
+            common,
+            "payload",
+            "the ten inertial parameters of the last link",
+            &payload,
+        )?,
+        differing(common, "anything", "every parameter", &all)?,
+    ];
+    rate(&mut found);
+    let (named, sentence) = answer(&found, names);
+    Some(Causes {
+        hypotheses: found,
+        named,
+        sentence,
+    })
+}
+
+/// Returns the hypothesis that D·δ_s differs between the sets.
+fn differing(
+    common: &Common,
+    name: &'static str,
+    what: &'static str,
+    d: &DMatrix<f64>,
+) -> Option<Hypothesis> {
+    let c = common.parameters.len();
+    let mut free = 0;
+    let mut weights = Vec::with_capacity(common.weights.len());
+    for (s, weight) in common.weights.iter().enumerate() {
+        // The first set fixes what is common; in the others D·δ is fitted, which removes it from the weight.
+        if s == 0 || d.ncols() == 0 {
+            weights.push(weight.clone());
+            continue;
+        }
+        let along = weight * d;
+        let (inner, rank) = symmetric_pseudo_inverse(&(d.transpose() * &along));
+        free += rank;
+        weights.push(weight - &along * inner * along.transpose());
+    }
+    let chi2 = if free == c * (common.values.len() - 1) {
+        0.0
+    } else {
+        common.about_mean(&weights)?.1
+    };
+    Some(hypothesis(common, name, what, free, chi2))
+}
+
+fn hypothesis(
+    common: &Common,
+    name: &'static str,
+    what: &'static str,
+    free: usize,
+    chi2: f64,
+) -> Hypothesis {
+    let all = common.parameters.len() * (common.values.len() - 1);
+    let degrees_of_freedom = all.saturating_sub(free);
+    let p = chi2_p(chi2, degrees_of_freedom);
+    Hypothesis {
+        name,
+        what,
+        free,
+        chi2,
+        degrees_of_freedom,
+        p,
+        log_likelihood_ratio: 0.0,
+        aic: chi2 + 2.0 * free as f64,
+        odds_against: 1.0,
+        explains: p >= LEVEL,
+        scales: Vec::new(),
+    }
+}
+
+/// Returns the hypothesis that all torques of a set have one scale of their own.
+fn scaled(common: &Common) -> Option<Hypothesis> {
+    let n = common.values.len();
+    let c = common.parameters.len();
+    let mut scales = vec![1.0; n];
+    let mut mean = common.about_mean(&common.weights)?.0;
+    for _ in 0..SCALE_STEPS.0 {
+        let mut change = 0.0f64;
+        for s in 1..n {
+            let along = &common.weights[s] * &mean;
+            let scale = along.dot(&common.values[s]) / along.dot(&mean);
+            change = change.max((scale - scales[s]).abs());
+            scales[s] = scale;
+        }
+        let (mut sum, mut right) = (DMatrix::zeros(c, c), DVector::zeros(c));
+        for ((weight, y), a) in common.weights.iter().zip(&common.values).zip(&scales) {
+            sum += weight * (a * a);
+            right += weight * y * *a;
+        }
+        mean = inverse(&sum)? * right;
+        if change < SCALE_STEPS.1 {
+            break;
+        }
+    }
+    let chi2 = (0..n)
+        .map(|s| quadratic(&common.weights[s], &(&common.values[s] - &mean * scales[s])))
+        .sum();
+    let own = |s: usize| match s {
+        0 => [1.0, 0.0],
+        _ => {
+            let by_first = 1.0 / quadratic(&common.weights[0], &mean);
+            let by_own = 1.0 / quadratic(&common.weights[s], &mean);
+            [scales[s], (by_own + scales[s].powi(2) * by_first).sqrt()]
+        }
+    };
+    let scales = (0..n).map(own).collect();
+    Some(Hypothesis {
+        scales,
+        ..hypothesis(common, "scale", "one scale of all torques", n - 1, chi2)
+    })
+}
+
+/// Compares the hypotheses with each other and sorts them, the best first.
+fn rate(list: &mut [Hypothesis]) {
+    let nothing = list
+        .iter()
+        .find(|h| h.name == "nothing")
+        .map_or(0.0, |h| h.chi2);
+    let best = list.iter().map(|h| h.aic).fold(f64::INFINITY, f64::min);
+    for h in list.iter_mut() {
+        h.log_likelihood_ratio = 0.5 * (nothing - h.chi2);
+        h.aic -= best;
+        h.odds_against = (0.5 * h.aic).exp();
+    }
+    list.sort_by(|a, b| a.aic.total_cmp(&b.aic));
+}
+
+/// Returns the name of the cause, if one can be given, and the answer in words.
+fn answer(list: &[Hypothesis], names: &[String]) -> (Option<String>, String) {
+    let Some(best) = list.first() else {
+        return (None, String::new());
+    };
+    let ties: Vec<&Hypothesis> = (list.iter())
+        .filter(|h| h.explains && h.odds_against < ODDS)
+        .collect();
+    match ties.as_slice() {
+        [] if list.iter().all(|h| !h.explains || h.name == "anything") => (
+            None,
+            "None of the tested causes explains the difference: its remainder is larger than chance for each of them. The sets differ in several ways at once, or the model has an error that depends on the motion.".into(),
+        ),
+        [only] if only.name == "nothing" => (
+            Some("nothing".into()),
+            "Chance alone explains the difference: no cause is needed.".into(),
+        ),
+        [only] if only.name == "anything" => (
+            None,
+            "None of the tested causes explains the difference better than one of all parameters: the sets differ in several ways at once, or the model has an error that depends on the motion.".into(),
+        ),
+        [only] => {
+            let sizes: Vec<String> = (only.scales.iter().zip(names).skip(1))
+                .map(|([scale, std], name)| {
+                    format!(
+                        "{name} {:+.2} % ± {:.2} % relative to {}",
+                        100.0 * (scale - 1.0),
+                        100.0 * std,
+                        names[0]
+                    )
+                })
+                .collect();
+            let sizes = match sizes.is_empty() {
+                true => String::new(),
+                false => format!(" ({})", sizes.join(", ")),
+            };
+            (
+                Some(only.name.into()),
+                format!(
+                    "The difference is in {}{sizes}. This explains it (remainder χ² {:.1} with {} degrees of freedom, p = {:.2}); every other hypothesis is at least {ODDS:.0} times less likely.",
+                    only.what, only.chi2, only.degrees_of_freedom, only.p
+                ),
+            )
+        }
+        several => (
+            None,
+            format!(
+                "Several causes explain the difference about equally well: {}. The odds against the last of them are {:.1} to 1.",
+                several.iter().map(|h| h.what).collect::<Vec<_>>().join("; "),
+                several.last().map_or(best.odds_against, |h| h.odds_against)
+            ),
+        ),
+    }
+}

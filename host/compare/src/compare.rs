@@ -1,0 +1,279 @@
+//! From recordings to a comparison.
+
+use std::collections::BTreeSet;
+
+use rig_identify::Base;
+use rig_model::robot::Robot;
+
+use crate::basis::Basis;
+use crate::causes::causes;
+use crate::common::Common;
+use crate::error::CompareError;
+use crate::grade::{Graded, grade};
+use crate::identified_set::IdentifiedSet;
+use crate::options::CompareOptions;
+use crate::pool::{Pool, pool};
+use crate::result::{
+    Comparison, Heterogeneity, JointTest, Pooled, PooledParameter, SetSummary, SetValue,
+};
+use crate::set::RecordingSet;
+use crate::significance::{LEVEL, chi2_p, holm};
+use crate::single::{Single, Spread, spread};
+use crate::torque::torque_matrix;
+use crate::trades::trades;
+
+/// Compares the parameters that several sets of recordings of one robot give. Memory does not grow with the recordings.
+///
+/// # Errors
+/// [`CompareError`]: fewer than two sets, two of a name, a set that cannot be identified.
+pub fn compare(
+    robot: &Robot,
+    sets: &[RecordingSet],
+    options: &CompareOptions,
+) -> Result<Comparison, CompareError> {
+    if sets.len() < 2 {
+        return Err(CompareError::TooFew(sets.len()));
+    }
+    if !(options.tolerance > 0.0 && options.tolerance.is_finite()) {
+        return Err(CompareError::Tolerance(options.tolerance));
+    }
+    let mut names = BTreeSet::new();
+    if let Some(twice) = sets.iter().find(|s| !names.insert(&s.name)) {
+        return Err(CompareError::TwoOfAName(twice.name.clone()));
+    }
+    let base = Base::structural(
+        robot,
+        rig_identify::ModelKind::Differential,
+        options.identify.seed,
+    )
+    .map_err(|e| CompareError::Model(e.to_string()))?;
+    let identified = sets
+        .iter()
+        .map(|set| IdentifiedSet::of(robot, &base, set, &options.identify))
+        .collect::<Result<Vec<_>, _>>()?;
+    compared(robot, &base, sets, &identified, options)
+}
+
+/// Compares identified sets.
+fn compared(
+    robot: &Robot,
+    base: &Base,
+    given: &[RecordingSet],
+    sets: &[IdentifiedSet],
+    options: &CompareOptions,
+) -> Result<Comparison, CompareError> {
+    let basis = Basis::of(base, sets);
+    let singles = singles(sets, &basis);
+    let alone: Vec<Vec<Single>> = (singles.iter())
+        .map(|list| list.iter().map(|(_, single)| *single).collect())
+        .collect();
+    let spreads: Vec<Option<Spread>> = (alone.iter())
+        .map(|own| (own.len() > 1).then(|| spread(own)))
+        .collect();
+    let between: Vec<f64> = (spreads.iter())
+        .map(|s| s.map_or(0.0, |s| s.between))
+        .collect();
+    let pooled = pool(sets, &basis, &alone, &between)?;
+    let parameters = parameters(&basis, &singles, &spreads, &pooled);
+    let common = Common::of(sets, &basis)?;
+    let joint_test = joint_test(&common);
+    let names: Vec<String> = sets.iter().map(|s| s.name.clone()).collect();
+    let causes = joint_test.and_then(|_| {
+        causes(
+            &common,
+            &names,
+            &basis.combination,
+            &basis.columns,
+            robot.joints.len(),
+        )
+    });
+    let joints = robot.joints.iter().map(|j| j.name.clone()).collect();
+    let torque = torque_matrix(sets, &basis, &pooled.values, joints);
+    let without = without(&common);
+    let (grade, reasons) = grade(&Graded {
+        names: &names,
+        parameters: &parameters,
+        joint: joint_test.as_ref(),
+        without: &without,
+        torque: &torque,
+        causes: causes.as_ref(),
+        tolerance: options.tolerance,
+    });
+    Ok(Comparison {
+        schema: "rig-compare/1",
+        robot: robot.name.clone(),
+        model: options.identify.model,
+        estimator: options.identify.estimator,
+        tolerance: options.tolerance,
+        level: LEVEL,
+        grade,
+        reasons,
+        sets: summaries(given, sets, &basis),
+        parameters,
+        joint_test,
+        without,
+        trades: match joint_test {
+            Some(_) => trades(sets, &basis, &common),
+            None => Vec::new(),
+        },
+        causes,
+        torque,
+        warnings: warnings(sets),
+        pooled: Pooled {
+            combination: basis.combination,
+            columns: basis.columns,
+            values: pooled.values.as_slice().to_vec(),
+            covariance: pooled.covariance,
+            sizes: sizes(sets),
+            band: sets.first().map(|s| s.found.details.treatment.band()),
+        },
+    })
+}
+
+/// Returns, by parameter, the sets that show it with their values.
+fn singles(sets: &[IdentifiedSet], basis: &Basis) -> Vec<Vec<(usize, Single)>> {
+    let own: Vec<_> = (sets.iter().zip(&basis.from_set))
+        .map(|(set, from)| {
+            (
+                from * &set.values,
+                from * &set.covariance * from.transpose(),
+            )
+        })
+        .collect();
+    (0..basis.len())
+        .map(|k| {
+            (0..sets.len())
+                .filter(|&s| basis.shown[s][k])
+                .map(|s| {
+                    let (values, covariance) = &own[s];
+                    let single = Single {
+                        value: values[k],
+                        variance: covariance[(k, k)].max(f64::MIN_POSITIVE),
+                        freedom: sets[s].freedom(),
+                    };
+                    (s, single)
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// Puts the results of each parameter together.
+fn parameters(
+    basis: &Basis,
+    singles: &[Vec<(usize, Single)>],
+    spreads: &[Option<Spread>],
+    pooled: &Pool,
+) -> Vec<PooledParameter> {
+    let tested: Vec<f64> = spreads.iter().flatten().map(|s| s.p).collect();
+    let mut corrected = holm(&tested).into_iter();
+    (0..basis.len())
+        .map(|k| PooledParameter {
+            expression: basis.names[k].clone(),
+            unit: basis.units[k].clone(),
+            value: pooled.values[k],
+            std: pooled.std[k],
+            half_interval: pooled.half[k],
+            degrees_of_freedom: pooled.freedom[k],
+            within: match (spreads[k], singles[k].first()) {
+                (Some(spread), _) => spread.within.sqrt(),
+                (None, Some((_, only))) => only.variance.sqrt(),
+                (None, None) => f64::NAN,
+            },
+            between: spreads[k].map_or(0.0, |s| s.between.sqrt()),
+            sets: (singles[k].iter())
+                .map(|(set, single)| SetValue {
+                    set: *set,
+                    value: single.value,
+                    std: single.variance.sqrt(),
+                })
+                .collect(),
+            test: spreads[k].map(|s| {
+                let p_holm = corrected.next().unwrap_or(1.0);
+                Heterogeneity {
+                    q: s.q,
+                    degrees_of_freedom: singles[k].len() - 1,
+                    p: s.p,
+                    p_holm,
+                    differs: p_holm < 0.5 * LEVEL,
+                }
+            }),
+        })
+        .collect()
+}
+
+/// Tests all parameters that every set shows; none if there are none.
+fn joint_test(common: &Common) -> Option<JointTest> {
+    if common.parameters.is_empty() {
+        return None;
+    }
+    let (_, chi2) = common.about_mean(&common.weights)?;
+    Some(tested(common, chi2, common.values.len()))
+}
+
+/// Returns the test of a sum of squares over `sets` sets.
+fn tested(common: &Common, chi2: f64, sets: usize) -> JointTest {
+    let degrees_of_freedom = common.parameters.len() * (sets - 1);
+    let p = chi2_p(chi2, degrees_of_freedom);
+    JointTest {
+        chi2,
+        degrees_of_freedom,
+        p,
+        differs: p < 0.5 * LEVEL,
+    }
+}
+
+/// Tests, for each set, all the others; empty for two sets.
+fn without(common: &Common) -> Vec<JointTest> {
+    let n = common.values.len();
+    if n < 3 || common.parameters.is_empty() {
+        return Vec::new();
+    }
+    (0..n)
+        .filter_map(|s| Some(tested(common, common.about_mean_without(s)?, n - 1)))
+        .collect()
+}
+
+fn summaries(given: &[RecordingSet], sets: &[IdentifiedSet], basis: &Basis) -> Vec<SetSummary> {
+    (sets.iter().zip(given).zip(&basis.shown))
+        .map(|((set, given), shown)| SetSummary {
+            name: set.name.clone(),
+            recordings: given.recordings.iter().map(|r| r.label()).collect(),
+            rank: set.found.rank,
+            degrees_of_freedom: set.found.details.estimate.degrees_of_freedom,
+            shrinkage: set.shrinkage,
+            relative_error: (set.found.joints.iter())
+                .map(|j| j.train_relative_error)
+                .collect(),
+            not_shown: (0..basis.len())
+                .filter(|&k| !shown[k])
+                .map(|k| basis.names[k].clone())
+                .collect(),
+        })
+        .collect()
+}
+
+/// Returns the warnings of the identifications, each with its set.
+fn warnings(sets: &[IdentifiedSet]) -> Vec<String> {
+    (sets.iter())
+        .flat_map(|set| {
+            let own = set.found.warnings.iter();
+            own.map(|warning| format!("Set {}: {warning}", set.name))
+        })
+        .collect()
+}
+
+/// Returns the largest RMS torque, speed and acceleration of each joint in a set.
+fn sizes(sets: &[IdentifiedSet]) -> [Vec<f64>; 3] {
+    let most = |of: fn(&IdentifiedSet) -> &Vec<f64>| {
+        let joints = sets.first().map_or(0, |s| of(s).len());
+        (0..joints)
+            .map(|j| sets.iter().map(|s| of(s)[j]).fold(0.0, f64::max))
+            .collect()
+    };
+    [
+        most(|s| &s.sizes.torque),
+        most(|s| &s.sizes.speed),
+        most(|s| &s.sizes.acceleration),
+    ]
+}

@@ -1,0 +1,35 @@
+//! Reasons why results cannot be compared.
+
+use rig_identify::IdentifyError;
+
+/// Reasons why results cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// Fewer than two sets.
+    #[error("{0} set of recordings cannot be compared with itself; give at least two.")]
+    TooFew(usize),
+    /// Two sets have one name.
+    #[error(
+        "Two sets are named \"{0}\"; give every set a name of its own with --set NAME=FILE[,FILE…]."
+    )]
+    TwoOfAName(String),
+    /// A set cannot be identified.
+    #[error("Set \"{set}\" cannot be identified: {why}")]
+    Set {
+        /// Name of the set.
+        set: String,
+        /// Reason.
+        why: IdentifyError,
+    },
+    /// The robot has no valid model.
+    #[error("The robot's model cannot be built: {0}")]
+    Model(String),
+    /// The covariance of a set cannot be inverted.
+    #[error(
+        "The covariance of set \"{0}\" is singular, so its errors are not known in every direction; give the set a longer recording."
+    )]
+    Singular(String),
+    /// The tolerance is not a positive number.
+    #[error("The tolerance {0} is not possible; give a share of the torque above 0, such as 0.05.")]
+    Tolerance(f64),
+}

@@ -1,0 +1,39 @@
+//! The pooled values as a description.
+
+use rig_identify::{Combinations, Sizes, as_bodies, redistributed};
+use rig_model::robot::Robot;
+
+use crate::matrices::inverse;
+use crate::result::Comparison;
+
+/// Returns `robot` with the pooled parameters, and remarks. Several links become the physically consistent bodies nearest
+/// to them in units of their errors. If there are none, the description changes by the smallest step.
+pub fn pooled_robot(robot: &Robot, comparison: &Comparison) -> (Robot, Vec<String>) {
+    let pooled = &comparison.pooled;
+    let base = Combinations {
+        combination: &pooled.combination,
+        columns: &pooled.columns,
+        values: &pooled.values,
+    };
+    let mut robot = robot.clone();
+    robot.identified = pooled.band.clone();
+    let mut failed = Vec::new();
+    if robot.joints.len() > 1
+        && let Some(information) = inverse(&pooled.covariance)
+    {
+        let sizes = Sizes {
+            torque: pooled.sizes[0].clone(),
+            speed: pooled.sizes[1].clone(),
+            acceleration: pooled.sizes[2].clone(),
+        };
+        match as_bodies(&robot, &base, information, sizes) {
+            Ok(bodies) => return (bodies.robot, bodies.remarks),
+            Err(error) => failed.push(format!(
+                "The links are not physically consistent bodies: {error} The description was changed by the smallest step instead."
+            )),
+        }
+    }
+    let (result, remarks) = redistributed(&robot, &base, None);
+    failed.extend(remarks);
+    (result, failed)
+}

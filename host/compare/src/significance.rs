@@ -1,0 +1,38 @@
+//! Probabilities and the level of all tests.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+
+/// Probability of a false alarm over all tests together. Half of it is for the joint test, half for the tests of single
+/// parameters. The same level tells whether the remainder of a hypothesis is consistent with chance.
+pub const LEVEL: f64 = 0.01;
+
+/// Returns the probability that χ² with `freedom` degrees of freedom is at least `value`; 1 without any.
+pub(crate) fn chi2_p(value: f64, freedom: usize) -> f64 {
+    if freedom == 0 {
+        return 1.0;
+    }
+    ChiSquared::new(freedom as f64).map_or(1.0, |d| d.sf(value.max(0.0)))
+}
+
+/// Returns the probability that F is at least `value`.
+pub(crate) fn f_p(value: f64, freedom: [f64; 2]) -> f64 {
+    FisherSnedecor::new(freedom[0], freedom[1]).map_or(1.0, |d| d.sf(value.max(0.0)))
+}
+
+/// Returns Student's quantile for a two-sided 95 % interval; `freedom` need not be whole.
+pub(crate) fn t_quantile(freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
+}
+
+/// Corrects probabilities for their number (Holm 1979, "A simple sequentially rejective multiple test procedure").
+pub(crate) fn holm(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
+    let mut corrected = vec![1.0; p.len()];
+    let mut most = 0.0f64;
+    for (rank, &k) in order.iter().enumerate() {
+        most = most.max(((p.len() - rank) as f64 * p[k]).min(1.0));
+        corrected[k] = most;
+    }
+    corrected
+}

@@ -1,0 +1,120 @@
+//! Causes that are named, each over several draws.
+
+use super::made::{Made, Truth, compared};
+use crate::{Comparison, Grade};
+
+const DRAWS: u64 = 20;
+
+/// Four sets, the third of another truth.
+fn with_third(draw: u64, third: &Truth) -> Comparison {
+    let list: Vec<_> = (0..4)
+        .map(|s| {
+            let truth = if s == 2 {
+                third.clone()
+            } else {
+                Truth::default()
+            };
+            (Made::new(20_000 + 10 * draw + s), truth)
+        })
+        .collect();
+    compared(&list)
+}
+
+/// Returns how often the cause is named, and the number of draws that were called different.
+fn named(third: &Truth, name: &str) -> [u64; 2] {
+    let mut counts = [0; 2];
+    for draw in 0..DRAWS {
+        let found = with_third(draw, third);
+        let causes = found.causes.unwrap();
+        counts[0] += u64::from(causes.named.as_deref() == Some(name));
+        counts[1] += u64::from(matches!(
+            found.grade,
+            Grade::DifferAndMatter | Grade::DifferWithoutEffect
+        ));
+        if causes.named.as_deref() != Some(name) {
+            println!("draw {draw}: {:?} {}", causes.named, causes.sentence);
+        }
+    }
+    println!(
+        "{name}: named in {} of {DRAWS}, different in {}",
+        counts[0], counts[1]
+    );
+    counts
+}
+
+#[test]
+fn a_torque_constant_that_changed_by_three_per_cent_is_named_scale() {
+    let third = Truth {
+        scale: 1.03,
+        ..Truth::default()
+    };
+    let [scale, different] = named(&third, "scale");
+    assert!(scale >= 18 && different == DRAWS, "{scale} {different}");
+    let causes = with_third(0, &third).causes.unwrap();
+    let found = causes
+        .hypotheses
+        .iter()
+        .find(|h| h.name == "scale")
+        .unwrap();
+    let [value, std] = found.scales[2];
+    assert!(
+        (value - 1.03).abs() < 4.0 * std && std < 0.005,
+        "{value} {std}"
+    );
+}
+
+#[test]
+fn friction_that_rose_by_a_fifth_is_named_friction() {
+    let mut third = Truth::default();
+    for f in &mut third.friction {
+        f[0] *= 1.2;
+        f[1] *= 1.2;
+    }
+    let [friction, different] = named(&third, "friction");
+    assert!(
+        friction >= 18 && different == DRAWS,
+        "{friction} {different}"
+    );
+}
+
+#[test]
+fn a_payload_on_the_last_link_is_named_payload() {
+    let third = Truth::default().with_payload(0.3, [0.3, 0.05]);
+    let [payload, different] = named(&third, "payload");
+    assert!(payload >= 18 && different == DRAWS, "{payload} {different}");
+    let found = with_third(1, &third);
+    assert_eq!(found.grade, Grade::DifferAndMatter);
+    // The set that stands apart is told.
+    assert!(
+        found
+            .reasons
+            .iter()
+            .any(|r| r.starts_with("Without set 2 the other sets do not differ"))
+    );
+}
+
+#[test]
+fn an_offset_of_one_joint_is_named_offset() {
+    let mut third = Truth::default();
+    third.friction[0][2] += 0.4;
+    let [offset, different] = named(&third, "offset");
+    assert!(offset >= 18 && different == DRAWS, "{offset} {different}");
+}
+
+/// Friction, scale and payload at once are none of the tested causes.
+#[test]
+fn several_changes_at_once_are_not_given_one_name() {
+    let mut third = Truth {
+        scale: 1.05,
+        ..Truth::default()
+    }
+    .with_payload(0.3, [0.3, 0.05]);
+    for f in &mut third.friction {
+        f[0] *= 0.7;
+    }
+    for draw in 0..5 {
+        let found = with_third(draw, &third);
+        assert_eq!(found.causes.unwrap().named, None);
+        assert_eq!(found.grade, Grade::DifferAndMatter);
+    }
+}

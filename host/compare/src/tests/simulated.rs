@@ -1,0 +1,67 @@
+//! Simulated comparisons of the described robots.
+
+use rig_model::robot::{EDDA_TEMPLATE, ONE_LINK_TEMPLATE, Robot};
+
+use crate::{SimulateOptions, SimulatedRobot, simulated};
+
+fn run(text: &str, seed: u64) -> SimulatedRobot {
+    let robot = Robot::from_toml(text, "robot.toml".as_ref()).unwrap();
+    let options = SimulateOptions {
+        seed,
+        ..SimulateOptions::default()
+    };
+    simulated(&robot, &options, |_| ()).unwrap()
+}
+
+/// All four identifications find the simulated robot: their torque is nearer to the true one than the noise of 1 %, and
+/// their intervals cover.
+#[test]
+fn four_identifications_find_the_simulated_robot() {
+    for text in [ONE_LINK_TEMPLATE, EDDA_TEMPLATE] {
+        for seed in 1..4 {
+            let found = run(text, seed);
+            assert_eq!(found.estimates.len(), 4);
+            for e in &found.estimates {
+                assert!(
+                    e.torque_error < 1e-3,
+                    "{} {}: {}",
+                    e.way,
+                    e.model,
+                    e.torque_error
+                );
+                let known = || e.values.iter().flatten().filter_map(|v| v.covers);
+                println!(
+                    "{} {} {}: {} of {}",
+                    found.robot,
+                    e.way,
+                    e.model,
+                    known().filter(|c| *c).count(),
+                    known().count()
+                );
+                assert!(known().filter(|c| !*c).count() <= 3);
+                assert_eq!(e.values.len(), found.parameters.len());
+                // The recursion begins far off and ends at its result.
+                if let [Some(first), Some(last)] =
+                    [e.convergence[1].first(), e.convergence[1].last()]
+                {
+                    assert!(*last < 0.1 * first && (last - e.torque_error).abs() < 1e-12);
+                }
+            }
+            for h in &found.holdout {
+                for error in &h.relative_error {
+                    assert!(*error < 1.2 * h.relative_error_of_truth + 1e-4, "{error}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_seed_gives_the_same_result_and_a_missing_encoder_is_said() {
+    let found = run(ONE_LINK_TEMPLATE, 7);
+    assert_eq!(found, run(ONE_LINK_TEMPLATE, 7));
+    assert_ne!(found.estimates, run(ONE_LINK_TEMPLATE, 8).estimates);
+    let missing = |found: &SimulatedRobot| found.notes.iter().any(|n| n.contains("not quantised"));
+    assert!(!missing(&found));
+    assert!(missing(&run(EDDA_TEMPLATE, 7)));
+}

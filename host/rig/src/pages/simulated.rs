@@ -1,0 +1,270 @@
+//! The pages of simulated robots that were identified off-line and on-line.
+
+use super::context::Context;
+use super::parts;
+use rig_compare::{Holdout, SimulatedEstimate, SimulatedRobot};
+use rig_output::{format_significant, format_unit, format_value};
+use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
+
+/// Words about what all estimates share.
+const RECURSION: &str = "On-line: the recursion of the firmware's estimator over the rows in their order, without forgetting. Its rows come from the same zero-phase preparation as off-line, so the figure shows the convergence of the recursion and not the delay of a causal filter.";
+
+/// Composes the page of one robot.
+pub fn simulated_robot(found: &SimulatedRobot, context: &Context) -> Document {
+    let mut sections = vec![accuracy(found), values(found)];
+    sections.push(convergence(found));
+    sections.push(holdout(found));
+    if !found.notes.is_empty() {
+        sections.push(
+            Section::new("notes", "What was simulated", "").with(Block::List(found.notes.clone())),
+        );
+    }
+    sections.push(parts::repeat(context));
+    Document {
+        title: format!("{}: simulated and identified", found.robot),
+        subtitle: "The description is the truth here: simulated, recorded with noise and quantisation, identified off-line and on-line by the differential and the integral model, and compared with the truth.".into(),
+        summary: summary(found),
+        sections,
+        footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
+    }
+}
+
+/// Composes the page over all robots.
+pub fn simulated_overview(all: &[(String, SimulatedRobot)], context: &Context) -> Document {
+    let mut columns = vec![
+        Column::text("Robot"),
+        Column::number("Parameters", ""),
+        Column::number("Motion", "s"),
+        Column::number("Condition number", ""),
+    ];
+    let names = all.first().map_or(Vec::new(), |(_, first)| {
+        first.estimates.iter().map(words).collect()
+    });
+    columns.extend(names.iter().map(|name| Column::number(name.clone(), "%")));
+    let errors = all.iter().map(|(_, r)| {
+        let mut cells = vec![
+            r.robot.clone(),
+            r.parameters.len().to_string(),
+            format_significant(r.seconds, 3),
+            format_significant(r.condition_number, 3),
+        ];
+        cells.extend(r.estimates.iter().map(|e| parts::percent(e.torque_error)));
+        cells
+    });
+    let errors = Table {
+        caption: "Torque error of the identified parameters on the training motion".into(),
+        columns,
+        rows: errors.collect(),
+        note: "RMS over all joints, as a share of the torque: the identified parameters' torque less the true one, without noise.".into(),
+    };
+    let mut columns = vec![
+        Column::text("Robot"),
+        Column::text("Joint"),
+        Column::number("Torque RMS", "N·m or N"),
+    ];
+    columns.extend(names.iter().map(|name| Column::number(name.clone(), "%")));
+    columns.push(Column::number("true parameters", "%"));
+    let rows = all
+        .iter()
+        .flat_map(|(_, r)| r.holdout.iter().map(|h| joint_row(Some(&r.robot), h)));
+    let joints = Table {
+        caption: "Residual on the hold-out motion, measured less predicted".into(),
+        columns,
+        rows: rows.collect(),
+        note: "Share of the torque RMS of the joint. The true parameters leave the noise and the error of the filtered motion.".into(),
+    };
+    let reports = all
+        .iter()
+        .map(|(folder, r)| format!("{}: {folder}/report.html", r.robot));
+    Document {
+        title: format!("{} simulated robots compared", all.len()),
+        subtitle: "Each robot was simulated from its description, recorded with noise and quantisation, and identified off-line and on-line by the differential and the integral model.".into(),
+        summary: all
+            .iter()
+            .map(|(_, r)| {
+                let best = r.estimates.iter().map(|e| e.torque_error).fold(f64::INFINITY, f64::min);
+                Fact::new(r.robot.clone(), parts::percent(best))
+                    .unit("%")
+                    .note("smallest torque error of the four estimates")
+            })
+            .collect(),
+        sections: vec![
+            Section::new("errors", "How near is the truth?", "").with(Block::Table(errors)),
+            Section::new("holdout", "Measured and predicted torque", "").with(Block::Table(joints)),
+            Section::new("reports", "Reports of the robots", RECURSION)
+                .with(Block::List(reports.collect())),
+            parts::repeat(context),
+        ],
+        footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
+    }
+}
+
+fn words(estimate: &SimulatedEstimate) -> String {
+    format!("{}, {}", estimate.way, estimate.model)
+}
+
+fn covered(estimate: &SimulatedEstimate) -> [usize; 2] {
+    let known = || estimate.values.iter().flatten().filter_map(|v| v.covers);
+    [known().filter(|covers| *covers).count(), known().count()]
+}
+
+/// Writes how many of the known intervals hold the truth.
+fn inside_of(estimate: &SimulatedEstimate) -> String {
+    match covered(estimate) {
+        [_, 0] => "not known".to_owned(),
+        [inside, all] => format!("{inside} of {all}"),
+    }
+}
+
+fn summary(found: &SimulatedRobot) -> Vec<Fact> {
+    found
+        .estimates
+        .iter()
+        .map(|e| {
+            let [inside, all] = covered(e);
+            Fact::new(words(e), parts::percent(e.torque_error))
+                .unit("% torque error")
+                .note(format!("intervals that hold the truth: {}", inside_of(e)))
+                .tone(if 10 * inside >= 9 * all {
+                    Tone::Good
+                } else {
+                    Tone::Notice
+                })
+        })
+        .collect()
+}
+
+fn accuracy(found: &SimulatedRobot) -> Section {
+    let rows = found
+        .estimates
+        .iter()
+        .map(|e| vec![words(e), parts::percent(e.torque_error), inside_of(e)]);
+    Section::new(
+        "accuracy",
+        "How near is the truth?",
+        "The torque error is the RMS torque of the difference to the true parameters on the training motion, as a share of the torque, over all joints.",
+    )
+    .with(Block::Table(Table {
+        caption: "Four identifications of one recording".into(),
+        columns: vec![
+            Column::text("Identification"),
+            Column::number("Torque error", "%"),
+            Column::number("95 % intervals that hold the truth", ""),
+        ],
+        rows: rows.collect(),
+        note: "Fewer than 95 % hold the truth where errors other than noise exceed the error by noise. The torque error tells how much this matters. An on-line estimate of many parameters needs more residuals than a short motion has before its intervals are known.".into(),
+    }))
+}
+
+fn values(found: &SimulatedRobot) -> Section {
+    let mut columns = vec![
+        Column::text("Parameter"),
+        Column::text("Unit"),
+        Column::number("Truth", ""),
+    ];
+    columns.extend(found.estimates.iter().map(|e| Column::number(words(e), "")));
+    let rows = found.parameters.iter().enumerate().map(|(k, p)| {
+        let mut cells = vec![
+            p.expression.clone(),
+            format_unit(&p.unit),
+            format_significant(p.truth, 5),
+        ];
+        cells.extend(found.estimates.iter().map(|e| match &e.values[k] {
+            None => "not shown".to_owned(),
+            Some(v) => match v.std {
+                Some(std) => format_value(v.value, std),
+                None => format_significant(v.value, 5),
+            },
+        }));
+        cells
+    });
+    Section::new(
+        "values",
+        "Identified and true parameters",
+        "± one standard deviation",
+    )
+    .with(Block::Table(Table {
+        caption: "Base parameters".into(),
+        columns,
+        rows: rows.collect(),
+        note: String::new(),
+    }))
+}
+
+fn convergence(found: &SimulatedRobot) -> Section {
+    let mut plot = Plot::new(
+        "Torque error of the on-line estimates",
+        Axis::new("time", "s"),
+        Axis::log("torque error", "% of the torque"),
+    );
+    let roles = [Role::Measured, Role::Model];
+    let online = found
+        .estimates
+        .iter()
+        .filter(|e| !e.convergence[0].is_empty());
+    for (e, role) in online.zip(roles) {
+        let [t, error] = &e.convergence;
+        let percent = error.iter().map(|e| 100.0 * e).collect();
+        plot = plot.with(Series::line(words(e), role, t.clone(), percent));
+    }
+    Section::new(
+        "convergence",
+        "How fast does the on-line estimate converge?",
+        RECURSION,
+    )
+    .with(Block::Plot(plot))
+}
+
+fn joint_row(robot: Option<&str>, h: &Holdout) -> Vec<String> {
+    let mut cells: Vec<String> = robot.map(str::to_owned).into_iter().collect();
+    cells.push(h.joint.clone());
+    cells.push(format!(
+        "{} {}",
+        format_significant(h.torque_rms, 3),
+        h.unit
+    ));
+    cells.extend(h.relative_error.iter().map(|e| parts::percent(*e)));
+    cells.push(parts::percent(h.relative_error_of_truth));
+    cells
+}
+
+fn holdout(found: &SimulatedRobot) -> Section {
+    let mut columns = vec![Column::text("Joint"), Column::number("Torque RMS", "")];
+    columns.extend(
+        found
+            .estimates
+            .iter()
+            .map(|e| Column::number(words(e), "%")),
+    );
+    columns.push(Column::number("true parameters", "%"));
+    let mut section = Section::new(
+        "holdout",
+        "Measured and predicted torque",
+        "The hold-out is another designed motion, which no identification used.",
+    )
+    .with(Block::Table(Table {
+        caption: "Residual on the hold-out as a share of the torque".into(),
+        columns,
+        rows: found.holdout.iter().map(|h| joint_row(None, h)).collect(),
+        note: "The true parameters leave the noise and the error of the filtered motion.".into(),
+    }));
+    for h in &found.holdout {
+        let [t, measured, predicted] = h.series.clone();
+        let mut plot = Plot::new(
+            format!("Joint {}: torque on the hold-out", h.joint),
+            Axis::new("time", "s"),
+            Axis::new("torque", h.unit),
+        )
+        .with(Series::line(
+            "measured",
+            Role::Measured,
+            t.clone(),
+            measured,
+        ))
+        .with(Series::line("predicted", Role::Model, t, predicted))
+        .note("Predicted by the off-line differential model.");
+        plot.height = 240;
+        section = section.with(Block::Plot(plot));
+    }
+    section
+}
