@@ -4,6 +4,7 @@
 mod bad_input;
 mod cases;
 mod compare;
+mod compliance;
 mod diagnose;
 mod excite;
 mod friction_map;

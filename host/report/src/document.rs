@@ -1,5 +1,6 @@
 //! Content of a document, independent of HTML.
 
+use super::heat_map::HeatMap;
 use super::plot::Plot;
 
 /// A whole document: one page to read, print and share.
@@ -136,6 +137,8 @@ pub enum Block {
     Table(Table),
     /// A figure.
     Plot(Plot),
+    /// A value over two quantities, as a coloured picture.
+    HeatMap(HeatMap),
     /// Blocks that unfold on a click; in print always unfolded.
     Details {
         /// The line that stays visible.

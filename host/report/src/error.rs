@@ -31,6 +31,20 @@ pub enum ReportError {
         /// Number of abscissae.
         expected: usize,
     },
+    /// A heat map whose values do not fill its grid.
+    #[error(
+        "The heat map \"{figure}\" has {found} {what}, but {expected} are needed; it takes at least two rows and columns, and one value for each pair."
+    )]
+    Grid {
+        /// Title of the figure.
+        figure: String,
+        /// What is counted.
+        what: &'static str,
+        /// Number found.
+        found: usize,
+        /// Number needed.
+        expected: usize,
+    },
     /// Equal aspect with a logarithmic axis.
     #[error(
         "The figure \"{figure}\" asks for equal scales and a logarithmic axis; only linear axes can have equal scales."

@@ -7,6 +7,7 @@ use super::assets::{PLOT_LICENCE, PLOT_SCRIPT, PLOT_STYLE, THEME, palette};
 use super::document::{Alignment, Block, Document, Fact, NoteKind, Section, Table, Tone};
 use super::error::ReportError;
 use super::escape::text;
+use super::heat_map::HeatMap;
 use super::plot::Plot;
 use super::scene::Scene;
 use super::svg;
@@ -194,6 +195,7 @@ impl Page {
             }
             Block::Table(table) => self.table(table)?,
             Block::Plot(plot) => self.plot(plot)?,
+            Block::HeatMap(map) => self.heat_map(map)?,
             Block::Details { summary, blocks } => {
                 let _ = writeln!(
                     self.body,
@@ -305,6 +307,35 @@ impl Page {
                 text(&table.note)
             );
         }
+        Ok(())
+    }
+
+    fn heat_map(&mut self, map: &HeatMap) -> Result<(), ReportError> {
+        let picture = map.svg()?;
+        self.figures += 1;
+        let id = format!("figure-{}", self.figures);
+        let _ = writeln!(
+            self.body,
+            "<figure id=\"{id}\" aria-labelledby=\"{id}-title\">\n\
+             <div class=\"figure-head\"><p class=\"figure-title\" id=\"{id}-title\"><b>Figure {}</b> {}</p></div>",
+            self.figures,
+            text(&map.title)
+        );
+        match picture {
+            // Outside of the class "static", which the zoomable figures replace.
+            Some(picture) => _ = writeln!(self.body, "<div>{picture}</div>"),
+            None => self
+                .body
+                .push_str("<p class=\"empty\">No value can be drawn.</p>\n"),
+        }
+        if !map.note.is_empty() {
+            let _ = writeln!(
+                self.body,
+                "<figcaption><p>{}</p></figcaption>",
+                text(&map.note)
+            );
+        }
+        self.body.push_str("</figure>\n");
         Ok(())
     }
 

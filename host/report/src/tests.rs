@@ -38,6 +38,35 @@ fn every_style(name: &str) -> Plot {
         .note(name)
 }
 
+fn heat_map(name: &str) -> HeatMap {
+    HeatMap {
+        title: name.into(),
+        x: Axis::new(name, name),
+        y: Axis::new(name, name),
+        value: Axis::new(name, name),
+        columns: vec![0.0, 1.0, 2.0],
+        rows: vec![0.0, 1.0],
+        values: vec![vec![1.0, 2.0, f64::NAN], vec![3.0, 4.0, 5.0]],
+        marks: vec![([1.0, 0.0], name.into())],
+        note: name.into(),
+        height: HeatMap::HEIGHT,
+    }
+}
+
+#[test]
+fn a_heat_map_colours_each_value_once_and_leaves_gaps_blank() {
+    let picture = heat_map("map").svg().unwrap().unwrap();
+    // One path for each of five values, one more for the axes.
+    assert_eq!(picture.matches("<path").count(), 6, "{picture}");
+    let mut wrong = heat_map("map");
+    wrong.values[1].pop();
+    let said = wrong.svg().unwrap_err().to_string();
+    assert!(said.contains("has 2 values in a row"), "{said}");
+    let mut empty = heat_map("map");
+    empty.values = vec![vec![f64::NAN; 3]; 2];
+    assert_eq!(empty.svg().unwrap(), None);
+}
+
 fn every_block(name: &str) -> Document {
     let inner = vec![
         Block::Text(name.into()),
@@ -49,6 +78,7 @@ fn every_block(name: &str) -> Document {
             note: name.into(),
         }),
         Block::Plot(every_style(name)),
+        Block::HeatMap(heat_map(name)),
         Block::Note {
             kind: NoteKind::Warning,
             text: name.into(),

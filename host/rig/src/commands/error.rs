@@ -37,6 +37,9 @@ pub enum CommandError {
     /// A recording.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// Stiffness and compliance.
+    #[error(transparent)]
+    Compliance(#[from] rig_compliance::ComplianceError),
     /// Identification of a load.
     #[error(transparent)]
     Load(#[from] LoadError),

@@ -7,6 +7,7 @@ mod base;
 mod board;
 mod chain_arg;
 mod compare;
+mod compliance;
 mod demo;
 mod diagnose;
 mod error;
@@ -64,6 +65,7 @@ enum Command {
     Diagnose(diagnose::Args),
     Load(load::Args),
     Compare(compare::Args),
+    Compliance(compliance::Args),
 }
 
 impl Cli {
@@ -91,6 +93,7 @@ impl Cli {
             Some(Command::Diagnose(args)) => diagnose::run(&args, &ui),
             Some(Command::Load(args)) => load::run(&args, &ui),
             Some(Command::Compare(args)) => compare::run(&args, &ui),
+            Some(Command::Compliance(args)) => compliance::run(&args, &ui),
         }
     }
 }

@@ -8,7 +8,7 @@ use super::error::CommandError;
 ///
 /// All commands refuse a folder that holds any of these files. Two commands would both write report.html, and a user
 /// could take a file of an earlier run for a result of the later one.
-const RESULTS: [&str; 15] = [
+const RESULTS: &[&str] = &[
     "report.html",
     "identified.toml",
     "identified.urdf",
@@ -24,6 +24,8 @@ const RESULTS: [&str; 15] = [
     "load.json",
     "compare.json",
     "pooled.toml",
+    "compliance.json",
+    "compliance.toml",
 ];
 
 /// Further files that the demonstration writes. Other commands ignore them: they may be the user's own recordings.

@@ -4,6 +4,7 @@
 //! files or clock.
 
 mod compare;
+mod compliance;
 mod context;
 mod demo;
 mod diagnosis;
@@ -22,6 +23,7 @@ mod validation;
 mod validation_voltage;
 
 pub use compare::compare;
+pub use compliance::compliance;
 pub use context::Context;
 pub use demo::{
     DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo, tracking_plot,

@@ -1,0 +1,126 @@
+//! The coordinates in which the stiffness of the drives stands.
+//!
+//! One spring per drive, in series with its motor. Its twist is the motor's coordinate minus that of the links: s = R(q)·δq,
+//! and the joints feel the torque Rᵀ·f of the springs. The rows of R come from the Jacobian of the drives, in the units
+//! that [`rig_shared::transmission`] uses for the inertia of a motor:
+//!
+//! | drive | row of R | unit of the stiffness |
+//! | --- | --- | --- |
+//! | simple | unit vector of its joint | N·m/rad or N/m at the joint |
+//! | coupled | ratios over its own ratio | N·m/rad at its own joint |
+//! | varying (screw) | motor radians per joint radian, changes with the pose | N·m/rad at the motor |
+
+use nalgebra::DMatrix;
+use rig_model::robot::{JointKind, Robot};
+use rig_shared::multibody::column;
+use rig_shared::transmission::{DriveKind, Transmission, motor_column};
+
+use crate::error::ComplianceError;
+
+/// Smallest reciprocal condition number of the Jacobian of the drives. By judgement: poses nearer to a dead centre of a
+/// screw have no meaning.
+const SINGULAR: f64 = 1e-9;
+
+/// The drives of a robot.
+#[derive(Clone, Debug)]
+pub(crate) struct Drives {
+    transmission: Transmission<f64>,
+    kinds: Vec<DriveKind>,
+    /// Motor radians per joint radian of the own joint; 1 for a varying drive.
+    scales: Vec<f64>,
+}
+
+impl Drives {
+    /// Builds the drives of a robot.
+    ///
+    /// # Errors
+    /// [`ComplianceError::Model`].
+    pub(crate) fn of(robot: &Robot) -> Result<Self, ComplianceError> {
+        let transmission =
+            (robot.transmission()).map_err(|error| ComplianceError::Model(error.to_string()))?;
+        let n = robot.joints.len();
+        let kinds = robot.drive_kinds();
+        let mut rows = vec![0.0; n * n];
+        (transmission.jacobian(&robot.middle_position(), &mut rows))
+            .map_err(|error| ComplianceError::Model(error.to_string()))?;
+        let scales = kinds.iter().enumerate().map(|(k, kind)| match kind {
+            DriveKind::Varying => 1.0,
+            DriveKind::Simple | DriveKind::Coupled => rows[k * n + k],
+        });
+        Ok(Self {
+            scales: scales.collect(),
+            transmission,
+            kinds,
+        })
+    }
+
+    /// Kind of the drive of joint `k`.
+    pub(crate) fn kind(&self, k: usize) -> DriveKind {
+        self.kinds[k]
+    }
+
+    /// Unit of the stiffness of the drive of joint `k`, ASCII.
+    pub(crate) fn unit(&self, robot: &Robot, k: usize) -> &'static str {
+        match (self.kinds[k], robot.joints[k].kind) {
+            (DriveKind::Varying, _) => "N*m/rad at the motor",
+            (_, JointKind::Revolute) => "N*m/rad",
+            (_, JointKind::Prismatic) => "N/m",
+        }
+    }
+
+    /// Described inertia of the motor of joint `k` in the coordinate of its stiffness; 0 if unknown.
+    pub(crate) fn inertia(&self, robot: &Robot, k: usize) -> f64 {
+        match self.kinds[k] {
+            DriveKind::Simple => robot.standard_parameters()[k][column::DRIVE_INERTIA],
+            _ => robot.motor_parameters()[k][motor_column::INERTIA],
+        }
+    }
+
+    /// Returns R at a pose: twist of each drive per motion of each joint.
+    ///
+    /// # Errors
+    /// [`ComplianceError::Model`] for a wrong number of joints.
+    pub(crate) fn rows(&self, q: &[f64]) -> Result<DMatrix<f64>, ComplianceError> {
+        let n = self.kinds.len();
+        let mut rows = vec![0.0; n * n];
+        (self.transmission.jacobian(q, &mut rows))
+            .map_err(|error| ComplianceError::Model(error.to_string()))?;
+        Ok(DMatrix::from_fn(n, n, |k, j| {
+            rows[k * n + j] / self.scales[k]
+        }))
+    }
+
+    /// Returns R⁻¹ at a pose: motion of each joint per twist of each drive.
+    ///
+    /// # Errors
+    /// [`ComplianceError::SingularDrives`], [`ComplianceError::Model`].
+    pub(crate) fn inverse(&self, q: &[f64]) -> Result<DMatrix<f64>, ComplianceError> {
+        let mut rows = self.rows(q)?;
+        // Rows of unit length: a screw has hundreds of motor radians per joint radian.
+        let lengths: Vec<f64> = rows.row_iter().map(|row| row.norm()).collect();
+        let singular = || ComplianceError::SingularDrives {
+            pose: listed_pose(q),
+        };
+        for (mut row, length) in rows.row_iter_mut().zip(&lengths) {
+            if !(*length > 0.0 && length.is_finite()) {
+                return Err(singular());
+            }
+            row /= *length;
+        }
+        let values = rows.singular_values();
+        if !(values.min() > SINGULAR * values.max()) {
+            return Err(singular());
+        }
+        let mut inverse = rows.try_inverse().ok_or_else(singular)?;
+        for (mut column, length) in inverse.column_iter_mut().zip(&lengths) {
+            column /= *length;
+        }
+        Ok(inverse)
+    }
+}
+
+/// Returns a pose as text.
+pub(crate) fn listed_pose(q: &[f64]) -> String {
+    let list: Vec<String> = q.iter().map(|q| format!("{q:.4}")).collect();
+    list.join(", ")
+}

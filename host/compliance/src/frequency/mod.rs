@@ -1,0 +1,17 @@
+//! Stiffness of a joint from its frequency response.
+
+mod bands;
+mod columns;
+mod fit;
+mod link_motion;
+mod response;
+mod spectra;
+mod two_mass;
+
+pub use bands::Band;
+#[cfg(test)]
+pub(crate) use bands::bands;
+pub(crate) use response::respond;
+pub use response::{FrequencyResponse, response_pose};
+#[cfg(test)]
+pub(crate) use spectra::spectra;

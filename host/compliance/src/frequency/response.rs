@@ -1,0 +1,421 @@
+//! The frequency response of one joint and the stiffness that it shows.
+
+use std::f64::consts::TAU;
+
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector, inertia_matrix};
+use rig_shared::transmission::DriveKind;
+use serde::Serialize;
+
+use super::bands::{Band, BandBins, bands};
+use super::fit::{Fitted, Known, fit, frictionless};
+use super::spectra::{Spectra, spectra};
+use super::two_mass::C;
+use crate::drives::{Drives, listed_pose};
+use crate::error::ComplianceError;
+use crate::signals::Signals;
+use crate::value::Value;
+
+/// Fewest bands with significant coherence. The model has seven parameters, and a band has two equations.
+const FEWEST: usize = 12;
+/// Share of the frequency range that must lie beyond the antiresonance on either side.
+const MARGIN: f64 = 0.1;
+/// Misfit of a rigid joint over that of two masses from which on an antiresonance is evident. On the emulated rig it was
+/// above 10 000 where the band held the antiresonance, and 2 where it ended far below.
+const EVIDENT: f64 = 10.0;
+/// Relative standard deviation of the stiffness beyond which the inertia of the description is used instead.
+const UNCERTAIN: f64 = 0.1;
+/// Relative difference of an inertia from the described one that is told, beyond three standard deviations.
+const DIFFERS: f64 = 0.15;
+/// Share of rows at the highest torque that shows saturation.
+const SATURATED: f64 = 0.01;
+/// Share of rows at the highest torque beyond which the response is not computed.
+const UNUSABLE: f64 = 0.1;
+/// Multiple of the noise that the model leaves which is told.
+const MISFIT: f64 = 4.0;
+/// Predictions of the link's friction; a third changes the stiffness by less than a tenth of its standard deviation.
+const PREDICTIONS: usize = 3;
+/// Largest number of points in the figure of the signals.
+const SHOWN: usize = 4000;
+
+/// What the frequency response of one joint shows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FrequencyResponse {
+    /// Name of the joint.
+    pub joint: String,
+    /// Index of the joint, from 0.
+    pub index: usize,
+    /// Names of the recordings.
+    pub recordings: Vec<String>,
+    /// Rows.
+    pub rows: usize,
+    /// Length, s.
+    pub seconds: f64,
+    /// Rows per second.
+    pub rate: f64,
+    /// True if the recordings were transformed as a whole, from rest to rest; else in Hann windows.
+    pub whole: bool,
+    /// True if the reference is the instrument; else the torque itself.
+    pub by_reference: bool,
+    /// Mean pose.
+    pub pose: Vec<f64>,
+    /// Frequency response, by band.
+    pub bands: Vec<Band>,
+    /// Magnitude and phase of the fitted model at the bands.
+    pub model: Vec<[f64; 2]>,
+    /// Magnitude and phase of the measured response without the estimated Coulomb friction, at the bands.
+    pub frictionless: Vec<[f64; 2]>,
+    /// c.
+    pub stiffness: Value,
+    /// d.
+    pub damping: Value,
+    /// Antiresonance, Hz.
+    pub antiresonance: Value,
+    /// Resonance, Hz.
+    pub resonance: Value,
+    /// Inertia of the link, kg·m² (kg).
+    pub link_inertia: Value,
+    /// True if the inertia of the link is that of the description, and was not estimated.
+    pub link_inertia_known: bool,
+    /// Inertia of the motor, joint side.
+    pub motor_inertia: Value,
+    /// Coulomb friction of the motor, joint side.
+    pub coulomb: Value,
+    /// Coulomb friction of the link.
+    pub link_coulomb: Value,
+    /// Delay of the position after the torque, s.
+    pub delay: Value,
+    /// Sum of squares per degree of freedom.
+    pub misfit: f64,
+    /// Inertia of the links at the pose by the description.
+    pub described_link_inertia: Option<f64>,
+    /// Inertia of the drive by the description.
+    pub described_motor_inertia: Option<f64>,
+    /// Stiffness by the antiresonance and the described inertia of the links.
+    pub stiffness_by_description: Option<Value>,
+    /// Time, torque and velocity of the longest stretch.
+    #[serde(skip)]
+    pub shown: [Vec<f64>; 3],
+    /// What to know about the result.
+    pub warnings: Vec<String>,
+}
+
+/// What the description says of a joint at a pose.
+struct Described {
+    link: Option<f64>,
+    motor: Option<f64>,
+    gravity: f64,
+}
+
+/// Computes the frequency response of joint `k` and fits the two-mass model.
+///
+/// # Errors
+/// [`ComplianceError`]: recordings that do not show the antiresonance, or a drive that is coupled to other joints.
+pub(crate) fn respond(
+    robot: &Robot,
+    drives: &Drives,
+    stretches: &[Signals],
+    k: usize,
+    by_reference: Option<bool>,
+) -> Result<FrequencyResponse, ComplianceError> {
+    let name = &robot.joints[k].name;
+    if drives.kind(k) != DriveKind::Simple {
+        return Err(ComplianceError::Recording(format!(
+            "The drive of joint \"{name}\" is coupled to other joints or turns a screw, so its two masses are not those of one joint; identify its stiffness by static loading (--static)."
+        )));
+    }
+    let mut warnings = Vec::new();
+    check_motion(robot, stretches, k, &mut warnings)?;
+    let mut spectra = spectra(stretches, k, name, by_reference)?;
+    if by_reference.is_none() && !spectra.by_reference {
+        warnings.push(format!(
+            "No reference of joint \"{name}\" was recorded (column ref{}): the torque itself is the instrument. With feedback on the torque the response is biased by noise and disturbances.",
+            k + 1
+        ));
+    }
+    let range = excited(&bands(&spectra), name)?;
+    let described = described(robot, &spectra.pose, k)?;
+    let mut known = Known {
+        gravity: described.gravity,
+        link_inertia: None,
+        rate: spectra.rate,
+    };
+    let unclear = || {
+        ComplianceError::Recording(format!(
+            "No model of two masses with positive inertias fits the response of joint \"{name}\" between {} and {} Hz. Either it shows no antiresonance there (record a chirp over a wider band, with more amplitude), or torque and velocity do not belong to one joint, or have opposite signs.",
+            format_significant(range[0], 3),
+            format_significant(range[1], 3)
+        ))
+    };
+    let mut found = fit_all(&mut spectra, &known).ok_or_else(unclear)?;
+    if let (Some(link), true) = (
+        described.link,
+        found.variance([1.0, 0.0, 0.0]).sqrt() > UNCERTAIN,
+    ) {
+        known.link_inertia = Some(link);
+        found = fit_all(&mut spectra, &known).ok_or_else(unclear)?;
+        warnings.push(format!(
+            "The response alone shows neither inertia of joint \"{name}\" well: the inertia of the links is that of the description, {} kg·m² at this pose. Its error is not in the standard deviation. A band beyond the resonance would show it.",
+            format_significant(link, 4)
+        ));
+    }
+    within(&found, range, name, &described)?;
+    Ok(result(
+        robot, stretches, k, spectra, &found, &described, known, warnings,
+    ))
+}
+
+/// Fits the model, then again with the friction of the link that it predicts.
+fn fit_all(spectra: &mut Spectra, known: &Known) -> Option<Fitted> {
+    let mut found = fit(&bands(spectra), known, None)?;
+    for _ in 0..PREDICTIONS {
+        spectra.predict_link(&found.model);
+        found = fit(&bands(spectra), known, Some(&found.model))?;
+    }
+    Some(found)
+}
+
+/// Checks that the joint is the one that moves, and that its torque is not cut.
+fn check_motion(
+    robot: &Robot,
+    stretches: &[Signals],
+    k: usize,
+    warnings: &mut Vec<String>,
+) -> Result<(), ComplianceError> {
+    for stretch in stretches {
+        let movement = |j: usize| -> f64 {
+            let q = &stretch.joints[j].q;
+            q.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum()
+        };
+        let own = movement(k);
+        let other = (0..stretch.joints.len())
+            .filter(|j| *j != k && robot.joints[*j].kind == robot.joints[k].kind)
+            .max_by(|a, b| movement(*a).total_cmp(&movement(*b)));
+        if let Some(other) = other.filter(|j| movement(*j) > own) {
+            return Err(ComplianceError::Recording(format!(
+                "{}: joint \"{}\" moves more than joint \"{}\"; give --joint {}, or record a motion of one joint.",
+                stretch.label,
+                robot.joints[other].name,
+                robot.joints[k].name,
+                robot.joints[other].name
+            )));
+        }
+        let tau = &stretch.joints[k].tau;
+        let most = tau.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+        let at = tau.iter().filter(|t| t.abs() >= 0.999 * most).count();
+        if most > 0.0 && at as f64 > SATURATED * tau.len() as f64 {
+            let told = format!(
+                "{}: {} % of the torques of joint \"{}\" are at the largest one, {}. The drive saturates, and a response under saturation depends on the amplitude: record with a smaller amplitude.",
+                stretch.label,
+                format_significant(100.0 * at as f64 / tau.len() as f64, 2),
+                robot.joints[k].name,
+                format_significant(most, 3)
+            );
+            if at as f64 > UNUSABLE * tau.len() as f64 {
+                return Err(ComplianceError::Recording(told));
+            }
+            warnings.push(told);
+        }
+    }
+    Ok(())
+}
+
+/// Returns the range of the bands with significant coherence, Hz.
+fn excited(bands: &[BandBins<'_>], name: &str) -> Result<[f64; 2], ComplianceError> {
+    let used: Vec<&Band> = bands.iter().map(|b| &b.band).filter(|b| b.used).collect();
+    match (used.first(), used.last()) {
+        (Some(first), Some(last)) if used.len() >= FEWEST => Ok([first.frequency, last.frequency]),
+        _ => {
+            let best = bands.iter().map(|b| b.band.coherence).fold(0.0, f64::max);
+            Err(ComplianceError::Recording(format!(
+                "Torque and velocity of joint \"{name}\" are coherent in {} of {} bands, {FEWEST} are needed (largest coherence {best:.2}): the motion excites too little, or the noise is too large. Record a chirp (`rig excite --kind chirp --joint {name} --band 1,50`), with more amplitude or repeated.",
+                used.len(),
+                bands.len()
+            )))
+        }
+    }
+}
+
+/// Checks that the antiresonance lies within the excited band.
+fn within(
+    found: &Fitted,
+    [low, high]: [f64; 2],
+    name: &str,
+    described: &Described,
+) -> Result<(), ComplianceError> {
+    let at = found.model.antiresonance() / TAU;
+    let evident = found.rigid_misfit > EVIDENT * found.misfit.max(1.0);
+    if evident && at > low * (1.0 + MARGIN) && at < high * (1.0 - MARGIN) {
+        return Ok(());
+    }
+    let bound = described.link.map_or(String::new(), |link| {
+        format!(
+            " With the described inertia of the links a stiffness of less than {} would show.",
+            format_significant(link * (TAU * high).powi(2), 2)
+        )
+    });
+    Err(ComplianceError::Recording(format!(
+        "The response of joint \"{name}\" shows no antiresonance between {} and {} Hz, where torque and velocity are coherent; a chirp over a wider band may show it.{bound}",
+        format_significant(low, 3),
+        format_significant(high, 3)
+    )))
+}
+
+/// Evaluates the description at a pose.
+fn described(robot: &Robot, pose: &[f64], k: usize) -> Result<Described, ComplianceError> {
+    let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
+    let n = robot.joints.len();
+    let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+    let mut rows: Vec<[f64; COLUMNS]> = robot.standard_parameters();
+    let motor = rows[k][column::DRIVE_INERTIA];
+    for row in &mut rows {
+        row[column::DRIVE_INERTIA] = 0.0;
+    }
+    let mut inertia = vec![0.0; n * n];
+    inertia_matrix(&chain, &rows, pose, &mut inertia).map_err(|e| wrong(&e))?;
+    let gravity = |step: f64| -> Result<f64, ComplianceError> {
+        let (mut q, mut torque) = (pose.to_vec(), vec![0.0; n]);
+        q[k] += step;
+        gravity_vector(&chain, &rows, &q, &mut torque).map_err(|e| wrong(&e))?;
+        Ok(torque[k])
+    };
+    let step = 1e-4;
+    let complete = robot.joints[k..].iter().all(|j| j.inertial.is_some());
+    let link = inertia[k * n + k];
+    Ok(Described {
+        link: (complete && link > 0.0).then_some(link),
+        motor: (motor > 0.0).then_some(motor),
+        gravity: (gravity(step)? - gravity(-step)?) / (2.0 * step),
+    })
+}
+
+/// The two masses with their uncertainty.
+struct Masses {
+    antiresonance: Value,
+    resonance: Value,
+    link: Value,
+    motor: Value,
+    /// Stiffness by the antiresonance and the described inertia of the links.
+    by_description: Option<Value>,
+}
+
+impl Masses {
+    fn of(found: &Fitted, described: &Described) -> Self {
+        let model = &found.model;
+        // ωa² = (c + kg)/Jl; the share of c in it.
+        let share = model.stiffness / (model.stiffness + model.gravity);
+        let antiresonance = found.scaled(model.antiresonance() / TAU, [0.5 * share, -0.5, 0.0]);
+        // ωr² = c/Jm + c/Jl.
+        let links = model.link_inertia / (model.link_inertia + model.motor_inertia);
+        let by_description = described.link.map(|link| {
+            let squared = (TAU * antiresonance.value).powi(2);
+            Value::new(
+                link * squared - model.gravity,
+                2.0 * link * squared * antiresonance.relative(),
+            )
+        });
+        Self {
+            antiresonance,
+            resonance: found.scaled(
+                model.resonance() / TAU,
+                [0.5, -0.5 * (1.0 - links), -0.5 * links],
+            ),
+            link: found.scaled(model.link_inertia, [0.0, 1.0, 0.0]),
+            motor: found.scaled(model.motor_inertia, [0.0, 0.0, 1.0]),
+            by_description,
+        }
+    }
+}
+
+/// Says what contradicts the description or the model.
+fn doubts(name: &str, found: &Fitted, masses: &Masses, described: &Described) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let motor = "motor (gear_ratio² times rotor_inertia)";
+    for (what, own, other) in [
+        (motor, masses.motor, described.motor),
+        ("links at this pose", masses.link, described.link),
+    ] {
+        let Some(other) = other else { continue };
+        let off = (own.value - other).abs();
+        if off > DIFFERS * other && off > 3.0 * own.std && own.std > 0.0 {
+            doubts.push(format!(
+                "Joint \"{name}\": the response shows an inertia of the {what} of {} ± {} kg·m², the description has {}. The scale of the torque, the ratio or the description is wrong; the stiffness has the error of the torque's scale.",
+                format_significant(own.value, 3),
+                format_significant(own.std, 2),
+                format_significant(other, 3)
+            ));
+        }
+    }
+    if found.misfit > MISFIT {
+        doubts.push(format!(
+            "The response of joint \"{name}\" differs from that of two masses by {} times the noise (RMS). The standard deviations take this for noise and may be too small. Further resonances, backlash, or friction that stops the motor near the antiresonance do this; look at the figure, and try a larger amplitude.",
+            format_significant(found.misfit.sqrt(), 2)
+        ));
+    }
+    doubts
+}
+
+/// Composes the result.
+fn result(
+    robot: &Robot,
+    stretches: &[Signals],
+    k: usize,
+    spectra: Spectra,
+    found: &Fitted,
+    described: &Described,
+    known: Known,
+    mut warnings: Vec<String>,
+) -> FrequencyResponse {
+    let name = robot.joints[k].name.clone();
+    let model = &found.model;
+    let masses = Masses::of(found, described);
+    warnings.extend(doubts(&name, found, &masses, described));
+    let spread = |p: usize| found.covariance[(p, p)].max(0.0).sqrt();
+    let bins = bands(&spectra);
+    let polar = |response: C| [response.norm(), response.arg()];
+    let frictionless = (bins.iter())
+        .map(|band| polar(frictionless(band, model)))
+        .collect();
+    let bands: Vec<Band> = bins.into_iter().map(|b| b.band).collect();
+    let mut recordings: Vec<String> = stretches.iter().map(|s| s.label.clone()).collect();
+    recordings.dedup();
+    let every = spectra.shown[0].len().div_ceil(SHOWN).max(1);
+    FrequencyResponse {
+        joint: name,
+        index: k,
+        recordings,
+        rows: spectra.rows,
+        seconds: spectra.seconds,
+        rate: spectra.rate,
+        whole: spectra.whole,
+        by_reference: spectra.by_reference,
+        model: (bands.iter())
+            .map(|band| polar(model.response(TAU * band.frequency)))
+            .collect(),
+        frictionless,
+        bands,
+        stiffness: found.scaled(model.stiffness, [1.0, 0.0, 0.0]),
+        damping: Value::new(model.damping, model.damping * spread(3)),
+        antiresonance: masses.antiresonance,
+        resonance: masses.resonance,
+        link_inertia: masses.link,
+        link_inertia_known: known.link_inertia.is_some(),
+        motor_inertia: masses.motor,
+        coulomb: Value::new(model.coulomb, spread(5)),
+        link_coulomb: Value::new(model.link_coulomb, spread(7)),
+        delay: Value::new(model.delay, spread(6) / spectra.rate),
+        misfit: found.misfit,
+        described_link_inertia: described.link,
+        described_motor_inertia: described.motor,
+        stiffness_by_description: masses.by_description,
+        shown: (spectra.shown).map(|list| list.into_iter().step_by(every).collect()),
+        pose: spectra.pose,
+        warnings,
+    }
+}
+
+/// Returns the pose of a response as text.
+pub fn response_pose(response: &FrequencyResponse) -> String {
+    listed_pose(&response.pose)
+}

@@ -1,0 +1,88 @@
+//! Motor and link with a spring between them: velocity of the motor per torque.
+//!
+//! Jm·θ̈ + fm·θ̇ + d·(θ̇ − q̇) + c·(θ − q) = τ,  Jl·q̈ + fl·q̇ + d·(q̇ − θ̇) + c·(q − θ) + kg·q = 0
+//!
+//! with kg, the derivative of the gravity torque by the position (Spong 1987; Pham & Gautier 1991 for the identification).
+//! Antiresonance ωa² = (c + kg)/Jl, where the link swings against a motor at rest; resonance ωr² ≈ c·(1/Jl + 1/Jm).
+//!
+//! Coulomb friction of motor and link are further inputs: that of the link acts on the motor through the spring.
+//!
+//! Leaves out: friction that depends on speed, position or
+//! load otherwise; modes beyond the first; motion of the other joints, which count as held.
+
+use nalgebra::Complex;
+
+/// Complex number.
+pub(crate) type C = Complex<f64>;
+
+/// Parameters of the model.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TwoMass {
+    /// c, N·m/rad; infinite for a rigid joint.
+    pub stiffness: f64,
+    /// Jl, kg·m².
+    pub link_inertia: f64,
+    /// Jm, kg·m², joint side.
+    pub motor_inertia: f64,
+    /// d, N·m·s/rad.
+    pub damping: f64,
+    /// fm, N·m·s/rad.
+    pub viscous: f64,
+    /// fl, N·m·s/rad.
+    pub link_viscous: f64,
+    /// Coulomb friction of the motor, N·m.
+    pub coulomb: f64,
+    /// Coulomb friction of the link, N·m.
+    pub link_coulomb: f64,
+    /// Delay of the velocity after the torque, s.
+    pub delay: f64,
+    /// kg, N·m/rad.
+    pub gravity: f64,
+}
+
+impl TwoMass {
+    /// Returns velocity per torque at an angular frequency, rad/s.
+    pub(crate) fn response(&self, omega: f64) -> C {
+        let s = C::new(0.0, omega);
+        // Torque that the link takes per position of the motor.
+        let link = self.link(s);
+        let behind = match self.stiffness.is_finite() {
+            true => {
+                let spring = s * self.damping + self.stiffness;
+                spring * link / (link + spring)
+            }
+            false => link,
+        };
+        let impedance = s * self.motor_inertia + self.viscous + behind / s;
+        C::from_polar(1.0, -omega * self.delay) / impedance
+    }
+
+    /// Returns the torque on the motor per torque on the link, through the spring.
+    pub(crate) fn through_spring(&self, omega: f64) -> C {
+        if !self.stiffness.is_finite() {
+            return C::new(1.0, 0.0);
+        }
+        let s = C::new(0.0, omega);
+        let spring = s * self.damping + self.stiffness;
+        spring / (self.link(s) + spring)
+    }
+
+    /// Torque per position of the link alone.
+    fn link(&self, s: C) -> C {
+        s * s * self.link_inertia + s * self.link_viscous + self.gravity
+    }
+
+    /// Antiresonance, rad/s.
+    pub(crate) fn antiresonance(&self) -> f64 {
+        ((self.stiffness + self.gravity) / self.link_inertia).sqrt()
+    }
+
+    /// Resonance, rad/s: the upper natural frequency of both masses without damping.
+    pub(crate) fn resonance(&self) -> f64 {
+        // λ² − (c/Jm + (c + kg)/Jl)·λ + c·kg/(Jm·Jl) = 0.
+        let sum = self.stiffness / self.motor_inertia
+            + (self.stiffness + self.gravity) / self.link_inertia;
+        let product = self.stiffness * self.gravity / (self.motor_inertia * self.link_inertia);
+        (0.5 * sum + (0.25 * sum * sum - product).max(0.0).sqrt()).sqrt()
+    }
+}

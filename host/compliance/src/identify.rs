@@ -1,0 +1,248 @@
+//! The whole: stiffness of the drives from all sources, and the compliance of the tool point.
+
+use rig_data::prepare::Recording;
+use rig_model::robot::Robot;
+use rig_output::{format_significant, format_unit};
+use serde::Serialize;
+
+use crate::drives::Drives;
+use crate::error::ComplianceError;
+use crate::frequency::{FrequencyResponse, respond};
+use crate::loading::{LoadingFindings, loading};
+use crate::map::{ComplianceMap, compliance_map};
+use crate::signals::read;
+use crate::stiffness::{DriveStiffness, Source, described_stiffness, given_stiffness};
+use crate::tool_point::{ToolCompliance, ToolPoint};
+use crate::value::Value;
+
+/// Standard deviations beyond which two estimates of one stiffness contradict each other.
+const CONTRADICTS: f64 = 4.0;
+/// Relative difference below which they do not, whatever the standard deviations.
+const AGREES: f64 = 0.1;
+
+/// Point and axes of a recorded wrench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WrenchFrame {
+    /// On the robot at the tool point, in the axes of the base.
+    Base,
+    /// The readings of the wrist sensor.
+    Sensor,
+}
+
+/// What to compute.
+#[derive(Clone, Debug, Default)]
+pub struct ComplianceOptions {
+    /// Stiffness by hand, base joint first; empty for none.
+    pub stiffness: Vec<f64>,
+    /// Standard deviations of it, or empty.
+    pub stiffness_std: Vec<f64>,
+    /// The joint of the frequency response, from 0.
+    pub joint: usize,
+    /// True for the reference as instrument, false for the torque; `None` for the reference if it was recorded.
+    pub by_reference: Option<bool>,
+    /// Where a recorded wrench is read; `None` for the sensor if the description has one.
+    pub wrench: Option<WrenchFrame>,
+    /// Tool point in the flange frame, m.
+    pub tool: [f64; 3],
+    /// Poses; empty for the middle of the ranges.
+    pub poses: Vec<Vec<f64>>,
+    /// The two joints of the map, from 0; `None` for none.
+    pub map: Option<[usize; 2]>,
+}
+
+/// The result.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Compliance {
+    /// Name and version of this format.
+    pub schema: &'static str,
+    /// Name of the robot.
+    pub robot: String,
+    /// Stiffness of each drive, base joint first.
+    pub drives: Vec<DriveStiffness>,
+    /// Static loading.
+    pub loading: Option<LoadingFindings>,
+    /// Frequency response.
+    pub frequency: Option<FrequencyResponse>,
+    /// Tool point in the flange frame, m.
+    pub tool: [f64; 3],
+    /// Compliance of the tool point at each pose.
+    pub poses: Vec<ToolCompliance>,
+    /// Map over two joints.
+    pub map: Option<ComplianceMap>,
+    /// What to know about the result.
+    pub warnings: Vec<String>,
+}
+
+/// Identifies the stiffness of the drives and computes the compliance of the tool point.
+///
+/// Values of the description are replaced by given ones, and those by measured ones.
+///
+/// # Errors
+/// [`ComplianceError`].
+pub fn identify_compliance(
+    robot: &Robot,
+    load: &[&dyn Recording],
+    response: &[&dyn Recording],
+    options: &ComplianceOptions,
+) -> Result<Compliance, ComplianceError> {
+    let mut tool = ToolPoint::new(robot, options.tool)?;
+    let sensed = match options.wrench {
+        Some(frame) => frame == WrenchFrame::Sensor,
+        None => robot.wrist_sensor.is_some() && !load.is_empty(),
+    };
+    if sensed {
+        tool = tool.with_sensor()?;
+    }
+    let mut warnings = Vec::new();
+    let mut drives = described_stiffness(robot)?;
+    if !options.stiffness.is_empty() {
+        given_stiffness(&mut drives, &options.stiffness, &options.stiffness_std)?;
+    }
+    let loading = match load {
+        [] => None,
+        _ => Some(loading(&tool, &read(load)?)?),
+    };
+    let frequency = match response {
+        [] => None,
+        _ => Some(respond(
+            robot,
+            &Drives::of(robot)?,
+            &read(response)?,
+            options.joint,
+            options.by_reference,
+        )?),
+    };
+    measured(
+        &mut drives,
+        loading.as_ref(),
+        frequency.as_ref(),
+        &mut warnings,
+    );
+    warnings.extend(loading.iter().flat_map(|l| l.warnings.clone()));
+    warnings.extend(frequency.iter().flat_map(|f| f.warnings.clone()));
+    let elastic = drives.iter().any(|d| d.stiffness.is_some());
+    if let (false, Some(found)) = (elastic, &loading) {
+        let missing = found.drives.iter().find_map(|d| d.missing.as_deref());
+        return Err(ComplianceError::Recording(format!(
+            "The recordings show the stiffness of no joint. {}",
+            missing.unwrap_or_default()
+        )));
+    }
+    if !elastic {
+        return Err(ComplianceError::Option(format!(
+            "The stiffness of no joint of {} is known: give --stiffness, recordings (--static, --frequency), or [[effect]] kind = \"joint_elasticity\" in the description.",
+            robot.name
+        )));
+    }
+    if options.stiffness.is_empty() {
+        warnings.extend(rigid(&drives));
+    }
+    let poses = match options.poses.as_slice() {
+        [] => vec![robot.middle_position()],
+        given => given.to_vec(),
+    };
+    let computed: Vec<ToolCompliance> = (poses.iter())
+        .map(|pose| tool.compliance(pose, &drives))
+        .collect::<Result<_, _>>()?;
+    let map = (options.map)
+        .map(|joints| compliance_map(&tool, &drives, joints, &poses[0]))
+        .transpose()?;
+    Ok(Compliance {
+        schema: "rig-compliance/1",
+        robot: robot.name.clone(),
+        drives,
+        loading,
+        frequency,
+        tool: options.tool,
+        poses: computed,
+        map,
+        warnings,
+    })
+}
+
+/// Names the drives without a stiffness.
+fn rigid(drives: &[DriveStiffness]) -> Option<String> {
+    let rigid: Vec<String> = (drives.iter())
+        .filter(|d| d.source == Source::Rigid)
+        .map(|d| format!("\"{}\"", d.joint))
+        .collect();
+    (!rigid.is_empty()).then(|| {
+        format!(
+            "The stiffness of joint {} is unknown: these drives count as rigid, so the tool point is more compliant than computed.",
+            rigid.join(", ")
+        )
+    })
+}
+
+/// Puts measured values into the list.
+fn measured(
+    drives: &mut [DriveStiffness],
+    loading: Option<&LoadingFindings>,
+    frequency: Option<&FrequencyResponse>,
+    warnings: &mut Vec<String>,
+) {
+    let loaded = loading.into_iter().flat_map(|l| &l.drives);
+    let mut all: Vec<(usize, Value, Source)> = loaded
+        .filter_map(|d| Some((d.index, d.stiffness?, Source::Loading)))
+        .collect();
+    all.extend(frequency.map(|f| (f.index, f.stiffness, Source::Frequency)));
+    for (k, value, source) in all {
+        let own = &mut drives[k];
+        let before = own.source.is_measured();
+        match own.stiffness.filter(|_| before) {
+            None => {
+                own.damping = None;
+                (own.stiffness, own.source) = (Some(value), source);
+            }
+            Some(other) => match contradiction(own, other, value) {
+                // What contradicts each other has no mean.
+                Some(told) => {
+                    warnings.push(told);
+                    continue;
+                }
+                None => {
+                    own.stiffness = Some(fused(other, value));
+                    own.source = match own.source == source {
+                        true => source,
+                        false => Source::Both,
+                    };
+                }
+            },
+        }
+        if let (Source::Frequency, Some(response)) = (source, frequency) {
+            own.damping = Some(response.damping);
+        }
+    }
+}
+
+/// Weighted mean of two independent estimates.
+fn fused(a: Value, b: Value) -> Value {
+    let weights = [a.std, b.std].map(|s| 1.0 / (s * s));
+    if !weights.iter().all(|w| w.is_finite()) {
+        return if a.std <= b.std { a } else { b };
+    }
+    let sum = weights[0] + weights[1];
+    Value::new(
+        (weights[0] * a.value + weights[1] * b.value) / sum,
+        1.0 / sum.sqrt(),
+    )
+}
+
+/// Says that a further measurement contradicts the earlier ones.
+fn contradiction(drive: &DriveStiffness, before: Value, new: Value) -> Option<String> {
+    let off = (before.value - new.value).abs();
+    let beyond =
+        off > CONTRADICTS * before.std.hypot(new.std) && off > AGREES * before.value.min(new.value);
+    beyond.then(|| {
+        format!(
+            "Two measurements of the stiffness of joint \"{}\" contradict each other: {} ± {} by {} and then {} ± {} {}. The first is used. Static loading shows the whole deflection at large loads, a frequency response the spring at small amplitudes.",
+            drive.joint,
+            format_significant(before.value, 4),
+            format_significant(before.std, 2),
+            drive.source.words(),
+            format_significant(new.value, 4),
+            format_significant(new.std, 2),
+            format_unit(drive.unit)
+        )
+    })
+}

@@ -1,0 +1,51 @@
+//! Static loading: which recordings show what.
+
+use super::link::by_link;
+use super::result::LoadingFindings;
+use super::tool::by_tool;
+use super::wrench::{has_displacement, has_wrench};
+use crate::error::ComplianceError;
+use crate::signals::Signals;
+use crate::tool_point::ToolPoint;
+
+/// Finds the stiffness of the drives from recordings of slow loading.
+///
+/// # Errors
+/// [`ComplianceError`]: recordings with neither a link encoder nor a displacement of the tool point.
+pub(crate) fn loading(
+    tool: &ToolPoint<'_>,
+    stretches: &[Signals],
+) -> Result<LoadingFindings, ComplianceError> {
+    let mut found = LoadingFindings::default();
+    let displaced: Vec<&Signals> = stretches.iter().filter(|s| has_displacement(s)).collect();
+    let linked: Vec<&Signals> = (stretches.iter())
+        .filter(|s| s.joints.iter().any(|j| j.link.is_some()))
+        .collect();
+    for signals in stretches {
+        let link = signals.joints.iter().any(|j| j.link.is_some());
+        let tool = has_displacement(signals);
+        if tool && !has_wrench(signals) {
+            return Err(ComplianceError::Recording(format!(
+                "{} has a displacement of the tool point, but no force (columns fx fy fz, N, base axes).",
+                signals.label
+            )));
+        }
+        if !link && !tool {
+            return Err(ComplianceError::Recording(format!(
+                "{} shows no deflection: static loading needs an encoder on a link (column ql<k>), or the displacement of the tool point (dx dy dz, m, base axes) with its force (fx fy fz, N).",
+                signals.label
+            )));
+        }
+    }
+    if !displaced.is_empty() {
+        let (drives, residual) = by_tool(tool, &displaced)?;
+        found.drives.extend(drives);
+        found.residual = Some(residual);
+    }
+    if !linked.is_empty() {
+        for k in 0..tool.count() {
+            found.drives.extend(by_link(tool, &linked, k)?);
+        }
+    }
+    Ok(found)
+}

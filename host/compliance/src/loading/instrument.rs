@@ -1,0 +1,141 @@
+//! Linear regression with instruments, for regressors with noise.
+//!
+//! Least squares with a noisy regressor underestimates its coefficient. The means of the neighbouring windows are
+//! instruments: they share the load but not the noise, if the noise of a window does not reach the next (Söderström &
+//! Stoica 1989). Covariance with correlated residuals: Newey & West 1987.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Singular value over the largest below which a direction is not determined. Columns have unit length.
+const SINGULAR: f64 = 1e-7;
+/// Squared component along such directions from which on a coefficient is not determined.
+const HIDDEN: f64 = 1e-5;
+
+/// A regression y = X·β + e with instruments Z, rows in order of time.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Regression {
+    x: Vec<Vec<f64>>,
+    z: Vec<Vec<f64>>,
+    y: Vec<f64>,
+    /// Group of each row: residuals of two groups are independent.
+    group: Vec<usize>,
+}
+
+/// An estimate.
+#[derive(Clone, Debug)]
+pub(crate) struct Estimate {
+    pub values: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    /// True for a coefficient that the rows do not determine.
+    pub hidden: Vec<bool>,
+}
+
+impl Estimate {
+    /// Standard deviation of a coefficient.
+    pub(crate) fn std(&self, k: usize) -> f64 {
+        self.covariance[(k, k)].max(0.0).sqrt()
+    }
+}
+
+impl Regression {
+    /// Adds a row.
+    pub(crate) fn push(&mut self, x: Vec<f64>, z: Vec<f64>, y: f64, group: usize) {
+        self.x.push(x);
+        self.z.push(z);
+        self.y.push(y);
+        self.group.push(group);
+    }
+
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.y.len()
+    }
+
+    /// Root mean square of what an estimate leaves.
+    pub(crate) fn residual(&self, found: &Estimate) -> f64 {
+        let left: Vec<f64> = (self.x.iter().zip(&self.y))
+            .map(|(x, y)| {
+                y - x
+                    .iter()
+                    .zip(found.values.iter())
+                    .map(|(a, b)| a * b)
+                    .sum::<f64>()
+            })
+            .collect();
+        rig_numerics::statistics::rms(&left)
+    }
+
+    /// Returns the estimate; `None` for too few rows or values that are not finite.
+    pub(crate) fn solve(&self) -> Option<Estimate> {
+        let (rows, count) = (self.len(), self.x.first()?.len());
+        if rows <= count {
+            return None;
+        }
+        let x = DMatrix::from_fn(rows, count, |r, c| self.x[r][c]);
+        let z = DMatrix::from_fn(rows, count, |r, c| self.z[r][c]);
+        let y = DVector::from_column_slice(&self.y);
+        // Columns of unit length: offsets, torques and signs have different units.
+        let scale: Vec<f64> = (x.column_iter())
+            .map(|column| Some(column.norm()).filter(|n| *n > 0.0).unwrap_or(1.0))
+            .collect();
+        let scaled = |m: &DMatrix<f64>| DMatrix::from_fn(rows, count, |r, c| m[(r, c)] / scale[c]);
+        let (x, z) = (scaled(&x), scaled(&z));
+        let (inverse, hidden) = pseudo_inverse(&z.tr_mul(&x))?;
+        let found = &inverse * z.tr_mul(&y);
+        let residuals = &y - &x * &found;
+        let meat = self.meat(&z, &residuals);
+        let freedom = rows as f64 / (rows - count) as f64;
+        let covariance = &inverse * meat * inverse.transpose() * freedom;
+        Some(Estimate {
+            values: DVector::from_fn(count, |k, _| found[k] / scale[k]),
+            covariance: DMatrix::from_fn(count, count, |a, b| {
+                covariance[(a, b)] / (scale[a] * scale[b])
+            }),
+            hidden,
+        })
+    }
+
+    /// Sum of z·e·eᵀ·zᵀ over neighbouring rows of a group, with falling weights.
+    fn meat(&self, z: &DMatrix<f64>, residuals: &DVector<f64>) -> DMatrix<f64> {
+        let (rows, count) = (z.nrows(), z.ncols());
+        // Newey & West 1994: the lag grows with the fourth root of the rows and more.
+        let lags = ((rows as f64).powf(1.0 / 3.0) as usize).max(1);
+        let scores = DMatrix::from_fn(rows, count, |r, c| z[(r, c)] * residuals[r]);
+        let mut meat = scores.tr_mul(&scores);
+        for lag in 1..=lags {
+            let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+            let mut cross = DMatrix::zeros(count, count);
+            for r in lag..rows {
+                if self.group[r] == self.group[r - lag] {
+                    cross += scores.row(r).transpose() * scores.row(r - lag);
+                }
+            }
+            meat += weight * (&cross + cross.transpose());
+        }
+        meat
+    }
+}
+
+/// Returns the pseudo-inverse, and for each column whether it is not determined.
+fn pseudo_inverse(cross: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<bool>)> {
+    if !cross.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let count = cross.ncols();
+    let svd = cross.clone().svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let most = svd.singular_values.max();
+    let mut inverse = DMatrix::zeros(count, count);
+    let mut lost = vec![0.0; count];
+    for (k, value) in svd.singular_values.iter().enumerate() {
+        let right = v_t.row(k).transpose();
+        if *value > SINGULAR * most {
+            inverse += &right * u.column(k).transpose() / *value;
+        } else {
+            for (sum, v) in lost.iter_mut().zip(right.iter()) {
+                *sum += v * v;
+            }
+        }
+    }
+    Some((inverse, lost.iter().map(|l| *l > HIDDEN).collect()))
+}

@@ -1,0 +1,376 @@
+//! Twist of the drives by encoders on the links.
+//!
+//! twist = R·(q − ql), and twist = (f − fh·direction)/c + offset. In slow motion f is the torque of the motor, R⁻ᵀ·τ, and fh
+//! the Coulomb friction between motor and spring, whose sign is that of the motion; the torque that accelerates the described
+//! motor is subtracted. With the motors held f is the torque
+//! of the described weight and of the wrench at the tool point, R⁻ᵀ·(g − Jᵀ·w), and fh the hysteresis of the gear, whose sign is that of the load's change.
+//! A gap adds half its width with the sign of the spring's torque.
+
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+use rig_shared::multibody::{Chain, gravity_vector};
+
+use super::instrument::{Estimate, Regression};
+use super::result::{Deflection, DriveLoading};
+use super::windows::{Course, courses, means, window_rows};
+use super::wrench::{has_wrench, torques, wrench};
+use crate::error::ComplianceError;
+use crate::signals::Signals;
+use crate::tool_point::ToolPoint;
+use crate::value::Value;
+
+/// Share of the range of the load after a turning point in which friction changes its sign.
+const TRANSITION: f64 = 0.1;
+/// Multiple of the friction torque by which the load changes until friction has changed its sign: 2, and some margin.
+const FRICTION_TURNS: f64 = 2.5;
+/// Share of a usual movement of a window below which the joint counts as resting.
+const MOVES: f64 = 0.2;
+/// Share of the spring's torque about zero in which a gap is crossed.
+const CROSSING: f64 = 0.1;
+/// Standard deviations beyond which a gap is significant.
+const GAP_SIGMAS: f64 = 5.0;
+/// Relative standard deviation of 1/c beyond which the stiffness is not shown.
+pub(super) const NOT_SHOWN: f64 = 0.2;
+/// Relative spread of the speed from which on viscous friction is estimated.
+const SPEEDS: f64 = 0.2;
+/// Fewest windows.
+const FEWEST: usize = 20;
+
+/// One window.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    stretch: usize,
+    load: f64,
+    /// Mean load of both neighbours.
+    instrument: f64,
+    twist: f64,
+    speed: f64,
+    moves: bool,
+    course: Course,
+}
+
+/// Columns of the regression.
+const LOAD: usize = 0;
+const DIRECTION: usize = 1;
+
+/// Finds the stiffness of drive `k` from stretches with link encoders. `None` if no stretch has those that it needs.
+///
+/// # Errors
+/// [`ComplianceError`].
+pub(super) fn by_link(
+    tool: &ToolPoint<'_>,
+    stretches: &[&Signals],
+    k: usize,
+) -> Result<Option<DriveLoading>, ComplianceError> {
+    let robot = tool.robot();
+    let row = tool.drives().rows(&robot.middle_position())?;
+    let needed: Vec<usize> = (0..robot.joints.len())
+        .filter(|j| row[(k, *j)].abs() > 1e-9 * row.row(k).norm())
+        .collect();
+    let usable: Vec<&Signals> = (stretches.iter().copied())
+        .filter(|s| needed.iter().all(|j| s.joints[*j].link.is_some()))
+        .collect();
+    if usable.is_empty() {
+        return Ok(None);
+    }
+    let by_wrench = usable.iter().all(|s| has_wrench(s));
+    let weighs = robot.joints.iter().all(|j| j.inertial.is_some());
+    let windows = collect(tool, &usable, k, by_wrench)?;
+    let by = match by_wrench {
+        true => Deflection::LinkByWrench,
+        false => Deflection::LinkByTorque,
+    };
+    Ok(Some(estimate(robot, k, by, &windows, weighs)))
+}
+
+/// Forms the windows of all stretches.
+fn collect(
+    tool: &ToolPoint<'_>,
+    stretches: &[&Signals],
+    k: usize,
+    by_wrench: bool,
+) -> Result<Vec<Window>, ComplianceError> {
+    let rows = window_rows(stretches.iter().map(|s| s.len()).sum());
+    let mut series = Vec::new();
+    for signals in stretches {
+        series.push(Series::of(tool, signals, k, by_wrench, rows)?);
+    }
+    let range = range(series.iter().flat_map(|s| &s.place));
+    let mut steps: Vec<f64> = (series.iter())
+        .flat_map(|s| s.place.windows(3).map(|w| (w[2] - w[0]).abs()))
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    let usual = rig_numerics::statistics::percentile(&steps, 0.8);
+    let mut all = Vec::new();
+    for (stretch, own) in series.iter().enumerate() {
+        let courses = courses(&own.place, range);
+        for i in 1..own.load.len().saturating_sub(1) {
+            let moved = own.place[i + 1] - own.place[i - 1];
+            // The neighbours of a window beside a turning point lie on the other side of it.
+            let alone = courses[i - 1].run != courses[i + 1].run;
+            // In motion friction depends on the speed, which is low on both sides of a turning point: what is left out
+            // must be the same on both, or the friction there looks like a load.
+            let near = match by_wrench {
+                true => courses[i].travel,
+                false => courses[i].travel.min(courses[i].ahead),
+            };
+            let far = near > TRANSITION * range;
+            if alone || courses[i].direction == 0.0 || !far {
+                continue;
+            }
+            all.push(Window {
+                stretch,
+                load: own.load[i],
+                instrument: 0.5 * (own.load[i - 1] + own.load[i + 1]),
+                twist: own.twist[i],
+                speed: moved,
+                moves: by_wrench || moved.abs() > MOVES * usual,
+                course: courses[i],
+            });
+        }
+    }
+    if !by_wrench {
+        all.retain(|w| w.moves);
+    }
+    Ok(all)
+}
+
+/// Means over the windows of one stretch.
+struct Series {
+    load: Vec<f64>,
+    twist: Vec<f64>,
+    /// What decides the direction: the load with the motors held, the drive's position in motion.
+    place: Vec<f64>,
+}
+
+impl Series {
+    fn of(
+        tool: &ToolPoint<'_>,
+        signals: &Signals,
+        k: usize,
+        by_wrench: bool,
+        rows: usize,
+    ) -> Result<Self, ComplianceError> {
+        let n = tool.count();
+        let q: Vec<Vec<f64>> = signals.joints.iter().map(|j| means(&j.q, rows)).collect();
+        let link: Vec<Option<Vec<f64>>> = (signals.joints.iter())
+            .map(|j| j.link.as_ref().map(|l| means(l, rows)))
+            .collect();
+        let torque: Vec<Vec<f64>> = signals.joints.iter().map(|j| means(&j.tau, rows)).collect();
+        let force = match by_wrench {
+            true => Some(wrench(signals)?.map(|list| means(&list, rows))),
+            false => None,
+        };
+        if !by_wrench && torque.iter().any(Vec::is_empty) {
+            return Err(ComplianceError::Recording(format!(
+                "{} has link encoders, but neither joint torques (tau<k> or i<k>) nor a wrench at the tool point (fx … mz); the load of the springs is unknown.",
+                signals.label
+            )));
+        }
+        let chain = Chain::new(&tool.robot().geometry(), tool.robot().gravity)
+            .map_err(|error| ComplianceError::Model(error.to_string()))?;
+        let parameters = tool.robot().standard_parameters();
+        let count = q.first().map_or(0, Vec::len);
+        let mut own = Self {
+            load: Vec::with_capacity(count),
+            twist: Vec::with_capacity(count),
+            place: Vec::with_capacity(count),
+        };
+        let mut travelled = 0.0;
+        for i in 0..count {
+            let pose: Vec<f64> = q.iter().map(|list| list[i]).collect();
+            let map = tool.drives().rows(&pose)?;
+            let inverse = tool.drives().inverse(&pose)?;
+            let joint: Vec<f64> = match &force {
+                None => torque.iter().map(|list| list[i]).collect(),
+                Some(force) => {
+                    // The weight loads the spring as the link itself moves.
+                    let place: Vec<f64> = (0..n)
+                        .map(|j| match &link[j] {
+                            Some(link) => q[j][0] + link[i] - link[0],
+                            None => pose[j],
+                        })
+                        .collect();
+                    let mut weight = vec![0.0; n];
+                    gravity_vector(&chain, &parameters, &place, &mut weight)
+                        .map_err(|error| ComplianceError::Model(error.to_string()))?;
+                    let pushed = torques(tool, &pose, &force.each_ref().map(|list| list[i]))?;
+                    weight.iter().zip(&pushed).map(|(g, w)| g - w).collect()
+                }
+            };
+            // f = R⁻ᵀ·τ.
+            let driven = |list: &[f64]| (0..n).map(|j| inverse[(j, k)] * list[j]).sum::<f64>();
+            let load = driven(&joint);
+            own.twist.push(
+                (0..n)
+                    .filter_map(|j| Some(map[(k, j)] * (pose[j] - link[j].as_ref()?[i])))
+                    .sum(),
+            );
+            if i > 0 {
+                travelled += (0..n)
+                    .map(|j| map[(k, j)] * (q[j][i] - q[j][i - 1]))
+                    .sum::<f64>();
+            }
+            own.place.push(if by_wrench { load } else { travelled });
+            own.load.push(load);
+        }
+        if !by_wrench {
+            let seconds = rows as f64 / signals.rate();
+            own.subtract_inertia(tool.drives().inertia(tool.robot(), k), seconds);
+        }
+        Ok(own)
+    }
+
+    /// Subtracts the torque that accelerates the motor; `seconds` is the length of a window.
+    fn subtract_inertia(&mut self, inertia: f64, seconds: f64) {
+        for i in 1..self.place.len().saturating_sub(1) {
+            let second = self.place[i + 1] - 2.0 * self.place[i] + self.place[i - 1];
+            self.load[i] -= inertia * second / (seconds * seconds);
+        }
+    }
+}
+
+/// Returns largest minus smallest value; 0 without values.
+pub(super) fn range<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+        (l.min(*v), h.max(*v))
+    });
+    (high - low).max(0.0)
+}
+
+/// Regression of the twist. `gap` gives the friction torque by which the sign of the spring's torque is known.
+fn regression(windows: &[Window], gap: Option<&dyn Fn(&Window) -> f64>) -> Regression {
+    let stretches = windows.iter().map(|w| w.stretch + 1).max().unwrap_or(0);
+    let speeds: Vec<f64> = windows.iter().map(|w| w.speed.abs()).collect();
+    let middle = rig_numerics::statistics::mean_or_zero(&speeds);
+    let spread = rig_numerics::statistics::squares_about(&speeds, middle);
+    let viscous = windows.iter().all(|w| w.moves)
+        && (spread / speeds.len().max(1) as f64).sqrt() > SPEEDS * middle;
+    let mut regression = Regression::default();
+    for w in windows {
+        let mut x = vec![w.load, w.course.direction];
+        x.extend((0..stretches).map(|s| f64::from(u8::from(s == w.stretch))));
+        if viscous {
+            x.push(w.speed);
+        }
+        if let Some(side) = gap {
+            x.push(side(w).signum());
+        }
+        let mut z = x.clone();
+        z[LOAD] = w.instrument;
+        regression.push(x, z, w.twist, w.stretch);
+    }
+    regression
+}
+
+/// Estimates stiffness, hysteresis and gap of drive `k`.
+fn estimate(
+    robot: &Robot,
+    k: usize,
+    by: Deflection,
+    windows: &[Window],
+    weighs: bool,
+) -> DriveLoading {
+    let mut kept = windows.to_vec();
+    let mut found = solve(&kept, None);
+    if let (Some(first), Deflection::LinkByWrench) = (&found, by) {
+        let friction = (first.values[DIRECTION] / first.values[LOAD]).abs();
+        kept.retain(|w| w.course.travel > FRICTION_TURNS * friction);
+        found = solve(&kept, None).or(found);
+    }
+    let mut result = DriveLoading {
+        joint: robot.joints[k].name.clone(),
+        index: k,
+        by,
+        stiffness: None,
+        hysteresis: None,
+        gap: None,
+        reverses: false,
+        load: [0.0; 2],
+        windows: kept.len(),
+        missing: None,
+        points: Default::default(),
+    };
+    let Some(found) = found.filter(|f| !f.hidden[LOAD] && f.values[LOAD] > 0.0) else {
+        result.missing = Some(missing(robot, k, by));
+        return result;
+    };
+    let friction = -found.values[DIRECTION] / found.values[LOAD];
+    let spring = |w: &Window| w.load - friction * w.course.direction;
+    let (mut used, mut last, mut gap) = (kept.clone(), found, None);
+    // With a wrench the sign of the spring's torque is known only with the weight of the links.
+    if by == Deflection::LinkByTorque || weighs {
+        let extreme = kept.iter().map(|w| spring(w).abs()).fold(0.0, f64::max);
+        let clear: Vec<Window> = (kept.iter().copied())
+            .filter(|w| spring(w).abs() > CROSSING * extreme)
+            .collect();
+        result.reverses = [-1.0, 1.0]
+            .iter()
+            .all(|side| clear.iter().filter(|w| spring(w) * side > 0.0).count() >= FEWEST / 4);
+        if let (true, Some(other)) = (result.reverses, solve(&clear, Some(&spring))) {
+            let own = other.values.len() - 1;
+            let value = Value::new(2.0 * other.values[own], 2.0 * other.std(own));
+            if value.value > GAP_SIGMAS * value.std && other.values[LOAD] > 0.0 {
+                (gap, last, used) = (Some(value), other, clear);
+            }
+        }
+    }
+    let compliance = Value::new(last.values[LOAD], last.std(LOAD));
+    if !(compliance.relative() < NOT_SHOWN) {
+        result.missing = Some(missing(robot, k, by));
+        return result;
+    }
+    let stiffness = compliance.reciprocal();
+    result.stiffness = Some(stiffness);
+    result.hysteresis = (!last.hidden[DIRECTION]).then(|| {
+        Value::new(
+            -last.values[DIRECTION] * stiffness.value,
+            last.std(DIRECTION) * stiffness.value,
+        )
+    });
+    result.gap = gap;
+    result.windows = used.len();
+    finish(&mut result, &kept, &last, &spring);
+    result
+}
+
+/// Adds the range of the load and the points of the figure.
+fn finish(
+    result: &mut DriveLoading,
+    windows: &[Window],
+    found: &Estimate,
+    spring: &dyn Fn(&Window) -> f64,
+) {
+    let loads: Vec<f64> = windows.iter().map(spring).collect();
+    let low = loads.iter().copied().fold(f64::INFINITY, f64::min);
+    result.load = [low, low + range(loads.iter())];
+    for w in windows {
+        let side = usize::from(w.course.direction < 0.0);
+        let offset = found.values[2 + w.stretch];
+        result.points[side].push([w.load, w.twist - offset]);
+    }
+}
+
+fn solve(windows: &[Window], gap: Option<&dyn Fn(&Window) -> f64>) -> Option<Estimate> {
+    (windows.len() >= FEWEST)
+        .then(|| regression(windows, gap).solve())
+        .flatten()
+}
+
+/// Says why the stiffness is not shown, and what would show it.
+fn missing(robot: &Robot, k: usize, by: Deflection) -> String {
+    let name = &robot.joints[k].name;
+    let effort = format_significant(robot.torque_limits()[k].unwrap_or(f64::NAN) * 0.5, 2);
+    let size = match robot.torque_limits()[k] {
+        Some(_) => format!(" by about {effort} {}", robot.joints[k].kind.units().1),
+        None => String::new(),
+    };
+    match by {
+        Deflection::LinkByTorque => format!(
+            "The twist of joint \"{name}\" does not follow its torque beyond noise. Move the joint slowly (`rig excite --kind reversals --joint {name}`) where gravity or a spring at the tool changes its torque{size}."
+        ),
+        Deflection::LinkByWrench | Deflection::Tool => format!(
+            "The load hardly turns joint \"{name}\". Change the force at the tool point slowly, to and fro, so that it loads this joint{size}."
+        ),
+    }
+}

@@ -1,0 +1,13 @@
+//! Stiffness of the drives from static loading.
+
+mod advice;
+mod findings;
+mod instrument;
+mod link;
+mod result;
+mod tool;
+mod windows;
+mod wrench;
+
+pub(crate) use findings::loading;
+pub use result::{Deflection, DriveLoading, LoadingFindings};

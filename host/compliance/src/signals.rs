@@ -1,0 +1,105 @@
+//! Recordings held in memory, one stretch without a gap at a time.
+//!
+//! Spectra and windows need whole stretches: memory grows with the recording.
+
+use rig_data::Block;
+use rig_data::prepare::Recording;
+
+use crate::error::ComplianceError;
+
+/// Rows of one read.
+const ROWS: usize = 8192;
+
+/// Columns of one joint.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct JointSignals {
+    pub q: Vec<f64>,
+    /// Empty if not recorded.
+    pub tau: Vec<f64>,
+    pub reference: Option<Vec<f64>>,
+    pub link: Option<Vec<f64>>,
+}
+
+/// One stretch of a recording.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Signals {
+    pub label: String,
+    pub t: Vec<f64>,
+    pub joints: Vec<JointSignals>,
+    extra: Vec<(String, Vec<f64>)>,
+}
+
+impl Signals {
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Rows per second; not a number for fewer than two rows.
+    pub(crate) fn rate(&self) -> f64 {
+        match (self.t.first(), self.t.last()) {
+            (Some(first), Some(last)) if last > first => (self.t.len() - 1) as f64 / (last - first),
+            _ => f64::NAN,
+        }
+    }
+
+    /// Returns a column that has no meaning for the model.
+    pub(crate) fn column(&self, name: &str) -> Option<&[f64]> {
+        let mut columns = self.extra.iter();
+        columns
+            .find(|(own, _)| own == name)
+            .map(|(_, values)| values.as_slice())
+    }
+
+    fn append(&mut self, block: Block) {
+        if self.joints.is_empty() {
+            self.joints = vec![JointSignals::default(); block.joints.len()];
+            self.extra = (block.extra.iter())
+                .map(|(name, _)| (name.clone(), Vec::new()))
+                .collect();
+        }
+        self.t.extend(block.t);
+        for (own, new) in self.joints.iter_mut().zip(block.joints) {
+            own.q.extend(new.q);
+            own.tau.extend(new.tau);
+            for (list, more) in [
+                (&mut own.reference, new.reference),
+                (&mut own.link, new.link),
+            ] {
+                if let Some(more) = more {
+                    list.get_or_insert_default().extend(more);
+                }
+            }
+        }
+        for ((_, own), (_, new)) in self.extra.iter_mut().zip(block.extra) {
+            own.extend(new);
+        }
+    }
+}
+
+/// Reads all recordings, one entry per stretch without a gap in time.
+///
+/// # Errors
+/// [`ComplianceError::Prepare`].
+pub(crate) fn read(recordings: &[&dyn Recording]) -> Result<Vec<Signals>, ComplianceError> {
+    let mut all: Vec<Signals> = Vec::new();
+    for recording in recordings {
+        let first = all.len();
+        recording.each_block(ROWS, &mut |block| {
+            if block.is_empty() {
+                return Ok(());
+            }
+            if all.len() == first || !block.continues {
+                all.push(Signals {
+                    label: recording.label(),
+                    ..Signals::default()
+                });
+            }
+            if let Some(last) = all.last_mut() {
+                last.append(block);
+            }
+            Ok(())
+        })?;
+    }
+    Ok(all)
+}

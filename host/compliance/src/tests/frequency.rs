@@ -1,0 +1,202 @@
+//! The stiffness from the frequency response of the emulated rig.
+
+use std::f64::consts::TAU;
+
+use rig_data::prepare::Recording;
+
+use rig_plant::effect::disturbance::Disturbance;
+
+use super::rig::{Rig, chirp, recording};
+use crate::frequency::{bands, spectra};
+use crate::signals::read;
+use crate::{Band, Compliance, ComplianceError, ComplianceOptions, identify_compliance};
+
+fn identify(
+    rig: &Rig,
+    run: impl Fn(u64) -> rig_data::Block,
+    seeds: &[u64],
+    by_reference: Option<bool>,
+) -> Result<Compliance, ComplianceError> {
+    let runs: Vec<_> = seeds.iter().map(|seed| recording(run(*seed))).collect();
+    let list: Vec<&dyn Recording> = runs.iter().map(|r| r as &dyn Recording).collect();
+    let options = ComplianceOptions {
+        by_reference,
+        ..ComplianceOptions::default()
+    };
+    identify_compliance(&rig.robot(), &[], &list, &options)
+}
+
+/// Friction (with presliding and weakening), noise of the current and counts of the encoder are those of the documentation's
+/// rig.
+#[test]
+fn a_chirp_shows_the_stiffness_within_five_per_cent() {
+    for (stiffness, damping) in [(600.0, 0.4), (1500.0, 0.8), (3000.0, 1.0)] {
+        let rig = Rig::new(stiffness, damping);
+        let run = |seed| rig.run(30.0, chirp(30.0, [1.0, 60.0], 1.2, 0.0), |_| 0.0, seed);
+        let found = identify(&rig, run, &[1], None).unwrap();
+        let response = found.frequency.unwrap();
+        assert!(response.whole && response.by_reference);
+        let off = 100.0 * (response.stiffness.value / stiffness - 1.0);
+        println!("chirp, {stiffness} N·m/rad: {off:.2} % off");
+        for (own, truth) in [
+            (response.stiffness, stiffness),
+            (response.stiffness_by_description.unwrap(), stiffness),
+            (response.link_inertia, 0.12),
+            (response.motor_inertia, 0.05),
+        ] {
+            assert!((own.value / truth - 1.0).abs() < 0.05, "{own:?}, {truth}");
+        }
+    }
+}
+
+#[test]
+fn plain_friction_is_split_between_motor_and_link_and_the_intervals_cover() {
+    let (stiffness, seeds) = (1500.0, 60);
+    let mut rig = Rig::new(stiffness, 0.8).with_plain_friction();
+    rig.config.sensors.current.noise = Some(0.1);
+    rig.config.sensors.encoder.counts_per_turn = 4096.0;
+    rig.config.mechanism.disturbance = Some(Disturbance {
+        std: 0.05,
+        correlation_time: 0.05,
+    });
+    let (mut covered, mut sum) = (0, 0.0);
+    for seed in 0..seeds {
+        let run = |seed| rig.run(16.0, chirp(16.0, [2.0, 60.0], 1.5, 0.0), |_| 0.0, seed);
+        let response = identify(&rig, run, &[seed], None)
+            .unwrap()
+            .frequency
+            .unwrap();
+        let [low, high] = response.stiffness.interval();
+        covered += usize::from(low <= stiffness && stiffness <= high);
+        sum += response.stiffness.value;
+    }
+    println!(
+        "chirps: {covered} of {seeds} intervals cover; mean {:.2}",
+        sum / seeds as f64
+    );
+    assert!(covered as f64 > 0.85 * seeds as f64, "{covered} of {seeds}");
+}
+
+/// A disturbance on the link, which the position loop answers with torque: torque and velocity are then related by the
+/// controller too, and the plain estimate S_τv/S_ττ takes that for the robot. The truth is the solution of both equations of
+/// motion with the numbers of the rig.
+#[test]
+fn the_reference_as_instrument_avoids_the_bias_of_feedback() {
+    let mut rig = Rig::new(1500.0, 0.8).with_plain_friction();
+    rig.bandwidth = 20.0;
+    // Linear: a disturbance that shakes the joint changes what Coulomb friction does on average.
+    rig.config.motor.friction.coulomb = 0.0;
+    rig.config.mechanism.friction.coulomb = 0.0;
+    let bands_of = |rig: &Rig, by_reference: bool| -> Vec<Band> {
+        let run = |seed| {
+            let chirp = chirp(40.0, [2.0, 60.0], 1.0, 0.0);
+            recording(rig.run(40.0, chirp, |_| 0.0, seed))
+        };
+        let runs: Vec<_> = (1..=4).map(run).collect();
+        let list: Vec<&dyn Recording> = runs.iter().map(|r| r as &dyn Recording).collect();
+        let found = spectra(&read(&list).unwrap(), 0, "link", Some(by_reference)).unwrap();
+        bands(&found).into_iter().map(|b| b.band).collect()
+    };
+    let truth = |frequency: f64| {
+        let s = nalgebra::Complex::new(0.0, TAU * frequency);
+        let spring = s * 0.8 + 1500.0;
+        let motor = s * s * 0.05 + s * 0.1 + spring;
+        let link = s * s * 0.12 + s * 0.2 + spring + 2.943;
+        s * link / (motor * link - spring * spring)
+    };
+    rig.config.mechanism.disturbance = Some(Disturbance {
+        std: 1.5,
+        correlation_time: 0.004,
+    });
+    let outside = |by_reference| {
+        let polar = |b: &Band| nalgebra::Complex::from_polar(b.magnitude, b.phase);
+        let found = bands_of(&rig, by_reference);
+        let used: Vec<&Band> = (found.iter())
+            .filter(|b| b.used && (3.0..50.0).contains(&b.frequency))
+            .collect();
+        let off = |b: &&&Band| (polar(b) - truth(b.frequency)).norm() > b.radius;
+        used.iter().filter(off).count() as f64 / used.len() as f64
+    };
+    let (fair, biased) = (outside(true), outside(false));
+    println!(
+        "feedback: truth outside of the 95 % circle in {fair:.2} of the bands by the reference, {biased:.2} by the torque"
+    );
+    assert!(fair < 0.2 && biased > 0.5, "{fair}, {biased}");
+}
+
+#[test]
+fn what_a_recording_does_not_show_is_refused_in_words() {
+    let rig = Rig::new(1500.0, 0.8);
+    let said = |rig: &Rig, run: &dyn Fn(u64) -> rig_data::Block| {
+        identify(rig, run, &[1], None).unwrap_err().to_string()
+    };
+    // Held still: the encoder may change by a count, and noise is not coherent.
+    let still = said(&rig, &|seed| rig.run(10.0, |t| 1e-6 * t, |_| 0.0, seed));
+    assert!(still.contains("does not move"), "{still}");
+    let slow = said(&rig, &|seed| {
+        rig.run(20.0, chirp(20.0, [0.5, 5.0], 1.0, 0.0), |_| 0.0, seed)
+    });
+    assert!(slow.contains("no antiresonance"), "{slow}");
+    let mut rigid = rig.clone();
+    rigid.config.mechanism.elasticity = None;
+    let stiff = said(&rigid, &|seed| {
+        rigid.run(20.0, chirp(20.0, [1.0, 40.0], 1.0, 0.0), |_| 0.0, seed)
+    });
+    assert!(
+        stiff.contains("no antiresonance") || stiff.contains("No model"),
+        "{stiff}"
+    );
+    let torqueless = said(&rig, &|seed| {
+        let mut block = rig.run(5.0, chirp(5.0, [1.0, 40.0], 1.0, 0.0), |_| 0.0, seed);
+        block.joints[0].tau.clear();
+        block
+    });
+    assert!(torqueless.contains("no torque"), "{torqueless}");
+}
+
+#[test]
+fn a_saturated_torque_is_told() {
+    let rig = Rig::new(1500.0, 0.8).with_plain_friction();
+    let cut = |share: f64| {
+        let run = |seed| {
+            let mut block = rig.run(20.0, chirp(20.0, [2.0, 60.0], 1.5, 0.0), |_| 0.0, seed);
+            let tau = &mut block.joints[0].tau;
+            let mut sizes: Vec<f64> = tau.iter().map(|t| t.abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            let most = sizes[((1.0 - share) * sizes.len() as f64) as usize];
+            tau.iter_mut().for_each(|t| *t = t.clamp(-most, most));
+            block
+        };
+        identify(&rig, run, &[1], None)
+    };
+    let warnings = cut(0.03).unwrap().warnings;
+    assert!(
+        warnings.iter().any(|w| w.contains("saturates")),
+        "{warnings:?}"
+    );
+    let refused = cut(0.3).unwrap_err().to_string();
+    assert!(refused.contains("saturates"), "{refused}");
+}
+
+/// A loading and a response of different gears have no mean.
+#[test]
+fn measurements_that_contradict_each_other_are_not_averaged() {
+    let (soft, stiff) = (Rig::new(1500.0, 0.8), Rig::new(2500.0, 0.8));
+    let slow = recording(soft.run(30.0, |t| 1.4 * (0.6 * t).sin(), |_| 0.0, 1));
+    let chirp = chirp(30.0, [1.0, 60.0], 1.2, 0.0);
+    let lively = recording(stiff.run(30.0, chirp, |_| 0.0, 2));
+    let options = ComplianceOptions::default();
+    let found = identify_compliance(&soft.robot(), &[&slow], &[&lively], &options).unwrap();
+    let kept = found.drives[0].stiffness.unwrap();
+    assert!((kept.value / 1500.0 - 1.0).abs() < 0.05, "{kept:?}");
+    assert!(found.warnings.iter().any(|w| w.contains("contradict")));
+    let again = recording(soft.run(
+        30.0,
+        super::rig::chirp(30.0, [1.0, 60.0], 1.2, 0.0),
+        |_| 0.0,
+        3,
+    ));
+    let found = identify_compliance(&soft.robot(), &[&slow], &[&again], &options).unwrap();
+    assert_eq!(found.drives[0].source, crate::Source::Both);
+    assert!(!found.warnings.iter().any(|w| w.contains("contradict")));
+}

@@ -1,0 +1,313 @@
+//! The stiffness from static loading, of the emulated rig and of an arm by statics.
+
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::SeedableRng;
+use rig_data::prepare::{InMemory, Recording};
+use rig_data::{Block, JointColumns};
+use rig_model::robot::{Reads, Robot, TX40, WristSensor};
+
+use super::rig::{Rig, recording};
+use super::statics::rest;
+use crate::{ComplianceOptions, Deflection, DriveLoading, ToolPoint, identify_compliance};
+
+fn identify(robot: &Robot, runs: &[InMemory], tool: [f64; 3]) -> Vec<DriveLoading> {
+    let list: Vec<&dyn Recording> = runs.iter().map(|r| r as &dyn Recording).collect();
+    let options = ComplianceOptions {
+        tool,
+        ..ComplianceOptions::default()
+    };
+    let found = identify_compliance(robot, &list, &[], &options).unwrap();
+    found.loading.unwrap().drives
+}
+
+/// A slow swing through gravity.
+fn swing(t: f64) -> f64 {
+    1.4 * (0.3 * t).sin()
+}
+
+/// Friction with presliding and weakening, noise and counts of the documentation's rig.
+#[test]
+fn a_slow_motion_shows_the_stiffness_within_five_per_cent() {
+    for stiffness in [600.0, 3000.0] {
+        let rig = Rig::new(stiffness, 0.5);
+        let run = recording(rig.run(60.0, swing, |_| 0.0, 1));
+        let own = &identify(&rig.robot(), &[run], [0.0; 3])[0];
+        let found = own.stiffness.unwrap();
+        assert!((found.value / stiffness - 1.0).abs() < 0.05, "{found:?}");
+        assert!(own.gap.is_none() && own.reverses);
+        println!("slow motion, {stiffness} N·m/rad: {found:?}");
+    }
+}
+
+#[test]
+fn intervals_of_a_slow_motion_cover_and_friction_is_kept_apart() {
+    let (stiffness, seeds) = (2000.0, 60);
+    let mut rig = Rig::new(stiffness, 0.5).with_plain_friction();
+    rig.config.sensors.current.noise = Some(0.1);
+    rig.config.sensors.encoder.counts_per_turn = 4096.0;
+    let (mut covered, mut friction) = (0, 0.0);
+    for seed in 0..seeds {
+        let run = recording(rig.run(30.0, |t| 1.4 * (0.6 * t).sin(), |_| 0.0, seed));
+        let own = &identify(&rig.robot(), &[run], [0.0; 3])[0];
+        let [low, high] = own.stiffness.unwrap().interval();
+        covered += u64::from(low <= stiffness && stiffness <= high);
+        friction += own.hysteresis.unwrap().value / seeds as f64;
+    }
+    println!("slow motions: {covered} of {seeds} intervals cover; friction {friction:.4} N·m");
+    assert!(covered * 100 > 85 * seeds, "{covered} of {seeds}");
+    // The friction of the link (0.3 N·m) loads the spring. That of the motor is 0.1 N·m and 0.1 N·m·s/rad; the mean speed where
+    // |q| < 1.12 rad is 0.725 rad/s.
+    assert!((friction - 0.1725).abs() < 0.005, "{friction}");
+}
+
+#[test]
+fn a_gap_is_told_and_not_averaged_into_the_stiffness() {
+    let (stiffness, gap) = (2000.0, 2e-3);
+    let rig = Rig::new(stiffness, 0.5).with_plain_friction().with_gap(gap);
+    let run = recording(rig.run(60.0, swing, |_| 0.0, 3));
+    let own = &identify(&rig.robot(), &[run], [0.0; 3])[0];
+    let (found, width) = (own.stiffness.unwrap(), own.gap.unwrap());
+    println!("gap of {gap} rad, {stiffness} N·m/rad: {width:?}, {found:?}");
+    assert!((found.value / stiffness - 1.0).abs() < 0.05, "{found:?}");
+    assert!((width.value / gap - 1.0).abs() < 0.05, "{width:?}");
+}
+
+/// The motor is held by its position loop, and the link is loaded from outside: by the link encoder, and by a gauge at the
+/// tool point.
+#[test]
+fn a_known_force_shows_stiffness_and_hysteresis_with_the_motor_held() {
+    let stiffness = 1500.0;
+    let rig = Rig::new(stiffness, 0.5).with_plain_friction();
+    let offset = [0.5, 0.0, 0.0];
+    let robot = rig.robot();
+    let tool = ToolPoint::new(&robot, offset).unwrap();
+    // A triangle of 4 N·m.
+    let torque = |t: f64| {
+        let phase = (t / 10.0).fract();
+        4.0 * (4.0 * (phase - 0.5).abs() - 1.0)
+    };
+    let block = rig.run(60.0, |_| 0.0, torque, 5);
+    let link = block.joints[0].link.clone().unwrap();
+    let (_, jacobian) = tool.jacobian(&[0.0]).unwrap();
+    let arm = [0, 1, 2].map(|r| jacobian[(r, 0)]);
+    let square: f64 = arm.iter().map(|a| a * a).sum();
+    let (start, _) = tool.jacobian(&[0.0]).unwrap();
+    let mut block = block;
+    for (r, (force, gauge)) in [("fx", "dx"), ("fy", "dy"), ("fz", "dz")]
+        .iter()
+        .enumerate()
+    {
+        let list = block
+            .t
+            .iter()
+            .map(|t| torque(*t) * arm[r] / square)
+            .collect();
+        block.extra.push(((*force).to_owned(), list));
+        let place = |q: &f64| tool.jacobian(&[q - link[0]]).unwrap().0[r] - start[r];
+        block
+            .extra
+            .push(((*gauge).to_owned(), link.iter().map(place).collect()));
+    }
+    let found = identify(&robot, &[recording(block)], offset);
+    assert_eq!(found.len(), 2);
+    for own in &found {
+        let value = own.stiffness.unwrap();
+        println!(
+            "{}, {stiffness} N·m/rad: {value:?}, {:?}",
+            own.by.words(),
+            own.hysteresis
+        );
+        assert!((value.value / stiffness - 1.0).abs() < 0.005, "{own:?}");
+        // The bearing of the link bears 0.3 N·m of the load in either direction.
+        let friction = own.hysteresis.unwrap().value;
+        assert!(
+            (friction.abs() - 0.3).abs() < 0.03,
+            "{:?} {friction}",
+            own.by
+        );
+    }
+    assert!(found.iter().any(|own| own.by == Deflection::Tool));
+}
+
+/// Poses and directions of the force on the arm of six joints.
+const POSES: [[f64; 6]; 4] = [
+    [0.3, -0.5, 1.2, 0.4, 0.8, -0.6],
+    [-1.2, 0.4, 0.9, -0.7, -1.1, 2.0],
+    [0.9, 0.1, 1.6, 1.2, 1.3, 0.4],
+    [0.0, -0.9, 0.6, -1.4, 0.7, -1.0],
+];
+const STIFFNESS: [f64; 6] = [2.0e4, 2.5e4, 1.2e4, 4.0e3, 3.0e3, 1.5e3];
+
+/// Displacement per force by the numeric solution of statics: pose, direction of the force, axis.
+fn displacements(robot: &Robot, offset: [f64; 3]) -> Vec<[[f64; 3]; 3]> {
+    let unit = |pose: &[f64; 6], c: usize| {
+        let mut wrench = [0.0; 6];
+        wrench[c] = 1.0;
+        let moved = rest(robot, pose, offset, &STIFFNESS, wrench).0;
+        [moved[0], moved[1], moved[2]]
+    };
+    POSES
+        .iter()
+        .map(|pose| [0, 1, 2].map(|c| unit(pose, c)))
+        .collect()
+}
+
+/// Recordings of forces of 80 N to and fro along three directions at each pose, with noise of force and gauge.
+fn loaded(table: &[[[f64; 3]; 3]], seed: u64) -> Vec<InMemory> {
+    let mut dice = Pcg64Mcg::seed_from_u64(seed);
+    let mut normal = move |std: f64| {
+        let value: f64 = StandardNormal.sample(&mut dice);
+        std * value
+    };
+    let rows = 400;
+    let mut runs = Vec::new();
+    for (pose, moved) in POSES.iter().zip(table) {
+        for (c, moved) in moved.iter().enumerate() {
+            let force: Vec<f64> = (0..rows)
+                .map(|k| 80.0 * (4.0 * ((k as f64 / 200.0).fract() - 0.5).abs() - 1.0))
+                .collect();
+            let mut block = Block {
+                t: (0..rows).map(|k| 0.1 * k as f64).collect(),
+                joints: pose
+                    .iter()
+                    .map(|q| JointColumns {
+                        q: vec![*q; rows],
+                        ..JointColumns::default()
+                    })
+                    .collect(),
+                first_line: 2,
+                ..Block::default()
+            };
+            for (r, (name, gauge)) in [("fx", "dx"), ("fy", "dy"), ("fz", "dz")]
+                .iter()
+                .enumerate()
+            {
+                let own = f64::from(u8::from(r == c));
+                let read = force.iter().map(|f| own * f + normal(1.0)).collect();
+                block.extra.push(((*name).to_owned(), read));
+                let read = force
+                    .iter()
+                    .map(|f| moved[r] * f + 1e-3 + normal(1e-5))
+                    .collect();
+                block.extra.push(((*gauge).to_owned(), read));
+            }
+            runs.push(recording(block));
+        }
+    }
+    runs
+}
+
+#[test]
+fn a_gauge_at_the_tool_shows_every_joint_and_its_intervals_cover() {
+    let robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    let offset = [0.1, 0.08, 0.12];
+    let table = displacements(&robot, offset);
+    let seeds = 50;
+    let mut covered = [0; 6];
+    for seed in 0..seeds {
+        let found = identify(&robot, &loaded(&table, seed), offset);
+        for (k, own) in found.iter().enumerate() {
+            let value = own.stiffness.unwrap_or_else(|| panic!("{:?}", own.missing));
+            assert!(
+                (value.value / STIFFNESS[k] - 1.0).abs() < 0.05,
+                "{k}: {value:?}"
+            );
+            let [low, high] = value.interval();
+            covered[k] += u64::from(low <= STIFFNESS[k] && STIFFNESS[k] <= high);
+        }
+    }
+    let all: u64 = covered.iter().sum();
+    println!("gauge at the tool: {all} of {} intervals cover", 6 * seeds);
+    assert!(covered.iter().all(|c| *c >= 40), "{covered:?}");
+    assert!(all > 6 * seeds * 88 / 100, "{covered:?}");
+}
+
+/// With the tool point on the axis of the last joint no force there turns it; with one pose the joints cannot be told apart.
+#[test]
+fn what_a_loading_does_not_show_is_named_with_a_pose_that_would() {
+    let robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    let offset = [0.0, 0.0, 0.12];
+    let table = displacements(&robot, offset);
+    let found = identify(&robot, &loaded(&table, 1), offset);
+    let last = found[5].missing.as_ref().unwrap();
+    assert!(
+        found[5].stiffness.is_none() && last.contains("no force at the tool point"),
+        "{last}"
+    );
+    assert!(found[1].stiffness.is_some());
+    // One pose with one direction shows one number.
+    let table = displacements(&robot, [0.1, 0.08, 0.12]);
+    let one = &loaded(&table, 1)[0];
+    let options = ComplianceOptions {
+        tool: [0.1, 0.08, 0.12],
+        ..ComplianceOptions::default()
+    };
+    let said = identify_compliance(&robot, &[one], &[], &options)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        said.contains("no joint") && said.contains("A force along"),
+        "{said}"
+    );
+}
+
+/// The same loads read by a sensor between flange and tool: other axes, another point, the opposite sign, and a bias.
+#[test]
+fn readings_of_a_wrist_sensor_give_the_same_stiffness() {
+    let mut robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    let offset = [0.1, 0.08, 0.12];
+    let table = displacements(&robot, offset);
+    let at_tool = loaded(&table, 1);
+    let plain = identify(&robot, &at_tool, offset);
+    let sensor = WristSensor {
+        position: [0.0, 0.01, 0.03],
+        rotation: [0.2, -0.4, 0.9],
+        reads: Some(Reads::Robot),
+        ..WristSensor::default()
+    };
+    let read = |run: &InMemory| {
+        let mut block = run.blocks[0].clone();
+        let q: Vec<f64> = block.joints.iter().map(|j| j.q[0]).collect();
+        // Poses by products of the joints' own poses.
+        let mut flange = nalgebra::Isometry3::identity();
+        for (joint, q) in robot.joints.iter().zip(&q) {
+            flange *= joint.pose(*q);
+        }
+        let own = flange * sensor.pose();
+        let arm = flange * nalgebra::Point3::from(offset) - own.translation.vector;
+        let force: Vec<Vec<f64>> = (["fx", "fy", "fz"].iter())
+            .map(|name| {
+                block
+                    .extra
+                    .iter()
+                    .find(|(n, _)| n == name)
+                    .unwrap()
+                    .1
+                    .clone()
+            })
+            .collect();
+        let mut readings = vec![Vec::new(); 6];
+        for i in 0..block.t.len() {
+            let push = nalgebra::Vector3::new(force[0][i], force[1][i], force[2][i]);
+            let turn = own.rotation.inverse();
+            let (f, m) = (-(turn * push), -(turn * arm.coords.cross(&push)));
+            for c in 0..3 {
+                readings[c].push(f[c] + 3.0);
+                readings[3 + c].push(m[c] - 0.2);
+            }
+        }
+        block.extra.retain(|(name, _)| name.starts_with('d'));
+        for (name, list) in rig_data::WRENCH_COLUMNS.iter().zip(readings) {
+            block.extra.push(((*name).to_owned(), list));
+        }
+        recording(block)
+    };
+    let runs: Vec<InMemory> = at_tool.iter().map(read).collect();
+    robot.wrist_sensor = Some(sensor);
+    let sensed = identify(&robot, &runs, offset);
+    for (a, b) in plain.iter().zip(&sensed) {
+        let (a, b) = (a.stiffness.unwrap(), b.stiffness.unwrap());
+        assert!((a.value / b.value - 1.0).abs() < 1e-6, "{a:?} {b:?}");
+    }
+}

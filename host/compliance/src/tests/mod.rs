@@ -1,0 +1,8 @@
+//! Tests against physics of other code.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod frequency;
+mod loading;
+mod rig;
+mod statics;

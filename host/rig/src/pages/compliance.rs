@@ -1,0 +1,626 @@
+//! The page of the stiffness of the joints and the compliance of the tool point.
+
+use super::context::Context;
+use super::parts;
+use rig_compliance::{
+    Band, Compliance, ComplianceMap, DriveLoading, FrequencyResponse, ToolCompliance, Value,
+    response_pose,
+};
+use rig_output::{format_significant, format_unit, format_value};
+use rig_report::{
+    Axis, Block, Column, Document, Fact, HeatMap, Marker, Plot, Role, Section, Series, Table, Tone,
+};
+
+/// Names of the rows of K_p.
+const DISPLACEMENTS: [&str; 6] = [
+    "dx (m)", "dy (m)", "dz (m)", "rx (rad)", "ry (rad)", "rz (rad)",
+];
+/// Names of the columns of K_p with their units.
+const WRENCH: [(&str, &str); 6] = [
+    ("fx", "per N"),
+    ("fy", "per N"),
+    ("fz", "per N"),
+    ("mx", "per N·m"),
+    ("my", "per N·m"),
+    ("mz", "per N·m"),
+];
+
+/// Composes the page of the compliance.
+pub fn compliance(found: &Compliance, context: &Context) -> Document {
+    let mut sections: Vec<Section> = parts::warnings(&[&found.warnings, &context.warnings])
+        .into_iter()
+        .collect();
+    sections.push(drives(found));
+    sections.extend(loading(found));
+    sections.extend(found.frequency.as_ref().map(frequency));
+    for (k, pose) in found.poses.iter().enumerate() {
+        sections.push(tool_point(found, pose, k));
+    }
+    sections.extend(found.map.as_ref().map(|map| chart(found, map)));
+    sections.push(limits());
+    sections.push(parts::repeat(context));
+    Document {
+        title: format!("{}: stiffness and compliance", found.robot),
+        subtitle: "Stiffness of the joints, and what the tool point yields to a force.".into(),
+        summary: summary(found, context),
+        sections,
+        footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
+    }
+}
+
+/// Formats a value with its standard deviation, if it has one.
+fn value(value: &Value) -> String {
+    match value.std > 0.0 {
+        true => format_value(value.value, value.std),
+        false => format_significant(value.value, 5),
+    }
+}
+
+fn summary(found: &Compliance, context: &Context) -> Vec<Fact> {
+    let mut facts = Vec::new();
+    for drive in found.drives.iter().filter(|d| d.source.is_measured()) {
+        if let Some(stiffness) = &drive.stiffness {
+            facts.push(
+                Fact::new(format!("Stiffness of {}", drive.joint), value(stiffness))
+                    .unit(format_unit(drive.unit))
+                    .note(format!("± standard deviation, by {}", drive.source.words()))
+                    .tone(Tone::Good),
+            );
+        }
+    }
+    if let Some(most) = found.poses.first().and_then(|p| p.principal.first()) {
+        facts.push(
+            Fact::new("Largest displacement per force", value(&most.compliance))
+                .unit("m/N")
+                .note("at the first pose, over all directions"),
+        );
+    }
+    facts.push(parts::warning_count(
+        found.warnings.len() + context.warnings.len(),
+    ));
+    facts
+}
+
+/// The stiffness of all drives.
+fn drives(found: &Compliance) -> Section {
+    let rows = found.drives.iter().map(|drive| {
+        let [low, high] = drive.stiffness.unwrap_or_default().interval();
+        let interval = match drive.stiffness {
+            Some(own) if own.std > 0.0 => format!(
+                "{} to {}",
+                format_significant(low, 4),
+                format_significant(high, 4)
+            ),
+            _ => "–".to_owned(),
+        };
+        vec![
+            drive.joint.clone(),
+            drive.stiffness.as_ref().map_or("rigid".into(), value),
+            interval,
+            format_unit(drive.unit),
+            drive.source.words().to_owned(),
+        ]
+    });
+    Section::new(
+        "stiffness",
+        "Stiffness of the joints",
+        "Torque per twist between motor and link, on the joint side. For a screw it is that at the motor.",
+    )
+    .with(Block::Table(Table {
+        caption: "Stiffness c of each drive".into(),
+        columns: vec![
+            Column::text("Joint"),
+            Column::number("c ± standard deviation", ""),
+            Column::number("95 % interval", ""),
+            Column::text("Unit"),
+            Column::text("Source"),
+        ],
+        rows: rows.collect(),
+        note: String::new(),
+    }))
+}
+
+/// Static loading.
+fn loading(found: &Compliance) -> Option<Section> {
+    let loading = found.loading.as_ref()?;
+    let optional = |own: &Option<Value>, none: &str| own.as_ref().map_or(none.into(), value);
+    let rows = loading.drives.iter().map(|drive| {
+        vec![
+            drive.joint.clone(),
+            drive.by.words().to_owned(),
+            optional(&drive.stiffness, "not shown"),
+            optional(&drive.hysteresis, "not shown"),
+            match (&drive.gap, drive.reverses) {
+                (Some(gap), _) => value(gap),
+                (None, true) => "none".into(),
+                (None, false) => "not shown".into(),
+            },
+            format!(
+                "{} to {}",
+                format_significant(drive.load[0], 3),
+                format_significant(drive.load[1], 3)
+            ),
+        ]
+    });
+    let mut section = Section::new(
+        "loading",
+        "Static loading",
+        "Friction makes loading and unloading run on two parallel lines: half their distance is the hysteresis, and their slope is the stiffness.",
+    )
+    .with(Block::Table(Table {
+        caption: "What static loading shows of each drive".into(),
+        columns: vec![
+            Column::text("Joint"),
+            Column::text("Measurement"),
+            Column::number("Stiffness", ""),
+            Column::number("Hysteresis", "N·m or N"),
+            Column::number("Backlash", "rad or m"),
+            Column::number("Load", "N·m or N"),
+        ],
+        rows: rows.collect(),
+        note: "Values ± one standard deviation. Backlash shows only where the torque of the spring changes its sign.".into(),
+    }));
+    for drive in &loading.drives {
+        section
+            .blocks
+            .extend(drive.missing.as_ref().map(parts::warning));
+        section.blocks.extend(curve(drive).map(Block::Plot));
+    }
+    if let Some(residual) = loading.residual {
+        section.blocks.push(Block::Text(format!(
+            "The springs leave {} of the displacement of the tool point (RMS). Gauge noise, elasticity of base and links, and movements of the base make it larger.",
+            parts::length(residual, "m")
+        )));
+    }
+    Some(section)
+}
+
+/// Twist over torque, if there are points.
+fn curve(drive: &DriveLoading) -> Option<Plot> {
+    if drive.points.iter().all(Vec::is_empty) {
+        return None;
+    }
+    let mut plot = Plot::new(
+        format!("{}: twist over torque", drive.joint),
+        Axis::new("torque of the drive", "N·m"),
+        Axis::new("twist", "rad"),
+    )
+    .note("Each dot is the mean of one window. The line has the slope of the estimated stiffness, without friction.");
+    let names = [("growing", Role::Measured), ("falling", Role::Before)];
+    for ((name, role), points) in names.iter().zip(&drive.points) {
+        plot = plot.with(Series::points(
+            *name,
+            *role,
+            points.iter().map(|p| p[0]).collect(),
+            points.iter().map(|p| p[1]).collect(),
+        ));
+    }
+    if let Some(stiffness) = &drive.stiffness {
+        let half = drive.gap.map_or(0.0, |gap| 0.5 * gap.value);
+        let [low, high] = drive.load;
+        let at = |f: f64| f / stiffness.value + half * f.signum();
+        let mut x = vec![low];
+        if low < 0.0 && high > 0.0 && half > 0.0 {
+            x.extend([-1e-9 * high, 1e-9 * high]);
+        }
+        x.push(high);
+        let y = x.iter().map(|f| at(*f)).collect();
+        plot = plot.with(Series::line("model", Role::Model, x, y));
+    }
+    Some(plot)
+}
+
+/// The frequency response of one joint.
+fn frequency(found: &FrequencyResponse) -> Section {
+    let how = match found.whole {
+        true => "transformed as a whole, from rest to rest",
+        false => "in Hann windows that overlap by half",
+    };
+    let instrument = match found.by_reference {
+        true => "The reference is the instrument, so that noise in the feedback gives no bias.",
+        false => {
+            "The torque is the instrument: with feedback on the torque the response is biased."
+        }
+    };
+    let lead = format!(
+        "Velocity of the motor per torque of joint \"{}\": {} rows at {} Hz, {how}. {instrument}",
+        found.joint,
+        parts::count(found.rows as u64),
+        format_significant(found.rate, 4)
+    );
+    let used: Vec<usize> = (0..found.bands.len())
+        .filter(|k| found.bands[*k].used)
+        .collect();
+    Section::new("frequency", "Frequency response", lead)
+        .with(Block::Table(two_masses(found)))
+        .with(Block::Plot(magnitude(found, &used)))
+        .with(Block::Plot(phase(found, &used)))
+        .with(Block::Plot(coherence(found)))
+        .with(Block::Text(format!(
+            "Mean pose: {}. Squared residual over noise: {} (1 for a response that two masses explain). Standard deviations are scaled by it.",
+            response_pose(found),
+            format_significant(found.misfit, 3)
+        )))
+        .with(Block::Details {
+            summary: "Torque and velocity over time".into(),
+            blocks: vec![Block::Plot(signals(found))],
+        })
+}
+
+fn two_masses(found: &FrequencyResponse) -> Table {
+    let described = |own: Option<f64>| own.map_or("–".into(), |v| format_significant(v, 4));
+    let by_description = found
+        .stiffness_by_description
+        .as_ref()
+        .map_or("–".into(), value);
+    let link = match found.link_inertia_known {
+        true => format!("{} (description)", value(&found.link_inertia)),
+        false => value(&found.link_inertia),
+    };
+    let none = || "–".to_owned();
+    let rows = [
+        ("Antiresonance", value(&found.antiresonance), none(), "Hz"),
+        ("Resonance", value(&found.resonance), none(), "Hz"),
+        (
+            "Stiffness c",
+            value(&found.stiffness),
+            by_description,
+            "N·m/rad",
+        ),
+        ("Damping", value(&found.damping), none(), "N·m·s/rad"),
+        (
+            "Inertia of the links",
+            link,
+            described(found.described_link_inertia),
+            "kg·m²",
+        ),
+        (
+            "Inertia of the motor, joint side",
+            value(&found.motor_inertia),
+            described(found.described_motor_inertia),
+            "kg·m²",
+        ),
+        (
+            "Coulomb friction of the motor",
+            value(&found.coulomb),
+            none(),
+            "N·m",
+        ),
+        (
+            "Coulomb friction of the link",
+            value(&found.link_coulomb),
+            none(),
+            "N·m",
+        ),
+        (
+            "Delay of the position after the torque",
+            value(&found.delay),
+            none(),
+            "s",
+        ),
+    ];
+    Table {
+        caption: "The two masses".into(),
+        columns: vec![
+            Column::text("Parameter"),
+            Column::number("Estimate ± standard deviation", ""),
+            Column::number("By the description", ""),
+            Column::text("Unit"),
+        ],
+        rows: rows
+            .map(|(name, own, other, unit)| vec![name.into(), own, other, unit.into()])
+            .into(),
+        note: "Stiffness by the description: its inertia of the links at this pose, times the square of the antiresonance, less the stiffness of gravity. For a prismatic joint read m for rad, N for N·m and kg for kg·m².".into(),
+    }
+}
+
+fn pick(list: &[Band], used: &[usize], of: impl Fn(&Band) -> f64) -> Vec<f64> {
+    used.iter().map(|k| of(&list[*k])).collect()
+}
+
+/// Marks antiresonance and resonance.
+fn marked(plot: Plot, found: &FrequencyResponse) -> Plot {
+    plot.mark(Marker::vertical(found.antiresonance.value, "antiresonance"))
+        .mark(Marker::vertical(found.resonance.value, "resonance"))
+}
+
+fn magnitude(found: &FrequencyResponse, used: &[usize]) -> Plot {
+    let x = pick(&found.bands, used, |b| b.frequency);
+    let plot = Plot::new(
+        "Magnitude of the frequency response",
+        Axis::log("frequency", "Hz"),
+        Axis::log("velocity per torque", "rad/s per N·m"),
+    )
+    .with(Series::band(
+        "95 % band",
+        Role::Measured,
+        x.clone(),
+        pick(&found.bands, used, |b| {
+            (b.magnitude - b.radius).max(0.05 * b.magnitude)
+        }),
+        pick(&found.bands, used, |b| b.magnitude + b.radius),
+    ))
+    .with(Series::points(
+        "measured",
+        Role::Measured,
+        x.clone(),
+        pick(&found.bands, used, |b| b.magnitude),
+    ))
+    .with(Series::points(
+        "without friction",
+        Role::After,
+        x.clone(),
+        used.iter().map(|k| found.frictionless[*k][0]).collect(),
+    ))
+    .with(Series::line(
+        "two masses",
+        Role::Model,
+        x,
+        used.iter().map(|k| found.model[*k][0]).collect(),
+    ))
+    .note("Bands with significant coherence. Without friction: the estimated Coulomb friction is subtracted from the torque; the model is compared with that.");
+    marked(plot, found)
+}
+
+fn phase(found: &FrequencyResponse, used: &[usize]) -> Plot {
+    let x = pick(&found.bands, used, |b| b.frequency);
+    let plot = Plot::new(
+        "Phase of the frequency response",
+        Axis::log("frequency", "Hz"),
+        Axis::new("phase", "°"),
+    )
+    .with(Series::points(
+        "measured",
+        Role::Measured,
+        x.clone(),
+        pick(&found.bands, used, |b| b.phase.to_degrees()),
+    ))
+    .with(Series::points(
+        "without friction",
+        Role::After,
+        x.clone(),
+        used.iter()
+            .map(|k| found.frictionless[*k][1].to_degrees())
+            .collect(),
+    ))
+    .with(Series::line(
+        "two masses",
+        Role::Model,
+        x,
+        used.iter()
+            .map(|k| found.model[*k][1].to_degrees())
+            .collect(),
+    ));
+    marked(plot, found)
+}
+
+fn coherence(found: &FrequencyResponse) -> Plot {
+    let all: Vec<usize> = (0..found.bands.len()).collect();
+    Plot::new(
+        "Coherence",
+        Axis::log("frequency", "Hz"),
+        Axis::new("coherence", ""),
+    )
+    .with(Series::line(
+        "coherence",
+        Role::Measured,
+        pick(&found.bands, &all, |b| b.frequency),
+        pick(&found.bands, &all, |b| b.coherence),
+    ))
+    .note(match found.by_reference {
+        true => "The smaller one of reference and torque, and of reference and velocity.",
+        false => "Of torque and velocity.",
+    })
+}
+
+fn signals(found: &FrequencyResponse) -> Plot {
+    let [time, torque, velocity] = &found.shown;
+    Plot::new(
+        "Torque and velocity",
+        Axis::new("time", "s"),
+        Axis::new("torque, velocity", "N·m, rad/s"),
+    )
+    .with(Series::line(
+        "torque",
+        Role::Measured,
+        time.clone(),
+        torque.clone(),
+    ))
+    .with(Series::line(
+        "velocity",
+        Role::After,
+        time.clone(),
+        velocity.clone(),
+    ))
+}
+
+/// A 6 × 6 matrix as a table.
+fn matrix(
+    caption: &str,
+    rows: [&str; 6],
+    columns: [(&str, &str); 6],
+    values: &[[f64; 6]; 6],
+    note: String,
+) -> Table {
+    let most = values
+        .iter()
+        .flatten()
+        .fold(0.0, |m: f64, v| m.max(v.abs()));
+    let mut heads = vec![Column::text("")];
+    heads.extend(columns.map(|(name, unit)| Column::number(name, unit)));
+    Table {
+        caption: caption.into(),
+        columns: heads,
+        rows: (rows.iter().zip(values))
+            .map(|(name, row)| {
+                let mut cells = vec![(*name).to_owned()];
+                // Rounding leaves what is zero a little off.
+                cells.extend(row.map(|v| match v.abs() < 1e-12 * most {
+                    true => "0".to_owned(),
+                    false => format_significant(v, 4),
+                }));
+                cells
+            })
+            .collect(),
+        note,
+    }
+}
+
+/// The compliance of the tool point at one pose.
+fn tool_point(found: &Compliance, pose: &ToolCompliance, k: usize) -> Section {
+    let list: Vec<String> = pose.pose.iter().map(|q| format!("{q:.4}")).collect();
+    let [x, y, z] = pose.position.map(|v| format!("{v:.4}"));
+    let lead = format!(
+        "Joints at {}; tool point at {x}, {y}, {z} m in the base frame. All axes are those of the base.",
+        list.join(", ")
+    );
+    let worst = (pose.compliance.iter().flatten())
+        .zip(pose.compliance_std.iter().flatten())
+        .filter(|(v, _)| **v != 0.0)
+        .map(|(v, s)| s / v.abs())
+        .fold(0.0, f64::max);
+    let spread = match worst > 0.0 {
+        true => format!(
+            "Standard deviations of the entries are in compliance.json; those of the diagonal are at most {} %.",
+            parts::percent(
+                (0..6)
+                    .filter(|r| pose.compliance[*r][*r] > 0.0)
+                    .map(|r| pose.compliance_std[r][r] / pose.compliance[r][r])
+                    .fold(0.0, f64::max)
+            )
+        ),
+        false => "The stiffness was given without a standard deviation.".to_owned(),
+    };
+    let title = match found.poses.len() {
+        1 => "Compliance of the tool point".to_owned(),
+        _ => format!("Compliance of the tool point, pose {}", k + 1),
+    };
+    let mut section = Section::new(format!("pose-{}", k + 1), title, lead)
+        .with(Block::Table(matrix(
+            "Compliance matrix K_p: displacement per wrench",
+            DISPLACEMENTS,
+            WRENCH,
+            &pose.compliance,
+            spread,
+        )))
+        .with(Block::Table(principal(found, pose)));
+    section = match &pose.stiffness {
+        Some(stiffness) => section.with(Block::Table(matrix(
+            "Stiffness matrix K_p⁻¹: wrench per displacement",
+            ["fx (N)", "fy (N)", "fz (N)", "mx (N·m)", "my (N·m)", "mz (N·m)"],
+            [("dx", "per m"), ("dy", "per m"), ("dz", "per m"), ("rx", "per rad"), ("ry", "per rad"), ("rz", "per rad")],
+            stiffness,
+            String::new(),
+        ))),
+        None => section.with(parts::info(format!(
+            "K_p has rank {}, so K_p⁻¹ does not exist: held motors do not yield in {} of six directions at this pose.",
+            pose.rank,
+            6 - pose.rank
+        ))),
+    };
+    if let Some(block) = &pose.translational_stiffness {
+        section = section.with(Block::Table(Table {
+            caption: "Inverse of the translational block of K_p: force per displacement, tool free to turn".into(),
+            columns: vec![
+                Column::text(""),
+                Column::number("dx", "per m"),
+                Column::number("dy", "per m"),
+                Column::number("dz", "per m"),
+            ],
+            rows: (["fx (N)", "fy (N)", "fz (N)"].iter().zip(block))
+                .map(|(name, row)| {
+                    let mut cells = vec![(*name).to_owned()];
+                    cells.extend(row.map(|v| format_significant(v, 4)));
+                    cells
+                })
+                .collect(),
+            note: String::new(),
+        }));
+    }
+    section
+}
+
+fn principal(found: &Compliance, pose: &ToolCompliance) -> Table {
+    let mut columns = vec![
+        Column::text("Direction in the base axes"),
+        Column::number("Displacement per force", "m/N"),
+    ];
+    columns.extend(
+        found
+            .drives
+            .iter()
+            .map(|d| Column::number(d.joint.clone(), "%")),
+    );
+    Table {
+        caption:
+            "Principal directions of the translational compliance, and the share of each joint"
+                .into(),
+        columns,
+        rows: (pose.principal.iter())
+            .map(|own| {
+                let mut cells = vec![
+                    own.direction.map(|v| format!("{v:.3}")).join(", "),
+                    match own.compliance.value > 1e-12 * pose.principal[0].compliance.value {
+                        true => value(&own.compliance),
+                        false => "0".to_owned(),
+                    },
+                ];
+                cells.extend(own.shares.iter().map(|s| format!("{:.1}", 100.0 * s)));
+                cells
+            })
+            .collect(),
+        note: String::new(),
+    }
+}
+
+/// The map over two joints.
+fn chart(found: &Compliance, map: &ComplianceMap) -> Section {
+    let [a, b] = map.joints;
+    let held: Vec<String> = (found.drives.iter().enumerate())
+        .filter(|(k, _)| *k != a && *k != b)
+        .map(|(k, drive)| format!("{} {:.3}", drive.joint, map.pose[k]))
+        .collect();
+    let point = |q: &[f64]| [q[a], q[b]];
+    let lead = format!(
+        "Largest displacement per force, over all directions of the force: {} m/N at the stiffest pose, {} m/N at the most compliant one.",
+        format_significant(map.range[0], 3),
+        format_significant(map.range[1], 3)
+    );
+    Section::new("map", "Compliance over the workspace", lead).with(Block::HeatMap(HeatMap {
+        title: "Largest displacement per force".into(),
+        x: Axis::new(map.names[0].clone(), map.units[0]),
+        y: Axis::new(map.names[1].clone(), map.units[1]),
+        value: Axis::new("", "µm/N"),
+        columns: map.x.clone(),
+        rows: map.y.clone(),
+        values: (map.values.iter())
+            .map(|row| {
+                row.iter()
+                    .map(|v| v.map_or(f64::NAN, |v| 1e6 * v))
+                    .collect()
+            })
+            .collect(),
+        marks: vec![
+            (point(&map.stiffest), "stiffest".into()),
+            (point(&map.most_compliant), "most compliant".into()),
+        ],
+        note: match held.is_empty() {
+            true => "Blank where the drives do not reach.".into(),
+            false => format!(
+                "Other joints: {}. Blank where the drives do not reach.",
+                held.join(", ")
+            ),
+        },
+        height: HeatMap::HEIGHT,
+    }))
+}
+
+/// What the model leaves out.
+fn limits() -> Section {
+    Section::new("limits", "What is left out", "").with(Block::List(vec![
+        "Elasticity of links, bearings, base and tool: a measured displacement contains it, K_p does not.".into(),
+        "The position loop: the motors count as held.".into(),
+        "Geometric stiffness: the torque of a preloaded arm changes as it moves. It matters where gravity or the force is large against stiffness over arm.".into(),
+        "Stiffness that depends on load or amplitude.".into(),
+    ]))
+}
