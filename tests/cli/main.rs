@@ -5,6 +5,7 @@ mod bad_input;
 mod cases;
 mod compare;
 mod compliance;
+mod control;
 mod diagnose;
 mod excite;
 mod friction_map;

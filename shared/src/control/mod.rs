@@ -1,10 +1,11 @@
-//! Control laws of the one-link rig.
+//! Control laws: of the one-link rig here, of arms in [`arm`].
 //!
 //! Each law is a pure function `step(&Config, &mut State, Input) -> Output`, or without a state if it has none. [`law`]
 //! selects among the position laws by [`ControlKind`]; [`current`] turns the torque's current into a bridge duty cycle.
 
 mod adaptation;
 pub mod adaptive;
+pub mod arm;
 pub mod computed_torque;
 mod config;
 pub mod current;

@@ -39,7 +39,7 @@ mod spatial;
 #[cfg(test)]
 mod lagrangian;
 #[cfg(test)]
-mod samples;
+pub(crate) mod samples;
 #[cfg(test)]
 mod structure;
 #[cfg(test)]

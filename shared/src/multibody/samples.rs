@@ -9,25 +9,25 @@ use rand_pcg::Pcg64;
 use super::{COLUMNS, Chain, JointGeometry, JointKind, column};
 
 /// Returns the ten inertial parameters of one kilogram at a point, m.
-pub(super) fn unit_point([x, y, z]: [f64; 3]) -> [f64; 10] {
+pub(crate) fn unit_point([x, y, z]: [f64; 3]) -> [f64; 10] {
     let [xx, yy, zz] = [y * y + z * z, x * x + z * z, x * x + y * y];
     [1.0, x, y, z, xx, -x * y, -x * z, yy, -y * z, zz]
 }
 
 /// A chain in a state of motion.
 #[derive(Clone, Debug)]
-pub(super) struct Sample {
-    pub(super) geometry: Vec<JointGeometry<f64>>,
-    pub(super) gravity: [f64; 3],
-    pub(super) parameters: Vec<[f64; COLUMNS]>,
-    pub(super) q: Vec<f64>,
-    pub(super) qd: Vec<f64>,
-    pub(super) qdd: Vec<f64>,
+pub(crate) struct Sample {
+    pub(crate) geometry: Vec<JointGeometry<f64>>,
+    pub(crate) gravity: [f64; 3],
+    pub(crate) parameters: Vec<[f64; COLUMNS]>,
+    pub(crate) q: Vec<f64>,
+    pub(crate) qd: Vec<f64>,
+    pub(crate) qdd: Vec<f64>,
 }
 
 impl Sample {
     /// Returns a random chain of `n` joints. Every link is a set of eight mass points, so it is a real body.
-    pub(super) fn random(n: usize, seed: u64) -> Self {
+    pub(crate) fn random(n: usize, seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ n as u64);
         let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
         let geometry = (0..n)
@@ -77,20 +77,20 @@ impl Sample {
     }
 
     /// Returns chains of 1 to 8 joints, `each` of every length.
-    pub(super) fn many(each: u64) -> impl Iterator<Item = Self> {
+    pub(crate) fn many(each: u64) -> impl Iterator<Item = Self> {
         (1..=8).flat_map(move |n| (0..each).map(move |seed| Self::random(n, seed)))
     }
 
-    pub(super) fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         self.geometry.len()
     }
 
-    pub(super) fn chain(&self) -> Chain<f64> {
+    pub(crate) fn chain(&self) -> Chain<f64> {
         Chain::new(&self.geometry, self.gravity).unwrap()
     }
 
     /// Returns the same without drive inertia, friction and offsets.
-    pub(super) fn links_only(&self) -> Self {
+    pub(crate) fn links_only(&self) -> Self {
         let mut bare = self.clone();
         for row in &mut bare.parameters {
             row[column::DRIVE_INERTIA..].fill(0.0);
@@ -100,7 +100,7 @@ impl Sample {
 }
 
 /// Returns the largest difference of two vectors over the larger of 1 and the largest entry.
-pub(super) fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let scale = a.iter().chain(b).fold(1.0, |m: f64, x| m.max(x.abs()));
     // `max` would lose a NaN.

@@ -52,6 +52,9 @@ pub enum CommandError {
     /// Identification.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// Control laws.
+    #[error(transparent)]
+    Control(#[from] rig_control::ControlError),
     /// Simulation.
     #[error(transparent)]
     Simulate(#[from] SimulateError),

@@ -8,6 +8,7 @@ mod board;
 mod chain_arg;
 mod compare;
 mod compliance;
+mod control;
 mod demo;
 mod diagnose;
 mod error;
@@ -66,6 +67,7 @@ enum Command {
     Load(load::Args),
     Compare(compare::Args),
     Compliance(compliance::Args),
+    Control(control::Args),
 }
 
 impl Cli {
@@ -94,6 +96,7 @@ impl Cli {
             Some(Command::Load(args)) => load::run(&args, &ui),
             Some(Command::Compare(args)) => compare::run(&args, &ui),
             Some(Command::Compliance(args)) => compliance::run(&args, &ui),
+            Some(Command::Control(args)) => control::run(&args, &ui),
         }
     }
 }

@@ -26,6 +26,7 @@ const RESULTS: &[&str] = &[
     "pooled.toml",
     "compliance.json",
     "compliance.toml",
+    "control.json",
 ];
 
 /// Further files that the demonstration writes. Other commands ignore them: they may be the user's own recordings.

@@ -6,6 +6,7 @@
 mod compare;
 mod compliance;
 mod context;
+mod control;
 mod demo;
 mod diagnosis;
 mod estimators;
@@ -25,6 +26,7 @@ mod validation_voltage;
 pub use compare::compare;
 pub use compliance::compliance;
 pub use context::Context;
+pub use control::control;
 pub use demo::{
     DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo, tracking_plot,
 };

@@ -1,0 +1,461 @@
+//! The task of a tool that presses on a surface: where the arm stands, what it presses, and along what it slides.
+
+use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
+
+use super::design::at_start;
+use super::error::{ControlError, within};
+use super::law_model::LawModel;
+use super::settings::{LawKind, Settings};
+use super::surface::Surface;
+use super::tool::tool_pose;
+use rig_model::robot::Robot;
+use rig_shared::control::arm::Task;
+use rig_shared::control::arm::impedance::Target;
+use rig_shared::multibody::{column, gravity_vector};
+use rig_shared::trajectory::Reference;
+
+/// Largest share of the torque limits that a default force takes in the start pose.
+const FORCE_SHARE: f64 = 0.25;
+/// Largest default force, N.
+const FORCE: f64 = 20.0;
+/// Largest default approach speed, m/s.
+const APPROACH: f64 = 0.05;
+/// Kinetic energy at contact over the elastic energy at the wanted force, square root. At a half the impact alone presses
+/// with half of the wanted force.
+const IMPACT: f64 = 0.5;
+/// Damping by the late force over that of the force loop, 1: k·τ/(Λ·kv). On the one-link rig without dry friction (27
+/// November 2026) 0.5 gave 6.5 % overshoot of the force, 1.0 gave 12 % and 5 gave 33 %; on EDDA 0.59 gave 10.4 %.
+const LATE: f64 = 0.55;
+/// Mobility along a direction, as a share of the largest, from which the tool can be moved along it. The square root is
+/// the ratio of distances: a hundredth.
+const MOBILE: f64 = 1e-4;
+/// Poses that are tried of each joint, as shares of its range.
+const SHARES: [f64; 3] = [0.25, 0.5, 0.75];
+/// Joints of which several poses are tried.
+const TRIED: usize = 6;
+/// Time between contact, slide and end, s.
+const SETTLE: f64 = 3.0;
+
+/// What to press, and where; `None` for a default that fits the robot.
+#[derive(Clone, Debug, Default)]
+pub struct ContactOptions {
+    /// The surface.
+    pub surface: Surface,
+    /// Tool point in the frame of the last joint, m.
+    pub tool: Option<[f64; 3]>,
+    /// Start pose, rad or m.
+    pub pose: Option<Vec<f64>>,
+    /// Direction into the surface, in the base frame.
+    pub normal: Option<[f64; 3]>,
+    /// Wanted force, N.
+    pub force: Option<f64>,
+    /// Length of the slide along the surface, m.
+    pub slide: f64,
+    /// Stiffness of the impedance, N/m.
+    pub stiffness: Option<f64>,
+}
+
+/// A task that fits a robot.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct ContactTask {
+    /// The surface.
+    pub surface: Surface,
+    /// Tool point in the frame of the last joint, m.
+    pub tool: [f64; 3],
+    /// Start pose, rad or m.
+    pub pose: Vec<f64>,
+    /// Start of the tool in the base frame, m: the origin of the task.
+    pub origin: [f64; 3],
+    /// Directions in the base frame: into the surface first, then along it.
+    pub directions: Vec<[f64; 3]>,
+    /// Inertia of the tool along each direction, kg, while it does not move along the others.
+    pub inertia: Vec<f64>,
+    /// Wanted force, N.
+    pub force: f64,
+    /// Highest speed of the approach, m/s.
+    pub approach: f64,
+    /// Bandwidth of the force loop, Hz.
+    pub force_bandwidth: f64,
+    /// Length of the slide, m.
+    pub slide: f64,
+    /// Behaviour of the impedance along each direction.
+    #[serde(skip)]
+    pub targets: Vec<Target<f64>>,
+    /// Time at which the slide begins, s.
+    pub slide_start: f64,
+    /// End of the motion, s.
+    pub duration: f64,
+    /// What was chosen, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Position of the tool and its Jacobian (3 × n) at a pose.
+fn jacobian(
+    model: &LawModel,
+    q: &[f64],
+    tool: [f64; 3],
+) -> Result<([f64; 3], DMatrix<f64>), ControlError> {
+    let mut columns = vec![[0.0; 6]; q.len()];
+    let position = tool_pose(&model.chain, q, tool, &mut columns)?;
+    let matrix = DMatrix::from_fn(3, q.len(), |axis, j| columns[j][axis]);
+    Ok((position, matrix))
+}
+
+/// Singular values of the tool's Jacobian, squared, from the largest.
+fn reach(model: &LawModel, q: &[f64], tool: [f64; 3]) -> Result<[f64; 3], ControlError> {
+    let (_, matrix) = jacobian(model, q, tool)?;
+    let square = &matrix * matrix.transpose();
+    let square = Matrix3::from_fn(|a, b| square[(a, b)]);
+    let mut values: [f64; 3] = SymmetricEigen::new(square).eigenvalues.into();
+    values.sort_by(|a, b| b.total_cmp(a));
+    Ok(values)
+}
+
+fn rank(values: &[f64; 3]) -> usize {
+    values
+        .iter()
+        .filter(|v| **v > MOBILE * values[0] && **v > 0.0)
+        .count()
+}
+
+/// All poses of a grid that respect the combined limits of coupled drives; the middle first.
+fn grid(robot: &Robot) -> Vec<Vec<f64>> {
+    let middle = robot.middle_position();
+    let mut poses = vec![middle.clone()];
+    for (j, joint) in robot.joints.iter().enumerate().take(TRIED) {
+        let range = joint.limits.as_ref().map(|l| l.for_motions());
+        let [low, high] = match range {
+            Some([low, high]) if low.is_finite() && high.is_finite() => [low, high],
+            _ => [middle[j] - 1.5, middle[j] + 1.5],
+        };
+        poses = (poses.iter())
+            .flat_map(|pose| {
+                SHARES.map(|share| {
+                    let mut pose = pose.clone();
+                    pose[j] = low + share * (high - low);
+                    pose
+                })
+            })
+            .collect();
+    }
+    let combined = robot.combined_limits();
+    let fits = |q: &Vec<f64>| {
+        combined.iter().all(|(weights, [low, high])| {
+            let sum: f64 = weights.iter().zip(q).map(|(w, q)| w * q).sum();
+            let edge = 0.1 * (high - low);
+            (low + edge..=high - edge).contains(&sum)
+        })
+    };
+    poses.retain(fits);
+    poses.insert(0, middle);
+    poses
+}
+
+/// Returns the pose of the grid from which the tool moves most evenly, and the number of directions that it moves along.
+fn best_pose(model: &LawModel, tool: [f64; 3]) -> Result<(Vec<f64>, usize), ControlError> {
+    let mut best: Option<(usize, f64, Vec<f64>)> = None;
+    for pose in grid(&model.robot) {
+        let values = reach(model, &pose, tool)?;
+        let rank = rank(&values);
+        let least = if rank == 0 { 0.0 } else { values[rank - 1] };
+        if (best.as_ref()).is_none_or(|(r, l, _)| (rank, least) > (*r, *l)) {
+            best = Some((rank, least, pose));
+        }
+    }
+    let (rank, _, pose) = best.unwrap_or_default();
+    Ok((pose, rank))
+}
+
+/// Chooses the tool point in the frame of the last joint, m: the origin, or twice the last link's centre of mass if the arm
+/// moves that in more directions. Adds a sentence about it.
+///
+/// # Errors
+/// [`ControlError`] if the model is no valid chain.
+pub fn tool_point(model: &LawModel, notes: &mut Vec<String>) -> Result<[f64; 3], ControlError> {
+    let own = model
+        .parameters
+        .last()
+        .map_or([0.0; 4], |row| [0, 1, 2, 3].map(|k| row[column::MASS + k]));
+    let [mass, x, y, z] = own;
+    let (_, at_origin) = best_pose(model, [0.0; 3])?;
+    if mass > 0.0 && at_origin < model.parameters.len().min(3) {
+        let end = [x, y, z].map(|moment| 2.0 * moment / mass);
+        if best_pose(model, end)?.1 > at_origin {
+            notes.push(format!(
+                "No tool is given: its point is {:.3}, {:.3}, {:.3} m in the frame of the last joint, twice the centre of mass of the last link.",
+                end[0], end[1], end[2]
+            ));
+            return Ok(end);
+        }
+    }
+    notes.push("No tool is given: its point is the origin of the last joint's frame.".to_owned());
+    Ok([0.0; 3])
+}
+
+/// Mobility of the tool J·A⁻¹·Jᵀ, m/(N·s²).
+fn mobility(
+    model: &LawModel,
+    q: &[f64],
+    matrix: &DMatrix<f64>,
+) -> Result<Matrix3<f64>, ControlError> {
+    let n = q.len();
+    let mut mass = vec![0.0; n * n];
+    model
+        .view()
+        .inertia_matrix(q, &mut mass)
+        .map_err(at_start)?;
+    let mass = DMatrix::from_row_slice(n, n, &mass);
+    let inverse = mass.try_inverse().ok_or_else(|| {
+        ControlError::Unreachable("The inertia matrix of the law's model cannot be inverted; give every joint an inertia.".to_owned())
+    })?;
+    let full = matrix * inverse * matrix.transpose();
+    Ok(Matrix3::from_fn(|a, b| full[(a, b)]))
+}
+
+/// Returns the directions: `normal` first, then those along the surface that the tool can be moved along.
+fn directions(mobility: &Matrix3<f64>, normal: Vector3<f64>) -> Vec<Vector3<f64>> {
+    let largest = mobility.diagonal().max();
+    let mut chosen = vec![normal];
+    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+        let along = chosen.iter().fold(axis, |left, d| left - d * d.dot(&axis));
+        if along.norm() < 0.1 {
+            continue;
+        }
+        let along = along.normalize();
+        let all: Vec<_> = chosen.iter().copied().chain([along]).collect();
+        let sub = DMatrix::from_fn(all.len(), all.len(), |a, b| {
+            all[a].dot(&(mobility * all[b]))
+        });
+        if SymmetricEigen::new(sub).eigenvalues.min() > MOBILE * largest {
+            chosen.push(along);
+        }
+    }
+    chosen
+}
+
+fn choose_normal(
+    mobility: &Matrix3<f64>,
+    given: Option<[f64; 3]>,
+    notes: &mut Vec<String>,
+) -> Result<Vector3<f64>, ControlError> {
+    let largest = mobility.diagonal().max();
+    let moves = |d: &Vector3<f64>| d.dot(&(mobility * d)) > 100.0 * MOBILE * largest;
+    if let Some(given) = given {
+        let normal = Vector3::from(given);
+        if !(normal.norm() > 1e-6 && normal.norm().is_finite()) {
+            return Err(ControlError::Unreachable(format!(
+                "The normal {given:?} is not a direction: give three numbers that are not all 0."
+            )));
+        }
+        let normal = normal.normalize();
+        return match moves(&normal) {
+            true => Ok(normal),
+            false => Err(ControlError::Unreachable(format!(
+                "The tool cannot press along {given:?} in the start pose: the arm does not move it there. Give another --normal or --pose."
+            ))),
+        };
+    }
+    let candidates = [-Vector3::z(), Vector3::x(), Vector3::y()];
+    let normal = candidates.into_iter().find(moves).ok_or_else(|| {
+        ControlError::Unreachable("The arm moves the tool along no axis of the base in the start pose; give --tool, --pose or --normal.".to_owned())
+    })?;
+    notes.push(format!(
+        "No normal is given: the tool presses along {:?} of the base frame.",
+        <[f64; 3]>::from(normal).map(|v| v + 0.0)
+    ));
+    Ok(normal)
+}
+
+impl ContactTask {
+    /// Chooses a task for the model of a law, with defaults where the options leave them open.
+    ///
+    /// # Errors
+    /// [`ControlError`] if a value is out of range or the tool cannot press there.
+    pub fn choose(
+        model: &LawModel,
+        options: &ContactOptions,
+        settings: &Settings,
+    ) -> Result<Self, ControlError> {
+        let surface = options.surface;
+        surface.check()?;
+        within(
+            "slide",
+            options.slide,
+            0.0..=1.0,
+            "it must be between 0 and 1 m",
+        )?;
+        let mut notes = Vec::new();
+        let tool = match options.tool {
+            Some(tool) => tool,
+            None => tool_point(model, &mut notes)?,
+        };
+        let n = model.parameters.len();
+        let pose = match &options.pose {
+            Some(pose) if pose.len() == n && pose.iter().all(|q| q.is_finite()) => pose.clone(),
+            Some(pose) => {
+                return Err(ControlError::Unreachable(format!(
+                    "--pose has {} numbers; give one for each of the {n} joints.",
+                    pose.len()
+                )));
+            }
+            None => {
+                let (pose, _) = best_pose(model, tool)?;
+                let list: Vec<String> = pose.iter().map(|q| format!("{q:.3}")).collect();
+                notes.push(format!(
+                    "No pose is given: the arm starts at {} (rad or m), where the tool moves most evenly.",
+                    list.join(", ")
+                ));
+                pose
+            }
+        };
+        let (origin, matrix) = jacobian(model, &pose, tool)?;
+        let mobility = mobility(model, &pose, &matrix)?;
+        let normal = choose_normal(&mobility, options.normal, &mut notes)?;
+        let directions = directions(&mobility, normal);
+        let count = directions.len();
+        let sub = DMatrix::from_fn(count, count, |a, b| {
+            directions[a].dot(&(mobility * directions[b]))
+        });
+        let inertia: Vec<f64> = match sub.try_inverse() {
+            Some(inverse) => inverse.diagonal().as_slice().to_vec(),
+            None => {
+                return Err(ControlError::Unreachable(
+                    "The start pose is singular; give another --pose.".to_owned(),
+                ));
+            }
+        };
+        let force = force(model, &pose, &matrix, normal, options.force, &mut notes)?;
+        if let Some(rate) = needed_rate(&surface, inertia[0], settings) {
+            notes.push(format!(
+                "The measured force is late on this stiff surface for a tool of {:.3} kg, and the force will overshoot: give --rate {rate:.0}, or a softer surface.",
+                inertia[0]
+            ));
+        }
+        let stiffest = IMPACT * force / (surface.stiffness * inertia[0]).sqrt();
+        let target = 0.2 * settings.bandwidth;
+        let omega = core::f64::consts::TAU * target;
+        let targets = inertia.iter().map(|mass| {
+            let stiffness = options.stiffness.unwrap_or(mass * omega * omega);
+            Target::design(stiffness, target, 1.0)
+        });
+        let approach = stiffest.min(APPROACH);
+        let slide_start =
+            1.2 * surface.gap / approach.min(force_speed(force, &surface, settings)) + SETTLE;
+        let slides = count > 1 && options.slide > 0.0;
+        Ok(Self {
+            surface,
+            tool,
+            pose,
+            origin,
+            directions: directions.iter().map(|d| (*d).into()).collect(),
+            targets: targets.collect(),
+            inertia,
+            force,
+            approach,
+            force_bandwidth: force_bandwidth(settings),
+            slide: if slides { options.slide } else { 0.0 },
+            slide_start,
+            duration: slide_start + if slides { SETTLE + 1.0 } else { 1.0 },
+            notes,
+        })
+    }
+
+    /// Returns the task as the laws take it.
+    pub fn task(&self) -> Task<'_, f64> {
+        Task {
+            tool: self.tool,
+            origin: self.origin,
+            directions: &self.directions,
+        }
+    }
+
+    /// Returns the reference of the tool at time `t` along each direction. For impedance it goes into the surface until
+    /// the two springs press with the wanted force.
+    pub(crate) fn reference(&self, law: LawKind, t: f64) -> [Reference<f64>; 3] {
+        let mut out = [Reference::default(); 3];
+        if law == LawKind::Impedance {
+            let depth =
+                self.force / self.targets[0].stiffness + self.force / self.surface.stiffness;
+            // A fifth-degree motion is fastest in its middle, at 15/8 of its mean.
+            out[0] = quintic(self.surface.gap + depth, 0.6 * self.slide_start, t);
+        }
+        let since = t - self.slide_start;
+        if self.slide > 0.0 && (0.0..SETTLE).contains(&since) {
+            let w = core::f64::consts::TAU / SETTLE;
+            let half = 0.5 * self.slide;
+            out[1] = Reference {
+                position: half * (1.0 - (w * since).cos()),
+                velocity: half * w * (w * since).sin(),
+                acceleration: half * w * w * (w * since).cos(),
+            };
+        }
+        out
+    }
+}
+
+fn force_bandwidth(settings: &Settings) -> f64 {
+    settings.bandwidth
+}
+
+/// Speed at which the hybrid law approaches on its own: kf·f.
+fn force_speed(force: f64, surface: &Surface, settings: &Settings) -> f64 {
+    let omega = core::f64::consts::TAU * force_bandwidth(settings);
+    0.5 * omega * force / surface.stiffness
+}
+
+/// Returns the rate that a surface needs, Hz; `None` if that of the settings is enough. The force that is taken off the arm
+/// is late by the computing time and half a tick: the rest of it damps the tool with k·τ.
+pub(crate) fn needed_rate(surface: &Surface, inertia: f64, settings: &Settings) -> Option<f64> {
+    let ticks = if settings.delay { 1.5 } else { 0.5 };
+    let kv = 2.0 * core::f64::consts::TAU * force_bandwidth(settings);
+    let late = surface.stiffness * ticks * settings.period() / (inertia * kv);
+    (late > LATE).then(|| (1.01 * settings.rate * late / LATE).ceil())
+}
+
+fn quintic(distance: f64, duration: f64, t: f64) -> Reference<f64> {
+    let u = (t / duration).clamp(0.0, 1.0);
+    Reference {
+        position: distance * u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u),
+        velocity: distance / duration * 30.0 * u * u * (1.0 - u).powi(2),
+        acceleration: distance / duration.powi(2) * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
+    }
+}
+
+/// Chooses the force, and checks that the torque limits allow it in the start pose.
+fn force(
+    model: &LawModel,
+    pose: &[f64],
+    matrix: &DMatrix<f64>,
+    normal: Vector3<f64>,
+    given: Option<f64>,
+    notes: &mut Vec<String>,
+) -> Result<f64, ControlError> {
+    let mut gravity = vec![0.0; pose.len()];
+    gravity_vector(&model.chain, &model.parameters, pose, &mut gravity)
+        .map_err(|error| at_start(error.into()))?;
+    let mut most = f64::INFINITY;
+    for (j, joint) in model.robot.joints.iter().enumerate() {
+        let torque = matrix.column(j).dot(&normal).abs();
+        if let Some(limit) = joint.limits.as_ref().and_then(|l| l.torque)
+            && torque > 1e-9
+        {
+            most = most.min((limit - gravity[j].abs()).max(0.0) / torque);
+        }
+    }
+    let force = match given {
+        Some(force) => force,
+        None => {
+            let force = FORCE.min(FORCE_SHARE * most);
+            notes.push(format!(
+                "No force is given: the tool presses with {force:.3} N."
+            ));
+            force
+        }
+    };
+    if !(force > 0.0 && force < most) {
+        return Err(ControlError::Unreachable(format!(
+            "A force of {force} N is not possible: in the start pose the torque limits allow more than 0 and less than {most:.3} N; give another --press or --pose."
+        )));
+    }
+    Ok(force)
+}

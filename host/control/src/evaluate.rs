@@ -1,0 +1,246 @@
+//! Laws on a robot: run, measured, and run again with wrong parameters.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::adaptation::Excitation;
+use super::closed_loop::{Trace, closed_loop};
+use super::contact_task::ContactTask;
+use super::controller::{Controller, limits, regressor};
+use super::error::ControlError;
+use super::law_model::LawModel;
+use super::measures::{self, PLOTTED};
+use super::result::{Adaptation, Adapted, Contact, Robustness, Tracking};
+use super::settings::{LawKind, Settings};
+use rig_model::robot::Robot;
+use rig_model::simulate::Model;
+use rig_numerics::statistics::median_of_finite;
+use rig_shared::trajectory::Reference;
+
+/// The true robot, and what is asked of it.
+pub struct Bench<'a> {
+    /// Description of the true robot.
+    pub robot: &'a Robot,
+    /// Its model.
+    pub truth: &'a Model,
+    /// Desired motion, one series a joint.
+    pub reference: &'a [Vec<Reference<f64>>],
+    /// Tool point in the frame of the last joint, m.
+    pub tool: [f64; 3],
+    /// Settings of the loop.
+    pub settings: Settings,
+    /// Share of wrong parameters, and number of draws; `None` for none.
+    pub wrong: Option<(f64, usize)>,
+}
+
+/// A motion with its measures.
+pub struct Run<M> {
+    /// The motion.
+    pub trace: Trace,
+    /// The measures.
+    pub measures: M,
+    /// What the law leaves out, one sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Bench<'_> {
+    /// Runs a law with a model.
+    fn run(
+        &self,
+        law: LawKind,
+        model: &LawModel,
+        task: Option<&ContactTask>,
+    ) -> Result<(Trace, Vec<String>), ControlError> {
+        let mut controller = Controller::design(law, model, self.reference, task, &self.settings)?;
+        let truth = (self.robot, self.truth);
+        let trace = closed_loop(truth, &mut controller, self.reference, task, &self.settings)?;
+        Ok((trace, controller.notes().to_vec()))
+    }
+
+    /// Runs and measures a law that tracks a motion. `name` is that of the model.
+    ///
+    /// # Errors
+    /// [`ControlError`], with time and joint if the loop is unstable.
+    pub fn track(
+        &self,
+        law: LawKind,
+        model: &LawModel,
+        name: &str,
+    ) -> Result<Run<Tracking>, ControlError> {
+        let (trace, notes) = self.run(law, model, None)?;
+        let [tool_rms, tool_largest] =
+            measures::tool(&self.truth.chain, self.tool, &trace, self.reference)?;
+        let measure = |trace: &Trace| {
+            measures::tool(&self.truth.chain, self.tool, trace, self.reference).map(|[rms, _]| rms)
+        };
+        let ticks = measures::ticks(trace.q[0].len());
+        let pick = |list: &[f64]| -> Vec<f64> { ticks.clone().map(|k| list[k]).collect() };
+        let errors = (0..trace.q.len()).map(|j| pick(&measures::errors(&trace, self.reference, j)));
+        let measures = Tracking {
+            law,
+            model: name.to_owned(),
+            joints: measures::joints(self.robot, &trace, self.reference),
+            tool_rms,
+            tool_largest,
+            robustness: self.robustness(law, model, None, measure)?,
+            adaptation: match law {
+                LawKind::Adaptive => Some(self.adaptation(model, &trace)?),
+                _ => None,
+            },
+            motion: String::new(),
+            time: ticks.clone().map(|k| k as f64 * trace.period).collect(),
+            errors: errors.collect(),
+            torques: trace.torque.iter().map(|list| pick(list)).collect(),
+        };
+        Ok(Run {
+            trace,
+            measures,
+            notes,
+        })
+    }
+
+    /// Runs and measures a law that presses on a surface.
+    ///
+    /// # Errors
+    /// [`ControlError`]; [`ControlError::Unreachable`] if the tool does not touch the surface.
+    pub fn press(
+        &self,
+        law: LawKind,
+        model: &LawModel,
+        name: &str,
+        task: &ContactTask,
+    ) -> Result<Run<Contact>, ControlError> {
+        let (trace, notes) = self.run(law, model, Some(task))?;
+        let found = measures::force(law, task, &trace)?;
+        let measure = |trace: &Trace| measures::force(law, task, trace).map(|own| own.overshoot);
+        let ticks = measures::ticks(trace.force.len());
+        let pick = |list: &[f64]| -> Vec<f64> {
+            ticks.clone().filter_map(|k| list.get(k)).copied().collect()
+        };
+        let measures = Contact {
+            law,
+            model: name.to_owned(),
+            force: task.force,
+            touched: found.touched,
+            impact_speed: found.impact_speed,
+            rise: found.rise,
+            overshoot: found.overshoot,
+            settling: found.settling,
+            steady_error: found.steady_error,
+            slide_force: found.slide_force,
+            slide_error: found.slide_error,
+            bounces: found.bounces,
+            robustness: self.robustness(law, model, Some(task), measure)?,
+            motion: String::new(),
+            time: ticks.clone().map(|k| k as f64 * trace.period).collect(),
+            forces: pick(&trace.force),
+            positions: [pick(&trace.tool[0]), pick(&trace.tool[1])],
+        };
+        Ok(Run {
+            trace,
+            measures,
+            notes,
+        })
+    }
+
+    /// Runs a law with random wrong parameters, several motions at a time. Draw k has the same parameters for every law.
+    fn robustness(
+        &self,
+        law: LawKind,
+        model: &LawModel,
+        task: Option<&ContactTask>,
+        measure: impl Fn(&Trace) -> Result<f64, ControlError> + Sync,
+    ) -> Result<Option<Robustness>, ControlError> {
+        let Some((share, draws)) = self.wrong else {
+            return Ok(None);
+        };
+        let models = (0..draws).map(|k| {
+            let mut own = LawModel::of(&model.robot)?;
+            own.parameters.clone_from(&model.parameters);
+            if let (Some(own), Some(given)) = (&mut own.motors, &model.motors) {
+                own.parameters.clone_from(&given.parameters);
+            }
+            own.disturb(share, self.settings.seed + k as u64);
+            Ok(own)
+        });
+        let models = models.collect::<Result<Vec<_>, ControlError>>()?;
+        let next = AtomicUsize::new(0);
+        let found = Mutex::new(vec![f64::NAN; draws]);
+        let workers = std::thread::available_parallelism().map_or(1, |count| count.get());
+        std::thread::scope(|scope| {
+            for _ in 0..workers.min(draws) {
+                scope.spawn(|| {
+                    while let Some((k, model)) = {
+                        let k = next.fetch_add(1, Ordering::Relaxed);
+                        models.get(k).map(|model| (k, model))
+                    } {
+                        let value = self
+                            .run(law, model, task)
+                            .and_then(|(trace, _)| measure(&trace));
+                        if let (Ok(value), Ok(mut list)) = (value, found.lock()) {
+                            list[k] = value;
+                        }
+                    }
+                });
+            }
+        });
+        let found = found.into_inner().unwrap_or_default();
+        Ok(Some(Robustness {
+            share,
+            draws,
+            failed: found.iter().filter(|value| value.is_nan()).count(),
+            worst: found.iter().copied().fold(f64::NAN, f64::max),
+            median: median_of_finite(found).unwrap_or(f64::NAN),
+        }))
+    }
+
+    /// Compares the parameters of the adaptive law with those of the true robot, where the motion excites them.
+    fn adaptation(&self, model: &LawModel, trace: &Trace) -> Result<Adaptation, ControlError> {
+        let controller = Controller::design(
+            LawKind::Adaptive,
+            model,
+            self.reference,
+            None,
+            &self.settings,
+        )?;
+        let truth = LawModel::of(self.robot)?;
+        let Some(parameters) = controller.parameters() else {
+            return Err(ControlError::Unreachable(
+                "The adaptive law has no parameters.".to_owned(),
+            ));
+        };
+        let scale: Vec<f64> = (limits(model, self.reference).iter().enumerate())
+            .map(|(j, [torque, _])| match torque.is_finite() {
+                true => *torque,
+                false => trace.torque[j].iter().map(|t| t.abs()).fold(1e-9, f64::max),
+            })
+            .collect();
+        let stride = self.reference[0].len().div_ceil(PLOTTED).max(1);
+        let regressor = regressor(model, &self.settings);
+        let excitation = Excitation::of(parameters, &regressor, self.reference, &scale, stride)?;
+        let true_values = parameters.values(&truth);
+        let course: Vec<[f64; 2]> = (trace.theta.iter())
+            .map(|(_, theta)| excitation.error(theta, &true_values, &parameters.size))
+            .collect();
+        let (first, last) = (&trace.theta[0].1, &trace.theta[trace.theta.len() - 1].1);
+        let ends = |k: usize| [course[0][k], course[course.len() - 1][k]];
+        Ok(Adaptation {
+            count: true_values.len(),
+            excited: excitation.directions,
+            error: ends(0),
+            torque_error: ends(1),
+            parameters: (0..true_values.len())
+                .map(|k| Adapted {
+                    expression: parameters.base.expression(k),
+                    unit: parameters.base.unit(k),
+                    truth: true_values[k],
+                    start: first[k],
+                    end: last[k],
+                    excited: excitation.share(k),
+                })
+                .collect(),
+            time: trace.theta.iter().map(|(t, _)| *t).collect(),
+            course: [0, 1].map(|k| course.iter().map(|own| own[k]).collect()),
+        })
+    }
+}

@@ -1,0 +1,93 @@
+//! The model that a law uses: a description, perhaps with wrong parameters.
+
+use rand::{RngExt as _, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::error::ControlError;
+use rig_model::robot::Robot;
+use rig_model::simulate::{Model, Motors};
+use rig_shared::control::arm::{ArmModel, ArmMotors};
+use rig_shared::multibody::{COLUMNS, Chain, column};
+
+/// The model that a law uses.
+pub struct LawModel {
+    /// Geometry and gravity.
+    pub chain: Chain<f64>,
+    /// Parameters with payloads, one row a joint.
+    pub parameters: Vec<[f64; COLUMNS]>,
+    /// Coupled drives.
+    pub motors: Option<Motors>,
+    /// The description, for its effects.
+    pub robot: Robot,
+}
+
+impl LawModel {
+    /// Builds the model of a description.
+    ///
+    /// # Errors
+    /// [`ControlError::Simulate`] if it is no valid chain.
+    pub fn of(robot: &Robot) -> Result<Self, ControlError> {
+        let Model {
+            chain,
+            parameters,
+            motors,
+            ..
+        } = Model::from_robot(robot)?;
+        Ok(Self {
+            chain,
+            parameters,
+            motors,
+            robot: robot.clone(),
+        })
+    }
+
+    /// Multiplies every link's ten inertial parameters by one factor, and each parameter of its drive and friction by
+    /// one of its own. Bodies remain possible bodies.
+    fn multiply(&mut self, mut factor: impl FnMut() -> f64) {
+        for row in &mut self.parameters {
+            let body = factor();
+            for (k, value) in row.iter_mut().enumerate() {
+                *value *= if k < column::DRIVE_INERTIA {
+                    body
+                } else {
+                    factor()
+                };
+            }
+        }
+        for value in (self.motors.iter_mut()).flat_map(|m| m.parameters.as_flattened_mut()) {
+            *value *= factor();
+        }
+    }
+
+    /// Multiplies all parameters by one factor.
+    pub fn scale(&mut self, by: f64) {
+        self.multiply(|| by);
+    }
+
+    /// Multiplies the parameters by random factors, uniform within 1 ± `share`; the same seed gives the same model. One
+    /// factor serves the ten inertial parameters of a link.
+    pub fn disturb(&mut self, share: f64, seed: u64) {
+        let mut random = Pcg64::seed_from_u64(seed);
+        self.multiply(|| 1.0 + share * (2.0 * random.random::<f64>() - 1.0));
+    }
+
+    /// Returns the view that laws take.
+    pub fn view(&self) -> ArmModel<'_, f64> {
+        ArmModel {
+            chain: &self.chain,
+            parameters: &self.parameters,
+            motors: self.motors.as_ref().map(|motors| ArmMotors {
+                transmission: &motors.transmission,
+                parameters: &motors.parameters,
+            }),
+        }
+    }
+
+    /// Returns all standard parameters: 14 a joint, then 3 a motor with coupled drives.
+    pub fn standard(&self) -> Vec<f64> {
+        let motors = self.motors.iter().flat_map(|m| m.parameters.as_flattened());
+        (self.parameters.as_flattened().iter().chain(motors))
+            .copied()
+            .collect()
+    }
+}

@@ -1,0 +1,293 @@
+//! Force and impedance against statics, closed forms and finite differences.
+
+use super::{robot, slippery};
+use crate::contact_task::needed_rate;
+use crate::tool::tool_pose;
+use crate::{
+    Bench, Contact, ContactOptions, ContactTask, LawKind, LawModel, Run, Settings, Surface,
+};
+use rig_model::robot::Robot;
+use rig_model::simulate::Model;
+use rig_shared::control::arm::impedance::Target;
+use rig_shared::multibody::potential_energy;
+use rig_shared::trajectory::Reference;
+
+fn options(stiffness: f64) -> ContactOptions {
+    ContactOptions {
+        surface: Surface {
+            stiffness,
+            ..Surface::default()
+        },
+        slide: 0.05,
+        ..ContactOptions::default()
+    }
+}
+
+fn press(robot: &Robot, law: LawKind, task: &ContactTask, settings: Settings) -> Run<Contact> {
+    let truth = Model::from_robot(robot).unwrap();
+    let model = LawModel::of(robot).unwrap();
+    let samples = (task.duration * settings.rate) as usize;
+    let still = |q: &f64| {
+        let at = Reference {
+            position: *q,
+            ..Reference::default()
+        };
+        vec![at; samples]
+    };
+    let reference: Vec<_> = task.pose.iter().map(still).collect();
+    let bench = Bench {
+        robot,
+        truth: &truth,
+        reference: &reference,
+        tool: task.tool,
+        settings,
+        wrong: None,
+    };
+    bench.press(law, &model, "own", task).unwrap()
+}
+
+fn choose(robot: &Robot, options: &ContactOptions, settings: &Settings) -> ContactTask {
+    ContactTask::choose(&LawModel::of(robot).unwrap(), options, settings).unwrap()
+}
+
+#[test]
+fn force_settles_without_overshoot_on_soft_and_stiff_surfaces() {
+    for name in ["one-link.toml", "edda.toml", "irp6.toml"] {
+        for stiffness in [1e3, 1e4, 1e5] {
+            let rough = robot(name);
+            let mut settings = Settings::default();
+            let task = choose(&rough, &options(stiffness), &settings);
+            // Light arms on the stiffest surface need the faster loop that the notes name.
+            if let Some(rate) = needed_rate(&task.surface, task.inertia[0], &settings) {
+                assert!(stiffness == 1e5 && task.inertia[0] < 5.0, "{name}");
+                settings.rate = rate;
+            }
+            // Real friction: the force comes without overshoot and without bounces.
+            let found = press(&rough, LawKind::Hybrid, &task, settings).measures;
+            assert!(
+                found.overshoot <= 0.1,
+                "{name} {stiffness}: {}",
+                found.overshoot
+            );
+            assert_eq!(found.bounces, 0, "{name} {stiffness}");
+            if let Some(error) = found.slide_error {
+                assert!(error < 1e-3, "{name} {stiffness}: slide {error}");
+            }
+            // Without dry friction and with exact sensors it settles to the wanted value.
+            let smooth = slippery(name);
+            let exact = Settings {
+                resolution: 0.0,
+                ..settings
+            };
+            let found = press(&smooth, LawKind::Hybrid, &task, exact).measures;
+            assert!(
+                found.overshoot <= 0.1,
+                "{name} {stiffness}: {}",
+                found.overshoot
+            );
+            assert!(
+                found.settling.is_some_and(|t| t < 1.0),
+                "{name} {stiffness}"
+            );
+            let off = found.steady_error.abs() / task.force;
+            assert!(off < 1e-3, "{name} {stiffness}: {off}");
+        }
+    }
+}
+
+#[test]
+fn torques_at_rest_balance_weight_and_contact_force() {
+    // τ = ∂U/∂q + ∂x/∂qᵀ·f, by central differences of potential energy and tool position.
+    let robot = slippery("irp6.toml");
+    let settings = Settings {
+        resolution: 0.0,
+        ..Settings::default()
+    };
+    let task = choose(&robot, &options(1e4), &settings);
+    let run = press(&robot, LawKind::Hybrid, &task, settings);
+    let model = LawModel::of(&robot).unwrap();
+    let k = (task.slide_start * settings.rate) as usize - 1;
+    let q: Vec<f64> = run.trace.q.iter().map(|list| list[k]).collect();
+    let pressed = run.trace.force[k];
+    let at = |j: usize, step: f64| {
+        let mut moved = q.clone();
+        moved[j] += step;
+        let energy = potential_energy(&model.chain, &model.parameters, &moved).unwrap();
+        let mut columns = vec![[0.0; 6]; moved.len()];
+        let tool = tool_pose(&model.chain, &moved, task.tool, &mut columns).unwrap();
+        let along: f64 = (0..3)
+            .map(|axis| task.directions[0][axis] * tool[axis])
+            .sum();
+        energy + pressed * along
+    };
+    for j in 0..q.len() {
+        let expected = (at(j, 1e-5) - at(j, -1e-5)) / 2e-5;
+        let found = run.trace.torque[j][k];
+        assert!(
+            (found - expected).abs() < 0.02 + 1e-3 * expected.abs(),
+            "{j}: {found} for {expected}"
+        );
+    }
+}
+
+#[test]
+fn impedance_at_rest_is_two_springs_in_series() {
+    for name in ["one-link.toml", "edda.toml", "irp6.toml"] {
+        let robot = slippery(name);
+        let settings = Settings {
+            resolution: 0.0,
+            ..Settings::default()
+        };
+        let task = choose(&robot, &options(3e3), &settings);
+        let run = press(&robot, LawKind::Impedance, &task, settings);
+        let k = (task.slide_start * settings.rate) as usize - 1;
+        let wanted = task.reference(LawKind::Impedance, task.slide_start)[0].position;
+        let target = task.targets[0].stiffness;
+        let [soft, hard] = [target, task.surface.stiffness];
+        let expected = soft * hard / (soft + hard) * (wanted - task.surface.gap);
+        let force = run.trace.force[k];
+        assert!(
+            (force / expected - 1.0).abs() < 0.01,
+            "{name}: {force} for {expected}"
+        );
+        // The target's own deflection is force over stiffness.
+        let deflection = wanted - run.trace.tool[0][k];
+        assert!(
+            (deflection * target / force - 1.0).abs() < 0.01,
+            "{name}: {deflection}"
+        );
+    }
+}
+
+#[test]
+fn impedance_swings_with_the_frequency_and_damping_of_its_target() {
+    // The reference enters a surface as stiff as the target almost at once. Then M·ẍ + D·ẋ + (K + k)·x = K·x_r, from
+    // f = k·x_r to half of it; the first swing goes beyond by exp(−π·ζ/√(1 − ζ²)), after π/(ω·√(1 − ζ²)).
+    for name in ["one-link.toml", "edda.toml", "irp6.toml"] {
+        let mut robot = slippery(name);
+        for joint in &mut robot.joints {
+            joint.limits.as_mut().unwrap().torque = None;
+        }
+        let settings = Settings {
+            rate: 5000.0,
+            delay: false,
+            resolution: 0.0,
+            ..Settings::default()
+        };
+        let mut chosen = options(1e4);
+        chosen.surface.gap = 0.0;
+        chosen.surface.friction = 0.0;
+        chosen.slide = 0.0;
+        chosen.force = Some(0.5);
+        let mut task = choose(&robot, &chosen, &settings);
+        let omega: f64 = core::f64::consts::TAU;
+        let mass = 0.7 * task.inertia[0];
+        let stiffness = mass * omega * omega;
+        for target in &mut task.targets {
+            *target = Target {
+                mass,
+                damping: 0.2 * omega * mass,
+                stiffness,
+            };
+        }
+        task.surface.stiffness = stiffness;
+        task.force = 0.01 * stiffness * 0.05;
+        let rush = 0.02;
+        task.slide_start = rush / 0.6;
+        task.duration = 2.0;
+        let truth = Model::from_robot(&robot).unwrap();
+        let model = LawModel::of(&robot).unwrap();
+        let still = |q: &f64| {
+            let at = Reference {
+                position: *q,
+                ..Reference::default()
+            };
+            vec![at; 10_000]
+        };
+        let reference: Vec<_> = task.pose.iter().map(still).collect();
+        let mut controller = crate::controller::Controller::design(
+            LawKind::Impedance,
+            &model,
+            &reference,
+            Some(&task),
+            &settings,
+        )
+        .unwrap();
+        let trace = crate::closed_loop::closed_loop(
+            (&robot, &truth),
+            &mut controller,
+            &reference,
+            Some(&task),
+            &settings,
+        )
+        .unwrap();
+        let both = (2.0 * omega * omega).sqrt();
+        let ratio = 0.2 * omega / (2.0 * both);
+        let damped = (1.0 - ratio * ratio).sqrt();
+        let start = (rush * settings.rate) as usize;
+        let half = ((rush / 2.0 + 0.75) * settings.rate) as usize;
+        let (at, least) =
+            trace.force[start..half]
+                .iter()
+                .enumerate()
+                .fold(
+                    (0, f64::MAX),
+                    |best, (k, f)| if *f < best.1 { (k, *f) } else { best },
+                );
+        let time = (start + at) as f64 / settings.rate - rush / 2.0;
+        let expected = core::f64::consts::PI / (both * damped);
+        assert!(
+            (time / expected - 1.0).abs() < 0.03,
+            "{name}: {time} for {expected}"
+        );
+        let swing = 1.0 - least / task.force;
+        let expected = (-core::f64::consts::PI * ratio / damped).exp();
+        assert!(
+            (swing - expected).abs() < 0.03,
+            "{name}: {swing} for {expected}"
+        );
+    }
+}
+
+#[test]
+fn a_rate_that_is_too_low_for_the_surface_is_told() {
+    let link = robot("one-link.toml");
+    let told = |rate| {
+        let settings = Settings {
+            rate,
+            ..Settings::default()
+        };
+        let notes = choose(&link, &options(1e5), &settings).notes;
+        notes.iter().any(|note| note.contains("--rate"))
+    };
+    assert!(told(1000.0) && !told(10_000.0));
+}
+
+#[test]
+fn tasks_that_no_arm_can_do_are_refused() {
+    let edda = robot("edda.toml");
+    let settings = Settings::default();
+    let model = LawModel::of(&edda).unwrap();
+    let refuse = |change: &dyn Fn(&mut ContactOptions)| {
+        let mut own = options(1e4);
+        change(&mut own);
+        ContactTask::choose(&model, &own, &settings)
+            .unwrap_err()
+            .to_string()
+    };
+    // Both axes stand upright.
+    let said = refuse(&|own| own.normal = Some([0.0, 0.0, 1.0]));
+    assert!(said.contains("does not move it there"), "{said}");
+    // The stretched arm cannot press outwards.
+    let said = refuse(&|own| {
+        own.pose = Some(vec![0.0, 0.0]);
+        own.normal = Some([1.0, 0.0, 0.0]);
+    });
+    assert!(said.contains("cannot press along"), "{said}");
+    let said = refuse(&|own| own.force = Some(1e4));
+    assert!(said.contains("torque limits"), "{said}");
+    let said = refuse(&|own| own.pose = Some(vec![0.0]));
+    assert!(said.contains("one for each of the 2 joints"), "{said}");
+    let said = refuse(&|own| own.surface.stiffness = 0.0);
+    assert!(said.contains("surface stiffness 0"), "{said}");
+}

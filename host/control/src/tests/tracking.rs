@@ -1,0 +1,196 @@
+//! Tracking against closed forms of linear error dynamics.
+
+use super::{robot, slippery};
+use crate::{Bench, ControlError, LawKind, LawModel, Settings, default_reference, references};
+use rig_model::robot::Robot;
+use rig_model::simulate::Model;
+use rig_shared::trajectory::Reference;
+
+/// A loop that is almost continuous, with exact sensors.
+fn continuous() -> Settings {
+    Settings {
+        rate: 20_000.0,
+        delay: false,
+        resolution: 0.0,
+        ..Settings::default()
+    }
+}
+
+/// Positions that are held, with a step of `step` at the second tick.
+fn held(at: &[f64], step: f64, samples: usize) -> Vec<Vec<Reference<f64>>> {
+    let joint = |q: &f64| {
+        (0..samples)
+            .map(|k| Reference {
+                position: q + if k == 0 { 0.0 } else { step },
+                ..Reference::default()
+            })
+            .collect()
+    };
+    at.iter().map(joint).collect()
+}
+
+fn bench<'a>(
+    robot: &'a Robot,
+    truth: &'a Model,
+    reference: &'a [Vec<Reference<f64>>],
+    settings: Settings,
+) -> Bench<'a> {
+    Bench {
+        robot,
+        truth,
+        reference,
+        tool: [0.1, 0.0, 0.0],
+        settings,
+        wrong: None,
+    }
+}
+
+#[test]
+fn computed_torque_gives_the_designed_error_dynamics() {
+    // Double pole at −ω: a step of d leaves the error d·(1 + ω·t)·exp(−ω·t) in every joint, coupled drives or not.
+    for name in ["one-link.toml", "edda.toml", "irp6.toml"] {
+        let robot = slippery(name);
+        let truth = Model::from_robot(&robot).unwrap();
+        let settings = continuous();
+        let step = 0.002;
+        let reference = held(&robot.middle_position(), step, 6000);
+        let model = LawModel::of(&robot).unwrap();
+        let run = bench(&robot, &truth, &reference, settings)
+            .track(LawKind::ComputedTorque, &model, name)
+            .unwrap();
+        for (j, q) in run.trace.q.iter().enumerate() {
+            assert_eq!(run.trace.saturated[j], 0);
+            for k in (1..q.len()).step_by(50) {
+                let t = (k - 1) as f64 * run.trace.period;
+                let phase = settings.omega() * t;
+                let expected = step * (1.0 + phase) * (-phase).exp();
+                let found = reference[j][k].position - q[k];
+                assert!(
+                    (found - expected).abs() < 0.01 * step,
+                    "{name} joint {j} at {t}: {found} for {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrong_weight_leaves_the_error_of_the_closed_form_and_an_integral_leaves_none() {
+    // With a model of 0.7 times the robot: 0.7·(J·kp·e + g) = g at rest, so e = (0.3/0.7)·g/(J·kp).
+    let robot = slippery("one-link.toml");
+    let truth = Model::from_robot(&robot).unwrap();
+    let mut model = LawModel::of(&robot).unwrap();
+    model.scale(0.7);
+    let settings = Settings {
+        delay: false,
+        resolution: 0.0,
+        ..Settings::default()
+    };
+    let reference = held(&[0.0], 0.0, 8000);
+    let bench = bench(&robot, &truth, &reference, settings);
+    let last = |law| {
+        let run = bench.track(law, &model, "0.7").unwrap();
+        run.trace.q[0].last().map(|q| -q).unwrap()
+    };
+    // mx = 0.3 kg·m; J = 0.12 kg·m² of the link and 50²·2e-5 kg·m² of the rotor.
+    let expected: f64 = 0.3 / 0.7 * 0.3 * 9.81 / (0.17 * settings.omega().powi(2));
+    let found = last(LawKind::ComputedTorque);
+    assert!(
+        (found / expected - 1.0).abs() < 1e-3,
+        "{found} for {expected}"
+    );
+    let found = last(LawKind::Pid);
+    assert!(found.abs() < 1e-4 * expected, "{found}");
+}
+
+#[test]
+fn adaptive_law_learns_what_the_motion_excites_and_tracks_better_for_it() {
+    let robot = robot("edda.toml");
+    let truth = Model::from_robot(&robot).unwrap();
+    let mut model = LawModel::of(&robot).unwrap();
+    model.scale(0.7);
+    let settings = Settings::default();
+    let reference = references(&default_reference(&robot, settings.rate, 20.0)).unwrap();
+    let bench = bench(&robot, &truth, &reference, settings);
+    let fixed = bench
+        .track(LawKind::ComputedTorque, &model, "0.7")
+        .unwrap()
+        .measures;
+    let own = bench
+        .track(LawKind::Adaptive, &model, "0.7")
+        .unwrap()
+        .measures;
+    assert!(
+        own.tool_rms < 0.5 * fixed.tool_rms,
+        "{} {}",
+        own.tool_rms,
+        fixed.tool_rms
+    );
+    let learnt = own.adaptation.unwrap();
+    assert!(learnt.excited > learnt.count / 2);
+    assert!(
+        learnt.error[1] < 0.4 * learnt.error[0],
+        "{:?}",
+        learnt.error
+    );
+    let torque = learnt.torque_error;
+    assert!(torque[1] < 0.1 * torque[0], "{torque:?}");
+    let shown = learnt.parameters.iter().filter(|one| one.excited > 0.99);
+    let [before, after] = shown.fold([0.0, 0.0], |[a, b], one| {
+        let size = one.truth.abs().max(0.02);
+        [
+            a + (one.start - one.truth).abs() / size,
+            b + (one.end - one.truth).abs() / size,
+        ]
+    });
+    assert!(
+        after < 0.5 * before,
+        "{after} {before}: {:?}",
+        learnt.parameters
+    );
+    // A motion of the elbow alone excites less.
+    let mut still = reference.clone();
+    let middle = still[0][0].position;
+    still[0].fill(Reference {
+        position: middle,
+        ..Reference::default()
+    });
+    let bench = Bench {
+        reference: &still,
+        ..bench
+    };
+    let own = bench
+        .track(LawKind::Adaptive, &model, "0.7")
+        .unwrap()
+        .measures;
+    let less = own.adaptation.unwrap();
+    assert!(
+        less.excited < learnt.excited,
+        "{} {}",
+        less.excited,
+        learnt.excited
+    );
+}
+
+#[test]
+fn an_unstable_loop_is_told_with_joint_and_time() {
+    let mut robot = robot("edda.toml");
+    for joint in &mut robot.joints {
+        joint.limits.as_mut().unwrap().torque = None;
+    }
+    let truth = Model::from_robot(&robot).unwrap();
+    let mut model = LawModel::of(&robot).unwrap();
+    model.scale(10.0);
+    let settings = Settings {
+        bandwidth: 50.0,
+        ..Settings::default()
+    };
+    let reference = references(&default_reference(&robot, settings.rate, 5.0)).unwrap();
+    let found = bench(&robot, &truth, &reference, settings)
+        .track(LawKind::ComputedTorque, &model, "10")
+        .err()
+        .unwrap();
+    assert!(matches!(found, ControlError::Unstable { .. }), "{found}");
+    let text = found.to_string();
+    assert!(text.contains("joint \"") && text.contains(" s, "), "{text}");
+}

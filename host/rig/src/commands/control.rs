@@ -1,0 +1,570 @@
+//! `rig control`: control laws of an arm in a simulated closed loop.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args as ClapArgs, ValueEnum};
+
+use super::error::CommandError;
+use super::input::{RobotArg, command_line, described};
+use super::overwrite::refuse_folder;
+use super::ui::Ui;
+use crate::pages;
+use crate::pages::Context;
+use rig_control::{
+    Bench, ContactOptions, ContactTask, ControlError, Evaluation, LawKind, LawModel, Settings,
+    Surface, Trace, default_reference, references, resolution, save, tool_point,
+};
+use rig_excite::load_reference;
+use rig_model::robot::Robot;
+use rig_model::simulate::Model;
+use rig_output::{can_take, folder, format_significant, write_whole};
+use rig_shared::trajectory::Reference;
+
+/// Simulates control laws on a robot and measures them: tracking error, force, robustness to wrong parameters.
+///
+/// The laws pid, computed-torque and adaptive (together: all) follow a trajectory. The laws hybrid and impedance (together:
+/// contact) press the tool on a compliant surface and slide along it. Without --trajectory the joints move by two sines
+/// each; without --tool, --pose, --normal and --press a task that fits the robot is chosen. Everything assumed is printed.
+///
+/// The robot is simulated as described, with dry friction that sticks, coupled drives and effects. A law reads encoder
+/// counts and the velocity of the firmware's observer. Its torque is limited, held between two ticks, and acts one tick late.
+///
+/// --model gives the law another model than the robot's own, for example identified.toml or the diagnosed model.toml.
+///
+/// Writes control.json, report.html and one recording a motion (columns t, q, qd, tau and ref) into the folder --out.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    robot: RobotArg,
+    /// Law to simulate; one or more
+    #[arg(long, value_enum, num_args = 1.., default_values_t = [Law::All])]
+    law: Vec<Law>,
+    /// Description that the laws use as their model, each with each law [default: the robot's own]
+    #[arg(long, num_args = 1.., value_name = "FILE")]
+    model: Vec<PathBuf>,
+    /// Trajectory by `rig excite` (.toml or .csv), or a recording whose reference is repeated
+    #[arg(long)]
+    trajectory: Option<PathBuf>,
+    /// Length of the default motion, s
+    #[arg(long, default_value_t = 10.0, conflicts_with = "trajectory")]
+    duration: f64,
+    /// Multiply all parameters of the laws' models by this factor
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Repeat with parameters that are wrong at random by up to this share, per cent
+    #[arg(long, value_name = "PERCENT")]
+    wrong: Option<f64>,
+    /// Number of such repetitions of each law
+    #[arg(long, default_value_t = 20)]
+    draws: usize,
+    /// Undamped natural frequency of the position loops, Hz
+    #[arg(long, default_value_t = Settings::default().bandwidth)]
+    bandwidth: f64,
+    /// Damping ratio of the position loops
+    #[arg(long, default_value_t = Settings::default().damping)]
+    damping: f64,
+    /// Control ticks a second, Hz
+    #[arg(long, default_value_t = Settings::default().rate)]
+    rate: f64,
+    /// The torque acts in the tick of its measurement, not one later
+    #[arg(long)]
+    no_delay: bool,
+    /// Encoder step of joints without a described encoder, rad or m at the joint; 0 for exact positions and velocities
+    #[arg(long, default_value_t = Settings::default().resolution)]
+    resolution: f64,
+    /// Share of dry friction that is compensated in motion, 0 to 1
+    #[arg(long, default_value_t = Settings::default().friction_gain)]
+    friction_gain: f64,
+    #[command(flatten)]
+    contact: ContactArgs,
+    /// Seed of the noise and of the wrong parameters
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+    /// Replace results that the folder already holds
+    #[arg(long)]
+    force: bool,
+}
+
+/// The surface and the task on it.
+#[derive(Debug, ClapArgs)]
+struct ContactArgs {
+    /// Stiffness of the surface, N/m
+    #[arg(long, default_value_t = Surface::default().stiffness)]
+    stiffness: f64,
+    /// Damping of the surface, N·s/m
+    #[arg(long, default_value_t = Surface::default().damping)]
+    surface_damping: f64,
+    /// Coefficient of friction between tool and surface
+    #[arg(long, default_value_t = Surface::default().friction)]
+    surface_friction: f64,
+    /// Distance of the tool from the surface at the start, m
+    #[arg(long, default_value_t = Surface::default().gap)]
+    gap: f64,
+    /// Wanted force, N [default: 20, or a quarter of what the torque limits allow]
+    #[arg(long, value_name = "N")]
+    press: Option<f64>,
+    /// Length of the slide along the surface, m
+    #[arg(long, default_value_t = 0.05)]
+    slide: f64,
+    /// Stiffness of the impedance, N/m [default: that of a fifth of the bandwidth]
+    #[arg(long)]
+    impedance: Option<f64>,
+    /// Standard deviation of the noise of the measured force, N
+    #[arg(long, default_value_t = 0.0)]
+    noise_force: f64,
+    /// Tool point in the frame of the last joint, m
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    tool: Option<Vec<f64>>,
+    /// Start pose, rad or m of each joint
+    #[arg(long, num_args = 1.., allow_negative_numbers = true)]
+    pose: Option<Vec<f64>>,
+    /// Direction into the surface, in the base frame
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    normal: Option<Vec<f64>>,
+}
+
+/// A law, or several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Law {
+    /// Independent PID of the motors, with gravity and friction compensation
+    Pid,
+    /// Computed torque
+    ComputedTorque,
+    /// Slotine and Li's adaptive law in base parameters
+    Adaptive,
+    /// pid, computed-torque and adaptive
+    All,
+    /// Force along the normal of a surface, motion along it
+    Hybrid,
+    /// The tool as a mass with spring and damper
+    Impedance,
+    /// hybrid and impedance
+    Contact,
+}
+
+impl Law {
+    fn kinds(self) -> &'static [LawKind] {
+        match self {
+            Self::Pid => &[LawKind::Pid],
+            Self::ComputedTorque => &[LawKind::ComputedTorque],
+            Self::Adaptive => &[LawKind::Adaptive],
+            Self::All => &[LawKind::Pid, LawKind::ComputedTorque, LawKind::Adaptive],
+            Self::Hybrid => &[LawKind::Hybrid],
+            Self::Impedance => &[LawKind::Impedance],
+            Self::Contact => &[LawKind::Hybrid, LawKind::Impedance],
+        }
+    }
+}
+
+/// Recordings that the command writes with one model; with several, the model's number follows the law.
+const MOTIONS: [&str; 5] = [
+    "pid.csv",
+    "computed-torque.csv",
+    "adaptive.csv",
+    "hybrid.csv",
+    "impedance.csv",
+];
+
+/// Largest share of wrong parameters, per cent: beyond it some inertia could vanish.
+const MOST_WRONG: f64 = 90.0;
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence that names the wrong file, value, joint or time.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    can_take(&args.out, &["control.json", "report.html"])?;
+    refuse_folder(&args.out, &MOTIONS, args.force)?;
+    let settings = settings(args)?;
+    let robot = args.robot.load(ui)?;
+    let models = models(args, &robot, ui)?;
+    let truth = Model::from_robot(&robot)?;
+    let mut laws: Vec<LawKind> = Vec::new();
+    for kind in args.law.iter().flat_map(|law| law.kinds()) {
+        if !laws.contains(kind) {
+            laws.push(*kind);
+        }
+    }
+    let mut evaluation = Evaluation {
+        schema: "rig-control/1",
+        robot: robot.name.clone(),
+        settings,
+        task: None,
+        tracking: Vec::new(),
+        contact: Vec::new(),
+        notes: assumptions(&robot, &settings),
+    };
+    evaluation.notes.extend(truth.effects.unsimulated());
+    let (pressing, tracking): (Vec<_>, Vec<_>) = laws.into_iter().partition(|law| law.is_contact());
+    let mut motions = Vec::new();
+    let whole = Whole {
+        args,
+        robot: &robot,
+        truth: &truth,
+        models: &models,
+    };
+    if !tracking.is_empty() {
+        whole.track(&tracking, settings, &mut evaluation, &mut motions, ui)?;
+    }
+    if !pressing.is_empty() {
+        whole.press(&pressing, settings, &mut evaluation, &mut motions, ui)?;
+    }
+    for note in &evaluation.notes {
+        ui.remark(note);
+    }
+    write(args, &robot, &evaluation, &motions)?;
+    for line in lines(&evaluation) {
+        ui.say(&line);
+    }
+    let report = args.out.join("report.html");
+    ui.say(&format!("report: {}", report.display()));
+    Ok(())
+}
+
+/// A motion to be written: file name, motion, reference.
+type Motion = (String, Trace, Vec<Vec<Reference<f64>>>);
+
+/// All inputs of the command.
+struct Whole<'a> {
+    args: &'a Args,
+    robot: &'a Robot,
+    truth: &'a Model,
+    models: &'a [(String, LawModel)],
+}
+
+impl Whole<'_> {
+    /// Runs each law with each model, `run` for the law, the model and the name of the recording.
+    fn each(
+        &self,
+        laws: &[LawKind],
+        mut run: impl FnMut(LawKind, &LawModel, &str, String) -> Result<(), CommandError>,
+    ) -> Result<(), CommandError> {
+        for law in laws {
+            for (k, (name, model)) in self.models.iter().enumerate() {
+                let motion = match self.models.len() {
+                    1 => format!("{}.csv", law.name()),
+                    _ => format!("{}-{}.csv", law.name(), k + 1),
+                };
+                run(*law, model, name, motion)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn bench<'b>(
+        &'b self,
+        reference: &'b [Vec<Reference<f64>>],
+        tool: [f64; 3],
+        settings: Settings,
+    ) -> Bench<'b> {
+        Bench {
+            robot: self.robot,
+            truth: self.truth,
+            reference,
+            tool,
+            settings,
+            wrong: self.args.wrong.map(|share| (0.01 * share, self.args.draws)),
+        }
+    }
+
+    fn track(
+        &self,
+        laws: &[LawKind],
+        mut settings: Settings,
+        evaluation: &mut Evaluation,
+        motions: &mut Vec<Motion>,
+        ui: &Ui,
+    ) -> Result<(), CommandError> {
+        let sampled = match &self.args.trajectory {
+            Some(path) => load_reference(path, self.robot, settings.rate)?,
+            None => default_reference(self.robot, settings.rate, self.args.duration),
+        };
+        let rate = 1.0 / sampled.period;
+        if (rate / settings.rate - 1.0).abs() > 1e-6 {
+            evaluation.notes.push(format!(
+                "The laws run at {rate:.6} Hz, the rate of the sampled trajectory; a .toml trajectory runs at any rate."
+            ));
+            settings.rate = rate;
+            settings.check()?;
+            evaluation.settings = settings;
+        }
+        let reference = references(&sampled)?;
+        let tool = match three("tool", self.args.contact.tool.as_deref())? {
+            Some(tool) => tool,
+            None => tool_point(&LawModel::of(self.robot)?, &mut evaluation.notes)?,
+        };
+        let bench = self.bench(&reference, tool, settings);
+        let mut progress = ui.progress("simulating", (laws.len() * self.models.len()) as u64);
+        self.each(laws, |law, model, name, motion| {
+            let mut run = bench.track(law, model, name)?;
+            progress.advance(1);
+            run.measures.motion.clone_from(&motion);
+            add_notes(&mut evaluation.notes, run.notes);
+            evaluation.tracking.push(run.measures);
+            motions.push((motion, run.trace, reference.clone()));
+            Ok(())
+        })
+    }
+
+    fn press(
+        &self,
+        laws: &[LawKind],
+        settings: Settings,
+        evaluation: &mut Evaluation,
+        motions: &mut Vec<Motion>,
+        ui: &Ui,
+    ) -> Result<(), CommandError> {
+        let given = &self.args.contact;
+        let options = ContactOptions {
+            surface: Surface {
+                stiffness: given.stiffness,
+                damping: given.surface_damping,
+                friction: given.surface_friction,
+                gap: given.gap,
+            },
+            tool: three("tool", given.tool.as_deref())?,
+            pose: given.pose.clone(),
+            normal: three("normal", given.normal.as_deref())?,
+            force: given.press,
+            slide: given.slide,
+            stiffness: given.impedance,
+        };
+        // One task for all models: that of the first.
+        let Some((_, first)) = self.models.first() else {
+            return Ok(());
+        };
+        let task = ContactTask::choose(first, &options, &settings)?;
+        add_notes(&mut evaluation.notes, task.notes.clone());
+        let samples = (task.duration * settings.rate).ceil() as usize;
+        let still = |q: &f64| {
+            let at = Reference {
+                position: *q,
+                ..Reference::default()
+            };
+            vec![at; samples]
+        };
+        let reference: Vec<Vec<Reference<f64>>> = task.pose.iter().map(still).collect();
+        let bench = self.bench(&reference, task.tool, settings);
+        let mut progress = ui.progress("simulating", (laws.len() * self.models.len()) as u64);
+        self.each(laws, |law, model, name, motion| {
+            let mut run = bench.press(law, model, name, &task)?;
+            progress.advance(1);
+            run.measures.motion.clone_from(&motion);
+            add_notes(&mut evaluation.notes, run.notes);
+            evaluation.contact.push(run.measures);
+            motions.push((motion, run.trace, reference.clone()));
+            Ok(())
+        })?;
+        evaluation.task = Some(task);
+        Ok(())
+    }
+}
+
+/// Adds the notes that are not there yet.
+fn add_notes(notes: &mut Vec<String>, more: Vec<String>) {
+    for note in more {
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+}
+
+fn settings(args: &Args) -> Result<Settings, CommandError> {
+    let settings = Settings {
+        bandwidth: args.bandwidth,
+        damping: args.damping,
+        rate: args.rate,
+        delay: !args.no_delay,
+        resolution: args.resolution,
+        friction_gain: args.friction_gain,
+        force_noise: args.contact.noise_force,
+        seed: args.seed,
+        ..Settings::default()
+    };
+    settings.check()?;
+    for (name, value, most) in [
+        ("scale", args.scale, 100.0),
+        ("duration", args.duration, 3600.0),
+    ] {
+        if !(value > 0.0 && value <= most) {
+            return Err(CommandError::Sentence(format!(
+                "--{name} {value} is not possible: it must be above 0 and at most {most}."
+            )));
+        }
+    }
+    if let Some(wrong) = args.wrong
+        && !(wrong > 0.0 && wrong <= MOST_WRONG)
+    {
+        return Err(CommandError::Sentence(format!(
+            "--wrong {wrong} is not possible: it must be above 0 and at most {MOST_WRONG} per cent."
+        )));
+    }
+    if !(1..=10_000).contains(&args.draws) {
+        return Err(CommandError::Sentence(format!(
+            "--draws {} is not possible: it must be between 1 and 10000.",
+            args.draws
+        )));
+    }
+    Ok(settings)
+}
+
+/// Returns the models of the laws with their names.
+fn models(args: &Args, robot: &Robot, ui: &Ui) -> Result<Vec<(String, LawModel)>, CommandError> {
+    let name = |path: &Path| {
+        let file = path.file_name().unwrap_or(path.as_os_str());
+        file.to_string_lossy().into_owned()
+    };
+    let mut models = Vec::new();
+    if args.model.is_empty() {
+        models.push((name(args.robot.path()), LawModel::of(robot)?));
+    }
+    for path in &args.model {
+        let other = described(path, args.robot.chain(), ui)?.robot;
+        if other.joints.len() != robot.joints.len() {
+            return Err(ControlError::OtherRobot {
+                what: path.display().to_string(),
+                expected: robot.joints.len(),
+                found: other.joints.len(),
+            }
+            .into());
+        }
+        models.push((name(path), LawModel::of(&other)?));
+    }
+    for (name, model) in &mut models {
+        if (args.scale - 1.0).abs() > 0.0 {
+            model.scale(args.scale);
+            *name = format!("{name} × {}", format_significant(args.scale, 3));
+        }
+    }
+    Ok(models)
+}
+
+fn three(name: &str, given: Option<&[f64]>) -> Result<Option<[f64; 3]>, CommandError> {
+    match given {
+        None => Ok(None),
+        Some([a, b, c]) if [a, b, c].iter().all(|v| v.abs() <= 10.0) => Ok(Some([*a, *b, *c])),
+        Some(other) => Err(CommandError::Sentence(format!(
+            "--{name} {other:?} is not possible: give three numbers of at most 10."
+        ))),
+    }
+}
+
+/// Returns what is assumed of the robot, one sentence each.
+fn assumptions(robot: &Robot, settings: &Settings) -> Vec<String> {
+    let mut notes = Vec::new();
+    let names = |which: &dyn Fn(usize) -> bool| -> String {
+        let joints = robot.joints.iter().enumerate().filter(|(j, _)| which(*j));
+        joints
+            .map(|(_, joint)| joint.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let step = settings.resolution;
+    let undescribed = |j: usize| resolution(robot, j, step) == step;
+    let list = names(&undescribed);
+    if step > 0.0 && !list.is_empty() {
+        notes.push(format!(
+            "No encoder is described for {list}: a step of {step} rad or m at the joint is assumed (--resolution)."
+        ));
+    }
+    let unlimited = |j: usize| {
+        let limits = robot.joints[j].limits.as_ref();
+        limits.and_then(|l| l.torque).is_none()
+    };
+    let list = names(&unlimited);
+    if !list.is_empty() {
+        notes.push(format!(
+            "No torque limit is described for {list}: the torque is not limited."
+        ));
+    }
+    notes
+}
+
+/// Writes all files of the result.
+///
+/// # Errors
+/// A file cannot be written.
+fn write(
+    args: &Args,
+    robot: &Robot,
+    evaluation: &Evaluation,
+    motions: &[Motion],
+) -> Result<(), CommandError> {
+    folder(&args.out)?;
+    let json = serde_json::to_string_pretty(evaluation).map_err(|error| {
+        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&args.out.join("control.json"), (json + "\n").as_bytes())?;
+    for (name, trace, reference) in motions {
+        save(&args.out.join(name), robot, trace, reference)?;
+    }
+    let context = Context {
+        command: command_line(),
+        ..Context::default()
+    };
+    rig_report::write(
+        &args.out.join("report.html"),
+        &pages::control(robot, evaluation, &context),
+    )?;
+    Ok(())
+}
+
+/// Returns the printed answer.
+fn lines(evaluation: &Evaluation) -> Vec<String> {
+    let mut lines = Vec::new();
+    let short = |value: f64| format_significant(value, 3);
+    let robust = |own: &rig_control::Robustness, factor: f64, unit: &str| {
+        format!(
+            "; parameters wrong by up to {} %: median {} {unit}, worst {} {unit}, {} of {} failed",
+            short(100.0 * own.share),
+            short(factor * own.median),
+            short(factor * own.worst),
+            own.failed,
+            own.draws
+        )
+    };
+    for own in &evaluation.tracking {
+        let mut line = format!(
+            "{} with {}: tool error {} mm RMS, {} mm at most",
+            own.law.name(),
+            own.model,
+            short(1e3 * own.tool_rms),
+            short(1e3 * own.tool_largest)
+        );
+        if let Some(found) = &own.robustness {
+            line.push_str(&robust(found, 1e3, "mm"));
+        }
+        lines.push(line);
+        if let Some(learnt) = &own.adaptation {
+            lines.push(format!(
+                "  the motion excites {} of {} directions of the base parameters; torque error of the model {} -> {} % of the limits",
+                learnt.excited,
+                learnt.count,
+                short(100.0 * learnt.torque_error[0]),
+                short(100.0 * learnt.torque_error[1])
+            ));
+        }
+    }
+    for own in &evaluation.contact {
+        let settling = own.settling.map_or("not before the slide".to_owned(), |t| {
+            format!("after {} s", short(t))
+        });
+        let mut line = format!(
+            "{} with {}: {} N, overshoot {} %, settled {settling}, steady error {} N, {} bounces",
+            own.law.name(),
+            own.model,
+            short(own.force),
+            short(100.0 * own.overshoot),
+            short(own.steady_error),
+            own.bounces
+        );
+        if let Some(found) = &own.robustness {
+            line.push_str(&robust(found, 100.0, "%"));
+        }
+        lines.push(line);
+    }
+    lines
+}

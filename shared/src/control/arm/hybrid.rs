@@ -1,0 +1,174 @@
+//! Hybrid control of position and force: some directions of the task follow a motion, the others press.
+//!
+//! The selection is that of Raibert & Craig (1981), the decoupling that of the operational space (Khatib 1987). Along a
+//! direction that moves, a = ẍ_r + kd·(ẋ_r − ẋ) + kp·(x_r − x). Along one that presses, the measured force is taken off
+//! the arm, and the error of the force asks for a speed:
+//!
+//! a = kv·(w − ẋ) + d, w = kf·(f_r − f) within ±the approach speed.
+//!
+//! On a surface of stiffness k the force obeys f̈ + kv·ḟ + kv·kf·k·f = kv·kf·k·f_r: two poles at −kv/2 with kf = kv/(4k)
+//! ([`ForceGains::design`]). In the air the same law moves towards the surface at min(kf·f_r, approach speed), so that there
+//! is no switch between two laws at contact. Contact at a speed below ½·kv·f_r/k has no overshoot in this linear loop, and
+//! kf·f_r is half of that.
+//!
+//! A disturbance observer takes away friction that the model lacks, in the air as in contact: d' = kd·(v_m − ẋ) is added to a,
+//! where v_m' = kv·(w − v_m) is the speed that the exact model would have. With the exact model d stays zero.
+//!
+//! Leaves out: moments on the tool, the mass of the tool beyond the sensor (subtract it from the reading), and friction on
+//! the surface, which the position loops overcome.
+
+use super::fault::{ControlFault, check};
+use super::input::{Inputs, Law, Limited};
+use super::model::ArmModel;
+use super::operational::Operational;
+use super::task::{AXES, Task};
+use crate::precompensation::PrecompensationSettings;
+use crate::scalar::Real;
+
+/// Gains of a direction that presses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ForceGains<T> {
+    /// Wanted force of the tool on the surface, along the direction, N.
+    pub force: T,
+    /// kv, 1/s.
+    pub velocity: T,
+    /// kf, m/(N·s).
+    pub admittance: T,
+    /// kd, 1/s².
+    pub disturbance: T,
+    /// Highest speed of the approach, m/s.
+    pub approach: T,
+}
+
+impl<T: Real> ForceGains<T> {
+    /// Returns gains with two poles at −2π·`bandwidth` (Hz) on a surface of `stiffness` (N/m), for a wanted force (N), at an
+    /// approach of at most `approach` (m/s). A disturbance is taken away with the same two poles.
+    pub fn design(force: T, stiffness: T, bandwidth: T, approach: T) -> Self {
+        let omega = T::from_f64(core::f64::consts::TAU) * bandwidth;
+        let velocity = omega + omega;
+        Self {
+            force,
+            velocity,
+            admittance: velocity / (T::from_f64(4.0) * stiffness),
+            disturbance: omega.squared(),
+            approach,
+        }
+    }
+}
+
+/// What a direction of the task does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Axis<T> {
+    /// It follows the reference, with kp in 1/s² and kd in 1/s.
+    Moves {
+        /// kp, 1/s².
+        proportional: T,
+        /// kd, 1/s.
+        derivative: T,
+    },
+    /// It presses.
+    Presses(ForceGains<T>),
+}
+
+/// Constants of the law.
+#[derive(Clone, Copy, Debug)]
+pub struct Config<'a, T> {
+    /// The model.
+    pub model: ArmModel<'a, T>,
+    /// Tool and directions.
+    pub task: Task<'a, T>,
+    /// The selection: what each direction does.
+    pub axes: &'a [Axis<T>],
+    /// Posture in the motions that do not move the tool: kp in 1/s², kd in 1/s.
+    pub posture: [T; 2],
+    /// Settings of the compensation of dry friction.
+    pub friction: PrecompensationSettings<T>,
+    /// Highest torque of each joint, N·m or N.
+    pub torque_limit: &'a [T],
+    /// Time between two steps, s.
+    pub period: T,
+}
+
+/// State of a direction that presses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Pressing<T> {
+    /// v_m, m/s.
+    model_velocity: T,
+    /// d, m/s².
+    disturbance: T,
+}
+
+/// State of the law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State<T> {
+    pressing: [Pressing<T>; AXES],
+}
+
+impl<T: Real> ForceGains<T> {
+    /// Returns the speed to move at for a force of the tool on the surface.
+    fn speed(&self, force: T) -> T {
+        let wanted = self.admittance * (self.force - force);
+        wanted.clamp_to(-self.approach, self.approach)
+    }
+
+    /// Advances the disturbance observer.
+    fn observe(&self, state: &mut Pressing<T>, speed: T, velocity: T, period: T) {
+        state.disturbance += period * self.disturbance * (state.model_velocity - velocity);
+        state.model_velocity += period * self.velocity * (speed - state.model_velocity);
+    }
+}
+
+impl<T: Real<Mask = bool>> Law<T> for Config<'_, T> {
+    type State = State<T>;
+
+    fn step(
+        &self,
+        state: &mut State<T>,
+        input: &Inputs<'_, T>,
+        torque: &mut [T],
+    ) -> Result<Limited, ControlFault> {
+        let count = self.task.directions.len();
+        check("axes", count, self.axes.len())?;
+        let motion = (self.task).motion(self.model.chain, input.position, input.velocity)?;
+        let mut wanted = [T::ZERO; AXES];
+        let mut speed = [T::ZERO; AXES];
+        let pressed = self.task.pressed(&input.force);
+        for (d, axis) in self.axes.iter().enumerate() {
+            let (x, v) = (motion.position[d], motion.velocity[d]);
+            match axis {
+                Axis::Moves {
+                    proportional,
+                    derivative,
+                } => {
+                    let reference = &input.task[d];
+                    wanted[d] = reference.acceleration
+                        + *proportional * (reference.position - x)
+                        + *derivative * (reference.velocity - v);
+                    speed[d] = reference.velocity;
+                }
+                Axis::Presses(gains) => {
+                    speed[d] = gains.speed(pressed[d]);
+                    wanted[d] = gains.velocity * (speed[d] - v) + state.pressing[d].disturbance;
+                }
+            }
+        }
+        let operational = Operational {
+            model: self.model,
+            friction: self.friction,
+            torque_limit: self.torque_limit,
+            posture: self.posture,
+        };
+        let limited =
+            operational.torque(input, &motion, count, [&wanted, &speed, &pressed], torque)?;
+        // Nothing is observed behind a limit: the observer would take it for a disturbance.
+        if !limited.any() {
+            for (d, axis) in self.axes.iter().enumerate() {
+                if let Axis::Presses(gains) = axis {
+                    let own = &mut state.pressing[d];
+                    gains.observe(own, speed[d], motion.velocity[d], self.period);
+                }
+            }
+        }
+        Ok(limited)
+    }
+}

@@ -1,0 +1,150 @@
+//! Torques for a wanted acceleration of the tool.
+
+use super::fault::{ControlFault, check};
+use super::friction::add_dry_friction;
+use super::input::{Inputs, Limited, limit};
+use super::model::ArmModel;
+use super::task::{AXES, TaskMotion};
+use crate::multibody::{MAX_JOINTS, MultibodyError};
+use crate::precompensation::PrecompensationSettings;
+use crate::scalar::Real;
+
+/// Smallest mobility of the tool along a direction, as a share of the largest one in the task, that is not singular. The
+/// square root is the ratio of distances that equal efforts move the tool: a thousandth.
+const SINGULAR: f64 = 1e-6;
+
+/// Constants of the laws in the space of a task.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Operational<'a, T> {
+    pub(super) model: ArmModel<'a, T>,
+    pub(super) friction: PrecompensationSettings<T>,
+    pub(super) torque_limit: &'a [T],
+    /// Posture: kp in 1/s² and kd in 1/s.
+    pub(super) posture: [T; 2],
+}
+
+impl<T: Real<Mask = bool>> Operational<'_, T> {
+    /// Computes the joint torques that give the tool the acceleration `wanted` along each direction (Khatib 1987):
+    /// q̈ = q̈₀ + A⁻¹·Jᵀ·Λ·(a − J̇·q̇ − J·q̈₀) with Λ = (J·A⁻¹·Jᵀ)⁻¹. q̈₀ holds the posture; it acts only where the tool
+    /// does not move. The force on the tool is taken off: τ = A·q̈ + C·q̇ + g + friction − Jᵀ·f. `speed` is the planned
+    /// velocity along each direction, which gives the direction of friction.
+    pub(super) fn torque(
+        &self,
+        input: &Inputs<'_, T>,
+        motion: &TaskMotion<T>,
+        count: usize,
+        [wanted, speed, pressed]: [&[T; AXES]; 3],
+        torque: &mut [T],
+    ) -> Result<Limited, ControlFault> {
+        let n = self.model.joint_count();
+        input.check(n)?;
+        check("torque_limit", n, self.torque_limit.len())?;
+        check("torque", n, torque.len())?;
+        let mut mass = [T::ZERO; MAX_JOINTS * MAX_JOINTS];
+        let mass = &mut mass[..n * n];
+        self.model.inertia_matrix(input.position, mass)?;
+        factorise(mass, n).map_err(|joint| {
+            ControlFault::Multibody(MultibodyError::NotPositiveDefinite { joint })
+        })?;
+        // A⁻¹·Jᵀ, one row a direction.
+        let mut response = motion.rows;
+        for row in response.iter_mut().take(count) {
+            solve(mass, n, &mut row[..n]);
+        }
+        let mut mobility = [T::ZERO; AXES * AXES];
+        let mut largest = T::ZERO;
+        for a in 0..count {
+            for b in 0..count {
+                mobility[a * count + b] = dot(&motion.rows[a][..n], &response[b][..n]);
+            }
+            largest = largest.max(mobility[a * count + a]);
+        }
+        let mobility = &mut mobility[..count * count];
+        factorise(mobility, count).map_err(|direction| ControlFault::Singular { direction })?;
+        for direction in 0..count {
+            let pivot = mobility[direction * count + direction].squared();
+            if !(T::from_f64(SINGULAR) * largest).lt(pivot) {
+                return Err(ControlFault::Singular { direction });
+            }
+        }
+        let [kp, kd] = self.posture;
+        let mut acceleration = [T::ZERO; MAX_JOINTS];
+        for (j, reference) in input.reference.iter().enumerate() {
+            acceleration[j] = reference.acceleration
+                + kp * (reference.position - input.position[j])
+                + kd * (reference.velocity - input.velocity[j]);
+        }
+        let (mut force, mut pace) = ([T::ZERO; AXES], *speed);
+        for d in 0..count {
+            force[d] =
+                wanted[d] - motion.convective[d] - dot(&motion.rows[d][..n], &acceleration[..n]);
+        }
+        solve(mobility, count, &mut force[..count]);
+        solve(mobility, count, &mut pace[..count]);
+        let mut planned = [T::ZERO; MAX_JOINTS];
+        for d in 0..count {
+            for j in 0..n {
+                acceleration[j] += response[d][j] * force[d];
+                planned[j] += response[d][j] * pace[d];
+            }
+        }
+        let (q, qd) = (input.position, input.velocity);
+        self.model.rigid_torque(q, qd, &acceleration[..n], torque)?;
+        self.model.add_viscous_torque(q, qd, torque)?;
+        add_dry_friction(&self.model, &self.friction, q, &planned[..n], qd, torque)?;
+        for (j, own) in torque.iter_mut().enumerate() {
+            *own += input.known(j);
+            for d in 0..count {
+                *own += motion.rows[d][j] * pressed[d];
+            }
+        }
+        Ok(limit(self.torque_limit, torque))
+    }
+}
+
+fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    let mut sum = T::ZERO;
+    for (&x, &y) in a.iter().zip(b) {
+        sum += x * y;
+    }
+    sum
+}
+
+/// Replaces the lower triangle of a symmetric n × n matrix by its Cholesky factor. Returns the row of the first pivot
+/// that is not above zero.
+fn factorise<T: Real<Mask = bool>>(matrix: &mut [T], n: usize) -> Result<(), usize> {
+    for j in 0..n {
+        for i in j..n {
+            let mut value = matrix[i * n + j];
+            for k in 0..j {
+                value -= matrix[i * n + k] * matrix[j * n + k];
+            }
+            if i > j {
+                matrix[i * n + j] = value / matrix[j * n + j];
+            } else if T::ZERO.lt(value) {
+                matrix[j * n + j] = value.sqrt();
+            } else {
+                return Err(j);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Solves L·Lᵀ·x = b in place.
+fn solve<T: Real>(factor: &[T], n: usize, x: &mut [T]) {
+    for i in 0..n {
+        let mut value = x[i];
+        for k in 0..i {
+            value -= factor[i * n + k] * x[k];
+        }
+        x[i] = value / factor[i * n + i];
+    }
+    for i in (0..n).rev() {
+        let mut value = x[i];
+        for k in i + 1..n {
+            value -= factor[k * n + i] * x[k];
+        }
+        x[i] = value / factor[i * n + i];
+    }
+}
