@@ -14,6 +14,8 @@ const NEARLY_ALL: f64 = 0.9;
 const KEPT: usize = 4;
 /// Number of equally good orders that are tried with the sensor turned.
 const TRIED: usize = 3;
+/// Rotation at which the steps end, rad.
+const SETTLED: f64 = 1e-9;
 /// Largest number of steps of the rotation.
 const MOST_TURNS: usize = 40;
 
@@ -29,11 +31,12 @@ pub(crate) fn settled(sensed: &Sensed, start: &Mounting, unknowns: &Unknowns) ->
         // A linear step of more than a third of a turn points nowhere.
         let [sensor, gravity] = turns.map(|by| by * (1.0 / size).min(1.0));
         let next = sensed.fit(&fit.mounting.turned(&sensor, &gravity), unknowns);
-        if !next.misfit().is_finite() || next.misfit() > fit.misfit() + 1e-9 {
+        // Likelihoods are sums over many rows: less than one is rounding and the curvature of the rotation.
+        if !next.misfit().is_finite() || next.misfit() > fit.misfit() + 1.0 {
             break;
         }
         fit = next;
-        if size < 1e-9 {
+        if size < SETTLED {
             break;
         }
     }
@@ -152,28 +155,22 @@ const UNITS: [Unit; 4] = [
 
 /// Returns the unit in which moments and forces fit each other decisively better than in N·m and N, in words. Only motion
 /// tells: poses at rest fit every unit, with another centre of mass.
-pub(crate) fn other_unit(sensed: &Sensed, compared: &Compared) -> Option<&'static str> {
-    let fit = &compared.stated;
+pub(crate) fn other_unit(sensed: &Sensed, fit: &Fit) -> Option<&'static str> {
     if sensed.recordings.iter().all(|r| r.poses) || sensed.is_exact(fit) {
         return None;
     }
-    let better = compared
-        .better
-        .as_ref()
-        .map_or(f64::INFINITY, |(_, fit)| fit.misfit());
     let each = 0.5 * fit.equations as f64;
     let misfit = |unit: &Unit| {
         let mounting = Mounting {
-            force: fit.mounting.force,
             moment: fit.mounting.moment / unit.factor,
-            gravity: fit.mounting.gravity,
+            ..fit.mounting.clone()
         };
         // The residual of the moments in the unit of the file.
-        sensed.fit(&mounting, &fit.unknowns).misfit() + 2.0 * each * unit.factor.ln()
+        settled(sensed, &mounting, &fit.unknowns).misfit() + 2.0 * each * unit.factor.ln()
     };
     let found = UNITS.iter().map(|unit| (misfit(unit), unit.words));
     let (least, words) = found.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (fit.misfit().min(better) - least > DECISIVE).then_some(words)
+    (fit.misfit() - least > DECISIVE).then_some(words)
 }
 
 /// Returns true if a fit leaves less than another in nearly all segments, in units of its noise.

@@ -61,6 +61,9 @@ pub struct SensorFindings {
     pub residual: [f64; 2],
     /// Residual of forces and of moments as a share of what they read beside bias and drift.
     pub share: [f64; 2],
+    /// RMS that noise of the forces, N, and of the moments, N·m, leaves in the band of the fit, inferred from the readings
+    /// above the band; `None` for poses.
+    pub noise: Option<[f64; 2]>,
     /// Bias by recording.
     pub biases: Vec<Bias>,
     /// Change of the bias per °C, if the data show one.
@@ -87,12 +90,18 @@ pub(crate) struct Told<'a> {
     pub channels: Channels,
     /// Pairs of a property that was found, and another that explains the readings as well.
     pub alternatives: Vec<[Nuisance; 2]>,
+    /// What the readings were shifted by, s.
+    pub delay: f64,
 }
 
 impl Told<'_> {
     /// Returns the estimated rotation of the sensor in the frame of the last joint, and the sign of its readings.
     fn rotation(&self) -> (Matrix3<f64>, Reads) {
-        let force = self.fit.mounting.force * self.channels.force.transpose();
+        let [turn, _] = self
+            .sensed
+            .rotations(self.fit)
+            .map(Rotation3::from_scaled_axis);
+        let force = turn * self.fit.mounting.force * self.channels.force.transpose();
         match force.determinant() > 0.0 {
             true => (force, Reads::Robot),
             false => (-force, Reads::Load),
@@ -153,11 +162,17 @@ impl Told<'_> {
             position,
             residual: self.fit.noise,
             share: self.sensed.share(self.fit),
+            noise: self.noise(),
             biases,
             warming: self.sensed.warming(self.fit),
             traces: self.traces(),
             rows: self.sensed.used_rows(&self.fit.unknowns),
-            saturated: self.sensed.recordings.iter().map(|r| r.saturated).sum(),
+            saturated: self
+                .sensed
+                .recordings
+                .iter()
+                .map(|r| r.passed.saturated)
+                .sum(),
             prepared,
         }
     }
@@ -177,7 +192,8 @@ impl Told<'_> {
 
     /// Returns the direction of gravity if it is not the described one.
     fn gravity(&self, warnings: &mut Vec<String>) -> Option<[f64; 3]> {
-        let turn = self.fit.mounting.gravity;
+        let [_, further] = self.sensed.rotations(self.fit);
+        let turn = Rotation3::from_scaled_axis(further) * self.fit.mounting.gravity;
         if !self.fit.unknowns.has(Nuisance::Lean) {
             return None;
         }
@@ -194,7 +210,10 @@ impl Told<'_> {
 
     /// Returns the delay of the sensor against the encoders, s.
     fn delay(&self, warnings: &mut Vec<String>) -> Option<f64> {
-        let delay = self.sensed.delay(self.fit)?;
+        let delay = self.delay + self.sensed.delay(self.fit).unwrap_or(0.0);
+        if delay == 0.0 {
+            return None;
+        }
         let sense = if delay > 0.0 { "late" } else { "early" };
         warnings.push(format!(
             "The readings are {} ms {sense} against the positions; the load was identified with this delay. Record both by one clock.",
@@ -253,6 +272,51 @@ impl Told<'_> {
                 }),
             })
             .collect()
+    }
+
+    /// Returns the noise in the band of the fit: that of the recordings, by their rows.
+    fn noise(&self) -> Option<[f64; 2]> {
+        let (mut sums, mut rows) = ([0.0; 2], 0.0);
+        for recorded in self.sensed.recordings {
+            let own = recorded.passed.noise?;
+            let count = recorded.rows() as f64;
+            for (sum, noise) in sums.iter_mut().zip(own) {
+                *sum += count * noise * noise;
+            }
+            rows += count;
+        }
+        (rows > 0.0).then(|| sums.map(|sum| (sum / rows).sqrt()))
+    }
+
+    /// Says if more is left than noise: half of the residual's power is not explained by the noise above the band. Refuses
+    /// readings of which a rigid load leaves more than half of the power.
+    ///
+    /// # Errors
+    /// [`LoadError::Fault`] with the residual, unless the user goes on.
+    pub(crate) fn not_rigid(&self, even_if_wrong: bool) -> Result<Option<String>, LoadError> {
+        let Some(noise) = self.noise() else {
+            return Ok(None);
+        };
+        let over =
+            |kind: usize| (self.fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2);
+        if self.sensed.is_exact(self.fit) || over(0).max(over(1)) <= 2.0 {
+            return Ok(None);
+        }
+        let share = self.sensed.share(self.fit);
+        let text = format!(
+            "A rigid load leaves {} N and {} N·m RMS ({} and {} % of what the sensor reads beside the bias); noise as that above the band would leave {} N and {} N·m. Something else acts on the sensor (cables that pull, contact, elasticity, gain and crosstalk, another robot), or its noise is slow.",
+            format_significant(self.fit.noise[0], 3),
+            format_significant(self.fit.noise[1], 3),
+            format_significant(100.0 * share[0], 2),
+            format_significant(100.0 * share[1], 2),
+            format_significant(noise[0], 3),
+            format_significant(noise[1], 3)
+        );
+        let lost = |kind: usize| share[kind].powi(2) > 0.5 && over(kind) > 2.0;
+        match (lost(0) || lost(1)) && !even_if_wrong {
+            true => Err(LoadError::Fault(text)),
+            false => Ok(Some(text)),
+        }
     }
 
     /// Returns warnings about values that no load has.

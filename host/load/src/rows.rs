@@ -25,11 +25,25 @@ const NEAR: f64 = 3.0;
 /// Shorter than this share of the longest pose, rows belong to the way between two.
 const SHORT: f64 = 0.05;
 
+/// Least share of white noise above the band from which the noise in the band is inferred.
+const LEAST_ABOVE: f64 = 0.05;
+
 /// Readings beyond which a channel counts as saturated, lowest and highest, by column.
 pub(crate) type Ends = [[f64; 2]; 6];
 
+/// What the rows of a recording tell beside the fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Passed {
+    /// Rows left out beside a saturated reading.
+    pub saturated: u64,
+    /// Noise of forces (N) and moments (N·m) in the band of the fit, if that above the band is white; `None` if the band
+    /// leaves nothing above it.
+    pub noise: Option<[f64; 2]>,
+}
+
 /// Streams the rows of a recording of motion. Position, regressor and readings pass the same low-pass, so that they
-/// are compared in the same band. Rows beside a reading outside of `ends` are left out; returns their number.
+/// are compared in the same band. Readings are those `delay` seconds later. Rows beside a reading outside of `ends` are
+/// left out.
 ///
 /// # Errors
 /// [`LoadError`]: a recording that cannot be read or has no sensor.
@@ -38,9 +52,9 @@ pub(crate) fn each_row(
     sensor: &Isometry3<f64>,
     recording: &dyn Recording,
     plan: &PreprocessingPlan,
-    ends: &Ends,
+    (ends, delay): (&Ends, f64),
     take: &mut dyn FnMut(&WrenchRow),
-) -> Result<u64, LoadError> {
+) -> Result<Passed, LoadError> {
     let low_pass = plan
         .parallel_low_pass()
         .ok_or_else(|| PrepareError::Cutoff {
@@ -49,7 +63,9 @@ pub(crate) fn each_row(
             nyquist: plan.sample_rate / 2.0,
         })?;
     let label = recording.label();
-    let mut left_out = 0;
+    let mut passed = Passed::default();
+    let mut above = [0.0; 2];
+    let mut counted = 0;
     let mut start = None;
     let mut missing = None;
     each_motion(recording, plan, 0, &mut |motion| {
@@ -70,10 +86,12 @@ pub(crate) fn each_row(
             readings,
             begin,
             ends,
+            delay,
         };
-        left_out += piece
-            .rows(take)
+        passed.saturated += piece
+            .rows(take, &mut above)
             .map_err(|e| PrepareError::Read(e.to_string()))?;
+        counted += motion.sound.1 - motion.sound.0;
         Ok(())
     })
     .map_err(|error| match missing {
@@ -83,7 +101,22 @@ pub(crate) fn each_row(
         },
         None => error.into(),
     })?;
-    Ok(left_out)
+    let [within, beyond] = shares(&low_pass, plan);
+    // Three channels of a kind.
+    let noise = above.map(|sum| (sum / (3.0 * counted.max(1) as f64) / beyond * within).sqrt());
+    passed.noise = (beyond > LEAST_ABOVE && counted > 0).then_some(noise);
+    Ok(passed)
+}
+
+/// Returns the shares of white noise that the zero-phase low-pass leaves, and that the rest of the signal has.
+fn shares(low_pass: &LowPass, plan: &PreprocessingPlan) -> [f64; 2] {
+    let reach = (10.0 * plan.sample_rate / plan.cutoff).ceil();
+    let reach = (reach as usize).clamp(32, 1 << 16);
+    let mut impulse = vec![0.0; 2 * reach + 1];
+    impulse[reach] = 1.0;
+    let response = low_pass.zero_phase(&impulse);
+    let within: f64 = response.iter().map(|h| h * h).sum();
+    [within, 1.0 - 2.0 * response[reach] + within]
 }
 
 /// Streams the poses of a recording: consecutive rows at one position are one pose, with their mean readings, because the
@@ -267,11 +300,18 @@ struct Piece<'a> {
     readings: [&'a [f64]; 6],
     begin: f64,
     ends: &'a Ends,
+    /// s
+    delay: f64,
 }
 
 impl Piece<'_> {
-    /// Streams the rows of the piece; returns the number of saturated ones.
-    fn rows(&self, take: &mut dyn FnMut(&WrenchRow)) -> Result<u64, MultibodyError> {
+    /// Streams the rows of the piece; returns the number of saturated ones. Adds the squares of forces and of moments above
+    /// the band to `above`.
+    fn rows(
+        &self,
+        take: &mut dyn FnMut(&WrenchRow),
+        above: &mut [f64; 2],
+    ) -> Result<u64, MultibodyError> {
         let motion = self.motion;
         let (low, high) = motion.sound;
         let [columns, axes] = self.regressors(low, high)?;
@@ -289,14 +329,27 @@ impl Piece<'_> {
         let readings: Vec<Vec<f64>> = (self.readings.iter())
             .map(|column| self.low_pass.zero_phase(&column[low..high]))
             .collect();
+        for (channel, (smooth, all)) in readings.iter().zip(&self.readings).enumerate() {
+            let rest = smooth.iter().zip(&all[low..high]);
+            above[channel / 3] += rest.map(|(smooth, y)| (y - smooth).powi(2)).sum::<f64>();
+        }
         let temperature = temperature(&motion.extra);
         let step = self.plan.decimation;
+        // Rows by which the readings are late: whole ones, and the share of the next.
+        let late = self.delay * self.plan.sample_rate;
+        let (whole, share) = (late.floor(), late - late.floor());
         let mut left_out = 0;
         for k in motion.usable.0.max(low)..motion.usable.1.min(high) {
             if !(motion.offset + k as u64).is_multiple_of(step as u64) {
                 continue;
             }
-            let around = k.saturating_sub(step).max(low)..(k + step + 1).min(high);
+            let read = (k - low) as f64 + whole;
+            if !(read >= 0.0 && read + 1.0 < (high - low) as f64) {
+                continue;
+            }
+            let read = read as usize;
+            let middle = low + read;
+            let around = middle.saturating_sub(step).max(low)..(middle + step + 1).min(high);
             let saturated = around.into_iter().any(|row| {
                 let now: [f64; 6] = std::array::from_fn(|c| self.readings[c][row]);
                 beyond(&now, self.ends)
@@ -323,7 +376,10 @@ impl Piece<'_> {
                     let direction = Vector3::from_fn(|c, _| axes[3 * axis + c][at]);
                     weight(&direction, origin)
                 }),
-                readings: std::array::from_fn(|c| readings[c][at]),
+                readings: std::array::from_fn(|c| {
+                    let [now, next] = [readings[c][read], readings[c][read + 1]];
+                    now + share * (next - now)
+                }),
             });
         }
         Ok(left_out)

@@ -52,11 +52,22 @@ fn values(sensed: &Sensed, fit: &Fit, without: &Fit, nuisance: Nuisance) -> Opti
     Some(values)
 }
 
+/// Returns the size below which a property is not looked at: what a spirit level, a caliper or a clock do not show either.
+fn least(nuisance: Nuisance) -> f64 {
+    match nuisance {
+        Nuisance::Rotation | Nuisance::Lean => 1e-3,
+        Nuisance::Delay => 1e-4,
+        Nuisance::Origin => 5e-4,
+        Nuisance::Drift | Nuisance::Warming => 0.0,
+    }
+}
+
 /// Returns true if the data show a nuisance of `fit`: it leaves less than `without` has it by chance, also if the noise is
 /// correlated in time. For a motion its values are compared with their spread over refits without one segment
 /// (Hotelling's T²); poses are independent of each other, so the F test holds for them.
 fn shows(sensed: &Sensed, fit: &Fit, without: &Fit, nuisance: Nuisance) -> bool {
-    if !is_better(fit, without) {
+    let size = values(sensed, fit, without, nuisance).map_or(0.0, |values| values.norm());
+    if size < least(nuisance) || !is_better(fit, without) {
         return false;
     }
     if sensed.recordings.iter().all(|r| r.poses) {
@@ -120,8 +131,8 @@ pub(crate) struct Selected {
 
 /// Takes in the properties and jumps that the data show. `start` is the mounting as described.
 pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected {
-    let mut fit = fit;
     let mut taken: Vec<Nuisance> = fit.unknowns.nuisances.clone();
+    let mut fit = without_needless(sensed, fit, start, None);
     let mut alternatives = Vec::new();
     loop {
         let mut larger: Vec<(Option<Nuisance>, Fit)> = Vec::new();

@@ -13,13 +13,15 @@ use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
 use crate::findings::{SensorFindings, Told};
 use crate::mounting::{Channels, Mounting};
-use crate::rows::{FEWEST_ROWS, LEAST_ROWS, each_pose, each_row};
+use crate::rows::{FEWEST_ROWS, LEAST_ROWS, Passed, each_pose, each_row};
 use crate::selection::{Selected, selected};
 use crate::statistics::{Collector, Recorded};
-use crate::system::{Fit, Sensed, Unknowns};
+use crate::system::{Fit, Nuisance, Sensed, Unknowns};
 use crate::torqueless::Torqueless;
 use crate::wrench_row::WrenchRow;
 
+/// Most times that the readings are shifted by the delay found.
+const MOST_SHIFTS: usize = 8;
 /// Share of the rows that may be left out because of saturation.
 const MOST_SATURATED: f64 = 0.5;
 
@@ -47,14 +49,53 @@ pub(crate) fn by_sensor(
 ) -> Result<(Estimate, SensorFindings), LoadError> {
     let robot = sensing.robot;
     let sensor = robot.wrist_sensor.clone().unwrap_or_default();
-    let (recordings, prepared) = collected(sensing, &sensor, warnings)?;
-    let sensed = Sensed {
-        recordings: &recordings,
-        to_joint: sensing.to_joint,
-        gravity: robot.gravity.into(),
-    };
+    let (mut delay, mut shifts) = (0.0, 0);
+    loop {
+        let mut said = Vec::new();
+        let (recordings, prepared) = collected(sensing, &sensor, delay, &mut said)?;
+        let sensed = Sensed {
+            recordings: &recordings,
+            to_joint: sensing.to_joint,
+            gravity: robot.gravity.into(),
+        };
+        let fitted = fitted(&sensed, sensing, &sensor, &mut said)?;
+        // The equations have a delay to first order only, so the readings are shifted by it and read again.
+        if let Some(further) = sensed.delay(&fitted.fit)
+            && shifts < MOST_SHIFTS
+        {
+            delay += further;
+            shifts += 1;
+            continue;
+        }
+        warnings.extend(said);
+        return finished(
+            &sensed,
+            fitted,
+            sensing,
+            (&sensor, delay),
+            prepared,
+            warnings,
+        );
+    }
+}
+
+/// A fit, and what it was decided on.
+struct Fitted {
+    fit: Fit,
+    /// Exchange of channels that was put right.
+    channels: Channels,
+    alternatives: Vec<[Nuisance; 2]>,
+}
+
+/// Fits the equations with the channels that are believed and the properties that the readings show.
+fn fitted(
+    sensed: &Sensed,
+    sensing: &Sensing,
+    sensor: &WristSensor,
+    warnings: &mut Vec<String>,
+) -> Result<Fitted, LoadError> {
     let unknowns = Unknowns {
-        tool: recordings.iter().any(|r| !r.loaded),
+        tool: sensed.recordings.iter().any(|r| !r.loaded),
         ..Unknowns::default()
     };
     let rows = sensed.used_rows(&unknowns);
@@ -64,12 +105,38 @@ pub(crate) fn by_sensor(
             least: LEAST_ROWS,
         });
     }
-    let pose = robot.last_link * sensor.pose();
-    let described: Matrix3<f64> = pose.rotation.to_rotation_matrix().into_inner();
     let sign = sensor.reads.unwrap_or(Reads::Load).sign();
-    let mounting = Mounting::of(&described, sign);
-    let compared = compare(&sensed, &mounting, &unknowns, sensor.reads.is_some());
-    if let Some(words) = other_unit(&sensed, &compared) {
+    let mounting = Mounting::of(&described(sensing, sensor), sign);
+    let compared = compare(sensed, &mounting, &unknowns, sensor.reads.is_some());
+    let Believed {
+        fit,
+        start,
+        channels,
+    } = believed(sensed, &mounting, &unknowns, compared, sensing, warnings)?;
+    let Selected { fit, alternatives } = selected(sensed, fit, &start);
+    Ok(Fitted {
+        fit,
+        channels,
+        alternatives,
+    })
+}
+
+/// Returns the described axes of the sensor in the frame of the last joint.
+fn described(sensing: &Sensing, sensor: &WristSensor) -> Matrix3<f64> {
+    let pose = sensing.robot.last_link * sensor.pose();
+    pose.rotation.to_rotation_matrix().into_inner()
+}
+
+/// Returns the load of a fit with what the readings tell beside it. `delay` is what the readings were shifted by.
+fn finished(
+    sensed: &Sensed,
+    fitted: Fitted,
+    sensing: &Sensing,
+    (sensor, delay): (&WristSensor, f64),
+    prepared: Option<PreprocessingPlan>,
+    warnings: &mut Vec<String>,
+) -> Result<(Estimate, SensorFindings), LoadError> {
+    if let Some(words) = other_unit(sensed, &fitted.fit) {
         let text = format!(
             "A rigid load does not fit forces and moments: {words}. Forces must be in N and moments in N·m."
         );
@@ -78,30 +145,26 @@ pub(crate) fn by_sensor(
         }
         warnings.push(text);
     }
-    let Believed {
-        fit,
-        start,
-        channels,
-    } = believed(&sensed, &mounting, &unknowns, compared, sensing, warnings)?;
-    let Selected { fit, alternatives } = selected(&sensed, fit, &start);
-    let fit = weighing(&sensed, fit, sensing, &sensor, warnings)?;
-    let mass = sensed_mass(&fit);
+    let fit = weighing(sensed, fitted.fit, sensing, sensor, warnings)?;
     let segments = sensed.factors(&fit);
-    let spread = match recordings.iter().all(|r| r.poses) {
+    let spread = match sensed.recordings.iter().all(|r| r.poses) {
         true => Spread::Residuals(fit.freedom().max(1.0) as usize),
         false => Spread::Segments,
     };
-    let found = estimate(&segments, mass, spread);
+    let found = estimate(&segments, sensed_mass(&fit), spread);
     let findings = Told {
-        sensed: &sensed,
+        sensed,
         fit: &fit,
-        robot,
-        described: &described,
-        sensor: &sensor,
-        channels,
-        alternatives,
+        robot: sensing.robot,
+        described: &described(sensing, sensor),
+        sensor,
+        channels: fitted.channels,
+        alternatives: fitted.alternatives,
+        delay,
     };
+    let pose = sensing.robot.last_link * sensor.pose();
     warnings.extend(findings.implausible(&found, &pose, sensing.even_if_wrong)?);
+    warnings.extend(findings.not_rigid(sensing.even_if_wrong)?);
     let findings = findings.findings(prepared, warnings);
     Ok((found, findings))
 }
@@ -111,10 +174,11 @@ fn sensed_mass(fit: &Fit) -> f64 {
     fit.values.first().copied().unwrap_or(0.0)
 }
 
-/// Reads the recordings.
+/// Reads the recordings, the readings `delay` seconds later than the positions.
 fn collected(
     sensing: &Sensing,
     sensor: &WristSensor,
+    delay: f64,
     warnings: &mut Vec<String>,
 ) -> Result<(Vec<Recorded>, Option<PreprocessingPlan>), LoadError> {
     let joints = sensing.robot.joints.len();
@@ -151,9 +215,10 @@ fn collected(
         };
         let mut collector = Collector::new(rows, judged.length);
         let mut take = |row: &WrenchRow| collector.push(row);
-        let saturated = match (&plan, next) {
+        let passed = match (&plan, next) {
             (Some(plan), Some((_, usable))) => {
-                each_row(sensing.chain, &pose, usable, plan, &judged.ends, &mut take)?
+                let read = (&judged.ends, delay);
+                each_row(sensing.chain, &pose, usable, plan, read, &mut take)?
             }
             _ => {
                 if !sensing.poses {
@@ -162,10 +227,14 @@ fn collected(
                         judged.rows
                     ));
                 }
-                each_pose(sensing.chain, &pose, *recording, &judged.ends, &mut take)?
+                let ends = &judged.ends;
+                Passed {
+                    saturated: each_pose(sensing.chain, &pose, *recording, ends, &mut take)?,
+                    noise: None,
+                }
             }
         };
-        let recorded = collector.finish(label, *loaded, poses, saturated);
+        let recorded = collector.finish(label, *loaded, poses, passed);
         saturation(&recorded, judged, sensing.even_if_wrong, warnings)?;
         recordings.push(recorded);
     }
@@ -188,7 +257,8 @@ fn saturation(
             format!("{column} at {} {unit}", format_significant(*value, 4))
         })
         .collect();
-    let left_out = recorded.saturated as f64 / (recorded.saturated + recorded.rows()).max(1) as f64;
+    let saturated = recorded.passed.saturated;
+    let left_out = saturated as f64 / (saturated + recorded.rows()).max(1) as f64;
     let text = format!(
         "{}: the sensor was saturated ({}); {:.1} % of the rows were left out.",
         recorded.label,

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use rig_identify::TriangularFactor;
 use rig_shared::multibody::INERTIAL_PARAMETERS;
 
+use crate::rows::Passed;
 use crate::wrench_row::{WEIGHED, WrenchRow};
 
 /// Number of segments of a recording.
@@ -60,8 +61,8 @@ pub(crate) struct Recorded {
     pub length: f64,
     /// True if the sensor's temperature was recorded and changes.
     pub warms: bool,
-    /// Rows that were left out because a channel was saturated.
-    pub saturated: u64,
+    /// What its rows tell beside the fit.
+    pub passed: Passed,
     /// Temperature of the first row, °C.
     pub reference: f64,
     /// Rows spread evenly over the recording, at most about [`SAMPLED`].
@@ -169,7 +170,7 @@ impl Collector {
         label: String,
         loaded: bool,
         poses: bool,
-        saturated: u64,
+        passed: Passed,
     ) -> Recorded {
         let segments = self.factors.iter().zip(&self.counts);
         Recorded {
@@ -188,7 +189,7 @@ impl Collector {
                 .collect(),
             length: self.length,
             warms: self.warms,
-            saturated,
+            passed,
             reference: self.reference.unwrap_or(0.0),
             sample: self.sample,
         }

@@ -588,7 +588,7 @@ fn leaning(robot: &Robot, angle: f64) -> Robot {
 #[test]
 fn a_leaning_base_is_no_turned_sensor_and_both_are_told_together() {
     let points = tool();
-    for (robot, angle) in [(irp6(), 0.05), (tx40(), 0.15)] {
+    for (robot, angle) in [(irp6(), 0.015), (irp6(), 0.05), (tx40(), 0.15)] {
         let truth = leaning(&robot, angle);
         let moving = Moving::new(truth.clone(), 0.7, 3);
         let motion = recorded(
@@ -657,7 +657,7 @@ fn a_sensor_that_is_late_or_early_is_no_turned_one() {
         9,
         NO_FLAW,
     );
-    for rows in [-5i32, 4] {
+    for rows in [-5i32, 4, 20, 40] {
         // Readings of another time beside the positions.
         let mut recording = on_time.clone();
         let late = rows.unsigned_abs() as usize;
@@ -680,13 +680,16 @@ fn a_sensor_that_is_late_or_early_is_no_turned_one() {
         let sensor = load.sensor.as_ref().unwrap();
         let delay = sensor.delay.expect("a delay");
         assert!((delay - f64::from(rows) / 200.0).abs() < 1e-3, "{delay}");
-        assert!(
-            sensor.turned.is_none() && sensor.gravity.is_none(),
-            "{:?}",
-            load.warnings
-        );
-        let [mass, centre] = errors(&load, &points);
-        assert!(mass < 0.01 && centre < 0.005, "{mass} {centre}");
+        let others = [
+            sensor.turned.is_some(),
+            sensor.gravity.is_some(),
+            sensor.position.is_some(),
+        ];
+        assert_eq!(others, [false; 3], "{:?}", load.warnings);
+        for (found, truth) in load.parameters.iter().zip(parameters(&points)) {
+            let off = (found.value.value - truth) / found.value.std;
+            assert!(off.abs() < 4.5, "{rows}: {found:?}, truth {truth}");
+        }
     }
 }
 
@@ -764,4 +767,44 @@ fn correlated_noise_turns_no_sensor_and_leans_no_base() {
         }
     }
     assert!(invented <= 1, "{invented} of 30");
+}
+
+#[test]
+fn without_noise_nothing_is_told() {
+    let moving = Moving::new(irp6(), 0.8, 3);
+    let exact = Sensor {
+        noise: [0.0; 2],
+        ..Sensor::default()
+    };
+    let motion = recorded(&moving, &tool(), &exact, [30.0, 100.0], 1, NO_FLAW);
+    let load = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+    assert_eq!(load.warnings, [""; 0]);
+    let [mass, centre] = errors(&load, &tool());
+    assert!(mass < 1e-3 && centre < 1e-4, "{mass} {centre}");
+}
+
+#[test]
+fn readings_of_another_motion_are_refused() {
+    let moving = Moving::new(tx40(), 0.7, 8);
+    let mut motion = recorded(
+        &moving,
+        &tool(),
+        &Sensor::default(),
+        [30.0, 100.0],
+        9,
+        NO_FLAW,
+    );
+    let other = Moving::new(tx40(), 0.7, 21);
+    let foreign = recorded(
+        &other,
+        &tool(),
+        &Sensor::default(),
+        [30.0, 100.0],
+        4,
+        NO_FLAW,
+    );
+    motion.blocks[0].extra = foreign.blocks[0].extra.clone();
+    let refused = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default());
+    let said = refused.expect_err("refused").to_string();
+    println!("{said}");
 }

@@ -174,12 +174,17 @@ fn readings(sensor: &SensorFindings) -> Section {
         }
     }
     section.with(Block::Text(format!(
-        "RMS of the residual over {} rows: {} N ({} % of what the forces read beside the bias) and {} N·m ({} % of the moments). Much more than the noise of the sensor comes from what is not modelled: cables that pull, contact, elasticity, gain and crosstalk of the sensor.",
+        "RMS of the residual over {} rows: {} N ({} % of what the forces read beside the bias) and {} N·m ({} % of the moments). {}What is not modelled: cables that pull, contact, elasticity, gain and crosstalk of the sensor.",
         parts::count(sensor.rows),
         format_significant(sensor.residual[0], 3),
         format_significant(100.0 * sensor.share[0], 2),
         format_significant(sensor.residual[1], 3),
         format_significant(100.0 * sensor.share[1], 2),
+        sensor.noise.map_or_else(String::new, |[force, moment]| format!(
+            "Noise as that of the readings above the band would leave {} N and {} N·m. ",
+            format_significant(force, 3),
+            format_significant(moment, 3)
+        )),
     )))
 }
 
