@@ -32,15 +32,33 @@ fn gears_of_an_arm_with_coupled_drives_are_simulated() {
     let plain = fs::read_to_string(robot("irp6.toml")).unwrap();
     let with =
         |joint: &str, rest: &str| format!("{plain}\n[[effect]]\njoint = \"{joint}\"\n{rest}\n");
-    let soft = "kind = \"joint_elasticity\"\nstiffness = 4.0e3\ndamping = 5.0\nlink_friction = 0.2";
+    // All of the coupled drives; the stiffness of a screw is that at its motor.
+    let spring = |stiffness: &str, damping: &str| {
+        format!(
+            "kind = \"joint_elasticity\"\nstiffness = {stiffness}\ndamping = {damping}\nlink_friction = 0.0"
+        )
+    };
     let loose =
         "kind = \"backlash\"\ngap = 0.01\nstiffness = 3.0e3\ndamping = 3.0\nlink_friction = 0.0";
-    fs::write(at("soft.toml"), with("upper_arm", soft)).unwrap();
-    let both = format!(
-        "{}\n[[effect]]\njoint = \"wrist_tilt\"\n{loose}\n",
-        with("upper_arm", soft)
-    );
-    fs::write(at("both.toml"), both).unwrap();
+    let gears = |tilt: &str| {
+        let others = [
+            ("lower_arm", spring("4.0", "1.0e-3")),
+            ("wrist_tilt", tilt.to_owned()),
+            ("wrist_turn", spring("2.0e4", "5.0")),
+        ];
+        others.iter().fold(
+            with("upper_arm", &spring("0.16", "2.0e-4")),
+            |text, (joint, rest)| format!("{text}\n[[effect]]\njoint = \"{joint}\"\n{rest}\n"),
+        )
+    };
+    fs::write(at("soft.toml"), gears(&spring("2.0e4", "5.0"))).unwrap();
+    fs::write(at("both.toml"), gears(loose)).unwrap();
+    // One of several coupled drives alone cannot have a spring.
+    fs::write(
+        at("half.toml"),
+        with("upper_arm", &spring("0.16", "2.0e-4")),
+    )
+    .unwrap();
     let mut excite = rig();
     excite.args([
         "excite",
@@ -88,8 +106,14 @@ fn gears_of_an_arm_with_coupled_drives_are_simulated() {
         fs::read(at("both.csv")).unwrap(),
         fs::read(at("again.csv")).unwrap()
     );
+    let said = refuse(&mut simulate(&at("half.toml"), &motion, &at("none.csv")));
+    assert!(
+        said.contains("upper_arm") && said.contains("coupled"),
+        "{said}"
+    );
     // A gear without a mass before it cannot be simulated.
-    let massless = with("column", soft).replace("rotor_inertia = 2.0e-4", "rotor_inertia = 0.0");
+    let massless = with("column", &spring("4.0e3", "5.0"))
+        .replace("rotor_inertia = 2.0e-4", "rotor_inertia = 0.0");
     fs::write(at("massless.toml"), massless).unwrap();
     let said = refuse(&mut simulate(
         &at("massless.toml"),

@@ -1,10 +1,14 @@
 //! Gears with backlash or elasticity at any joints of a chain: the motor is one mass, the link the other.
 //!
 //! A robot of n joints has n coordinates, and one more for the link of each joint with such a gear. The first n are the
-//! motors': positions that the motors would give the joints through stiff gears. With coupled drives they are the
-//! solution q of Ψ = F(q). A joint without such a gear has its link at the same coordinate. The gear's torque acts
-//! between the two coordinates of its joint. The inertia of coupled motors, its change with the position, and their
-//! friction belong to the first n coordinates. So a wound-up gear does not change the ratio of a screw.
+//! motors': positions θ that the motors would give the joints through stiff gears. With coupled drives they are the
+//! solution of Ψ = F(θ). A joint without such a gear has its link at the same coordinate. The inertia of coupled motors,
+//! its change with the position, and their friction belong to the first n coordinates.
+//!
+//! The gear of a drive is a spring in series with its motor: its twist is Ψ(θ) − Ψ(q), q the links, and its torque acts
+//! on θ and on q by the Jacobian of Ψ at either. Twist and stiffness are those of the joint for simple and coupled drives
+//! (motor radians over the drive's own ratio), and those of the motor for a screw, whose ratio changes. A coupled drive
+//! connects joints, so all drives that are coupled have such a gear, or none.
 //!
 //! Sources: Spong 1987 (eqs. 8 and 9: no gyroscopic torque of the rotors); Nordin and Gutman 2002. The drive's inertia,
 //! the position sensor and the joint's friction are on the motor's side. The effect moves a share of the joint's viscous
@@ -12,7 +16,9 @@
 
 use rig_shared::effects::{Kind, SHAPES, transmission_torque};
 use rig_shared::multibody::{bias_torque, column, inertia_matrix};
-use rig_shared::transmission::motor_column;
+use rig_shared::transmission::{DriveKind, motor_column};
+
+use nalgebra::{DMatrix, DVector};
 
 use super::error::SimulateError;
 use super::model::Model;
@@ -32,15 +38,16 @@ pub(super) struct Gear {
     /// Coordinate of its link.
     pub link: usize,
     law: [f64; 3],
+    /// Motor radians per unit of twist: the drive's own ratio; 1 for a screw.
+    scale: f64,
     /// Share of the joint's friction that acts on the link.
     pub link_friction: f64,
 }
 
 impl Gear {
-    /// Returns the torque from motor to link for positions and velocities of all coordinates.
-    pub(super) fn torque(&self, q: &[f64], v: &[f64]) -> f64 {
+    /// Returns the torque from motor to link.
+    fn torque(&self, twist: f64, speed: f64) -> f64 {
         let [gap, stiffness, damping] = self.law;
-        let [twist, speed] = [q, v].map(|x| x[self.joint] - x[self.link]);
         transmission_torque(gap, stiffness, damping, twist, speed)
     }
 }
@@ -58,6 +65,22 @@ pub(super) struct Elastic {
     pub v: Vec<f64>,
     /// True if the links have a state.
     pub moving: bool,
+    /// Torques that the gears take from the motors' coordinates, and give to the links, joint by joint.
+    pub torque: [Vec<f64>; 2],
+    side: Side,
+}
+
+/// Buffers for one side of the gears.
+#[derive(Clone, Debug)]
+struct Side {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    position: Vec<f64>,
+    speed: Vec<f64>,
+    /// n × n, motors' side and links' side.
+    jacobians: [Vec<f64>; 2],
+    /// Twist and its rate by drive, in motor radians.
+    twist: Vec<[f64; 2]>,
 }
 
 impl Elastic {
@@ -85,10 +108,22 @@ impl Elastic {
                 joint,
                 link,
                 law,
+                scale: 1.0,
                 link_friction,
             });
         }
+        refuse_half_coupled(model, &mut gears)?;
+        let list = || vec![0.0; n];
         let elastic = Self {
+            torque: [list(), list()],
+            side: Side {
+                q: list(),
+                v: list(),
+                position: list(),
+                speed: list(),
+                jacobians: [vec![0.0; n * n], vec![0.0; n * n]],
+                twist: vec![[0.0; 2]; n],
+            },
             q: vec![0.0; gears.len()],
             v: vec![0.0; gears.len()],
             gears,
@@ -121,6 +156,76 @@ impl Elastic {
         for (own, at) in out.iter_mut().zip(&self.at) {
             *own = all[*at];
         }
+    }
+
+    /// Computes the torques of all gears from positions and velocities of all coordinates.
+    ///
+    /// # Errors
+    /// [`SimulateError::Drives`] on wrong lengths.
+    pub(super) fn transmit(
+        &mut self,
+        model: &Model,
+        q: &[f64],
+        v: &[f64],
+    ) -> Result<(), SimulateError> {
+        let n = self.at.len();
+        for side in &mut self.torque {
+            side.fill(0.0);
+        }
+        let Some(motors) = &model.motors else {
+            for gear in &self.gears {
+                let [twist, speed] = [q, v].map(|x| x[gear.joint] - x[gear.link]);
+                let torque = gear.torque(twist, speed);
+                self.torque[0][gear.joint] = torque;
+                self.torque[1][gear.joint] = torque;
+            }
+            return Ok(());
+        };
+        let own = &mut self.side;
+        own.twist.fill([0.0; 2]);
+        for (side, sign) in [(0, 1.0), (1, -1.0)] {
+            for j in 0..n {
+                let at = if side == 0 { j } else { self.at[j] };
+                (own.q[j], own.v[j]) = (q[at], v[at]);
+            }
+            let t = &motors.transmission;
+            t.motor_position(&own.q, &mut own.position)?;
+            t.motor_velocity(&own.q, &own.v, &mut own.speed)?;
+            t.jacobian(&own.q, &mut own.jacobians[side])?;
+            for (twist, (position, speed)) in
+                (own.twist.iter_mut()).zip(own.position.iter().zip(&own.speed))
+            {
+                twist[0] += sign * position;
+                twist[1] += sign * speed;
+            }
+        }
+        for gear in &self.gears {
+            let k = gear.joint;
+            let [twist, speed] = own.twist[k].map(|x| x / gear.scale);
+            let torque = gear.torque(twist, speed) / gear.scale;
+            for (jacobian, torques) in own.jacobians.iter().zip(&mut self.torque) {
+                let row = &jacobian[k * n..(k + 1) * n];
+                for (to, entry) in torques.iter_mut().zip(row) {
+                    *to += entry * torque;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the twist of each gear per motion of the joints (rows: gears) at positions of the joints.
+    fn twists(&self, model: &Model, q: &[f64]) -> Result<DMatrix<f64>, SimulateError> {
+        let n = q.len();
+        let Some(motors) = &model.motors else {
+            return Ok(DMatrix::from_fn(self.gears.len(), n, |k, j| {
+                f64::from(u8::from(self.gears[k].joint == j))
+            }));
+        };
+        let mut jacobian = vec![0.0; n * n];
+        motors.transmission.jacobian(q, &mut jacobian)?;
+        Ok(DMatrix::from_fn(self.gears.len(), n, |k, j| {
+            jacobian[self.gears[k].joint * n + j] / self.gears[k].scale
+        }))
     }
 
     /// Returns the inverse of the inertia matrix of the links and of the motors with stiff gears (n × n), the other motors
@@ -166,20 +271,29 @@ impl Elastic {
             let t = &coupled.transmission;
             t.add_motor_inertia(&coupled.parameters, q, &mut motors)?;
         }
+        let motors = self.motor_mobility(&motors, n)?;
+        let links = DMatrix::from_row_slice(n, n, &links);
+        let [of_motors, of_links] = [self.twists(model, q)?, self.twists(model, &at)?];
         let mut rate = 0.0_f64;
-        for gear in &self.gears {
-            let j = gear.joint;
-            let motor = self.motor_mobility(&motors, n, j)?;
-            let reduced = 1.0 / (motor + links[j * n + j]);
+        for (k, gear) in self.gears.iter().enumerate() {
+            let of_motor = of_motors.row(k).select_columns(&self.joints());
+            let motor = (&of_motor * &motors).dot(&of_motor);
+            let link = (of_links.row(k) * &links).dot(&of_links.row(k));
+            let reduced = 1.0 / (motor + link);
             let [_, stiffness, damping] = gear.law;
             rate = rate.max((stiffness / reduced).sqrt() + damping / reduced);
         }
         Ok((dt * rate / ANGLE).ceil().max(1.0) as usize)
     }
 
-    /// Returns the acceleration of motor `joint` per torque on it, from the motors' inertia matrix. Motors behind other
-    /// gears of this kind are free; those of stiff gears are held by their links.
-    fn motor_mobility(&self, motors: &[f64], n: usize, joint: usize) -> Result<f64, SimulateError> {
+    /// Returns the joints with gears.
+    fn joints(&self) -> Vec<usize> {
+        self.gears.iter().map(|gear| gear.joint).collect()
+    }
+
+    /// Returns the accelerations of the motors behind gears per torque on them, from the motors' inertia matrix (n × n).
+    /// Motors of stiff gears are held by their links.
+    fn motor_mobility(&self, motors: &[f64], n: usize) -> Result<DMatrix<f64>, SimulateError> {
         let count = self.gears.len();
         let mut own = vec![0.0; count * count];
         for (r, row) in self.gears.iter().enumerate() {
@@ -188,10 +302,18 @@ impl Elastic {
             }
         }
         let mut inverse = vec![0.0; count * count];
-        let place = self.gears.iter().position(|gear| gear.joint == joint);
+        let joint = self.gears.first().map_or(1, |gear| gear.joint + 1);
         invert(&mut own, &mut inverse, count)
-            .map_err(|_| SimulateError::NotPositiveDefinite { joint: joint + 1 })?;
-        Ok(place.map_or(0.0, |k| inverse[k * count + k]))
+            .map_err(|_| SimulateError::NotPositiveDefinite { joint })?;
+        Ok(DMatrix::from_row_slice(count, count, &inverse))
+    }
+
+    /// Returns the twist of a gear, of which [`Self::transmit`] has just computed the torque.
+    fn twist(&self, model: &Model, q: &[f64], gear: &Gear) -> f64 {
+        match model.motors {
+            Some(_) => self.side.twist[gear.joint][0] / gear.scale,
+            None => q[gear.joint] - q[gear.link],
+        }
     }
 
     /// Puts the links at rest under gravity behind motors at `q`, with the velocities `v` of the motors.
@@ -207,16 +329,47 @@ impl Elastic {
         let n = q.len();
         let (mut links, mut load) = (q.to_vec(), vec![0.0; n]);
         let still = vec![0.0; n];
+        let joints = self.joints();
+        let mut all = q.to_vec();
+        all.resize(n + joints.len(), 0.0);
+        let at_rest = vec![0.0; all.len()];
         for _ in 0..REST_PASSES {
             bias_torque(&model.chain, &model.parameters, &links, &still, &mut load)?;
-            let mut moved = false;
-            for gear in &self.gears {
-                let j = gear.joint;
+            // The model's own offset and friction act on the motor.
+            let pull = DVector::from_iterator(
+                joints.len(),
+                joints
+                    .iter()
+                    .map(|&j| load[j] - model.parameters[j][column::OFFSET]),
+            );
+            let to_twist = self.twists(model, &links)?.select_columns(&joints);
+            let singular = || SimulateError::NotPositiveDefinite {
+                joint: joints.first().map_or(1, |j| j + 1),
+            };
+            let lu = to_twist.clone().lu();
+            let torque = to_twist
+                .transpose()
+                .lu()
+                .solve(&pull)
+                .ok_or_else(singular)?;
+            for (gear, link) in self.gears.iter().zip(joints.iter().map(|&j| links[j])) {
+                all[gear.link] = link;
+            }
+            self.transmit(model, &all, &at_rest)?;
+            let wanted = self.gears.iter().zip(torque.iter()).map(|(gear, pull)| {
                 let [gap, stiffness, _] = gear.law;
-                // The model's own offset and friction act on the motor.
-                let pull = load[j] - model.parameters[j][column::OFFSET];
-                let contact = 0.5 * gap * f64::from(i8::from(pull > 0.0) - i8::from(pull < 0.0));
-                let link = q[j] - pull / stiffness - contact;
+                let contact = 0.5 * gap * f64::from(i8::from(*pull > 0.0) - i8::from(*pull < 0.0));
+                pull / stiffness + contact
+            });
+            let twist = self.gears.iter().map(|gear| self.twist(model, &all, gear));
+            let beyond = DVector::from_iterator(
+                joints.len(),
+                wanted.zip(twist).map(|(wanted, twist)| wanted - twist),
+            );
+            let step = lu.solve(&beyond).ok_or_else(singular)?;
+            let mut moved = false;
+            for (&j, step) in joints.iter().zip(step.iter()) {
+                let link = links[j] - step;
                 moved |= link != links[j];
                 links[j] = link;
             }
@@ -247,4 +400,48 @@ fn refuse_no_rotor(model: &Model, joint: usize) -> Result<(), SimulateError> {
     Err(SimulateError::NoRotor {
         effect: model.effects.named_at(joint, elastic).unwrap_or_default(),
     })
+}
+
+/// Gives the gears of coupled drives their ratios. Refuses a gear of a drive that is coupled with one whose gear is
+/// stiff: a stiff gear binds coordinates of several joints, and these would be no coordinates of their own.
+fn refuse_half_coupled(model: &Model, gears: &mut [Gear]) -> Result<(), SimulateError> {
+    let Some(motors) = &model.motors else {
+        return Ok(());
+    };
+    let n = model.parameters.len();
+    let mut jacobian = vec![0.0; n * n];
+    motors.transmission.jacobian(&vec![0.0; n], &mut jacobian)?;
+    let has = |joint: usize| gears.iter().any(|gear| gear.joint == joint);
+    for drive in 0..n {
+        for joint in 0..n {
+            // A screw beyond its reach has no ratio, but it has a place in the matrix.
+            if jacobian[drive * n + joint] == 0.0 || has(drive) == has(joint) {
+                continue;
+            }
+            let (own, other) = if has(drive) {
+                (drive, joint)
+            } else {
+                (joint, drive)
+            };
+            let elastic = |k: Kind| k.transmission(&[0.0; SHAPES]).is_some();
+            return Err(SimulateError::HalfCoupled {
+                effect: model.effects.named_at(own, elastic).unwrap_or_default(),
+                other: other + 1,
+            });
+        }
+    }
+    for gear in gears {
+        let kind = motors.transmission.kind(gear.joint);
+        if kind != Some(DriveKind::Simple) && gear.link_friction > 0.0 {
+            let elastic = |k: Kind| k.transmission(&[0.0; SHAPES]).is_some();
+            return Err(SimulateError::LinkFriction {
+                effect: (model.effects.named_at(gear.joint, elastic)).unwrap_or_default(),
+                share: gear.link_friction,
+            });
+        }
+        if kind != Some(DriveKind::Varying) {
+            gear.scale = jacobian[gear.joint * n + gear.joint];
+        }
+    }
+    Ok(())
 }

@@ -68,6 +68,27 @@ fn links(stepper: &Stepper<'_>, q: &[f64], v: &[f64]) -> [Vec<f64>; 2] {
     ]
 }
 
+/// Twist of every drive between its motor and the links at `links`: of the joint, or of the motor of a screw.
+fn twists(robot: &Robot, motors: &[f64], links: &[f64]) -> Vec<f64> {
+    let transmission = robot.transmission().unwrap();
+    let [front, behind] = [motors, links].map(|q| {
+        let mut psi = vec![0.0; q.len()];
+        transmission.motor_position(q, &mut psi).unwrap();
+        psi
+    });
+    let scale = |joint: &crate::robot::Joint| {
+        let drive = joint.drive.as_ref().unwrap();
+        if drive.screw.is_some() {
+            1.0
+        } else {
+            joint.gear_ratio()
+        }
+    };
+    (front.iter().zip(&behind).zip(&robot.joints))
+        .map(|((front, behind), joint)| (front - behind) / scale(joint))
+        .collect()
+}
+
 /// Energy of rotors, links and springs; of the latter gap and stiffness are given by joint.
 fn energy(
     robot: &Robot,
@@ -91,10 +112,11 @@ fn energy(
         .zip(&robot.joints)
         .map(|(w, j)| 0.5 * j.drive.as_ref().unwrap().rotor_inertia * w * w)
         .sum();
+    let twists = twists(robot, q, &at);
     let bent: f64 = springs
         .iter()
         .map(|(j, gap, stiffness)| {
-            let twist = q[*j] - at[*j];
+            let twist = twists[*j];
             0.5 * stiffness * (twist - twist.clamp(-0.5 * gap, 0.5 * gap)).powi(2)
         })
         .sum();
@@ -468,8 +490,8 @@ fn the_irp6_with_elastic_gears_keeps_its_energy() {
         let drive = joint.drive.as_mut().unwrap();
         (drive.coulomb, drive.viscous) = (0.0, 0.0);
     }
-    // A screw, and one of the two coupled joints of the wrist.
-    let springs = [(1, 0.0, 2e4), (2, 0.0, 2e4), (4, 0.0, 300.0)];
+    // Two screws, with the stiffness at the motor, and the coupled joints of the wrist.
+    let springs = [(1, 0.0, 0.8), (2, 0.0, 0.8), (3, 0.0, 2e3), (4, 0.0, 300.0)];
     for (joint, _, stiffness) in springs {
         robot = with(robot, joint, Kind::JointElasticity, &[stiffness, 0.0, 0.0]);
     }
@@ -487,6 +509,80 @@ fn the_irp6_with_elastic_gears_keeps_its_energy() {
     let [coarse, fine] = [2e-4, 1e-4].map(drift);
     println!("{coarse} {fine}");
     assert!(coarse < 1e-3 && fine < coarse / 3.0, "{coarse} {fine}");
+}
+
+/// The IRp-6 without dry friction, with a spring at each of its coupled drives.
+fn elastic_irp6(stiffness: [f64; 4]) -> Robot {
+    let mut robot = Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap();
+    for (joint, stiffness) in (1..5).zip(stiffness) {
+        robot = with(robot, joint, Kind::JointElasticity, &[stiffness, 0.0, 0.0]);
+    }
+    robot
+}
+
+#[test]
+fn a_soft_drive_of_the_parallelogram_lets_its_arm_sag_and_does_not_tilt_the_next() {
+    let robot = elastic_irp6([0.5, 1e9, 1e12, 1e12]);
+    let model = Model::from_robot(&robot).unwrap();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let (mut q, v) = (robot.middle_position(), vec![0.0; 5]);
+    // Away from upright, where gravity has no lever.
+    q[1] += 0.35;
+    stepper.put_links_at_rest(&q, &v).unwrap();
+    let at = links(&stepper, &q, &v)[0].clone();
+    assert!((at[1] - q[1]).abs() > 1e-3, "{at:?}");
+    // The drives of upper arm and wrist hold their angles against the base.
+    let mut absolute = 0.0;
+    for j in 1..4 {
+        absolute += at[j] - q[j];
+        assert!(j == 1 || absolute.abs() < 1e-6, "joint {j}: {at:?} {q:?}");
+    }
+    // Virtual work: the spring's torque times its twist for a motion of the lower arm alone is that of gravity.
+    let twist = twists(&robot, &q, &at);
+    let height = |by: f64| {
+        let mut moved = at.clone();
+        (moved[1], moved[2]) = (moved[1] + by, moved[2] - by);
+        let bare = Model::from_robot(&robot).unwrap();
+        let potential = potential_energy(&bare.chain, &bare.parameters, &moved).unwrap();
+        [potential, twists(&robot, &q, &moved)[1]]
+    };
+    let ([up, more], [down, less]) = (height(1e-5), height(-1e-5));
+    let (gravity, spring) = (up - down, -0.5 * twist[1] * (more - less));
+    assert!((gravity / spring - 1.0).abs() < 1e-4, "{gravity} {spring}");
+}
+
+#[test]
+fn coupled_drives_have_a_spring_each_or_none() {
+    let robot = Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap();
+    let one = with(robot.clone(), 1, Kind::JointElasticity, &[0.5, 0.0, 0.0]);
+    let refused = Stepper::new(&Model::from_robot(&one).unwrap())
+        .err()
+        .unwrap();
+    assert!(
+        refused.to_string().contains("coupled with that of joint"),
+        "{refused}"
+    );
+    // Friction of a coupled drive is that of its motor too.
+    let rubbing = elastic_irp6([0.8, 0.8, 2e3, 300.0]);
+    let rubbing = Robot {
+        effects: (rubbing.effects.iter().cloned())
+            .map(|mut own| {
+                own.effect.shapes[2] = 0.5;
+                own
+            })
+            .collect(),
+        ..rubbing
+    };
+    let refused = Stepper::new(&Model::from_robot(&rubbing).unwrap())
+        .err()
+        .unwrap();
+    assert!(
+        refused.to_string().contains("link_friction = 0"),
+        "{refused}"
+    );
+    // The drive of the column is alone.
+    let column = with(robot, 0, Kind::JointElasticity, &[5e4, 0.0, 0.0]);
+    assert!(Stepper::new(&Model::from_robot(&column).unwrap()).is_ok());
 }
 
 /// Final positions and velocities of the IRp-6 with stiff gears, as the simulation without elastic gears of chains gave

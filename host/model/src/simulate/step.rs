@@ -212,10 +212,14 @@ impl<'a> Stepper<'a> {
                 }
             }
         }
-        for gear in &self.elastic.gears {
-            let torque = gear.torque(&self.middle, &self.mean_velocity);
-            self.bias[gear.joint] += torque;
-            self.bias[gear.link] -= torque;
+        if self.elastic.is_empty() {
+            return Ok(());
+        }
+        (self.elastic).transmit(self.model, &self.middle, &self.mean_velocity)?;
+        let [of_motors, of_links] = &self.elastic.torque;
+        for (j, at) in self.elastic.at.iter().enumerate() {
+            self.bias[j] += of_motors[j];
+            self.bias[*at] -= of_links[j];
         }
         Ok(())
     }
@@ -235,7 +239,7 @@ impl<'a> Stepper<'a> {
                 Some(gear) => {
                     let speed = self.mean_velocity[gear.link];
                     let friction = self.model.effects.friction(j, speed, speed.sgn());
-                    gear.torque(&self.middle, &self.mean_velocity) - gear.link_friction * friction
+                    self.elastic.torque[1][j] - gear.link_friction * friction
                 }
                 None => self.bias[j] + inertia - rotor,
             };
