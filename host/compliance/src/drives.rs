@@ -90,6 +90,14 @@ impl Drives {
         }))
     }
 
+    /// Returns the motion of each motor per motion of the joints, in the units of R. It vanishes at a dead centre.
+    ///
+    /// # Errors
+    /// [`ComplianceError::Model`] for a wrong number of joints.
+    pub(crate) fn speeds(&self, q: &[f64]) -> Result<Vec<f64>, ComplianceError> {
+        Ok(self.rows(q)?.row_iter().map(|row| row.norm()).collect())
+    }
+
     /// Returns R⁻¹ at a pose: motion of each joint per twist of each drive.
     ///
     /// # Errors

@@ -5,12 +5,12 @@ use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit};
 use serde::Serialize;
 
-use crate::drives::Drives;
+use crate::drives::{Drives, listed_pose};
 use crate::error::ComplianceError;
 use crate::frequency::{FrequencyResponse, respond};
 use crate::loading::{LoadingFindings, loading};
 use crate::map::{ComplianceMap, compliance_map};
-use crate::signals::read;
+use crate::signals::{read, refuse_degrees};
 use crate::stiffness::{DriveStiffness, Source, described_stiffness, given_stiffness};
 use crate::tool_point::{ToolCompliance, ToolPoint};
 use crate::value::Value;
@@ -100,7 +100,11 @@ pub fn identify_compliance(
     }
     let loading = match load {
         [] => None,
-        _ => Some(loading(&tool, &read(load)?)?),
+        _ => {
+            let stretches = read(load)?;
+            refuse_degrees(robot, &stretches)?;
+            Some(loading(&tool, &stretches)?)
+        }
     };
     let frequency = match response {
         [] => None,
@@ -137,16 +141,7 @@ pub fn identify_compliance(
     if options.stiffness.is_empty() {
         warnings.extend(rigid(&drives));
     }
-    let poses = match options.poses.as_slice() {
-        [] => vec![robot.middle_position()],
-        given => given.to_vec(),
-    };
-    let computed: Vec<ToolCompliance> = (poses.iter())
-        .map(|pose| tool.compliance(pose, &drives))
-        .collect::<Result<_, _>>()?;
-    let map = (options.map)
-        .map(|joints| compliance_map(&tool, &drives, joints, &poses[0]))
-        .transpose()?;
+    let (computed, map) = at_poses(&tool, &drives, options, &mut warnings)?;
     Ok(Compliance {
         schema: "rig-compliance/1",
         robot: robot.name.clone(),
@@ -157,6 +152,80 @@ pub fn identify_compliance(
         poses: computed,
         map,
         warnings,
+    })
+}
+
+/// Computes the compliance at the poses and the map, and tells what is special about the poses.
+fn at_poses(
+    tool: &ToolPoint<'_>,
+    drives: &[DriveStiffness],
+    options: &ComplianceOptions,
+    warnings: &mut Vec<String>,
+) -> Result<(Vec<ToolCompliance>, Option<ComplianceMap>), ComplianceError> {
+    let robot = tool.robot();
+    let poses = match options.poses.as_slice() {
+        [] => vec![robot.middle_position()],
+        given => given.to_vec(),
+    };
+    warnings.extend(poses.iter().filter_map(|pose| outside(robot, pose)));
+    let computed: Vec<ToolCompliance> = (poses.iter())
+        .map(|pose| tool.compliance(pose, drives))
+        .collect::<Result<_, _>>()?;
+    let map = (options.map)
+        .map(|joints| compliance_map(tool, drives, joints, &poses[0]))
+        .transpose()?;
+    warnings.extend(computed.iter().filter_map(on_axis));
+    for (own, map) in map
+        .iter()
+        .flat_map(|m| m.singular.iter().map(move |s| (s, m)))
+    {
+        let [a, b] = map.joints;
+        warnings.push(format!(
+            "The drive of joint \"{}\" is near a dead centre at {} {:.3} {}, {} {:.3} {}: its motor hardly moves the joint there, and the arm yields without bound. {} cells of the map about such poses are left blank.",
+            own.joint, map.names[0], own.pose[a], map.units[0], map.names[1], own.pose[b], map.units[1], own.cells
+        ));
+    }
+    Ok((computed, map))
+}
+
+/// Names the joints that a pose puts beyond their limits.
+fn outside(robot: &Robot, pose: &[f64]) -> Option<String> {
+    let names: Vec<String> = (robot.joints.iter().zip(pose))
+        .filter_map(|(joint, q)| {
+            let [low, high] = joint.limits.as_ref()?.position;
+            (*q < low || *q > high).then(|| {
+                format!(
+                    "\"{}\" at {} (limits {} to {} {})",
+                    joint.name,
+                    format_significant(*q, 4),
+                    format_significant(low, 4),
+                    format_significant(high, 4),
+                    joint.kind.units().0
+                )
+            })
+        })
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The pose {} is beyond the limits of joint {}; its compliance is computed all the same. Positions are in rad and m.",
+            listed_pose(pose),
+            names.join(", ")
+        )
+    })
+}
+
+/// Arm over which a rotation of the tool point moves it, m, below which it lies on the axes.
+const ON_AXIS: f64 = 1e-9;
+
+/// Says that no force moves the tool point.
+fn on_axis(found: &ToolCompliance) -> Option<String> {
+    let trace = |rows: std::ops::Range<usize>| rows.map(|r| found.compliance[r][r]).sum::<f64>();
+    let (linear, angular) = (trace(0..3), trace(3..6));
+    (angular > 0.0 && linear <= ON_AXIS * ON_AXIS * angular).then(|| {
+        format!(
+            "At the pose {} the tool point lies on the axis of every elastic joint, so that no force moves it: the displacement is 0. Give the tool point by --tool.",
+            listed_pose(&found.pose)
+        )
     })
 }
 

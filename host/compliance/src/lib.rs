@@ -42,7 +42,7 @@ pub use error::ComplianceError;
 pub use frequency::{Band, FrequencyResponse, response_pose};
 pub use identify::{Compliance, ComplianceOptions, WrenchFrame, identify_compliance};
 pub use loading::{Deflection, DriveLoading, LoadingFindings};
-pub use map::{ComplianceMap, GRID, compliance_map};
+pub use map::{ComplianceMap, GRID, SingularPose, compliance_map};
 pub use stiffness::{
     DriveStiffness, Source, described_stiffness, elasticity_effects, given_stiffness,
 };

@@ -12,6 +12,21 @@ use crate::tool_point::ToolPoint;
 /// Points of the grid along each joint.
 pub const GRID: usize = 41;
 
+/// Motion of a motor per motion of its joint over the largest one of the map, below which the pose counts as singular. By judgement:
+/// the joint is 400 times more compliant there than elsewhere, and the linear matrix holds for tiny motions only.
+const DEAD_CENTRE: f64 = 0.05;
+
+/// A pose at which a motor hardly moves its joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SingularPose {
+    /// Joint of the drive.
+    pub joint: String,
+    /// Pose of the grid that is nearest to the dead centre.
+    pub pose: Vec<f64>,
+    /// Blank cells about it.
+    pub cells: usize,
+}
+
 /// Largest displacement of the tool point per force, over the ranges of two joints.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ComplianceMap {
@@ -26,7 +41,7 @@ pub struct ComplianceMap {
     /// Positions of the second joint.
     pub y: Vec<f64>,
     /// Largest displacement per force over all directions, m/N: one row per position of the second joint. `None` where the
-    /// drives do not reach.
+    /// drives do not reach or are nearly singular.
     pub values: Vec<Vec<Option<f64>>>,
     /// Positions of all joints; those of the two joints are not used.
     pub pose: Vec<f64>,
@@ -36,6 +51,8 @@ pub struct ComplianceMap {
     pub stiffest: Vec<f64>,
     /// Smallest and largest value, m/N.
     pub range: [f64; 2],
+    /// One entry for each drive with a dead centre on the map.
+    pub singular: Vec<SingularPose>,
 }
 
 /// Computes the map over the ranges of two joints (from 0); the others stay at `pose`.
@@ -62,6 +79,7 @@ pub fn compliance_map(
         (0..GRID).map(|i| low + step * i as f64).collect()
     };
     let (x, y) = (grid(a), grid(b));
+    let dead = DeadCentres::of(tool, [(a, &x), (b, &y)], pose)?;
     let mut q = pose.to_vec();
     let mut best: Option<([f64; 2], [Vec<f64>; 2])> = None;
     let mut values = Vec::with_capacity(GRID);
@@ -70,6 +88,7 @@ pub fn compliance_map(
         for first in &x {
             (q[a], q[b]) = (*first, *second);
             let value = match tool.largest(&q, stiffness) {
+                _ if dead.near(tool, &q)? => None,
                 Ok(value) => Some(value).filter(|v| v.is_finite()),
                 Err(ComplianceError::SingularDrives { .. }) => None,
                 Err(other) => return Err(other),
@@ -104,7 +123,53 @@ pub fn compliance_map(
         most_compliant,
         stiffest,
         range,
+        singular: dead.poses,
     })
+}
+
+/// The dead centres of the drives over a map.
+struct DeadCentres {
+    /// Largest motion of each motor per motion of the joints.
+    most: Vec<f64>,
+    poses: Vec<SingularPose>,
+}
+
+impl DeadCentres {
+    fn of(
+        tool: &ToolPoint<'_>,
+        [(a, x), (b, y)]: [(usize, &Vec<f64>); 2],
+        pose: &[f64],
+    ) -> Result<Self, ComplianceError> {
+        let mut cells = Vec::with_capacity(x.len() * y.len());
+        let mut q = pose.to_vec();
+        for second in y {
+            for first in x {
+                (q[a], q[b]) = (*first, *second);
+                cells.push((q.clone(), tool.drives().speeds(&q)?));
+            }
+        }
+        let mut found = Self {
+            most: vec![0.0; tool.count()],
+            poses: Vec::new(),
+        };
+        for (k, most) in found.most.iter_mut().enumerate() {
+            *most = cells.iter().map(|(_, s)| s[k]).fold(0.0, f64::max);
+            let near = cells.iter().filter(|(_, s)| s[k] < DEAD_CENTRE * *most);
+            let nearest = near.clone().min_by(|m, n| m.1[k].total_cmp(&n.1[k]));
+            found.poses.extend(nearest.map(|(q, _)| SingularPose {
+                joint: tool.robot().joints[k].name.clone(),
+                pose: q.clone(),
+                cells: near.count(),
+            }));
+        }
+        Ok(found)
+    }
+
+    /// Returns true if a drive is near a dead centre.
+    fn near(&self, tool: &ToolPoint<'_>, q: &[f64]) -> Result<bool, ComplianceError> {
+        let speeds = tool.drives().speeds(q)?;
+        Ok((speeds.iter().zip(&self.most)).any(|(s, most)| *s < DEAD_CENTRE * most))
+    }
 }
 
 /// Returns the position range of a joint; one turn, or 1 m to either side, for a joint without finite limits.

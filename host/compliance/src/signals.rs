@@ -4,6 +4,8 @@
 
 use rig_data::Block;
 use rig_data::prepare::Recording;
+use rig_model::robot::{JointKind, Robot};
+use rig_output::format_significant;
 
 use crate::error::ComplianceError;
 
@@ -75,6 +77,45 @@ impl Signals {
             own.extend(new);
         }
     }
+}
+
+/// Movement over the range of the limits beyond which positions are not in radians. By judgement: limits may be described
+/// narrower than they are.
+const BEYOND: f64 = 1.5;
+/// Movement beyond which positions of a joint without limits are not in radians.
+const TURNS: f64 = 8.0 * std::f64::consts::PI;
+
+/// Refuses positions of revolute joints that cannot be in radians, by the range of their movement. Drives and links are judged alike.
+///
+/// # Errors
+/// [`ComplianceError::Recording`].
+pub(crate) fn refuse_degrees(robot: &Robot, stretches: &[Signals]) -> Result<(), ComplianceError> {
+    for signals in stretches {
+        for (k, (joint, own)) in robot.joints.iter().zip(&signals.joints).enumerate() {
+            if joint.kind != JointKind::Revolute {
+                continue;
+            }
+            let limits = joint.limits.as_ref().map(|l| l.position[1] - l.position[0]);
+            let most = limits
+                .filter(|r| r.is_finite())
+                .map_or(TURNS, |r| BEYOND * r);
+            let link = own.link.as_deref().unwrap_or_default();
+            for (column, values) in [("q", own.q.as_slice()), ("ql", link)] {
+                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                if high - low > most {
+                    return Err(ComplianceError::Recording(format!(
+                        "{}: {column}{} (joint \"{}\") moves by {} rad, more than the joint can; record it in radians (1° is 0.01745 rad), or correct its limits.",
+                        signals.label,
+                        k + 1,
+                        joint.name,
+                        format_significant(high - low, 3)
+                    )));
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Reads all recordings, one entry per stretch without a gap in time.

@@ -22,6 +22,8 @@ pub enum Source {
     Frequency,
     /// The mean of loading and frequency response, weighted by their variances.
     Both,
+    /// Typed by the user as rigid (inf).
+    GivenRigid,
     /// No value: the drive counts as rigid.
     Rigid,
 }
@@ -35,6 +37,7 @@ impl Source {
             Self::Loading => "static loading",
             Self::Frequency => "frequency response",
             Self::Both => "loading and frequency response",
+            Self::GivenRigid => "rigid, as given",
             Self::Rigid => "unknown, counted as rigid",
         }
     }
@@ -107,12 +110,16 @@ pub fn given_stiffness(
     stds: &[f64],
 ) -> Result<(), ComplianceError> {
     let n = list.len();
-    if values.len() != n || !(stds.is_empty() || stds.len() == n) {
-        return Err(ComplianceError::Option(format!(
-            "--stiffness has {} numbers and --stiffness-std {}, but the robot has {n} joints; give one for each joint, base first (inf for a rigid one).",
-            values.len(),
-            stds.len()
-        )));
+    let wrong = |option: &str, count: usize, hint: &str| {
+        ComplianceError::Option(format!(
+            "{option} has {count} numbers, but the robot has {n} joints; give one for each joint, base first ({hint})."
+        ))
+    };
+    if values.len() != n {
+        return Err(wrong("--stiffness", values.len(), "inf for a rigid one"));
+    }
+    if !(stds.is_empty() || stds.len() == n) {
+        return Err(wrong("--stiffness-std", stds.len(), "0 for a rigid one"));
     }
     for (k, entry) in list.iter_mut().enumerate() {
         let (value, std) = (values[k], stds.get(k).copied().unwrap_or(0.0));
@@ -132,7 +139,7 @@ pub fn given_stiffness(
         entry.stiffness = value.is_finite().then_some(Value::new(value, std));
         entry.source = match entry.stiffness {
             Some(_) => Source::Given,
-            None => Source::Rigid,
+            None => Source::GivenRigid,
         };
     }
     Ok(())

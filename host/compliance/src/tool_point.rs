@@ -71,6 +71,7 @@ pub struct ToolPoint<'a> {
     chain: Chain<f64>,
     drives: Drives,
     fixed: Pose<f64>,
+    offset: [f64; 3],
     /// Frame in which wrenches are read, and the sign that makes them the wrench on the robot; `None` for the tool point and
     /// the base axes.
     sensor: Option<(Pose<f64>, f64)>,
@@ -92,6 +93,7 @@ impl<'a> ToolPoint<'a> {
             chain,
             drives: Drives::of(robot)?,
             fixed: frame(&place),
+            offset,
             sensor: None,
         })
     }
@@ -134,6 +136,11 @@ impl<'a> ToolPoint<'a> {
     /// Number of joints.
     pub(crate) fn count(&self) -> usize {
         self.robot.joints.len()
+    }
+
+    /// The tool point in the flange frame, m.
+    pub(crate) fn offset(&self) -> [f64; 3] {
+        self.offset
     }
 
     /// The robot.

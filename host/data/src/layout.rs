@@ -247,7 +247,9 @@ fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<boo
     let name = &robot.joints[first - 1].name;
     // Some joints are recorded and others not, for example those of a gripper.
     let unmoved = if joint.len() < joints {
-        format!("where joint `{name}` never moves, make it type=\"fixed\" in the URDF; ")
+        format!(
+            "where joint `{name}` never moves, make it type=\"fixed\" in the URDF, or record its constant position; "
+        )
     } else {
         String::new()
     };

@@ -126,6 +126,15 @@ pub enum NoteKind {
     Fault,
 }
 
+/// A link to another file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Link {
+    /// Visible text.
+    pub text: String,
+    /// Path of the file, relative to the folder of the page.
+    pub address: String,
+}
+
 /// One piece of a section.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Block {
@@ -133,6 +142,8 @@ pub enum Block {
     Text(String),
     /// Items of equal rank.
     List(Vec<String>),
+    /// Links to other files, one below the other.
+    Links(Vec<Link>),
     /// A table.
     Table(Table),
     /// A figure.

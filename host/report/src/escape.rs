@@ -50,6 +50,25 @@ pub(crate) fn json(source: &str) -> String {
     out
 }
 
+/// Escapes a relative path as an address (RFC 3986, section 2): all bytes but letters, digits, `-`, `.`, `_`, `~` and `/`
+/// become their code, so that no path is read as a scheme, a query or markup.
+pub(crate) fn address(path: &str) -> String {
+    use std::fmt::Write;
+    let mut out = String::with_capacity(path.len());
+    for byte in path.bytes() {
+        match byte {
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => {
+                out.push(char::from(byte));
+            }
+            _ => {
+                // Writing into a String cannot fail.
+                let _ = write!(out, "%{byte:02X}");
+            }
+        }
+    }
+    out
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
@@ -69,6 +88,13 @@ mod tests {
             parsed.root_element().attribute("title"),
             Some(clean.as_str())
         );
+    }
+
+    #[test]
+    fn an_address_is_a_relative_path_and_nothing_else() {
+        assert_eq!(address("irp6/report.html"), "irp6/report.html");
+        assert_eq!(address("javascript:x"), "javascript%3Ax");
+        assert_eq!(address("a \"b\"?ö"), "a%20%22b%22%3F%C3%B6");
     }
 
     #[test]

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::assets::{PLOT_LICENCE, PLOT_SCRIPT, PLOT_STYLE, THEME, palette};
-use super::document::{Alignment, Block, Document, Fact, NoteKind, Section, Table, Tone};
+use super::document::{Alignment, Block, Document, Fact, Link, NoteKind, Section, Table, Tone};
 use super::error::ReportError;
-use super::escape::text;
+use super::escape::{address, text};
 use super::heat_map::HeatMap;
 use super::plot::Plot;
 use super::scene::Scene;
@@ -193,6 +193,7 @@ impl Page {
                 }
                 self.body.push_str("</ul>\n");
             }
+            Block::Links(links) => self.links(links),
             Block::Table(table) => self.table(table)?,
             Block::Plot(plot) => self.plot(plot)?,
             Block::HeatMap(map) => self.heat_map(map)?,
@@ -230,6 +231,19 @@ impl Page {
             }
         }
         Ok(())
+    }
+
+    fn links(&mut self, links: &[Link]) {
+        self.body.push_str("<ul>\n");
+        for link in links {
+            let _ = writeln!(
+                self.body,
+                "<li><a href=\"{}\">{}</a></li>",
+                address(&link.address),
+                text(&link.text)
+            );
+        }
+        self.body.push_str("</ul>\n");
     }
 
     fn paragraphs(&mut self, source: &str) {
@@ -323,7 +337,7 @@ impl Page {
         );
         match picture {
             // Outside of the class "static", which the zoomable figures replace.
-            Some(picture) => _ = writeln!(self.body, "<div>{picture}</div>"),
+            Some(picture) => _ = writeln!(self.body, "<div class=\"heat-map\">{picture}</div>"),
             None => self
                 .body
                 .push_str("<p class=\"empty\">No value can be drawn.</p>\n"),

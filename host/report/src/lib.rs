@@ -29,7 +29,9 @@ mod scene;
 mod svg;
 mod thin;
 
-pub use document::{Alignment, Block, Column, Document, Fact, NoteKind, Section, Table, Tone};
+pub use document::{
+    Alignment, Block, Column, Document, Fact, Link, NoteKind, Section, Table, Tone,
+};
 pub use error::ReportError;
 pub use file::{write, write_svg};
 pub use heat_map::HeatMap;

@@ -201,6 +201,14 @@ fn check_motion(
                 robot.joints[other].name
             )));
         }
+        if own == 0.0 {
+            return Err(ComplianceError::Recording(format!(
+                "{}: joint \"{}\" does not move, so the recording shows nothing of its stiffness; record a motion of this joint (`rig excite --kind chirp`), and check the column q{}.",
+                stretch.label,
+                robot.joints[k].name,
+                k + 1
+            )));
+        }
         let tau = &stretch.joints[k].tau;
         let most = tau.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
         let at = tau.iter().filter(|t| t.abs() >= 0.999 * most).count();

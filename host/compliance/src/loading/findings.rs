@@ -38,14 +38,19 @@ pub(crate) fn loading(
         }
     }
     if !displaced.is_empty() {
-        let (drives, residual) = by_tool(tool, &displaced)?;
+        let (drives, residual, told) = by_tool(tool, &displaced)?;
         found.drives.extend(drives);
         found.residual = Some(residual);
+        found.warnings.extend(told);
     }
     if !linked.is_empty() {
         for k in 0..tool.count() {
             found.drives.extend(by_link(tool, &linked, k)?);
         }
     }
+    let told: Vec<String> = (found.drives.iter())
+        .flat_map(|d| d.warnings.clone())
+        .collect();
+    found.warnings.extend(told);
     Ok(found)
 }

@@ -51,18 +51,67 @@ impl Regression {
         self.y.len()
     }
 
+    /// What an estimate leaves of each row.
+    pub(crate) fn residuals(&self, found: &Estimate) -> Vec<f64> {
+        let predicted =
+            |x: &[f64]| -> f64 { x.iter().zip(found.values.iter()).map(|(a, b)| a * b).sum() };
+        (self.x.iter().zip(&self.y))
+            .map(|(x, y)| y - predicted(x))
+            .collect()
+    }
+
     /// Root mean square of what an estimate leaves.
     pub(crate) fn residual(&self, found: &Estimate) -> f64 {
-        let left: Vec<f64> = (self.x.iter().zip(&self.y))
-            .map(|(x, y)| {
-                y - x
-                    .iter()
-                    .zip(found.values.iter())
-                    .map(|(a, b)| a * b)
-                    .sum::<f64>()
+        rig_numerics::statistics::rms(&self.residuals(found))
+    }
+
+    /// Successive rows of each group.
+    pub(crate) fn neighbours(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        (1..self.len())
+            .filter(|r| self.group[*r] == self.group[r - 1])
+            .map(|r| (r - 1, r))
+    }
+
+    /// Root mean square of the readings about the mean of their group.
+    pub(crate) fn signal(&self) -> f64 {
+        let mut groups: std::collections::BTreeMap<usize, Vec<f64>> = Default::default();
+        for (group, y) in self.group.iter().zip(&self.y) {
+            groups.entry(*group).or_default().push(*y);
+        }
+        let about = |list: &Vec<f64>| {
+            rig_numerics::statistics::squares_about(list, rig_numerics::statistics::mean(list))
+        };
+        (groups.values().map(about).sum::<f64>() / self.len().max(1) as f64).sqrt()
+    }
+
+    /// Returns the matrix of the columns and the readings; `None` without rows.
+    pub(crate) fn matrices(&self) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let count = self.x.first()?.len();
+        Some((
+            DMatrix::from_fn(self.len(), count, |r, c| self.x[r][c]),
+            DVector::from_column_slice(&self.y),
+        ))
+    }
+
+    /// Change of each coefficient by a residual of RMS 1 that runs along what its column has apart from the others.
+    pub(crate) fn along(&self) -> Vec<f64> {
+        let Some((mut x, _)) = self.matrices() else {
+            return Vec::new();
+        };
+        let scale: Vec<f64> = (x.column_iter_mut())
+            .map(|mut column| {
+                let length = Some(column.norm()).filter(|n| *n > 0.0).unwrap_or(1.0);
+                column /= length;
+                length
             })
             .collect();
-        rig_numerics::statistics::rms(&left)
+        let rows = self.len() as f64;
+        match pseudo_inverse(&x.tr_mul(&x)) {
+            Some((inverse, _)) => (scale.iter().enumerate())
+                .map(|(k, s)| (rows * inverse[(k, k)].max(0.0)).sqrt() / s)
+                .collect(),
+            None => vec![0.0; scale.len()],
+        }
     }
 
     /// Returns the estimate; `None` for too few rows or values that are not finite.

@@ -4,13 +4,15 @@
 //! the Coulomb friction between motor and spring, whose sign is that of the motion; the torque that accelerates the described
 //! motor is subtracted. With the motors held f is the torque
 //! of the described weight and of the wrench at the tool point, R⁻ᵀ·(g − Jᵀ·w), and fh the hysteresis of the gear, whose sign is that of the load's change.
-//! A gap adds half its width with the sign of the spring's torque.
+//! A gap adds half its width with the sign of the spring's torque. With a wrench the load at which it is crossed is searched, because
+//! it depends on the described weight.
 
 use rig_model::robot::Robot;
-use rig_output::format_significant;
+use rig_output::{format_significant, format_unit};
 use rig_shared::multibody::{Chain, gravity_vector};
+use rig_shared::transmission::DriveKind;
 
-use super::instrument::{Estimate, Regression};
+use super::fit::{Fit, Row, fit};
 use super::result::{Deflection, DriveLoading};
 use super::windows::{Course, courses, means, window_rows};
 use super::wrench::{has_wrench, torques, wrench};
@@ -19,18 +21,18 @@ use crate::signals::Signals;
 use crate::tool_point::ToolPoint;
 use crate::value::Value;
 
+/// Largest plausible change of a twist, rad or m. By judgement: gears twist by milliradians.
+const TWIST: f64 = 0.2;
 /// Share of the range of the load after a turning point in which friction changes its sign.
 const TRANSITION: f64 = 0.1;
 /// Multiple of the friction torque by which the load changes until friction has changed its sign: 2, and some margin.
 const FRICTION_TURNS: f64 = 2.5;
 /// Share of a usual movement of a window below which the joint counts as resting.
 const MOVES: f64 = 0.2;
-/// Share of the spring's torque about zero in which a gap is crossed.
-const CROSSING: f64 = 0.1;
-/// Standard deviations beyond which a gap is significant.
-const GAP_SIGMAS: f64 = 5.0;
 /// Relative standard deviation of 1/c beyond which the stiffness is not shown.
 pub(super) const NOT_SHOWN: f64 = 0.2;
+/// Standard deviations beyond which a negative compliance shows a wrong sign.
+pub(super) const NEGATIVE: f64 = 2.0;
 /// Relative spread of the speed from which on viscous friction is estimated.
 const SPEEDS: f64 = 0.2;
 /// Fewest windows.
@@ -74,13 +76,12 @@ pub(super) fn by_link(
         return Ok(None);
     }
     let by_wrench = usable.iter().all(|s| has_wrench(s));
-    let weighs = robot.joints.iter().all(|j| j.inertial.is_some());
     let windows = collect(tool, &usable, k, by_wrench)?;
     let by = match by_wrench {
         true => Deflection::LinkByWrench,
         false => Deflection::LinkByTorque,
     };
-    Ok(Some(estimate(robot, k, by, &windows, weighs)))
+    Ok(Some(estimate(robot, k, by, &windows)))
 }
 
 /// Forms the windows of all stretches.
@@ -93,7 +94,9 @@ fn collect(
     let rows = window_rows(stretches.iter().map(|s| s.len()).sum());
     let mut series = Vec::new();
     for signals in stretches {
-        series.push(Series::of(tool, signals, k, by_wrench, rows)?);
+        let own = Series::of(tool, signals, k, by_wrench, rows)?;
+        plausible(tool.robot(), signals, k, &own)?;
+        series.push(own);
     }
     let range = range(series.iter().flat_map(|s| &s.place));
     let mut steps: Vec<f64> = (series.iter())
@@ -141,6 +144,27 @@ struct Series {
     twist: Vec<f64>,
     /// What decides the direction: the load with the motors held, the drive's position in motion.
     place: Vec<f64>,
+}
+
+/// Refuses a twist that no gear has: encoders with different units.
+fn plausible(
+    robot: &Robot,
+    signals: &Signals,
+    k: usize,
+    own: &Series,
+) -> Result<(), ComplianceError> {
+    let twist = range(own.twist.iter());
+    if robot.drive_kinds()[k] == DriveKind::Varying || !(twist > TWIST) {
+        return Ok(());
+    }
+    let number = k + 1;
+    Err(ComplianceError::Recording(format!(
+        "{}: the twist of joint \"{}\" changes by {} {}, more than a loaded gear can. Motor (q{number}) and link (ql{number}) must have the same unit, rad or m (1° is 0.01745 rad), the same sign, and belong to the same joint.",
+        signals.label,
+        robot.joints[k].name,
+        format_significant(twist, 3),
+        robot.joints[k].kind.units().0
+    )))
 }
 
 impl Series {
@@ -238,122 +262,124 @@ pub(super) fn range<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     (high - low).max(0.0)
 }
 
-/// Regression of the twist. `gap` gives the friction torque by which the sign of the spring's torque is known.
-fn regression(windows: &[Window], gap: Option<&dyn Fn(&Window) -> f64>) -> Regression {
+/// Rows of the regression of the twist.
+fn rows(windows: &[Window]) -> Vec<Row> {
     let stretches = windows.iter().map(|w| w.stretch + 1).max().unwrap_or(0);
     let speeds: Vec<f64> = windows.iter().map(|w| w.speed.abs()).collect();
     let middle = rig_numerics::statistics::mean_or_zero(&speeds);
     let spread = rig_numerics::statistics::squares_about(&speeds, middle);
     let viscous = windows.iter().all(|w| w.moves)
         && (spread / speeds.len().max(1) as f64).sqrt() > SPEEDS * middle;
-    let mut regression = Regression::default();
-    for w in windows {
-        let mut x = vec![w.load, w.course.direction];
-        x.extend((0..stretches).map(|s| f64::from(u8::from(s == w.stretch))));
-        if viscous {
-            x.push(w.speed);
-        }
-        if let Some(side) = gap {
-            x.push(side(w).signum());
-        }
-        let mut z = x.clone();
-        z[LOAD] = w.instrument;
-        regression.push(x, z, w.twist, w.stretch);
-    }
-    regression
+    (windows.iter().enumerate())
+        .map(|(window, w)| {
+            let mut x = vec![w.load, -w.course.direction];
+            x.extend((0..stretches).map(|s| f64::from(u8::from(s == w.stretch))));
+            if viscous {
+                x.push(w.speed);
+            }
+            Row {
+                x,
+                z: vec![w.instrument],
+                y: w.twist,
+                group: w.stretch,
+                arms: vec![1.0],
+                loads: vec![w.load],
+                directions: vec![w.course.direction],
+                window,
+            }
+        })
+        .collect()
 }
 
 /// Estimates stiffness, hysteresis and gap of drive `k`.
-fn estimate(
-    robot: &Robot,
-    k: usize,
-    by: Deflection,
-    windows: &[Window],
-    weighs: bool,
-) -> DriveLoading {
+fn estimate(robot: &Robot, k: usize, by: Deflection, windows: &[Window]) -> DriveLoading {
+    // A wrench gives the torque of the spring only as well as the weight is described.
+    let search = by == Deflection::LinkByWrench;
     let mut kept = windows.to_vec();
-    let mut found = solve(&kept, None);
-    if let (Some(first), Deflection::LinkByWrench) = (&found, by) {
-        let friction = (first.values[DIRECTION] / first.values[LOAD]).abs();
+    let mut found = solve(&kept, search);
+    if let (Some(first), true) = (&found, search) {
+        let friction = first.friction(0).abs();
         kept.retain(|w| w.course.travel > FRICTION_TURNS * friction);
-        found = solve(&kept, None).or(found);
+        found = solve(&kept, search).or(found);
     }
-    let mut result = DriveLoading {
-        joint: robot.joints[k].name.clone(),
-        index: k,
-        by,
-        stiffness: None,
-        hysteresis: None,
-        gap: None,
-        reverses: false,
-        load: [0.0; 2],
-        windows: kept.len(),
-        missing: None,
-        points: Default::default(),
-    };
-    let Some(found) = found.filter(|f| !f.hidden[LOAD] && f.values[LOAD] > 0.0) else {
+    let mut result = DriveLoading::new(robot.joints[k].name.clone(), k, by);
+    result.windows = kept.len();
+    let Some(found) = found.filter(|f| !f.estimate.hidden[LOAD]) else {
         result.missing = Some(missing(robot, k, by));
         return result;
     };
-    let friction = -found.values[DIRECTION] / found.values[LOAD];
-    let spring = |w: &Window| w.load - friction * w.course.direction;
-    let (mut used, mut last, mut gap) = (kept.clone(), found, None);
-    // With a wrench the sign of the spring's torque is known only with the weight of the links.
-    if by == Deflection::LinkByTorque || weighs {
-        let extreme = kept.iter().map(|w| spring(w).abs()).fold(0.0, f64::max);
-        let clear: Vec<Window> = (kept.iter().copied())
-            .filter(|w| spring(w).abs() > CROSSING * extreme)
-            .collect();
-        result.reverses = [-1.0, 1.0]
-            .iter()
-            .all(|side| clear.iter().filter(|w| spring(w) * side > 0.0).count() >= FEWEST / 4);
-        if let (true, Some(other)) = (result.reverses, solve(&clear, Some(&spring))) {
-            let own = other.values.len() - 1;
-            let value = Value::new(2.0 * other.values[own], 2.0 * other.std(own));
-            if value.value > GAP_SIGMAS * value.std && other.values[LOAD] > 0.0 {
-                (gap, last, used) = (Some(value), other, clear);
-            }
-        }
-    }
-    let compliance = Value::new(last.values[LOAD], last.std(LOAD));
-    if !(compliance.relative() < NOT_SHOWN) {
-        result.missing = Some(missing(robot, k, by));
+    let compliance = found.value(LOAD);
+    let told = found.lack.told(robot.joints[k].kind.units().0);
+    if !(compliance.value > 0.0 && compliance.relative() < NOT_SHOWN) {
+        let opposite = compliance.value < -NEGATIVE * compliance.std;
+        result.missing = Some(match (opposite, told) {
+            (true, _) => opposite_sign(robot, k, by),
+            (false, Some(told)) => format!("{} {ASK}", crooked(robot, k, &told)),
+            (false, None) => missing(robot, k, by),
+        });
         return result;
     }
     let stiffness = compliance.reciprocal();
     result.stiffness = Some(stiffness);
-    result.hysteresis = (!last.hidden[DIRECTION]).then(|| {
-        Value::new(
-            -last.values[DIRECTION] * stiffness.value,
-            last.std(DIRECTION) * stiffness.value,
-        )
+    result.hysteresis = (!found.estimate.hidden[DIRECTION]).then(|| {
+        let own = found.value(DIRECTION);
+        Value::new(own.value * stiffness.value, own.std * stiffness.value)
     });
-    result.gap = gap;
-    result.windows = used.len();
-    finish(&mut result, &kept, &last, &spring);
+    result.warnings.extend(told.map(|told| {
+        format!(
+            "{} The standard deviation of the stiffness contains it. {ASK}",
+            crooked(robot, k, &told)
+        )
+    }));
+    result.reverses = found.reverses(&rows(&kept), 0);
+    finish(&mut result, &kept, &found);
+    if let Some((gap, column)) = found.gap(0) {
+        result.add_gap(found.value(column), gap.zero);
+    }
+    result.windows = found.windows;
     result
 }
 
+/// What a residual beyond noise may come from.
+const ASK: &str = "Check signs, units and columns of load and encoder; a stiffness that grows with the twist, and hysteresis that is not constant, leave such a residual too.";
+
+/// Says that the twist is no straight line.
+fn crooked(robot: &Robot, k: usize, told: &str) -> String {
+    format!(
+        "The twist of joint \"{}\" does not follow its load as a spring with friction and gap does: {told}.",
+        robot.joints[k].name
+    )
+}
+
+/// Says that the twist follows the load with the wrong sign.
+fn opposite_sign(robot: &Robot, k: usize, by: Deflection) -> String {
+    let (name, number) = (&robot.joints[k].name, k + 1);
+    let cause = match by {
+        Deflection::LinkByTorque => format!("tau{number} is negated"),
+        _ => "the force is that on the environment instead of that on the robot".to_owned(),
+    };
+    format!(
+        "The twist of joint \"{name}\" follows its load, but with the opposite sign: {cause}, or q{number} (motor) and ql{number} (link) are exchanged. Correct the sign or the columns."
+    )
+}
+
 /// Adds the range of the load and the points of the figure.
-fn finish(
-    result: &mut DriveLoading,
-    windows: &[Window],
-    found: &Estimate,
-    spring: &dyn Fn(&Window) -> f64,
-) {
-    let loads: Vec<f64> = windows.iter().map(spring).collect();
+fn finish(result: &mut DriveLoading, windows: &[Window], found: &Fit) {
+    let loads: Vec<f64> = (windows.iter())
+        .map(|w| w.load - found.friction(0) * w.course.direction)
+        .collect();
     let low = loads.iter().copied().fold(f64::INFINITY, f64::min);
     result.load = [low, low + range(loads.iter())];
     for w in windows {
         let side = usize::from(w.course.direction < 0.0);
-        let offset = found.values[2 + w.stretch];
+        let offset = found.estimate.values[2 + w.stretch];
         result.points[side].push([w.load, w.twist - offset]);
     }
 }
 
-fn solve(windows: &[Window], gap: Option<&dyn Fn(&Window) -> f64>) -> Option<Estimate> {
+fn solve(windows: &[Window], search: bool) -> Option<Fit> {
     (windows.len() >= FEWEST)
-        .then(|| regression(windows, gap).solve())
+        .then(|| fit(&rows(windows), 1, search))
         .flatten()
 }
 
@@ -362,7 +388,10 @@ fn missing(robot: &Robot, k: usize, by: Deflection) -> String {
     let name = &robot.joints[k].name;
     let effort = format_significant(robot.torque_limits()[k].unwrap_or(f64::NAN) * 0.5, 2);
     let size = match robot.torque_limits()[k] {
-        Some(_) => format!(" by about {effort} {}", robot.joints[k].kind.units().1),
+        Some(_) => format!(
+            " by about {effort} {}",
+            format_unit(robot.joints[k].kind.units().1)
+        ),
         None => String::new(),
     };
     match by {

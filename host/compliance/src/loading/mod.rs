@@ -2,6 +2,7 @@
 
 mod advice;
 mod findings;
+mod fit;
 mod instrument;
 mod link;
 mod result;

@@ -1,8 +1,13 @@
 //! What static loading shows of a drive.
 
+use rig_output::format_significant;
 use serde::Serialize;
 
 use crate::value::Value;
+
+/// Torque at which a gap is crossed over the range of the load, beyond which the described weight is wrong. By judgement: about the
+/// width that counts as crossing, on both sides.
+const MISPLACED: f64 = 0.1;
 
 /// How the deflection was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -42,6 +47,8 @@ pub struct DriveLoading {
     pub hysteresis: Option<Value>,
     /// Whole gap, in the drive's coordinate; `None` if there is no significant one, or if the torque keeps its sign.
     pub gap: Option<Value>,
+    /// Torque of the drive at which the gap is crossed, by the described weight.
+    pub gap_torque: Option<f64>,
     /// True if the torque of the spring changed its sign, so that a gap would show.
     pub reverses: bool,
     /// Smallest and largest torque of the spring.
@@ -50,9 +57,47 @@ pub struct DriveLoading {
     pub windows: usize,
     /// Reason and remedy if the stiffness is not shown.
     pub missing: Option<String>,
+    /// What to know about the estimate.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
     /// Torque and twist of the windows, loading (growing) and unloading (falling).
     #[serde(skip)]
     pub points: [Vec<[f64; 2]>; 2],
+}
+
+impl DriveLoading {
+    /// A measurement that shows nothing yet.
+    pub(crate) fn new(joint: String, index: usize, by: Deflection) -> Self {
+        Self {
+            joint,
+            index,
+            by,
+            stiffness: None,
+            hysteresis: None,
+            gap: None,
+            gap_torque: None,
+            reverses: false,
+            load: [0.0; 2],
+            windows: 0,
+            missing: None,
+            warnings: Vec::new(),
+            points: Default::default(),
+        }
+    }
+
+    /// Adds a gap that is crossed at `zero`, and tells if the described weight does not put it there.
+    pub(crate) fn add_gap(&mut self, half: Value, zero: f64) {
+        self.gap = Some(Value::new(2.0 * half.value, 2.0 * half.std));
+        self.gap_torque = Some(zero);
+        self.reverses = true;
+        if zero.abs() > MISPLACED * (self.load[1] - self.load[0]) {
+            self.warnings.push(format!(
+                "The gap of joint \"{}\" is crossed where the load is {} by the description, but a gap is crossed at 0: the described weight of the links is not that of this arm, or the force has a bias. Stiffness and gap do not depend on it.",
+                self.joint,
+                format_significant(zero, 2)
+            ));
+        }
+    }
 }
 
 /// What all loading recordings show.

@@ -2,17 +2,17 @@
 //!
 //! δx = J·δq_motor + Σ a_k·(a_k·w)/c_k − Σ a_k·h_k·direction_k + offset, with the columns a_k of J·R⁻¹: linear in the
 //! compliances 1/c_k and in the hysteresis h_k (rad or m). Only the translation is measured. Movements of the motors are
-//! taken from their encoders.
+//! taken from their encoders. A gap adds a_k·(gap/2)·sign(spring), see [`super::fit`].
 //!
-//! Leaves out: gaps, the change of the weight's torque as the links themselves yield, elasticity of base and links, which counts as that of the drives.
+//! Leaves out: gaps that are crossed at other torques than the described weight tells, if several recordings have several such torques; the change of the weight's torque as the links themselves yield, elasticity of base and links, which counts as that of the drives.
 
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 use rig_shared::multibody::{Chain, gravity_vector};
 
 use super::advice::advice;
-use super::instrument::{Estimate, Regression};
-use super::link::{NOT_SHOWN, range};
+use super::fit::{Fit, Row, fit};
+use super::link::{NEGATIVE, NOT_SHOWN, range};
 use super::result::{Deflection, DriveLoading};
 use super::windows::{Course, courses, means, window_rows};
 use super::wrench::{DISPLACEMENT, torques, wrench};
@@ -24,6 +24,13 @@ use crate::value::Value;
 
 /// Largest movement of a held motor within a recording, rad or m.
 const HELD: f64 = 0.02;
+/// Largest plausible twist of a loaded joint, rad or m. By judgement: gears twist by milliradians, and beyond this the arm is
+/// not linear.
+const TWIST: f64 = 0.2;
+/// Arm below which the tool point lies on the axes, m.
+const ARMLESS: f64 = 1e-9;
+/// Standard deviations beyond which a negative hysteresis is impossible.
+const IMPOSSIBLE: f64 = 2.0;
 /// Share of the range of the load after a turning point in which friction changes its sign.
 const TRANSITION: f64 = 0.15;
 /// Share of the largest load times arm from which on a drive's turning points count.
@@ -35,8 +42,10 @@ const FEWEST: usize = 12;
 struct Held {
     /// Columns a_k, rows dx dy dz: [axis][drive].
     arms: [Vec<f64>; 3],
-    /// Torque of each drive by window.
+    /// Torque of each drive by window, of the wrench.
     loads: Vec<Vec<f64>>,
+    /// Torque of each drive by the weight at the start; of what is described.
+    weight: Vec<f64>,
     /// Displacement without that of the motors, for each measured axis.
     displacement: [Option<Vec<f64>>; 3],
 }
@@ -48,30 +57,39 @@ struct Held {
 pub(super) fn by_tool(
     tool: &ToolPoint<'_>,
     stretches: &[&Signals],
-) -> Result<(Vec<DriveLoading>, f64), ComplianceError> {
-    let rows = window_rows(stretches.iter().map(|s| s.len()).sum());
+) -> Result<(Vec<DriveLoading>, f64, Vec<String>), ComplianceError> {
+    let size = window_rows(stretches.iter().map(|s| s.len()).sum());
     let mut held = Vec::new();
     for signals in stretches {
-        held.push(hold(tool, signals, rows)?);
+        held.push(hold(tool, signals, size)?);
     }
     let n = tool.count();
     let ranges: Vec<f64> = (0..n)
         .map(|k| range(held.iter().flat_map(|h| &h.loads[k])))
         .collect();
-    let (regression, windows) = regression(&held, &ranges);
+    let (rows, windows) = rows(&held, &ranges);
     let found = (windows >= FEWEST)
-        .then(|| regression.solve())
+        .then(|| fit(&rows, n, true))
         .flatten()
         .ok_or_else(|| {
             ComplianceError::Recording(format!(
                 "The recordings of the loaded tool point have {windows} usable windows, {FEWEST} are needed: change the force slowly, to and fro, and record more rows."
             ))
         })?;
+    let told = found.lack.told("m").map(|told| crooked(tool, &told));
     let mut drives = Vec::new();
     for k in 0..n {
-        drives.push(drive(tool, k, &held, &found, windows)?);
+        drives.push(drive(tool, k, &held, &rows, &found)?);
     }
-    Ok((drives, regression.residual(&found)))
+    Ok((drives, found.lack.residual, told.into_iter().collect()))
+}
+
+/// Says that the displacement is not that of springs.
+fn crooked(tool: &ToolPoint<'_>, told: &str) -> String {
+    let [x, y, z] = tool.offset();
+    format!(
+        "The displacement of the tool point does not follow the force as the springs of the joints do: {told}. Is the tool point, where force and gauge act, at --tool {x} {y} {z} (m, flange frame)? Check axes, signs and units of force and displacement too; elasticity of links and base, drift, and a stiffness that grows with the load leave such a residual as well. The standard deviations contain it."
+    )
 }
 
 /// Reads a stretch at one pose.
@@ -95,7 +113,7 @@ fn hold(tool: &ToolPoint<'_>, signals: &Signals, rows: usize) -> Result<Held, Co
     let (_, per_twist) = tool.per_twist(&pose)?;
     let force = wrench(signals)?.map(|list| means(&list, rows));
     let motors: Vec<Vec<f64>> = signals.joints.iter().map(|j| means(&j.q, rows)).collect();
-    let loads = loads(tool, &pose, &force, &motors)?;
+    let (loads, weight) = loads(tool, &pose, &force, &motors)?;
     for name in DISPLACEMENT {
         let list = signals.column(name).unwrap_or_default();
         if let Some(row) = list.iter().position(|d| !d.is_finite()) {
@@ -105,6 +123,7 @@ fn hold(tool: &ToolPoint<'_>, signals: &Signals, rows: usize) -> Result<Held, Co
             )));
         }
     }
+    plausible(signals, &jacobian)?;
     let displacement = std::array::from_fn(|axis| {
         let read = means(signals.column(DISPLACEMENT[axis])?, rows);
         Some(
@@ -119,17 +138,38 @@ fn hold(tool: &ToolPoint<'_>, signals: &Signals, rows: usize) -> Result<Held, Co
     Ok(Held {
         arms: std::array::from_fn(|axis| (0..n).map(|k| per_twist[(axis, k)]).collect()),
         loads,
+        weight,
         displacement,
     })
 }
 
-/// Torque of each drive by window: of the wrench, and of the weight as the motors move a little.
+/// Refuses a displacement that no small twist of the joints gives.
+fn plausible(signals: &Signals, jacobian: &nalgebra::DMatrix<f64>) -> Result<(), ComplianceError> {
+    let arm: f64 = (jacobian.column_iter())
+        .map(|c| c.fixed_rows::<3>(0).norm())
+        .sum();
+    for name in DISPLACEMENT {
+        let moved = range(signals.column(name).unwrap_or_default().iter());
+        if arm > ARMLESS && moved > TWIST * arm {
+            return Err(ComplianceError::Recording(format!(
+                "{}: {name} changes by {} m, but a twist of {TWIST} rad (m) of every joint moves the tool point by {} m at most at this pose. Record the displacement in metres (1 mm is 0.001), and check --tool.",
+                signals.label,
+                format_significant(moved, 3),
+                format_significant(TWIST * arm, 3)
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Torque of each drive by window: of the wrench, and of the weight as the motors move a little. Then the torque of the weight at
+/// the start, which the springs hold.
 fn loads(
     tool: &ToolPoint<'_>,
     pose: &[f64],
     force: &[Vec<f64>; 6],
     motors: &[Vec<f64>],
-) -> Result<Vec<Vec<f64>>, ComplianceError> {
+) -> Result<(Vec<Vec<f64>>, Vec<f64>), ComplianceError> {
     let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
     let (n, robot) = (tool.count(), tool.robot());
     let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
@@ -153,56 +193,83 @@ fn loads(
             own.push(joint.sum());
         }
     }
-    Ok(loads)
+    let weight = (0..n).map(|k| (0..n).map(|j| inverse[(j, k)] * before[j]).sum());
+    Ok((loads, weight.collect()))
 }
 
-/// Forms the regression; its columns are the compliances, the hystereses and an offset per stretch and axis. Returns also
-/// the number of windows.
-fn regression(held: &[Held], ranges: &[f64]) -> (Regression, usize) {
-    let n = ranges.len();
-    let offsets = 3 * held.len();
-    let (mut regression, mut windows) = (Regression::default(), 0);
+/// Forms the rows of the regression; its columns are the compliances, the hystereses and an offset per stretch and axis.
+/// Returns also the number of windows.
+fn rows(held: &[Held], ranges: &[f64]) -> (Vec<Row>, usize) {
+    let mut rows = Vec::new();
+    let mut windows = 0;
     for (stretch, own) in held.iter().enumerate() {
-        let courses: Vec<Vec<Course>> = (0..n).map(|k| courses(&own.loads[k], ranges[k])).collect();
-        let size = |k: usize| {
-            let arm: f64 = own.arms.iter().map(|a| a[k] * a[k]).sum();
-            range(own.loads[k].iter()) * arm.sqrt()
-        };
-        let most = (0..n).map(size).fold(0.0, f64::max);
-        let material: Vec<usize> = (0..n).filter(|k| size(*k) > MATERIAL * most).collect();
-        for i in 1..own.loads.first().map_or(0, Vec::len).saturating_sub(1) {
-            let settled = material.iter().all(|k| {
-                let course = &courses[*k];
-                course[i].direction != 0.0
-                    && course[i].travel > TRANSITION * ranges[*k]
-                    && course[i - 1].run == course[i + 1].run
-            });
-            if !settled {
+        let settled = settled(own, ranges);
+        for axis in 0..3 {
+            let Some(read) = &own.displacement[axis] else {
                 continue;
-            }
-            windows += 1;
-            for axis in 0..3 {
-                let Some(read) = &own.displacement[axis] else {
-                    continue;
-                };
-                let arm = &own.arms[axis];
-                let mut x: Vec<f64> = (0..n).map(|k| arm[k] * own.loads[k][i]).collect();
-                let mut z: Vec<f64> = (0..n)
-                    .map(|k| arm[k] * 0.5 * (own.loads[k][i - 1] + own.loads[k][i + 1]))
-                    .collect();
-                let turned = |k: usize| match material.contains(&k) {
-                    true => -arm[k] * courses[k][i].direction,
-                    false => 0.0,
-                };
-                let offset = (0..offsets).map(|o| f64::from(u8::from(o == 3 * stretch + axis)));
-                let rest: Vec<f64> = (0..n).map(turned).chain(offset).collect();
-                x.extend(&rest);
-                z.extend(&rest);
-                regression.push(x, z, read[i], 3 * stretch + axis);
+            };
+            for (w, (i, directions)) in settled.iter().enumerate() {
+                let group = 3 * stretch + axis;
+                rows.push(Row {
+                    group,
+                    y: read[*i],
+                    window: windows + w,
+                    ..row(own, *i, axis, directions, group, 3 * held.len())
+                });
             }
         }
+        windows += settled.len();
     }
-    (regression, windows)
+    (rows, windows)
+}
+
+/// Windows away from turning points, with the direction of each drive that is loaded, 0 of the others.
+fn settled(own: &Held, ranges: &[f64]) -> Vec<(usize, Vec<f64>)> {
+    let n = ranges.len();
+    let courses: Vec<Vec<Course>> = (0..n).map(|k| courses(&own.loads[k], ranges[k])).collect();
+    let size = |k: usize| {
+        let arm: f64 = own.arms.iter().map(|a| a[k] * a[k]).sum();
+        range(own.loads[k].iter()) * arm.sqrt()
+    };
+    let most = (0..n).map(size).fold(0.0, f64::max);
+    let material: Vec<usize> = (0..n).filter(|k| size(*k) > MATERIAL * most).collect();
+    (1..own.loads.first().map_or(0, Vec::len).saturating_sub(1))
+        .filter(|i| {
+            material.iter().all(|k| {
+                let course = &courses[*k];
+                course[*i].direction != 0.0
+                    && course[*i].travel > TRANSITION * ranges[*k]
+                    && course[i - 1].run == course[i + 1].run
+            })
+        })
+        .map(|i| {
+            let direction = |k: usize| match material.contains(&k) {
+                true => courses[k][i].direction,
+                false => 0.0,
+            };
+            (i, (0..n).map(direction).collect())
+        })
+        .collect()
+}
+
+/// One row without its reading.
+fn row(own: &Held, i: usize, axis: usize, directions: &[f64], group: usize, offsets: usize) -> Row {
+    let n = directions.len();
+    let arms = own.arms[axis].clone();
+    let beside = |k: usize| 0.5 * (own.loads[k][i - 1] + own.loads[k][i + 1]);
+    let load = (0..n).map(|k| arms[k] * own.loads[k][i]);
+    let friction = (0..n).map(|k| -arms[k] * directions[k]);
+    let offset = (0..offsets).map(|o| f64::from(u8::from(o == group)));
+    Row {
+        x: load.chain(friction).chain(offset).collect(),
+        z: (0..n).map(|k| arms[k] * beside(k)).collect(),
+        y: 0.0,
+        group,
+        loads: (0..n).map(|k| own.loads[k][i] - own.weight[k]).collect(),
+        directions: directions.to_vec(),
+        window: 0,
+        arms,
+    }
 }
 
 /// Returns what the loading shows of drive `k`.
@@ -210,34 +277,64 @@ fn drive(
     tool: &ToolPoint<'_>,
     k: usize,
     held: &[Held],
-    found: &Estimate,
-    windows: usize,
+    rows: &[Row],
+    found: &Fit,
 ) -> Result<DriveLoading, ComplianceError> {
     let n = tool.count();
     let robot = tool.robot();
-    let compliance = Value::new(found.values[k], found.std(k));
-    let shown = !found.hidden[k] && compliance.value > 0.0 && compliance.relative() < NOT_SHOWN;
+    let mut result = DriveLoading::new(robot.joints[k].name.clone(), k, Deflection::Tool);
+    result.windows = found.windows;
     let loads: Vec<f64> = held.iter().flat_map(|h| h.loads[k].clone()).collect();
     let low = loads.iter().copied().fold(f64::INFINITY, f64::min);
-    let stiffness = shown.then(|| compliance.reciprocal());
-    let hysteresis = stiffness.filter(|_| !found.hidden[n + k] && found.values[n + k] != 0.0);
-    Ok(DriveLoading {
-        joint: robot.joints[k].name.clone(),
-        index: k,
-        by: Deflection::Tool,
-        stiffness,
-        hysteresis: hysteresis
-            .map(|c| Value::new(found.values[n + k] * c.value, found.std(n + k) * c.value)),
-        gap: None,
-        reverses: false,
-        load: [low, low + range(loads.iter())],
-        windows,
-        missing: match shown {
-            true => None,
-            false => Some(missing(tool, robot, k)?),
-        },
-        points: Default::default(),
-    })
+    result.load = [low, low + range(loads.iter())];
+    let compliance = found.value(k);
+    let determined = !found.estimate.hidden[k] && compliance.relative() < NOT_SHOWN;
+    if !(determined && compliance.value > 0.0) {
+        let random = found.estimate.std(k) < NOT_SHOWN * compliance.value.abs();
+        let told = found.lack.told("m").filter(|_| random);
+        let opposite = !found.estimate.hidden[k] && compliance.value < -NEGATIVE * compliance.std;
+        result.missing = Some(match (opposite, told) {
+            (true, _) => opposite_sign(&result.joint),
+            (false, Some(told)) => format!(
+                "The stiffness of joint \"{}\" is uncertain by more than {} %. {}",
+                result.joint,
+                100.0 * NOT_SHOWN,
+                crooked(tool, &told)
+            ),
+            (false, None) => missing(tool, robot, k)?,
+        });
+        return Ok(result);
+    }
+    let stiffness = compliance.reciprocal();
+    result.stiffness = Some(stiffness);
+    let torque = |v: Value| Value::new(v.value * stiffness.value, v.std * stiffness.value);
+    if !found.estimate.hidden[n + k] && found.estimate.values[n + k] != 0.0 {
+        result.hysteresis = Some(torque(found.value(n + k)));
+        let own = torque(Value::new(
+            found.estimate.values[n + k],
+            found.estimate.std(n + k),
+        ));
+        if own.value < -IMPOSSIBLE * own.std {
+            result.warnings.push(format!(
+                "The hysteresis of joint \"{}\" comes out as {} ± {}, but friction makes it positive: the displacement does not belong to this load. Check --tool, and axes and signs of force and displacement.",
+                result.joint,
+                format_significant(own.value, 3),
+                format_significant(own.std, 2)
+            ));
+        }
+    }
+    result.reverses = found.reverses(rows, k);
+    if let Some((gap, column)) = found.gap(k) {
+        result.add_gap(found.value(column), gap.zero);
+    }
+    Ok(result)
+}
+
+/// Says that the displacement follows the force with the wrong sign.
+fn opposite_sign(name: &str) -> String {
+    format!(
+        "The displacement of the tool point follows the torque of joint \"{name}\", but with the opposite sign: the force is that on the environment instead of that on the robot, or the gauge counts the other way, or two axes are exchanged, or --tool is wrong. Correct the signs, the columns or the tool point."
+    )
 }
 
 /// Says which pose and force would show a drive.

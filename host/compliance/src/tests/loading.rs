@@ -5,7 +5,7 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::SeedableRng;
 use rig_data::prepare::{InMemory, Recording};
 use rig_data::{Block, JointColumns};
-use rig_model::robot::{Reads, Robot, TX40, WristSensor};
+use rig_model::robot::{ONE_LINK_TEMPLATE, Reads, Robot, TX40, WristSensor};
 
 use super::rig::{Rig, recording};
 use super::statics::rest;
@@ -73,27 +73,23 @@ fn a_gap_is_told_and_not_averaged_into_the_stiffness() {
     assert!((width.value / gap - 1.0).abs() < 0.05, "{width:?}");
 }
 
-/// The motor is held by its position loop, and the link is loaded from outside: by the link encoder, and by a gauge at the
-/// tool point.
-#[test]
-fn a_known_force_shows_stiffness_and_hysteresis_with_the_motor_held() {
-    let stiffness = 1500.0;
-    let rig = Rig::new(stiffness, 0.5).with_plain_friction();
-    let offset = [0.5, 0.0, 0.0];
+/// The place of the tool point on the link.
+const OFFSET: [f64; 3] = [0.5, 0.0, 0.0];
+
+/// The motor is held by its position loop, and the link is loaded from outside by a triangle: by the link encoder, and by a
+/// gauge at the tool point.
+fn held(rig: &Rig, size: f64) -> Block {
     let robot = rig.robot();
-    let tool = ToolPoint::new(&robot, offset).unwrap();
-    // A triangle of 4 N·m.
+    let tool = ToolPoint::new(&robot, OFFSET).unwrap();
     let torque = |t: f64| {
         let phase = (t / 10.0).fract();
-        4.0 * (4.0 * (phase - 0.5).abs() - 1.0)
+        size * (4.0 * (phase - 0.5).abs() - 1.0)
     };
-    let block = rig.run(60.0, |_| 0.0, torque, 5);
+    let mut block = rig.run(60.0, |_| 0.0, torque, 5);
     let link = block.joints[0].link.clone().unwrap();
-    let (_, jacobian) = tool.jacobian(&[0.0]).unwrap();
+    let (start, jacobian) = tool.jacobian(&[0.0]).unwrap();
     let arm = [0, 1, 2].map(|r| jacobian[(r, 0)]);
     let square: f64 = arm.iter().map(|a| a * a).sum();
-    let (start, _) = tool.jacobian(&[0.0]).unwrap();
-    let mut block = block;
     for (r, (force, gauge)) in [("fx", "dx"), ("fy", "dy"), ("fz", "dz")]
         .iter()
         .enumerate()
@@ -109,6 +105,15 @@ fn a_known_force_shows_stiffness_and_hysteresis_with_the_motor_held() {
             .extra
             .push(((*gauge).to_owned(), link.iter().map(place).collect()));
     }
+    block
+}
+
+#[test]
+fn a_known_force_shows_stiffness_and_hysteresis_with_the_motor_held() {
+    let stiffness = 1500.0;
+    let rig = Rig::new(stiffness, 0.5).with_plain_friction();
+    let (robot, offset) = (rig.robot(), OFFSET);
+    let block = held(&rig, 4.0);
     let found = identify(&robot, &[recording(block)], offset);
     assert_eq!(found.len(), 2);
     for own in &found {
@@ -128,6 +133,162 @@ fn a_known_force_shows_stiffness_and_hysteresis_with_the_motor_held() {
         );
     }
     assert!(found.iter().any(|own| own.by == Deflection::Tool));
+}
+
+/// The force crosses the gap in every period. Without the gap as unknown the line through both sides is far too compliant.
+#[test]
+fn a_gap_is_kept_apart_with_the_motor_held() {
+    let (stiffness, gap) = (1500.0, 2e-3);
+    let rig = Rig::new(stiffness, 0.5).with_plain_friction().with_gap(gap);
+    let found = identify(&rig.robot(), &[recording(held(&rig, 4.0))], OFFSET);
+    assert_eq!(found.len(), 2);
+    for own in &found {
+        let value = own.stiffness.unwrap();
+        println!(
+            "gap with the motor held, {}: {value:?} {:?}",
+            own.by.words(),
+            own.gap
+        );
+        assert!((value.value / stiffness - 1.0).abs() < 0.05, "{own:?}");
+        assert!((own.gap.unwrap().value / gap - 1.0).abs() < 0.05, "{own:?}");
+    }
+}
+
+/// A description without the true weight (a balanced arm, say) tells another torque at which the gap is crossed.
+#[test]
+fn a_gap_is_found_where_the_described_weight_does_not_put_it() {
+    let (stiffness, gap) = (1500.0, 2e-3);
+    let mut dice = Pcg64Mcg::seed_from_u64(4);
+    let robot = Robot::from_toml(ONE_LINK_TEMPLATE, "rig.toml".as_ref()).unwrap();
+    let rows = 3000;
+    let mut normal =
+        |std: f64| -> f64 { std * Distribution::<f64>::sample(&StandardNormal, &mut dice) };
+    let force: Vec<f64> = (0..rows)
+        .map(|k| 8.0 * (0.00628 * k as f64).sin())
+        .collect();
+    let twist = |f: f64| 0.5 * f / stiffness + 0.5 * gap * f.signum();
+    let mut block = Block {
+        t: (0..rows).map(|k| 0.02 * k as f64).collect(),
+        joints: vec![JointColumns {
+            q: vec![0.0; rows],
+            link: Some(force.iter().map(|f| twist(*f) + normal(1e-6)).collect()),
+            ..JointColumns::default()
+        }],
+        first_line: 2,
+        ..Block::default()
+    };
+    for name in ["fx", "fy"] {
+        block.extra.push((name.to_owned(), vec![0.0; rows]));
+    }
+    let gauge = force
+        .iter()
+        .map(|f| 0.5 * twist(*f) + normal(1e-6))
+        .collect();
+    block.extra.push(("dz".to_owned(), gauge));
+    let read = |sign: f64, normal: &mut dyn FnMut(f64) -> f64| -> Vec<f64> {
+        force.iter().map(|f| sign * f + normal(0.02)).collect()
+    };
+    let mut reversed = block.clone();
+    block.extra.push(("fz".to_owned(), read(1.0, &mut normal)));
+    for own in &identify(&robot, &[recording(block)], OFFSET) {
+        let value = own.stiffness.unwrap();
+        assert!((value.value / stiffness - 1.0).abs() < 0.02, "{own:?}");
+        assert!((own.gap.unwrap().value / gap - 1.0).abs() < 0.05, "{own:?}");
+    }
+    // The force on the environment.
+    reversed
+        .extra
+        .push(("fz".to_owned(), read(-1.0, &mut normal)));
+    let options = ComplianceOptions {
+        tool: OFFSET,
+        ..ComplianceOptions::default()
+    };
+    let said = |block: Block| {
+        identify_compliance(&robot, &[&recording(block)], &[], &options)
+            .unwrap_err()
+            .to_string()
+    };
+    let text = said(reversed.clone());
+    assert!(text.contains("opposite sign"), "{text}");
+    // A gauge in millimetres.
+    for (name, values) in &mut reversed.extra {
+        if name == "dz" {
+            values.iter_mut().for_each(|v| *v *= 1000.0);
+        }
+    }
+    let text = said(reversed);
+    assert!(text.contains("in metres"), "{text}");
+}
+
+/// Two drives have gaps, and both turn in the same displacement. A base without gravity: the gaps are crossed as the force is.
+#[test]
+fn gaps_of_two_joints_are_kept_apart_by_a_gauge() {
+    let mut robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    robot.gravity = [0.0; 3];
+    let offset = [0.1, 0.08, 0.12];
+    let gaps = [0.0, 1e-3, 0.0, 2e-3, 0.0, 0.0];
+    let mut runs = loaded(&displacements(&robot, offset), 3);
+    let tool = ToolPoint::new(&robot, offset).unwrap();
+    for (i, run) in runs.iter_mut().enumerate() {
+        let (_, arms) = tool.per_twist(&POSES[i / 3]).unwrap();
+        let block = &mut run.blocks[0];
+        for row in 0..block.t.len() {
+            let force = 4.0 * ((row as f64 / 200.0).fract() - 0.5).abs() - 1.0;
+            for r in 0..3 {
+                let shift =
+                    |k: usize| arms[(r, k)] * 0.5 * gaps[k] * (arms[(i % 3, k)] * force).signum();
+                let gauge = block
+                    .extra
+                    .iter_mut()
+                    .find(|(name, _)| name == ["dx", "dy", "dz"][r]);
+                gauge.unwrap().1[row] += (0..6).map(shift).sum::<f64>();
+            }
+        }
+    }
+    for (k, own) in identify(&robot, &runs, offset).iter().enumerate() {
+        let value = own.stiffness.unwrap_or_else(|| panic!("{:?}", own.missing));
+        println!("two gaps, joint {}: {value:?} {:?}", k + 1, own.gap);
+        assert!(
+            (value.value / STIFFNESS[k] - 1.0).abs() < 0.05,
+            "{k}: {value:?}"
+        );
+        match gaps[k] > 0.0 {
+            true => assert!(
+                (own.gap.unwrap().value / gaps[k] - 1.0).abs() < 0.1,
+                "{k}: {:?}",
+                own.gap
+            ),
+            false => assert!(own.gap.is_none(), "{k}: {:?}", own.gap),
+        }
+    }
+}
+
+/// The lack of fit tells a tool point at which force and gauge do not act.
+#[test]
+fn a_wrong_tool_point_is_told() {
+    let robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    let offset = [0.1, 0.08, 0.12];
+    let runs = loaded(&displacements(&robot, offset), 1);
+    let list: Vec<&dyn Recording> = runs.iter().map(|r| r as &dyn Recording).collect();
+    let said = |tool: [f64; 3]| {
+        let options = ComplianceOptions {
+            tool,
+            ..ComplianceOptions::default()
+        };
+        match identify_compliance(&robot, &list, &[], &options) {
+            Ok(found) => found.warnings.join(" "),
+            Err(error) => error.to_string(),
+        }
+    };
+    let right = said(offset);
+    assert!(!right.contains("--tool"), "{right}");
+    for wrong in [[0.0; 3], [0.0, 0.0, 0.12]] {
+        let text = said(wrong);
+        assert!(
+            text.contains("does not follow the force") && text.contains("--tool"),
+            "{text}"
+        );
+    }
 }
 
 /// Poses and directions of the force on the arm of six joints.

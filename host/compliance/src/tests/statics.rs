@@ -8,7 +8,10 @@ use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 use rig_model::robot::{IRP6_TEMPLATE, Joint, JointKind, Robot, TX40};
 use rig_shared::transmission::DriveKind;
 
-use crate::{DriveStiffness, ToolPoint, described_stiffness, given_stiffness};
+use crate::{
+    ComplianceOptions, DriveStiffness, ToolPoint, described_stiffness, given_stiffness,
+    identify_compliance,
+};
 
 /// Place of the tool point and its axes.
 fn tool(robot: &Robot, q: &[f64], offset: [f64; 3]) -> Isometry3<f64> {
@@ -247,4 +250,54 @@ fn uncertainty_of_the_stiffness_reaches_both_matrices() {
             "{k}: {spread} against {std}"
         );
     }
+}
+
+/// A screw of the IRp-6 has a dead centre on the map: without it one cell would take all colours.
+#[test]
+fn a_dead_centre_is_named_and_left_blank() {
+    let robot = Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap();
+    let options = ComplianceOptions {
+        stiffness: vec![5e4, 40.0, 40.0, 5e3, 5e3],
+        map: Some([1, 2]),
+        ..ComplianceOptions::default()
+    };
+    let found = identify_compliance(&robot, &[], &[], &options).unwrap();
+    let map = found.map.unwrap();
+    let blank = map.values.iter().flatten().filter(|v| v.is_none()).count();
+    println!(
+        "dead centres: {:?}, {blank} blank, {:?} m/N",
+        map.singular, map.range
+    );
+    assert!(!map.singular.is_empty() && blank > 0 && blank < 400);
+    assert!(map.range[1] < 1.0, "{:?}", map.range);
+    assert!(found.warnings.iter().any(|w| w.contains("dead centre")));
+}
+
+#[test]
+fn poses_beyond_limits_and_a_tool_point_on_the_axis_are_told() {
+    let robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    let said = |stiffness: Vec<f64>, pose: Vec<f64>| {
+        let options = ComplianceOptions {
+            stiffness,
+            poses: vec![pose],
+            ..ComplianceOptions::default()
+        };
+        identify_compliance(&robot, &[], &[], &options)
+            .unwrap()
+            .warnings
+            .join(" ")
+    };
+    let rigid = f64::INFINITY;
+    // Only the last joint yields, and its axis holds the origin of the flange.
+    let last = vec![rigid, rigid, rigid, rigid, rigid, 1e3];
+    let text = said(last, vec![0.1; 6]);
+    assert!(
+        text.contains("--tool") && !text.contains("limits"),
+        "{text}"
+    );
+    let text = said(vec![1e4; 6], vec![0.0, 9.0, 0.5, 0.0, 0.5, 0.0]);
+    assert!(
+        text.contains("limits") && !text.contains("--tool"),
+        "{text}"
+    );
 }

@@ -290,7 +290,9 @@ fn lines(robot: &Robot, found: &Compliance) -> Vec<String> {
                     true => format_value(most.compliance.value, most.compliance.std),
                     false => format_significant(most.compliance.value, 4),
                 },
-                most.direction.map(|v| format!("{v:.3}")).join(", ")
+                most.direction
+                    .map(|v| format!("{:.3}", if v.abs() < 5e-4 { 0.0 } else { v }))
+                    .join(", ")
             ));
         }
     }

@@ -586,7 +586,7 @@ pub fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError>
     for (k, path) in data.iter().enumerate() {
         if data[..k].iter().any(|before| real(before) == real(path)) {
             return Err(CommandError::Sentence(format!(
-                "{} is given twice as training data, which would count its noise twice; {instead}.",
+                "{} is given twice, which would count its noise twice; {instead}.",
                 path.display()
             )));
         }

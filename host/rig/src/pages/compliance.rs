@@ -25,6 +25,10 @@ const WRENCH: [(&str, &str); 6] = [
     ("mz", "per N·m"),
 ];
 
+/// Ratio of the largest to the smallest value of a map from which on its colours are logarithmic. By judgement: on a
+/// linear scale a ridge beside a dead centre leaves one colour to all else.
+const LOGARITHMIC: f64 = 5.0;
+
 /// Composes the page of the compliance.
 pub fn compliance(found: &Compliance, context: &Context) -> Document {
     let mut sections: Vec<Section> = parts::warnings(&[&found.warnings, &context.warnings])
@@ -197,11 +201,13 @@ fn curve(drive: &DriveLoading) -> Option<Plot> {
     }
     if let Some(stiffness) = &drive.stiffness {
         let half = drive.gap.map_or(0.0, |gap| 0.5 * gap.value);
+        let zero = drive.gap_torque.unwrap_or_default();
         let [low, high] = drive.load;
-        let at = |f: f64| f / stiffness.value + half * f.signum();
+        let at = |f: f64| f / stiffness.value + half * (f - zero).signum();
         let mut x = vec![low];
-        if low < 0.0 && high > 0.0 && half > 0.0 {
-            x.extend([-1e-9 * high, 1e-9 * high]);
+        if low < zero && high > zero && half > 0.0 {
+            let step = 1e-9 * (high - low);
+            x.extend([zero - step, zero + step]);
         }
         x.push(high);
         let y = x.iter().map(|f| at(*f)).collect();
@@ -237,7 +243,7 @@ fn frequency(found: &FrequencyResponse) -> Section {
         .with(Block::Plot(phase(found, &used)))
         .with(Block::Plot(coherence(found)))
         .with(Block::Text(format!(
-            "Mean pose: {}. Squared residual over noise: {} (1 for a response that two masses explain). Standard deviations are scaled by it.",
+            "Mean pose: {}. Squared residual over noise: {} (1 for a response that two masses explain). Variances are scaled by it, standard deviations by its root.",
             response_pose(found),
             format_significant(found.misfit, 3)
         )))
@@ -468,8 +474,8 @@ fn matrix(
 
 /// The compliance of the tool point at one pose.
 fn tool_point(found: &Compliance, pose: &ToolCompliance, k: usize) -> Section {
-    let list: Vec<String> = pose.pose.iter().map(|q| format!("{q:.4}")).collect();
-    let [x, y, z] = pose.position.map(|v| format!("{v:.4}"));
+    let list: Vec<String> = pose.pose.iter().map(|q| fixed(*q, 4)).collect();
+    let [x, y, z] = pose.position.map(|v| fixed(v, 4));
     let lead = format!(
         "Joints at {}; tool point at {x}, {y}, {z} m in the base frame. All axes are those of the base.",
         list.join(", ")
@@ -558,18 +564,33 @@ fn principal(found: &Compliance, pose: &ToolCompliance) -> Table {
         columns,
         rows: (pose.principal.iter())
             .map(|own| {
+                let arms: f64 = (0..3).map(|r| pose.compliance[r + 3][r + 3]).sum();
+                let most = pose.principal[0].compliance.value.max(1e-18 * arms);
+                let yields = own.compliance.value > 1e-12 * most;
                 let mut cells = vec![
-                    own.direction.map(|v| format!("{v:.3}")).join(", "),
-                    match own.compliance.value > 1e-12 * pose.principal[0].compliance.value {
+                    own.direction.map(|v| fixed(v, 3)).join(", "),
+                    match yields {
                         true => value(&own.compliance),
                         false => "0".to_owned(),
                     },
                 ];
-                cells.extend(own.shares.iter().map(|s| format!("{:.1}", 100.0 * s)));
+                cells.extend(own.shares.iter().map(|s| match yields {
+                    true => format!("{:.1}", 100.0 * s),
+                    false => "–".to_owned(),
+                }));
                 cells
             })
             .collect(),
         note: String::new(),
+    }
+}
+
+/// Formats with fixed decimals; what rounds to zero has no sign.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.trim_start_matches(['-', '0', '.']).is_empty() {
+        true => text.trim_start_matches('-').to_owned(),
+        false => text,
     }
 }
 
@@ -590,7 +611,10 @@ fn chart(found: &Compliance, map: &ComplianceMap) -> Section {
         title: "Largest displacement per force".into(),
         x: Axis::new(map.names[0].clone(), map.units[0]),
         y: Axis::new(map.names[1].clone(), map.units[1]),
-        value: Axis::new("", "µm/N"),
+        value: match map.range[1] > LOGARITHMIC * map.range[0] {
+            true => Axis::log("", "µm/N"),
+            false => Axis::new("", "µm/N"),
+        },
         columns: map.x.clone(),
         rows: map.y.clone(),
         values: (map.values.iter())
@@ -605,9 +629,9 @@ fn chart(found: &Compliance, map: &ComplianceMap) -> Section {
             (point(&map.most_compliant), "most compliant".into()),
         ],
         note: match held.is_empty() {
-            true => "Blank where the drives do not reach.".into(),
+            true => "Blank where the drives do not reach or are near a dead centre.".into(),
             false => format!(
-                "Other joints: {}. Blank where the drives do not reach.",
+                "Other joints: {}. Blank where the drives do not reach or are near a dead centre.",
                 held.join(", ")
             ),
         },
