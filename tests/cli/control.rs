@@ -142,9 +142,26 @@ fn wrong_options_are_refused_in_a_sentence() {
     assert!(contact(&["--press", "10000"]).contains("torque limits"));
     assert!(contact(&["--stiffness", "0"]).contains("surface stiffness 0"));
     assert!(contact(&["--pose", "0"]).contains("one for each of the 2 joints"));
+    assert!(contact(&["--pose", "nan", "0"]).contains("--pose contains NaN"));
+    assert!(contact(&["--impedance", "nan"]).contains("impedance NaN"));
+    assert!(contact(&["--slide", "1"]).contains("--slide"));
     // A model of another robot.
-    let mut command = control("edda.toml", &["--model"], &out);
-    let said = refuse(command.arg(robot("irp6.toml")));
+    let mut command = control("edda.toml", &[], &out);
+    let said = refuse(command.arg("--model").arg(robot("irp6.toml")));
     assert!(said.contains("5 joints, and the robot has 2"), "{said}");
     assert!(!out.exists());
+}
+
+/// With --force no recording of the earlier run stays beside the new results, and the user's own files do.
+#[test]
+fn recordings_of_an_earlier_run_are_removed_with_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let short = ["--duration", "3", "--law"];
+    let run = |law: &[&str]| control("one-link.toml", &[&short[..], law].concat(), &out);
+    succeed(&mut run(&["pid", "computed-torque"]));
+    fs::write(out.join("mine.csv"), "mine").unwrap();
+    succeed(&mut run(&["pid", "--force"]));
+    assert!(out.join("pid.csv").is_file() && out.join("mine.csv").is_file());
+    assert!(!out.join("computed-torque.csv").exists());
 }

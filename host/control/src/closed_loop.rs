@@ -6,6 +6,8 @@ use rand_pcg::Pcg64;
 use super::contact_task::ContactTask;
 use super::controller::Controller;
 use super::error::ControlError;
+use super::law_model::LawModel;
+use super::mobility::free_inertia;
 use super::plant::{Contact, Plant};
 use super::sensing::Encoders;
 use super::settings::Settings;
@@ -55,11 +57,7 @@ pub(crate) fn closed_loop(
     let n = reference.len();
     let samples = reference.first().map_or(0, Vec::len);
     let start: Vec<f64> = reference.iter().map(|series| series[0].position).collect();
-    let contact = task.map(|task| Contact {
-        surface: task.surface,
-        task: task.task(),
-        inertia: task.inertia[0],
-    });
+    let contact = task.map(|task| contact(robot, task)).transpose()?;
     let mut plant = Plant::new(model, contact, &start)?;
     let mut encoders = Encoders::new(robot, settings.rate, settings.resolution);
     let mut random = Pcg64::seed_from_u64(settings.seed);
@@ -112,6 +110,16 @@ pub(crate) fn closed_loop(
         stable(robot, &plant, controller, t)?;
     }
     Ok(trace)
+}
+
+/// Returns the surface with the tool of the true robot on it.
+fn contact<'a>(robot: &Robot, task: &'a ContactTask) -> Result<Contact<'a>, ControlError> {
+    let truth = LawModel::of(robot)?;
+    Ok(Contact {
+        surface: task.surface,
+        task: task.task(),
+        inertia: free_inertia(&truth, &task.pose, task.tool, task.directions[0])?,
+    })
 }
 
 fn empty(n: usize, samples: usize, period: f64) -> Trace {

@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
 use super::design::at_start;
 use super::error::{ControlError, within};
 use super::law_model::LawModel;
+use super::mobility::{jacobian, mobility};
+use super::position_limits::PositionLimits;
 use super::settings::{LawKind, Settings};
 use super::surface::Surface;
-use super::tool::tool_pose;
 use rig_model::robot::Robot;
 use rig_shared::control::arm::Task;
 use rig_shared::control::arm::impedance::Target;
@@ -72,7 +73,7 @@ pub struct ContactTask {
     pub inertia: Vec<f64>,
     /// Wanted force, N.
     pub force: f64,
-    /// Highest speed of the approach, m/s.
+    /// Planned highest speed of the hybrid law's approach, m/s.
     pub approach: f64,
     /// Bandwidth of the force loop, Hz.
     pub force_bandwidth: f64,
@@ -87,18 +88,6 @@ pub struct ContactTask {
     pub duration: f64,
     /// What was chosen, one sentence each.
     pub notes: Vec<String>,
-}
-
-/// Position of the tool and its Jacobian (3 × n) at a pose.
-fn jacobian(
-    model: &LawModel,
-    q: &[f64],
-    tool: [f64; 3],
-) -> Result<([f64; 3], DMatrix<f64>), ControlError> {
-    let mut columns = vec![[0.0; 6]; q.len()];
-    let position = tool_pose(&model.chain, q, tool, &mut columns)?;
-    let matrix = DMatrix::from_fn(3, q.len(), |axis, j| columns[j][axis]);
-    Ok((position, matrix))
 }
 
 /// Singular values of the tool's Jacobian, squared, from the largest.
@@ -192,26 +181,6 @@ pub fn tool_point(model: &LawModel, notes: &mut Vec<String>) -> Result<[f64; 3],
     Ok([0.0; 3])
 }
 
-/// Mobility of the tool J·A⁻¹·Jᵀ, m/(N·s²).
-fn mobility(
-    model: &LawModel,
-    q: &[f64],
-    matrix: &DMatrix<f64>,
-) -> Result<Matrix3<f64>, ControlError> {
-    let n = q.len();
-    let mut mass = vec![0.0; n * n];
-    model
-        .view()
-        .inertia_matrix(q, &mut mass)
-        .map_err(at_start)?;
-    let mass = DMatrix::from_row_slice(n, n, &mass);
-    let inverse = mass.try_inverse().ok_or_else(|| {
-        ControlError::Unreachable("The inertia matrix of the law's model cannot be inverted; give every joint an inertia.".to_owned())
-    })?;
-    let full = matrix * inverse * matrix.transpose();
-    Ok(Matrix3::from_fn(|a, b| full[(a, b)]))
-}
-
 /// Returns the directions: `normal` first, then those along the surface that the tool can be moved along.
 fn directions(mobility: &Matrix3<f64>, normal: Vector3<f64>) -> Vec<Vector3<f64>> {
     let largest = mobility.diagonal().max();
@@ -266,6 +235,59 @@ fn choose_normal(
     Ok(normal)
 }
 
+/// Returns the given pose of the joints, or one in which the tool moves most evenly.
+fn start_pose(
+    model: &LawModel,
+    given: Option<&[f64]>,
+    tool: [f64; 3],
+    notes: &mut Vec<String>,
+) -> Result<Vec<f64>, ControlError> {
+    let n = model.parameters.len();
+    match given {
+        Some(pose) if pose.len() == n => match pose.iter().find(|q| !q.is_finite()) {
+            Some(wrong) => Err(ControlError::Unreachable(format!(
+                "--pose contains {wrong}; give a finite number, rad or m, for each joint."
+            ))),
+            None => match PositionLimits::of(&model.robot).outside(|j| pose[j]) {
+                Some(outside) => Err(ControlError::Unreachable(format!(
+                    "The start pose is beyond a position limit: {outside}. Give another --pose."
+                ))),
+                None => Ok(pose.to_vec()),
+            },
+        },
+        Some(pose) => Err(ControlError::Unreachable(format!(
+            "--pose has {} numbers; give one for each of the {n} joints.",
+            pose.len()
+        ))),
+        None => {
+            let (pose, _) = best_pose(model, tool)?;
+            let list: Vec<String> = pose.iter().map(|q| format!("{q:.3}")).collect();
+            notes.push(format!(
+                "No pose is given: the arm starts at {} (rad or m), where the tool moves most evenly.",
+                list.join(", ")
+            ));
+            Ok(pose)
+        }
+    }
+}
+
+/// Returns the inertia of the tool along each direction while it moves along all of them, kg.
+fn inertias(
+    mobility: &Matrix3<f64>,
+    directions: &[Vector3<f64>],
+) -> Result<Vec<f64>, ControlError> {
+    let count = directions.len();
+    let along = DMatrix::from_fn(count, count, |a, b| {
+        directions[a].dot(&(mobility * directions[b]))
+    });
+    match along.try_inverse() {
+        Some(inverse) => Ok(inverse.diagonal().as_slice().to_vec()),
+        None => Err(ControlError::Unreachable(
+            "The start pose is singular; give another --pose.".to_owned(),
+        )),
+    }
+}
+
 impl ContactTask {
     /// Chooses a task for the model of a law, with defaults where the options leave them open.
     ///
@@ -284,50 +306,30 @@ impl ContactTask {
             0.0..=1.0,
             "it must be between 0 and 1 m",
         )?;
+        if let Some(stiffness) = options.stiffness {
+            within(
+                "impedance",
+                stiffness,
+                1.0..=1e6,
+                "it must be between 1 and 1000000 N/m",
+            )?;
+        }
         let mut notes = Vec::new();
         let tool = match options.tool {
             Some(tool) => tool,
             None => tool_point(model, &mut notes)?,
         };
-        let n = model.parameters.len();
-        let pose = match &options.pose {
-            Some(pose) if pose.len() == n && pose.iter().all(|q| q.is_finite()) => pose.clone(),
-            Some(pose) => {
-                return Err(ControlError::Unreachable(format!(
-                    "--pose has {} numbers; give one for each of the {n} joints.",
-                    pose.len()
-                )));
-            }
-            None => {
-                let (pose, _) = best_pose(model, tool)?;
-                let list: Vec<String> = pose.iter().map(|q| format!("{q:.3}")).collect();
-                notes.push(format!(
-                    "No pose is given: the arm starts at {} (rad or m), where the tool moves most evenly.",
-                    list.join(", ")
-                ));
-                pose
-            }
-        };
+        let pose = start_pose(model, options.pose.as_deref(), tool, &mut notes)?;
         let (origin, matrix) = jacobian(model, &pose, tool)?;
         let mobility = mobility(model, &pose, &matrix)?;
         let normal = choose_normal(&mobility, options.normal, &mut notes)?;
         let directions = directions(&mobility, normal);
         let count = directions.len();
-        let sub = DMatrix::from_fn(count, count, |a, b| {
-            directions[a].dot(&(mobility * directions[b]))
-        });
-        let inertia: Vec<f64> = match sub.try_inverse() {
-            Some(inverse) => inverse.diagonal().as_slice().to_vec(),
-            None => {
-                return Err(ControlError::Unreachable(
-                    "The start pose is singular; give another --pose.".to_owned(),
-                ));
-            }
-        };
+        let inertia = inertias(&mobility, &directions)?;
         let force = force(model, &pose, &matrix, normal, options.force, &mut notes)?;
         if let Some(rate) = needed_rate(&surface, inertia[0], settings) {
             notes.push(format!(
-                "The measured force is late on this stiff surface for a tool of {:.3} kg, and the force will overshoot: give --rate {rate:.0}, or a softer surface.",
+                "The measured force is late on this stiff surface for a tool of {:.3} kg, and the force may overshoot: give --rate {rate:.0}, or a softer surface.",
                 inertia[0]
             ));
         }
@@ -342,6 +344,9 @@ impl ContactTask {
         let slide_start =
             1.2 * surface.gap / approach.min(force_speed(force, &surface, settings)) + SETTLE;
         let slides = count > 1 && options.slide > 0.0;
+        if options.slide > 0.0 && !slides {
+            notes.push("There is no slide: the arm moves the tool along no direction of the surface without leaving it.".to_owned());
+        }
         Ok(Self {
             surface,
             tool,

@@ -57,6 +57,32 @@ pub enum ControlError {
         /// Joints of the description.
         found: usize,
     },
+    /// A joint of the model is of another kind than the robot's.
+    #[error(
+        "{what} describes another robot: its joint \"{name}\" is {found}, and the robot's joint {place} (\"{own}\") is {expected}; give a description of the same robot."
+    )]
+    OtherKind {
+        /// The description.
+        what: String,
+        /// Place of the joint, from 1.
+        place: usize,
+        /// Name of the robot's joint.
+        own: String,
+        /// Kind of the robot's joint.
+        expected: &'static str,
+        /// Name of the joint in the description.
+        name: String,
+        /// Its kind.
+        found: &'static str,
+    },
+    /// A description cannot be the model of a law.
+    #[error("{what} cannot be the model of a law: {reason}")]
+    Model {
+        /// The description.
+        what: String,
+        /// The reason.
+        reason: SimulateError,
+    },
     /// A setting is out of range.
     #[error("{name} {value} is not possible: {right}.")]
     Setting {

@@ -10,8 +10,11 @@ use super::controller::{Controller, limits, regressor};
 use super::error::ControlError;
 use super::law_model::LawModel;
 use super::measures::{self, PLOTTED};
+use super::position_limits::PositionLimits;
 use super::result::{Adaptation, Adapted, Contact, Robustness, Tracking};
 use super::settings::{LawKind, Settings};
+use super::task_path;
+use super::warnings;
 use rig_model::robot::Robot;
 use rig_model::simulate::Model;
 use rig_numerics::statistics::median_of_finite;
@@ -51,6 +54,7 @@ impl Bench<'_> {
         model: &LawModel,
         task: Option<&ContactTask>,
     ) -> Result<(Trace, Vec<String>), ControlError> {
+        PositionLimits::of(self.robot).check(self.reference, self.settings.period())?;
         let mut controller = Controller::design(law, model, self.reference, task, &self.settings)?;
         let truth = (self.robot, self.truth);
         let trace = closed_loop(truth, &mut controller, self.reference, task, &self.settings)?;
@@ -76,6 +80,12 @@ impl Bench<'_> {
         let ticks = measures::ticks(trace.q[0].len());
         let pick = |list: &[f64]| -> Vec<f64> { ticks.clone().map(|k| list[k]).collect() };
         let errors = (0..trace.q.len()).map(|j| pick(&measures::errors(&trace, self.reference, j)));
+        let adaptation = match law {
+            LawKind::Adaptive => Some(self.adaptation(model, &trace)?),
+            _ => None,
+        };
+        let mut warnings = warnings::of_motion(self.robot, &trace, false);
+        warnings.extend(adaptation.as_ref().and_then(warnings::of_adaptation));
         let measures = Tracking {
             law,
             model: name.to_owned(),
@@ -83,10 +93,8 @@ impl Bench<'_> {
             tool_rms,
             tool_largest,
             robustness: self.robustness(law, model, None, measure)?,
-            adaptation: match law {
-                LawKind::Adaptive => Some(self.adaptation(model, &trace)?),
-                _ => None,
-            },
+            adaptation,
+            warnings,
             motion: String::new(),
             time: ticks.clone().map(|k| k as f64 * trace.period).collect(),
             errors: errors.collect(),
@@ -110,6 +118,7 @@ impl Bench<'_> {
         name: &str,
         task: &ContactTask,
     ) -> Result<Run<Contact>, ControlError> {
+        task_path::check(self.robot, task)?;
         let (trace, notes) = self.run(law, model, Some(task))?;
         let found = measures::force(law, task, &trace)?;
         let measure = |trace: &Trace| measures::force(law, task, trace).map(|own| own.overshoot);
@@ -128,9 +137,11 @@ impl Bench<'_> {
             settling: found.settling,
             steady_error: found.steady_error,
             slide_force: found.slide_force,
+            slide_peak: found.slide_peak,
             slide_error: found.slide_error,
             bounces: found.bounces,
             robustness: self.robustness(law, model, Some(task), measure)?,
+            warnings: warnings::of_motion(self.robot, &trace, true),
             motion: String::new(),
             time: ticks.clone().map(|k| k as f64 * trace.period).collect(),
             forces: pick(&trace.force),

@@ -4,8 +4,8 @@ use rand::{RngExt as _, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::error::ControlError;
-use rig_model::robot::Robot;
-use rig_model::simulate::{Model, Motors};
+use rig_model::robot::{JointKind, Robot};
+use rig_model::simulate::{Model, Motors, controllers};
 use rig_shared::control::arm::{ArmModel, ArmMotors};
 use rig_shared::multibody::{COLUMNS, Chain, column};
 
@@ -19,6 +19,13 @@ pub struct LawModel {
     pub motors: Option<Motors>,
     /// The description, for its effects.
     pub robot: Robot,
+}
+
+fn kind_name(kind: JointKind) -> &'static str {
+    match kind {
+        JointKind::Revolute => "revolute",
+        JointKind::Prismatic => "prismatic",
+    }
 }
 
 impl LawModel {
@@ -39,6 +46,54 @@ impl LawModel {
             motors,
             robot: robot.clone(),
         })
+    }
+
+    /// Builds the model of another description of a robot, and a sentence about joints with other names. `what` names the
+    /// description.
+    ///
+    /// # Errors
+    /// [`ControlError::OtherRobot`], [`ControlError::OtherKind`] if it has other joints; [`ControlError::Model`] if a joint
+    /// has no inertia.
+    pub fn of_same(
+        other: &Robot,
+        robot: &Robot,
+        what: &str,
+    ) -> Result<(Self, Option<String>), ControlError> {
+        if other.joints.len() != robot.joints.len() {
+            return Err(ControlError::OtherRobot {
+                what: what.to_owned(),
+                expected: robot.joints.len(),
+                found: other.joints.len(),
+            });
+        }
+        let pairs = || other.joints.iter().zip(&robot.joints);
+        if let Some((k, (found, own))) = (pairs().enumerate()).find(|(_, (a, b))| a.kind != b.kind)
+        {
+            return Err(ControlError::OtherKind {
+                what: what.to_owned(),
+                place: k + 1,
+                own: own.name.clone(),
+                expected: kind_name(own.kind),
+                name: found.name.clone(),
+                found: kind_name(found.kind),
+            });
+        }
+        let renamed: Vec<String> = (pairs().filter(|(a, b)| a.name != b.name))
+            .map(|(a, b)| format!("{} for {}", a.name, b.name))
+            .collect();
+        let note = (!renamed.is_empty()).then(|| {
+            format!(
+                "Warning: joints of {what} have other names than those of the robot ({}); is it a description of the same robot?",
+                renamed.join(", ")
+            )
+        });
+        let refused = |reason| ControlError::Model {
+            what: what.to_owned(),
+            reason,
+        };
+        let model = Model::from_robot(other).map_err(refused)?;
+        controllers(other, &model, &other.middle_position()).map_err(refused)?;
+        Ok((Self::of(other)?, note))
     }
 
     /// Multiplies every link's ten inertial parameters by one factor, and each parameter of its drive and friction by

@@ -39,16 +39,20 @@ mod error;
 mod evaluate;
 mod law_model;
 mod measures;
+mod mobility;
 mod plant;
+mod position_limits;
 mod recording;
 mod reference;
 mod result;
 mod sensing;
 mod settings;
 mod surface;
+mod task_path;
 #[cfg(test)]
 mod tests;
 mod tool;
+mod warnings;
 
 pub use adaptation::EXCITED;
 pub use closed_loop::Trace;

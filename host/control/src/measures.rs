@@ -86,6 +86,7 @@ pub(crate) struct ForceMeasures {
     pub settling: Option<f64>,
     pub steady_error: f64,
     pub slide_force: Option<f64>,
+    pub slide_peak: Option<f64>,
     pub slide_error: Option<f64>,
     pub bounces: usize,
 }
@@ -149,6 +150,7 @@ pub(crate) fn force(
             let off: Vec<f64> = after.iter().map(|f| f - task.force).collect();
             rms(&off)
         }),
+        slide_peak: (task.slide > 0.0).then(|| after.iter().copied().fold(0.0, f64::max)),
         slide_error: along.map(|along| rms(&along)),
         bounces,
     })

@@ -16,7 +16,8 @@ const PHASE: f64 = 0.05;
 pub(crate) struct Contact<'a> {
     pub surface: Surface,
     pub task: Task<'a, f64>,
-    /// Least inertia that the tool has along the normal, kg.
+    /// Inertia of the tool along the normal in the start pose while it is free to move along the surface, kg: the smallest
+    /// one, which bounds the step of the simulation.
     pub inertia: f64,
 }
 

@@ -23,6 +23,21 @@ pub struct Evaluation {
     pub notes: Vec<String>,
 }
 
+impl Evaluation {
+    /// Returns the warnings about all motions, each with law and model.
+    pub fn warnings(&self) -> Vec<String> {
+        let of = |law: LawKind, model: &str, list: &[String]| -> Vec<String> {
+            let sentence = |text: &String| format!("{} with {model}: {text}", law.name());
+            list.iter().map(sentence).collect()
+        };
+        let tracking = self.tracking.iter();
+        let tracking = tracking.flat_map(|own| of(own.law, &own.model, &own.warnings));
+        let contact = self.contact.iter();
+        let contact = contact.flat_map(|own| of(own.law, &own.model, &own.warnings));
+        tracking.chain(contact).collect()
+    }
+}
+
 /// One joint in a motion.
 #[derive(Clone, Debug, Serialize)]
 pub struct JointMeasures {
@@ -55,6 +70,8 @@ pub struct Tracking {
     pub robustness: Option<Robustness>,
     /// What the adaptive law learnt.
     pub adaptation: Option<Adaptation>,
+    /// Limits that the motion left or stayed at, and an adaptation that diverges; one sentence each.
+    pub warnings: Vec<String>,
     /// Name of the file with the motion.
     pub motion: String,
     /// Time of the plotted samples, s.
@@ -145,12 +162,16 @@ pub struct Contact {
     pub steady_error: f64,
     /// RMS force error during the slide, N; `None` without a slide.
     pub slide_force: Option<f64>,
+    /// Largest force from the start of the slide to the end, N; `None` without a slide.
+    pub slide_peak: Option<f64>,
     /// RMS position error along the surface during the slide, m.
     pub slide_error: Option<f64>,
     /// Number of times that the tool left the surface after the first contact.
     pub bounces: usize,
     /// Overshoot with random wrong parameters.
     pub robustness: Option<Robustness>,
+    /// Limits that the motion left or stayed at, and an adaptation that diverges; one sentence each.
+    pub warnings: Vec<String>,
     /// Name of the file with the motion.
     pub motion: String,
     /// Time of the plotted samples, s.

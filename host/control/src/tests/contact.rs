@@ -2,6 +2,8 @@
 
 use super::{robot, slippery};
 use crate::contact_task::needed_rate;
+use crate::mobility::free_inertia;
+use crate::task_path;
 use crate::tool::tool_pose;
 use crate::{
     Bench, Contact, ContactOptions, ContactTask, LawKind, LawModel, Run, Settings, Surface,
@@ -290,4 +292,141 @@ fn tasks_that_no_arm_can_do_are_refused() {
     assert!(said.contains("one for each of the 2 joints"), "{said}");
     let said = refuse(&|own| own.surface.stiffness = 0.0);
     assert!(said.contains("surface stiffness 0"), "{said}");
+}
+
+#[test]
+fn tasks_beyond_the_position_limits_are_refused() {
+    let robot = robot("irp6.toml");
+    let settings = Settings::default();
+    let model = LawModel::of(&robot).unwrap();
+    // 50 mm are within the limits and 1 m is not.
+    let near = choose(&robot, &options(1e4), &settings);
+    task_path::check(&robot, &near).unwrap();
+    let mut own = options(1e4);
+    own.slide = 1.0;
+    let far = choose(&robot, &own, &settings);
+    let said = task_path::check(&robot, &far).unwrap_err().to_string();
+    assert!(said.contains("limit") && said.contains("--slide"), "{said}");
+    // The checked path ends where the hybrid law takes the arm: with a limit between start and that position of a joint,
+    // and without it, check and motion agree.
+    let run = press(&robot, LawKind::Hybrid, &near, settings);
+    assert!(
+        run.measures.warnings.is_empty(),
+        "{:?}",
+        run.measures.warnings
+    );
+    for j in 0..robot.joints.len() {
+        let travel = |sign: f64| {
+            let series = run.trace.q[j].iter();
+            series
+                .map(|q| sign * (q - near.pose[j]))
+                .fold(0.0, f64::max)
+        };
+        let sign = if travel(1.0) > travel(-1.0) {
+            1.0
+        } else {
+            -1.0
+        };
+        if travel(sign) < 0.01 {
+            continue;
+        }
+        for (share, fits) in [(0.9, false), (1.1, true)] {
+            let mut tight = robot.clone();
+            let limits = tight.joints[j].limits.as_mut().unwrap();
+            limits.position[usize::from(sign > 0.0)] = near.pose[j] + sign * share * travel(sign);
+            let found = task_path::check(&tight, &near);
+            assert_eq!(found.is_ok(), fits, "joint {j} share {share}");
+        }
+    }
+    // A pose that no joint can take, and one that is no number.
+    let mut own = options(1e4);
+    own.pose = Some(near.pose.clone());
+    own.pose.as_mut().unwrap()[2] = -3.0;
+    let said = ContactTask::choose(&model, &own, &settings)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        said.contains("-3.000 rad") && said.contains("--pose"),
+        "{said}"
+    );
+    own.pose.as_mut().unwrap()[2] = f64::NAN;
+    let said = ContactTask::choose(&model, &own, &settings)
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("--pose contains NaN"), "{said}");
+    for stiffness in [f64::NAN, 1e9, -1.0] {
+        let mut own = options(1e4);
+        own.stiffness = Some(stiffness);
+        let said = ContactTask::choose(&model, &own, &settings).unwrap_err();
+        assert!(said.to_string().starts_with("impedance"), "{said}");
+    }
+}
+
+#[test]
+fn force_peak_of_the_slide_is_that_of_the_motion() {
+    let robot = robot("irp6.toml");
+    let settings = Settings::default();
+    let task = choose(&robot, &options(1e4), &settings);
+    let run = press(&robot, LawKind::Hybrid, &task, settings);
+    let largest = run.trace.force.iter().copied().fold(0.0, f64::max);
+    let before = task.force * (1.0 + run.measures.overshoot);
+    let peak = run.measures.slide_peak.unwrap();
+    assert!(
+        peak > before && peak == largest,
+        "{peak} {before} {largest}"
+    );
+    // An arm with one joint does not slide, and says so.
+    let link = choose(&super::robot("one-link.toml"), &options(1e4), &settings);
+    assert!(link.notes.iter().any(|note| note.contains("no slide")));
+}
+
+#[test]
+fn a_tool_that_is_free_along_the_surface_is_lighter() {
+    // Without the surface a force along the normal accelerates the tool by f/m along the normal. The least kinetic energy
+    // for a unit speed along the normal is m/2 with the free inertia, by minimisation over the other directions.
+    for name in ["edda.toml", "irp6.toml"] {
+        let robot = robot(name);
+        let task = choose(&robot, &options(1e4), &Settings::default());
+        let model = LawModel::of(&robot).unwrap();
+        let free = free_inertia(&model, &task.pose, task.tool, task.directions[0]).unwrap();
+        let n = task.pose.len();
+        let mut mass = vec![0.0; n * n];
+        model.view().inertia_matrix(&task.pose, &mut mass).unwrap();
+        let mut columns = vec![[0.0; 6]; n];
+        tool_pose(&model.chain, &task.pose, task.tool, &mut columns).unwrap();
+        let along = |v: &[f64]| -> f64 {
+            let speeds = columns.iter().zip(v);
+            speeds
+                .map(|(c, v)| (0..3).map(|k| task.directions[0][k] * c[k]).sum::<f64>() * v)
+                .sum()
+        };
+        let energy = |v: &[f64]| -> f64 {
+            let pairs = (0..n).flat_map(|a| (0..n).map(move |b| (a, b)));
+            pairs.map(|(a, b)| mass[a * n + b] * v[a] * v[b]).sum()
+        };
+        // Coordinate descent of vᵀAv/(nᵀJv)².
+        let mut v: Vec<f64> = (0..n).map(|j| along(&unit(n, j))).collect();
+        for _ in 0..2000 {
+            for j in 0..n {
+                let quotient = |step: f64| {
+                    let mut w = v.clone();
+                    w[j] += step;
+                    energy(&w) / along(&w).powi(2)
+                };
+                let size = v.iter().map(|v| v.abs()).fold(1e-9, f64::max);
+                let best = [-0.1, -0.01, -1e-3, -1e-4, 0.0, 1e-4, 1e-3, 0.01, 0.1]
+                    .map(|share| share * size)
+                    .into_iter()
+                    .min_by(|a, b| quotient(*a).total_cmp(&quotient(*b)));
+                v[j] += best.unwrap();
+            }
+        }
+        let least = energy(&v) / along(&v).powi(2);
+        assert!((least / free - 1.0).abs() < 1e-3, "{name}: {least} {free}");
+        assert!(free < task.inertia[0], "{name}: {free} {:?}", task.inertia);
+    }
+}
+
+fn unit(n: usize, j: usize) -> Vec<f64> {
+    (0..n).map(|k| f64::from(u8::from(k == j))).collect()
 }

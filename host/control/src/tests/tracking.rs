@@ -194,3 +194,89 @@ fn an_unstable_loop_is_told_with_joint_and_time() {
     let text = found.to_string();
     assert!(text.contains("joint \"") && text.contains(" s, "), "{text}");
 }
+
+#[test]
+fn a_loop_at_its_torque_limits_and_a_growing_error_are_told() {
+    let robot = robot("edda.toml");
+    let truth = Model::from_robot(&robot).unwrap();
+    let model = LawModel::of(&robot).unwrap();
+    let told = |bandwidth: f64| {
+        let settings = Settings {
+            bandwidth,
+            ..Settings::default()
+        };
+        let reference = references(&default_reference(&robot, settings.rate, 5.0)).unwrap();
+        let run = bench(&robot, &truth, &reference, settings)
+            .track(LawKind::Adaptive, &model, "own")
+            .unwrap();
+        run.measures.warnings.join(" ")
+    };
+    let said = told(100.0);
+    for word in ["torque limit in", "adapted parameters grew", "--bandwidth"] {
+        assert!(said.contains(word), "{said}");
+    }
+    assert_eq!(told(5.0), "");
+}
+
+#[test]
+fn positions_beyond_the_limits_are_refused_or_told() {
+    let robot = slippery("edda.toml");
+    let truth = Model::from_robot(&robot).unwrap();
+    let model = LawModel::of(&robot).unwrap();
+    let settings = Settings::default();
+    let mut pose = robot.middle_position();
+    let high = robot.joints[1].limits.as_ref().unwrap().position[1];
+    // Asked for: refused.
+    pose[1] = high - 0.01;
+    let reference = held(&pose, 0.02, 200);
+    let said = bench(&robot, &truth, &reference, settings)
+        .track(LawKind::ComputedTorque, &model, "own")
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        said.contains("joint \"elbow\"") && said.contains("0.001 s"),
+        "{said}"
+    );
+    // Not asked for, but passed by an underdamped loop: told.
+    pose[1] = high - 0.11;
+    let reference = held(&pose, 0.1, 1000);
+    let loose = Settings {
+        damping: 0.2,
+        ..settings
+    };
+    let told = |settings: Settings| {
+        let run = bench(&robot, &truth, &reference, settings)
+            .track(LawKind::ComputedTorque, &model, "own")
+            .unwrap();
+        let beyond = run.trace.q[1].iter().any(|q| *q > high);
+        (beyond, run.measures.warnings.join(" "))
+    };
+    let (beyond, said) = told(loose);
+    assert!(
+        beyond && said.contains("joint \"elbow\" left its limit"),
+        "{said}"
+    );
+    assert_eq!(told(settings), (false, String::new()));
+}
+
+#[test]
+fn models_of_other_robots_are_refused() {
+    let robot = robot("edda.toml");
+    let mut other = robot.clone();
+    other.joints[1].name = "forearm".to_owned();
+    let (_, note) = LawModel::of_same(&other, &robot, "other.toml").unwrap();
+    assert!(note.unwrap().contains("forearm for elbow"));
+    assert!(
+        LawModel::of_same(&robot, &robot, "own")
+            .unwrap()
+            .1
+            .is_none()
+    );
+    other.joints[1].kind = rig_model::robot::JointKind::Prismatic;
+    let said = LawModel::of_same(&other, &robot, "other.toml")
+        .err()
+        .unwrap();
+    assert!(said.to_string().contains("prismatic"), "{said}");
+    assert!(matches!(said, ControlError::OtherKind { .. }));
+}

@@ -6,17 +6,17 @@ use clap::{Args as ClapArgs, ValueEnum};
 
 use super::error::CommandError;
 use super::input::{RobotArg, command_line, described};
-use super::overwrite::refuse_folder;
+use super::overwrite::{refuse_file, refuse_folder};
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
 use rig_control::{
-    Bench, ContactOptions, ContactTask, ControlError, Evaluation, LawKind, LawModel, Settings,
-    Surface, Trace, default_reference, references, resolution, save, tool_point,
+    Bench, ContactOptions, ContactTask, Evaluation, LawKind, LawModel, Settings, Surface, Trace,
+    default_reference, references, resolution, save, tool_point,
 };
 use rig_excite::load_reference;
 use rig_model::robot::Robot;
-use rig_model::simulate::Model;
+use rig_model::simulate::{Model, controllers};
 use rig_output::{can_take, folder, format_significant, write_whole};
 use rig_shared::trajectory::Reference;
 
@@ -83,7 +83,7 @@ pub(crate) struct Args {
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Replace results that the folder already holds
+    /// Replace results that the folder already holds; recordings of the earlier run are removed
     #[arg(long)]
     force: bool,
 }
@@ -110,7 +110,7 @@ struct ContactArgs {
     #[arg(long, default_value_t = 0.05)]
     slide: f64,
     /// Stiffness of the impedance, N/m [default: that of a fifth of the bandwidth]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     impedance: Option<f64>,
     /// Standard deviation of the noise of the measured force, N
     #[arg(long, default_value_t = 0.0)]
@@ -180,14 +180,21 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_folder(&args.out, &MOTIONS, args.force)?;
     let settings = settings(args)?;
     let robot = args.robot.load(ui)?;
-    let models = models(args, &robot, ui)?;
+    let mut notes = Vec::new();
+    let models = models(args, &robot, &mut notes, ui)?;
     let truth = Model::from_robot(&robot)?;
+    // Refuses a joint without inertia.
+    controllers(&robot, &truth, &robot.middle_position())?;
     let mut laws: Vec<LawKind> = Vec::new();
     for kind in args.law.iter().flat_map(|law| law.kinds()) {
         if !laws.contains(kind) {
             laws.push(*kind);
         }
     }
+    for name in motion_names(&laws, models.len()) {
+        refuse_file(&args.out.join(name), args.force)?;
+    }
+    notes.extend(assumptions(&robot, &settings));
     let mut evaluation = Evaluation {
         schema: "rig-control/1",
         robot: robot.name.clone(),
@@ -195,7 +202,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         task: None,
         tracking: Vec::new(),
         contact: Vec::new(),
-        notes: assumptions(&robot, &settings),
+        notes,
     };
     evaluation.notes.extend(truth.effects.unsimulated());
     let (pressing, tracking): (Vec<_>, Vec<_>) = laws.into_iter().partition(|law| law.is_contact());
@@ -215,6 +222,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for note in &evaluation.notes {
         ui.remark(note);
     }
+    for warning in evaluation.warnings() {
+        ui.remark(&format!("Warning: {warning}"));
+    }
     write(args, &robot, &evaluation, &motions)?;
     for line in lines(&evaluation) {
         ui.say(&line);
@@ -222,6 +232,64 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let report = args.out.join("report.html");
     ui.say(&format!("report: {}", report.display()));
     Ok(())
+}
+
+/// Returns the name of the recording of a law with model `k` of `models`.
+fn motion_name(law: LawKind, k: usize, models: usize) -> String {
+    match models {
+        1 => format!("{}.csv", law.name()),
+        _ => format!("{}-{}.csv", law.name(), k + 1),
+    }
+}
+
+/// Returns the names of all recordings.
+fn motion_names(laws: &[LawKind], models: usize) -> Vec<String> {
+    let of = |law: &LawKind| {
+        let law = *law;
+        (0..models).map(move |k| motion_name(law, k, models))
+    };
+    laws.iter().flat_map(of).collect()
+}
+
+/// Removes the recordings that an earlier run left in the folder. Its control.json lists them; the names are this
+/// command's.
+///
+/// # Errors
+/// A file cannot be removed.
+fn remove_earlier(out: &Path) -> Result<(), CommandError> {
+    let Ok(text) = std::fs::read_to_string(out.join("control.json")) else {
+        return Ok(());
+    };
+    let Ok(earlier) = serde_json::from_str::<serde_json::Value>(&text) else {
+        return Ok(());
+    };
+    let runs = ["tracking", "contact"].into_iter();
+    let runs = runs.flat_map(|part| earlier[part].as_array().into_iter().flatten());
+    for name in runs.filter_map(|run| run["motion"].as_str()) {
+        let path = out.join(name);
+        if is_motion(name) && path.is_file() {
+            std::fs::remove_file(&path).map_err(|error| {
+                CommandError::Sentence(format!(
+                    "{} of an earlier run cannot be removed: {error}.",
+                    path.display()
+                ))
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns true if this command writes recordings of this name: a law, perhaps with a number.
+fn is_motion(name: &str) -> bool {
+    MOTIONS.contains(&name)
+        || MOTIONS.iter().any(|own| {
+            let law = own.trim_end_matches(".csv");
+            (name
+                .strip_prefix(law)
+                .and_then(|rest| rest.strip_prefix('-')))
+            .and_then(|rest| rest.strip_suffix(".csv"))
+            .is_some_and(|number| number.parse::<usize>().is_ok())
+        })
 }
 
 /// A motion to be written: file name, motion, reference.
@@ -244,10 +312,7 @@ impl Whole<'_> {
     ) -> Result<(), CommandError> {
         for law in laws {
             for (k, (name, model)) in self.models.iter().enumerate() {
-                let motion = match self.models.len() {
-                    1 => format!("{}.csv", law.name()),
-                    _ => format!("{}-{}.csv", law.name(), k + 1),
-                };
+                let motion = motion_name(*law, k, self.models.len());
                 run(*law, model, name, motion)?;
             }
         }
@@ -411,8 +476,13 @@ fn settings(args: &Args) -> Result<Settings, CommandError> {
     Ok(settings)
 }
 
-/// Returns the models of the laws with their names.
-fn models(args: &Args, robot: &Robot, ui: &Ui) -> Result<Vec<(String, LawModel)>, CommandError> {
+/// Returns the models of the laws with their names. Adds sentences about them to `notes`.
+fn models(
+    args: &Args,
+    robot: &Robot,
+    notes: &mut Vec<String>,
+    ui: &Ui,
+) -> Result<Vec<(String, LawModel)>, CommandError> {
     let name = |path: &Path| {
         let file = path.file_name().unwrap_or(path.as_os_str());
         file.to_string_lossy().into_owned()
@@ -423,15 +493,9 @@ fn models(args: &Args, robot: &Robot, ui: &Ui) -> Result<Vec<(String, LawModel)>
     }
     for path in &args.model {
         let other = described(path, args.robot.chain(), ui)?.robot;
-        if other.joints.len() != robot.joints.len() {
-            return Err(ControlError::OtherRobot {
-                what: path.display().to_string(),
-                expected: robot.joints.len(),
-                found: other.joints.len(),
-            }
-            .into());
-        }
-        models.push((name(path), LawModel::of(&other)?));
+        let (model, note) = LawModel::of_same(&other, robot, &path.display().to_string())?;
+        notes.extend(note);
+        models.push((name(path), model));
     }
     for (name, model) in &mut models {
         if (args.scale - 1.0).abs() > 0.0 {
@@ -494,6 +558,7 @@ fn write(
     motions: &[Motion],
 ) -> Result<(), CommandError> {
     folder(&args.out)?;
+    remove_earlier(&args.out)?;
     let json = serde_json::to_string_pretty(evaluation).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
@@ -540,9 +605,11 @@ fn lines(evaluation: &Evaluation) -> Vec<String> {
         lines.push(line);
         if let Some(learnt) = &own.adaptation {
             lines.push(format!(
-                "  the motion excites {} of {} directions of the base parameters; torque error of the model {} -> {} % of the limits",
+                "  the motion excites {} of {} directions of the base parameters; error in these {} -> {} parameter sizes; torque error of the model {} -> {} % of the limits",
                 learnt.excited,
                 learnt.count,
+                short(learnt.error[0]),
+                short(learnt.error[1]),
                 short(100.0 * learnt.torque_error[0]),
                 short(100.0 * learnt.torque_error[1])
             ));
@@ -552,8 +619,11 @@ fn lines(evaluation: &Evaluation) -> Vec<String> {
         let settling = own.settling.map_or("not before the slide".to_owned(), |t| {
             format!("after {} s", short(t))
         });
+        let slide = own.slide_peak.map_or_else(String::new, |peak| {
+            format!(", at most {} N during the slide", short(peak))
+        });
         let mut line = format!(
-            "{} with {}: {} N, overshoot {} %, settled {settling}, steady error {} N, {} bounces",
+            "{} with {}: {} N, overshoot {} % before the slide, settled {settling}, steady error {} N{slide}, {} bounces",
             own.law.name(),
             own.model,
             short(own.force),

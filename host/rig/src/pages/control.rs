@@ -14,7 +14,8 @@ const GOOD_OVERSHOOT: f64 = 0.1;
 
 /// Composes the page.
 pub fn control(robot: &Robot, found: &Evaluation, context: &Context) -> Document {
-    let mut sections = Vec::new();
+    let warned = found.warnings();
+    let mut sections: Vec<Section> = parts::warnings(&[&warned]).into_iter().collect();
     if !found.notes.is_empty() {
         let notes = found.notes.iter().map(|note| parts::info(note.as_str()));
         let section = Section::new("assumed", "What was assumed", "");
@@ -43,7 +44,7 @@ pub fn control(robot: &Robot, found: &Evaluation, context: &Context) -> Document
         subtitle:
             "Laws in a simulated closed loop: errors, forces, and robustness to wrong parameters."
                 .into(),
-        summary: summary(found),
+        summary: summary(found, warned.len()),
         sections,
         footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
     }
@@ -78,15 +79,26 @@ fn role(k: usize) -> Role {
     Role::ALL[k % Role::ALL.len()]
 }
 
-fn summary(found: &Evaluation) -> Vec<Fact> {
+/// Returns the tone of a result.
+fn tone(good: bool) -> Tone {
+    match good {
+        true => Tone::Good,
+        false => Tone::Warning,
+    }
+}
+
+fn summary(found: &Evaluation, warned: usize) -> Vec<Fact> {
     let mut facts = Vec::new();
+    if warned > 0 {
+        facts.push(parts::warning_count(warned));
+    }
     let best = (found.tracking.iter()).min_by(|a, b| a.tool_rms.total_cmp(&b.tool_rms));
     if let Some(best) = best {
         facts.push(
             Fact::new("Smallest tool error", short(1e3 * best.tool_rms))
                 .unit("mm RMS")
                 .note(format!("{} with {}", best.law.name(), best.model))
-                .tone(Tone::Good),
+                .tone(tone(best.warnings.is_empty())),
         );
     }
     for own in found.tracking.iter().take(3) {
@@ -97,17 +109,21 @@ fn summary(found: &Evaluation) -> Vec<Fact> {
         );
     }
     for own in found.contact.iter().take(4) {
+        let band = (1.0 + GOOD_OVERSHOOT) * own.force;
+        let slide = own.slide_peak.map_or_else(String::new, |peak| {
+            format!(", slide: at most {} of {} N", short(peak), short(own.force))
+        });
+        let good = own.overshoot <= GOOD_OVERSHOOT
+            && own.slide_peak.is_none_or(|peak| peak <= band)
+            && own.warnings.is_empty();
         facts.push(
             Fact::new(
                 format!("Force overshoot, {}", own.law.name()),
                 short(100.0 * own.overshoot),
             )
             .unit("%")
-            .note(own.model.clone())
-            .tone(match own.overshoot <= GOOD_OVERSHOOT {
-                true => Tone::Good,
-                false => Tone::Warning,
-            }),
+            .note(format!("{}{slide}", own.model))
+            .tone(tone(good)),
         );
     }
     facts
@@ -253,8 +269,13 @@ fn adaptation(k: usize, own: &Tracking, learnt: &Adaptation) -> Section {
         format!("adaptation-{}", k + 1),
         format!("What the adaptive law learnt, {}", own.model),
         format!(
-            "The motion excites {} of {} directions of the base parameters: an error of one parameter size there makes at least 1 % of the motion's torque. The law can only learn these. Errors in the others change no torque of this motion, and stay.",
-            learnt.excited, learnt.count
+            "The motion excites {} of {} directions of the base parameters: an error of one parameter size there makes at least 1 % of the motion's torque. The law reduces the torque error in these directions: their error went from {} to {} parameter sizes, the torque error of the model from {} to {} % of the limits. Errors in the other directions make less torque than that, and hardly change.",
+            learnt.excited,
+            learnt.count,
+            short(learnt.error[0]),
+            short(learnt.error[1]),
+            short(100.0 * learnt.torque_error[0]),
+            short(100.0 * learnt.torque_error[1])
         ),
     )
     .with(Block::Plot(plot(
@@ -277,49 +298,91 @@ fn adaptation(k: usize, own: &Tracking, learnt: &Adaptation) -> Section {
             Column::number("Start", ""),
             Column::number("End", ""),
             Column::text("Unit"),
-            Column::number("Excited", "%"),
+            Column::number("In excited directions", "%"),
         ],
         rows: rows.collect(),
-        note: "Excited: share of the parameter that lies in the excited directions. A parameter below 100 % need not converge.".into(),
+        note: "In excited directions: share of the parameter that lies there. It does not say that the value converges. A single parameter converges only if its share is 100 % and the error in all excited directions falls to zero; weakly excited directions fall slowly.".into(),
     }))
 }
 
+/// Returns the measures of a force until the slide.
 fn contact_row(own: &Contact) -> Vec<String> {
     let some = |value: Option<f64>| value.map_or("–".to_owned(), short);
-    let mut row = vec![
-        own.law.name().to_owned(),
-        own.model.clone(),
-        short(own.force),
+    vec![
         short(1e3 * own.impact_speed),
         some(own.rise),
         short(100.0 * own.overshoot),
         some(own.settling),
         short(own.steady_error),
-        some(own.slide_force),
-        some(own.slide_error.map(|v| 1e3 * v)),
         own.bounces.to_string(),
-    ];
-    row.extend(robust(own.robustness.as_ref(), 100.0));
-    row
+    ]
+}
+
+/// Returns the tables of forces: until the slide, during it, and with wrong parameters.
+fn force_tables(laws: &[Contact]) -> Vec<Block> {
+    let law = || vec![Column::text("Law"), Column::text("Model")];
+    let name = |own: &Contact| vec![own.law.name().to_owned(), own.model.clone()];
+    let table = |caption: &str, columns: Vec<Column>, rows: Vec<Vec<String>>, note: &str| {
+        Block::Table(Table {
+            caption: caption.into(),
+            columns: law().into_iter().chain(columns).collect(),
+            rows: (laws.iter().zip(rows))
+                .map(|(own, row)| name(own).into_iter().chain(row).collect())
+                .collect(),
+            note: note.into(),
+        })
+    };
+    let mut tables = vec![table(
+        "Forces before the slide",
+        vec![
+            Column::number("Impact speed", "mm/s"),
+            Column::number("Rise", "s"),
+            Column::number("Overshoot", "%"),
+            Column::number("Settling", "s"),
+            Column::number("Steady error", "N"),
+            Column::number("Bounces", ""),
+        ],
+        laws.iter().map(contact_row).collect(),
+        "Rise: 10 to 90 %. Settling: from contact until the force stays within 5 %. Bounces are those of the whole motion.",
+    )];
+    if laws.iter().any(|own| own.slide_peak.is_some()) {
+        let some = |value: Option<f64>| value.map_or("–".to_owned(), short);
+        let row = |own: &Contact| {
+            vec![
+                some(own.slide_peak),
+                some(own.slide_force),
+                some(own.slide_error.map(|v| 1e3 * v)),
+            ]
+        };
+        tables.push(table(
+            "Forces during the slide",
+            vec![
+                Column::number("Largest force", "N"),
+                Column::number("Force error, RMS", "N"),
+                Column::number("Path error, RMS", "mm"),
+            ],
+            laws.iter().map(row).collect(),
+            "From the start of the slide to the end of the motion.",
+        ));
+    }
+    let columns = robust_columns(laws[0].robustness.as_ref(), "%");
+    if !columns.is_empty() {
+        let rows = laws
+            .iter()
+            .map(|own| robust(own.robustness.as_ref(), 100.0));
+        tables.push(table(
+            "Overshoot with wrong parameters",
+            columns,
+            rows.collect(),
+            "Overshoot before the slide.",
+        ));
+    }
+    tables
 }
 
 fn contact(found: &Evaluation) -> Section {
     let laws = &found.contact;
     let many = several(laws.iter().map(|own| own.model.as_str()));
-    let mut columns = vec![
-        Column::text("Law"),
-        Column::text("Model"),
-        Column::number("Wanted force", "N"),
-        Column::number("Impact speed", "mm/s"),
-        Column::number("Rise", "s"),
-        Column::number("Overshoot", "%"),
-        Column::number("Settling", "s"),
-        Column::number("Steady error", "N"),
-        Column::number("Slide: force error", "N"),
-        Column::number("Slide: path error", "mm"),
-        Column::number("Bounces", ""),
-    ];
-    columns.extend(robust_columns(laws[0].robustness.as_ref(), "%"));
     let mut force = Plot::new(
         "Force on the surface",
         Axis::new("Time", "s"),
@@ -354,24 +417,24 @@ fn contact(found: &Evaluation) -> Section {
     }
     let mut lead = String::new();
     if let Some(task) = &found.task {
-        force = force.mark(Marker::vertical(task.slide_start, "slide"));
+        if task.slide > 0.0 {
+            // Without a label, which would cover the peak of the force.
+            force = force.mark(Marker::vertical(task.slide_start, ""));
+            force.note = "The vertical line is the start of the slide.".into();
+        }
         depth = depth.mark(Marker::horizontal(1e3 * task.surface.gap, "surface"));
         lead = format!(
-            "The surface has {} N/m, the tool an inertia of {} kg along the normal. Approach at no more than {} mm/s.",
+            "Wanted force {} N. The surface has {} N/m, the tool an inertia of {} kg along the normal. The hybrid law plans its approach at {} mm/s or less; the impedance law enters along a polynomial. The impact speeds in the table are measured.",
+            short(task.force),
             short(task.surface.stiffness),
             short(task.inertia[0]),
             short(1e3 * task.approach)
         );
     }
-    Section::new("contact", "On the surface", lead)
+    let section = Section::new("contact", "On the surface", lead)
         .with(Block::Plot(force))
-        .with(Block::Plot(depth))
-        .with(Block::Table(Table {
-            caption: "Forces".into(),
-            columns,
-            rows: laws.iter().map(contact_row).collect(),
-            note: "Rise: 10 to 90 %. Settling: from contact until the force stays within 5 %. Overshoot and settling are before the slide; with wrong parameters median and worst are overshoots.".into(),
-        }))
+        .with(Block::Plot(depth));
+    force_tables(laws).into_iter().fold(section, Section::with)
 }
 
 fn settings(found: &Evaluation) -> Section {

@@ -1,0 +1,45 @@
+//! Warnings about a motion that a user would otherwise take for a good one.
+
+use super::closed_loop::Trace;
+use super::position_limits::PositionLimits;
+use super::result::Adaptation;
+use rig_model::robot::Robot;
+
+/// Share of the ticks at the torque limit above which the limit governs the loop: in most ticks the law does not act.
+const AT_LIMIT: f64 = 0.5;
+/// Torque error of the adapted parameters, as a share of the torque limits, below which a growth is no warning. The
+/// adaptation of an exact model moves by friction that is not compensated: 0.0007 on the IRp-6 (27 November 2026).
+const GROWN: f64 = 0.01;
+
+/// Returns a sentence about each limit that the motion left or stayed at.
+pub(crate) fn of_motion(robot: &Robot, trace: &Trace, on_surface: bool) -> Vec<String> {
+    let mut warnings = PositionLimits::of(robot).left(&trace.q, trace.period);
+    let ticks = trace.q.first().map_or(1, Vec::len).max(1) as f64;
+    let remedy = match on_surface {
+        true => "a smaller --press, or a shorter --slide",
+        false => "a slower motion, or a better model",
+    };
+    for (joint, count) in robot.joints.iter().zip(&trace.saturated) {
+        let share = *count as f64 / ticks;
+        if share > AT_LIMIT {
+            warnings.push(format!(
+                "joint \"{}\" is at its torque limit in {:.0} % of the ticks, so the law does not control it. Give a lower --bandwidth, {remedy}.",
+                joint.name,
+                100.0 * share
+            ));
+        }
+    }
+    warnings
+}
+
+/// Returns a sentence if the adaptation made the parameters worse.
+pub(crate) fn of_adaptation(learnt: &Adaptation) -> Option<String> {
+    let [start, end] = learnt.torque_error;
+    (end > start && end > GROWN).then(|| {
+        format!(
+            "the error of the adapted parameters grew: their torque error is {:.2} % of the torque limits at the start and {:.2} % at the end. Give a lower --bandwidth, which slows the adaptation too, or start from a better model.",
+            100.0 * start,
+            100.0 * end
+        )
+    })
+}
