@@ -15,7 +15,7 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 use crate::common::Common;
 use crate::matrices::{inverse, quadratic, symmetric_pseudo_inverse};
 use crate::result::{Causes, Hypothesis};
-use crate::significance::{LEVEL, chi2_p};
+use crate::significance::{FAMILY_LEVEL, chi2_p};
 
 /// Odds against every other hypothesis from which a cause is named.
 pub const ODDS: f64 = 20.0;
@@ -137,7 +137,7 @@ fn hypothesis(
         log_likelihood_ratio: 0.0,
         aic: chi2 + 2.0 * free as f64,
         odds_against: 1.0,
-        explains: p >= LEVEL,
+        explains: p >= FAMILY_LEVEL,
         scales: Vec::new(),
     }
 }

@@ -8,6 +8,7 @@ use rig_model::robot::Robot;
 use crate::basis::Basis;
 use crate::causes::causes;
 use crate::common::Common;
+use crate::content::refuse_same_rows;
 use crate::error::CompareError;
 use crate::grade::{Graded, grade};
 use crate::identified_set::IdentifiedSet;
@@ -17,15 +18,16 @@ use crate::result::{
     Comparison, Heterogeneity, JointTest, Pooled, PooledParameter, SetSummary, SetValue,
 };
 use crate::set::RecordingSet;
-use crate::significance::{LEVEL, chi2_p, holm};
+use crate::significance::{FAMILY_LEVEL, TEST_LEVEL, chi2_p, holm};
 use crate::single::{Single, Spread, spread};
 use crate::torque::torque_matrix;
 use crate::trades::trades;
+use crate::warnings::{brief_warnings, warnings};
 
 /// Compares the parameters that several sets of recordings of one robot give. Memory does not grow with the recordings.
 ///
 /// # Errors
-/// [`CompareError`]: fewer than two sets, two of a name, a set that cannot be identified.
+/// [`CompareError`]: fewer than two sets, two of a name, recordings that share rows, a set that cannot be identified.
 pub fn compare(
     robot: &Robot,
     sets: &[RecordingSet],
@@ -41,6 +43,7 @@ pub fn compare(
     if let Some(twice) = sets.iter().find(|s| !names.insert(&s.name)) {
         return Err(CompareError::TwoOfAName(twice.name.clone()));
     }
+    refuse_same_rows(sets.iter().flat_map(|s| s.recordings.iter().copied()))?;
     let base = Base::structural(
         robot,
         rig_identify::ModelKind::Differential,
@@ -105,7 +108,8 @@ fn compared(
         model: options.identify.model,
         estimator: options.identify.estimator,
         tolerance: options.tolerance,
-        level: LEVEL,
+        family_level: FAMILY_LEVEL,
+        test_level: TEST_LEVEL,
         grade,
         reasons,
         sets: summaries(given, sets, &basis),
@@ -119,13 +123,16 @@ fn compared(
         causes,
         torque,
         warnings: warnings(sets),
+        brief_warnings: brief_warnings(sets),
         pooled: Pooled {
             combination: basis.combination,
             columns: basis.columns,
             values: pooled.values.as_slice().to_vec(),
             covariance: pooled.covariance,
             sizes: sizes(sets),
-            band: sets.first().map(|s| s.found.details.treatment.band()),
+            bands: (sets.iter())
+                .map(|s| s.found.details.treatment.band())
+                .collect(),
         },
     })
 }
@@ -195,7 +202,7 @@ fn parameters(
                     degrees_of_freedom: singles[k].len() - 1,
                     p: s.p,
                     p_holm,
-                    differs: p_holm < 0.5 * LEVEL,
+                    differs: p_holm < TEST_LEVEL,
                 }
             }),
         })
@@ -219,7 +226,7 @@ fn tested(common: &Common, chi2: f64, sets: usize) -> JointTest {
         chi2,
         degrees_of_freedom,
         p,
-        differs: p < 0.5 * LEVEL,
+        differs: p < TEST_LEVEL,
     }
 }
 
@@ -249,16 +256,6 @@ fn summaries(given: &[RecordingSet], sets: &[IdentifiedSet], basis: &Basis) -> V
                 .filter(|&k| !shown[k])
                 .map(|k| basis.names[k].clone())
                 .collect(),
-        })
-        .collect()
-}
-
-/// Returns the warnings of the identifications, each with its set.
-fn warnings(sets: &[IdentifiedSet]) -> Vec<String> {
-    (sets.iter())
-        .flat_map(|set| {
-            let own = set.found.warnings.iter();
-            own.map(|warning| format!("Set {}: {warning}", set.name))
         })
         .collect()
 }

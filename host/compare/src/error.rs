@@ -13,6 +13,21 @@ pub enum CompareError {
         "Two sets are named \"{0}\"; give every set a name of its own with --set NAME=FILE[,FILE…]."
     )]
     TwoOfAName(String),
+    /// Two recordings share rows.
+    #[error(
+        "{first} and {second} hold the same rows: about {percent} % of the shorter recording is in the other one, too. A copy counts its noise twice and confirms nothing; give every recording once, and cut recordings so that no part is in two of them."
+    )]
+    SameRows {
+        /// Label of a recording.
+        first: String,
+        /// Label of another one.
+        second: String,
+        /// Estimated share of the shorter recording, in per cent.
+        percent: f64,
+    },
+    /// A recording cannot be read.
+    #[error("{0}")]
+    Read(String),
     /// A set cannot be identified.
     #[error("Set \"{set}\" cannot be identified: {why}")]
     Set {

@@ -1,7 +1,7 @@
 //! The grade of a comparison.
 
 use crate::result::{Causes, Grade, JointTest, PooledParameter, TorqueMatrix};
-use crate::significance::LEVEL;
+use crate::significance::{FAMILY_LEVEL, TEST_LEVEL};
 
 /// What a grade is given on.
 pub(crate) struct Graded<'a> {
@@ -38,7 +38,7 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
         format!(
             "{} of {tested} tested parameters differ by more than their errors (level {} after Holm's correction){}",
             differing.len(),
-            0.5 * LEVEL,
+            TEST_LEVEL,
             match differing.is_empty() {
                 true => ".".to_owned(),
                 false => format!(": {}.", differing.join(", ")),
@@ -54,7 +54,7 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
             } else {
                 "do not differ significantly"
             },
-            0.5 * LEVEL
+            TEST_LEVEL
         ),
     ];
     let differ = joint.differs || !differing.is_empty();
@@ -91,7 +91,7 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
 
 /// Names the one set without which the others do not differ.
 fn outlier(of: &Graded) -> Option<String> {
-    let mut alone = (of.without.iter().zip(of.names)).filter(|(test, _)| test.p >= LEVEL);
+    let mut alone = (of.without.iter().zip(of.names)).filter(|(test, _)| test.p >= FAMILY_LEVEL);
     let (test, name) = alone.next()?;
     if alone.next().is_some() {
         return None;

@@ -12,6 +12,7 @@ mod basis;
 mod causes;
 mod common;
 mod compare;
+mod content;
 mod error;
 mod grade;
 mod identified_set;
@@ -30,6 +31,7 @@ mod single;
 mod tests;
 mod torque;
 mod trades;
+mod warnings;
 
 pub use causes::ODDS;
 pub use compare::compare;
@@ -41,7 +43,7 @@ pub use result::{
 };
 pub use robot::pooled_robot;
 pub use set::RecordingSet;
-pub use significance::LEVEL;
+pub use significance::{FAMILY_LEVEL, TEST_LEVEL};
 pub use simulated::{
     Holdout, SimulateOptions, SimulatedEstimate, SimulatedRobot, SimulatedValue, SimulationError,
     TrueParameter, simulated,

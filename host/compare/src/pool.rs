@@ -6,7 +6,7 @@
 //! parameters, and a few sets cannot determine them. So Ψ is diagonal, and its entries are the moment estimates of
 //! DerSimonian and Laird (1986) of each parameter.
 //!
-//! The standard error of a parameter is the larger of two. One follows from the errors within the sets. The other is the
+//! Standard error and interval of a parameter are the larger ones of two. One follows from the errors within the sets. The other is the
 //! scatter of the sets about their mean, of each parameter alone (Hartung and Knapp 2001, "A refined method for the
 //! meta-analysis of controlled clinical trials", eq. 3); its interval uses Student's t with the effective number of sets
 //! (Kish 1965) minus one. With few sets intervals are wide: t is 12.7 for two sets and 3.2 for four.
@@ -17,7 +17,7 @@ use crate::basis::Basis;
 use crate::error::CompareError;
 use crate::identified_set::IdentifiedSet;
 use crate::matrices::inverse;
-use crate::significance::t_quantile;
+use crate::significance::{freedom_of_quantile, t_quantile};
 use crate::single::{Single, scatter};
 
 /// Pooled values.
@@ -30,7 +30,7 @@ pub(crate) struct Pool {
     pub std: Vec<f64>,
     /// Half the 95 % intervals.
     pub half: Vec<f64>,
-    /// Degrees of freedom of the intervals.
+    /// Degrees of freedom with which Student's t times the standard error is half the interval.
     pub freedom: Vec<f64>,
 }
 
@@ -85,10 +85,9 @@ pub(crate) fn pool(
             by_errors * t_quantile(together),
             scatter.map_or(0.0, |[std, freedom]| std * t_quantile(freedom)),
         ];
-        let (std, freedom, half) = match scatter {
-            Some([std, freedom]) if halves[1] > halves[0] => (std, freedom, halves[1]),
-            _ => (by_errors, together, halves[0]),
-        };
+        let half = halves[0].max(halves[1]);
+        let std = scatter.map_or(by_errors, |[std, _]| std.max(by_errors));
+        let freedom = freedom_of_quantile(half / std);
         found.std.push(std);
         found.half.push(half);
         found.freedom.push(freedom);

@@ -34,8 +34,10 @@ pub struct Comparison {
     pub estimator: Estimator,
     /// Share of a joint's torque RMS above which a difference matters.
     pub tolerance: f64,
-    /// Probability of a false alarm over all tests together.
-    pub level: f64,
+    /// Probability of a false alarm over all tests together; level of the remainder of a hypothesis.
+    pub family_level: f64,
+    /// Level of the joint test, and of the tests of single parameters after Holm's correction.
+    pub test_level: f64,
     /// Grade.
     pub grade: Grade,
     /// Its reasons, sentences.
@@ -56,6 +58,9 @@ pub struct Comparison {
     pub torque: TorqueMatrix,
     /// Warnings, sentences.
     pub warnings: Vec<String>,
+    /// One warning of each kind: that of the set with the largest residual.
+    #[serde(skip)]
+    pub brief_warnings: Vec<String>,
     /// Content for the written description.
     #[serde(skip)]
     pub pooled: Pooled,
@@ -74,8 +79,8 @@ pub struct Pooled {
     pub covariance: DMatrix<f64>,
     /// RMS torque, speed and acceleration of each joint in the liveliest set.
     pub sizes: [Vec<f64>; 3],
-    /// Band of the first set.
-    pub band: Option<IdentifiedBand>,
+    /// Band of each set.
+    pub bands: Vec<IdentifiedBand>,
 }
 
 /// A set.
@@ -117,11 +122,11 @@ pub struct PooledParameter {
     pub unit: String,
     /// Pooled value, SI.
     pub value: f64,
-    /// Its standard error.
+    /// Its standard error: the larger of that by the errors within the sets and that by the scatter of the sets.
     pub std: f64,
-    /// Half the 95 % interval.
+    /// Half the 95 % interval: the larger of the two.
     pub half_interval: f64,
-    /// Degrees of freedom of the interval.
+    /// Degrees of freedom with which Student's t times `std` is `half_interval`.
     pub degrees_of_freedom: f64,
     /// Typical standard deviation within a set.
     pub within: f64,

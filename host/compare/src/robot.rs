@@ -1,7 +1,7 @@
 //! The pooled values as a description.
 
 use rig_identify::{Combinations, Sizes, as_bodies, redistributed};
-use rig_model::robot::Robot;
+use rig_model::robot::{IdentifiedBand, Robot};
 
 use crate::matrices::inverse;
 use crate::result::Comparison;
@@ -16,8 +16,14 @@ pub fn pooled_robot(robot: &Robot, comparison: &Comparison) -> (Robot, Vec<Strin
         values: &pooled.values,
     };
     let mut robot = robot.clone();
-    robot.identified = pooled.band.clone();
+    robot.identified = common_band(&pooled.bands);
     let mut failed = Vec::new();
+    if robot.identified.is_none() {
+        failed.push(
+            "The sets were identified with different cut-offs or row rates, so pooled.toml has no [identified] table."
+                .to_owned(),
+        );
+    }
     if robot.joints.len() > 1
         && let Some(information) = inverse(&pooled.covariance)
     {
@@ -27,7 +33,10 @@ pub fn pooled_robot(robot: &Robot, comparison: &Comparison) -> (Robot, Vec<Strin
             acceleration: pooled.sizes[2].clone(),
         };
         match as_bodies(&robot, &base, information, sizes) {
-            Ok(bodies) => return (bodies.robot, bodies.remarks),
+            Ok(bodies) => {
+                failed.extend(bodies.remarks);
+                return (bodies.robot, failed);
+            }
             Err(error) => failed.push(format!(
                 "The links are not physically consistent bodies: {error} The description was changed by the smallest step instead."
             )),
@@ -36,4 +45,22 @@ pub fn pooled_robot(robot: &Robot, comparison: &Comparison) -> (Robot, Vec<Strin
     let (result, remarks) = redistributed(&robot, &base, None);
     failed.extend(remarks);
     (result, failed)
+}
+
+/// Returns the band if all sets have the same filters, with the largest speed thresholds; none otherwise.
+fn common_band(bands: &[IdentifiedBand]) -> Option<IdentifiedBand> {
+    let (first, others) = bands.split_first()?;
+    let mut band = first.clone();
+    for other in others {
+        let same = other.cutoff == band.cutoff
+            && other.rate == band.rate
+            && other.torque_lead == band.torque_lead;
+        if !same {
+            return None;
+        }
+        for (most, own) in band.min_speed.iter_mut().zip(&other.min_speed) {
+            *most = most.max(*own);
+        }
+    }
+    Some(band)
 }

@@ -2,9 +2,12 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
-/// Probability of a false alarm over all tests together. Half of it is for the joint test, half for the tests of single
-/// parameters. The same level tells whether the remainder of a hypothesis is consistent with chance.
-pub const LEVEL: f64 = 0.01;
+/// Probability of a false alarm over all tests together. The same level tells whether the remainder of a hypothesis is
+/// consistent with chance.
+pub const FAMILY_LEVEL: f64 = 0.01;
+/// Level of the joint test, and of the tests of single parameters after Holm's correction: half of [`FAMILY_LEVEL`] for
+/// each of the two.
+pub const TEST_LEVEL: f64 = 0.5 * FAMILY_LEVEL;
 
 /// Returns the probability that χ² with `freedom` degrees of freedom is at least `value`; 1 without any.
 pub(crate) fn chi2_p(value: f64, freedom: usize) -> f64 {
@@ -22,6 +25,19 @@ pub(crate) fn f_p(value: f64, freedom: [f64; 2]) -> f64 {
 /// Returns Student's quantile for a two-sided 95 % interval; `freedom` need not be whole.
 pub(crate) fn t_quantile(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
+}
+
+/// Returns the degrees of freedom that have this quantile, from 1 to 10⁶; the inverse of [`t_quantile`].
+pub(crate) fn freedom_of_quantile(quantile: f64) -> f64 {
+    let (mut low, mut high) = (0.0f64, 1e6f64.ln());
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        match t_quantile(middle.exp()) > quantile {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    (0.5 * (low + high)).exp()
 }
 
 /// Corrects probabilities for their number (Holm 1979, "A simple sequentially rejective multiple test procedure").

@@ -2,6 +2,7 @@
 
 mod online;
 mod options;
+mod prepared;
 mod recorded;
 mod result;
 mod run;

@@ -21,7 +21,7 @@ impl Default for SimulateOptions {
             seed: 1,
             rate: 500.0,
             harmonics: 3,
-            periods: 2,
+            periods: 3,
             starts: 2,
         }
     }

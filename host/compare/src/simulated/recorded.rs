@@ -20,6 +20,8 @@ pub(super) struct Recorded {
     pub recording: InMemory,
     pub seconds: f64,
     pub condition_number: f64,
+    /// RMS speed of the slowest joint, rad/s or m/s.
+    pub slowest: f64,
     pub notes: Vec<String>,
 }
 
@@ -61,6 +63,9 @@ pub(super) fn recorded(
     let mut notes = motion.notes;
     notes.append(&mut done.notes);
     notes.extend(done.quantise(robot));
+    let slowest = (done.motion.qd.iter())
+        .map(|qd| rms(qd))
+        .fold(f64::INFINITY, f64::min);
     let rows = done.motion.q.first().map_or(0, Vec::len);
     let joints = (done
         .motion
@@ -88,6 +93,7 @@ pub(super) fn recorded(
         },
         seconds: rows as f64 * done.period,
         condition_number: motion.values.condition_number,
+        slowest,
         notes,
     })
 }

@@ -40,6 +40,14 @@ pub struct SimulatedRobot {
     pub seconds: f64,
     /// Sample rate, Hz.
     pub rate: f64,
+    /// Cut-off of the position filter, Hz.
+    pub cutoff: f64,
+    /// Rows of the differential model per second.
+    pub rows_per_second: f64,
+    /// Length of the windows of the integral model, s. A window starts every quarter of it.
+    pub window: f64,
+    /// Per joint, speed below which rows are left out, rad/s or m/s.
+    pub min_speed: Vec<f64>,
     /// Condition number of the designed motion, scaled columns.
     pub condition_number: f64,
     /// The parameters with their true values.

@@ -1,7 +1,7 @@
 //! One robot: motions, recordings, four identifications, and their comparison.
 
 use nalgebra::{DMatrix, DVector};
-use rig_data::prepare::InMemory;
+use rig_data::prepare::{InMemory, PrepareOptions};
 use rig_identify::{
     Base, Estimator, Identification, ModelKind, Options, TriangularFactor, described, identify,
 };
@@ -9,6 +9,7 @@ use rig_model::robot::{JointKind, Robot};
 
 use super::online::{Online, PLACES, online};
 use super::options::SimulateOptions;
+use super::prepared::prepare;
 use super::recorded::{POSITION_NOISE, TORQUE_NOISE, recorded};
 use super::result::{
     Holdout, SimulatedEstimate, SimulatedRobot, SimulatedValue, SimulationError, TrueParameter,
@@ -43,8 +44,16 @@ pub fn simulated(
     let holdout = recorded(robot, options, other, "hold-out", &mut |share| {
         progress(0.4 + 0.4 * share);
     })?;
-    let found = [ModelKind::Differential, ModelKind::Integral]
-        .map(|model| offline(robot, &training.recording, &holdout.recording, model));
+    let prepare = prepare(robot, &training)?;
+    let found = [ModelKind::Differential, ModelKind::Integral].map(|model| {
+        offline(
+            robot,
+            &training.recording,
+            &holdout.recording,
+            &prepare,
+            model,
+        )
+    });
     let [differential, integral] = found;
     let (differential, integral) = (differential?, integral?);
     progress(0.9);
@@ -87,6 +96,10 @@ pub fn simulated(
         seed: options.seed,
         seconds: training.seconds,
         rate: options.rate,
+        cutoff: differential.details.treatment.cutoff,
+        rows_per_second: differential.details.treatment.kept_rate(),
+        window: integral.details.window.as_ref().map_or(0.0, |w| w.0),
+        min_speed: differential.details.treatment.speed_threshold[..].to_vec(),
         condition_number: training.condition_number,
         parameters: (0..base.len())
             .map(|k| TrueParameter {
@@ -106,11 +119,13 @@ fn offline(
     robot: &Robot,
     training: &InMemory,
     holdout: &InMemory,
+    prepare: &PrepareOptions,
     model: ModelKind,
 ) -> Result<Identification, rig_identify::IdentifyError> {
     let options = Options {
         model,
         estimator: Estimator::Weighted,
+        prepare: prepare.clone(),
         ..Options::default()
     };
     identify(robot, &[training], &[holdout], &options)

@@ -4,8 +4,10 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::made::{Made, Truth, compared};
-use crate::{Comparison, Grade, pooled_robot};
+use super::made::{Made, Truth, compared, robot};
+use crate::significance::t_quantile;
+use crate::{CompareOptions, Comparison, Grade, RecordingSet, compare, pooled_robot};
+use rig_data::prepare::InMemory;
 
 /// Draws of four sets.
 const DRAWS: u64 = 100;
@@ -194,5 +196,64 @@ fn the_pooled_robot_has_the_pooled_torques() {
             p.expression,
             p.value
         );
+    }
+}
+
+/// A copy of a recording, a part of one, and a shifted one are refused; two recordings of one motion with other noise
+/// are not.
+#[test]
+fn recordings_with_the_same_rows_are_refused() {
+    let truth = Truth::default();
+    let whole = Made::new(90_001).recording(&truth);
+    let cut = |from: usize, to: usize, label: &str| {
+        let mut part = whole.clone();
+        part.label = label.to_owned();
+        for block in &mut part.blocks {
+            block.t = block.t[from..to].to_vec();
+            for joint in &mut block.joints {
+                for list in [&mut joint.q, &mut joint.tau] {
+                    // As written with nine digits.
+                    let nine = |x: &f64| format!("{x:.8e}").parse().unwrap();
+                    *list = list[from..to].iter().map(nine).collect();
+                }
+            }
+        }
+        part
+    };
+    let other = Made::new(90_002).recording(&truth);
+    let said = |first: &InMemory, second: &InMemory| {
+        let set = |name: &str, recording| RecordingSet {
+            name: name.to_owned(),
+            recordings: vec![recording],
+        };
+        let sets = [set("a", first), set("b", second)];
+        compare(&robot(), &sets, &CompareOptions::default()).map_err(|e| e.to_string())
+    };
+    let copy = said(&whole, &cut(0, 4000, "copy")).unwrap_err();
+    assert!(copy.contains("made 90001 and copy"), "{copy}");
+    let parts = said(&cut(0, 2400, "morning"), &cut(1600, 4000, "evening")).unwrap_err();
+    assert!(parts.contains("morning and evening"), "{parts}");
+    assert!(said(&whole, &other).is_ok());
+}
+
+/// Two sets that agree by chance: the standard error is not smaller than the errors within the sets allow, and Student's
+/// t times it is half the interval.
+#[test]
+fn two_sets_that_agree_by_chance_have_no_smaller_standard_error() {
+    let truth = Truth::default();
+    let made = |s: u64| (Made::new(95_000 + s), truth.clone());
+    for draw in 0..5 {
+        let found = compared(&[made(2 * draw), made(2 * draw + 1)]);
+        for p in &found.parameters {
+            // The mean of two values with the smaller of their errors.
+            let least = p.sets.iter().map(|v| v.std).fold(f64::INFINITY, f64::min) / 2f64.sqrt();
+            assert!(p.std > 0.5 * least, "{}: {} {least}", p.expression, p.std);
+            let half = p.std * t_quantile(p.degrees_of_freedom);
+            assert!(
+                (half / p.half_interval - 1.0).abs() < 1e-3,
+                "{}",
+                p.expression
+            );
+        }
     }
 }

@@ -120,7 +120,7 @@ impl Compare {
 }
 
 /// Parses a setting: `auto` (chosen from the data) or a number.
-fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
+pub(super) fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
     if text == "auto" {
         return Ok(Choice::Auto);
     }
@@ -130,7 +130,7 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
 }
 
 /// Parses a speed threshold: `auto`, or a finite number of 0 or more.
-fn speed(text: &str) -> Result<Choice<f64>, String> {
+pub(super) fn speed(text: &str) -> Result<Choice<f64>, String> {
     match auto::<f64>(text)? {
         Choice::Fixed(speed) if !(speed >= 0.0 && speed.is_finite()) => Err(format!(
             "{text} is not a valid speed; 0 keeps all rows, and a number above it leaves out slower rows"
@@ -140,7 +140,7 @@ fn speed(text: &str) -> Result<Choice<f64>, String> {
 }
 
 /// Parses a torque lead, within the limits of a robot description.
-fn lead(text: &str) -> Result<f64, String> {
+pub(super) fn lead(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(lead) if lead.abs() <= MOST_LEAD => Ok(lead),
         _ => Err(format!(

@@ -10,12 +10,18 @@ use rig_report::{
     Axis, Block, Column, Document, Fact, Marker, Plot, Role, Section, Series, Style, Table, Tone,
 };
 
+/// Where the figures are that a warning of an identification names.
+pub(crate) const SEE_IDENTIFY: &str = "Figures that a warning of a set names are in the report of \"rig identify\" on the set's recordings.";
 /// Number of parameters whose forest plots are shown unfolded.
 const UNFOLDED: usize = 12;
 
 /// Composes the page.
 pub fn compare(found: &Comparison, context: &Context) -> Document {
     let mut sections: Vec<Section> = parts::warnings(&[&found.warnings, &context.warnings])
+        .map(|section| match found.brief_warnings.is_empty() {
+            true => section,
+            false => section.with(parts::info(SEE_IDENTIFY)),
+        })
         .into_iter()
         .collect();
     sections.push(
@@ -56,7 +62,7 @@ fn summary(found: &Comparison, context: &Context) -> Vec<Fact> {
         )
         .note(format!(
             "level {} after Holm's correction",
-            0.5 * found.level
+            found.test_level
         )),
     ];
     if let Some((share, joint, ..)) = found.torque.worst() {
@@ -131,24 +137,22 @@ fn sets(found: &Comparison) -> Section {
 
 fn values(found: &Comparison) -> Section {
     let rows = found.parameters.iter().map(|p| {
-        let (q, holm, differs) = match p.test {
-            None => ("–".to_owned(), "–".to_owned(), "one set only"),
-            Some(t) => (
-                format!("{} ({})", format_significant(t.q, 3), t.degrees_of_freedom),
-                probability(t.p_holm),
-                if t.differs { "differs" } else { "–" },
-            ),
+        let test = match p.test {
+            None => "one set only".to_owned(),
+            Some(t) if t.differs => format!("{} differs ▲", probability(t.p_holm)),
+            Some(t) => probability(t.p_holm),
         };
         vec![
             p.expression.clone(),
-            format_value(p.value, p.half_interval),
-            format_unit(&p.unit),
+            test,
+            format!(
+                "{} {}",
+                format_value(p.value, p.half_interval),
+                format_unit(&p.unit)
+            ),
             format_significant(p.std, 2),
             format_significant(p.within, 2),
             format_significant(p.between, 2),
-            q,
-            holm,
-            differs.to_owned(),
         ]
     });
     let mut section = Section::new(
@@ -160,17 +164,14 @@ fn values(found: &Comparison) -> Section {
         caption: "Pooled parameters".into(),
         columns: vec![
             Column::text("Parameter"),
+            Column::number("p (Holm)", ""),
             Column::number("Value ± half the 95 % interval", ""),
-            Column::text("Unit"),
             Column::number("Standard error", ""),
             Column::number("Within a set", ""),
             Column::number("Between sets", ""),
-            Column::number("Q (degrees of freedom)", ""),
-            Column::number("p (Holm)", ""),
-            Column::text("Test"),
         ],
         rows: rows.collect(),
-        note: "Within: typical standard deviation in one set. Between: standard deviation of the true values between sets that the errors within them do not explain. Q: Cochran's test that a parameter is the same in all sets.".into(),
+        note: "p: of Cochran's test that a parameter is the same in all sets, after Holm's correction; Q is below the figures. Standard error: the larger of that by the errors within the sets and that by the scatter of the sets. Within: typical standard deviation in one set. Between: standard deviation of the true values between sets that the errors within them do not explain.".into(),
     }));
     if found.sets.len() < 5 {
         section = section.with(parts::info(format!(
@@ -310,16 +311,15 @@ fn causes(found: &Comparison) -> Option<Section> {
     let rows = causes.hypotheses.iter().map(|h| {
         vec![
             h.name.to_owned(),
-            h.what.to_owned(),
-            h.free.to_string(),
-            format!("{:.1} ({})", h.chi2, h.degrees_of_freedom),
-            probability(h.p),
-            format_significant(h.log_likelihood_ratio, 4),
+            if h.explains { "yes" } else { "no" }.to_owned(),
             match h.odds_against < 1e6 {
                 true => format_significant(h.odds_against, 3),
                 false => "> 1 000 000".into(),
             },
-            if h.explains { "yes" } else { "no" }.to_owned(),
+            probability(h.p),
+            format!("{:.1} ({})", h.chi2, h.degrees_of_freedom),
+            h.free.to_string(),
+            h.what.to_owned(),
         ]
     });
     Some(
@@ -327,18 +327,17 @@ fn causes(found: &Comparison) -> Option<Section> {
             caption: "Hypotheses, the most likely first".into(),
             columns: vec![
                 Column::text("Hypothesis"),
-                Column::text("What may differ between the sets"),
-                Column::number("Free values", ""),
-                Column::number("Remainder χ² (degrees of freedom)", ""),
-                Column::number("p of the remainder", ""),
-                Column::number("ln likelihood ratio to nothing", ""),
+                Column::text("Explains"),
                 Column::number("Odds against the best", ""),
-                Column::text("Explains the difference"),
+                Column::number("p of the remainder", ""),
+                Column::number("Remainder χ² (degrees of freedom)", ""),
+                Column::number("Free values", ""),
+                Column::text("What may differ between the sets"),
             ],
             rows: rows.collect(),
             note: format!(
                 "A cause is named if its remainder is consistent with chance (p of {} or more) and the odds against every other such hypothesis are {ODDS} or more. Odds: exp(half the difference of Akaike's criterion).",
-                found.level
+                found.family_level
             ),
         })),
     )

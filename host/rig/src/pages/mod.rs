@@ -23,6 +23,7 @@ mod treatment;
 mod validation;
 mod validation_voltage;
 
+pub(crate) use compare::SEE_IDENTIFY;
 pub use compare::compare;
 pub use compliance::compliance;
 pub use context::Context;

@@ -4,7 +4,9 @@ use super::context::Context;
 use super::parts;
 use rig_compare::{Holdout, SimulatedEstimate, SimulatedRobot};
 use rig_output::{format_significant, format_unit, format_value};
-use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
+use rig_report::{
+    Axis, Block, Column, Document, Fact, Link, Plot, Role, Section, Series, Style, Table, Tone,
+};
 
 /// Words about what all estimates share.
 const RECURSION: &str = "On-line: the recursion of the firmware's estimator over the rows in their order, without forgetting. Its rows come from the same zero-phase preparation as off-line, so the figure shows the convergence of the recursion and not the delay of a causal filter.";
@@ -35,18 +37,20 @@ pub fn simulated_overview(all: &[(String, SimulatedRobot)], context: &Context) -
         Column::text("Robot"),
         Column::number("Parameters", ""),
         Column::number("Motion", "s"),
-        Column::number("Condition number", ""),
+        Column::number("Cut-off", "Hz"),
+        Column::number("Rows", "1/s"),
     ];
     let names = all.first().map_or(Vec::new(), |(_, first)| {
         first.estimates.iter().map(words).collect()
     });
     columns.extend(names.iter().map(|name| Column::number(name.clone(), "%")));
-    let errors = all.iter().map(|(_, r)| {
+    let errors = all.iter().map(|(name, r)| {
         let mut cells = vec![
-            r.robot.clone(),
+            name.clone(),
             r.parameters.len().to_string(),
             format_significant(r.seconds, 3),
-            format_significant(r.condition_number, 3),
+            format_significant(r.cutoff, 3),
+            format_significant(r.rows_per_second, 3),
         ];
         cells.extend(r.estimates.iter().map(|e| parts::percent(e.torque_error)));
         cells
@@ -57,33 +61,31 @@ pub fn simulated_overview(all: &[(String, SimulatedRobot)], context: &Context) -
         rows: errors.collect(),
         note: "RMS over all joints, as a share of the torque: the identified parameters' torque less the true one, without noise.".into(),
     };
-    let mut columns = vec![
-        Column::text("Robot"),
-        Column::text("Joint"),
-        Column::number("Torque RMS", "N·m or N"),
-    ];
+    let mut columns = vec![Column::text("Robot"), Column::text("Joint")];
     columns.extend(names.iter().map(|name| Column::number(name.clone(), "%")));
     columns.push(Column::number("true parameters", "%"));
-    let rows = all
-        .iter()
-        .flat_map(|(_, r)| r.holdout.iter().map(|h| joint_row(Some(&r.robot), h)));
+    let rows = all.iter().flat_map(|(name, r)| {
+        let own = move |h| [vec![name.clone()], joint_row(h)].concat();
+        r.holdout.iter().map(own)
+    });
     let joints = Table {
         caption: "Residual on the hold-out motion, measured less predicted".into(),
         columns,
         rows: rows.collect(),
         note: "Share of the torque RMS of the joint. The true parameters leave the noise and the error of the filtered motion.".into(),
     };
-    let reports = all
-        .iter()
-        .map(|(folder, r)| format!("{}: {folder}/report.html", r.robot));
+    let reports = all.iter().map(|(folder, r)| Link {
+        text: format!("{folder} ({})", r.robot),
+        address: format!("{folder}/report.html"),
+    });
     Document {
         title: format!("{} simulated robots compared", all.len()),
         subtitle: "Each robot was simulated from its description, recorded with noise and quantisation, and identified off-line and on-line by the differential and the integral model.".into(),
         summary: all
             .iter()
-            .map(|(_, r)| {
+            .map(|(name, r)| {
                 let best = r.estimates.iter().map(|e| e.torque_error).fold(f64::INFINITY, f64::min);
-                Fact::new(r.robot.clone(), parts::percent(best))
+                Fact::new(name.clone(), parts::percent(best))
                     .unit("%")
                     .note("smallest torque error of the four estimates")
             })
@@ -92,7 +94,7 @@ pub fn simulated_overview(all: &[(String, SimulatedRobot)], context: &Context) -
             Section::new("errors", "How near is the truth?", "").with(Block::Table(errors)),
             Section::new("holdout", "Measured and predicted torque", "").with(Block::Table(joints)),
             Section::new("reports", "Reports of the robots", RECURSION)
-                .with(Block::List(reports.collect())),
+                .with(Block::Links(reports.collect())),
             parts::repeat(context),
         ],
         footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
@@ -125,10 +127,10 @@ fn summary(found: &SimulatedRobot) -> Vec<Fact> {
             Fact::new(words(e), parts::percent(e.torque_error))
                 .unit("% torque error")
                 .note(format!("intervals that hold the truth: {}", inside_of(e)))
-                .tone(if 10 * inside >= 9 * all {
-                    Tone::Good
-                } else {
-                    Tone::Notice
+                .tone(match all {
+                    0 => Tone::Plain,
+                    _ if 10 * inside >= 9 * all => Tone::Good,
+                    _ => Tone::Notice,
                 })
         })
         .collect()
@@ -152,24 +154,46 @@ fn accuracy(found: &SimulatedRobot) -> Section {
             Column::number("95 % intervals that hold the truth", ""),
         ],
         rows: rows.collect(),
-        note: "Fewer than 95 % hold the truth where errors other than noise exceed the error by noise. The torque error tells how much this matters. An on-line estimate of many parameters needs more residuals than a short motion has before its intervals are known.".into(),
+        note: format!(
+            "Position cut off at {} Hz, {} rows/s, windows of the integral model {} s; rows below {} rad/s or m/s are left out. Fewer than 95 % hold the truth where errors other than noise exceed the error by noise, such as joints that stick at reversals. The torque error tells how much this matters.",
+            format_significant(found.cutoff, 3),
+            format_significant(found.rows_per_second, 3),
+            format_significant(found.window, 2),
+            format_significant(found.min_speed.iter().copied().fold(0.0, f64::max), 2)
+        ),
     }))
 }
 
 fn values(found: &SimulatedRobot) -> Section {
+    let section = Section::new(
+        "values",
+        "Identified and true parameters",
+        "± one standard deviation",
+    );
+    ["off-line", "on-line"]
+        .into_iter()
+        .fold(section, |section, way| {
+            section.with(Block::Table(values_of(found, way)))
+        })
+}
+
+/// The parameters by the estimates of one way.
+fn values_of(found: &SimulatedRobot, way: &str) -> Table {
+    let estimates: Vec<&SimulatedEstimate> =
+        found.estimates.iter().filter(|e| e.way == way).collect();
     let mut columns = vec![
         Column::text("Parameter"),
         Column::text("Unit"),
         Column::number("Truth", ""),
     ];
-    columns.extend(found.estimates.iter().map(|e| Column::number(words(e), "")));
+    columns.extend(estimates.iter().map(|e| Column::number(e.model, "")));
     let rows = found.parameters.iter().enumerate().map(|(k, p)| {
         let mut cells = vec![
             p.expression.clone(),
             format_unit(&p.unit),
             format_significant(p.truth, 5),
         ];
-        cells.extend(found.estimates.iter().map(|e| match &e.values[k] {
+        cells.extend(estimates.iter().map(|e| match &e.values[k] {
             None => "not shown".to_owned(),
             Some(v) => match v.std {
                 Some(std) => format_value(v.value, std),
@@ -178,17 +202,12 @@ fn values(found: &SimulatedRobot) -> Section {
         }));
         cells
     });
-    Section::new(
-        "values",
-        "Identified and true parameters",
-        "± one standard deviation",
-    )
-    .with(Block::Table(Table {
-        caption: "Base parameters".into(),
+    Table {
+        caption: format!("Base parameters, {way}"),
         columns,
         rows: rows.collect(),
         note: String::new(),
-    }))
+    }
 }
 
 fn convergence(found: &SimulatedRobot) -> Section {
@@ -215,21 +234,15 @@ fn convergence(found: &SimulatedRobot) -> Section {
     .with(Block::Plot(plot))
 }
 
-fn joint_row(robot: Option<&str>, h: &Holdout) -> Vec<String> {
-    let mut cells: Vec<String> = robot.map(str::to_owned).into_iter().collect();
-    cells.push(h.joint.clone());
-    cells.push(format!(
-        "{} {}",
-        format_significant(h.torque_rms, 3),
-        h.unit
-    ));
+fn joint_row(h: &Holdout) -> Vec<String> {
+    let mut cells = vec![h.joint.clone()];
     cells.extend(h.relative_error.iter().map(|e| parts::percent(*e)));
     cells.push(parts::percent(h.relative_error_of_truth));
     cells
 }
 
 fn holdout(found: &SimulatedRobot) -> Section {
-    let mut columns = vec![Column::text("Joint"), Column::number("Torque RMS", "")];
+    let mut columns = vec![Column::text("Joint")];
     columns.extend(
         found
             .estimates
@@ -245,24 +258,33 @@ fn holdout(found: &SimulatedRobot) -> Section {
     .with(Block::Table(Table {
         caption: "Residual on the hold-out as a share of the torque".into(),
         columns,
-        rows: found.holdout.iter().map(|h| joint_row(None, h)).collect(),
+        rows: found.holdout.iter().map(joint_row).collect(),
         note: "The true parameters leave the noise and the error of the filtered motion.".into(),
     }));
     for h in &found.holdout {
         let [t, measured, predicted] = h.series.clone();
+        let residual = (measured.iter().zip(&predicted))
+            .map(|(measured, predicted)| measured - predicted)
+            .collect();
         let mut plot = Plot::new(
             format!("Joint {}: torque on the hold-out", h.joint),
             Axis::new("time", "s"),
             Axis::new("torque", h.unit),
         )
-        .with(Series::line(
+        .with(Series::new(
             "measured",
             Role::Measured,
+            Style::Points,
             t.clone(),
             measured,
         ))
-        .with(Series::line("predicted", Role::Model, t, predicted))
-        .note("Predicted by the off-line differential model.");
+        .with(Series::line("predicted", Role::Model, t.clone(), predicted))
+        .with(Series::line("residual", Role::Residual, t, residual));
+        plot = plot.note(format!(
+            "Predicted by the off-line differential model. RMS torque: {} {}.",
+            format_significant(h.torque_rms, 3),
+            h.unit
+        ));
         plot.height = 240;
         section = section.with(Block::Plot(plot));
     }

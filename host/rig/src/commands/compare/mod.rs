@@ -5,12 +5,12 @@ mod simulated;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use clap::Args as ClapArgs;
+use clap::{ArgGroup, Args as ClapArgs};
 
 use self::simulated::Simulated;
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
-use super::identify::{Fit, Model};
+use super::identify::{Fit, Model, lead, speed};
 use super::input::{
     Inputs, Use, Watched, command_line, described, recordings, refuse_faults, refuse_twice,
 };
@@ -39,6 +39,7 @@ const FILES: [&str; 3] = ["compare.json", "pooled.toml", "report.html"];
 /// With --simulated it compares methods instead of recordings: the descriptions are the truth. Writes report.html, and a
 /// folder with report.html and compare.json for each robot.
 #[derive(Debug, ClapArgs)]
+#[command(group(ArgGroup::new("recordings").args(["data", "set", "simulated"]).required(true).multiple(true)))]
 pub(crate) struct Args {
     /// Robot description, TOML or URDF (`rig init` writes one to start from); several with --simulated
     #[arg(long, value_name = "FILE", num_args = 1.., required_unless_present = "simulated")]
@@ -46,14 +47,14 @@ pub(crate) struct Args {
     #[command(flatten)]
     chain: ChainArg,
     /// Recording that is a set of its own, CSV or MCAP; any number
-    #[arg(long, num_args = 1.., required_unless_present_any = ["set", "simulated"])]
+    #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
     /// Named set of recordings, which are identified together; may be repeated
     #[arg(long, value_name = "NAME=FILE[,FILE...]", value_parser = named_set)]
     set: Vec<NamedSet>,
     /// Instead of recordings: simulate each robot (default: those of `rig init one-link`, `irp6` and `edda`) with noise
     /// and quantisation, identify it off-line and on-line by both models, and compare with the truth
-    #[arg(long, conflicts_with_all = ["data", "set", "model", "estimator", "tolerance", "cutoff", "even_if_wrong"])]
+    #[arg(long, conflicts_with_all = ["data", "set", "model", "estimator", "tolerance", "cutoff", "min_speed", "torque_lead", "even_if_wrong"])]
     simulated: bool,
     /// Equations that are fitted
     #[arg(long, value_enum, default_value = "differential")]
@@ -67,6 +68,13 @@ pub(crate) struct Args {
     /// Cut-off of the zero-phase low-pass on the position, Hz [default: from each set]
     #[arg(long)]
     cutoff: Option<f64>,
+    /// Leave out rows slower than this, rad/s or m/s, where the sign of friction is uncertain; 0 keeps all, or "auto"
+    #[arg(long, default_value = "auto", value_parser = speed, allow_negative_numbers = true)]
+    min_speed: Choice<f64>,
+    /// Torque lead of all sets: time by which a recorded torque acts later, s (half a sample for a command held until the
+    /// next one)
+    #[arg(long, default_value_t = 0.0, value_parser = lead, allow_negative_numbers = true)]
+    torque_lead: f64,
     /// Seed of the random states from which the base parameters are computed; with --simulated of motions and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -135,6 +143,8 @@ impl Args {
                 seed: self.seed,
                 prepare: PrepareOptions {
                     cutoff: self.cutoff.map_or(Choice::Auto, Choice::Fixed),
+                    speed_threshold: self.min_speed,
+                    torque_lead: self.torque_lead,
                     ..PrepareOptions::default()
                 },
                 ..Options::default()
@@ -180,9 +190,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     let all: Vec<&Inputs> = inputs.iter().collect();
     refuse_faults(&robot, &all, (Use::Fit, Vec::new()), args.even_if_wrong, ui)?;
-    // Passes over each recording: three of the identification, one of the rows.
+    // Passes over each recording: one for its content, three of the identification, one of the rows.
     let bytes: u64 = inputs.iter().map(Inputs::bytes).sum();
-    let progress = RefCell::new(ui.progress("comparing", 4 * bytes));
+    let progress = RefCell::new(ui.progress("comparing", 5 * bytes));
     let watched: Vec<Vec<Watched>> = inputs.iter().map(|i| i.watched(&progress)).collect();
     let named: Vec<RecordingSet> = (sets.iter().zip(&watched))
         .map(|(set, watched)| RecordingSet {
@@ -192,10 +202,16 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .collect();
     let mut found = compare(&robot, &named, &args.options())?;
     drop(progress);
-    for inputs in &inputs {
-        found.warnings.extend(inputs.heard());
-        found.warnings.extend(inputs.outside());
+    let own: Vec<String> = (inputs.iter())
+        .flat_map(|inputs| inputs.heard().into_iter().chain(inputs.outside()))
+        .collect();
+    for warning in found.brief_warnings.iter().chain(&own) {
+        ui.remark(warning);
     }
+    if !found.brief_warnings.is_empty() {
+        ui.remark(pages::SEE_IDENTIFY);
+    }
+    found.warnings.extend(own);
     write(args, &robot, &found, read)?;
     for line in lines(&found) {
         ui.say(&line);

@@ -89,8 +89,8 @@ impl Simulated<'_> {
         }
         drop(bar);
         self.write(&all)?;
-        for (_, found) in &all {
-            for line in lines(found) {
+        for (name, found) in &all {
+            for line in lines(name, found) {
                 ui.say(&line);
             }
         }
@@ -126,13 +126,14 @@ impl Simulated<'_> {
     }
 }
 
-/// Returns the printed answer for a robot.
-fn lines(found: &SimulatedRobot) -> Vec<String> {
+/// Returns the printed answer for a robot; `name` is that of its folder.
+fn lines(name: &str, found: &SimulatedRobot) -> Vec<String> {
     let mut lines = vec![format!(
-        "{}: {} base parameters, motion of {:.1} s.",
-        found.robot,
+        "{name}: {} base parameters, motion of {:.1} s, position cut off at {} Hz, {} rows/s.",
         found.parameters.len(),
-        found.seconds
+        found.seconds,
+        format_significant(found.cutoff, 3),
+        format_significant(found.rows_per_second, 3)
     )];
     for (k, e) in found.estimates.iter().enumerate() {
         let known = || e.values.iter().flatten().filter_map(|v| v.covers);
