@@ -81,7 +81,10 @@ fn compared(
     let common = Common::of(sets, &basis)?;
     let joint_test = joint_test(&common);
     let names: Vec<String> = sets.iter().map(|s| s.name.clone()).collect();
-    let causes = joint_test.and_then(|_| {
+    // What agrees needs no cause.
+    let differs = |p: &PooledParameter| p.test.is_some_and(|test| test.differs);
+    let differing = joint_test.filter(|test| test.differs || parameters.iter().any(differs));
+    let causes = differing.and_then(|_| {
         causes(
             &common,
             &names,

@@ -11,8 +11,9 @@
 //! | varying (screw) | motor radians per joint radian, changes with the pose | N·m/rad at the motor |
 
 use nalgebra::DMatrix;
+use rig_model::effects::Effects;
 use rig_model::robot::{JointKind, Robot};
-use rig_shared::multibody::column;
+use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{DriveKind, Transmission, motor_column};
 
 use crate::error::ComplianceError;
@@ -20,6 +21,17 @@ use crate::error::ComplianceError;
 /// Smallest reciprocal condition number of the Jacobian of the drives. By judgement: poses nearer to a dead centre of a
 /// screw have no meaning.
 const SINGULAR: f64 = 1e-9;
+
+/// Returns the parameters of all links with the payloads of the description.
+///
+/// # Errors
+/// [`ComplianceError::Model`].
+pub(crate) fn loaded(robot: &Robot) -> Result<Vec<[f64; COLUMNS]>, ComplianceError> {
+    let mut rows = robot.standard_parameters();
+    let effects = Effects::of(robot).map_err(|error| ComplianceError::Model(error.to_string()))?;
+    effects.add_loads(&mut rows);
+    Ok(rows)
+}
 
 /// The drives of a robot.
 #[derive(Clone, Debug)]
@@ -131,4 +143,26 @@ impl Drives {
 pub(crate) fn listed_pose(q: &[f64]) -> String {
     let list: Vec<String> = q.iter().map(|q| format!("{q:.4}")).collect();
     list.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use rig_model::robot::ONE_LINK_TEMPLATE;
+    use rig_shared::multibody::COLUMN_NAMES;
+
+    #[test]
+    fn a_described_payload_is_part_of_its_link() {
+        let bare = Robot::from_toml(ONE_LINK_TEMPLATE, "rig.toml".as_ref()).unwrap();
+        let effect =
+            "\n[[effect]]\nkind = \"payload\"\njoint = \"link\"\nmass = 0.5\ndistance = 0.4\n";
+        let text = format!("{ONE_LINK_TEMPLATE}{effect}");
+        let carrying = Robot::from_toml(&text, "rig.toml".as_ref()).unwrap();
+        let (before, after) = (loaded(&bare).unwrap()[0], loaded(&carrying).unwrap()[0]);
+        for (name, added) in [("m", 0.5), ("mx", 0.2), ("Iyy", 0.08), ("Izz", 0.08)] {
+            let k = COLUMN_NAMES.iter().position(|own| *own == name).unwrap();
+            assert!((after[k] - before[k] - added).abs() < 1e-12, "{name}");
+        }
+    }
 }

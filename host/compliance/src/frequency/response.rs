@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use rig_model::robot::Robot;
+use rig_model::robot::{JointKind, Robot};
 use rig_output::format_significant;
-use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector, inertia_matrix};
+use rig_shared::multibody::{Chain, column, gravity_vector, inertia_matrix};
 use rig_shared::transmission::DriveKind;
 use serde::Serialize;
 
@@ -12,7 +12,7 @@ use super::bands::{Band, BandBins, bands};
 use super::fit::{Fitted, Known, fit, frictionless};
 use super::spectra::{Spectra, spectra};
 use super::two_mass::C;
-use crate::drives::{Drives, listed_pose};
+use crate::drives::{Drives, listed_pose, loaded};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 use crate::value::Value;
@@ -103,6 +103,8 @@ pub struct FrequencyResponse {
 
 /// What the description says of a joint at a pose.
 struct Described {
+    /// Unit of an inertia of the joint.
+    unit: &'static str,
     link: Option<f64>,
     motor: Option<f64>,
     gravity: f64,
@@ -156,8 +158,9 @@ pub(crate) fn respond(
         known.link_inertia = Some(link);
         found = fit_all(&mut spectra, &known).ok_or_else(unclear)?;
         warnings.push(format!(
-            "The response alone shows neither inertia of joint \"{name}\" well: the inertia of the links is that of the description, {} kg·m² at this pose. Its error is not in the standard deviation. A band beyond the resonance would show it.",
-            format_significant(link, 4)
+            "The response alone shows neither inertia of joint \"{name}\" well: the inertia of the links is that of the description, {} {unit} at this pose. Its error is not in the standard deviation. A band beyond the resonance would show it.",
+            format_significant(link, 4),
+            unit = described.unit
         ));
     }
     within(&found, range, name, &described)?;
@@ -275,7 +278,7 @@ fn described(robot: &Robot, pose: &[f64], k: usize) -> Result<Described, Complia
     let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
     let n = robot.joints.len();
     let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
-    let mut rows: Vec<[f64; COLUMNS]> = robot.standard_parameters();
+    let mut rows = loaded(robot)?;
     let motor = rows[k][column::DRIVE_INERTIA];
     for row in &mut rows {
         row[column::DRIVE_INERTIA] = 0.0;
@@ -292,6 +295,10 @@ fn described(robot: &Robot, pose: &[f64], k: usize) -> Result<Described, Complia
     let complete = robot.joints[k..].iter().all(|j| j.inertial.is_some());
     let link = inertia[k * n + k];
     Ok(Described {
+        unit: match robot.joints[k].kind {
+            JointKind::Revolute => "kg·m²",
+            JointKind::Prismatic => "kg",
+        },
         link: (complete && link > 0.0).then_some(link),
         motor: (motor > 0.0).then_some(motor),
         gravity: (gravity(step)? - gravity(-step)?) / (2.0 * step),
@@ -348,10 +355,11 @@ fn doubts(name: &str, found: &Fitted, masses: &Masses, described: &Described) ->
         let off = (own.value - other).abs();
         if off > DIFFERS * other && off > 3.0 * own.std && own.std > 0.0 {
             doubts.push(format!(
-                "Joint \"{name}\": the response shows an inertia of the {what} of {} ± {} kg·m², the description has {}. The scale of the torque, the ratio or the description is wrong; the stiffness has the error of the torque's scale.",
+                "Joint \"{name}\": the response shows an inertia of the {what} of {} ± {} {unit}, the description has {}. The scale of the torque, the ratio or the description is wrong; the stiffness has the error of the torque's scale.",
                 format_significant(own.value, 3),
                 format_significant(own.std, 2),
-                format_significant(other, 3)
+                format_significant(other, 3),
+                unit = described.unit
             ));
         }
     }

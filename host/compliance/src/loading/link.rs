@@ -16,6 +16,7 @@ use super::fit::{Fit, Row, fit};
 use super::result::{Deflection, DriveLoading};
 use super::windows::{Course, courses, means, window_rows};
 use super::wrench::{has_wrench, torques, wrench};
+use crate::drives::loaded;
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 use crate::tool_point::ToolPoint;
@@ -193,7 +194,7 @@ impl Series {
         }
         let chain = Chain::new(&tool.robot().geometry(), tool.robot().gravity)
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
-        let parameters = tool.robot().standard_parameters();
+        let parameters = loaded(tool.robot())?;
         let count = q.first().map_or(0, Vec::len);
         let mut own = Self {
             load: Vec::with_capacity(count),

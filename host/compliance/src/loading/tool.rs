@@ -16,7 +16,7 @@ use super::link::{NEGATIVE, NOT_SHOWN, range};
 use super::result::{Deflection, DriveLoading};
 use super::windows::{Course, courses, means, window_rows};
 use super::wrench::{DISPLACEMENT, torques, wrench};
-use crate::drives::listed_pose;
+use crate::drives::{listed_pose, loaded};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 use crate::tool_point::ToolPoint;
@@ -173,7 +173,7 @@ fn loads(
     let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
     let (n, robot) = (tool.count(), tool.robot());
     let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
-    let parameters = robot.standard_parameters();
+    let parameters = loaded(robot)?;
     let weight = |q: &[f64]| {
         let mut torque = vec![0.0; n];
         gravity_vector(&chain, &parameters, q, &mut torque)
