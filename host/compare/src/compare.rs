@@ -81,10 +81,7 @@ fn compared(
     let common = Common::of(sets, &basis)?;
     let joint_test = joint_test(&common);
     let names: Vec<String> = sets.iter().map(|s| s.name.clone()).collect();
-    // What agrees needs no cause.
-    let differs = |p: &PooledParameter| p.test.is_some_and(|test| test.differs);
-    let differing = joint_test.filter(|test| test.differs || parameters.iter().any(differs));
-    let causes = differing.and_then(|_| {
+    let causes = differing(joint_test.as_ref(), &parameters).then(|| {
         causes(
             &common,
             &names,
@@ -93,6 +90,7 @@ fn compared(
             robot.joints.len(),
         )
     });
+    let causes = causes.flatten();
     let joints = robot.joints.iter().map(|j| j.name.clone()).collect();
     let torque = torque_matrix(sets, &basis, &pooled.values, joints);
     let without = without(&common);
@@ -138,6 +136,12 @@ fn compared(
                 .collect(),
         },
     })
+}
+
+/// Returns true if the sets differ by any test: what agrees needs no cause.
+fn differing(joint: Option<&JointTest>, parameters: &[PooledParameter]) -> bool {
+    let differs = |p: &PooledParameter| p.test.is_some_and(|test| test.differs);
+    joint.is_some_and(|test| test.differs || parameters.iter().any(differs))
 }
 
 /// Returns, by parameter, the sets that show it with their values.

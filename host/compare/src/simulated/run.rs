@@ -30,13 +30,7 @@ pub fn simulated(
     mut progress: impl FnMut(f64),
 ) -> Result<SimulatedRobot, SimulationError> {
     let base = Base::structural(robot, ModelKind::Differential, 1)?;
-    if base.len() > PLACES {
-        return Err(SimulationError::TooManyParameters {
-            robot: robot.name.clone(),
-            parameters: base.len(),
-            most: PLACES,
-        });
-    }
+    refuse_too_many(robot, &base)?;
     let training = recorded(robot, options, options.seed, "training", &mut |share| {
         progress(0.4 * share);
     })?;
@@ -101,17 +95,33 @@ pub fn simulated(
         window: integral.details.window.as_ref().map_or(0.0, |w| w.0),
         min_speed: differential.details.treatment.speed_threshold[..].to_vec(),
         condition_number: training.condition_number,
-        parameters: (0..base.len())
-            .map(|k| TrueParameter {
-                expression: base.expression(k),
-                unit: base.unit(k).to_owned(),
-                truth: judge.truth[k],
-            })
-            .collect(),
+        parameters: true_parameters(&base, &judge),
         holdout: judge.joints(robot, &differential, &bases),
         estimates,
         notes,
     })
+}
+
+/// Refuses more parameters than the on-line estimator has places for.
+fn refuse_too_many(robot: &Robot, base: &Base) -> Result<(), SimulationError> {
+    if base.len() <= PLACES {
+        return Ok(());
+    }
+    Err(SimulationError::TooManyParameters {
+        robot: robot.name.clone(),
+        parameters: base.len(),
+        most: PLACES,
+    })
+}
+
+/// Returns the parameters of the description.
+fn true_parameters(base: &Base, judge: &Judge) -> Vec<TrueParameter> {
+    let of = |k: usize| TrueParameter {
+        expression: base.expression(k),
+        unit: base.unit(k).to_owned(),
+        truth: judge.truth[k],
+    };
+    (0..base.len()).map(of).collect()
 }
 
 /// Identifies the recording off-line.
