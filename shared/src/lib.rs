@@ -4,6 +4,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod cholesky;
 pub mod compensation;
 pub mod control;
 pub mod drive;

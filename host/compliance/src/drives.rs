@@ -38,8 +38,6 @@ pub(crate) fn loaded(robot: &Robot) -> Result<Vec<[f64; COLUMNS]>, ComplianceErr
 pub(crate) struct Drives {
     transmission: Transmission<f64>,
     kinds: Vec<DriveKind>,
-    /// Motor radians per joint radian of the own joint; 1 for a varying drive.
-    scales: Vec<f64>,
 }
 
 impl Drives {
@@ -50,19 +48,9 @@ impl Drives {
     pub(crate) fn of(robot: &Robot) -> Result<Self, ComplianceError> {
         let transmission =
             (robot.transmission()).map_err(|error| ComplianceError::Model(error.to_string()))?;
-        let n = robot.joints.len();
-        let kinds = robot.drive_kinds();
-        let mut rows = vec![0.0; n * n];
-        (transmission.jacobian(&robot.middle_position(), &mut rows))
-            .map_err(|error| ComplianceError::Model(error.to_string()))?;
-        let scales = kinds.iter().enumerate().map(|(k, kind)| match kind {
-            DriveKind::Varying => 1.0,
-            DriveKind::Simple | DriveKind::Coupled => rows[k * n + k],
-        });
         Ok(Self {
-            scales: scales.collect(),
+            kinds: robot.drive_kinds(),
             transmission,
-            kinds,
         })
     }
 
@@ -98,7 +86,7 @@ impl Drives {
         (self.transmission.jacobian(q, &mut rows))
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
         Ok(DMatrix::from_fn(n, n, |k, j| {
-            rows[k * n + j] / self.scales[k]
+            rows[k * n + j] / self.transmission.own_turns(k).unwrap_or(1.0)
         }))
     }
 

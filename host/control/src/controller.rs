@@ -12,7 +12,7 @@ use rig_shared::control::arm::hybrid::{Axis, ForceGains};
 use rig_shared::control::arm::impedance::Target;
 use rig_shared::control::arm::pid::PidGains;
 use rig_shared::control::arm::{
-    ControlFault, Inputs, Law, Limited, PassiveRegressor, REGRESSOR_WORKSPACE,
+    ControlFault, Inputs, Law, Limited, Operational, PassiveRegressor, REGRESSOR_WORKSPACE,
 };
 use rig_shared::control::arm::{adaptive, computed_torque, hybrid, impedance, pid};
 use rig_shared::trajectory::Reference;
@@ -182,6 +182,13 @@ impl<'a> Controller<'a> {
         let period = self.settings.period();
         let [proportional, derivative] = &self.gains;
         let posture = [proportional[0], derivative[0]];
+        let operational = |task| Operational {
+            model,
+            task,
+            posture,
+            friction,
+            torque_limit,
+        };
         let task = self.task.map(ContactTask::task);
         match (&mut self.inner, task) {
             (Inner::Pid { gains, state }, _) => pid::Config {
@@ -196,22 +203,14 @@ impl<'a> Controller<'a> {
                 own.step(self.model, torque_limit, &self.settings, input, torque)
             }
             (Inner::Hybrid { axes, state }, Some(task)) => hybrid::Config {
-                model,
-                task,
+                operational: operational(task),
                 axes,
-                posture,
-                friction,
-                torque_limit,
                 period,
             }
             .step(state, input, torque),
             (Inner::Impedance { targets }, Some(task)) => impedance::Config {
-                model,
-                task,
+                operational: operational(task),
                 targets,
-                posture,
-                friction,
-                torque_limit,
             }
             .step(&mut (), input, torque),
             _ => computed_torque::Config {

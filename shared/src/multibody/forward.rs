@@ -5,7 +5,8 @@ use super::chain::{Chain, MAX_JOINTS, MultibodyError, check};
 use super::inertia_matrix::inertia_matrix;
 use super::inverse::bias_torque;
 use super::parameters::COLUMNS;
-use crate::scalar::{Mask, Real};
+use crate::cholesky;
+use crate::scalar::Real;
 
 /// Computes the accelerations q̈ (length n) under the torques `tau`: A(q)·q̈ = τ − bias(q, q̇), with the inertia matrix
 /// of the composite-rigid-body algorithm and a Cholesky factorisation (Featherstone 2008, sec. 6.2). The factorisation
@@ -65,44 +66,8 @@ pub fn solve_positive_definite<T: Real>(
 ) -> Result<(), MultibodyError> {
     let n = x.len();
     check("matrix", n * n, matrix.len())?;
-    factorise(matrix, n)?;
-    for i in 0..n {
-        let mut value = x[i];
-        for k in 0..i {
-            value -= matrix[i * n + k] * x[k];
-        }
-        x[i] = value / matrix[i * n + i];
-    }
-    for i in (0..n).rev() {
-        let mut value = x[i];
-        for k in i + 1..n {
-            value -= matrix[k * n + i] * x[k];
-        }
-        x[i] = value / matrix[i * n + i];
-    }
-    Ok(())
-}
-
-/// Replaces the lower triangle of an n × n matrix by its Cholesky factor L, A = L·Lᵀ.
-fn factorise<T: Real>(matrix: &mut [T], n: usize) -> Result<(), MultibodyError> {
-    for j in 0..n {
-        let mut pivot = matrix[j * n + j];
-        for k in 0..j {
-            pivot -= matrix[j * n + k].squared();
-        }
-        // NaN fails this comparison too.
-        if !T::ZERO.lt(pivot).all() {
-            return Err(MultibodyError::NotPositiveDefinite { joint: j });
-        }
-        let root = pivot.sqrt();
-        matrix[j * n + j] = root;
-        for i in j + 1..n {
-            let mut value = matrix[i * n + j];
-            for k in 0..j {
-                value -= matrix[i * n + k] * matrix[j * n + k];
-            }
-            matrix[i * n + j] = value / root;
-        }
-    }
+    cholesky::factorise(matrix, n)
+        .map_err(|joint| MultibodyError::NotPositiveDefinite { joint })?;
+    cholesky::solve(matrix, x);
     Ok(())
 }

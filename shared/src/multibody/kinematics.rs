@@ -18,16 +18,7 @@ pub fn point_position<T: Real>(
     point: [T; 3],
     jacobian: &mut [[T; 3]],
 ) -> Result<[T; 3], MultibodyError> {
-    let n = chain.joint_count();
-    check("q", n, q.len())?;
-    check("jacobian", n, jacobian.len())?;
-    if link >= n {
-        return Err(MultibodyError::WrongLength {
-            argument: "q",
-            expected: link + 1,
-            found: n,
-        });
-    }
+    check_link(chain, q, link, jacobian.len())?;
     jacobian.fill([T::ZERO; 3]);
     let mut place = Vector3(point);
     // Inwards: values in frame i are transformed to frame i − 1.
@@ -45,6 +36,26 @@ pub fn point_position<T: Real>(
         place = transform.origin + transform.direction_to_parent(place);
     }
     Ok(place.0)
+}
+
+/// Checks lengths, and that the chain has the link.
+fn check_link<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    link: usize,
+    jacobian: usize,
+) -> Result<(), MultibodyError> {
+    let n = chain.joint_count();
+    check("q", n, q.len())?;
+    check("jacobian", n, jacobian)?;
+    if link >= n {
+        return Err(MultibodyError::WrongLength {
+            argument: "q",
+            expected: link + 1,
+            found: n,
+        });
+    }
+    Ok(())
 }
 
 /// Position and orientation of a frame in another one.
@@ -71,16 +82,7 @@ pub fn frame_pose<T: Real>(
     fixed: &Pose<T>,
     jacobian: &mut [[T; 6]],
 ) -> Result<Pose<T>, MultibodyError> {
-    let n = chain.joint_count();
-    check("q", n, q.len())?;
-    check("jacobian", n, jacobian.len())?;
-    if link >= n {
-        return Err(MultibodyError::WrongLength {
-            argument: "q",
-            expected: link + 1,
-            found: n,
-        });
-    }
+    check_link(chain, q, link, jacobian.len())?;
     jacobian.fill([T::ZERO; 6]);
     let z = Vector3([T::ZERO, T::ZERO, T::ONE]);
     let mut place = Vector3(fixed.position);

@@ -169,6 +169,16 @@ impl<T: Real> Transmission<T> {
         self.motors.get(motor).map(|m| m.kind)
     }
 
+    /// Returns the turns of motor `motor` (from 0) per unit of the coordinate in which its inertia and its stiffness stand:
+    /// its own ratio, or 1 for a varying drive, whose coordinate is the motor's. `None` past the end.
+    pub fn own_turns(&self, motor: usize) -> Option<T> {
+        let own = self.motors.get(motor)?;
+        match own.kind {
+            DriveKind::Varying => Some(T::ONE),
+            DriveKind::Simple | DriveKind::Coupled => own.ratios.get(motor).copied(),
+        }
+    }
+
     /// Returns true if every drive moves only its own joint at a constant ratio: all motor columns are then zero.
     pub fn is_simple(&self) -> bool {
         self.motors.iter().all(|m| m.kind == DriveKind::Simple)
@@ -184,5 +194,16 @@ impl<T: Real> Transmission<T> {
     /// column counts as zero. Returns `false` past the end.
     pub fn has_joint_inertia(&self, joint: usize) -> bool {
         self.joint_inertia.get(joint).copied().unwrap_or(false)
+    }
+}
+
+impl<T: Real<Mask = bool>> Transmission<T> {
+    /// Returns true if motor `motor` turns with joint `joint` (both from 0), at some position at least.
+    pub fn turns_with(&self, motor: usize, joint: usize) -> bool {
+        self.motors.get(motor).is_some_and(|own| {
+            let weights = own.screw.iter().flat_map(|screw| screw.weights.get(joint));
+            let mut entries = own.ratios.get(joint).into_iter().chain(weights);
+            entries.any(|entry| T::ZERO.lt(entry.abs()))
+        })
     }
 }

@@ -65,6 +65,8 @@ pub(super) struct Elastic {
     pub v: Vec<f64>,
     /// True if the links have a state.
     pub moving: bool,
+    /// Rate of the gear of a robot of one joint, whose inertia does not change, rad/s.
+    rate: Option<f64>,
     /// Torques that the gears take from the motors' coordinates, and give to the links, joint by joint.
     pub torque: [Vec<f64>; 2],
     side: Side,
@@ -114,7 +116,7 @@ impl Elastic {
         }
         refuse_half_coupled(model, &mut gears)?;
         let list = || vec![0.0; n];
-        let elastic = Self {
+        let mut elastic = Self {
             torque: [list(), list()],
             side: Side {
                 q: list(),
@@ -129,9 +131,15 @@ impl Elastic {
             gears,
             at,
             moving: false,
+            rate: None,
         };
-        if !elastic.is_empty() {
-            elastic.link_mobility(model, &vec![0.0; n])?;
+        if elastic.is_empty() {
+            return Ok(elastic);
+        }
+        // Refuses links and motors without inertia.
+        elastic.link_mobility(model, &vec![0.0; n])?;
+        if n == 1 && model.motors.is_none() {
+            elastic.rate = Some(elastic.fastest(model, &[0.0])?);
         }
         Ok(elastic)
     }
@@ -253,9 +261,18 @@ impl Elastic {
     }
 
     /// Returns the number of substeps of a step of `dt` with the motors at `q`: the phase of the fastest gear within one
-    /// is [`ANGLE`] at most. The masses on the two sides of a gear are taken with all other coordinates free, which gives
-    /// the highest rate.
+    /// is [`ANGLE`] at most.
     pub(super) fn steps(&self, model: &Model, q: &[f64], dt: f64) -> Result<usize, SimulateError> {
+        let rate = match self.rate {
+            Some(rate) => rate,
+            None => self.fastest(model, q)?,
+        };
+        Ok((dt * rate / ANGLE).ceil().max(1.0) as usize)
+    }
+
+    /// Returns the rate of the fastest gear with the motors at `q`, rad/s. The masses on the two sides of a gear are taken
+    /// with all other coordinates free, which gives the highest rate.
+    fn fastest(&self, model: &Model, q: &[f64]) -> Result<f64, SimulateError> {
         let n = q.len();
         let mut at = q.to_vec();
         for (gear, link) in self.gears.iter().zip(&self.q) {
@@ -283,7 +300,7 @@ impl Elastic {
             let [_, stiffness, damping] = gear.law;
             rate = rate.max((stiffness / reduced).sqrt() + damping / reduced);
         }
-        Ok((dt * rate / ANGLE).ceil().max(1.0) as usize)
+        Ok(rate)
     }
 
     /// Returns the joints with gears.
@@ -409,13 +426,11 @@ fn refuse_half_coupled(model: &Model, gears: &mut [Gear]) -> Result<(), Simulate
         return Ok(());
     };
     let n = model.parameters.len();
-    let mut jacobian = vec![0.0; n * n];
-    motors.transmission.jacobian(&vec![0.0; n], &mut jacobian)?;
+    let t = &motors.transmission;
     let has = |joint: usize| gears.iter().any(|gear| gear.joint == joint);
     for drive in 0..n {
         for joint in 0..n {
-            // A screw beyond its reach has no ratio, but it has a place in the matrix.
-            if jacobian[drive * n + joint] == 0.0 || has(drive) == has(joint) {
+            if !t.turns_with(drive, joint) || has(drive) == has(joint) {
                 continue;
             }
             let (own, other) = if has(drive) {
@@ -431,17 +446,14 @@ fn refuse_half_coupled(model: &Model, gears: &mut [Gear]) -> Result<(), Simulate
         }
     }
     for gear in gears {
-        let kind = motors.transmission.kind(gear.joint);
-        if kind != Some(DriveKind::Simple) && gear.link_friction > 0.0 {
+        if t.kind(gear.joint) != Some(DriveKind::Simple) && gear.link_friction > 0.0 {
             let elastic = |k: Kind| k.transmission(&[0.0; SHAPES]).is_some();
             return Err(SimulateError::LinkFriction {
                 effect: (model.effects.named_at(gear.joint, elastic)).unwrap_or_default(),
                 share: gear.link_friction,
             });
         }
-        if kind != Some(DriveKind::Varying) {
-            gear.scale = jacobian[gear.joint * n + gear.joint];
-        }
+        gear.scale = t.own_turns(gear.joint).unwrap_or(1.0);
     }
     Ok(())
 }

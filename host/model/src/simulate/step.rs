@@ -32,7 +32,8 @@ const PASSES: usize = 2;
 /// Passes if effects depend on accelerations and hidden states. They converge, but not in one pass.
 const PASSES_WITH_EFFECTS: usize = 5;
 
-/// Steps a model. Owns every buffer, so that a step allocates nothing.
+/// Steps a model. Owns every buffer: a step allocates nothing, except with elastic gears of several joints, whose step
+/// length follows the pose.
 pub struct Stepper<'a> {
     model: &'a Model,
     /// The parameters without friction and offset, which the step computes itself.
@@ -50,6 +51,8 @@ pub struct Stepper<'a> {
     friction: DryFriction,
     acting: Acting<'a>,
     elastic: Elastic,
+    /// Positions and velocities of all coordinates.
+    both: [Vec<f64>; 2],
     acceleration: Vec<f64>,
     /// Loads of the links on the gears.
     loads: Vec<f64>,
@@ -116,6 +119,7 @@ impl<'a> Stepper<'a> {
                 matrix: vec![0.0; joints * joints],
             },
             elastic,
+            both: [Vec::with_capacity(n), Vec::with_capacity(n)],
         };
         refuse_driving_friction(model, &stepper.elastic)?;
         Ok(stepper)
@@ -290,19 +294,25 @@ impl<'a> Stepper<'a> {
         }
         self.put_links_at_rest(q, v)?;
         let joints = q.len();
-        let mut both = [q.to_vec(), v.to_vec()];
-        both[0].extend_from_slice(&self.elastic.q);
-        both[1].extend_from_slice(&self.elastic.v);
         let steps = self.elastic.steps(self.model, q, dt)?;
-        let [positions, speeds] = &mut both;
+        let [mut positions, mut speeds] = std::mem::take(&mut self.both);
+        for (all, own, links) in [
+            (&mut positions, &*q, &self.elastic.q),
+            (&mut speeds, &*v, &self.elastic.v),
+        ] {
+            all.clear();
+            all.extend_from_slice(own);
+            all.extend_from_slice(links);
+        }
         for _ in 0..steps {
-            self.advance(positions, speeds, torque, dt / steps as f64)
+            self.advance(&mut positions, &mut speeds, torque, dt / steps as f64)
                 .map_err(|e| self.with_joint(e))?;
         }
         q.copy_from_slice(&positions[..joints]);
         v.copy_from_slice(&speeds[..joints]);
         self.elastic.q.copy_from_slice(&positions[joints..]);
         self.elastic.v.copy_from_slice(&speeds[joints..]);
+        self.both = [positions, speeds];
         Ok(())
     }
 

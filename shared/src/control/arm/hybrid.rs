@@ -19,10 +19,8 @@
 
 use super::fault::{ControlFault, check};
 use super::input::{Inputs, Law, Limited};
-use super::model::ArmModel;
 use super::operational::Operational;
-use super::task::{AXES, Task};
-use crate::precompensation::PrecompensationSettings;
+use super::task::AXES;
 use crate::scalar::Real;
 
 /// Gains of a direction that presses.
@@ -73,18 +71,10 @@ pub enum Axis<T> {
 /// Constants of the law.
 #[derive(Clone, Copy, Debug)]
 pub struct Config<'a, T> {
-    /// The model.
-    pub model: ArmModel<'a, T>,
-    /// Tool and directions.
-    pub task: Task<'a, T>,
+    /// Arm, tool and directions.
+    pub operational: Operational<'a, T>,
     /// The selection: what each direction does.
     pub axes: &'a [Axis<T>],
-    /// Posture in the motions that do not move the tool: kp in 1/s², kd in 1/s.
-    pub posture: [T; 2],
-    /// Settings of the compensation of dry friction.
-    pub friction: PrecompensationSettings<T>,
-    /// Highest torque of each joint, N·m or N.
-    pub torque_limit: &'a [T],
     /// Time between two steps, s.
     pub period: T,
 }
@@ -127,12 +117,13 @@ impl<T: Real<Mask = bool>> Law<T> for Config<'_, T> {
         input: &Inputs<'_, T>,
         torque: &mut [T],
     ) -> Result<Limited, ControlFault> {
-        let count = self.task.directions.len();
+        let Operational { model, task, .. } = &self.operational;
+        let count = task.directions.len();
         check("axes", count, self.axes.len())?;
-        let motion = (self.task).motion(self.model.chain, input.position, input.velocity)?;
+        let motion = task.motion(model.chain, input.position, input.velocity)?;
         let mut wanted = [T::ZERO; AXES];
         let mut speed = [T::ZERO; AXES];
-        let pressed = self.task.pressed(&input.force);
+        let pressed = task.pressed(&input.force);
         for (d, axis) in self.axes.iter().enumerate() {
             let (x, v) = (motion.position[d], motion.velocity[d]);
             match axis {
@@ -152,14 +143,9 @@ impl<T: Real<Mask = bool>> Law<T> for Config<'_, T> {
                 }
             }
         }
-        let operational = Operational {
-            model: self.model,
-            friction: self.friction,
-            torque_limit: self.torque_limit,
-            posture: self.posture,
-        };
         let limited =
-            operational.torque(input, &motion, count, [&wanted, &speed, &pressed], torque)?;
+            self.operational
+                .torque(input, &motion, [&wanted, &speed, &pressed], torque)?;
         // Nothing is observed behind a limit: the observer would take it for a disturbance.
         if !limited.any() {
             for (d, axis) in self.axes.iter().enumerate() {

@@ -9,10 +9,8 @@
 
 use super::fault::{ControlFault, check};
 use super::input::{Inputs, Law, Limited};
-use super::model::ArmModel;
 use super::operational::Operational;
-use super::task::{AXES, Task};
-use crate::precompensation::PrecompensationSettings;
+use super::task::AXES;
 use crate::scalar::Real;
 
 /// The behaviour of one direction.
@@ -42,18 +40,10 @@ impl<T: Real> Target<T> {
 /// Constants of the law.
 #[derive(Clone, Copy, Debug)]
 pub struct Config<'a, T> {
-    /// The model.
-    pub model: ArmModel<'a, T>,
-    /// Tool and directions.
-    pub task: Task<'a, T>,
+    /// Arm, tool and directions.
+    pub operational: Operational<'a, T>,
     /// Behaviour along each direction.
     pub targets: &'a [Target<T>],
-    /// Posture in the motions that do not move the tool: kp in 1/s², kd in 1/s.
-    pub posture: [T; 2],
-    /// Settings of the compensation of dry friction.
-    pub friction: PrecompensationSettings<T>,
-    /// Highest torque of each joint, N·m or N.
-    pub torque_limit: &'a [T],
 }
 
 impl<T: Real<Mask = bool>> Law<T> for Config<'_, T> {
@@ -65,10 +55,11 @@ impl<T: Real<Mask = bool>> Law<T> for Config<'_, T> {
         input: &Inputs<'_, T>,
         torque: &mut [T],
     ) -> Result<Limited, ControlFault> {
-        let count = self.task.directions.len();
+        let Operational { model, task, .. } = &self.operational;
+        let count = task.directions.len();
         check("targets", count, self.targets.len())?;
-        let motion = (self.task).motion(self.model.chain, input.position, input.velocity)?;
-        let pressed = self.task.pressed(&input.force);
+        let motion = task.motion(model.chain, input.position, input.velocity)?;
+        let pressed = task.pressed(&input.force);
         let mut wanted = [T::ZERO; AXES];
         let mut speed = [T::ZERO; AXES];
         for (d, target) in self.targets.iter().enumerate() {
@@ -79,12 +70,7 @@ impl<T: Real<Mask = bool>> Law<T> for Config<'_, T> {
             // Without inertia the target would move at this speed.
             speed[d] = reference.velocity + pull / target.damping;
         }
-        let operational = Operational {
-            model: self.model,
-            friction: self.friction,
-            torque_limit: self.torque_limit,
-            posture: self.posture,
-        };
-        operational.torque(input, &motion, count, [&wanted, &speed, &pressed], torque)
+        self.operational
+            .torque(input, &motion, [&wanted, &speed, &pressed], torque)
     }
 }

@@ -35,5 +35,6 @@ mod tests;
 pub use fault::ControlFault;
 pub use input::{Inputs, Law, Limited};
 pub use model::{ArmModel, ArmMotors};
+pub use operational::Operational;
 pub use regressor::{PassiveRegressor, REGRESSOR_WORKSPACE};
 pub use task::{AXES, Task, TaskMotion};

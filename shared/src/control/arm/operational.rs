@@ -4,7 +4,8 @@ use super::fault::{ControlFault, check};
 use super::friction::add_dry_friction;
 use super::input::{Inputs, Limited, limit};
 use super::model::ArmModel;
-use super::task::{AXES, TaskMotion};
+use super::task::{AXES, Task, TaskMotion};
+use crate::cholesky::{factorise, solve};
 use crate::multibody::{MAX_JOINTS, MultibodyError};
 use crate::precompensation::PrecompensationSettings;
 use crate::scalar::Real;
@@ -15,12 +16,17 @@ const SINGULAR: f64 = 1e-6;
 
 /// Constants of the laws in the space of a task.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Operational<'a, T> {
-    pub(super) model: ArmModel<'a, T>,
-    pub(super) friction: PrecompensationSettings<T>,
-    pub(super) torque_limit: &'a [T],
-    /// Posture: kp in 1/s² and kd in 1/s.
-    pub(super) posture: [T; 2],
+pub struct Operational<'a, T> {
+    /// The model.
+    pub model: ArmModel<'a, T>,
+    /// Tool and directions.
+    pub task: Task<'a, T>,
+    /// Posture in the motions that do not move the tool: kp in 1/s², kd in 1/s.
+    pub posture: [T; 2],
+    /// Settings of the compensation of dry friction.
+    pub friction: PrecompensationSettings<T>,
+    /// Highest torque of each joint, N·m or N.
+    pub torque_limit: &'a [T],
 }
 
 impl<T: Real<Mask = bool>> Operational<'_, T> {
@@ -32,11 +38,10 @@ impl<T: Real<Mask = bool>> Operational<'_, T> {
         &self,
         input: &Inputs<'_, T>,
         motion: &TaskMotion<T>,
-        count: usize,
         [wanted, speed, pressed]: [&[T; AXES]; 3],
         torque: &mut [T],
     ) -> Result<Limited, ControlFault> {
-        let n = self.model.joint_count();
+        let (n, count) = (self.model.joint_count(), self.task.directions.len());
         input.check(n)?;
         check("torque_limit", n, self.torque_limit.len())?;
         check("torque", n, torque.len())?;
@@ -49,7 +54,7 @@ impl<T: Real<Mask = bool>> Operational<'_, T> {
         // A⁻¹·Jᵀ, one row a direction.
         let mut response = motion.rows;
         for row in response.iter_mut().take(count) {
-            solve(mass, n, &mut row[..n]);
+            solve(mass, &mut row[..n]);
         }
         let mut mobility = [T::ZERO; AXES * AXES];
         let mut largest = T::ZERO;
@@ -79,8 +84,8 @@ impl<T: Real<Mask = bool>> Operational<'_, T> {
             force[d] =
                 wanted[d] - motion.convective[d] - dot(&motion.rows[d][..n], &acceleration[..n]);
         }
-        solve(mobility, count, &mut force[..count]);
-        solve(mobility, count, &mut pace[..count]);
+        solve(mobility, &mut force[..count]);
+        solve(mobility, &mut pace[..count]);
         let mut planned = [T::ZERO; MAX_JOINTS];
         for d in 0..count {
             for j in 0..n {
@@ -108,43 +113,4 @@ fn dot<T: Real>(a: &[T], b: &[T]) -> T {
         sum += x * y;
     }
     sum
-}
-
-/// Replaces the lower triangle of a symmetric n × n matrix by its Cholesky factor. Returns the row of the first pivot
-/// that is not above zero.
-fn factorise<T: Real<Mask = bool>>(matrix: &mut [T], n: usize) -> Result<(), usize> {
-    for j in 0..n {
-        for i in j..n {
-            let mut value = matrix[i * n + j];
-            for k in 0..j {
-                value -= matrix[i * n + k] * matrix[j * n + k];
-            }
-            if i > j {
-                matrix[i * n + j] = value / matrix[j * n + j];
-            } else if T::ZERO.lt(value) {
-                matrix[j * n + j] = value.sqrt();
-            } else {
-                return Err(j);
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Solves L·Lᵀ·x = b in place.
-fn solve<T: Real>(factor: &[T], n: usize, x: &mut [T]) {
-    for i in 0..n {
-        let mut value = x[i];
-        for k in 0..i {
-            value -= factor[i * n + k] * x[k];
-        }
-        x[i] = value / factor[i * n + i];
-    }
-    for i in (0..n).rev() {
-        let mut value = x[i];
-        for k in i + 1..n {
-            value -= factor[k * n + i] * x[k];
-        }
-        x[i] = value / factor[i * n + i];
-    }
 }
