@@ -12,10 +12,11 @@ use crate::body::body;
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, sizes_of};
 use crate::findings::SensorFindings;
+use crate::intake::Sensing;
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
 use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers};
-use crate::sensor::{Sensing, by_sensor};
+use crate::sensor::by_sensor;
 use crate::torque::{Driven, equations};
 
 /// Probability by chance below which sensor and torques contradict each other.

@@ -50,6 +50,7 @@ mod error;
 mod estimate;
 mod findings;
 mod identify;
+mod intake;
 mod jump;
 mod missing;
 mod mounting;

@@ -66,19 +66,18 @@ fn least(nuisance: Nuisance) -> f64 {
 /// correlated in time. For a motion its values are compared with their spread over refits without one segment
 /// (Hotelling's T²); poses are independent of each other, so the F test holds for them.
 fn shows(sensed: &Sensed, fit: &Fit, without: &Fit, nuisance: Nuisance) -> bool {
-    let size = values(sensed, fit, without, nuisance).map_or(0.0, |values| values.norm());
-    if size < least(nuisance) || !is_better(fit, without) {
-        return false;
-    }
-    if sensed.recordings.iter().all(|r| r.poses) {
-        return true;
-    }
     let (Some(values), Some(place)) = (
         values(sensed, fit, without, nuisance),
         sensed.place(&fit.unknowns, nuisance),
     ) else {
         return false;
     };
+    if values.norm() < least(nuisance) || !is_better(fit, without) {
+        return false;
+    }
+    if sensed.recordings.iter().all(|r| r.poses) {
+        return true;
+    }
     let segments = sensed.factors(fit);
     let count = values.len() as f64;
     let freedom = segments.len() as f64 - count;

@@ -1,43 +1,23 @@
 //! The load from the wrist sensor, stage by stage.
 
-use nalgebra::{Matrix3, SMatrix};
+use nalgebra::Matrix3;
 use rig_data::WRENCH_COLUMNS;
-use rig_data::prepare::{PrepareOptions, PreprocessingPlan, Recording, as_recordings, surveyed};
-use rig_model::robot::{Reads, Robot, WristSensor};
-use rig_output::{format_significant, listed};
-use rig_shared::multibody::{Chain, INERTIAL_PARAMETERS};
+use rig_data::prepare::{PreprocessingPlan, Recording, surveyed};
+use rig_model::robot::{Reads, WristSensor};
+use rig_output::format_significant;
 
-use crate::channels::{Judged, judge};
 use crate::convention::{Compared, compare, other_unit, settled};
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
 use crate::findings::{SensorFindings, Told};
+use crate::intake::{Intake, Sensing, judged, moving};
 use crate::mounting::{Channels, Mounting};
-use crate::rows::{FEWEST_ROWS, LEAST_ROWS, Passed, each_pose, each_row};
+use crate::rows::LEAST_ROWS;
 use crate::selection::{Selected, selected};
-use crate::statistics::{Collector, Recorded};
 use crate::system::{Fit, Nuisance, Sensed, Unknowns};
-use crate::torqueless::Torqueless;
-use crate::wrench_row::WrenchRow;
 
 /// Most times that the readings are shifted by the delay found.
 const MOST_SHIFTS: usize = 8;
-/// Share of the rows that may be left out because of saturation.
-const MOST_SATURATED: f64 = 0.5;
-
-/// Recordings of the wrist sensor.
-pub(crate) struct Sensing<'a> {
-    pub robot: &'a Robot,
-    pub chain: &'a Chain<f64>,
-    /// Recordings with the load, then those without it.
-    pub recordings: &'a [(&'a dyn Recording, bool)],
-    pub to_joint: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
-    pub prepare: &'a PrepareOptions,
-    /// True if every row of every recording is a pose at rest.
-    pub poses: bool,
-    /// True to go on with the best explanation if the channels look wrong.
-    pub even_if_wrong: bool,
-}
 
 /// Identifies the load from the wrist sensor; adds sentences to `warnings`.
 ///
@@ -49,10 +29,16 @@ pub(crate) fn by_sensor(
 ) -> Result<(Estimate, SensorFindings), LoadError> {
     let robot = sensing.robot;
     let sensor = robot.wrist_sensor.clone().unwrap_or_default();
+    let judged = judged(sensing, &sensor)?;
+    let moving = moving(sensing, &judged);
+    let moving: Vec<&dyn Recording> = moving.iter().map(|r| r as &dyn Recording).collect();
+    let (surveys, usable) = surveyed(&moving, robot.joints.len())?;
+    let intake = Intake::of(sensing, &sensor, judged, surveys, &usable)?;
+    warnings.extend(intake.notes());
     let (mut delay, mut shifts) = (0.0, 0);
     loop {
         let mut said = Vec::new();
-        let (recordings, prepared) = collected(sensing, &sensor, delay, &mut said)?;
+        let recordings = intake.read(delay, &mut said)?;
         let sensed = Sensed {
             recordings: &recordings,
             to_joint: sensing.to_joint,
@@ -73,7 +59,7 @@ pub(crate) fn by_sensor(
             fitted,
             sensing,
             (&sensor, delay),
-            prepared,
+            intake.plan,
             warnings,
         );
     }
@@ -172,106 +158,6 @@ fn finished(
 /// Returns the mass by a fit.
 fn sensed_mass(fit: &Fit) -> f64 {
     fit.values.first().copied().unwrap_or(0.0)
-}
-
-/// Reads the recordings, the readings `delay` seconds later than the positions.
-fn collected(
-    sensing: &Sensing,
-    sensor: &WristSensor,
-    delay: f64,
-    warnings: &mut Vec<String>,
-) -> Result<(Vec<Recorded>, Option<PreprocessingPlan>), LoadError> {
-    let joints = sensing.robot.joints.len();
-    let mut judged = Vec::new();
-    for (recording, _) in sensing.recordings {
-        judged.push(judge(*recording, sensor, sensing.poses)?);
-    }
-    let is_poses = |judged: &Judged| sensing.poses || judged.rows < FEWEST_ROWS as u64;
-    let moving: Vec<Torqueless> = (sensing.recordings.iter().zip(&judged))
-        .filter(|(_, judged)| !is_poses(judged))
-        .map(|((recording, _), _)| Torqueless(*recording))
-        .collect();
-    let moving: Vec<&dyn Recording> = moving.iter().map(|r| r as &dyn Recording).collect();
-    let (surveys, usable) = surveyed(&moving, joints)?;
-    let plan = match surveys.is_empty() {
-        true => None,
-        false => Some(PreprocessingPlan::decide(
-            &surveys,
-            sensing.prepare,
-            &vec![None; joints],
-        )?),
-    };
-    warnings.extend(surveys.iter().filter_map(|s| s.note.clone()));
-    let pose = sensing.robot.last_link * sensor.pose();
-    let mut prepared = surveys.iter().zip(as_recordings(&usable));
-    let mut recordings = Vec::new();
-    for ((recording, loaded), judged) in sensing.recordings.iter().zip(&judged) {
-        let label = recording.label();
-        let poses = is_poses(judged);
-        let next = if poses { None } else { prepared.next() };
-        let rows = match (&plan, &next) {
-            (Some(plan), Some((survey, _))) => survey.rows / plan.decimation as u64,
-            _ => judged.rows,
-        };
-        let mut collector = Collector::new(rows, judged.length);
-        let mut take = |row: &WrenchRow| collector.push(row);
-        let passed = match (&plan, next) {
-            (Some(plan), Some((_, usable))) => {
-                let read = (&judged.ends, delay);
-                each_row(sensing.chain, &pose, usable, plan, read, &mut take)?
-            }
-            _ => {
-                if !sensing.poses {
-                    warnings.push(format!(
-                        "{label} has {} rows: each was taken as a pose at rest.",
-                        judged.rows
-                    ));
-                }
-                let ends = &judged.ends;
-                Passed {
-                    saturated: each_pose(sensing.chain, &pose, *recording, ends, &mut take)?,
-                    noise: None,
-                }
-            }
-        };
-        let recorded = collector.finish(label, *loaded, poses, passed);
-        saturation(&recorded, judged, sensing.even_if_wrong, warnings)?;
-        recordings.push(recorded);
-    }
-    Ok((recordings, plan))
-}
-
-/// Says which channels were cut, and refuses a recording that mostly was.
-fn saturation(
-    recorded: &Recorded,
-    judged: &Judged,
-    even_if_wrong: bool,
-    warnings: &mut Vec<String>,
-) -> Result<(), LoadError> {
-    if judged.cut.is_empty() {
-        return Ok(());
-    }
-    let list: Vec<String> = (judged.cut.iter())
-        .map(|(column, value)| {
-            let unit = if column.starts_with('f') { "N" } else { "N·m" };
-            format!("{column} at {} {unit}", format_significant(*value, 4))
-        })
-        .collect();
-    let saturated = recorded.passed.saturated;
-    let left_out = saturated as f64 / (saturated + recorded.rows()).max(1) as f64;
-    let text = format!(
-        "{}: the sensor was saturated ({}); {:.1} % of the rows were left out.",
-        recorded.label,
-        listed(&list),
-        100.0 * left_out
-    );
-    if left_out > MOST_SATURATED && !even_if_wrong {
-        return Err(LoadError::Fault(format!(
-            "{text} Take a sensor with a larger range, a slower motion, or poses with a smaller lever."
-        )));
-    }
-    warnings.push(text);
-    Ok(())
 }
 
 /// Channels that are believed.

@@ -1,0 +1,186 @@
+//! The recordings of the wrist sensor: judged and surveyed once, and read as often as the equations need them.
+
+use nalgebra::SMatrix;
+use rig_data::prepare::{
+    MaybeResampled, PrepareOptions, PreprocessingPlan, Recording, Survey, as_recordings,
+};
+use rig_model::robot::{Robot, WristSensor};
+use rig_output::{format_significant, listed};
+use rig_shared::multibody::{Chain, INERTIAL_PARAMETERS};
+
+use crate::channels::{Judged, judge};
+use crate::error::LoadError;
+use crate::rows::{FEWEST_ROWS, Passed, each_pose, each_row};
+use crate::statistics::{Collector, Recorded};
+use crate::torqueless::Torqueless;
+use crate::wrench_row::WrenchRow;
+
+/// Share of the rows that may be left out because of saturation.
+const MOST_SATURATED: f64 = 0.5;
+
+/// Recordings of the wrist sensor.
+pub(crate) struct Sensing<'a> {
+    pub robot: &'a Robot,
+    pub chain: &'a Chain<f64>,
+    /// Recordings with the load, then those without it.
+    pub recordings: &'a [(&'a dyn Recording, bool)],
+    pub to_joint: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
+    pub prepare: &'a PrepareOptions,
+    /// True if every row of every recording is a pose at rest.
+    pub poses: bool,
+    /// True to go on with the best explanation if the channels look wrong.
+    pub even_if_wrong: bool,
+}
+
+/// Judges the channels of all recordings.
+///
+/// # Errors
+/// [`LoadError`] of the first one that cannot be used.
+pub(crate) fn judged(sensing: &Sensing, sensor: &WristSensor) -> Result<Vec<Judged>, LoadError> {
+    let judge = |(recording, _): &(&dyn Recording, bool)| judge(*recording, sensor, sensing.poses);
+    sensing.recordings.iter().map(judge).collect()
+}
+
+/// Returns true if each row of a recording is a pose at rest.
+fn is_poses(sensing: &Sensing, judged: &Judged) -> bool {
+    sensing.poses || judged.rows < FEWEST_ROWS as u64
+}
+
+/// Returns the recordings of a motion.
+pub(crate) fn moving<'a>(sensing: &Sensing<'a>, judged: &[Judged]) -> Vec<Torqueless<'a>> {
+    (sensing.recordings.iter().zip(judged))
+        .filter(|(_, judged)| !is_poses(sensing, judged))
+        .map(|((recording, _), _)| Torqueless(*recording))
+        .collect()
+}
+
+/// Recordings that are ready to be read.
+pub(crate) struct Intake<'a> {
+    sensing: &'a Sensing<'a>,
+    sensor: &'a WristSensor,
+    /// By recording.
+    judged: Vec<Judged>,
+    /// By recording of a motion.
+    surveys: Vec<Survey>,
+    usable: Vec<&'a dyn Recording>,
+    /// Preparation of the recordings of a motion; `None` for poses.
+    pub plan: Option<PreprocessingPlan>,
+}
+
+impl<'a> Intake<'a> {
+    /// Decides how the recordings are prepared; `surveys` and `usable` are those of [`moving`].
+    ///
+    /// # Errors
+    /// [`LoadError::Prepare`].
+    pub(crate) fn of(
+        sensing: &'a Sensing<'a>,
+        sensor: &'a WristSensor,
+        judged: Vec<Judged>,
+        surveys: Vec<Survey>,
+        usable: &'a [MaybeResampled<'a>],
+    ) -> Result<Self, LoadError> {
+        let plan = match surveys.is_empty() {
+            true => None,
+            false => Some(PreprocessingPlan::decide(
+                &surveys,
+                sensing.prepare,
+                &vec![None; sensing.robot.joints.len()],
+            )?),
+        };
+        Ok(Self {
+            sensing,
+            sensor,
+            judged,
+            surveys,
+            usable: as_recordings(usable),
+            plan,
+        })
+    }
+
+    /// Returns what is to be said of the recordings before they are read.
+    pub(crate) fn notes(&self) -> impl Iterator<Item = String> {
+        self.surveys.iter().filter_map(|s| s.note.clone())
+    }
+
+    /// Reads the recordings, the readings `delay` seconds later than the positions.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub(crate) fn read(
+        &self,
+        delay: f64,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Recorded>, LoadError> {
+        let sensing = self.sensing;
+        let pose = sensing.robot.last_link * self.sensor.pose();
+        let mut prepared = self.surveys.iter().zip(&self.usable);
+        let mut recordings = Vec::new();
+        for ((recording, loaded), judged) in sensing.recordings.iter().zip(&self.judged) {
+            let label = recording.label();
+            let poses = is_poses(sensing, judged);
+            let next = if poses { None } else { prepared.next() };
+            let rows = match (&self.plan, &next) {
+                (Some(plan), Some((survey, _))) => survey.rows / plan.decimation as u64,
+                _ => judged.rows,
+            };
+            let mut collector = Collector::new(rows, judged.length);
+            let mut take = |row: &WrenchRow| collector.push(row);
+            let passed = match (&self.plan, next) {
+                (Some(plan), Some((_, usable))) => {
+                    let read = (&judged.ends, delay);
+                    each_row(sensing.chain, &pose, *usable, plan, read, &mut take)?
+                }
+                _ => {
+                    if !sensing.poses {
+                        warnings.push(format!(
+                            "{label} has {} rows: each was taken as a pose at rest.",
+                            judged.rows
+                        ));
+                    }
+                    let ends = &judged.ends;
+                    Passed {
+                        saturated: each_pose(sensing.chain, &pose, *recording, ends, &mut take)?,
+                        noise: None,
+                    }
+                }
+            };
+            let recorded = collector.finish(label, *loaded, poses, passed);
+            saturation(&recorded, judged, sensing.even_if_wrong, warnings)?;
+            recordings.push(recorded);
+        }
+        Ok(recordings)
+    }
+}
+
+/// Says which channels were cut, and refuses a recording that mostly was.
+fn saturation(
+    recorded: &Recorded,
+    judged: &Judged,
+    even_if_wrong: bool,
+    warnings: &mut Vec<String>,
+) -> Result<(), LoadError> {
+    if judged.cut.is_empty() {
+        return Ok(());
+    }
+    let list: Vec<String> = (judged.cut.iter())
+        .map(|(column, value)| {
+            let unit = if column.starts_with('f') { "N" } else { "N·m" };
+            format!("{column} at {} {unit}", format_significant(*value, 4))
+        })
+        .collect();
+    let saturated = recorded.passed.saturated;
+    let left_out = saturated as f64 / (saturated + recorded.rows()).max(1) as f64;
+    let text = format!(
+        "{}: the sensor was saturated ({}); {:.1} % of the rows were left out.",
+        recorded.label,
+        listed(&list),
+        100.0 * left_out
+    );
+    if left_out > MOST_SATURATED && !even_if_wrong {
+        return Err(LoadError::Fault(format!(
+            "{text} Take a sensor with a larger range, a slower motion, or poses with a smaller lever."
+        )));
+    }
+    warnings.push(text);
+    Ok(())
+}
