@@ -6,18 +6,19 @@
 //! parameters, and a few sets cannot determine them. So Ψ is diagonal, and its entries are the moment estimates of
 //! DerSimonian and Laird (1986) of each parameter.
 //!
-//! Standard error and interval of a parameter are the larger ones of two. One follows from the errors within the sets. The other is the
-//! scatter of the sets about their mean, of each parameter alone (Hartung and Knapp 2001, "A refined method for the
-//! meta-analysis of controlled clinical trials", eq. 3); its interval uses Student's t with the effective number of sets
-//! (Kish 1965) minus one. With few sets intervals are wide: t is 12.7 for two sets and 3.2 for four.
+//! Standard error and interval of a parameter are the larger ones of two. One follows from the errors within the sets. The
+//! other is the scatter of the sets about their mean, of each parameter alone (Hartung and Knapp 2001, "A refined method
+//! for the meta-analysis of controlled clinical trials", eq. 3); its interval uses Student's t with the effective number of
+//! sets (Kish 1965) minus one. With few sets intervals are wide: t is 12.7 for two sets and 3.2 for four.
 
 use nalgebra::{DMatrix, DVector};
+use rig_identify::t_quantile;
 
 use crate::basis::Basis;
 use crate::error::CompareError;
 use crate::identified_set::IdentifiedSet;
 use crate::matrices::inverse;
-use crate::significance::{freedom_of_quantile, t_quantile};
+use crate::significance::freedom_of_quantile;
 use crate::single::{Single, scatter};
 
 /// Pooled values.

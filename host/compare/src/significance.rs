@@ -1,6 +1,7 @@
 //! Probabilities and the level of all tests.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+use rig_identify::t_quantile;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Probability of a false alarm over all tests together. The same level tells whether the remainder of a hypothesis is
 /// consistent with chance.
@@ -20,11 +21,6 @@ pub(crate) fn chi2_p(value: f64, freedom: usize) -> f64 {
 /// Returns the probability that F is at least `value`.
 pub(crate) fn f_p(value: f64, freedom: [f64; 2]) -> f64 {
     FisherSnedecor::new(freedom[0], freedom[1]).map_or(1.0, |d| d.sf(value.max(0.0)))
-}
-
-/// Returns Student's quantile for a two-sided 95 % interval; `freedom` need not be whole.
-pub(crate) fn t_quantile(freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
 }
 
 /// Returns the degrees of freedom that have this quantile, from 1 to 10⁶; the inverse of [`t_quantile`].

@@ -26,6 +26,35 @@ pub(crate) struct Spread {
     pub between: f64,
 }
 
+/// Values weighted by their inverse variances.
+struct Weighted {
+    weights: Vec<f64>,
+    sum: f64,
+    /// Sum of the squared weights.
+    squares: f64,
+    /// Weighted squares about the weighted mean.
+    about: f64,
+}
+
+impl Weighted {
+    /// Weighs `list`, with the variance `between` sets in addition to each own.
+    fn of(list: &[Single], between: f64) -> Self {
+        let weights: Vec<f64> = (list.iter())
+            .map(|s| 1.0 / (s.variance + between))
+            .collect();
+        let (sum, squares) = (weights.iter()).fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
+        let pairs = || list.iter().zip(&weights);
+        let mean = pairs().map(|(s, w)| w * s.value).sum::<f64>() / sum;
+        let about = pairs().map(|(s, w)| w * (s.value - mean).powi(2)).sum();
+        Self {
+            weights,
+            sum,
+            squares,
+            about,
+        }
+    }
+}
+
 /// Returns the spread of a parameter over two or more sets.
 ///
 /// Between sets: the moment estimator of DerSimonian and Laird (1986). Within: the typical variance of Higgins and
@@ -33,17 +62,12 @@ pub(crate) struct Spread {
 /// values") for variances that are estimated themselves.
 pub(crate) fn spread(list: &[Single]) -> Spread {
     let n = list.len() as f64;
-    let weights: Vec<f64> = list.iter().map(|s| 1.0 / s.variance).collect();
-    let (sum, squares) = (weights.iter()).fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
-    let mean = list
-        .iter()
-        .zip(&weights)
-        .map(|(s, w)| w * s.value)
-        .sum::<f64>()
-        / sum;
-    let q: f64 = (list.iter().zip(&weights))
-        .map(|(s, w)| w * (s.value - mean).powi(2))
-        .sum();
+    let Weighted {
+        weights,
+        sum,
+        squares,
+        about: q,
+    } = Weighted::of(list, 0.0);
     let lost: f64 = (list.iter().zip(&weights))
         .map(|(s, w)| (1.0 - w / sum).powi(2) / s.freedom)
         .sum();
@@ -63,19 +87,12 @@ pub(crate) fn scatter(list: &[Single], between: f64) -> Option<[f64; 2]> {
     if list.len() < 2 {
         return None;
     }
-    let weights: Vec<f64> = (list.iter())
-        .map(|s| 1.0 / (s.variance + between))
-        .collect();
-    let (sum, squares) = (weights.iter()).fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
-    let mean = list
-        .iter()
-        .zip(&weights)
-        .map(|(s, w)| w * s.value)
-        .sum::<f64>()
-        / sum;
-    let about: f64 = (list.iter().zip(&weights))
-        .map(|(s, w)| w * (s.value - mean).powi(2))
-        .sum();
+    let Weighted {
+        sum,
+        squares,
+        about,
+        ..
+    } = Weighted::of(list, between);
     let freedom = (sum * sum / squares - 1.0).max(1.0);
     Some([(about / ((list.len() - 1) as f64 * sum)).sqrt(), freedom])
 }

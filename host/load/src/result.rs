@@ -175,7 +175,7 @@ pub(crate) struct Numbers {
 
 /// Returns the numbers of an estimate.
 pub(crate) fn numbers(found: &Estimate) -> Numbers {
-    let quantile = t_quantile(found.degrees_of_freedom);
+    let quantile = t_quantile(found.degrees_of_freedom as f64);
     let value = |value: f64, std: f64| Value {
         value,
         std,

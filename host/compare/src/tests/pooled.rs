@@ -5,9 +5,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::made::{Made, Truth, compared, robot};
-use crate::significance::t_quantile;
 use crate::{CompareOptions, Comparison, Grade, RecordingSet, compare, pooled_robot};
 use rig_data::prepare::InMemory;
+use rig_identify::t_quantile;
 
 /// Draws of four sets.
 const DRAWS: u64 = 100;

@@ -206,7 +206,7 @@ fn means(place: &[Option<usize>], residual: &[f64], block: &[usize]) -> Vec<Opti
                 .filter(|s| s[1] > 0.0)
                 .collect();
             let [mean, std] = grouped_mean(&list);
-            (list.len() > 1).then(|| [mean, t_quantile(list.len() - 1) * std])
+            (list.len() > 1).then(|| [mean, t_quantile((list.len() - 1) as f64) * std])
         })
         .collect()
 }

@@ -251,7 +251,7 @@ impl Shown {
 /// Converts half a 95 % interval to a standard deviation.
 fn std_of(half: f64, fit: &FrictionFit, points: usize) -> f64 {
     let parameters = fit.half_interval.len() + 1 + usize::from(fit.stribeck_velocity.is_some());
-    half / t_quantile(points.saturating_sub(parameters).max(1))
+    half / t_quantile(points.saturating_sub(parameters) as f64)
 }
 
 /// Returns a sentence if friction is negative, that is, if it drives instead of braking.

@@ -163,7 +163,7 @@ fn fit(points: &[FrictionPoint], weights: &[f64], vs: Option<f64>) -> Option<Fri
     let freedom = n.saturating_sub(columns + usize::from(vs.is_some())).max(1);
     // At least one, the points' own standard deviation.
     let sigma = (squares / freedom as f64).max(1.0).sqrt();
-    let quantile = t_quantile(freedom);
+    let quantile = t_quantile(freedom as f64);
     let half = |c: usize| quantile * sigma * inverse.row(c).norm();
     Some(FrictionFit {
         coulomb: x[0],

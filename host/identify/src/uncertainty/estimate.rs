@@ -51,7 +51,7 @@ impl Estimate {
         let std: Vec<f64> = (0..size)
             .map(|k| covariance[(k, k)].max(0.0).sqrt())
             .collect();
-        let quantile = t_quantile(degrees_of_freedom);
+        let quantile = t_quantile(degrees_of_freedom as f64);
         let condition = |m: &DMatrix<f64>| {
             let s = m.singular_values();
             s.max() / s.min()
@@ -100,9 +100,10 @@ pub struct Ellipse {
     pub second: [f64; 2],
 }
 
-/// Returns Student's t quantile for a two-sided 95 % interval.
-pub fn t_quantile(degrees_of_freedom: usize) -> f64 {
-    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64)
+/// Returns Student's t quantile for a two-sided 95 % interval; the degrees of freedom need not be whole, and count as 1 at
+/// least.
+pub fn t_quantile(degrees_of_freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0))
         .map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
 }
 
