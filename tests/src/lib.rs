@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 pub mod circle;
+pub mod engines;
 
 use std::ops::ControlFlow;
 use std::path::Path;

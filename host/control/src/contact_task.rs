@@ -24,9 +24,17 @@ const APPROACH: f64 = 0.05;
 /// Kinetic energy at contact over the elastic energy at the wanted force, square root. At a half the impact alone presses
 /// with half of the wanted force.
 const IMPACT: f64 = 0.5;
-/// Damping by the late force over that of the force loop, 1: k·τ/(Λ·kv). On the one-link rig without dry friction (27
-/// November 2026) 0.5 gave 6.5 % overshoot of the force, 1.0 gave 12 % and 5 gave 33 %; on EDDA 0.59 gave 10.4 %.
-const LATE: f64 = 0.55;
+/// Damping by the late force over that of the force loop, 1: k·τ/(Λ·kv). At one both are equal, and the force settles in
+/// about twice the time. Without dry friction the one-link rig settled on 10⁵ N/m in 0.03 s at 0.63, in 0.16 s at 2.5 and in
+/// 1.0 s at 10 (27 November 2026).
+const LATE: f64 = 1.0;
+/// Control ticks in a period of the force loop's bandwidth, 1. At 1000 ticks a second, with one tick of delay, a velocity of
+/// 100 Hz and encoder steps of 1e-5 rad, 100 kept all robots quiet, also with the observer's gain doubled; 33 with this
+/// doubled gain gave limit cycles of the force on IRp-6 and EDDA (27 November 2026).
+const TICKS: f64 = 100.0;
+/// Largest bandwidth of the force loop, in bandwidths of the position loops, 1. Those say how fast the arm's mechanics may be
+/// moved. With 8 the encoder's steps gave limit cycles on IRp-6 at 4000 ticks a second (27 November 2026).
+const FASTEST: f64 = 4.0;
 /// Mobility along a direction, as a share of the largest, from which the tool can be moved along it. The square root is
 /// the ratio of distances: a hundredth.
 const MOBILE: f64 = 1e-4;
@@ -329,7 +337,7 @@ impl ContactTask {
         let force = force(model, &pose, &matrix, normal, options.force, &mut notes)?;
         if let Some(rate) = needed_rate(&surface, inertia[0], settings) {
             notes.push(format!(
-                "The measured force is late on this stiff surface for a tool of {:.3} kg, and the force may overshoot: give --rate {rate:.0}, or a softer surface.",
+                "The measured force is late on this stiff surface for a tool of {:.3} kg, and the force settles slowly: give --rate {rate:.0}, or a softer surface.",
                 inertia[0]
             ));
         }
@@ -342,7 +350,7 @@ impl ContactTask {
         });
         let approach = stiffest.min(APPROACH);
         let slide_start =
-            1.2 * surface.gap / approach.min(force_speed(force, &surface, settings)) + SETTLE;
+            1.2 * surface.gap / planned_speed(approach, force, &surface, settings) + SETTLE;
         let slides = count > 1 && options.slide > 0.0;
         if options.slide > 0.0 && !slides {
             notes.push("There is no slide: the arm moves the tool along no direction of the surface without leaving it.".to_owned());
@@ -398,23 +406,36 @@ impl ContactTask {
     }
 }
 
+/// Returns the bandwidth of the force loop, Hz: as high as the rate allows, and at most [`FASTEST`] times that of the
+/// position loops.
 fn force_bandwidth(settings: &Settings) -> f64 {
-    settings.bandwidth
+    (settings.rate / TICKS).min(FASTEST * settings.bandwidth)
 }
 
-/// Speed at which the hybrid law approaches on its own: kf·f.
-fn force_speed(force: f64, surface: &Surface, settings: &Settings) -> f64 {
-    let omega = core::f64::consts::TAU * force_bandwidth(settings);
-    0.5 * omega * force / surface.stiffness
+/// Returns the lowest rate at which the force loop is as fast as it becomes, Hz; `None` if the settings have it.
+pub(crate) fn fastest_rate(settings: &Settings) -> Option<f64> {
+    let rate = TICKS * FASTEST * settings.bandwidth;
+    (settings.rate < rate).then_some(rate)
+}
+
+/// Returns the speed for which the time of the approach is planned, m/s: at most that of the hybrid law, kf·f. The force
+/// of the impedance grows while its reference goes into the surface, so its approach takes the time that a force loop of half
+/// the position loops' bandwidth would need, at any rate.
+fn planned_speed(approach: f64, force: f64, surface: &Surface, settings: &Settings) -> f64 {
+    let speed = |bandwidth: f64| core::f64::consts::TAU * bandwidth * force / surface.stiffness;
+    let hybrid = speed(force_bandwidth(settings));
+    approach.min(hybrid).min(speed(0.5 * settings.bandwidth))
 }
 
 /// Returns the rate that a surface needs, Hz; `None` if that of the settings is enough. The force that is taken off the arm
 /// is late by the computing time and half a tick: the rest of it damps the tool with k·τ.
 pub(crate) fn needed_rate(surface: &Surface, inertia: f64, settings: &Settings) -> Option<f64> {
-    let ticks = if settings.delay { 1.5 } else { 0.5 };
-    let kv = 2.0 * core::f64::consts::TAU * force_bandwidth(settings);
-    let late = surface.stiffness * ticks * settings.period() / (inertia * kv);
-    (late > LATE).then(|| (1.01 * settings.rate * late / LATE).ceil())
+    let ticks = settings.lateness() * settings.rate;
+    // The rate times the bandwidth of the force loop.
+    let needed = surface.stiffness * ticks / (2.0 * core::f64::consts::TAU * inertia * LATE);
+    let rising = (needed * TICKS).sqrt();
+    let rate = rising.max(needed / (FASTEST * settings.bandwidth));
+    (rate > settings.rate).then(|| (1.01 * rate).ceil())
 }
 
 fn quintic(distance: f64, duration: f64, t: f64) -> Reference<f64> {

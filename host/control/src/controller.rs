@@ -300,12 +300,15 @@ fn adapting(
 /// Returns the selection: the normal presses, the other directions move.
 fn axes(task: &ContactTask, settings: &Settings) -> Vec<Axis<f64>> {
     let omega = settings.omega();
-    let gains = ForceGains::design(
-        task.force,
-        task.surface.stiffness,
-        task.force_bandwidth,
-        task.approach,
-    );
+    let gains = ForceGains {
+        late: settings.lateness(),
+        ..ForceGains::design(
+            task.force,
+            task.surface.stiffness,
+            task.force_bandwidth,
+            task.approach,
+        )
+    };
     (0..task.directions.len())
         .map(|d| match d {
             0 => Axis::Presses(gains),

@@ -122,6 +122,8 @@ impl Bench<'_> {
         let (trace, notes) = self.run(law, model, Some(task))?;
         let found = measures::force(law, task, &trace)?;
         let measure = |trace: &Trace| measures::force(law, task, trace).map(|own| own.overshoot);
+        let mut warnings = warnings::of_motion(self.robot, &trace, true);
+        warnings.extend(warnings::of_force(law, &found, task, &self.settings));
         let ticks = measures::ticks(trace.force.len());
         let pick = |list: &[f64]| -> Vec<f64> {
             ticks.clone().filter_map(|k| list.get(k)).copied().collect()
@@ -134,6 +136,7 @@ impl Bench<'_> {
             impact_speed: found.impact_speed,
             rise: found.rise,
             overshoot: found.overshoot,
+            overshoot_before_slide: found.overshoot_before_slide,
             settling: found.settling,
             steady_error: found.steady_error,
             slide_force: found.slide_force,
@@ -141,7 +144,7 @@ impl Bench<'_> {
             slide_error: found.slide_error,
             bounces: found.bounces,
             robustness: self.robustness(law, model, Some(task), measure)?,
-            warnings: warnings::of_motion(self.robot, &trace, true),
+            warnings,
             motion: String::new(),
             time: ticks.clone().map(|k| k as f64 * trace.period).collect(),
             forces: pick(&trace.force),

@@ -83,6 +83,7 @@ pub(crate) struct ForceMeasures {
     pub impact_speed: f64,
     pub rise: Option<f64>,
     pub overshoot: f64,
+    pub overshoot_before_slide: f64,
     pub settling: Option<f64>,
     pub steady_error: f64,
     pub slide_force: Option<f64>,
@@ -133,6 +134,10 @@ pub(crate) fn force(
         k => (trace.tool[0][k] - trace.tool[0][k - 1]) / h,
     };
     let after = &trace.force[slide..];
+    let beyond = |forces: &[f64]| {
+        let largest = forces.iter().copied().fold(0.0, f64::max);
+        (largest / task.force - 1.0).max(0.0)
+    };
     let along: Option<Vec<f64>> = (task.slide > 0.0).then(|| {
         let series = trace.tool[1].iter().enumerate().skip(slide);
         series
@@ -143,7 +148,8 @@ pub(crate) fn force(
         touched: touch as f64 * h,
         impact_speed: speed,
         rise,
-        overshoot: (before.iter().copied().fold(0.0, f64::max) / task.force - 1.0).max(0.0),
+        overshoot: beyond(&trace.force),
+        overshoot_before_slide: beyond(before),
         settling,
         steady_error: mean_or_zero(steady) - task.force,
         slide_force: (task.slide > 0.0).then(|| {

@@ -94,7 +94,8 @@ pub struct Robustness {
     pub draws: usize,
     /// Motions that were unstable, in which the law gave no torque, or in which the tool did not reach the surface.
     pub failed: usize,
-    /// Median of the motions that did not fail; RMS error of the tool (m), or overshoot of the force (1).
+    /// Median of the motions that did not fail; RMS error of the tool (m), or overshoot of the force in the whole
+    /// contact (1).
     pub median: f64,
     /// The worst of the motions that did not fail.
     pub worst: f64,
@@ -154,8 +155,10 @@ pub struct Contact {
     pub impact_speed: f64,
     /// Time from 10 % to 90 % of the wanted force, s; `None` if it was not reached.
     pub rise: Option<f64>,
-    /// Largest force beyond the wanted one before the slide, as a share of it.
+    /// Largest force of the whole contact beyond the wanted one, as a share of it. The slide counts.
     pub overshoot: f64,
+    /// The same before the slide.
+    pub overshoot_before_slide: f64,
     /// Time from contact until the force stays within 5 %; `None` if it did not before the slide.
     pub settling: Option<f64>,
     /// Mean force error in the last half second before the slide, N.

@@ -134,6 +134,12 @@ impl Settings {
         1.0 / self.rate
     }
 
+    /// Returns the mean time from a measurement until its torque acts, s: the computing time, and half of the tick in which
+    /// the torque is held.
+    pub(crate) fn lateness(&self) -> f64 {
+        (if self.delay { 1.5 } else { 0.5 }) * self.period()
+    }
+
     pub(crate) fn friction(&self) -> PrecompensationSettings<f64> {
         PrecompensationSettings {
             enabled: self.friction_gain > 0.0,

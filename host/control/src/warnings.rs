@@ -1,8 +1,11 @@
 //! Warnings about a motion that a user would otherwise take for a good one.
 
 use super::closed_loop::Trace;
+use super::contact_task::{ContactTask, fastest_rate};
+use super::measures::ForceMeasures;
 use super::position_limits::PositionLimits;
 use super::result::Adaptation;
+use super::settings::{LawKind, Settings};
 use rig_model::robot::Robot;
 
 /// Share of the ticks at the torque limit above which the limit governs the loop: in most ticks the law does not act.
@@ -10,6 +13,9 @@ const AT_LIMIT: f64 = 0.5;
 /// Torque error of the adapted parameters, as a share of the torque limits, below which a growth is no warning. The
 /// adaptation of an exact model moves by friction that is not compensated: 0.0007 on the IRp-6 (27 November 2026).
 const GROWN: f64 = 0.01;
+/// Overshoot of the force during the slide, 1, above which the loop is too slow for the surface: the overshoot that counts
+/// as good.
+const OVERSHOOT: f64 = 0.1;
 
 /// Returns a sentence about each limit that the motion left or stayed at.
 pub(crate) fn of_motion(robot: &Robot, trace: &Trace, on_surface: bool) -> Vec<String> {
@@ -42,4 +48,29 @@ pub(crate) fn of_adaptation(learnt: &Adaptation) -> Option<String> {
             100.0 * end
         )
     })
+}
+
+/// Returns a sentence if the force of the hybrid law peaks during the slide, with the rate at which the loop is fastest.
+pub(crate) fn of_force(
+    law: LawKind,
+    found: &ForceMeasures,
+    task: &ContactTask,
+    settings: &Settings,
+) -> Option<String> {
+    let during = found.slide_peak? / task.force - 1.0;
+    if law != LawKind::Hybrid || during <= OVERSHOOT {
+        return None;
+    }
+    let remedy = match fastest_rate(settings) {
+        Some(rate) => format!("Give --rate {rate:.0}, or a softer surface."),
+        None => {
+            "Give a better model, a higher --bandwidth and --rate, or a softer surface.".to_owned()
+        }
+    };
+    Some(format!(
+        "the force peaks at {:.1} N of {:.1} N during the slide: joint friction changes its direction, and the force loop of {:.1} Hz needs time to press against it. {remedy}",
+        (1.0 + during) * task.force,
+        task.force,
+        task.force_bandwidth
+    ))
 }

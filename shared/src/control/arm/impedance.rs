@@ -70,7 +70,8 @@ impl<T: Real<Mask = bool>> Law<T> for Config<'_, T> {
             // Without inertia the target would move at this speed.
             speed[d] = reference.velocity + pull / target.damping;
         }
-        self.operational
-            .torque(input, &motion, [&wanted, &speed, &pressed], torque)
+        let targets = [&wanted, &speed, &pressed];
+        let computed = self.operational.torque(input, &motion, targets, torque)?;
+        Ok(computed.limited)
     }
 }

@@ -29,6 +29,15 @@ pub struct Operational<'a, T> {
     pub torque_limit: &'a [T],
 }
 
+/// What comes with the torques of a task.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Computed<T> {
+    /// The joints at their torque limits.
+    pub limited: Limited,
+    /// Mobility of the tool along each direction, the diagonal of J·A⁻¹·Jᵀ, m/(N·s²).
+    pub mobility: [T; AXES],
+}
+
 impl<T: Real<Mask = bool>> Operational<'_, T> {
     /// Computes the joint torques that give the tool the acceleration `wanted` along each direction (Khatib 1987):
     /// q̈ = q̈₀ + A⁻¹·Jᵀ·Λ·(a − J̇·q̇ − J·q̈₀) with Λ = (J·A⁻¹·Jᵀ)⁻¹. q̈₀ holds the posture; it acts only where the tool
@@ -40,7 +49,7 @@ impl<T: Real<Mask = bool>> Operational<'_, T> {
         motion: &TaskMotion<T>,
         [wanted, speed, pressed]: [&[T; AXES]; 3],
         torque: &mut [T],
-    ) -> Result<Limited, ControlFault> {
+    ) -> Result<Computed<T>, ControlFault> {
         let (n, count) = (self.model.joint_count(), self.task.directions.len());
         input.check(n)?;
         check("torque_limit", n, self.torque_limit.len())?;
@@ -57,12 +66,13 @@ impl<T: Real<Mask = bool>> Operational<'_, T> {
             solve(mass, &mut row[..n]);
         }
         let mut mobility = [T::ZERO; AXES * AXES];
-        let mut largest = T::ZERO;
+        let (mut largest, mut diagonal) = (T::ZERO, [T::ZERO; AXES]);
         for a in 0..count {
             for b in 0..count {
                 mobility[a * count + b] = dot(&motion.rows[a][..n], &response[b][..n]);
             }
-            largest = largest.max(mobility[a * count + a]);
+            diagonal[a] = mobility[a * count + a];
+            largest = largest.max(diagonal[a]);
         }
         let mobility = &mut mobility[..count * count];
         factorise(mobility, count).map_err(|direction| ControlFault::Singular { direction })?;
@@ -103,7 +113,10 @@ impl<T: Real<Mask = bool>> Operational<'_, T> {
                 *own += motion.rows[d][j] * pressed[d];
             }
         }
-        Ok(limit(self.torque_limit, torque))
+        Ok(Computed {
+            limited: limit(self.torque_limit, torque),
+            mobility: diagonal,
+        })
     }
 }
 
