@@ -4,11 +4,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use super::encoding::{Decoded, decoded};
 use super::error::{MAX_BYTES, RobotError};
 use super::serial_robot::Robot;
 use super::urdf::{self, Audit, ChainChoice, Original};
-use super::{dh, text, written};
+use super::{dh, mjcf, text, written};
 
 impl Robot {
     /// Reads a description. The extension selects TOML or URDF; for other extensions the first character does.
@@ -50,7 +52,8 @@ pub struct Description {
 }
 
 impl Description {
-    /// Reads a description. The extension selects TOML or URDF; for other extensions the first character does.
+    /// Reads a description. The extension selects TOML or URDF; for other extensions the first character does. XML whose
+    /// outermost element is `<mujoco>` is MJCF.
     ///
     /// # Errors
     /// [`RobotError`] with the fault of the file and its line.
@@ -90,6 +93,9 @@ impl Description {
                 urdf: None,
             });
         }
+        if mjcf::is_mjcf(&text) {
+            return Self::of_mjcf(&text, path, choice);
+        }
         let original = Original::read_chain(text, path, choice)?;
         let robot = original.robot().clone();
         let mut remarks = original.remarks().to_vec();
@@ -105,6 +111,26 @@ impl Description {
         Ok(Self {
             robot,
             urdf: Some(original),
+            remarks,
+        })
+    }
+}
+
+impl Description {
+    /// Reads the text of an MJCF file.
+    fn of_mjcf(text: &str, path: &Path, choice: &ChainChoice) -> Result<Self, RobotError> {
+        let mjcf::Read { chain, gravity } = mjcf::read(text, path, choice)?;
+        let converted = dh::convert(&chain);
+        let mut robot = converted.robot;
+        let turned = converted.base.rotation.inverse() * Vector3::from(gravity);
+        robot.gravity = turned.into();
+        let mut remarks = chain.remarks;
+        remarks.extend(converted.remarks);
+        remarks.extend(robot.implausible_bodies(None));
+        remarks.extend(robot.unlikely_values());
+        Ok(Self {
+            robot,
+            urdf: None,
             remarks,
         })
     }

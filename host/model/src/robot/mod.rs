@@ -1,4 +1,4 @@
-//! The robot description: read from TOML or URDF, written back.
+//! The robot description: read from TOML, URDF or MJCF, written back.
 //!
 //! Joint-side SI units throughout; angles grow in the positive sense of the joint axis.
 //!
@@ -35,6 +35,7 @@ mod joint_pose;
 mod link_size;
 mod load;
 mod load_body;
+mod mjcf;
 mod numbers;
 mod placed;
 mod right_angle;
@@ -60,6 +61,7 @@ pub use fault::{is_safe_magnitude, written};
 pub use joint::{Controller, Inertial, Joint, JointFriction, JointKind, JointLimits};
 pub use load::Load;
 pub use load_body::CentredBody;
+pub use mjcf::MjcfJoints;
 pub use placed::Placed;
 pub use serial_robot::Robot;
 pub use templates::{

@@ -1,10 +1,15 @@
 //! A six-axis force and torque sensor between the last link and the load.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rig_output::{format_short, format_significant};
 use serde::{Deserialize, Serialize};
 
 use super::array::exact;
 use super::fault::{Fault, Step, written};
+
+/// Distance from the flange at which no wrist sensor is, m. By judgement: sensors lie within 0.3 m, and a millimetre that counts
+/// as a metre is beyond.
+const FARTHEST: f64 = 1.0;
 
 /// The sensor at the wrist. The flange frame is that of the last joint (TOML) or of the last link (URDF).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -57,6 +62,26 @@ impl WristSensor {
         )
     }
 
+    /// Says that no wrist sensor is where the description puts it, with the unit that it looks like. At rest every position
+    /// explains the readings, with another centre of mass, and in motion it makes the moments look like another unit. So the
+    /// length itself tells.
+    pub fn too_far(&self) -> Option<String> {
+        let away = Vector3::from(self.position).norm();
+        if away <= FARTHEST {
+            return None;
+        }
+        let list = |scale: f64| self.position.map(|x| format_short(scale * x)).join(", ");
+        let unit = match away <= 1e3 * FARTHEST {
+            true => format!(" They look like mm: these would be [{}] m.", list(1e-3)),
+            false => String::new(),
+        };
+        Some(format!(
+            "The wrist sensor is described at [{}] m, {} m from the flange, where no wrist sensor is.{unit} Give its position in the flange frame in m (--sensor-position, or position in [wrist_sensor]).",
+            list(1.0),
+            format_significant(away, 3)
+        ))
+    }
+
     /// Returns the first value that no sensor can have.
     pub(super) fn check(&self) -> Result<(), Fault> {
         let fault = |key: &'static str, found: f64, advice: &str| Fault {
@@ -65,23 +90,17 @@ impl WristSensor {
             found: written(found),
             advice: advice.to_owned(),
         };
-        for (key, values, most, advice) in [
-            (
-                "position",
-                self.position,
-                10.0,
-                "it must be at most 10 m from the flange",
-            ),
-            (
-                "rotation",
-                self.rotation,
-                7.0,
-                "it must be an angle in rad, at most one turn",
-            ),
-        ] {
-            if let Some(found) = values.iter().find(|v| !(v.abs() <= most)) {
-                return Err(fault(key, *found, advice));
-            }
+        if let Some(found) = self.position.iter().find(|v| !v.is_finite()) {
+            return Err(fault("position", *found, "it must be a length in m"));
+        }
+        if let Some(text) = self.too_far() {
+            let farthest = self.position.into_iter().fold(0.0, largest);
+            let advice = text.replacen("The wrist", "the wrist", 1);
+            return Err(fault("position", farthest, advice.trim_end_matches('.')));
+        }
+        if let Some(found) = self.rotation.iter().find(|v| !(v.abs() <= 7.0)) {
+            let advice = "it must be an angle in rad, at most one turn";
+            return Err(fault("rotation", *found, advice));
         }
         for (key, range, unit) in [
             ("force_range", self.force_range, "N"),
@@ -97,6 +116,11 @@ impl WristSensor {
         }
         Ok(())
     }
+}
+
+/// Returns the number of the larger size.
+fn largest(a: f64, b: f64) -> f64 {
+    if b.abs() > a.abs() { b } else { a }
 }
 
 #[cfg(test)]
@@ -126,7 +150,12 @@ mod tests {
     #[test]
     fn values_that_no_sensor_has_are_named() {
         for (table, said) in [
-            ("position = [0.0, 0.0, 50.0]", "at most 10 m"),
+            (
+                "position = [0.0, 0.0, 50.0]",
+                "They look like mm: these would be [0, 0, 0.05] m",
+            ),
+            ("position = [0.0, 5.0, 0.0]", "[0, 0.005, 0] m"),
+            ("position = [0.0, nan, 0.0]", "a length in m"),
             ("rotation = [0.0, 0.0, 90.0]", "in rad"),
             ("force_range = -1.0", "greater than 0, in N"),
             ("moment_range = nan", "NaN"),

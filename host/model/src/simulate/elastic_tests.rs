@@ -585,6 +585,55 @@ fn coupled_drives_have_a_spring_each_or_none() {
     assert!(Stepper::new(&Model::from_robot(&column).unwrap()).is_ok());
 }
 
+/// A step would have millions of parts: the gear is refused at the first one, with what would be right.
+#[test]
+fn a_gear_that_is_too_fast_for_the_steps_is_refused_at_once() {
+    let said = |robot: &Robot| {
+        let model = Model::from_robot(robot).unwrap();
+        let n = robot.joints.len();
+        let (mut q, mut v) = (vec![0.1; n], vec![0.0; n]);
+        match Stepper::new(&model) {
+            Err(error) => Some(error.to_string()),
+            Ok(mut stepper) => (stepper.step(&mut q, &mut v, &vec![0.0; n], &[], 1e-3))
+                .err()
+                .map(|error| error.to_string()),
+        }
+    };
+    let light = |n: usize| {
+        let mut robot = planar(n, false);
+        robot.joints[0].drive.as_mut().unwrap().rotor_inertia = 1e-12;
+        robot
+    };
+    for (n, kind, shapes, by) in [
+        (1, Kind::JointElasticity, &[2e6, 0.0, 0.0][..], "stiffness"),
+        (1, Kind::Backlash, &[1e-3, 5e3, 900.0, 0.0], "damping"),
+        (2, Kind::JointElasticity, &[2e6, 0.0, 0.0], "stiffness"),
+    ] {
+        let text = said(&with(light(n), 0, kind, shapes)).unwrap();
+        assert!(
+            text.contains("joint j0")
+                && text.contains("Hz")
+                && text.contains("rotor_inertia")
+                && text.contains(&format!("a smaller {by}")),
+            "{text}"
+        );
+    }
+    // A link without much inertia behind a heavy motor.
+    let mut robot = planar(1, false);
+    let body = robot.joints[0].inertial.as_mut().unwrap();
+    (body.mass, body.first_moment) = (1e-9, [0.0; 3]);
+    body.inertia = [1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9];
+    let text = said(&with(robot, 0, Kind::JointElasticity, &[1e3, 0.0, 0.0])).unwrap();
+    assert!(text.contains("[joint.inertial]"), "{text}");
+    // A small motor and a stiff gear of a real arm, 1.6 kHz.
+    let mut robot = planar(1, false);
+    robot.joints[0].drive.as_mut().unwrap().rotor_inertia = 1e-8;
+    assert_eq!(
+        said(&with(robot, 0, Kind::JointElasticity, &[1e4, 0.0, 0.0])),
+        None
+    );
+}
+
 /// Final positions and velocities of the IRp-6 with stiff gears, as the simulation without elastic gears of chains gave
 /// them (commit 321a398).
 #[test]

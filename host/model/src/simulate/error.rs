@@ -1,5 +1,6 @@
 //! Reasons why a motion could not be simulated.
 
+use rig_output::{format_short, format_significant};
 use rig_shared::multibody::{ChainError, MultibodyError};
 use rig_shared::transmission::TransmissionError;
 use thiserror::Error;
@@ -90,6 +91,9 @@ pub enum SimulateError {
         /// The effect and its joint.
         effect: String,
     },
+    /// A gear that would need steps without end.
+    #[error(transparent)]
+    TooStiff(Box<TooStiff>),
     /// Backlash or elasticity of one of several coupled drives.
     #[error(
         "{effect}: the drive is coupled with that of joint {other}, whose gear is stiff, and the simulation needs all coupled drives with such a gear or none; give the others joint_elasticity too, with a large stiffness if they are nearly rigid."
@@ -116,4 +120,54 @@ pub enum SimulateError {
     /// Wrong lengths, or an inertia matrix that is not positive definite.
     #[error(transparent)]
     Multibody(#[from] MultibodyError),
+}
+
+/// A gear whose motion is faster than the simulation resolves.
+#[derive(Debug, Error)]
+#[error(
+    "{effect} swings at {} Hz, and the simulation resolves {} Hz at most: {}. Give {key}, or a smaller {by} (SI units).",
+    format_significant(*frequency, 3),
+    format_short(*highest),
+    light.said(*inertia),
+    key = light.key()
+)]
+pub struct TooStiff {
+    /// The effect and its joint.
+    pub effect: String,
+    /// Rate of spring and damping over 2π, Hz.
+    pub frequency: f64,
+    /// Highest frequency that is integrated, Hz.
+    pub highest: f64,
+    /// Key of the effect that contributes most.
+    pub by: &'static str,
+    /// The lighter side of the gear.
+    pub light: Light,
+    /// Its inertia in the coordinate of the stiffness, kg·m² or kg.
+    pub inertia: f64,
+}
+
+/// A side of a gear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Light {
+    /// The motor's.
+    Rotor,
+    /// The link's.
+    Link,
+}
+
+impl Light {
+    fn said(self, inertia: f64) -> String {
+        let inertia = format_significant(inertia, 3);
+        match self {
+            Self::Rotor => format!("its rotor has {inertia} kg·m² (kg) behind the gear"),
+            Self::Link => format!("its link has {inertia} kg·m² (kg)"),
+        }
+    }
+
+    fn key(self) -> &'static str {
+        match self {
+            Self::Rotor => "a larger rotor_inertia in [joint.drive]",
+            Self::Link => "the link a larger mass and inertia in [joint.inertial]",
+        }
+    }
 }

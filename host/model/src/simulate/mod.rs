@@ -19,7 +19,7 @@ mod tests;
 
 pub use closed_loop::{Inputs, Motion, closed_loop, closed_loop_since, closed_loop_watched};
 pub use controllers::{STAND_IN_BANDWIDTH, controllers};
-pub use error::SimulateError;
+pub use error::{Light, SimulateError, TooStiff};
 pub use history::Since;
 pub use link_motion::LinkMotion;
 pub use load_wrench::LoadWrench;

@@ -30,3 +30,4 @@ pub(super) use spatial::SpatialInertia;
 pub(super) use unit_check::check_units;
 pub use values::is_placeholder;
 pub use write::Urdf;
+pub(super) use write::escaped;

@@ -297,7 +297,7 @@ pub(super) fn comment(text: &str) -> String {
 }
 
 /// Returns text for an XML attribute.
-pub(super) fn escaped(text: &str) -> String {
+pub(in crate::robot) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
