@@ -5,6 +5,7 @@ use std::path::Path;
 use super::error::{DataError, Warning};
 use super::motors::MotorSide;
 use super::place::Place;
+use super::remark::Remark;
 
 /// Whether every joint needs a torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -127,6 +128,8 @@ pub(super) struct FileColumn {
     pub name: String,
     /// Name in messages: the name in the file.
     pub label: String,
+    /// Value in SI units of one unit of the file.
+    pub factor: f64,
     pub role: Role,
     /// Index in [`super::Block::extra`], if it is kept by name.
     pub extra: Option<usize>,
@@ -158,6 +161,19 @@ impl FileColumn {
         }
     }
 
+    /// Returns the error for a value that is no number, or beyond [`FileColumn::largest`].
+    pub(super) fn no_measurement(&self, path: &Path, place: Place, value: f64) -> DataError {
+        if value.is_finite() {
+            return self.out_of_range(path, place, value);
+        }
+        DataError::NotANumber {
+            path: path.into(),
+            place,
+            column: self.label.clone(),
+            found: rig_output::format_short(value),
+        }
+    }
+
     /// Returns the error for a value beyond [`FileColumn::largest`].
     pub(super) fn out_of_range(&self, path: &Path, place: Place, value: f64) -> DataError {
         DataError::OutOfRange {
@@ -176,12 +192,44 @@ pub(super) struct Layout {
     pub columns: Vec<FileColumn>,
     pub time: usize,
     pub joints: usize,
+    /// Time of the first row in the unit of the file, if times are counted from it.
+    pub origin: Option<f64>,
     pub extras: usize,
     /// Conversion from motors to joints, if needed.
     pub motors: Option<MotorSide>,
     /// Per joint, the motors whose columns determine its position or torque, if it is converted.
     pub movers: Vec<Vec<usize>>,
     pub warnings: Vec<Warning>,
+}
+
+/// Time above which a converted time is counted from the first row, s: 1973 for times since 1970. Doubles in seconds would
+/// not resolve what the unit of the file does.
+const SINCE_1970: f64 = 1e8;
+
+impl Layout {
+    /// Counts the times from this row, the first one, if they are times since 1970 in another unit than s.
+    pub(super) fn count_from(&mut self, raw: &[f64]) {
+        let (Some(column), Some(t)) = (self.columns.get(self.time), raw.get(self.time)) else {
+            return;
+        };
+        if column.factor == 1.0 || t.abs() * column.factor < SINCE_1970 {
+            return;
+        }
+        self.origin = Some(*t);
+        self.warnings.push(Warning::Reading {
+            remark: Remark::CountedTime { what: "since 1970" },
+        });
+    }
+
+    /// Converts a row to SI units.
+    pub(super) fn convert(&self, values: &mut [f64]) {
+        for (k, (value, column)) in values.iter_mut().zip(&self.columns).enumerate() {
+            let origin = self.origin.filter(|_| k == self.time).unwrap_or(0.0);
+            if column.factor != 1.0 || origin != 0.0 {
+                *value = (*value - origin) * column.factor;
+            }
+        }
+    }
 }
 
 /// Lists names of columns for a message, at most twelve.

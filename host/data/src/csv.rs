@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
 
-use super::columns::{FileColumn, Layout};
+use super::columns::{FileColumn, Layout, Role};
 use super::csv_header::{Lines, Separator, find_header};
 use super::error::DataError;
 use super::header::Header;
+use super::iso_time::iso_time;
 use super::number::{decimal, number};
 use super::place::Place;
 use super::remark::Remark;
@@ -19,6 +20,9 @@ const LONGEST_LINE: usize = 1 << 20;
 
 /// Magnitude below which a number of any column needs no further check.
 const LARGEST_QUICK: f64 = 1e9;
+
+/// Number of rows that decide whether blanks separate the columns.
+const AHEAD: usize = 50;
 
 /// Bytes read at once; larger buffers measured no faster.
 const BUFFER: usize = 1 << 17;
@@ -36,7 +40,8 @@ pub(super) struct TextLines {
 }
 
 impl TextLines {
-    fn open(path: &Path) -> Result<Self, DataError> {
+    /// Opens a text file.
+    pub(super) fn open(path: &Path) -> Result<Self, DataError> {
         let failed = |source| DataError::Read {
             path: path.into(),
             source,
@@ -57,6 +62,11 @@ impl TextLines {
             bytes: 0,
             end: if is_return_alone { b'\r' } else { b'\n' },
         })
+    }
+
+    /// Returns the number of bytes read so far.
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
     }
 }
 
@@ -100,6 +110,19 @@ impl Lines for TextLines {
         self.number
     }
 
+    fn ahead(&self) -> Vec<String> {
+        let buffered = self.reader.buffer();
+        let mut lines: Vec<&[u8]> = buffered.split(|b| *b == self.end).take(AHEAD + 1).collect();
+        // The last one may go on behind the buffer, if it is not empty.
+        if lines.len() > 1 {
+            lines.pop();
+        }
+        let texts = lines
+            .into_iter()
+            .map(|line| String::from_utf8_lossy(line).into_owned());
+        texts.filter(|line| !line.trim().is_empty()).collect()
+    }
+
     fn path(&self) -> &Path {
         &self.path
     }
@@ -114,6 +137,8 @@ pub(super) struct CsvRows {
     remarks: Vec<Remark>,
     /// True if the last line is a row that was not returned yet: the header was in a comment before it.
     waiting: bool,
+    /// Whole seconds of the first time that is a date or a time of day.
+    iso_origin: Option<i64>,
     quoted: QuotedRow,
 }
 
@@ -139,6 +164,7 @@ impl CsvRows {
             mark: None,
             remarks: found.remarks,
             waiting: found.has_row,
+            iso_origin: None,
             quoted: QuotedRow {
                 reader: reader.build(),
                 text: Vec::new(),
@@ -155,8 +181,11 @@ impl CsvRows {
     }
 
     /// Returns the assumptions so far.
-    pub(super) fn remarks(&self) -> &[Remark] {
-        &self.remarks
+    pub(super) fn remarks(&self) -> Vec<Remark> {
+        let iso = self.iso_origin.map(|_| Remark::CountedTime {
+            what: "dates or times of day (ISO 8601)",
+        });
+        self.remarks.iter().cloned().chain(iso).collect()
     }
 
     /// Reads the next row into `values`, one per column; returns its line, or `None` at the end.
@@ -330,6 +359,17 @@ impl CsvRows {
         let value = number(field, own);
         *place = value;
         if !column.strict {
+            return Ok(());
+        }
+        if value.is_nan()
+            && column.role == Role::Time
+            && let Some((seconds, nanoseconds)) = std::str::from_utf8(field).ok().and_then(iso_time)
+        {
+            // Whole seconds are subtracted before the sum, which so keeps the nanoseconds.
+            let origin = *self.iso_origin.get_or_insert(seconds);
+            if let Some(place) = values.get_mut(found) {
+                *place = (seconds - origin) as f64 + nanoseconds as f64 * 1e-9;
+            }
             return Ok(());
         }
         if !value.is_finite() {

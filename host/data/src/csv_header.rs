@@ -7,6 +7,7 @@ use csv_core::{ReaderBuilder, Terminator};
 use super::error::DataError;
 use super::number::number;
 use super::remark::Remark;
+use super::time_names::is_time;
 
 /// Separator between two columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,8 +38,8 @@ impl Separator {
         }
     }
 
-    /// Splits a header line into names.
-    fn split(self, text: &str) -> Vec<String> {
+    /// Splits a line into names or fields without quotation marks.
+    pub(super) fn split(self, text: &str) -> Vec<String> {
         let unquoted = |name: &str| {
             let name = name.trim();
             let inner = name.strip_prefix('"').and_then(|n| n.strip_suffix('"'));
@@ -67,12 +68,24 @@ impl Separator {
     }
 
     /// Returns the separator of this header line and its names. The separator that yields a column `t` is taken,
-    /// otherwise the one that yields most columns.
-    fn of(text: &str) -> (Self, Vec<String>) {
+    /// otherwise the one that yields most columns. A name such as `t [s]` has blanks, so blanks count only if they fit
+    /// more of the `rows` behind the header than any other separator in it.
+    fn of(text: &str, rows: &[String]) -> (Self, Vec<String>) {
         let all = [Self::Comma, Self::Semicolon, Self::Tab, Self::Blank];
         let mut tried = all.map(|s| (s, s.split(text)));
-        let has_time = |names: &[String]| names.len() > 1 && names.iter().any(|n| n == "t");
-        let best = (0..tried.len()).find(|k| has_time(&tried[*k].1));
+        let fitting = |(by, names): &(Self, Vec<String>)| match names.len() {
+            0 | 1 => None,
+            n => Some(rows.iter().filter(|row| by.split(row).len() == n).count()),
+        };
+        let others = tried[..3].iter().filter_map(fitting).max();
+        let takes_blanks = fitting(&tried[3]) > others;
+        let found = |is_it: fn(&str) -> bool| {
+            (0..tried.len()).find(|k| {
+                let names = &tried[*k].1;
+                names.len() > 1 && names.iter().any(|n| is_it(n)) && (*k < 3 || takes_blanks)
+            })
+        };
+        let best = found(|name| name == "t").or_else(|| found(is_time));
         let best = best.unwrap_or_else(|| {
             // `max_by_key` returns the last of equal values, so the order is reversed to take the first.
             let count = |k: &usize| tried[*k].1.len();
@@ -91,6 +104,8 @@ pub(super) trait Lines {
     fn line(&self) -> &[u8];
     /// Returns its number, from 1.
     fn number(&self) -> u64;
+    /// Returns lines behind it that are read already.
+    fn ahead(&self) -> Vec<String>;
     /// Returns the path of the file.
     fn path(&self) -> &Path;
 }
@@ -144,7 +159,7 @@ pub(super) fn find_header(lines: &mut impl Lines) -> Result<FoundHeader, DataErr
             });
             continue;
         }
-        return Ok(header(text, line, comment));
+        return Ok(header(text, line, comment, lines.ahead()));
     }
     Err(DataError::Empty {
         path: lines.path().into(),
@@ -152,11 +167,12 @@ pub(super) fn find_header(lines: &mut impl Lines) -> Result<FoundHeader, DataErr
 }
 
 /// Returns this line as the header, or the comment before it if this line is a row that fits it.
-fn header(text: &str, line: u64, comment: Option<Comment>) -> FoundHeader {
-    let (separator, names) = Separator::of(text);
+fn header(text: &str, line: u64, comment: Option<Comment>, mut ahead: Vec<String>) -> FoundHeader {
+    let (separator, names) = Separator::of(text, &ahead);
     let mut remarks = Vec::new();
     if let Some(comment) = comment {
-        let (by, named) = Separator::of(&comment.text);
+        ahead.insert(0, text.to_owned());
+        let (by, named) = Separator::of(&comment.text, &ahead);
         let row = by.split(text);
         // In a row a comma may be a decimal comma, in names it is not.
         let is_number = |field: &String| {
@@ -164,7 +180,8 @@ fn header(text: &str, line: u64, comment: Option<Comment>) -> FoundHeader {
             number(field.as_bytes(), mark).is_finite()
         };
         let fits = row.len() == named.len() && row.iter().any(is_number);
-        if fits && !names.iter().any(|n| n == "t") && named.iter().any(|n| n == "t") {
+        let has_time = |names: &[String]| names.len() > 1 && names.iter().any(|n| is_time(n));
+        if fits && !has_time(&names) && has_time(&named) {
             remarks.push(Remark::CommentedHeader {
                 line: comment.line,
                 sign: comment.sign,

@@ -285,6 +285,10 @@ fn files_of_other_programs_are_named_by_their_first_bytes() {
             b"SQLite format 3\0\x10\0".to_vec(),
             "SQLite database, as rosbag2",
         ),
+        (
+            [b"SQLite format 3\0".to_vec(), vec![0; 4000]].concat(),
+            "is an SQLite database, as rosbag2 writes",
+        ),
         (b"\x1f\x8b\x08\0\0\0".to_vec(), "compressed by gzip"),
         (zip("t.npy"), "NumPy"),
         (zip("[Content_Types].xml"), "workbook"),
@@ -332,4 +336,26 @@ fn columns_are_called_what_the_file_calls_them() {
         ["qm1", "i1", "duty1", "ref1"]
     );
     assert_eq!(names("t,qm1,taum1,u1,i1"), ["qm1", "taum1", "u1", "ref1"]);
+}
+
+#[test]
+fn names_with_blanks_before_their_units_are_split_at_the_other_separator() {
+    let time = "taken from column `t ";
+    for text in [
+        "t [s],q1 [rad],tau1 [Nm]\n0,0.5,-12.5\n0.001,0.25,3\n",
+        "t (s),q1 (rad),tau1 (Nm)\n0,0.5,-12.5\n0.001,0.25,3\n",
+        "t [s], q1 [rad], tau1 [Nm]\n0, 0.5, -12.5\n0.001, 0.25, 3\n",
+    ] {
+        holds(text, 2, &[time]);
+    }
+    let by = |separator: &str| format!("columns are separated by {separator}");
+    let text = "t [s];q1 [rad];tau1 [Nm]\n0;0,5;-12,5\n0,001;0,25;3\n";
+    holds(text, 2, &[time, &by("`;`")]);
+    let text = "t [s]\tq1 [rad]\ttau1 [Nm]\n0\t0.5\t-12.5\n0.001\t0.25\t3\n";
+    holds(text, 2, &[time, &by("tabs")]);
+    let text = "# t [s],q1 [rad],tau1 [Nm]\n0,0.5,-12.5\n0.001,0.25,3\n";
+    holds(text, 2, &[time, "is read as the header"]);
+    // Blanks separate where they fit the rows, also with decimal commas and a comma in a name.
+    let text = "t q1 tau1 at(x,y)\n0 0,5 -12,5 1\n0,001 0,25 3 1\n";
+    holds(text, 2, &[&by("blanks")]);
 }

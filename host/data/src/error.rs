@@ -20,10 +20,18 @@ pub enum DataError {
         source: std::io::Error,
     },
     /// The path is a directory.
-    #[error("{} is a directory, but a recording is one .csv or .mcap file", path.display())]
+    #[error("{} is a directory without metadata.yaml, but a recording is one .csv or .mcap file, or a folder that rosbag2 wrote", path.display())]
     Directory {
         /// The directory.
         path: PathBuf,
+    },
+    /// A folder of rosbag2 that cannot be read.
+    #[error("{}: {message}", path.display())]
+    Bag {
+        /// The folder.
+        path: PathBuf,
+        /// One sentence: what was found and what is correct.
+        message: String,
     },
     /// The path is a pipe or a device.
     #[error("{} is a pipe or a device, but a recording is gone through from its start more than once; save it as a .csv or .mcap file and give that", path.display())]
@@ -171,6 +179,12 @@ pub enum DataError {
         /// Line or message.
         place: Place,
         /// Reason why the conversion fails, one sentence.
+        message: String,
+    },
+    /// A mapping of channels to columns that is wrong, or does not fit the file.
+    #[error("{message}")]
+    Mapping {
+        /// One sentence: what was found and what is correct.
         message: String,
     },
     /// An MCAP file that is damaged or holds something else.

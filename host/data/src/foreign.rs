@@ -15,9 +15,9 @@ pub enum ForeignFormat {
         "a ROS 1 bag; convert it with `mcap convert in.bag out.mcap` (or `rosbags-convert`) and give the .mcap file"
     )]
     RosBag,
-    /// SQLite, as rosbag2 writes by default in older versions.
+    /// SQLite without the tables of rosbag2.
     #[error(
-        "an SQLite database, as rosbag2 writes; convert it to MCAP (`ros2 bag convert` with storage_id mcap, or `mcap convert in.db3 out.mcap`) and give the .mcap file"
+        "an SQLite database, as rosbag2 writes, but tables `topics` and `messages` cannot be found in it; copy it again, or let `ros2 bag convert` write it anew with storage_id mcap"
     )]
     Sqlite,
     /// A whole file compressed with gzip, xz, bzip2, zstd or lz4.
@@ -28,17 +28,20 @@ pub enum ForeignFormat {
         "a workbook of a spreadsheet program; save the sheet as \"CSV UTF-8\" and give the .csv file"
     )]
     Workbook,
-    /// NumPy arrays.
+    /// A single NumPy array.
     #[error(
-        "a NumPy file; write its columns with `numpy.savetxt(\"out.csv\", table, delimiter=\",\", header=\"t,q1,tau1\", comments=\"\")`"
+        "a NumPy file of one array, which has no names for its columns; write it with `numpy.savez(\"out.npz\", t=t, q=q, tau=tau)`"
     )]
     NumPy,
+    /// A NumPy archive, which is read.
+    #[error("a NumPy archive")]
+    NumPyArchive,
     /// Any other zip archive.
     #[error("a zip archive; unpack it and give the .csv or .mcap file inside")]
     Zip,
-    /// MATLAB, any version.
+    /// MATLAB of version 4 or 7.3; others are read.
     #[error(
-        "a MATLAB file; write its columns with `writetable(array2table([t q1 tau1], 'VariableNames', {{'t','q1','tau1'}}), 'out.csv')`"
+        "a MATLAB file of version 7.3, which is HDF5; save it with `save('out.mat', 't', 'q', 'tau', '-v7')`"
     )]
     Matlab,
     /// HDF5.
@@ -82,9 +85,8 @@ impl ForeignFormat {
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         let is = |magic: &[u8]| head.starts_with(magic);
         let holds = |part: &[u8]| head.windows(part.len()).any(|w| w == part);
-        const MAGICS: [(&[u8], ForeignFormat); 26] = [
+        const MAGICS: [(&[u8], ForeignFormat); 25] = [
             (b"#ROSBAG", ForeignFormat::RosBag),
-            (b"SQLite format 3\0", ForeignFormat::Sqlite),
             (b"\x1f\x8b", ForeignFormat::Compressed("gzip")),
             (b"\xfd7zXZ\0", ForeignFormat::Compressed("xz")),
             (b"BZh", ForeignFormat::Compressed("bzip2")),
@@ -112,7 +114,7 @@ impl ForeignFormat {
         ];
         if is(b"PK\x03\x04") {
             return Some(if holds(b".npy") {
-                Self::NumPy
+                Self::NumPyArchive
             } else if holds(b"[Content_Types].xml") || holds(b"opendocument.spreadsheet") {
                 Self::Workbook
             } else {

@@ -1,5 +1,6 @@
 //! Converts ROS `sensor_msgs/JointState` to rows; names are matched with the robot's joints.
 
+use super::flat_rows::in_nanoseconds;
 use super::remark::Remark;
 use super::ros_layout::Field;
 use super::ros_message::{Encoding, JointSample};
@@ -110,6 +111,11 @@ impl JointStates {
         }
     }
 
+    /// Returns the time of the last message, ns, and whether it is a header stamp.
+    pub(super) fn absolute_time(&self, log_time: u64) -> (i128, bool) {
+        (in_nanoseconds(self.time(log_time)), !self.is_logged_time)
+    }
+
     /// Returns the columns and their names in messages.
     pub(super) fn columns(&self) -> (Vec<String>, Vec<String>) {
         let (mut names, mut labels) = (vec!["t".to_owned()], vec!["t".to_owned()]);
@@ -168,7 +174,10 @@ impl JointStates {
         }
         let origin = format!("{}.{:09}", self.origin.0, self.origin.1);
         remarks.push(if self.is_logged_time {
-            Remark::LogTime { origin }
+            Remark::LogTime {
+                origin,
+                stamp: "is zero",
+            }
         } else {
             Remark::Stamp { origin }
         });

@@ -125,7 +125,7 @@ fn bare_word(message: &[u8], name: &str) -> Option<&'static str> {
 }
 
 /// Returns the message with `null` for NaN and Infinity outside strings; `None` if it contains none.
-fn without_nan(message: &[u8]) -> Option<Vec<u8>> {
+pub(super) fn without_nan(message: &[u8]) -> Option<Vec<u8>> {
     let mut plain = Vec::with_capacity(message.len());
     let (mut quoted, mut changed) = (false, false);
     let mut rest = message;

@@ -10,7 +10,8 @@ use super::error::{DataError, Warning};
 use super::header::Header;
 use super::motors::MotorSide;
 use super::place::Place;
-use rig_model::robot::Robot;
+use super::unit::Unit;
+use rig_model::robot::{JointKind, Robot};
 
 /// Returns the columns of a file for `robot`.
 ///
@@ -46,17 +47,23 @@ pub(super) fn layout(
     let mut warnings = Vec::new();
     let mut extras = 0;
     let mut columns = Vec::with_capacity(names.len());
-    for ((name, label), signal) in names.iter().zip(&described.labels).zip(signals) {
+    for (k, signal) in signals.into_iter().enumerate() {
+        let (name, label) = (&names[k], &described.labels[k]);
         let role = match signal {
             _ if name == "t" => Role::Time,
             None => Role::None,
             Some((signal, joint)) => roles.of(name, signal, joint, &mut warnings),
         };
+        let unit = described.units.get(k).copied().flatten();
+        if let (Some(unit), Some((signal, joint))) = (unit, signal) {
+            check_unit(unit, signal, joint, label, robot).map_err(header)?;
+        }
         let keep = matches!(role, Role::None | Role::Duty(..));
         let strict = role != Role::None || signal.is_some() || is_numeric_extra(name);
         columns.push(FileColumn {
             name: name.clone(),
             label: label.clone(),
+            factor: unit.map_or(1.0, |unit| unit.factor),
             role,
             extra: keep.then_some(extras),
             strict,
@@ -70,11 +77,53 @@ pub(super) fn layout(
         columns,
         time,
         joints,
+        origin: None,
         extras,
         motors,
         movers,
         warnings,
     })
+}
+
+/// Checks that a unit is one of the joint's kind of motion: m for a prismatic joint, rad for another one.
+fn check_unit(
+    unit: Unit,
+    signal: Signal,
+    joint: usize,
+    label: &str,
+    robot: &Robot,
+) -> Result<(), String> {
+    let is_of_joint = matches!(
+        signal,
+        Signal::Position
+            | Signal::LinkPosition
+            | Signal::Reference
+            | Signal::Velocity
+            | Signal::Torque
+    );
+    let Some(own) = robot.joints.get(joint).filter(|_| is_of_joint) else {
+        return Ok(());
+    };
+    let is_prismatic = own.kind == JointKind::Prismatic;
+    if unit.is_linear().is_none_or(|linear| linear == is_prismatic) {
+        return Ok(());
+    }
+    let (kind, fitting) = match (is_prismatic, signal) {
+        (true, Signal::Velocity) => ("prismatic", "m/s or mm/s"),
+        (true, Signal::Torque) => ("prismatic", "N, mN or kN"),
+        (true, _) => ("prismatic", "m or mm"),
+        (false, Signal::Velocity) => ("revolute", "rad/s, deg/s, rpm or rev/s"),
+        (false, Signal::Torque) => ("revolute", "Nm, mNm, cNm, kNm or kgcm"),
+        (false, _) => ("revolute", "rad, mrad, deg or rev"),
+    };
+    Err(format!(
+        "the unit of column `{label}` is {}, but joint `{}` of robot `{}` is {kind}; give its unit by --unit {}{}=UNIT, where UNIT is {fitting}",
+        unit.name,
+        own.name,
+        robot.name,
+        signal.prefix(),
+        joint + 1
+    ))
 }
 
 /// Returns true for a column with a meaning that belongs to no joint: wrist sensor or supply.

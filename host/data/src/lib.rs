@@ -21,22 +21,41 @@
 //! # }
 //! ```
 
+mod array;
+mod bag;
+mod bag_table;
 mod block;
 mod bursts;
+mod channel;
 mod columns;
 mod compensated;
+pub mod contents;
 mod csv;
 mod csv_header;
+mod decoder;
 mod efforts;
 mod error;
+mod flat_message;
+mod flat_rows;
 mod foreign;
+mod form;
 mod header;
+mod iso_time;
+mod joined_rows;
+mod joint_names;
 mod joint_states;
 mod json_samples;
 mod layout;
+mod likely_time;
+mod mapping;
+mod mat;
+mod mcap_index;
+mod mcap_messages;
 mod mcap_records;
 mod mcap_rows;
+mod mcap_sorted;
 mod motors;
+mod npz;
 mod number;
 mod own_names;
 mod place;
@@ -53,18 +72,24 @@ pub mod runs;
 mod sample_hold;
 mod sampling;
 pub mod sessions;
+mod side_rows;
 mod source;
+mod sqlite;
+mod table_rows;
 mod text_file;
 mod thermal_history;
+mod time_names;
 mod torque_spike;
+mod unit;
 mod unsigned;
 mod writer;
 
-pub use block::{Block, JointColumns, WRENCH_COLUMNS};
+pub use block::{Block, JointColumns, WRENCH_COLUMNS, WRENCH_MESSAGE};
 pub use columns::EffortNeed;
 pub use compensated::Compensated;
 pub use error::{DataError, Warning};
 pub use foreign::ForeignFormat;
+pub use mapping::Mapping;
 pub use place::Place;
 pub use plausibility::{Implausible, JUDGED_ROWS, plausibility, strange_rates};
 pub use plausibility::{unit_of_steps, velocity_scale};
@@ -75,10 +100,15 @@ pub use reference::{StrangeReference, strange_references};
 pub use remark::Remark;
 pub use sampling::Sampling;
 pub use source::{Blocks, KEPT_WARNINGS, Source, column_names};
+pub use unit::Unit;
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 
 #[cfg(test)]
+mod bag_table_test;
+#[cfg(test)]
 mod csv_test;
+#[cfg(test)]
+mod mapping_test;
 #[cfg(test)]
 mod mcap_test;
 #[cfg(test)]

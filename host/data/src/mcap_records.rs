@@ -117,6 +117,28 @@ impl Records {
         })
     }
 
+    /// Goes to the chunk that begins at a byte, and opens it. The check sum of the data section is not computed then; that of
+    /// the chunk is.
+    pub(super) fn chunk_at(&mut self, offset: u64) -> Result<(), DataError> {
+        let sought = self.file.seek(SeekFrom::Start(offset));
+        sought.map_err(|source| self.unreadable(source))?;
+        self.fill(RECORD_HEADER as u64)?;
+        match record_header(&self.body) {
+            Some((op::CHUNK, length)) if length <= self.length.saturating_sub(offset) => {
+                self.open_chunk(offset, length, false)
+            }
+            _ => Err(self.damaged(offset, "no chunk begins where the index says")),
+        }
+    }
+
+    /// Returns the next record of the open chunk; `None` at its end.
+    pub(super) fn next_in_chunk(&mut self) -> Result<Option<(u8, &[u8])>, DataError> {
+        Ok(match self.next_of_chunk()? {
+            Some((code, Body::Chunk(range))) => Some((code, &self.chunk[range])),
+            _ => None,
+        })
+    }
+
     fn damaged(&self, at: u64, what: &str) -> DataError {
         DataError::Mcap {
             path: self.path.clone(),

@@ -3,18 +3,17 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use ::mcap::records::{Record, op};
-
+use super::channel;
 use super::columns::{FileColumn, Layout};
 use super::error::DataError;
 use super::header::Header;
 use super::joint_states::{JointStates, Refusal};
 use super::json_samples::{JsonSamples, written};
-use super::mcap_records::Records;
+use super::mcap_messages::{Event, Messages, cut_off};
 use super::place::Place;
 use super::remark::Remark;
 use super::ros_layout::{Field, joint_state};
-use super::ros_message::Encoding;
+use super::ros_message::{Encoding, ros_encoding};
 use rig_output::format_short;
 
 /// Topic of the joint samples.
@@ -22,6 +21,11 @@ pub(super) const TOPIC: &str = "/joint/state";
 
 /// Names of the ROS joint state in both versions.
 const JOINT_STATE: [&str; 2] = ["sensor_msgs/msg/JointState", "sensor_msgs/JointState"];
+
+/// Returns true if a type of messages is the joint state of ROS.
+pub(super) fn is_joint_state(of: &str) -> bool {
+    JOINT_STATE.contains(&of)
+}
 
 /// Content of a channel's messages.
 enum Content {
@@ -40,14 +44,10 @@ struct Channel {
     content: Content,
 }
 
-struct Schema {
-    name: String,
-    encoding: String,
-    text: String,
-}
-
 struct Topic {
     name: String,
+    /// True if a standard definition is used for its messages.
+    is_undefined: bool,
     /// Name of the schema.
     of: String,
     /// Number of messages so far.
@@ -63,9 +63,8 @@ enum Samples {
 /// Rows of an MCAP file in the order of the file.
 pub(super) struct McapRows {
     path: PathBuf,
-    records: Records,
-    channels: BTreeMap<u16, Channel>,
-    schemas: BTreeMap<u16, Schema>,
+    messages: Messages,
+    channels: BTreeMap<usize, Channel>,
     topics: Vec<Topic>,
     /// Names of the robot's joints.
     joints: Vec<String>,
@@ -85,13 +84,17 @@ pub(super) struct McapRows {
 }
 
 impl McapRows {
-    /// Opens the file and determines the columns from the first message.
-    pub(super) fn open(path: &Path, joints: &[String]) -> Result<(Self, Header), DataError> {
+    /// Opens the files of a recording and determines the columns from the first message. `path` is the name of the
+    /// recording in messages.
+    pub(super) fn open(
+        path: &Path,
+        files: &[PathBuf],
+        joints: &[String],
+    ) -> Result<(Self, Header), DataError> {
         let mut rows = Self {
             path: path.into(),
-            records: Records::open(path)?,
+            messages: Messages::open(files)?,
             channels: BTreeMap::new(),
-            schemas: BTreeMap::new(),
             topics: Vec::new(),
             joints: joints.to_vec(),
             chosen: None,
@@ -110,8 +113,15 @@ impl McapRows {
         let header = match &rows.chosen {
             Some((_, Samples::Json(samples))) => Header::of(samples.names().to_vec()),
             Some((topic, Samples::JointStates(states))) => {
-                let topic = &rows.topics[*topic].name;
+                let Topic {
+                    name: topic,
+                    is_undefined,
+                    of,
+                    ..
+                } = &rows.topics[*topic];
                 rows.remarks.extend(states.remarks(topic));
+                let assumed = is_undefined.then(|| Remark::StandardDefinition { of: of.clone() });
+                rows.remarks.extend(assumed);
                 let (names, labels) = states.columns();
                 Header {
                     names,
@@ -122,6 +132,7 @@ impl McapRows {
                             "message 1 on {topic} has an empty `effort` array, so there is no torque; let the robot's driver publish the efforts and record again"
                         )
                     }),
+                    ..Header::default()
                 }
             }
             None => Header::of(Vec::new()),
@@ -130,20 +141,21 @@ impl McapRows {
     }
 
     pub(super) fn bytes_read(&self) -> u64 {
-        self.records.bytes_read()
+        self.messages.bytes_read()
+    }
+
+    /// Returns the time of the last row, ns, and whether it is a header stamp.
+    pub(super) fn time(&self) -> (i128, bool) {
+        match &self.chosen {
+            Some((_, Samples::JointStates(states))) => states.absolute_time(self.log_time),
+            _ => (i128::from(self.log_time), false),
+        }
     }
 
     /// Returns the assumptions and omissions so far; complete after the last row.
     pub(super) fn remarks(&self) -> Vec<Remark> {
         let mut remarks = self.remarks.clone();
-        if let Some(broken) = self.records.broken() {
-            remarks.push(Remark::CutOff {
-                at: broken.at,
-                messages: self.given.0,
-                until: self.given.1,
-                lost: broken.lost,
-            });
-        }
+        remarks.extend(cut_off(&self.path, self.messages.broken(), self.given));
         remarks
     }
 
@@ -182,7 +194,7 @@ impl McapRows {
                 wanted.join(", ")
             ));
         }
-        if let Some(broken) = self.records.broken() {
+        if let Some((_, broken)) = self.messages.broken().first() {
             return self.error(format!(
                 "the file breaks off at byte {} before the first sample; record it again",
                 broken.at
@@ -208,66 +220,47 @@ impl McapRows {
     /// end.
     fn next_message(&mut self) -> Result<bool, DataError> {
         loop {
-            let (code, body) = match self.records.next_record()? {
+            let (channel, log_time) = match self.messages.next_event()? {
                 None => return Ok(false),
-                Some(record) => record,
-            };
-            if !matches!(code, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
-                continue;
-            }
-            match ::mcap::parse_record(code, body) {
-                Ok(Record::Schema { header, data }) => {
-                    let schema = Schema {
-                        name: header.name,
-                        encoding: header.encoding,
-                        text: String::from_utf8_lossy(&data).into_owned(),
-                    };
-                    self.schemas.insert(header.id, schema);
-                }
-                Ok(Record::Channel(channel)) => {
-                    let schema = self.schemas.get(&channel.schema_id);
-                    let of = schema.map_or("no schema", |s| s.name.as_str()).to_owned();
-                    let content = content(&channel.topic, &channel.message_encoding, schema);
+                Some(Event::Channel(number, channel)) => {
+                    let of = channel.schema.as_ref();
+                    let of = of.map_or("no schema", |s| s.name.as_str()).to_owned();
+                    let content = content(channel);
                     let known = self.topics.iter().position(|t| t.name == channel.topic);
                     let topic = known.unwrap_or(self.topics.len());
                     if known.is_none() {
                         self.topics.push(Topic {
-                            name: channel.topic,
+                            name: channel.topic.clone(),
+                            is_undefined: channel.undefined().is_some(),
                             of,
                             messages: 0,
                         });
                     }
-                    self.channels.insert(channel.id, Channel { topic, content });
+                    self.channels.insert(number, Channel { topic, content });
+                    continue;
                 }
-                Ok(Record::Message { header, data }) => {
-                    let Some(channel) = self.channels.get(&header.channel_id) else {
-                        continue;
-                    };
-                    if matches!(channel.content, Content::Other) {
+                Some(Event::Message {
+                    channel,
+                    log_time,
+                    data,
+                }) => {
+                    let content = self.channels.get(&channel).map(|c| &c.content);
+                    if matches!(content, None | Some(Content::Other)) {
                         continue;
                     }
                     self.message.clear();
-                    self.message.extend_from_slice(&data);
-                    if self.accept(header.channel_id, header.log_time)? {
-                        return Ok(true);
-                    }
+                    self.message.extend_from_slice(data);
+                    (channel, log_time)
                 }
-                Ok(_) => {}
-                Err(e) => {
-                    let message = e.to_string();
-                    let message = message.lines().next().unwrap_or_default().to_owned();
-                    let at = self.records.bytes_read();
-                    return Err(self.error(format!(
-                        "the MCAP file is damaged before byte {at} ({}); copy it from the recorder again",
-                        message.trim_end_matches('.')
-                    )));
-                }
+            };
+            if self.accept(channel, log_time)? {
+                return Ok(true);
             }
         }
     }
 
     /// Checks the message in `self.message`; returns false if it is skipped.
-    fn accept(&mut self, channel: u16, log_time: u64) -> Result<bool, DataError> {
+    fn accept(&mut self, channel: usize, log_time: u64) -> Result<bool, DataError> {
         let Some(Channel { topic, content }) = self.channels.get(&channel) else {
             return Ok(false);
         };
@@ -400,20 +393,14 @@ impl McapRows {
 }
 
 /// Determines the content of a channel's messages.
-fn content(topic: &str, encoding: &str, schema: Option<&Schema>) -> Content {
-    let is_joint_state = schema.is_some_and(|s| JOINT_STATE.contains(&s.name.as_str()));
-    let ros = match encoding {
-        "cdr" => Some(Encoding::Cdr),
-        "ros1" => Some(Encoding::Ros1),
-        _ => None,
-    };
-    match (schema, ros) {
+fn content(channel: &channel::Channel) -> Content {
+    let (topic, encoding) = (channel.topic.as_str(), channel.encoding.as_str());
+    let schema = channel.schema.as_ref();
+    let has_joints = schema.is_some_and(|s| is_joint_state(&s.name));
+    match (schema, ros_encoding(encoding)) {
         _ if topic == TOPIC && encoding == "json" => Content::Json,
-        (Some(schema), Some(ros)) if is_joint_state => {
-            // Other definition languages describe the same standard message.
-            let is_msg = matches!(schema.encoding.as_str(), "ros2msg" | "ros1msg");
-            let text = if is_msg { schema.text.as_str() } else { "" };
-            match joint_state(text, ros == Encoding::Ros1) {
+        (Some(schema), Some(ros)) if has_joints => {
+            match joint_state(schema.ros_text(), ros == Encoding::Ros1) {
                 Ok(fields) => Content::JointStates(fields, ros),
                 Err(why) => Content::Unreadable(format!("cannot be read: {why}")),
             }

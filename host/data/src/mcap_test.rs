@@ -4,7 +4,8 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use super::{Block, EffortNeed, Quantity, Source};
+use super::contents::contents;
+use super::{Block, EffortNeed, Mapping, Quantity, Source};
 use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -739,5 +740,130 @@ fn arrays_that_are_missing_or_no_numbers_are_named() {
     assert!(
         warnings[0].contains("header stamp of message 1 is zero"),
         "{warnings:?}"
+    );
+}
+
+/// Writes a file of 300 JSON messages on `topic` every 2 ms, and returns its path.
+fn json_file(folder: &Path, topic: &str, make: impl Fn(u64) -> String) -> std::path::PathBuf {
+    let mut records = channel(1, 0, topic, "json");
+    for k in 0..300 {
+        let ns = 1_700_000_000_000_000_000 + k * 2_000_000;
+        records.extend(message(1, ns, make(k).as_bytes()));
+    }
+    let path = folder.join("a.mcap");
+    std::fs::write(&path, whole(&records)).unwrap();
+    path
+}
+
+fn mapped(path: &Path, robot: &Robot, columns: &[&str]) -> (Vec<Block>, Vec<String>) {
+    let mut mapping = Mapping::default();
+    for entry in columns {
+        mapping.add_column(entry).unwrap();
+    }
+    let source = Source::open_mapped(path, robot, EffortNeed::Optional, &mapping).unwrap();
+    let (blocks, warnings) = source.read_all().unwrap();
+    (blocks, warnings.iter().map(ToString::to_string).collect())
+}
+
+#[test]
+fn the_name_of_a_joint_is_no_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = [
+        "wrist_turn",
+        "wrist_rev",
+        "lift_mm",
+        "tilt_mrad",
+        "elbow_deg",
+    ];
+    let path = json_file(folder.path(), "/joint_states", |k| {
+        let q = 0.01 * k as f64;
+        format!(
+            "{{\"name\": {names:?}, \"position\": [{q}, {q}, {q}, {q}, {q}], \"raw_deg\": [{q}, {q}, {q}, {q}, {q}]}}"
+        )
+    });
+    let robot = robot(&names);
+    let entries: Vec<String> = (names.iter().enumerate())
+        .map(|(k, name)| format!("q{}=joint_states/position/{name}", k + 1))
+        .collect();
+    let entries: Vec<&str> = entries.iter().map(String::as_str).collect();
+    let (blocks, warnings) = mapped(&path, &robot, &entries);
+    for joint in &blocks[0].joints {
+        assert_eq!(joint.q[100], 1.0, "{warnings:?}");
+    }
+    assert!(
+        warnings.iter().all(|w| !w.contains("converted")),
+        "{warnings:?}"
+    );
+    // The name of the array states the unit of all elements.
+    let in_degrees: Vec<String> = entries
+        .iter()
+        .map(|e| e.replace("position", "raw_deg"))
+        .collect();
+    let in_degrees: Vec<&str> = in_degrees.iter().map(String::as_str).collect();
+    let (blocks, _) = mapped(&path, &robot, &in_degrees);
+    assert_eq!(blocks[0].joints[0].q[100], 1f64.to_radians());
+    for robot in [None, Some(&robot)] {
+        let found = contents(&path, robot, &mut |_| {}).unwrap();
+        let proposed = found.proposal.columns.iter();
+        let own: Vec<_> = proposed.map(|p| (p.full_name(), p.unit)).collect();
+        for name in names {
+            let wanted = (format!("joint_states/position/{name}"), None);
+            assert!(own.contains(&wanted), "{name} in {own:?}");
+        }
+    }
+}
+
+#[test]
+fn a_sample_of_the_own_kind_keeps_its_time_when_mapped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = json_file(folder.path(), "/joint/state", |k| {
+        let t = 0.001 * k as f64;
+        format!("{{\"t\": {t}, \"angle\": {t}, \"clock\": {}}}", 3.0 * t)
+    });
+    let robot = robot(&["link"]);
+    let (blocks, warnings) = mapped(&path, &robot, &["q1=joint/state/angle"]);
+    assert_eq!(blocks[0].t[299], 0.001 * 299.0, "{warnings:?}");
+    assert!(
+        warnings.iter().all(|w| !w.contains("stamp")),
+        "{warnings:?}"
+    );
+    let (blocks, _) = mapped(
+        &path,
+        &robot,
+        &["q1=joint/state/angle", "t=joint/state/clock"],
+    );
+    assert_eq!(blocks[0].t[299], 3.0 * (0.001 * 299.0));
+    let found = contents(&path, Some(&robot), &mut |_| {}).unwrap();
+    assert!((found.topics[0].time.period.unwrap() - 0.001).abs() < 1e-9);
+    // Another topic has the time of the log, and no stamp that could be zero.
+    let path = json_file(folder.path(), "/arm", |k| {
+        format!("{{\"angle\": {}}}", 0.1 * k as f64)
+    });
+    let (blocks, warnings) = mapped(&path, &robot, &["q1=arm/angle"]);
+    assert!((blocks[0].t[299] - 0.598).abs() < 1e-9);
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.contains("stamp of message 1 is missing")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn rows_before_the_first_message_with_a_channel_count_as_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = json_file(folder.path(), "/arm", |k| match k {
+        3 => "{\"q1\": 1, \"extra\": 2}".to_owned(),
+        _ => "{\"q1\": 1}".to_owned(),
+    });
+    let found = contents(&path, None, &mut |_| {}).unwrap();
+    let extra = found.topics[0]
+        .channels
+        .iter()
+        .find(|c| c.name == "extra")
+        .unwrap();
+    assert_eq!(
+        (extra.values, extra.missing, extra.first_missing),
+        (1, 299, Some(1))
     );
 }

@@ -10,6 +10,8 @@ pub enum Place {
     Line(u64),
     /// Message of its topic in an MCAP file, from 1.
     Message(u64),
+    /// Row of arrays, from 1.
+    Row(u64),
 }
 
 impl Place {
@@ -18,6 +20,7 @@ impl Place {
         match self {
             Self::Line(line) => format!("{}:{line}", path.display()),
             Self::Message(number) => format!("{}, message {number}", path.display()),
+            Self::Row(row) => format!("{}, row {row}", path.display()),
         }
     }
 }
@@ -27,6 +30,7 @@ impl fmt::Display for Place {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
             Self::Message(number) => write!(f, "message {number}"),
+            Self::Row(row) => write!(f, "row {row}"),
         }
     }
 }

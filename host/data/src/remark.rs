@@ -34,10 +34,13 @@ pub enum Remark {
     },
     /// An MCAP file whose end is missing.
     #[error(
-        "the file breaks off at byte {at}, as after a power loss or a recorder that was killed: {messages} messages are read, the last at t = {until} s; {lost}",
+        "{} breaks off at byte {at}, as after a power loss or a recorder that was killed: {messages} messages are read, the last at t = {until} s; {lost}",
+        file.as_deref().unwrap_or("the file"),
         until = rig_output::format_time(*until)
     )]
     CutOff {
+        /// Name of the file, for a recording of several.
+        file: Option<String>,
         /// Byte after the last complete record.
         at: u64,
         /// Messages that were read.
@@ -61,11 +64,13 @@ pub enum Remark {
     },
     /// ROS messages without a stamp.
     #[error(
-        "the header stamp of message 1 is zero: t is the time at which the recorder logged a message, counted from message 1 ({origin} s)"
+        "the header stamp of message 1 {stamp}: t is the time at which the recorder logged a message, counted from message 1 ({origin} s)"
     )]
     LogTime {
         /// Log time of the first message, seconds and nanoseconds.
         origin: String,
+        /// Why the stamp is not used: "is zero" or "is missing".
+        stamp: &'static str,
     },
     /// Joint names with a prefix.
     #[error("the joints of topic {topic} are those of the robot behind the prefix \"{prefix}\"")]
@@ -93,6 +98,62 @@ pub enum Remark {
         /// Its joints, quoted.
         joints: String,
     },
+    /// A column of time with another name.
+    #[error("the time is taken from column `{label}`, the only one that is named as a time")]
+    TimeColumn {
+        /// Its name in the file.
+        label: String,
+    },
+    /// A unit that the file states.
+    #[error("column `{label}` is converted from {unit}, as its name states")]
+    StatedUnit {
+        /// Its name in the file.
+        label: String,
+        /// The unit.
+        unit: &'static str,
+    },
+    /// Times that are counted from the first row.
+    #[error("t is counted from the first row, because the times of the file are {what}")]
+    CountedTime {
+        /// Description of the times.
+        what: &'static str,
+    },
+    /// Columns from a topic other than that of the rows.
+    #[error(
+        "{columns} are interpolated linearly to the times of the rows, from topic {topic} ({rate} Hz)"
+    )]
+    Interpolated {
+        /// Names of the columns.
+        columns: String,
+        /// The topic.
+        topic: String,
+        /// Messages per second.
+        rate: String,
+    },
+    /// Messages whose definition the recording does not hold.
+    #[error("the recording holds no definition of {of}: the standard one of ROS is used")]
+    StandardDefinition {
+        /// Type of the messages.
+        of: String,
+    },
+    /// Arrays that are no columns.
+    #[error("these arrays are no columns: {names}")]
+    OtherArrays {
+        /// Names, with shapes of those that have another number of rows.
+        names: String,
+    },
+    /// Rows without a value of another topic.
+    #[error(
+        "{rows} rows are left out, because topic {topic} has no message before, after or near them; the first is message {first}"
+    )]
+    LeftOut {
+        /// The topic.
+        topic: String,
+        /// Number of rows.
+        rows: u64,
+        /// The first one.
+        first: u64,
+    },
     /// Velocities that are not numbers.
     #[error(
         "the velocity of joint \"{joint}\" is NaN in the first message: the velocities are not read"
@@ -118,6 +179,13 @@ impl Remark {
             Self::Preamble { .. } => 8,
             Self::Separator { .. } => 9,
             Self::QuotedDecimalComma { .. } => 10,
+            Self::LeftOut { .. } => 11,
+            Self::Interpolated { .. } => 12,
+            Self::TimeColumn { .. } => 13,
+            Self::StatedUnit { .. } => 14,
+            Self::CountedTime { .. } => 15,
+            Self::StandardDefinition { .. } => 16,
+            Self::OtherArrays { .. } => 17,
         }
     }
 }

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 /// Maximum nesting of definitions: deeper ones do not belong to a message.
 const DEEPEST: usize = 16;
 
-/// `sensor_msgs/JointState` and its parts, for recorders that do not store them.
-const KNOWN: [(&str, &str); 3] = [
+/// Standard messages and their parts, for recorders that do not store their definitions.
+const KNOWN: [(&str, &str); 6] = [
     (
         "sensor_msgs/JointState",
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
@@ -16,6 +16,12 @@ const KNOWN: [(&str, &str); 3] = [
         "builtin_interfaces/Time stamp\nstring frame_id",
     ),
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
+    (
+        "geometry_msgs/WrenchStamped",
+        "std_msgs/Header header\nWrench wrench",
+    ),
+    ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque"),
+    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
 ];
 
 /// `std_msgs/Header` of ROS 1.
@@ -59,6 +65,8 @@ pub(super) enum Count {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     None,
+    /// The header of the message.
+    Header,
     Seconds,
     Nanoseconds,
     Name,
@@ -70,6 +78,7 @@ pub(super) enum Part {
 /// One field of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field {
+    pub name: String,
     pub kind: Kind,
     pub count: Count,
     pub part: Part,
@@ -80,6 +89,28 @@ pub(super) struct Field {
 /// # Errors
 /// The part that cannot be read, one clause.
 pub(super) fn joint_state(definition: &str, is_ros1: bool) -> Result<Vec<Field>, String> {
+    let fields = message_fields("sensor_msgs/JointState", definition, is_ros1)?;
+    for (part, name) in [(Part::Name, "name"), (Part::Position, "position")] {
+        if !fields.iter().any(|f| f.part == part) {
+            return Err(format!(
+                "the definition of its messages has no field `{name}`"
+            ));
+        }
+    }
+    Ok(fields)
+}
+
+/// Returns the fields of a message of type `root` (`geometry_msgs/msg/Wrench`, or without `msg`) from its definition.
+/// An empty definition is enough for the standard messages that are known here.
+///
+/// # Errors
+/// The part that cannot be read, one clause.
+pub(super) fn message_fields(
+    root: &str,
+    definition: &str,
+    is_ros1: bool,
+) -> Result<Vec<Field>, String> {
+    let root = root.replace("/msg/", "/");
     let mut definitions: BTreeMap<String, String> = KNOWN
         .iter()
         .map(|(name, text)| ((*name).to_owned(), (*text).to_owned()))
@@ -87,7 +118,7 @@ pub(super) fn joint_state(definition: &str, is_ros1: bool) -> Result<Vec<Field>,
     if is_ros1 {
         definitions.insert("std_msgs/Header".into(), ROS1_HEADER.into());
     }
-    let mut name = "sensor_msgs/JointState".to_owned();
+    let mut name = root.clone();
     let mut text = String::new();
     for line in definition.lines() {
         if line.starts_with("=====") {
@@ -100,15 +131,7 @@ pub(super) fn joint_state(definition: &str, is_ros1: bool) -> Result<Vec<Field>,
         }
     }
     store(&mut definitions, &name, &mut text);
-    let fields = fields(&definitions, "sensor_msgs/JointState", "", 0)?;
-    for (part, name) in [(Part::Name, "name"), (Part::Position, "position")] {
-        if !fields.iter().any(|f| f.part == part) {
-            return Err(format!(
-                "the definition of its messages has no field `{name}`"
-            ));
-        }
-    }
-    Ok(fields)
+    fields(&definitions, &root, "", 0)
 }
 
 /// Stores a definition that is not empty.
@@ -156,7 +179,12 @@ fn fields(
             kind
         };
         let part = part(&path, &kind, count);
-        fields.push(Field { kind, count, part });
+        fields.push(Field {
+            name: field.to_owned(),
+            kind,
+            count,
+            part,
+        });
     }
     Ok(fields)
 }
@@ -207,12 +235,13 @@ fn primitive(base: &str) -> Option<Kind> {
 
 /// A ROS 1 time: two whole numbers with these meanings.
 fn seconds(whole: Part, nanoseconds: Part) -> Kind {
-    let field = |part| Field {
+    let field = |name: &str, part| Field {
+        name: name.to_owned(),
         kind: Kind::Number(Number::Unsigned(4)),
         count: Count::One,
         part,
     };
-    Kind::Nested(vec![field(whole), field(nanoseconds)])
+    Kind::Nested(vec![field("sec", whole), field("nanosec", nanoseconds)])
 }
 
 /// Returns the name under which a nested type, used inside `within`, is defined.
@@ -233,6 +262,7 @@ fn qualified(definitions: &BTreeMap<String, String>, base: &str, within: &str) -
 fn part(path: &str, kind: &Kind, count: Count) -> Part {
     let numbers = matches!(kind, Kind::Number(Number::Float(_))) && count != Count::One;
     match (path, kind) {
+        (".header", Kind::Nested(_)) if count == Count::One => Part::Header,
         (".header.stamp.sec" | ".header.stamp.secs", Kind::Number(_)) => Part::Seconds,
         (".header.stamp.nanosec" | ".header.stamp.nsecs", Kind::Number(_)) => Part::Nanoseconds,
         (".name", Kind::Text) if count != Count::One => Part::Name,

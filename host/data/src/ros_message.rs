@@ -11,6 +11,15 @@ pub(super) enum Encoding {
     Ros1,
 }
 
+/// Returns the encoding of messages by its name in an MCAP file.
+pub(super) fn ros_encoding(name: &str) -> Option<Encoding> {
+    match name {
+        "cdr" => Some(Encoding::Cdr),
+        "ros1" => Some(Encoding::Ros1),
+        _ => None,
+    }
+}
+
 /// A joint state; reused from message to message.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct JointSample {
@@ -102,13 +111,13 @@ impl JointSample {
             Part::Position => self.position.push(value),
             Part::Velocity => self.velocity.push(value),
             Part::Effort => self.effort.push(value),
-            Part::None | Part::Name => {}
+            Part::None | Part::Header | Part::Name => {}
         }
     }
 }
 
 /// A position in a message.
-struct Cursor<'a> {
+pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     is_big_endian: bool,
@@ -118,7 +127,7 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    fn new(message: &'a [u8], encoding: Encoding) -> Result<Self, String> {
+    pub(super) fn new(message: &'a [u8], encoding: Encoding) -> Result<Self, String> {
         let cursor = |bytes, is_big_endian, alignment| Self {
             bytes,
             at: 0,
@@ -144,7 +153,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    fn left(&self) -> usize {
+    pub(super) fn left(&self) -> usize {
         self.bytes.len().saturating_sub(self.at)
     }
 
@@ -159,7 +168,7 @@ impl<'a> Cursor<'a> {
         Some(taken)
     }
 
-    fn pass(&mut self, number: Number, count: usize) -> Option<()> {
+    pub(super) fn pass(&mut self, number: Number, count: usize) -> Option<()> {
         if count > 0 {
             self.align(number.size());
             self.take(number.size().checked_mul(count)?)?;
@@ -167,7 +176,7 @@ impl<'a> Cursor<'a> {
         Some(())
     }
 
-    fn number(&mut self, number: Number) -> Option<f64> {
+    pub(super) fn number(&mut self, number: Number) -> Option<f64> {
         let size = number.size();
         self.align(size);
         let mut raw = [0; 8];
@@ -186,11 +195,11 @@ impl<'a> Cursor<'a> {
         })
     }
 
-    fn count(&mut self) -> Option<usize> {
+    pub(super) fn count(&mut self) -> Option<usize> {
         Some(self.number(Number::Unsigned(4))? as usize)
     }
 
-    fn text(&mut self) -> Option<&'a [u8]> {
+    pub(super) fn text(&mut self) -> Option<&'a [u8]> {
         let count = self.count()?;
         let text = self.take(count)?;
         // CDR counts the terminating zero.

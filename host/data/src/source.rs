@@ -1,7 +1,5 @@
 //! A recording as a stream of blocks that can be read repeatedly.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::block::{Block, JointColumns};
@@ -9,16 +7,17 @@ use super::bursts::bursts;
 use super::columns::{EffortNeed, Layout, Role};
 use super::csv::CsvRows;
 use super::error::{DataError, Warning};
-use super::foreign::{ForeignFormat, HEAD};
+use super::form::Form;
 use super::header::Header;
+use super::joined_rows::JoinedRows;
 use super::layout::layout;
-use super::mcap_records::MAGIC;
-use super::mcap_rows::McapRows;
+use super::mapping::Mapping;
 use super::motors::{MotorPass, MotorSide};
 use super::place::Place;
 use super::quantity::Quantity;
 use super::remark::Remark;
 use super::sampling::Sampling;
+use super::table_rows::TableRows;
 use rig_model::robot::Robot;
 use rig_output::format_trimmed;
 
@@ -36,29 +35,50 @@ pub struct Source {
     joints: Vec<String>,
     pub(super) layout: Layout,
     sampling: Sampling,
-    is_mcap: bool,
+    form: Form,
+    mapping: Mapping,
     bytes: u64,
 }
 
 enum Rows {
     Csv(Box<CsvRows>),
-    Mcap(Box<McapRows>),
+    Messages(Box<JoinedRows>),
+    Arrays(Box<TableRows>),
 }
 
 impl Rows {
-    fn open(path: &Path, is_mcap: bool, joints: &[String]) -> Result<(Self, Header), DataError> {
-        if is_mcap {
-            McapRows::open(path, joints).map(|(r, h)| (Self::Mcap(Box::new(r)), h))
-        } else {
-            CsvRows::open(path).map(|(r, h)| (Self::Csv(Box::new(r)), h))
-        }
+    fn open(
+        path: &Path,
+        form: &Form,
+        joints: &[String],
+        mapping: &Mapping,
+    ) -> Result<(Self, Header), DataError> {
+        let (rows, mut header) = match form {
+            Form::Messages(files) => {
+                let (rows, header) = JoinedRows::open(path, files, joints, mapping)?;
+                (Self::Messages(Box::new(rows)), header)
+            }
+            Form::Csv => {
+                let (rows, mut header) = CsvRows::open(path)?;
+                mapping.rename(path, &mut header)?;
+                (Self::Csv(Box::new(rows)), header)
+            }
+            Form::Arrays(form) => {
+                let (rows, mut header) = TableRows::open(path, *form)?;
+                mapping.rename(path, &mut header)?;
+                (Self::Arrays(Box::new(rows)), header)
+            }
+        };
+        mapping.set_units(path, joints, &mut header)?;
+        Ok((rows, header))
     }
 
     /// Returns the assumptions and omissions so far.
     fn remarks(&self) -> Vec<Remark> {
         match self {
-            Self::Csv(r) => r.remarks().to_vec(),
-            Self::Mcap(r) => r.remarks(),
+            Self::Csv(r) => r.remarks(),
+            Self::Messages(r) => r.remarks(),
+            Self::Arrays(r) => r.remarks(),
         }
     }
 
@@ -72,7 +92,8 @@ impl Rows {
     ) -> Result<(), DataError> {
         let (place, hint) = match self {
             Self::Csv(_) => (Place::Line(row), ""),
-            Self::Mcap(r) => (Place::Message(row), r.order_hint()),
+            Self::Messages(r) => (Place::Message(row), r.order_hint()),
+            Self::Arrays(_) => (Place::Row(row), ""),
         };
         match previous {
             Some(previous) if now <= previous => Err(DataError::TimeNotGrowing {
@@ -86,23 +107,33 @@ impl Rows {
         }
     }
 
+    /// Reads the next row in SI units into `values`.
     fn next_row(&mut self, layout: &Layout, values: &mut [f64]) -> Result<Option<u64>, DataError> {
+        let row = self.next_raw(layout, values);
+        layout.convert(values);
+        row
+    }
+
+    /// Reads the next row in the units of the file into `values`.
+    fn next_raw(&mut self, layout: &Layout, values: &mut [f64]) -> Result<Option<u64>, DataError> {
         match self {
             Self::Csv(r) => r.next_row(layout, values),
-            Self::Mcap(r) => r.next_row(layout, values),
+            Self::Messages(r) => r.next_row(layout, values),
+            Self::Arrays(r) => r.next_row(layout, values),
         }
     }
 
     fn bytes_read(&self) -> u64 {
         match self {
             Self::Csv(r) => r.bytes_read(),
-            Self::Mcap(r) => r.bytes_read(),
+            Self::Messages(r) => r.bytes_read(),
+            Self::Arrays(r) => r.bytes_read(),
         }
     }
 }
 
 impl Source {
-    /// Opens a recording (CSV or MCAP, detected from its first bytes) in which every joint has its torque.
+    /// Opens a recording (CSV, MCAP or a folder of rosbag2, detected from its content) in which every joint has its torque.
     ///
     /// Reads the header and the first 1001 rows and reports their errors; [`Blocks`] reports later ones.
     pub fn open(path: &Path, robot: &Robot) -> Result<Self, DataError> {
@@ -111,15 +142,29 @@ impl Source {
 
     /// Opens a recording like [`Source::open`]; `need` says whether the torque may be missing.
     pub fn open_with(path: &Path, robot: &Robot, need: EffortNeed) -> Result<Self, DataError> {
-        let (is_mcap, bytes) = checked(path)?;
+        Self::open_mapped(path, robot, need, &Mapping::default())
+    }
+
+    /// Opens a recording like [`Source::open_with`]; `mapping` says which channels of the file are its columns.
+    pub fn open_mapped(
+        path: &Path,
+        robot: &Robot,
+        need: EffortNeed,
+        mapping: &Mapping,
+    ) -> Result<Self, DataError> {
+        let (form, bytes) = Form::of(path)?;
         let joints: Vec<String> = robot.joints.iter().map(|j| j.name.clone()).collect();
-        let (mut rows, header) = Rows::open(path, is_mcap, &joints)?;
+        let (mut rows, header) = Rows::open(path, &form, &joints, mapping)?;
         let mut layout = layout(path, &header, robot, need)?;
         let mut values = vec![0.0; layout.columns.len()];
         let mut times = Vec::new();
         while times.len() < PROBED_ROWS
-            && let Some(line) = rows.next_row(&layout, &mut values)?
+            && let Some(line) = rows.next_raw(&layout, &mut values)?
         {
+            if times.is_empty() {
+                layout.count_from(&values);
+            }
+            layout.convert(&mut values);
             let now = values[layout.time];
             rows.check_growth(path, line, times.last().copied(), now)?;
             times.push(now);
@@ -135,9 +180,10 @@ impl Source {
             });
         }
         let sampling = Sampling::of(&times);
-        // A cut-off file is reported by the pass that reaches its end.
-        let remarks = rows.remarks().into_iter();
-        let kept = remarks.filter(|remark| !matches!(remark, Remark::CutOff { .. }));
+        // What the end of the file shows is reported by the pass that reaches it.
+        let remarks = header.remarks.iter().cloned().chain(rows.remarks());
+        let is_late = |r: &Remark| matches!(r, Remark::CutOff { .. } | Remark::LeftOut { .. });
+        let kept = remarks.filter(|remark| !is_late(remark));
         layout
             .warnings
             .extend(kept.map(|remark| Warning::Reading { remark }));
@@ -146,9 +192,15 @@ impl Source {
             joints,
             layout,
             sampling,
-            is_mcap,
+            form,
+            mapping: mapping.clone(),
             bytes,
         })
+    }
+
+    /// Opens the rows for another pass.
+    fn rows(&self) -> Result<Rows, DataError> {
+        Rows::open(&self.path, &self.form, &self.joints, &self.mapping).map(|(rows, _)| rows)
     }
 
     /// Returns the path of the file.
@@ -200,10 +252,10 @@ impl Source {
 
     /// Returns the place of a row as its user finds it: line of a text file, message of an MCAP file.
     pub fn place(&self, row: u64) -> Place {
-        if self.is_mcap {
-            Place::Message(row)
-        } else {
-            Place::Line(row)
+        match self.form {
+            Form::Messages(_) => Place::Message(row),
+            Form::Csv => Place::Line(row),
+            Form::Arrays(_) => Place::Row(row),
         }
     }
 
@@ -245,43 +297,14 @@ impl Source {
     }
 }
 
-/// Checks that a path names a regular file of a known format. Returns true for MCAP (CSV otherwise), and the length in
-/// bytes.
-fn checked(path: &Path) -> Result<(bool, u64), DataError> {
-    let failed = |source| DataError::Read {
-        path: path.into(),
-        source,
-    };
-    let metadata = std::fs::metadata(path).map_err(failed)?;
-    if metadata.is_dir() {
-        return Err(DataError::Directory { path: path.into() });
-    }
-    // Opening a pipe without a writer would block forever.
-    if !metadata.is_file() {
-        return Err(DataError::NotAFile { path: path.into() });
-    }
-    let mut start = Vec::new();
-    let mut head = File::open(path).map_err(failed)?.take(HEAD as u64);
-    head.read_to_end(&mut start).map_err(failed)?;
-    // By content, because file extensions are often wrong.
-    let is_mcap = start.starts_with(&MAGIC[..5]);
-    if !is_mcap && let Some(format) = ForeignFormat::of(&start) {
-        return Err(DataError::Foreign {
-            path: path.into(),
-            format,
-        });
-    }
-    Ok((is_mcap, metadata.len()))
-}
-
 /// Returns the names of a recording's columns in order, without a robot: those of the header line, or of the first
 /// message of an MCAP file. For a ROS 2 recording it is `t` alone, because its other columns are joints of a robot.
 ///
 /// # Errors
 /// [`DataError`]: a file that cannot be read or is not a recording.
 pub fn column_names(path: &Path) -> Result<Vec<String>, DataError> {
-    let (is_mcap, _) = checked(path)?;
-    let (_, header) = Rows::open(path, is_mcap, &[])?;
+    let (form, _) = Form::of(path)?;
+    let (_, header) = Rows::open(path, &form, &[], &Mapping::default())?;
     Ok(header.names)
 }
 
@@ -491,7 +514,7 @@ impl Blocks<'_> {
     fn next_block(&mut self) -> Result<Option<Block>, DataError> {
         let source = self.source;
         if self.rows.is_none() {
-            self.rows = Some(Rows::open(&source.path, source.is_mcap, &source.joints)?.0);
+            self.rows = Some(source.rows()?);
         }
         let mut block: Option<Block> = None;
         loop {

@@ -126,9 +126,9 @@ fn wrong_recordings_are_named_by_line_and_column() {
         ("\n\n".into(), "a.csv", &["is empty"]),
         ("t,q1,tau1\n".into(), "a.csv", &["no rows"]),
         (
-            format!("time,q1,tau1\n{rows}"),
+            format!("row,q1,tau1\n{rows}"),
             "a.csv:1:",
-            &["no column `t`", "`time`"],
+            &["no column `t`", "`row`"],
         ),
         (
             format!("t;q1;tau1\n{rows}"),

@@ -32,6 +32,10 @@ pub struct PrepareOptions {
     pub decimation: Choice<usize>,
     /// Speed below which a row is masked, rad/s or m/s, the same for all joints; 0 masks nothing.
     pub speed_threshold: Choice<f64>,
+    /// Time before and after each row below the speed threshold in which rows of the differential model are left out, too, s.
+    /// A joint that sticks at a reversal has friction between its two signs, and the low-pass spreads this error over its
+    /// memory.
+    pub reversal_margin: f64,
     /// Uses the recording's own velocity and acceleration instead of differentiating the position.
     pub measured_derivatives: bool,
     /// Torque lead, s: time from the recorded instant of a torque to its action. A command that is held until the next
@@ -51,6 +55,7 @@ impl Default for PrepareOptions {
             order: 4,
             decimation: Choice::Auto,
             speed_threshold: Choice::Auto,
+            reversal_margin: 0.0,
             measured_derivatives: false,
             torque_lead: 0.0,
             piece_rows: 1 << 16,
@@ -104,6 +109,9 @@ pub struct PreprocessingPlan {
     /// The same for judging values on recordings that they were not fitted to; never higher. Rows that are left out of
     /// a fit because they bias it still show how good it is.
     pub judged_speed: Vec<f64>,
+    /// Time before and after each slower row in which rows of the differential model are left out, too, s.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub reversal_margin: f64,
     /// Reason for these thresholds, a sentence.
     pub speed_reason: String,
     /// Per joint, torques beyond which rows count as saturated (lowest, highest).
@@ -229,6 +237,7 @@ impl PreprocessingPlan {
             torque_lead: options.torque_lead,
             judged_speed: speed_threshold.clone(),
             speed_threshold,
+            reversal_margin: options.reversal_margin,
             speed_reason,
             saturation: saturation(surveys, torque_limits, spectra.len()),
             trimmed,
@@ -323,6 +332,11 @@ impl PreprocessingPlan {
     pub fn kept_rate(&self) -> f64 {
         self.sample_rate / self.decimation as f64
     }
+}
+
+/// Returns true for no margin.
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// Minimum number of rows after decimation.

@@ -1,0 +1,23 @@
+//! What a file of measurements holds, whether or not it is a recording of a robot: channels, rates, gaps, ranges, and the
+//! columns that they probably are.
+//!
+//! Nothing here needs a robot, and memory does not grow with the file.
+
+mod intake;
+mod likely;
+mod messages;
+mod names;
+mod picture;
+mod proposal;
+mod read;
+mod table;
+mod text;
+mod topic;
+
+pub use picture::Picture;
+pub use proposal::{Proposal, Proposed};
+pub use read::contents;
+pub use topic::{Channel, Contents, Step, Time, Topic};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,168 @@
+//! Units of columns and their factors to SI.
+
+use std::f64::consts::{PI, TAU};
+
+/// Unit of a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// Its usual sign in ASCII.
+    pub name: &'static str,
+    /// Value in SI units of one unit.
+    pub factor: f64,
+    /// Measured quantities.
+    pub of: &'static str,
+}
+
+const ANGLE: &str = "angle";
+const LENGTH: &str = "length";
+const TIME: &str = "time";
+const SPEED: &str = "velocity";
+const EFFORT: &str = "torque or force";
+const CURRENT: &str = "current";
+const VOLTAGE: &str = "voltage";
+
+/// Names, the first of which is printed; factor to SI; quantity.
+const UNITS: [(&[&str], f64, &str); 29] = [
+    (&["rad"], 1.0, ANGLE),
+    (&["mrad"], 1e-3, ANGLE),
+    (&["deg", "degree", "degrees", "°"], PI / 180.0, ANGLE),
+    (&["rev", "turn", "turns"], TAU, ANGLE),
+    (&["m"], 1.0, LENGTH),
+    (&["mm"], 1e-3, LENGTH),
+    (&["s", "sec", "secs", "seconds"], 1.0, TIME),
+    (&["ms", "msec", "millis", "milliseconds"], 1e-3, TIME),
+    (
+        &["us", "µs", "μs", "usec", "micros", "microseconds"],
+        1e-6,
+        TIME,
+    ),
+    (&["ns", "nsec", "nanos", "nanoseconds"], 1e-9, TIME),
+    (&["rad/s"], 1.0, SPEED),
+    (&["deg/s", "°/s", "dps"], PI / 180.0, SPEED),
+    (&["rpm"], TAU / 60.0, SPEED),
+    (&["rev/s", "rps"], TAU, SPEED),
+    (&["m/s"], 1.0, SPEED),
+    (&["mm/s"], 1e-3, SPEED),
+    (&["Nm", "N·m", "N*m", "N.m"], 1.0, EFFORT),
+    (&["mNm", "mN·m", "mN*m", "mN.m"], 1e-3, EFFORT),
+    (&["cNm", "Ncm", "N·cm"], 1e-2, EFFORT),
+    (&["kNm", "kN·m"], 1e3, EFFORT),
+    (&["kgcm", "kgfcm", "kgf·cm", "kg·cm"], 0.098_066_5, EFFORT),
+    (&["N"], 1.0, EFFORT),
+    (&["mN"], 1e-3, EFFORT),
+    (&["kN"], 1e3, EFFORT),
+    (&["A", "amp", "amps"], 1.0, CURRENT),
+    (&["mA"], 1e-3, CURRENT),
+    (&["V", "volt", "volts"], 1.0, VOLTAGE),
+    (&["mV"], 1e-3, VOLTAGE),
+    (&["degC", "°C", "celsius"], 1.0, "temperature"),
+];
+
+impl Unit {
+    /// Returns the unit of this name. Case counts in short names (`mN` and `MN` are not the same), and not in words.
+    pub fn named(name: &str) -> Option<Self> {
+        let name = name.trim();
+        let fits = |own: &&str| match own.chars().count() {
+            ..=3 => *own == name,
+            _ => own.eq_ignore_ascii_case(name),
+        };
+        let found = UNITS.iter().find(|(names, ..)| names.iter().any(fits));
+        found.map(|(names, factor, of)| Self {
+            name: names.first().copied().unwrap_or_default(),
+            factor: *factor,
+            of,
+        })
+    }
+
+    /// Returns all names for a message.
+    pub fn list() -> String {
+        let names: Vec<&str> = UNITS
+            .iter()
+            .filter_map(|(names, ..)| names.first().copied())
+            .collect();
+        names.join(", ")
+    }
+
+    /// Splits `q1 [deg]`, `q1 (deg)`, `q1/deg` and `q1_deg` into name and unit. A part behind `_` counts only if it has
+    /// two letters or more, because `pos_m` may be a motor.
+    pub fn split(name: &str) -> Option<(&str, Self)> {
+        let name = name.trim();
+        for (open, close) in [('[', ']'), ('(', ')')] {
+            let parts = name.strip_suffix(close).and_then(|n| n.rsplit_once(open));
+            if let Some((name, unit)) = parts {
+                return Self::named(unit).map(|unit| (name.trim_end(), unit));
+            }
+        }
+        let (before, unit) = name.rsplit_once(['_', '/', ' '])?;
+        let is_long = unit.chars().count() > 1;
+        (is_long && !before.is_empty())
+            .then(|| Self::named(unit).map(|unit| (before.trim_end(), unit)))
+            .flatten()
+    }
+
+    /// Splits a name like [`Unit::split`], also one whose unit stands before a number: `q_deg_1`, `tau_mNm2`.
+    pub fn stated(name: &str) -> Option<(&str, Self)> {
+        let before = name.trim().trim_end_matches(|c: char| c.is_ascii_digit());
+        Self::split(name).or_else(|| Self::split(before.trim_end_matches(['_', '/', ' '])))
+    }
+
+    /// Returns true for a unit of straight motion, false for one of rotation; `None` for another quantity.
+    pub fn is_linear(self) -> Option<bool> {
+        match self.of {
+            LENGTH => Some(true),
+            ANGLE => Some(false),
+            SPEED => Some(self.name.starts_with('m')),
+            EFFORT => Some(self.name.ends_with('N')),
+            _ => None,
+        }
+    }
+
+    /// Returns true for a unit of SI as the columns have it.
+    pub fn is_si(self) -> bool {
+        self.factor == 1.0
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_found_in_names_as_people_write_them() {
+        for (text, name, unit) in [
+            ("q1 [deg]", "q1", "deg"),
+            ("q1(°)", "q1", "deg"),
+            ("Time (ms)", "Time", "ms"),
+            ("time_us", "time", "us"),
+            ("tau1 [N·m]", "tau1", "Nm"),
+            ("speed_rpm", "speed", "rpm"),
+            ("q1/rad", "q1", "rad"),
+        ] {
+            let (found, own) = Unit::split(text).unwrap();
+            assert_eq!((found, own.name), (name, unit), "{text}");
+        }
+        for text in ["q1", "q_m", "position_2", "tau_J", "i [x]", "_deg"] {
+            assert!(Unit::split(text).is_none(), "{text}");
+        }
+        for (text, unit) in [
+            ("q_deg1", "deg"),
+            ("tau_mNm_2", "mNm"),
+            ("speed_rpm", "rpm"),
+        ] {
+            assert_eq!(Unit::stated(text).unwrap().1.name, unit, "{text}");
+        }
+        for text in ["q1", "q_m1", "position_2", "deg1", "12"] {
+            assert!(Unit::stated(text).is_none(), "{text}");
+        }
+        let linear = |name| Unit::named(name).unwrap().is_linear();
+        for name in ["m", "mm", "m/s", "mm/s", "N", "mN", "kN"] {
+            assert_eq!(linear(name), Some(true), "{name}");
+        }
+        for name in ["rad", "deg/s", "rpm", "Nm", "kgcm"] {
+            assert_eq!(linear(name), Some(false), "{name}");
+        }
+        assert!(Unit::named("MN").is_none());
+        assert!((Unit::named("rpm").unwrap().factor * 60.0 - TAU).abs() < 1e-15);
+    }
+}
