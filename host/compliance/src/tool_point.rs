@@ -101,7 +101,7 @@ impl<'a> ToolPoint<'a> {
     /// Takes wrenches as readings of the wrist sensor of the description: about its origin and in its axes.
     ///
     /// # Errors
-    /// [`ComplianceError::Option`]: no sensor is described, or not which wrench it reads.
+    /// [`ComplianceError::Option`]: no sensor is described, or not which wrench it reads, or it is metres away.
     pub(crate) fn with_sensor(mut self) -> Result<Self, ComplianceError> {
         let sensor = self.robot.wrist_sensor.as_ref();
         let reads = sensor.and_then(|sensor| sensor.reads);
@@ -111,6 +111,9 @@ impl<'a> ToolPoint<'a> {
                 self.robot.name
             )));
         };
+        if let Some(text) = sensor.too_far() {
+            return Err(ComplianceError::Option(text));
+        }
         // The sensor reads the robot's wrench on the load, or its opposite, which acts on the robot.
         let pose = self.robot.last_link * sensor.pose();
         self.sensor = Some((frame(&pose), -reads.sign()));

@@ -189,9 +189,11 @@ fn narrowed(joint: &Joint, limits: &mut JointLimits) -> Result<Option<String>, E
     let [one, other] = motor.range.map(|angle| (angle - drive.zero) / ratio);
     let range = [low.max(one.min(other)), high.min(one.max(other))];
     if !(range[0] < range[1]) {
-        return Err(ExciteError::Infeasible {
+        let [a, b] = [low, high].map(|q| drive.zero + ratio * q);
+        return Err(ExciteError::MotorAngle {
             joint: joint.name.clone(),
-            limit: "motor angle",
+            limit: motor.range,
+            turned: [a.min(b), a.max(b)],
         });
     }
     if range != [low, high] {

@@ -8,7 +8,7 @@ use rig_data::DataError;
 use rig_identify::IdentifyError;
 use rig_model::robot::Place;
 use rig_model::simulate::SimulateError;
-use rig_output::WriteError;
+use rig_output::{WriteError, format_significant};
 
 /// Reasons why there is no trajectory.
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +51,34 @@ pub enum ExciteError {
         joint: String,
         /// position, velocity, acceleration, torque, crank, motor angle, motor speed, motor torque or workspace
         limit: &'static str,
+    },
+    /// A range of a motor that no pose within the limits of the joints reaches.
+    #[error(
+        "the motor of joint \"{joint}\" may turn between {} and {} rad ([joint.drive.limits] position), but within the limits of the joints it turns between {} and {} rad: give a range that overlaps, or correct gear_ratio, zero or the position limits",
+        format_significant(limit[0], 4), format_significant(limit[1], 4), format_significant(turned[0], 4), format_significant(turned[1], 4)
+    )]
+    MotorAngle {
+        /// The joint's name.
+        joint: String,
+        /// Described range, rad.
+        limit: [f64; 2],
+        /// Range over all poses, rad.
+        turned: [f64; 2],
+    },
+    /// A torque limit that cannot hold the arm at any pose.
+    #[error(
+        "{} of joint \"{joint}\" is {} {unit}, but to hold the arm against gravity takes {} {unit} or more at every pose within the limits: give more than that, or correct masses, gravity, gear_ratio or the position limits",
+        of.words(), format_significant(*limit, 3), format_significant(*least, 3), unit = of.unit()
+    )]
+    Holding {
+        /// The joint's name.
+        joint: String,
+        /// Whose limit it is.
+        of: HeldLimit,
+        /// The limit, N·m or N.
+        limit: f64,
+        /// The least holding torque, N·m or N.
+        least: f64,
     },
     /// The limits leave no room for a staged motion.
     #[error("no {kind} fits joint \"{joint}\": {why}")]
@@ -110,6 +138,17 @@ pub enum ExciteError {
         /// The file.
         path: PathBuf,
     },
+    /// A file that holds something else than the parameters of a motion.
+    #[error(
+        "{} holds {found}, not the parameters of a motion; give the .toml file that `rig excite --out motion.toml` writes",
+        path.display()
+    )]
+    NoParameters {
+        /// The file.
+        path: PathBuf,
+        /// What it holds.
+        found: &'static str,
+    },
     /// Invalid TOML, or TOML that describes no trajectories.
     #[error("{}:{place}: {message}", path.display())]
     Toml {
@@ -151,6 +190,33 @@ pub enum ExciteError {
         /// Line, or number of the message, from 1.
         row: u64,
     },
+}
+
+/// Whose torque limit cannot hold the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldLimit {
+    /// The joint's, with the limit of its own motor at a constant ratio; true if it is revolute.
+    Joint(bool),
+    /// The motor's, on its side of coupled drives or of a screw.
+    Motor,
+}
+
+impl HeldLimit {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Joint(_) => {
+                "the torque limit ([joint.limits], or [joint.drive.limits] times the gear ratio)"
+            }
+            Self::Motor => "the motor torque limit ([joint.drive.limits])",
+        }
+    }
+
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Joint(false) => "N",
+            Self::Joint(true) | Self::Motor => "N·m",
+        }
+    }
 }
 
 /// Returns the joints with the right form of "have".

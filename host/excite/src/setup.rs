@@ -5,6 +5,7 @@ use rig_shared::multibody::{COLUMNS, Chain, INERTIAL_PARAMETERS, column};
 use crate::bounds::{Bounds, Room, bounds_of, named, prior};
 use crate::drives::{Combined, Drives};
 use crate::error::wrong;
+use crate::feasible::refuse_unreachable;
 use crate::frame::Frame;
 use crate::identified::{SIZE_SEED, column_sizes, independent, load_names};
 use crate::period::schedule_of;
@@ -232,7 +233,9 @@ pub(super) fn frame_of(
     }
     let mut model = Model::from_robot(robot)?;
     let drives = Drives::of(robot, model.motors.take(), &bounds, room.speed)?;
-    let (parameters, on_torque) = torque_notes(robot, options, &bounds, prior(robot, &model));
+    let known = prior(robot, &model);
+    refuse_unreachable(robot, &bounds, drives.as_ref(), known.is_ok())?;
+    let (parameters, on_torque) = torque_notes(robot, options, &bounds, known);
     notes.extend(on_torque);
     let motors = drives.as_ref().map_or(&[][..], |drives| &drives.limits);
     if parameters.is_none() && motors.iter().any(|m| m.torque.is_finite()) {

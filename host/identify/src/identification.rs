@@ -12,6 +12,7 @@ use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::position::PositionTorque;
 use crate::unmodelled::tilt::BaseTilt;
+use crate::warning::Warning;
 use rig_data::prepare::{Masked, PreprocessingPlan, Survey};
 
 /// An identified base parameter.
@@ -99,8 +100,8 @@ pub struct Identification {
     pub base_tilt: Option<BaseTilt>,
     /// Combinations that the data do not determine.
     pub not_excited: Vec<NotExcited>,
-    /// Sentences.
-    pub warnings: Vec<String>,
+    /// Warnings; in JSON their sentences.
+    pub warnings: Vec<Warning>,
     /// The few parameters that suffice for the torque.
     pub essential: Option<EssentialSet>,
     /// A full, physically consistent set of standard parameters; absent for a single joint unless requested.
@@ -112,6 +113,13 @@ pub struct Identification {
     /// Further content of the report.
     #[serde(skip)]
     pub details: Details,
+}
+
+impl Identification {
+    /// Returns the warnings as sentences.
+    pub fn sentences(&self) -> Vec<String> {
+        self.warnings.iter().map(ToString::to_string).collect()
+    }
 }
 
 /// Report content beyond `identification.json`.

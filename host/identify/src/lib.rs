@@ -60,6 +60,7 @@ mod structure;
 mod treatment;
 mod uncertainty;
 mod unmodelled;
+mod warning;
 
 #[cfg(test)]
 mod tests;
@@ -109,3 +110,4 @@ pub use uncertainty::torque_residuals::torque_residuals;
 pub use unmodelled::field_torque::FieldTorque;
 pub use unmodelled::position::PositionTorque;
 pub use unmodelled::tilt::BaseTilt;
+pub use warning::{AtJoint, JointFinding, OwnCutoff, Part, Unsettled, Warning, WarningKind};

@@ -17,9 +17,13 @@ pub struct ControllerNumbers {
     pub franka: String,
 }
 
-/// Returns the numbers of the identified body for controllers. Inertias that the data do not show are zero, which these
-/// controllers take as "a point": no number is invented.
-pub fn controller_numbers(load: &LoadIdentification) -> ControllerNumbers {
+/// Returns the numbers of the identified body for controllers; `None` if the data do not show the mass or the centre of
+/// mass, because a controller would move by a value that nothing supports. An inertia that the data do not show is zero,
+/// which these controllers take as "a point": no number is invented.
+pub fn controller_numbers(load: &LoadIdentification) -> Option<ControllerNumbers> {
+    if !load.mass_shown() || load.centre_shown().contains(&false) {
+        return None;
+    }
     let list = |values: &[f64]| {
         values
             .iter()
@@ -47,7 +51,7 @@ pub fn controller_numbers(load: &LoadIdentification) -> ControllerNumbers {
     };
     // A about z, B about y, C about x.
     let (c, b, a) = turn.euler_angles();
-    ControllerNumbers {
+    Some(ControllerNumbers {
         universal_robots: format!(
             "set_target_payload({}, [{}], [{}])",
             number(mass),
@@ -80,7 +84,7 @@ pub fn controller_numbers(load: &LoadIdentification) -> ControllerNumbers {
             list(centre.as_slice()),
             list(inertia.as_slice())
         ),
-    }
+    })
 }
 
 /// Returns six significant digits as a controller reads them: ASCII, without an exponent.

@@ -53,6 +53,11 @@ pub enum LoadError {
         /// Least number.
         least: usize,
     },
+    /// No joint moves.
+    #[error(
+        "The joints rest in these recordings, and friction hides the torque of a joint at rest; record a motion (`rig excite --load` designs one), or give --by sensor."
+    )]
+    AtRest,
     /// The data do not show the mass.
     #[error("The data do not show the mass of the load: {why}.")]
     NoMass {

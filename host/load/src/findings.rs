@@ -224,9 +224,8 @@ impl Told<'_> {
 
     /// Returns the estimated origin of the sensor in the flange frame if it is not the described one, m.
     fn position(&self, warnings: &mut Vec<String>) -> Option<[f64; 3]> {
-        let error = self.sensed.origin(self.fit)?;
-        let flange = self.robot.last_link.rotation.inverse();
-        let origin = Vector3::from(self.sensor.position) + flange * error;
+        let origin = self.origin()?;
+        let error = origin - Vector3::from(self.sensor.position);
         warnings.push(format!(
             "The sensor's origin lies {} mm from the described one; the load was identified with the estimated origin. Measure it, or write position = [{:.4}, {:.4}, {:.4}] into [wrist_sensor].",
             format_significant(1e3 * error.norm(), 3),
@@ -235,6 +234,13 @@ impl Told<'_> {
             origin.z
         ));
         Some(origin.into())
+    }
+
+    /// Returns the estimated origin of the sensor in the flange frame, m.
+    fn origin(&self) -> Option<Vector3<f64>> {
+        let error = self.sensed.origin(self.fit)?;
+        let flange = self.robot.last_link.rotation.inverse();
+        Some(Vector3::from(self.sensor.position) + flange * error)
     }
 
     fn traces(&self) -> Vec<Trace> {
@@ -332,7 +338,9 @@ impl Told<'_> {
         let mass = found.values[0];
         let moment = Vector3::new(found.values[1], found.values[2], found.values[3]);
         let in_flange = self.robot.last_link.inverse() * sensor;
-        let lever = (moment / mass - in_flange.translation.vector).norm();
+        let described = in_flange.translation.vector;
+        let origin = self.origin().unwrap_or(described);
+        let lever = (moment / mass - origin).norm();
         if lever <= FARTHEST {
             return Ok(Vec::new());
         }

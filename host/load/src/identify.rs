@@ -83,6 +83,7 @@ pub fn identify_load(
     if torque.as_ref().is_some_and(|torque| !torque.with_unloaded) {
         warnings.push(by_description(robot)?);
     }
+    warnings.extend(torque.as_ref().and_then(unused));
     let agreement = (sensed.as_ref().zip(driven.as_ref())).map(|(a, b)| agreement(a, b));
     let contradicts = agreement.as_ref().and_then(contradiction);
     let mut found = match (sensed, driven) {
@@ -191,6 +192,20 @@ fn without_tool(mut found: Estimate, tool: &Load) -> Result<Estimate, LoadError>
         found.hide_inertia();
     }
     Ok(found)
+}
+
+/// Says which joints' torques were not used.
+fn unused(torque: &TorqueFindings) -> Option<String> {
+    let joints: Vec<String> = (torque.joints.iter().zip(&torque.residual))
+        .filter(|(_, residual)| residual.is_none())
+        .map(|(name, _)| name.clone())
+        .collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "No torque of {} was used: the joint rests, and friction hides its torque. The other joints gave the load; a motion of all joints tells more (`rig excite --load`).",
+            listed(&joints)
+        )
+    })
 }
 
 /// Says what the torques by a description are worth.

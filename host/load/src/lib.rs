@@ -54,6 +54,7 @@ mod intake;
 mod jump;
 mod missing;
 mod mounting;
+mod noise_floor;
 mod options;
 mod result;
 mod rows;

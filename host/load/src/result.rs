@@ -41,8 +41,8 @@ pub struct LoadParameter {
 pub struct TorqueFindings {
     /// Joints.
     pub joints: Vec<String>,
-    /// Per joint, RMS of the torque residual with the load, N·m or N.
-    pub residual: Vec<f64>,
+    /// Per joint, RMS of the torque residual with the load, N·m or N; `None` if none of its torques was used.
+    pub residual: Vec<Option<f64>>,
     /// True if recordings without the load gave the parameters of the robot; false if its description did.
     pub with_unloaded: bool,
     /// Preparation of the recordings.
@@ -111,6 +111,19 @@ pub struct LoadIdentification {
     pub not_shown: Vec<NotShown>,
     /// Warnings, the most important first.
     pub warnings: Vec<String>,
+}
+
+impl LoadIdentification {
+    /// Returns true if the data show the mass.
+    pub fn mass_shown(&self) -> bool {
+        self.parameters.first().is_some_and(|p| p.shown)
+    }
+
+    /// Returns for x, y and z of the centre of mass if the data show it: mass and first moment.
+    pub fn centre_shown(&self) -> [bool; 3] {
+        let mass = self.mass_shown();
+        std::array::from_fn(|k| mass && self.parameters.get(1 + k).is_some_and(|p| p.shown))
+    }
 }
 
 /// Parameters that the data do not show.

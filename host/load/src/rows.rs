@@ -3,12 +3,13 @@
 use nalgebra::Isometry3;
 use nalgebra::{Matrix3, Vector3};
 use rig_data::prepare::{LowPass, Motion, PrepareError, PreprocessingPlan, Recording, each_motion};
-use rig_data::{Block, WRENCH_COLUMNS};
+use rig_data::{Block, WRENCH_COLUMNS, WRENCH_MESSAGE};
 use rig_shared::multibody::{
     Chain, INERTIAL_PARAMETERS, MultibodyError, Pose as Frame, frame_pose, wrench_regressor,
 };
 
 use crate::error::LoadError;
+use crate::noise_floor::NoiseFloor;
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
 
 /// Name of the column with the sensor's temperature.
@@ -25,9 +26,6 @@ const NEAR: f64 = 3.0;
 /// Shorter than this share of the longest pose, rows belong to the way between two.
 const SHORT: f64 = 0.05;
 
-/// Least share of white noise above the band from which the noise in the band is inferred.
-const LEAST_ABOVE: f64 = 0.05;
-
 /// Readings beyond which a channel counts as saturated, lowest and highest, by column.
 pub(crate) type Ends = [[f64; 2]; 6];
 
@@ -36,7 +34,7 @@ pub(crate) type Ends = [[f64; 2]; 6];
 pub(crate) struct Passed {
     /// Rows left out beside a saturated reading.
     pub saturated: u64,
-    /// Noise of forces (N) and moments (N·m) in the band of the fit, if that above the band is white; `None` if the band
+    /// Noise of forces (N) and moments (N·m) in the band of the fit, if that of the messages is white; `None` if the band
     /// leaves nothing above it.
     pub noise: Option<[f64; 2]>,
 }
@@ -64,8 +62,7 @@ pub(crate) fn each_row(
         })?;
     let label = recording.label();
     let mut passed = Passed::default();
-    let mut above = [0.0; 2];
-    let mut counted = 0;
+    let mut floor = NoiseFloor::new(&low_pass, plan);
     let mut start = None;
     let mut missing = None;
     each_motion(recording, plan, 0, &mut |motion| {
@@ -89,9 +86,8 @@ pub(crate) fn each_row(
             delay,
         };
         passed.saturated += piece
-            .rows(take, &mut above)
+            .rows(take, &mut floor)
             .map_err(|e| PrepareError::Read(e.to_string()))?;
-        counted += motion.sound.1 - motion.sound.0;
         Ok(())
     })
     .map_err(|error| match missing {
@@ -101,22 +97,8 @@ pub(crate) fn each_row(
         },
         None => error.into(),
     })?;
-    let [within, beyond] = shares(&low_pass, plan);
-    // Three channels of a kind.
-    let noise = above.map(|sum| (sum / (3.0 * counted.max(1) as f64) / beyond * within).sqrt());
-    passed.noise = (beyond > LEAST_ABOVE && counted > 0).then_some(noise);
+    passed.noise = floor.noise();
     Ok(passed)
-}
-
-/// Returns the shares of white noise that the zero-phase low-pass leaves, and that the rest of the signal has.
-fn shares(low_pass: &LowPass, plan: &PreprocessingPlan) -> [f64; 2] {
-    let reach = (10.0 * plan.sample_rate / plan.cutoff).ceil();
-    let reach = (reach as usize).clamp(32, 1 << 16);
-    let mut impulse = vec![0.0; 2 * reach + 1];
-    impulse[reach] = 1.0;
-    let response = low_pass.zero_phase(&impulse);
-    let within: f64 = response.iter().map(|h| h * h).sum();
-    [within, 1.0 - 2.0 * response[reach] + within]
 }
 
 /// Streams the poses of a recording: consecutive rows at one position are one pose, with their mean readings, because the
@@ -280,8 +262,13 @@ fn readings(extra: &[(String, Vec<f64>)]) -> Result<[&[f64]; 6], &'static str> {
 }
 
 /// Returns the column of the sensor's temperature.
-fn temperature(extra: &[(String, Vec<f64>)]) -> Option<&[f64]> {
-    let column = extra.iter().find(|(name, _)| name == TEMPERATURE);
+fn temperature(columns: &[(String, Vec<f64>)]) -> Option<&[f64]> {
+    extra(columns, TEMPERATURE)
+}
+
+/// Returns the column with this name.
+fn extra<'a>(columns: &'a [(String, Vec<f64>)], name: &str) -> Option<&'a [f64]> {
+    let column = columns.iter().find(|(own, _)| own == name);
     column.map(|(_, list)| list.as_slice())
 }
 
@@ -305,12 +292,11 @@ struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Streams the rows of the piece; returns the number of saturated ones. Adds the squares of forces and of moments above
-    /// the band to `above`.
+    /// Streams the rows of the piece; returns the number of saturated ones. Adds the readings to `floor`.
     fn rows(
         &self,
         take: &mut dyn FnMut(&WrenchRow),
-        above: &mut [f64; 2],
+        floor: &mut NoiseFloor<'_>,
     ) -> Result<u64, MultibodyError> {
         let motion = self.motion;
         let (low, high) = motion.sound;
@@ -329,10 +315,9 @@ impl Piece<'_> {
         let readings: Vec<Vec<f64>> = (self.readings.iter())
             .map(|column| self.low_pass.zero_phase(&column[low..high]))
             .collect();
-        for (channel, (smooth, all)) in readings.iter().zip(&self.readings).enumerate() {
-            let rest = smooth.iter().zip(&all[low..high]);
-            above[channel / 3] += rest.map(|(smooth, y)| (y - smooth).powi(2)).sum::<f64>();
-        }
+        let all = self.readings.map(|column| &column[low..high]);
+        let messages = extra(&motion.extra, WRENCH_MESSAGE).map(|list| &list[low..high]);
+        floor.add(all, &readings, messages);
         let temperature = temperature(&motion.extra);
         let step = self.plan.decimation;
         // Rows by which the readings are late: whole ones, and the share of the next.

@@ -29,6 +29,12 @@ pub(crate) fn by_sensor(
 ) -> Result<(Estimate, SensorFindings), LoadError> {
     let robot = sensing.robot;
     let sensor = robot.wrist_sensor.clone().unwrap_or_default();
+    if let Some(text) = sensor.too_far() {
+        if !sensing.even_if_wrong {
+            return Err(LoadError::Fault(text));
+        }
+        warnings.push(text);
+    }
     let judged = judged(sensing, &sensor)?;
     let moving = moving(sensing, &judged);
     let moving: Vec<&dyn Recording> = moving.iter().map(|r| r as &dyn Recording).collect();

@@ -44,8 +44,8 @@ pub(crate) struct Driven<'a> {
 pub(crate) struct Equations {
     /// One factor a segment, the load's columns first.
     pub segments: Vec<TriangularFactor>,
-    /// Per joint, RMS of the residual, N·m or N.
-    pub noise: Vec<f64>,
+    /// Per joint, RMS of the residual, N·m or N; `None` if none of its torques was used, as at rest.
+    pub noise: Vec<Option<f64>>,
     /// Preparation.
     pub plan: PreprocessingPlan,
 }
@@ -74,7 +74,7 @@ fn may_differ(c: usize, joints: usize, described: bool) -> bool {
 /// Collects the equations of all recordings.
 ///
 /// # Errors
-/// [`LoadError`]: recordings that cannot be prepared, a robot without a model.
+/// [`LoadError`]: recordings that cannot be prepared, a robot without a model, joints that all rest.
 pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
     let robot = driven.robot;
     let joints = robot.joints.len();
@@ -133,12 +133,13 @@ pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
         parts.extend(assembly.segments(&freed, &plan, loaded, expected)?);
     }
     let noise = noise_of(&parts);
+    if noise.iter().all(Option::is_none) {
+        return Err(LoadError::AtRest);
+    }
     let segments = (parts.iter())
         .map(|joints| {
             let mut whole = TriangularFactor::new(joints[0].columns());
-            for (factor, noise) in joints.iter().zip(&noise) {
-                whole.merge(factor, 1.0 / noise);
-            }
+            merge_weighted(&mut whole, joints, &noise);
             whole
         })
         .collect();
@@ -224,10 +225,30 @@ impl Assembly<'_> {
     }
 }
 
-/// Returns the RMS residual of each joint, all joints weighted by it.
-fn noise_of(parts: &[Vec<TriangularFactor>]) -> Vec<f64> {
-    let joints = parts.first().map_or(0, Vec::len);
-    let columns = parts.first().map_or(0, |own| own[0].columns());
+/// Adds the equations of the joints in units of their noise. A joint without noise has no equations.
+fn merge_weighted(
+    whole: &mut TriangularFactor,
+    joints: &[TriangularFactor],
+    noise: &[Option<f64>],
+) {
+    for (factor, noise) in joints.iter().zip(noise) {
+        if let Some(noise) = noise {
+            whole.merge(factor, 1.0 / noise);
+        }
+    }
+}
+
+/// Returns the RMS residual of each joint, all joints weighted by it. A joint has none if no row of its torque is used
+/// because it rests, or if all its torques are zero: it tells nothing, and a weight of 1/0 would make every equation
+/// not a number.
+fn noise_of(parts: &[Vec<TriangularFactor>]) -> Vec<Option<f64>> {
+    let Some(columns) = (parts.first())
+        .and_then(|own| own.first())
+        .map(TriangularFactor::columns)
+    else {
+        return Vec::new();
+    };
+    let joints = parts[0].len();
     let whole: Vec<TriangularFactor> = (0..joints)
         .map(|j| {
             let mut sum = TriangularFactor::new(columns);
@@ -238,25 +259,45 @@ fn noise_of(parts: &[Vec<TriangularFactor>]) -> Vec<f64> {
         })
         .collect();
     let size = |factor: &TriangularFactor| {
-        let rows = factor.rows().max(1) as f64;
-        (factor.right_side_squares() / rows)
-            .sqrt()
-            .max(f64::MIN_POSITIVE)
+        let rms = (factor.right_side_squares() / factor.rows().max(1) as f64).sqrt();
+        (rms > 0.0).then_some(rms)
     };
-    let mut noise: Vec<f64> = whole.iter().map(size).collect();
-    let least: Vec<f64> = noise.iter().map(|n| 1e-9 * n).collect();
+    let sizes: Vec<Option<f64>> = whole.iter().map(size).collect();
+    let mut noise = sizes.clone();
     for _ in 0..ROUNDS {
         let mut all = TriangularFactor::new(columns);
-        for (factor, noise) in whole.iter().zip(&noise) {
-            all.merge(factor, 1.0 / noise);
-        }
+        merge_weighted(&mut all, &whole, &noise);
         let (r, z) = all.system();
         let x = solved(&r, &z);
-        for ((noise, factor), least) in noise.iter_mut().zip(&whole).zip(&least) {
+        for ((noise, factor), size) in noise.iter_mut().zip(&whole).zip(&sizes) {
             let rows = factor.rows().max(1) as f64;
             let rms = (factor.residual_squares(x.as_slice()) / rows).sqrt();
-            *noise = rms.max(*least);
+            *noise = size.map(|size| rms.max(1e-9 * size));
         }
     }
     noise
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A weight of 1/0 would make the equations not a number, and their singular values would never be found.
+    #[test]
+    fn a_joint_without_rows_has_no_noise_and_leaves_that_of_the_others() {
+        let mut moves = TriangularFactor::new(2);
+        for k in 0..100 {
+            let x = 0.1 * f64::from(k);
+            let off = if k % 2 == 0 { 0.5 } else { -0.5 };
+            moves.push(&[x.sin(), x.cos()], 3.0 * x.sin() - x.cos() + off, 1.0);
+        }
+        let rests = TriangularFactor::new(2);
+        let mut zero = TriangularFactor::new(2);
+        zero.push(&[1.0, 1.0], 0.0, 1.0);
+        let noise = noise_of(&[vec![rests, moves, zero]]);
+        assert_eq!(noise[0], None);
+        assert!((noise[1].unwrap_or(0.0) - 0.5).abs() < 0.02, "{noise:?}");
+        assert_eq!(noise[2], None);
+        assert!(noise_of(&[]).is_empty());
+    }
 }

@@ -305,7 +305,12 @@ fn what_is_identified_is_the_robot_without_its_effects() {
             "{:?}",
             found.procedure
         );
-        assert!(!found.warnings.iter().any(|w| w.contains("effects")));
+        assert!(
+            !found
+                .warnings
+                .iter()
+                .any(|w| w.to_string().contains("effects"))
+        );
         for (a, b) in found.base_parameters.iter().zip(&plain.base_parameters) {
             assert_eq!(a.expression, b.expression);
             let off = (a.value - b.value).abs();

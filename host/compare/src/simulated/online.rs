@@ -17,9 +17,11 @@ pub(super) const PLACES: usize = 64;
 const BAND: f64 = 10.0;
 /// Assumed noise, as a share of the RMS of an equation.
 const ASSUMED_NOISE: f64 = 0.01;
-/// Instants in a residual block, longer than the correlation of the residual: decimated rows are nearly white, and
-/// windows of the integral model overlap by three quarters.
-const RESIDUAL_BLOCK: [u32; 2] = [5, 20];
+/// Fewest and most instants in a residual block, longer than the correlation of the residual: decimated rows are nearly white,
+/// and windows of the integral model overlap by three quarters. As long as the recording has enough blocks.
+const RESIDUAL_BLOCK: [[f64; 2]; 2] = [[2.0, 5.0], [8.0, 20.0]];
+/// Residual blocks per place that the recursion needs before it knows the noise (4), and a tenth more for odd blocks.
+const BLOCKS: f64 = 4.4;
 /// Points of the convergence curve.
 const POINTS: u64 = 200;
 
@@ -55,6 +57,7 @@ pub(super) fn online(
         0..=6 => run::<6>(robot, base, recording, found),
         7..=12 => run::<12>(robot, base, recording, found),
         13..=36 => run::<36>(robot, base, recording, found),
+        37..=58 => run::<58>(robot, base, recording, found),
         _ => run::<PLACES>(robot, base, recording, found),
     }
 }
@@ -83,7 +86,9 @@ fn run<const N: usize>(
             }
         }
     })?;
-    let instants = RESIDUAL_BLOCK[usize::from(found.model == ModelKind::Integral)];
+    let [fewest, most] = RESIDUAL_BLOCK[usize::from(found.model == ModelKind::Integral)];
+    let used = sizes.iter().map(|s| s.rows).sum::<f64>() / sizes.len().max(1) as f64;
+    let instants = (used / (BLOCKS * N as f64)).clamp(fewest, most) as u32;
     let (config, half) = config::<N>(&sizes, p, instants);
     let scales: Vec<f64> = (sizes.iter())
         .map(|s| (s.rows.max(1.0) / s.y.max(f64::MIN_POSITIVE)).sqrt())

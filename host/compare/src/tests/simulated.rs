@@ -31,12 +31,16 @@ fn four_identifications_find_the_simulated_robot() {
                 );
                 let known = || e.values.iter().flatten().filter_map(|v| v.covers);
                 println!(
-                    "{} {} {}: {} of {}",
+                    "{} seed {seed} ({:.1} s, {:.1} Hz, {:.0} rows/s) {} {}: {} of {}, torque error {:.2e}",
                     found.robot,
+                    found.seconds,
+                    found.cutoff,
+                    found.rows_per_second,
                     e.way,
                     e.model,
                     known().filter(|c| *c).count(),
-                    known().count()
+                    known().count(),
+                    e.torque_error
                 );
                 assert!(known().filter(|c| !*c).count() <= 3);
                 assert_eq!(e.values.len(), found.parameters.len());
@@ -70,9 +74,10 @@ fn a_seed_gives_the_same_result_and_a_missing_encoder_is_said() {
 /// nearly as often as they claim.
 #[test]
 fn intervals_of_many_parameters_hold_the_truth() {
-    let count: u64 = std::env::var("RIG_SEEDS").map_or(1, |n| n.parse().unwrap());
+    let number = |name: &str| std::env::var(name).map_or(1, |n| n.parse().unwrap());
+    let (first, count): (u64, u64) = (number("RIG_FIRST"), number("RIG_SEEDS"));
     let mut inside = [[0usize; 2]; 4];
-    for seed in 1..=count {
+    for seed in first..first + count {
         let found = run(IRP6_TEMPLATE, seed);
         assert!(found.seconds * found.rows_per_second > 10.0 * found.parameters.len() as f64);
         for (e, sum) in found.estimates.iter().zip(&mut inside) {
@@ -97,8 +102,10 @@ fn intervals_of_many_parameters_hold_the_truth() {
     }
     for [held, all] in inside {
         println!("{held} of {all}");
+        // Over 28 recordings the shares were 0.915 to 0.962. Before the rows' band ended below the cut-off, 0.892 off-line.
+        let share = if count < 5 { 0.8 } else { 0.9 };
         assert!(
-            held as f64 >= 0.8 * all as f64 && all >= 57 * count as usize / 2,
+            held as f64 >= share * all as f64 && all >= 57 * count as usize / 2,
             "{held} of {all}"
         );
     }

@@ -1,6 +1,6 @@
 //! Static loading: which recordings show what.
 
-use super::link::by_link;
+use super::link::by_links;
 use super::result::LoadingFindings;
 use super::tool::by_tool;
 use super::wrench::{has_displacement, has_wrench};
@@ -44,9 +44,7 @@ pub(crate) fn loading(
         found.warnings.extend(told);
     }
     if !linked.is_empty() {
-        for k in 0..tool.count() {
-            found.drives.extend(by_link(tool, &linked, k)?);
-        }
+        found.drives.extend(by_links(tool, &linked)?);
     }
     let told: Vec<String> = (found.drives.iter())
         .flat_map(|d| d.warnings.clone())

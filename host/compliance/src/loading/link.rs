@@ -6,6 +6,10 @@
 //! of the described weight and of the wrench at the tool point, R⁻ᵀ·(g − Jᵀ·w), and fh the hysteresis of the gear, whose sign is that of the load's change.
 //! A gap adds half its width with the sign of the spring's torque. With a wrench the load at which it is crossed is searched, because
 //! it depends on the described weight.
+//!
+//! With the motors held weight and wrench act on the link where it stands, q − twist. A link encoder has an unknown zero, so the
+//! twist in the first window is unknown, too. It is the measured one less the offset of the regression: the regression is
+//! repeated with it. The twist of a drive whose stiffness is not shown counts as zero there.
 
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit};
@@ -38,6 +42,8 @@ pub(super) const NEGATIVE: f64 = 2.0;
 const SPEEDS: f64 = 0.2;
 /// Fewest windows.
 const FEWEST: usize = 20;
+/// Regressions with the motors held. The twist is a small angle ε, so that each one leaves ε times the error of the one before.
+const PASSES: usize = 4;
 
 /// One window.
 #[derive(Clone, Copy, Debug)]
@@ -56,49 +62,99 @@ struct Window {
 const LOAD: usize = 0;
 const DIRECTION: usize = 1;
 
-/// Finds the stiffness of drive `k` from stretches with link encoders. `None` if no stretch has those that it needs.
+/// What the stretches with link encoders show of one drive.
+struct Found {
+    loading: DriveLoading,
+    /// Twist in the first window of each stretch, of those that have one.
+    first: Vec<Option<f64>>,
+}
+
+/// Finds the stiffness of all drives from stretches with link encoders, of those that have the encoders that they need.
 ///
 /// # Errors
 /// [`ComplianceError`].
-pub(super) fn by_link(
+pub(super) fn by_links(
+    tool: &ToolPoint<'_>,
+    stretches: &[&Signals],
+) -> Result<Vec<DriveLoading>, ComplianceError> {
+    let n = tool.count();
+    let mut first = vec![vec![0.0; n]; stretches.len()];
+    let mut passes = 0;
+    loop {
+        let found = (0..n)
+            .map(|k| by_link(tool, stretches, k, &first))
+            .collect::<Result<Vec<_>, _>>()?;
+        passes += 1;
+        let held = (found.iter().flatten()).any(|own| own.loading.by == Deflection::LinkByWrench);
+        if !held || passes == PASSES {
+            return Ok(found.into_iter().flatten().map(|own| own.loading).collect());
+        }
+        for (s, (first, signals)) in first.iter_mut().zip(stretches).enumerate() {
+            let twist: Vec<f64> = (found.iter())
+                .map(|own| own.as_ref().and_then(|own| own.first[s]).unwrap_or(0.0))
+                .collect();
+            let pose: Vec<f64> = (signals.joints.iter())
+                .map(|j| j.q.first().copied().unwrap_or(0.0))
+                .collect();
+            let inverse = tool.drives().inverse(&pose)?;
+            for (j, own) in first.iter_mut().enumerate() {
+                *own = (0..n).map(|k| inverse[(j, k)] * twist[k]).sum();
+            }
+        }
+    }
+}
+
+/// Finds the stiffness of drive `k`. `first`: motor minus link of each joint in the first window of each stretch. `None` if no
+/// stretch has the encoders that it needs.
+fn by_link(
     tool: &ToolPoint<'_>,
     stretches: &[&Signals],
     k: usize,
-) -> Result<Option<DriveLoading>, ComplianceError> {
+    first: &[Vec<f64>],
+) -> Result<Option<Found>, ComplianceError> {
     let robot = tool.robot();
     let row = tool.drives().rows(&robot.middle_position())?;
     let needed: Vec<usize> = (0..robot.joints.len())
         .filter(|j| row[(k, *j)].abs() > 1e-9 * row.row(k).norm())
         .collect();
-    let usable: Vec<&Signals> = (stretches.iter().copied())
-        .filter(|s| needed.iter().all(|j| s.joints[*j].link.is_some()))
+    let usable: Vec<usize> = (0..stretches.len())
+        .filter(|s| (needed.iter()).all(|j| stretches[*s].joints[*j].link.is_some()))
         .collect();
     if usable.is_empty() {
         return Ok(None);
     }
-    let by_wrench = usable.iter().all(|s| has_wrench(s));
-    let windows = collect(tool, &usable, k, by_wrench)?;
+    let by_wrench = usable.iter().all(|s| has_wrench(stretches[*s]));
+    let rows = window_rows(usable.iter().map(|s| stretches[*s].len()).sum());
+    let mut series = Vec::new();
+    for s in &usable {
+        let at = by_wrench.then_some(first[*s].as_slice());
+        let own = Series::of(tool, stretches[*s], k, at, rows)?;
+        plausible(robot, stretches[*s], k, &own)?;
+        series.push(own);
+    }
+    let windows = collect(&series, by_wrench);
     let by = match by_wrench {
         true => Deflection::LinkByWrench,
         false => Deflection::LinkByTorque,
     };
-    Ok(Some(estimate(robot, k, by, &windows)))
+    let (loading, offsets) = estimate(robot, k, by, &windows);
+    let mut twists = vec![None; stretches.len()];
+    if let Some(stiffness) = loading.stiffness {
+        for (place, (s, own)) in usable.iter().zip(&series).enumerate() {
+            // A stretch that hardly loads this drive has no offset of its own.
+            let offset = offsets.get(place).copied().flatten();
+            let offset = offset.unwrap_or_else(|| own.unloaded(stiffness.value));
+            twists[*s] = own.twist.first().map(|twist| twist - offset);
+        }
+    }
+    Ok(Some(Found {
+        loading,
+        first: twists,
+    }))
 }
 
 /// Forms the windows of all stretches.
-fn collect(
-    tool: &ToolPoint<'_>,
-    stretches: &[&Signals],
-    k: usize,
-    by_wrench: bool,
-) -> Result<Vec<Window>, ComplianceError> {
-    let rows = window_rows(stretches.iter().map(|s| s.len()).sum());
-    let mut series = Vec::new();
-    for signals in stretches {
-        let own = Series::of(tool, signals, k, by_wrench, rows)?;
-        plausible(tool.robot(), signals, k, &own)?;
-        series.push(own);
-    }
+fn collect(series: &[Series], by_wrench: bool) -> Vec<Window> {
     let range = range(series.iter().flat_map(|s| &s.place));
     let mut steps: Vec<f64> = (series.iter())
         .flat_map(|s| s.place.windows(3).map(|w| (w[2] - w[0]).abs()))
@@ -136,7 +192,7 @@ fn collect(
     if !by_wrench {
         all.retain(|w| w.moves);
     }
-    Ok(all)
+    all
 }
 
 /// Means over the windows of one stretch.
@@ -169,11 +225,13 @@ fn plausible(
 }
 
 impl Series {
+    /// Forms the means over windows of `rows` rows. `held`: with the motors held, motor minus link of each joint in the first
+    /// window; the wrench then gives the load.
     fn of(
         tool: &ToolPoint<'_>,
         signals: &Signals,
         k: usize,
-        by_wrench: bool,
+        held: Option<&[f64]>,
         rows: usize,
     ) -> Result<Self, ComplianceError> {
         let n = tool.count();
@@ -182,11 +240,11 @@ impl Series {
             .map(|j| j.link.as_ref().map(|l| means(l, rows)))
             .collect();
         let torque: Vec<Vec<f64>> = signals.joints.iter().map(|j| means(&j.tau, rows)).collect();
-        let force = match by_wrench {
-            true => Some(wrench(signals)?.map(|list| means(&list, rows))),
-            false => None,
+        let force = match held {
+            Some(first) => Some((first, wrench(signals)?.map(|list| means(&list, rows)))),
+            None => None,
         };
-        if !by_wrench && torque.iter().any(Vec::is_empty) {
+        if held.is_none() && torque.iter().any(Vec::is_empty) {
             return Err(ComplianceError::Recording(format!(
                 "{} has link encoders, but neither joint torques (tau<k> or i<k>) nor a wrench at the tool point (fx … mz); the load of the springs is unknown.",
                 signals.label
@@ -205,24 +263,26 @@ impl Series {
         for i in 0..count {
             let pose: Vec<f64> = q.iter().map(|list| list[i]).collect();
             let map = tool.drives().rows(&pose)?;
-            let inverse = tool.drives().inverse(&pose)?;
-            let joint: Vec<f64> = match &force {
-                None => torque.iter().map(|list| list[i]).collect(),
-                Some(force) => {
-                    // The weight loads the spring as the link itself moves.
+            let (at, joint) = match &force {
+                None => (pose.clone(), torque.iter().map(|list| list[i]).collect()),
+                Some((first, force)) => {
                     let place: Vec<f64> = (0..n)
                         .map(|j| match &link[j] {
-                            Some(link) => q[j][0] + link[i] - link[0],
+                            Some(link) => q[j][0] - first[j] + link[i] - link[0],
                             None => pose[j],
                         })
                         .collect();
-                    let mut weight = vec![0.0; n];
-                    gravity_vector(&chain, &parameters, &place, &mut weight)
+                    let mut load = vec![0.0; n];
+                    gravity_vector(&chain, &parameters, &place, &mut load)
                         .map_err(|error| ComplianceError::Model(error.to_string()))?;
-                    let pushed = torques(tool, &pose, &force.each_ref().map(|list| list[i]))?;
-                    weight.iter().zip(&pushed).map(|(g, w)| g - w).collect()
+                    let pushed = torques(tool, &place, &force.each_ref().map(|list| list[i]))?;
+                    for (weight, pushed) in load.iter_mut().zip(&pushed) {
+                        *weight -= pushed;
+                    }
+                    (place, load)
                 }
             };
+            let inverse = tool.drives().inverse(&at)?;
             // f = R⁻ᵀ·τ.
             let driven = |list: &[f64]| (0..n).map(|j| inverse[(j, k)] * list[j]).sum::<f64>();
             let load = driven(&joint);
@@ -236,14 +296,21 @@ impl Series {
                     .map(|j| map[(k, j)] * (q[j][i] - q[j][i - 1]))
                     .sum::<f64>();
             }
-            own.place.push(if by_wrench { load } else { travelled });
+            own.place
+                .push(if held.is_some() { load } else { travelled });
             own.load.push(load);
         }
-        if !by_wrench {
+        if held.is_none() {
             let seconds = rows as f64 / signals.rate();
             own.subtract_inertia(tool.drives().inertia(tool.robot(), k), seconds);
         }
         Ok(own)
+    }
+
+    /// Returns the mean twist without that of the mean load: the twist that the encoders read without a load.
+    fn unloaded(&self, stiffness: f64) -> f64 {
+        let mean = rig_numerics::statistics::mean_or_zero;
+        mean(&self.twist) - mean(&self.load) / stiffness
     }
 
     /// Subtracts the torque that accelerates the motor; `seconds` is the length of a window.
@@ -292,8 +359,14 @@ fn rows(windows: &[Window]) -> Vec<Row> {
         .collect()
 }
 
-/// Estimates stiffness, hysteresis and gap of drive `k`.
-fn estimate(robot: &Robot, k: usize, by: Deflection, windows: &[Window]) -> DriveLoading {
+/// Estimates stiffness, hysteresis and gap of drive `k`. Returns also the twist that each stretch reads without a load, where the
+/// windows show it.
+fn estimate(
+    robot: &Robot,
+    k: usize,
+    by: Deflection,
+    windows: &[Window],
+) -> (DriveLoading, Vec<Option<f64>>) {
     // A wrench gives the torque of the spring only as well as the weight is described.
     let search = by == Deflection::LinkByWrench;
     let mut kept = windows.to_vec();
@@ -307,7 +380,7 @@ fn estimate(robot: &Robot, k: usize, by: Deflection, windows: &[Window]) -> Driv
     result.windows = kept.len();
     let Some(found) = found.filter(|f| !f.estimate.hidden[LOAD]) else {
         result.missing = Some(missing(robot, k, by));
-        return result;
+        return (result, Vec::new());
     };
     let compliance = found.value(LOAD);
     let told = found.lack.told(robot.joints[k].kind.units().0);
@@ -318,7 +391,7 @@ fn estimate(robot: &Robot, k: usize, by: Deflection, windows: &[Window]) -> Driv
             (false, Some(told)) => format!("{} {ASK}", crooked(robot, k, &told)),
             (false, None) => missing(robot, k, by),
         });
-        return result;
+        return (result, Vec::new());
     }
     let stiffness = compliance.reciprocal();
     result.stiffness = Some(stiffness);
@@ -338,7 +411,10 @@ fn estimate(robot: &Robot, k: usize, by: Deflection, windows: &[Window]) -> Driv
         result.add_gap(found.value(column), gap.zero);
     }
     result.windows = found.windows;
-    result
+    let stretches = kept.iter().map(|w| w.stretch + 1).max().unwrap_or(0);
+    let estimate = &found.estimate;
+    let offsets = (2..2 + stretches).map(|c| (!estimate.hidden[c]).then_some(estimate.values[c]));
+    (result, offsets.collect())
 }
 
 /// What a residual beyond noise may come from.

@@ -8,7 +8,7 @@ use rig_data::{Block, JointColumns};
 use rig_model::robot::{ONE_LINK_TEMPLATE, Reads, Robot, TX40, WristSensor};
 
 use super::rig::{Rig, recording};
-use super::statics::rest;
+use super::statics::{links_at_rest, rest, weight};
 use crate::{ComplianceOptions, Deflection, DriveLoading, ToolPoint, identify_compliance};
 
 fn identify(robot: &Robot, runs: &[InMemory], tool: [f64; 3]) -> Vec<DriveLoading> {
@@ -151,6 +151,80 @@ fn a_gap_is_kept_apart_with_the_motor_held() {
         );
         assert!((value.value / stiffness - 1.0).abs() < 0.05, "{own:?}");
         assert!((own.gap.unwrap().value / gap - 1.0).abs() < 0.05, "{own:?}");
+    }
+}
+
+/// An arm that bends under its own weight before the force comes, with encoders on the links whose zero is unknown: force and
+/// weight act on the arm where it stands. A force in the axes of the base has another arm there.
+#[test]
+fn links_that_hang_behind_held_motors_are_loaded_where_they_stand() {
+    let mut robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    for (joint, mass) in robot.joints.iter_mut().zip([0.0, 12.0, 8.0, 3.0, 1.0, 2.0]) {
+        joint.inertial = Some(rig_model::robot::Inertial {
+            mass,
+            first_moment: [0.1 * mass, 0.02 * mass, 0.05 * mass],
+            inertia: [0.5, 0.0, 0.0, 0.5, 0.0, 0.5],
+        });
+    }
+    let offset = [0.02, 0.01, 0.12];
+    let stiffness = STIFFNESS.map(|c| 0.2 * c);
+    let rows = 400;
+    let mut runs = Vec::new();
+    for (p, pose) in POSES[..2].iter().enumerate() {
+        for c in 0..3 {
+            // To and fro: 101 different forces.
+            let at_rest: Vec<Vec<f64>> = (0..=100)
+                .map(|k| {
+                    let mut wrench = [0.0; 6];
+                    wrench[c] = 80.0 * (f64::from(k) / 50.0 - 1.0);
+                    links_at_rest(&robot, pose, offset, &stiffness, wrench, |q| {
+                        weight(&robot, q)
+                    })
+                })
+                .collect();
+            let level = |row: usize| (row as i64 % 200 - 100).unsigned_abs() as usize;
+            let mut block = Block {
+                t: (0..rows).map(|k| 0.1 * k as f64).collect(),
+                joints: (0..6)
+                    .map(|j| {
+                        // The zero of the link's encoder.
+                        let zero = 0.1 * (j + p) as f64;
+                        let link = (0..rows).map(|k| at_rest[level(k)][j] + zero);
+                        JointColumns {
+                            q: vec![pose[j]; rows],
+                            link: Some(link.collect()),
+                            ..JointColumns::default()
+                        }
+                    })
+                    .collect(),
+                ..Block::default()
+            };
+            for (axis, name) in ["fx", "fy", "fz"].into_iter().enumerate() {
+                let force = |k: usize| match axis == c {
+                    true => 80.0 * (level(k) as f64 / 50.0 - 1.0),
+                    false => 0.0,
+                };
+                block
+                    .extra
+                    .push((name.to_owned(), (0..rows).map(force).collect()));
+            }
+            runs.push(InMemory {
+                label: format!("pose {p}, force {c}"),
+                blocks: vec![block],
+            });
+        }
+    }
+    let found = identify(&robot, &runs, offset);
+    assert_eq!(found.len(), 6);
+    for (own, truth) in found.iter().zip(stiffness) {
+        assert_eq!(own.by, Deflection::LinkByWrench);
+        let value = own.stiffness.unwrap().value;
+        println!(
+            "links that hang, {}: {:.4} % off",
+            own.joint,
+            100.0 * (value / truth - 1.0)
+        );
+        assert!((value / truth - 1.0).abs() < 1e-5, "{} {value}", own.joint);
     }
 }
 

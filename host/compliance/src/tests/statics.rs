@@ -48,22 +48,59 @@ pub(super) fn rest(
     stiffness: &[f64],
     wrench: [f64; 6],
 ) -> ([f64; 6], f64) {
+    let q = links_at_rest(robot, start, offset, stiffness, wrench, |_| 0.0);
+    (
+        moved(robot, &q, start, offset),
+        springs(robot, &q, start, stiffness),
+    )
+}
+
+/// Returns displacement and rotation of the tool point.
+fn moved(robot: &Robot, q: &[f64], start: &[f64], offset: [f64; 3]) -> [f64; 6] {
     let unloaded = tool(robot, start, offset);
+    let pose = tool(robot, q, offset);
+    let shift = pose * Point3::origin() - unloaded * Point3::origin();
+    let turn = (pose.rotation * unloaded.rotation.inverse()).scaled_axis();
+    [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
+}
+
+/// Returns the energy of the springs.
+fn springs(robot: &Robot, q: &[f64], start: &[f64], stiffness: &[f64]) -> f64 {
+    (twists(robot, q, start).iter().zip(stiffness))
+        .map(|(s, c)| 0.5 * c * s * s)
+        .sum()
+}
+
+/// Returns the potential energy of the described masses.
+pub(super) fn weight(robot: &Robot, q: &[f64]) -> f64 {
+    let mut pose = Isometry3::identity();
+    let mut energy = 0.0;
+    for (joint, q) in robot.joints.iter().zip(q) {
+        pose *= joint.pose(*q);
+        let Some(body) = &joint.inertial else {
+            continue;
+        };
+        let moment =
+            pose.rotation * Vector3::from(body.first_moment) + body.mass * pose.translation.vector;
+        energy -= moment.dot(&Vector3::from(robot.gravity));
+    }
+    energy
+}
+
+/// Returns the positions of the links at rest behind motors at `start`, under a wrench at the tool point and a potential.
+pub(super) fn links_at_rest(
+    robot: &Robot,
+    start: &[f64],
+    offset: [f64; 3],
+    stiffness: &[f64],
+    wrench: [f64; 6],
+    potential: impl Fn(&[f64]) -> f64,
+) -> Vec<f64> {
     let [fx, fy, fz, mx, my, mz] = wrench;
-    let moved = |q: &[f64]| -> [f64; 6] {
-        let pose = tool(robot, q, offset);
-        let shift = pose * Point3::origin() - unloaded * Point3::origin();
-        let turn = (pose.rotation * unloaded.rotation.inverse()).scaled_axis();
-        [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
-    };
-    let springs = |q: &[f64]| -> f64 {
-        (twists(robot, q, start).iter().zip(stiffness))
-            .map(|(s, c)| 0.5 * c * s * s)
-            .sum()
-    };
     let energy = |q: &[f64]| -> f64 {
-        let [x, y, z, a, b, c] = moved(q);
-        springs(q) - (fx * x + fy * y + fz * z + mx * a + my * b + mz * c)
+        let [x, y, z, a, b, c] = moved(robot, q, start, offset);
+        springs(robot, q, start, stiffness) + potential(q)
+            - (fx * x + fy * y + fz * z + mx * a + my * b + mz * c)
     };
     let n = start.len();
     let mut q = start.to_vec();
@@ -87,7 +124,7 @@ pub(super) fn rest(
             *q -= step;
         }
     }
-    (moved(&q), springs(&q))
+    q
 }
 
 fn given(robot: &Robot, stiffness: &[f64]) -> Vec<DriveStiffness> {

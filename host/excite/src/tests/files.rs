@@ -54,6 +54,36 @@ fn faults_in_a_file_are_named_with_their_line() {
     assert!(missing.contains("no-such.toml"));
 }
 
+/// A file of another kind is named, not read as broken TOML; samples are no parameters of a motion.
+#[test]
+fn other_files_are_told_from_the_parameters_of_a_motion() {
+    let robot = one_link();
+    let file = designed(&robot, &quick(Criterion::ConditionNumber)).file;
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    file.save(&at("samples.csv"), &robot, 500.0).unwrap();
+    std::fs::copy(at("samples.csv"), at("named.toml")).unwrap();
+    std::fs::write(at("run.mcap"), b"\x89MCAP0\r\n\x01").unwrap();
+    std::fs::write(at("robot.toml"), ONE_LINK_TEMPLATE).unwrap();
+    std::fs::write(at("robot.urdf"), "<?xml version=\"1.0\"?>\n<robot/>").unwrap();
+    for (name, found) in [
+        ("samples.csv", "samples in columns (CSV)"),
+        ("named.toml", "samples in columns (CSV)"),
+        ("run.mcap", "a recording (MCAP)"),
+        ("robot.toml", "a robot description"),
+        ("robot.urdf", "XML, as a URDF does"),
+    ] {
+        let text = TrajectoryFile::load(&at(name)).unwrap_err().to_string();
+        assert!(
+            text.contains(name) && text.contains(&format!("holds {found}, not the parameters")),
+            "{text}"
+        );
+        assert!(text.contains("rig excite --out motion.toml"), "{text}");
+    }
+    let text = load_reference(&at("robot.toml"), &robot, 500.0).unwrap_err();
+    assert!(text.to_string().contains("a robot description"), "{text}");
+}
+
 #[test]
 fn staged_motions_keep_the_limits_and_every_kind_survives_its_file() {
     let robot = one_link();

@@ -144,7 +144,55 @@ fn a_simple_drive_narrows_the_limits_of_its_joint() {
         ..MotorLimits::default()
     });
     let refused = design(&robot, &options(), |_, _| ()).unwrap_err();
-    assert!(refused.to_string().contains("motor angle"), "{refused}");
+    assert!(
+        refused
+            .to_string()
+            .contains("between 100000 and 200000 rad"),
+        "{refused}"
+    );
+}
+
+/// No pose of the arm keeps these limits: no search begins, and the sentence has the numbers.
+#[test]
+fn limits_of_motors_that_no_pose_keeps_are_refused_before_the_search() {
+    let robot = irp6();
+    let searched = std::cell::Cell::new(false);
+    let said = |name: &str, limits: MotorLimits| {
+        let mut robot = robot.clone();
+        let joint = robot.joint_index(name).unwrap();
+        robot.joints[joint].drive.as_mut().unwrap().limits = Some(limits);
+        match design(&robot, &options(), |_, _| searched.set(true)) {
+            Err(error) => error.to_string(),
+            Ok(_) => String::new(),
+        }
+    };
+    let angle = |range| MotorLimits {
+        position: Some(range),
+        ..MotorLimits::default()
+    };
+    // A screw, whose ratio follows the pose, and a wrist that three motors move.
+    for name in ["lower_arm", "wrist_turn"] {
+        let text = said(name, angle([9e3, 1e4]));
+        assert!(
+            text.contains(name)
+                && text.contains("9000 and 10000 rad")
+                && text.contains("give a range"),
+            "{text}"
+        );
+    }
+    // The upper arm never points up or down, so its screw always carries it.
+    let text = said(
+        "upper_arm",
+        MotorLimits {
+            torque: Some(1e-3),
+            ..MotorLimits::default()
+        },
+    );
+    assert!(
+        text.contains("upper_arm") && text.contains("0.001 N·m") && text.contains("hold the arm"),
+        "{text}"
+    );
+    assert!(!searched.get());
 }
 
 #[test]

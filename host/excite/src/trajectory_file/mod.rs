@@ -1,6 +1,7 @@
 //! Trajectories in files: their parameters as TOML, their samples as CSV.
 
 mod content;
+mod foreign;
 mod read;
 mod reference;
 mod samples;

@@ -9,6 +9,7 @@ use rig_shared::trajectory::{
 use toml::Spanned;
 
 use super::content::{DesignRecord, JointTrajectory, TrajectoryFile};
+use super::foreign::{foreign, is_robot};
 use super::text::{DesignText, FileText, JointText, MotionText};
 use crate::{Criterion, ExciteError};
 use rig_model::robot::Place;
@@ -222,8 +223,15 @@ impl TrajectoryFile {
     /// Reads TOML text; `path` only names the source in messages.
     ///
     /// # Errors
-    /// [`ExciteError::Toml`].
+    /// [`ExciteError::Toml`], [`ExciteError::NoParameters`].
     pub fn from_toml(text: &str, path: &Path) -> Result<Self, ExciteError> {
+        let robot = || is_robot(text).then_some("a robot description");
+        if let Some(found) = foreign(text.as_bytes()).or_else(robot) {
+            return Err(ExciteError::NoParameters {
+                path: path.into(),
+                found,
+            });
+        }
         let wrong = |offset: usize, message: String| ExciteError::Toml {
             path: path.into(),
             place: Place::of(text, offset),

@@ -1,25 +1,39 @@
 //! Trajectory files on the disk.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use super::content::TrajectoryFile;
+use super::foreign::foreign;
 use crate::ExciteError;
 use rig_model::robot::Robot;
 use rig_output::write_whole;
 
 /// Size limit of a trajectory file; a thousand joints would fit.
 const MAX_BYTES: u64 = 1 << 20;
+/// Bytes by which the kind of a file is recognised: its first lines.
+const BEGINNING: u64 = 4096;
 
 impl TrajectoryFile {
     /// Reads a `.toml` trajectory.
     ///
     /// # Errors
-    /// [`ExciteError`] with line and column of the error.
+    /// [`ExciteError::NoParameters`] if the file holds something else; [`ExciteError`] with line and column of the error.
     pub fn load(path: &Path) -> Result<Self, ExciteError> {
         let failed = |source| ExciteError::Read {
             path: path.into(),
             source,
         };
+        let mut beginning = Vec::new();
+        let file = File::open(path).map_err(failed)?;
+        (file.take(BEGINNING).read_to_end(&mut beginning)).map_err(failed)?;
+        if let Some(found) = foreign(&beginning) {
+            return Err(ExciteError::NoParameters {
+                path: path.into(),
+                found,
+            });
+        }
         if std::fs::metadata(path).map_err(failed)?.len() > MAX_BYTES {
             return Err(ExciteError::TooLarge { path: path.into() });
         }

@@ -117,11 +117,8 @@ impl<'a> Yardstick<'a> {
                 .map(|far| far < AT_THE_SET || estimator == Estimator::Consistent),
             largest_shift: Some(self.largest_shift(fitted)),
             values: Some(fitted.kept.whole.clone()),
-            said: fitted
-                .said
-                .iter()
-                .chain(&fitted.warnings)
-                .cloned()
+            said: (fitted.said.iter().cloned())
+                .chain(fitted.warnings.iter().map(ToString::to_string))
                 .collect(),
         }
     }

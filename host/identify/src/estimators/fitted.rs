@@ -6,6 +6,7 @@ use super::problem::Problem;
 use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::jackknife::Refit;
 use crate::uncertainty::parts::Parts;
+use crate::warning::Warning;
 
 /// The result of an estimator.
 #[derive(Clone, Debug)]
@@ -25,7 +26,7 @@ pub(crate) struct Fitted {
     /// Remarks on the fit, sentences for the report.
     pub said: Vec<String>,
     /// What the reader must know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Reason to trust other estimates more, a clause (instruments only).
     pub doubtful: Option<String>,
 }

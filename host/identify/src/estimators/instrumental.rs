@@ -23,6 +23,7 @@ use crate::error::{IdentifyError, singular};
 use crate::rows::factor::TriangularFactor;
 use crate::uncertainty::jackknife::{LeaveOut, PARTS, Refit, joined, part_of};
 use crate::uncertainty::parts::Parts;
+use crate::warning::{Unsettled, Warning};
 use rig_output::format_significant;
 
 /// Largest change of a parameter at convergence, as a share of its standard deviation.
@@ -182,17 +183,13 @@ impl LastPass<'_> {
             self.drift.words(problem),
         ];
         let mut warnings = Vec::new();
-        warnings.extend(self.unsettled.map(|moved| {
-            format!(
-                "Instrumental variables had not settled after {MOST_PASSES} passes: a parameter still moves by {moved:.2} of its standard deviation."
-            )
+        warnings.extend(self.unsettled.map(|moved| Warning::Unsettled {
+            by: Unsettled::Instrumental,
+            passes: MOST_PASSES,
+            moved: Some(moved),
         }));
         let doubtful = self.doubt(problem, parts, statistic);
-        warnings.extend(doubtful.as_ref().map(|why| {
-            format!(
-                "Do not trust the estimate by instrumental variables over the weighted fit: {why}."
-            )
-        }));
+        warnings.extend(doubtful.clone().map(Warning::Distrusted));
         fitted(
             problem,
             &self.all.whole,
@@ -260,7 +257,7 @@ fn fitted(
     kept: Refit,
     measured: &LeaveOut,
     said: Vec<String>,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
     doubtful: Option<String>,
 ) -> Result<Fitted, IdentifyError> {
     let size = kept.whole.len();

@@ -24,6 +24,7 @@ use crate::rows::factor::TriangularFactor;
 use crate::rows::stream::each_rows;
 use crate::uncertainty::jackknife::{LeaveOut, PARTS, joined, part_of};
 use crate::uncertainty::parts::Parts;
+use crate::warning::{Unsettled, Warning};
 use rig_numerics::vector::dot_in_order;
 
 /// Highest order of the autoregression.
@@ -296,9 +297,11 @@ pub(crate) fn likelihood(problem: &Problem, parts: &Parts) -> Result<Fitted, Ide
         // In the first pass the correlation between joints is still unknown.
         if (pass > 1 && moved <= SETTLED) || pass == MOST_PASSES {
             if moved > SETTLED {
-                fitted.warnings.push(format!(
-                    "Maximum likelihood had not settled after {MOST_PASSES} passes: a parameter still moves by {moved:.2} of its standard deviation."
-                ));
+                fitted.warnings.push(Warning::Unsettled {
+                    by: Unsettled::Likelihood,
+                    passes: MOST_PASSES,
+                    moved: Some(moved),
+                });
             }
             let orders: Vec<String> = predictors
                 .iter()

@@ -18,6 +18,7 @@ use crate::error::IdentifyError;
 use crate::rows::factor::TriangularFactor;
 use crate::uncertainty::jackknife::{LeaveOut, PARTS, joined, part_of};
 use crate::uncertainty::parts::Parts;
+use crate::warning::{Unsettled, Warning};
 
 /// Largest change of a parameter at convergence, as a share of its standard deviation.
 const SETTLED: f64 = 0.02;
@@ -82,9 +83,11 @@ pub(crate) fn output_error(
         values.clone_from(&fitted.kept.whole);
         if moved <= SETTLED || passes == MOST_PASSES {
             if moved > SETTLED {
-                fitted.warnings.push(format!(
-                    "Output error had not settled after {MOST_PASSES} passes: a parameter still moves by {moved:.2} of its standard deviation."
-                ));
+                fitted.warnings.push(Warning::Unsettled {
+                    by: Unsettled::OutputError,
+                    passes: MOST_PASSES,
+                    moved: Some(moved),
+                });
             }
             fitted
                 .said

@@ -18,6 +18,7 @@ use crate::error::IdentifyError;
 use crate::rows::factor::TriangularFactor;
 use crate::uncertainty::jackknife::{LeaveOut, Refit};
 use crate::uncertainty::parts::Parts;
+use crate::warning::Warning;
 
 /// Number of candidates of the relative uncertainty, evenly spaced in the logarithm.
 const STEPS: usize = 17;
@@ -60,7 +61,7 @@ pub(crate) fn ridge(
     let identified = problem.identified_covariance(&covariance);
     let mut warnings = Vec::new();
     if !prior.stated {
-        warnings.push("The prior rests on stand-ins for what the description does not state; values that the data do not determine are guesses.".to_owned());
+        warnings.push(Warning::StandIns);
     }
     Ok(Fitted {
         classical_std: (0..kept.whole.len())

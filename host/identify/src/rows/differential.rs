@@ -181,8 +181,10 @@ impl<'a> Differential<'a> {
     pub(crate) fn used(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
         let motors = slow_motors(motion, self.plan)?;
         let (picked, step) = (self.picked(motion), self.decimator.step());
+        let treatment = self.plan.treatment;
+        let margin = (treatment.reversal_margin * treatment.sample_rate).round() as usize;
         let equations = motion.joints.iter().enumerate().map(|(j, joint)| Equation {
-            keep: kept(joint, &motors, &picked, step, j, tally),
+            keep: kept(joint, &motors, &picked, [step, margin], j, tally),
             ..Default::default()
         });
         Ok(Rows {
@@ -280,7 +282,7 @@ fn kept(
     joint: &JointMotion,
     motors: &[SlowMotor],
     picked: &[usize],
-    step: usize,
+    [step, margin]: [usize; 2],
     j: usize,
     tally: &mut Tally,
 ) -> Vec<bool> {
@@ -304,7 +306,7 @@ fn kept(
             let slow = slow.iter().any(|(list, before)| {
                 let (near, all) = around(before, k, step);
                 let dwells = near == all || around(before, k, 2 * step).0 > 3 * step.max(2);
-                list[k] || dwells
+                list[k] || dwells || around(before, k, margin).0 > 0
             });
             let saturated = around(&saturated_before, k, step).0 > 0;
             if saturated {

@@ -386,7 +386,7 @@ fn a_torque_recorded_before_it_acts_is_said() {
             }
         }
         let found = identify(&robot, &[&made], &[], &Options::default()).unwrap();
-        let warned = (found.warnings.iter()).any(|w| w.contains("--torque-lead 0.002"));
+        let warned = (found.warnings.iter()).any(|w| w.to_string().contains("--torque-lead 0.002"));
         assert_eq!(warned, said, "{:?}", found.warnings);
     }
 }

@@ -25,6 +25,7 @@ use crate::structure::essential::{EssentialSet, Known, essential};
 use crate::structure::excitation::{NotExcited, hardly_excited};
 use crate::uncertainty::parts::Parts;
 use crate::uncertainty::relative_error::judge;
+use crate::warning::Warning;
 
 /// Half width of the interval that holds 95 % of a normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
@@ -39,7 +40,7 @@ pub(crate) struct Further {
     /// [`crate::Details::free`].
     pub free: Vec<[f64; 3]>,
     pub procedure: Vec<String>,
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Computes all further results.
@@ -89,9 +90,7 @@ pub(crate) fn further(
                 let set = judged_set(problem, result, &prior, &found, held.as_ref())?;
                 further.standard = Some(set);
             }
-            Err(e) => further.warnings.push(format!(
-                "No physically consistent set of standard parameters is given: {e}"
-            )),
+            Err(e) => further.warnings.push(Warning::Inconsistent(e.to_string())),
         }
     }
     if compared {

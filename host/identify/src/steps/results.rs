@@ -19,6 +19,7 @@ use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::ResidualReport;
 use crate::unmodelled::beyond::Beyond;
 use crate::unmodelled::lag::Lag;
+use crate::warning::Warning;
 use rig_data::prepare::{PreprocessingPlan, Survey};
 use rig_model::effects::Effects;
 use rig_model::robot::Robot;
@@ -89,7 +90,7 @@ impl Results<'_> {
         let stated =
             Effects::of(self.described).map_err(|e| IdentifyError::Model(e.to_string()))?;
         let [taken, left] = stated.uncompensated();
-        warnings.extend(left);
+        warnings.extend(left.map(Warning::EffectsLeftOut));
         let procedure = taken
             .into_iter()
             .chain(self.known.said())
@@ -135,7 +136,7 @@ impl Results<'_> {
     }
 
     /// Returns the warnings about recordings and fit.
-    fn warnings(&self, estimate: &Estimate, lag: Option<Lag>) -> Vec<String> {
+    fn warnings(&self, estimate: &Estimate, lag: Option<Lag>) -> Vec<Warning> {
         let heard = Heard {
             robot: self.problem.robot,
             options: self.problem.options,

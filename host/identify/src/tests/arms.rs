@@ -370,6 +370,7 @@ fn a_joint_without_rows_is_not_called_explained() {
         found
             .warnings
             .iter()
+            .map(ToString::to_string)
             .any(|w| w.contains("j2") && w.contains("hold-out"))
     );
     assert!(found.joints[0].holdout_relative_error.unwrap() > 0.0);

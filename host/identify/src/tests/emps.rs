@@ -195,7 +195,12 @@ fn emps_by_instrumental_variables_and_output_error() {
             let found = identify(&robot, &[recording], &[], &options).unwrap();
             show(&format!("{estimator:?}"), &found);
             println!("   {:?} {:?}", found.procedure, found.warnings);
-            assert!(found.warnings.iter().all(|w| !w.contains("settled")));
+            assert!(
+                found
+                    .warnings
+                    .iter()
+                    .all(|w| !w.to_string().contains("settled"))
+            );
             let expected = if std::ptr::eq(recording, &train) {
                 PUBLISHED
             } else {

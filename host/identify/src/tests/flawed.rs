@@ -101,7 +101,9 @@ fn the_spectrum_alone_takes_filtered_noise_for_motion() {
         by_spectrum.cutoff
     );
     assert!(
-        found.warnings[0].contains("chosen by the torque"),
+        found.warnings[0]
+            .to_string()
+            .contains("chosen by the torque"),
         "{:?}",
         found.warnings
     );

@@ -181,7 +181,12 @@ fn one_recommendation_whichever_run_is_held_back() {
         println!("   {:?}", found.warnings);
         assert_eq!(comparison.repeated_holdout.len(), repeated);
         assert_eq!(comparison.recommended, found.estimator);
-        assert!(!found.warnings.iter().any(|w| w.contains("do not take")));
+        assert!(
+            !found
+                .warnings
+                .iter()
+                .any(|w| w.to_string().contains("do not take"))
+        );
         let unseen = holdout.is_empty() || holdout == [2];
         assert_eq!(
             comparison.recommendation.contains("different motion"),

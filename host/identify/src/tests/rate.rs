@@ -69,8 +69,12 @@ fn a_holdout_of_another_rate_is_judged_in_the_band_of_the_fit() {
             identify(&robot, &[&training], &[&holdout], &options).unwrap()
         };
         let same = found(1000.0);
-        let speaks =
-            |found: &Identification| found.warnings.iter().any(|w| w.contains("at 1000 Hz"));
+        let speaks = |found: &Identification| {
+            found
+                .warnings
+                .iter()
+                .any(|w| w.to_string().contains("at 1000 Hz"))
+        };
         assert!(!speaks(&same), "{:?}", same.warnings);
         for rate in [400.0, 2500.0] {
             let other = found(rate);

@@ -84,10 +84,9 @@ fn an_arm_is_identified_beside_a_joint_that_stands_still() {
                 let found = identify(&robot, &[&training], &[&holdout], &options).unwrap();
                 let name = &robot.joints[locked].name;
                 assert!(
-                    found
-                        .warnings
-                        .iter()
-                        .any(|w| w.starts_with(&format!("Joint {name} stands still at 0.4"))),
+                    found.warnings.iter().any(|w| w
+                        .to_string()
+                        .starts_with(&format!("Joint {name} stands still at 0.4"))),
                     "{:?}",
                     found.warnings
                 );
@@ -194,7 +193,10 @@ fn a_joint_that_only_creeps_is_said_and_nothing_of_it_recommended() {
     let found = identify(&robot, &[&creeping], &[&moving], &options).unwrap();
     let said = format!("Joint {} moves by 0.00", robot.joints[1].name);
     assert!(
-        found.warnings.iter().any(|w| w.starts_with(&said)),
+        found
+            .warnings
+            .iter()
+            .any(|w| w.to_string().starts_with(&said)),
         "{:?}",
         found.warnings
     );
@@ -213,7 +215,8 @@ fn a_joint_that_moves_by_its_encoder_s_noise_alone_is_said_to_stand_still() {
     }
     let found = identify(&robot, &[&training], &[], &Options::default()).unwrap();
     let name = &robot.joints[2].name;
-    let own: Vec<&String> = (found.warnings.iter())
+    let own: Vec<String> = (found.warnings.iter())
+        .map(ToString::to_string)
         .filter(|w| w.starts_with(&format!("Joint {name}")))
         .collect();
     let words = format!(

@@ -22,6 +22,7 @@ use crate::estimators::linear::by_noise;
 use crate::rows::cache::RowCache;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
+use crate::warning::{OwnCutoff, Warning};
 use rig_data::prepare::Choice;
 use rig_data::prepare::CutoffTrial;
 use rig_data::prepare::MAX_CUTOFF_SHARE;
@@ -32,7 +33,6 @@ use rig_data::prepare::Survey;
 use rig_data::prepare::trimmed_rows;
 use rig_model::robot::Robot;
 use rig_numerics::statistics::mean_or_zero;
-use rig_output::format_significant;
 
 /// Reduction of the mean log residual of the joints from which another cut-off replaces the spectrum's. 0.15: on the
 /// rig of `rig demo` (white position noise, presliding friction unmodelled) a cut-off five times too low left 11 %
@@ -134,7 +134,7 @@ pub(crate) fn decided(
 
 /// Returns warnings about the cut-off: the torque gave another one than the spectrum, or some joints are explained
 /// clearly better with a cut-off of their own.
-pub(crate) fn doubts(treatment: &PreprocessingPlan, robot: &Robot) -> Vec<String> {
+pub(crate) fn doubts(treatment: &PreprocessingPlan, robot: &Robot) -> Vec<Warning> {
     let mut doubts = Vec::new();
     let (cutoff, trials) = (treatment.cutoff, &treatment.trials);
     let error = |cutoff: f64, j: usize| {
@@ -142,30 +142,25 @@ pub(crate) fn doubts(treatment: &PreprocessingPlan, robot: &Robot) -> Vec<String
         trial.map_or(f64::NAN, |t| t.relative_error[j])
     };
     if let Some(by_spectrum) = treatment.spectral_cutoff {
-        doubts.push(format!(
-            "The cut-off of the position filter, {} Hz, was chosen by the torque. The spectrum of the position alone gives {} Hz: the noise of the position is not white (time stamps with jitter, a coarse encoder, or a position that was filtered before it was recorded). Compare the figure of the torque residual over the cut-off; --cutoff sets another one.",
-            format_significant(cutoff, 3),
-            format_significant(by_spectrum, 3)
-        ));
+        doubts.push(Warning::CutoffByTorque {
+            cutoff,
+            by_spectrum,
+        });
     }
     let mut alone = Vec::new();
     for (j, joint) in robot.joints.iter().enumerate() {
         let own = own_cutoff(trials, j);
         let more = error(cutoff, j) / error(own, j);
         if more.ln() > BETTER {
-            alone.push(format!(
-                "joint {} with {} Hz ({:.0} % less)",
-                joint.name,
-                format_significant(own, 3),
-                100.0 * (1.0 - 1.0 / more)
-            ));
+            alone.push(OwnCutoff {
+                joint: joint.name.clone(),
+                cutoff: own,
+                less: 1.0 - 1.0 / more,
+            });
         }
     }
     if robot.joints.len() > 1 && !alone.is_empty() {
-        doubts.push(format!(
-            "One cut-off serves all joints. Alone, the torque of some would be explained better with another one: {}. Their friction near reversals or the noise of their positions differs; compare the figure of the torque residual over the cut-off.",
-            alone.join(", ")
-        ));
+        doubts.push(Warning::OwnCutoffs(alone));
     }
     doubts
 }

@@ -72,32 +72,6 @@ impl Lag {
             .filter_map(|(factor, memory)| own(factor, (memory / step as f64).max(1.0)));
         Ok(shown(&own.collect::<Vec<_>>()).filter(|lag| lag.lead.abs() >= LEAST * treatment.dt()))
     }
-
-    /// Describes the lead in words; `sample` is the recording's sample period, s.
-    pub(crate) fn said(&self, sample: f64) -> String {
-        let samples = self.lead / sample;
-        let size = format!(
-            "{:.2} ms ({:.1} samples)",
-            1e3 * self.lead.abs(),
-            samples.abs()
-        );
-        let (what, mend) = if samples < 0.0 {
-            (
-                format!("was recorded some {size} after it acted, as behind a filter"),
-                "If it was, give both by one clock, or that time, negative, as --torque-lead"
-                    .to_owned(),
-            )
-        } else {
-            let hold = format!(
-                "If the recorded torque is a command that is held until the next, give half a sample, --torque-lead {}",
-                rig_output::format_significant(0.5 * sample, 2)
-            );
-            (format!("was recorded some {size} before it acts"), hold)
-        };
-        format!(
-            "What is left of the torque goes with its rate of change, as if it {what} (noise of the position that a controller feeds back makes that look longer): inertia and friction are then off by more than their intervals say. {mend}."
-        )
-    }
 }
 
 /// Returns the rows around row `i` if they follow each other without a gap.

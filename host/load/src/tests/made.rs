@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use rig_data::prepare::InMemory;
-use rig_data::{Block, JointColumns, WRENCH_COLUMNS};
+use rig_data::{Block, JointColumns, WRENCH_COLUMNS, WRENCH_MESSAGE};
 use rig_identify::chain_of;
 use rig_model::robot::{Inertial, Robot};
 use rig_shared::multibody::{Chain, point_position};
@@ -218,6 +218,45 @@ pub(super) fn recorded(
         .collect();
     let q: Vec<Vec<f64>> = t.iter().map(|t| moving.position(*t)).collect();
     block(format!("made {seed}"), t, q, &read)
+}
+
+/// Returns a recording of 30 s whose rows have 1 kHz, with a sensor of `rate` Hz that begins `late` s after the first row, and
+/// whose readings are interpolated to the rows as those of another topic are.
+pub(super) fn interpolated(
+    moving: &Moving,
+    points: &Points,
+    sensor: &Sensor,
+    [rate, late]: [f64; 2],
+    seed: u64,
+    flaw: &dyn Fn(f64, [f64; 6]) -> [f64; 6],
+) -> InMemory {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let messages: Vec<[f64; 6]> = (0..(30.0 * rate) as usize)
+        .map(|k| {
+            let t = late + k as f64 / rate;
+            let wrench = moving.wrench(points, &|t| moving.position(t), t);
+            flaw(t, sensor.read(wrench, &mut random))
+        })
+        .collect();
+    let places = (0..30_000).map(|k| (k, (f64::from(k) * 1e-3 - late) * rate));
+    let places: Vec<(i32, f64)> = places
+        .filter(|(_, place)| *place >= 0.0 && *place < messages.len() as f64 - 1.0)
+        .collect();
+    let t: Vec<f64> = places.iter().map(|(k, _)| f64::from(*k) * 1e-3).collect();
+    let q = t.iter().map(|t| moving.position(*t)).collect();
+    let read: Vec<[f64; 6]> = (places.iter())
+        .map(|(_, place)| {
+            let (before, share) = (*place as usize, place.fract());
+            let [a, b] = [messages[before], messages[before + 1]];
+            std::array::from_fn(|c| a[c] + share * (b[c] - a[c]))
+        })
+        .collect();
+    let mut made = block(format!("interpolated {seed}"), t, q, &read);
+    let numbers = places.iter().map(|(_, place)| place + 1.5).collect();
+    made.blocks[0]
+        .extra
+        .push((WRENCH_MESSAGE.to_owned(), numbers));
+    made
 }
 
 /// Returns a recording of poses, one row each.

@@ -1,6 +1,6 @@
 //! The load by the wrist sensor: accuracy, flaws of sensors that are found, and what the data do not show.
 
-use super::made::{Moving, Points, Sensor, parameters, poses, recorded, tool};
+use super::made::{Moving, Points, Sensor, interpolated, parameters, poses, recorded, tool};
 use crate::{LoadError, LoadIdentification, LoadOptions, identify_load};
 use rand::{RngExt, SeedableRng};
 use rig_model::robot::{IRP6_TEMPLATE, Reads, Robot, TX40, WristSensor};
@@ -450,6 +450,8 @@ fn what_poses_cannot_show_is_named_with_a_pose_that_would() {
     );
     assert!(!six.inertia_shown && six.body.mass > 0.0);
     assert!(six.parameters[..4].iter().all(|p| p.shown));
+    let numbers = crate::controller_numbers(&six).unwrap();
+    assert!(numbers.universal_robots.ends_with("[0, 0, 0, 0, 0, 0])"));
     // Two poses leave a direction of the centre of mass open; the named pose closes it.
     let two = found(&all[..2]).unwrap();
     let missing = &two.not_shown[0];
@@ -457,6 +459,11 @@ fn what_poses_cannot_show_is_named_with_a_pose_that_would() {
         missing.parameters.iter().all(|p| p.starts_with('m')),
         "{missing:?}"
     );
+    // No controller gets a centre of mass that nothing supports, and the URDF says so.
+    assert!(crate::controller_numbers(&two).is_none());
+    assert!(two.centre_shown().contains(&false));
+    let unknown = format!("do not show {}", missing.parameters.join(", "));
+    assert!(crate::urdf_link(&two).contains(&unknown));
     let mut three = all[..2].to_vec();
     three.push(missing.pose.clone().unwrap());
     let three = found(&three).unwrap();
@@ -558,6 +565,31 @@ fn readings_that_no_load_gives_are_refused() {
     assert!(text.contains("looks like N·mm"), "{text}");
     let text = refused(&|_, [a, b, c, d, _, f]| [a, b, c, d, 0.0, f]);
     assert!(text.contains("my of made 2 is 0"), "{text}");
+    // A position of the sensor in millimetres is no unit of the moments, neither in motion nor at rest.
+    let mut far = Moving::new(irp6(), 0.8, 11);
+    let at = &mut far.robot.wrist_sensor.as_mut().unwrap().position;
+    *at = [1.5, 0.0, 4.0];
+    let rest: Vec<Vec<f64>> = [1.0, 14.0, 29.0].map(|t| moving.position(t)).to_vec();
+    for recording in [
+        recorded(
+            &moving,
+            &points,
+            &Sensor::default(),
+            [20.0, 100.0],
+            2,
+            &|_, r| r,
+        ),
+        poses(&moving, &points, &Sensor::default(), &rest, 2),
+    ] {
+        let text = identify_load(&far.robot, &[&recording], &[], &LoadOptions::default())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            text.contains("look like mm: these would be [0.0015, 0, 0.004] m")
+                && !text.contains("moments"),
+            "{text}"
+        );
+    }
     // A sensor that nothing hangs on.
     let nothing: Points = vec![(1e-9, [0.0; 3])];
     let motion = recorded(
@@ -767,6 +799,55 @@ fn correlated_noise_turns_no_sensor_and_leans_no_base() {
         }
     }
     assert!(invented <= 1, "{invented} of 30");
+}
+
+/// Between two messages of the sensor, the noise is interpolated: little of it is left above the band. A force that no load
+/// has is told all the same.
+#[test]
+fn a_sensor_that_is_slower_than_the_joints_is_not_accused() {
+    let points = tool();
+    let sensor = Sensor {
+        noise: [0.2, 0.02],
+        ..Sensor::default()
+    };
+    let cable = |t: f64, mut read: [f64; 6]| {
+        read[0] += 0.5 * (3.1 * t).sin();
+        read
+    };
+    let moving = Moving::new(irp6(), 0.8, 5);
+    let load = |timing: [f64; 2], flaw: &dyn Fn(f64, [f64; 6]) -> [f64; 6]| {
+        let motion = interpolated(&moving, &points, &sensor, timing, 5, flaw);
+        identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap()
+    };
+    for timing in [
+        [1000.0, 0.0005],
+        [500.0, 0.0],
+        [500.0, 0.0003],
+        [333.0, 0.0],
+        [100.0, 0.004],
+    ] {
+        let found = load(timing, NO_FLAW);
+        assert!(
+            found.warnings.is_empty(),
+            "{timing:?}: {:?}",
+            found.warnings
+        );
+        let told = found.sensor.unwrap();
+        for kind in 0..2 {
+            let ratio = told.residual[kind] / told.noise.unwrap()[kind];
+            println!("{timing:?} {kind}: residual {ratio} of the noise");
+            assert!((0.85..1.15).contains(&ratio), "{timing:?}: {ratio}");
+        }
+    }
+    let found = load([100.0, 0.004], &cable);
+    assert!(
+        found
+            .warnings
+            .iter()
+            .any(|w| w.contains("Something else acts")),
+        "{:?}",
+        found.warnings
+    );
 }
 
 #[test]
