@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::run::{refuse, rig, robot};
+use crate::run::{refuse, rig, robot, succeed};
 
 /// A recording of the one-link rig: 4 s at 1 kHz of a motion within the limits, changed by `change`.
 fn recording(folder: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf {
@@ -383,4 +383,40 @@ fn impossible_numbers_are_named_by_line_and_column() {
     let said = sentence(&path);
     names(&said, &["recording.csv:702", "`q1`", "no position"]);
     assert!(!said.contains("0000000"), "{said}");
+}
+
+/// A trajectory of another kind than the command runs: one sentence says what the file holds and what is wanted.
+#[test]
+fn a_file_that_is_no_motion_is_named_as_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut excite = rig();
+    excite.args([
+        "excite",
+        "--kind",
+        "staircase",
+        "--start",
+        "-1.5708",
+        "--robot",
+    ]);
+    excite.arg(robot("one-link.toml"));
+    succeed(excite.arg("--out").arg(at("motion.csv")));
+    let wanted = [
+        "not the parameters of a motion",
+        "rig excite --out motion.toml",
+    ];
+    let mut record = rig();
+    record.args(["record", "--emulated", "--home", "-1.5708", "--trajectory"]);
+    record.arg(at("motion.csv")).arg("--out").arg(at("run.csv"));
+    let said = refuse(&mut record);
+    names(&said, &["motion.csv holds samples in columns"]);
+    names(&said, &wanted);
+    let mut simulate = rig();
+    simulate.args(["simulate", "--robot"]);
+    simulate.arg(robot("one-link.toml"));
+    simulate.arg("--trajectory").arg(robot("one-link.toml"));
+    let said = refuse(simulate.arg("--out").arg(at("run.csv")));
+    names(&said, &["one-link.toml holds a robot description"]);
+    names(&said, &wanted);
+    assert!(!at("run.csv").exists());
 }

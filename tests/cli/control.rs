@@ -103,6 +103,12 @@ fn tool_presses_with_the_wanted_force() {
             hybrid["overshoot"].as_f64().unwrap() <= 0.1,
             "{name}: {hybrid}"
         );
+        // The overshoot is that of the whole contact.
+        let peak = hybrid["slide_peak"].as_f64().unwrap_or(0.0);
+        let band =
+            (1.0 + hybrid["overshoot"].as_f64().unwrap()) * hybrid["force"].as_f64().unwrap();
+        assert!(peak <= band + 1e-9, "{name}: {hybrid}");
+        assert!(hybrid["overshoot_before_slide"].is_number(), "{name}");
         assert_eq!(hybrid["bounces"], 0, "{name}");
         let error = hybrid["steady_error"].as_f64().unwrap().abs();
         assert!(

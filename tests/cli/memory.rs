@@ -4,7 +4,7 @@
 use std::fs;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use crate::run::{rig, robot};
@@ -26,19 +26,19 @@ fn write(path: &Path, rows: usize) {
     }
 }
 
-/// Largest resident memory of an identification, KiB.
-fn peak(data: &Path) -> u64 {
-    let out = tempfile::tempdir().unwrap();
-    let mut child = rig()
+/// Returns an identification from a recording.
+fn identification(data: &Path, out: &Path) -> Command {
+    let mut command = rig();
+    command
         .args(["identify", "--robot"])
-        .arg(robot("one-link.toml"))
-        .arg("--data")
-        .arg(data)
-        .arg("--out")
-        .arg(out.path())
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
+        .arg(robot("one-link.toml"));
+    command.arg("--data").arg(data).arg("--out").arg(out);
+    command
+}
+
+/// Returns the largest resident memory of a command, KiB.
+fn peak(mut command: Command) -> u64 {
+    let mut child = command.stdout(Stdio::null()).spawn().unwrap();
     let status = format!("/proc/{}/status", child.id());
     let mut peak = 0;
     while child.try_wait().unwrap().is_none() {
@@ -63,7 +63,22 @@ fn a_recording_eight_times_as_long_needs_no_more_memory() {
     );
     write(&short, 400_000);
     write(&long, 3_200_000);
-    let (small, large) = (peak(&short), peak(&long));
+    let of = |data: &Path, out: &str| peak(identification(data, &folder.path().join(out)));
+    let (small, large) = (of(&short, "small"), of(&long, "large"));
     println!("peak memory: {small} KiB for 0.4 million rows, {large} KiB for 3.2 million");
+    assert!(large < small + small / 4, "{small} KiB grew to {large} KiB");
+}
+
+#[test]
+fn a_look_into_a_file_eight_times_as_long_needs_no_more_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let [small, large] = [100_000, 800_000].map(|rows| {
+        let path = folder.path().join(format!("{rows}.csv"));
+        write(&path, rows);
+        let mut command = rig();
+        command.arg("inspect").arg(&path);
+        peak(command)
+    });
+    println!("peak memory: {small} KiB for 0.1 million rows, {large} KiB for 0.8 million");
     assert!(large < small + small / 4, "{small} KiB grew to {large} KiB");
 }

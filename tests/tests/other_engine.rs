@@ -9,59 +9,17 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
 
 use rig_data::Source;
 use rig_data::prepare::Recording;
 use rig_identify::{Estimator, ModelKind, Options, identified_robot, identify};
 use rig_model::robot::{Description, IRP6_TEMPLATE, Robot};
 use rig_output::data_dir;
-
-fn scripts() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("other_engine")
-}
-
-fn has_engines(python: &Path) -> bool {
-    Command::new(python)
-        .args(["-c", "import mujoco, numpy, pinocchio"])
-        .output()
-        .is_ok_and(|o| o.status.success())
-}
+use rig_tests::engines::{self, scripts};
 
 /// A Python with both engines.
 fn python() -> Option<&'static PathBuf> {
-    static FOUND: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let find = || {
-        let named = std::env::var_os("RIG_PYTHON").map(PathBuf::from);
-        let usual = Path::new(env!("CARGO_TARGET_TMPDIR")).join("other_engine");
-        let own = usual.join("bin/python");
-        for python in named
-            .into_iter()
-            .chain([PathBuf::from("python3"), own.clone()])
-        {
-            if has_engines(&python) {
-                return Some(python);
-            }
-        }
-        let made = Command::new("python3")
-            .args(["-m", "venv"])
-            .arg(&usual)
-            .output()
-            .is_ok_and(|o| o.status.success())
-            && Command::new(&own)
-                .args(["-m", "pip", "install", "--quiet", "-r"])
-                .arg(scripts().join("requirements.txt"))
-                .output()
-                .is_ok_and(|o| o.status.success());
-        (made && has_engines(&own)).then_some(own)
-    };
-    let found = FOUND.get_or_init(find).as_ref();
-    if found.is_none() {
-        println!(
-            "SKIPPED: no Python with mujoco and pin; install tests/other_engine/requirements.txt and name it in RIG_PYTHON."
-        );
-    }
-    found
+    engines::python(Path::new(env!("CARGO_TARGET_TMPDIR")))
 }
 
 /// robot.urdf, train.csv, holdout.csv and truth.json of an arm, made in `place`.
@@ -231,4 +189,40 @@ fn urdf_of_an_identified_arm_loads_in_a_standard_parser() {
         &identified,
         &original.with_values(&identified).unwrap().text,
     );
+}
+
+/// `tests/mjcf/load.py` gives the fragment to MuJoCo, at joints of the same names.
+#[test]
+fn mujoco_takes_the_values_of_joints_from_a_written_fragment() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mjcf = Path::new(env!("CARGO_MANIFEST_DIR")).join("mjcf");
+    let robot = Description::load(&mjcf.join("arm.xml")).unwrap().robot;
+    let path = folder.path().join("joints.xml");
+    std::fs::write(&path, robot.to_mjcf_joints().text).unwrap();
+    let names = robot.joints.iter().map(|joint| joint.name.as_str());
+    let made = Command::new(python)
+        .arg(mjcf.join("load.py"))
+        .arg(&path)
+        .args(names)
+        .output()
+        .unwrap();
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let found: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
+    for (name, key, want) in [
+        ("pan", "armature", 0.01),
+        ("lift", "armature", 0.3),
+        ("lift", "damping", 1.5),
+        ("lift", "frictionloss", 0.8),
+        ("lift", "gear", -80.0),
+        ("roll", "gear", 1.0),
+        ("slide", "damping", 0.2),
+    ] {
+        let own = found[name][key].as_f64().unwrap();
+        assert!((own - want).abs() < 1e-12, "{name} {key}: {own}");
+    }
 }

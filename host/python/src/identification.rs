@@ -9,7 +9,7 @@ use rig::commands::{
     write_identification,
 };
 use rig_data::prepare::{Choice, PrepareOptions, as_recordings};
-use rig_identify::{Estimator, Options, identified_robot};
+use rig_identify::{Estimator, Options, Warning, identified_robot};
 use rig_model::robot::{Description, MOST_LEAD};
 use rig_output::folder;
 
@@ -170,7 +170,7 @@ impl Identification {
     /// Sentences; also issued as :class:`Remark`.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.found.warnings.clone()
+        self.found.sentences()
     }
 
     /// The description with the identified values.
@@ -313,8 +313,8 @@ impl Job {
         let (a, b) = (as_recordings(&a), as_recordings(&b));
         let mut found = rig_identify::identify(robot, &a, &b, &self.options)?;
         for inputs in both {
-            found.warnings.extend(inputs.heard());
-            found.warnings.extend(inputs.outside());
+            let told = inputs.heard().into_iter().chain(inputs.outside());
+            found.warnings.extend(told.map(Warning::from));
         }
         let Impossible { refused, doubtful } = Impossible::of(robot, &found);
         if !self.even_if_wrong && !refused.is_empty() {
@@ -323,7 +323,8 @@ impl Job {
                 refused.join(" ")
             )));
         }
-        (found.warnings).splice(0..0, refused.into_iter().chain(doubtful));
+        let first = refused.into_iter().chain(doubtful);
+        (found.warnings).splice(0..0, first.map(Warning::from));
         Ok((found, warnings, remarks))
     }
 
@@ -446,12 +447,15 @@ fn result(
     (mut found, warnings, remarks): Found,
     name: &dyn Fn(String) -> String,
 ) -> PyResult<Identification> {
-    for list in [&mut found.warnings, &mut found.procedure] {
-        list.iter_mut().for_each(|text| *text = name(text.clone()));
+    for text in &mut found.procedure {
+        *text = name(text.clone());
+    }
+    for warning in &mut found.warnings {
+        *warning = name(warning.to_string()).into();
     }
     let named = |list: Vec<String>| -> Vec<String> { list.into_iter().map(name).collect() };
     warn(py, &named(remarks))?;
-    warn(py, &found.warnings)?;
+    warn(py, &found.sentences())?;
     let json = serde_json::to_string(&found).map_err(|error| {
         Error::new_err(format!("The result cannot be written as JSON: {error}."))
     })?;

@@ -7,7 +7,7 @@ use rig::commands::Cli;
 
 fn main() -> ExitCode {
     match Cli::parse().run() {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(status) => ExitCode::from(status),
         Err(error) => {
             eprintln!("rig: {error}");
             ExitCode::FAILURE

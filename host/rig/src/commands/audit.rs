@@ -20,7 +20,7 @@ pub(crate) fn run(
 ) -> Result<(), CommandError> {
     let audit = audit_file(path, choice, seed)?;
     if json {
-        ui.say(&format!("{:#}", as_json(path, &audit)));
+        ui.print(&format!("{:#}", as_json(path, &audit)));
         return Ok(());
     }
     for finding in &audit.findings {

@@ -49,7 +49,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             "rules_agree": same,
             "base_parameters": parameters,
         });
-        ui.say(&format!("{result:#}"));
+        ui.print(&format!("{result:#}"));
         return Ok(());
     }
     ui.say(&format!("{}: {} base parameters", robot.name, list.len()));

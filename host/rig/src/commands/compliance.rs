@@ -6,6 +6,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, recordings, refuse_twice};
+use super::map_arg::UnitArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
@@ -71,6 +72,11 @@ pub(crate) struct Args {
     /// The two joints of the map, separated by a comma [default: the second and the third, else the first two]
     #[arg(long, value_delimiter = ',', value_name = "JOINT,JOINT")]
     map: Vec<String>,
+    #[command(flatten)]
+    columns: UnitArg,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -97,6 +103,13 @@ enum WrenchArg {
     Sensor,
 }
 
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join("compliance.json"))
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -108,8 +121,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_twice(&args.frequency, "give every recording once")?;
     let robot = args.robot.load(ui)?;
     let options = args.options(&robot)?;
-    let load = Inputs::read_with(&robot, &args.load, EffortNeed::Optional)?;
-    let response = Inputs::read_with(&robot, &args.frequency, EffortNeed::Required)?;
+    let mapping = args.columns.mapping()?;
+    let read = |paths, need| Inputs::read_mapped(&robot, paths, need, &mapping);
+    let load = read(&args.load, EffortNeed::Optional)?;
+    let response = read(&args.frequency, EffortNeed::Required)?;
     for warning in load.warnings().chain(response.warnings()) {
         ui.remark(&warning);
     }

@@ -64,8 +64,8 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = Settings::default().damping)]
     damping: f64,
     /// Control ticks a second, Hz
-    #[arg(long, default_value_t = Settings::default().rate)]
-    rate: f64,
+    #[arg(long, help = format!("Control ticks a second, Hz [default: {}]", Settings::default().rate))]
+    rate: Option<f64>,
     /// The torque acts in the tick of its measurement, not one later
     #[arg(long)]
     no_delay: bool,
@@ -80,6 +80,9 @@ pub(crate) struct Args {
     /// Seed of the noise and of the wrong parameters
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -170,6 +173,13 @@ const MOTIONS: [&str; 5] = [
 
 /// Largest share of wrong parameters, per cent: beyond it some inertia could vanish.
 const MOST_WRONG: f64 = 90.0;
+
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join("control.json"))
+    }
+}
 
 /// Runs the command.
 ///
@@ -349,8 +359,11 @@ impl Whole<'_> {
         };
         let rate = 1.0 / sampled.period;
         if (rate / settings.rate - 1.0).abs() > 1e-6 {
+            let given = self.args.rate.map_or(String::new(), |given| {
+                format!(" --rate {given} was not used.")
+            });
             evaluation.notes.push(format!(
-                "The laws run at {rate:.6} Hz, the rate of the sampled trajectory; a .toml trajectory runs at any rate."
+                "The laws run at {rate:.6} Hz, the rate of the sampled trajectory; a .toml trajectory runs at any rate.{given}"
             ));
             settings.rate = rate;
             settings.check()?;
@@ -441,7 +454,7 @@ fn settings(args: &Args) -> Result<Settings, CommandError> {
     let settings = Settings {
         bandwidth: args.bandwidth,
         damping: args.damping,
-        rate: args.rate,
+        rate: args.rate.unwrap_or(Settings::default().rate),
         delay: !args.no_delay,
         resolution: args.resolution,
         friction_gain: args.friction_gain,
@@ -622,8 +635,12 @@ fn lines(evaluation: &Evaluation) -> Vec<String> {
         let slide = own.slide_peak.map_or_else(String::new, |peak| {
             format!(", at most {} N during the slide", short(peak))
         });
+        let before = own.slide_peak.map_or_else(String::new, |_| {
+            let before = short(100.0 * own.overshoot_before_slide);
+            format!(" ({before} % before the slide)")
+        });
         let mut line = format!(
-            "{} with {}: {} N, overshoot {} % before the slide, settled {settling}, steady error {} N{slide}, {} bounces",
+            "{} with {}: {} N, overshoot {} %{before}, settled {settling}, steady error {} N{slide}, {} bounces",
             own.law.name(),
             own.model,
             short(own.force),

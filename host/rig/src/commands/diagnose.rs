@@ -12,17 +12,18 @@ use super::error::CommandError;
 use super::input::{
     Inputs, RobotArg, command_line, recordings, refuse_as_rest, refuse_shared, refuse_twice,
 };
+use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::pictures::{self, forget};
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
-use rig_data::EffortNeed;
 use rig_data::prepare::Recording;
 use rig_data::prepare::Unburdened;
 use rig_data::runs::Run;
+use rig_data::{EffortNeed, Mapping};
 use rig_diagnose::experiment::FILE;
-use rig_diagnose::outcome::Diagnosis;
+use rig_diagnose::outcome::{Diagnosis, Verdict};
 use rig_diagnose::voltage::diagnose_voltage;
 use rig_diagnose::{DiagnoseError, Options, clamped, diagnose, sensor_zeros};
 use rig_model::robot::Robot;
@@ -81,6 +82,15 @@ pub(crate) struct Args {
     /// Fit although recordings look wrong (sign, unit, ratio, clock, swapped columns); the faults are printed first
     #[arg(long)]
     even_if_wrong: bool,
+    #[command(flatten)]
+    columns: MapArg,
+    /// Give the verdict as exit status: 0 nothing-missing, 10 explained, 11 parameter-change, 12 remainder, 13 data-fault
+    /// (1 and 2 remain errors)
+    #[arg(long)]
+    exit_code: bool,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -92,21 +102,29 @@ pub(crate) struct Args {
     seed: u64,
 }
 
-/// Runs the command.
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join(DIAGNOSIS))
+    }
+}
+
+/// Runs the command; returns the exit status.
 ///
 /// # Errors
 /// A sentence that names the wrong file, line or value.
-pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
     can_take(&args.out, &[MODEL, DIAGNOSIS, REPORT, FILE])?;
     refuse_folder(&args.out, &[], args.force)?;
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
     refuse_repeated(args)?;
     // Wrong units do not stop the command: they give a verdict.
-    let (training, holdout, workflow) = read(&robot, args)?;
+    let mapping = args.columns.mapping()?;
+    let (training, holdout, workflow) = read(&robot, args, &mapping)?;
     refuse_without_effort(args, &training)?;
     let logs = Logs {
-        unburdened: Inputs::read(&robot, &args.pulls_off)?,
+        unburdened: Inputs::read_mapped(&robot, &args.pulls_off, EffortNeed::Required, &mapping)?,
         training,
         holdout,
     };
@@ -134,7 +152,22 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     write_diagnosis(&args.out, &found, &model, command_line(), warnings)?;
     printed::print(ui, &found, &args.out.join(REPORT));
-    Ok(())
+    Ok(if args.exit_code {
+        status(found.verdict)
+    } else {
+        0
+    })
+}
+
+/// Returns the exit status of a verdict.
+fn status(verdict: Verdict) -> u8 {
+    match verdict {
+        Verdict::NothingMissing => 0,
+        Verdict::Explained => 10,
+        Verdict::ParameterChange => 11,
+        Verdict::Remainder => 12,
+        Verdict::DataFault => 13,
+    }
 }
 
 /// Refuses recordings that are given twice or for two uses.
@@ -296,16 +329,20 @@ type Workflow = fn(
 ) -> Result<(Diagnosis, Robot), DiagnoseError>;
 
 /// Opens the recordings and selects the workflow: a single joint without torque or current is diagnosed by its voltage.
-fn read(robot: &Robot, args: &Args) -> Result<(Inputs, Inputs, Workflow), CommandError> {
+fn read(
+    robot: &Robot,
+    args: &Args,
+    mapping: &Mapping,
+) -> Result<(Inputs, Inputs, Workflow), CommandError> {
     if robot.joints.len() == 1 {
-        let all = |paths| Inputs::read_with(robot, paths, EffortNeed::Optional);
+        let all = |paths| Inputs::read_mapped(robot, paths, EffortNeed::Optional, mapping);
         let (training, holdout) = (all(&args.data)?, all(&args.holdout)?);
         if !training.any_effort() && !holdout.any_effort() {
             return Ok((training, holdout, diagnose_voltage));
         }
     }
-    let training = Inputs::read(robot, &args.data)?;
-    let holdout = Inputs::read(robot, &args.holdout)?;
+    let all = |paths| Inputs::read_mapped(robot, paths, EffortNeed::Required, mapping);
+    let (training, holdout) = (all(&args.data)?, all(&args.holdout)?);
     Ok((training, holdout, diagnose))
 }
 
@@ -314,7 +351,9 @@ fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandEr
     let Some(path) = &args.drive_off else {
         return Ok(Vec::new());
     };
-    let log = Inputs::read(robot, std::slice::from_ref(path))?;
+    let mapping = args.columns.mapping()?;
+    let path = std::slice::from_ref(path);
+    let log = Inputs::read_mapped(robot, path, EffortNeed::Required, &mapping)?;
     let zeros = (recordings(&log.listened()).into_iter())
         .map(sensor_zeros)
         .collect::<Result<Vec<_>, _>>()?
@@ -327,7 +366,8 @@ fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandEr
 
 /// Recordings made with the joints clamped.
 fn clamps(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<Run>, CommandError> {
-    let logs = Inputs::read(robot, &args.clamped)?;
+    let mapping = args.columns.mapping()?;
+    let logs = Inputs::read_mapped(robot, &args.clamped, EffortNeed::Required, &mapping)?;
     let runs = (recordings(&logs.listened()).into_iter())
         .map(clamped)
         .collect::<Result<Vec<_>, _>>()?

@@ -6,10 +6,12 @@ use clap::Args as ClapArgs;
 
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, Use, command_line, recordings, refuse_faults};
+use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
+use rig_data::EffortNeed;
 use rig_identify::{DroppedPass, FrictionMap, FrictionMapOptions, Options, friction_map, identify};
 use rig_model::robot::{JointKind, Robot};
 use rig_output::format_significant;
@@ -36,6 +38,11 @@ pub(crate) struct Args {
     /// Draw the map although columns look wrong (sign, unit, ratio, clock, swapped); prints the faults
     #[arg(long)]
     even_if_wrong: bool,
+    #[command(flatten)]
+    columns: MapArg,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -61,6 +68,13 @@ fn joint_of(robot: &Robot, given: &str) -> Result<usize, CommandError> {
     })
 }
 
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join("friction-map.json"))
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -70,8 +84,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_folder(&args.out, &[], args.force)?;
     let robot = args.robot.load(ui)?;
     let joint = joint_of(&robot, &args.joint)?;
-    let training = Inputs::read(&robot, &args.data)?;
-    let sweep = Inputs::read(&robot, std::slice::from_ref(&args.sweep))?;
+    let mapping = args.columns.mapping()?;
+    let read = |paths| Inputs::read_mapped(&robot, paths, EffortNeed::Required, &mapping);
+    let training = read(&args.data)?;
+    let sweep = read(std::slice::from_ref(&args.sweep))?;
     for warning in training.warnings().chain(sweep.warnings()) {
         ui.remark(&warning);
     }

@@ -14,13 +14,15 @@ use super::error::CommandError;
 use super::input::{
     Inputs, RobotArg, Use, command_line, recordings, refuse_faults, refuse_shared, refuse_twice,
 };
+use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
+use rig_data::EffortNeed;
 use rig_data::prepare::{Choice, PrepareOptions};
 use rig_identify::{
-    Estimator, Identification, Loss, ModelKind, Options, identified_robot, identify,
+    Estimator, Identification, Loss, ModelKind, Options, Warning, identified_robot, identify,
 };
 use rig_model::robot::{Description, MOST_LEAD, Robot};
 use rig_output::{can_take, folder, write_whole};
@@ -208,6 +210,11 @@ pub(crate) struct Args {
     /// Fit although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); prints the faults
     #[arg(long)]
     even_if_wrong: bool,
+    #[command(flatten)]
+    columns: MapArg,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -242,6 +249,13 @@ impl Args {
     }
 }
 
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join(JSON))
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -251,8 +265,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_folder(&args.out, &[], args.force)?;
     let description = args.robot.describe(ui)?;
     let robot = &description.robot;
-    let training = Inputs::read(robot, &args.data)?;
-    let holdout = Inputs::read(robot, &args.holdout)?;
+    let mapping = args.columns.mapping()?;
+    let read = |paths| Inputs::read_mapped(robot, paths, EffortNeed::Required, &mapping);
+    let (training, holdout) = (read(&args.data)?, read(&args.holdout)?);
     let warnings: Vec<String> = training.warnings().chain(holdout.warnings()).collect();
     for warning in &warnings {
         ui.remark(warning);
@@ -346,8 +361,8 @@ fn identified(
     )?;
     drop(progress);
     for inputs in [training, holdout] {
-        found.warnings.extend(inputs.heard());
-        found.warnings.extend(inputs.outside());
+        let told = inputs.heard().into_iter().chain(inputs.outside());
+        found.warnings.extend(told.map(Warning::from));
     }
     let Impossible { refused, doubtful } = Impossible::of(robot, &found);
     if !args.even_if_wrong && !refused.is_empty() {
@@ -356,7 +371,8 @@ fn identified(
             refused.join(" ")
         )));
     }
-    (found.warnings).splice(0..0, refused.into_iter().chain(doubtful));
+    let first = refused.into_iter().chain(doubtful);
+    (found.warnings).splice(0..0, first.map(Warning::from));
     Ok(found)
 }
 

@@ -9,7 +9,7 @@ use super::error::CommandError;
 use super::input::described;
 use super::overwrite::refuse_file;
 use super::ui::Ui;
-use rig_model::robot::{self, ChainChoice};
+use rig_model::robot::{self, ChainChoice, Origin};
 use rig_output::write_whole;
 
 /// Robots with a prepared description.
@@ -40,7 +40,7 @@ pub(crate) struct Args {
     /// Which robot
     #[arg(value_enum, required_unless_present = "from", conflicts_with = "from")]
     pub(crate) kind: Option<Kind>,
-    /// URDF file whose values the description gets
+    /// URDF or MJCF file whose values the description gets
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,
     #[command(flatten)]
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Writes the chain of a URDF file as TOML.
+/// Writes the chain of a URDF or MJCF file as TOML.
 fn from_urdf(from: &Path, args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let name = from.with_extension("toml");
     let name = name
@@ -100,9 +100,9 @@ fn from_urdf(from: &Path, args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let path = args.out.clone().unwrap_or(name);
     refuse_file(&path, args.force)?;
     let description = described(from, &args.chain, ui)?;
-    if description.urdf.is_none() {
+    if description.robot.origin != Origin::Urdf {
         return Err(CommandError::Sentence(format!(
-            "{} is a TOML description already; --from takes a URDF file.",
+            "{} is a TOML description already; --from takes a URDF or MJCF file.",
             from.display()
         )));
     }
@@ -112,7 +112,7 @@ fn from_urdf(from: &Path, args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .to_string_lossy();
     let mut head = vec![
         format!(
-            "The chain of {source} with its dynamics. Lines that begin with # hold what a URDF does not state:"
+            "The chain of {source} with its dynamics. Lines that begin with # hold what the file does not state:"
         ),
         "remove the # and write a value behind the = to use one.".to_owned(),
     ];

@@ -10,8 +10,8 @@ use super::error::CommandError;
 use super::ui::{Progress, Ui};
 use rig_data::prepare::{PrepareError, Recording};
 use rig_data::{
-    Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Source, StrangeReference, Warning,
-    plausibility, strange_rates, strange_references,
+    Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Mapping, Source, StrangeReference,
+    Warning, plausibility, strange_rates, strange_references,
 };
 use rig_diagnose::faults::faults_at_start;
 use rig_model::robot::{Description, Joint, JointKind, Robot};
@@ -20,7 +20,7 @@ use rig_output::{Finding, format_significant, one_a_kind, worst_first};
 /// The robot description.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct RobotArg {
-    /// Robot description, TOML or URDF (`rig init` writes one to start from)
+    /// Robot description, TOML, URDF or MJCF (`rig init` writes one to start from)
     #[arg(long = "robot", value_name = "FILE")]
     path: PathBuf,
     #[command(flatten)]
@@ -204,9 +204,22 @@ impl Inputs {
         paths: &[PathBuf],
         need: EffortNeed,
     ) -> Result<Self, CommandError> {
+        Self::read_mapped(robot, paths, need, &Mapping::default())
+    }
+
+    /// As [`Self::read_with`]; `mapping` says which channels are the columns.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_mapped(
+        robot: &Robot,
+        paths: &[PathBuf],
+        need: EffortNeed,
+        mapping: &Mapping,
+    ) -> Result<Self, CommandError> {
         let sources = paths
             .iter()
-            .map(|path| Source::open_with(path, robot, need))
+            .map(|path| Source::open_mapped(path, robot, need, mapping))
             .collect::<Result<Vec<_>, _>>()?;
         let heard = sources.iter().map(|_| RefCell::default()).collect();
         let outside = sources.iter().map(|_| RefCell::default()).collect();

@@ -49,7 +49,7 @@ pub(crate) struct Args {
     robot: Option<PathBuf>,
     #[command(flatten)]
     chain: ChainArg,
-    /// Trajectory to load (`rig excite` writes one); the page can load another
+    /// Trajectory to load (.toml by `rig excite`); the page can load another
     #[arg(long)]
     trajectory: Option<PathBuf>,
     /// Position of the link at the start, rad; an incremental encoder cannot measure it. Without it the emulated link

@@ -9,6 +9,7 @@ use super::error::CommandError;
 use super::input::{
     Inputs, RobotArg, Use, command_line, real, recordings, refuse_faults, refuse_twice,
 };
+use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
@@ -71,6 +72,11 @@ pub(crate) struct Args {
     /// Go on with the best explanation if channels look wrong; prints what is wrong
     #[arg(long)]
     even_if_wrong: bool,
+    #[command(flatten)]
+    columns: MapArg,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -104,14 +110,19 @@ enum ReadsArg {
 struct Written<'a> {
     #[serde(flatten)]
     found: &'a LoadIdentification,
-    controllers: &'a ControllerNumbers,
+    /// Absent (null) if the data do not show mass and centre of mass.
+    controllers: Option<&'a ControllerNumbers>,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// A sentence that names the wrong file, line or value.
-pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join("load.json"))
+    }
+}
+
+/// Refuses options and files that do not fit together.
+fn check(args: &Args) -> Result<(), CommandError> {
     can_take(&args.out, &FILES)?;
     refuse_folder(&args.out, &[], args.force)?;
     refuse_twice(&args.data, "give every recording once")?;
@@ -122,14 +133,27 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
                 .to_owned(),
         ));
     }
+    Ok(())
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence that names the wrong file, line or value.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    check(args)?;
     let mut robot = args.robot.load(ui)?;
     sensor(args, &mut robot)?;
     let need = match args.by {
         Measured::Sensor => EffortNeed::Optional,
         Measured::Torque | Measured::Both => EffortNeed::Required,
     };
-    let with = Inputs::read_with(&robot, &args.data, need)?;
-    let without = Inputs::read_with(&robot, &args.without, need)?;
+    let mapping = match args.by {
+        Measured::Torque => args.columns.mapping()?,
+        Measured::Sensor | Measured::Both => args.columns.mapping()?.with_wrench(),
+    };
+    let read = |paths| Inputs::read_mapped(&robot, paths, need, &mapping);
+    let (with, without) = (read(&args.data)?, read(&args.without)?);
     for warning in with.warnings().chain(without.warnings()) {
         ui.remark(&warning);
     }
@@ -175,11 +199,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         warnings: with.warnings().chain(without.warnings()).collect(),
         ..Context::default()
     };
-    write(args, &found, &numbers, &context)?;
+    write(args, &found, numbers.as_ref(), &context)?;
     for warning in &found.warnings {
         ui.remark(warning);
     }
-    for line in lines(&robot, &found, &numbers) {
+    for line in lines(&robot, &found, numbers.as_ref()) {
         ui.say(&line);
     }
     ui.say(&format!(
@@ -214,12 +238,15 @@ fn sensor(args: &Args, robot: &mut Robot) -> Result<(), CommandError> {
         match list {
             [a, b, c] if list.iter().all(|v| v.abs() <= most) => Ok([*a, *b, *c]),
             _ => Err(CommandError::Sentence(format!(
-                "--{name} {list:?} is not possible: give three numbers of at most {most} {unit}."
+                "--{name} {list:?} is not possible: give three numbers of at most {most} {unit}, in {unit}."
             ))),
         }
     };
     if let Some(list) = &args.sensor_position {
-        sensor.position = three("sensor-position", list, 10.0, "m")?;
+        sensor.position = three("sensor-position", list, 1e4, "m")?;
+        if let Some(text) = sensor.too_far() {
+            return Err(CommandError::Sentence(text));
+        }
     }
     if let Some(list) = &args.sensor_rotation {
         sensor.rotation = three("sensor-rotation", list, 7.0, "rad")?;
@@ -243,7 +270,7 @@ fn sensor(args: &Args, robot: &mut Robot) -> Result<(), CommandError> {
 fn write(
     args: &Args,
     found: &LoadIdentification,
-    controllers: &ControllerNumbers,
+    controllers: Option<&ControllerNumbers>,
     context: &Context,
 ) -> Result<(), CommandError> {
     folder(&args.out)?;
@@ -264,16 +291,21 @@ fn write(
 }
 
 /// Returns the printed answer.
-fn lines(robot: &Robot, found: &LoadIdentification, numbers: &ControllerNumbers) -> Vec<String> {
+fn lines(
+    robot: &Robot,
+    found: &LoadIdentification,
+    numbers: Option<&ControllerNumbers>,
+) -> Vec<String> {
     let value = |v: &Value| format_value(v.value, v.std);
+    let marked = |v: &Value, shown: bool| {
+        let mark = if shown { "" } else { " (not shown)" };
+        format!("{}{mark}", value(v))
+    };
+    let centre = found.centre.iter().zip(found.centre_shown());
+    let centre: Vec<String> = centre.map(|(v, shown)| marked(v, shown)).collect();
     let mut lines = vec![
-        format!("mass {} kg", value(&found.mass)),
-        format!(
-            "centre of mass {}, {}, {} m in the flange frame",
-            value(&found.centre[0]),
-            value(&found.centre[1]),
-            value(&found.centre[2])
-        ),
+        format!("mass {} kg", marked(&found.mass, found.mass_shown())),
+        format!("centre of mass {} m in the flange frame", centre.join(", ")),
     ];
     if found.inertia_shown {
         let [xx, xy, xz, yy, yz, zz] = found.inertia.each_ref().map(value);
@@ -303,8 +335,25 @@ fn lines(robot: &Robot, found: &LoadIdentification, numbers: &ControllerNumbers)
         }
         lines.push(line);
     }
-    lines.push(format!("Universal Robots: {}", numbers.universal_robots));
-    lines.push(format!("KUKA: {}", numbers.kuka));
-    lines.push(format!("Franka: {}", numbers.franka));
+    lines.extend(for_controllers(found, numbers));
     lines
+}
+
+/// Returns the printed numbers for controllers.
+fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumbers>) -> Vec<String> {
+    let Some(numbers) = numbers else {
+        return vec![
+            "numbers for controllers: none, because these data do not show mass and centre of mass"
+                .to_owned(),
+        ];
+    };
+    let zero = match found.inertia_shown {
+        true => "",
+        false => " (inertia not shown, given as zero)",
+    };
+    vec![
+        format!("Universal Robots: {}{zero}", numbers.universal_robots),
+        format!("KUKA: {}{zero}", numbers.kuka),
+        format!("Franka: {}{zero}", numbers.franka),
+    ]
 }

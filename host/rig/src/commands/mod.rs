@@ -7,6 +7,7 @@ mod base;
 mod board;
 mod chain_arg;
 mod compare;
+mod completions;
 mod compliance;
 mod control;
 mod demo;
@@ -18,9 +19,12 @@ mod friction_map;
 mod identify;
 mod init;
 mod input;
+mod inspect;
 mod interrupts;
 mod live;
 mod load;
+mod map_arg;
+mod mjcf;
 mod overwrite;
 mod pictures;
 mod record;
@@ -29,7 +33,7 @@ mod ui;
 mod urdf;
 mod validate;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 pub use diagnose::write_diagnosis;
 pub use error::CommandError;
@@ -46,12 +50,16 @@ use ui::Ui;
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    /// Print errors alone, and what --json asks for
+    #[arg(long, global = true)]
+    quiet: bool,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
     Init(init::Args),
+    Inspect(inspect::Args),
     Record(record::Args),
     Live(live::Args),
     Board(board::Args),
@@ -60,6 +68,7 @@ enum Command {
     Simulate(simulate::Args),
     Base(base::Args),
     Urdf(urdf::Args),
+    Mjcf(mjcf::Args),
     Identify(identify::Args),
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
@@ -68,19 +77,21 @@ enum Command {
     Compare(compare::Args),
     Compliance(compliance::Args),
     Control(control::Args),
+    Completions(completions::Args),
 }
 
 impl Cli {
-    /// Runs the command.
+    /// Runs the command; returns the exit status.
     ///
     /// # Errors
     /// A sentence for the user.
-    pub fn run(self) -> Result<(), CommandError> {
-        let ui = Ui::new();
+    pub fn run(self) -> Result<u8, CommandError> {
+        let ui = if self.quiet { Ui::quiet() } else { Ui::new() };
         match self.command {
             None => demo::run(&demo::Args::default(), &ui),
             Some(Command::Demo(args)) => demo::run(&args, &ui),
             Some(Command::Init(args)) => init::run(&args, &ui),
+            Some(Command::Inspect(args)) => inspect::run(&args, &ui),
             Some(Command::Record(args)) => record::run(&args, &ui),
             Some(Command::Live(args)) => live::run(&args, &ui),
             Some(Command::Board(args)) => board::run(&args, &ui),
@@ -89,14 +100,34 @@ impl Cli {
             Some(Command::Simulate(args)) => simulate::run(&args, &ui),
             Some(Command::Base(args)) => base::run(&args, &ui),
             Some(Command::Urdf(args)) => urdf::run(&args, &ui),
-            Some(Command::Identify(args)) => identify::run(&args, &ui),
-            Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
-            Some(Command::Validate(args)) => validate::run(&args, &ui),
-            Some(Command::Diagnose(args)) => diagnose::run(&args, &ui),
-            Some(Command::Load(args)) => load::run(&args, &ui),
-            Some(Command::Compare(args)) => compare::run(&args, &ui),
-            Some(Command::Compliance(args)) => compliance::run(&args, &ui),
-            Some(Command::Control(args)) => control::run(&args, &ui),
+            Some(Command::Mjcf(args)) => mjcf::run(&args, &ui),
+            Some(Command::Identify(args)) => {
+                ui.with_json(args.json_file(), |ui| identify::run(&args, ui))
+            }
+            Some(Command::FrictionMap(args)) => {
+                ui.with_json(args.json_file(), |ui| friction_map::run(&args, ui))
+            }
+            Some(Command::Validate(args)) => {
+                ui.with_json(args.json_file(), |ui| validate::run(&args, ui))
+            }
+            Some(Command::Diagnose(args)) => {
+                return ui.with_json(args.json_file(), |ui| diagnose::run(&args, ui));
+            }
+            Some(Command::Completions(args)) => {
+                completions::run(&args, &mut Self::command(), &ui);
+                Ok(())
+            }
+            Some(Command::Load(args)) => ui.with_json(args.json_file(), |ui| load::run(&args, ui)),
+            Some(Command::Compare(args)) => {
+                ui.with_json(args.json_file(), |ui| compare::run(&args, ui))
+            }
+            Some(Command::Compliance(args)) => {
+                ui.with_json(args.json_file(), |ui| compliance::run(&args, ui))
+            }
+            Some(Command::Control(args)) => {
+                ui.with_json(args.json_file(), |ui| control::run(&args, ui))
+            }
         }
+        .map(|()| 0)
     }
 }

@@ -27,6 +27,7 @@ const RESULTS: &[&str] = &[
     "compliance.json",
     "compliance.toml",
     "control.json",
+    "inspect.json",
 ];
 
 /// Further files that the demonstration writes. Other commands ignore them: they may be the user's own recordings.

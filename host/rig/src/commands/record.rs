@@ -48,7 +48,7 @@ pub(crate) struct Args {
     robot: Option<PathBuf>,
     #[command(flatten)]
     chain: ChainArg,
-    /// Trajectory to run (`rig excite` writes one); without it the rig stays disarmed
+    /// Trajectory to run (.toml by `rig excite`); without it the rig stays disarmed
     #[arg(long)]
     trajectory: Option<PathBuf>,
     /// Recording time after the trajectory (and its drive_off), or in total without a trajectory, s

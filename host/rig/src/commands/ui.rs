@@ -1,14 +1,21 @@
 //! Output for the user while a command works: a progress bar on a terminal, and sentences.
 
 use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+
+use super::error::CommandError;
 
 /// Prints messages for the user. Results go to standard output, everything else to standard error.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ui {
     terminal: bool,
+    /// True if results are printed as sentences.
+    has_results: bool,
+    /// True if remarks are printed.
+    has_remarks: bool,
 }
 
 impl Ui {
@@ -16,11 +23,57 @@ impl Ui {
     pub(crate) fn new() -> Self {
         Self {
             terminal: std::io::stderr().is_terminal(),
+            has_results: true,
+            has_remarks: true,
         }
+    }
+
+    /// Returns an output that prints errors alone, and what is asked for as JSON.
+    pub(crate) fn quiet() -> Self {
+        Self {
+            terminal: false,
+            has_results: false,
+            has_remarks: false,
+        }
+    }
+
+    /// Returns this output without sentences about results.
+    fn without_results(self) -> Self {
+        Self {
+            has_results: false,
+            ..self
+        }
+    }
+
+    /// Runs a command. If `file` is one of its results, prints that instead of sentences.
+    ///
+    /// # Errors
+    /// Those of the command.
+    pub(crate) fn with_json<T>(
+        &self,
+        file: Option<PathBuf>,
+        run: impl FnOnce(&Self) -> Result<T, CommandError>,
+    ) -> Result<T, CommandError> {
+        let Some(file) = file else {
+            return run(self);
+        };
+        let done = run(&self.without_results())?;
+        let text = std::fs::read_to_string(&file).map_err(|error| {
+            CommandError::Sentence(format!("{} cannot be read: {error}.", file.display()))
+        })?;
+        self.print(text.trim_end());
+        Ok(done)
     }
 
     /// Prints a result: one line on standard output.
     pub(crate) fn say(&self, text: &str) {
+        if self.has_results {
+            self.print(text);
+        }
+    }
+
+    /// Prints what is asked for as JSON.
+    pub(crate) fn print(&self, text: &str) {
         if let Err(error) = writeln!(std::io::stdout(), "{text}") {
             // A closed pipe (`rig … | head`) is no failure; a full disk is one.
             if error.kind() == std::io::ErrorKind::BrokenPipe {
@@ -33,7 +86,9 @@ impl Ui {
 
     /// Prints a remark: one line on standard error.
     pub(crate) fn remark(&self, text: &str) {
-        eprintln!("rig: {text}");
+        if self.has_remarks {
+            eprintln!("rig: {text}");
+        }
     }
 
     /// Creates a bar for work of `total` steps. It is hidden without a terminal and during the first second.

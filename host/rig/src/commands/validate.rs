@@ -7,11 +7,12 @@ use serde::Serialize;
 
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, Use, command_line, recordings, refuse_faults};
+use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
-use rig_data::EffortNeed;
+use rig_data::{EffortNeed, Mapping};
 use rig_diagnose::voltage::{DrivenBy, FreeRun, controller_terms, validate_voltage};
 use rig_model::robot::Robot;
 use rig_output::format_significant;
@@ -40,12 +41,24 @@ pub(crate) struct Args {
     /// Compare although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); prints the faults
     #[arg(long)]
     even_if_wrong: bool,
+    #[command(flatten)]
+    columns: MapArg,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
     /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
+}
+
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join("validation.json"))
+    }
 }
 
 /// Runs the command.
@@ -56,7 +69,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &["validation.json", "report.html"])?;
     refuse_folder(&args.out, &[], args.force)?;
     let robot = args.robot.load(ui)?;
-    let (inputs, voltage) = opened(&robot, &args.data)?;
+    let (inputs, voltage) = opened(&robot, &args.data, &args.columns.mapping()?)?;
     for warning in inputs.warnings() {
         ui.remark(&warning);
     }
@@ -111,18 +124,23 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 }
 
 /// Opens the recordings. Returns true with them if the robot has one joint and only its motor voltage was recorded.
-fn opened(robot: &Robot, paths: &[PathBuf]) -> Result<(Inputs, bool), CommandError> {
+fn opened(
+    robot: &Robot,
+    paths: &[PathBuf],
+    mapping: &Mapping,
+) -> Result<(Inputs, bool), CommandError> {
+    let read = |need| Inputs::read_mapped(robot, paths, need, mapping);
     if robot.joints.len() != 1 {
-        return Ok((Inputs::read(robot, paths)?, false));
+        return Ok((read(EffortNeed::Required)?, false));
     }
-    let inputs = Inputs::read_with(robot, paths, EffortNeed::Optional)?;
+    let inputs = read(EffortNeed::Optional)?;
     if inputs.all_effort() {
         return Ok((inputs, false));
     }
     match !inputs.any_effort() && inputs.any_voltage() {
         true => Ok((inputs, true)),
         // This call fails with an error that names the missing column and the file.
-        false => Ok((Inputs::read(robot, paths)?, false)),
+        false => Ok((read(EffortNeed::Required)?, false)),
     }
 }
 

@@ -196,7 +196,7 @@ impl Demo {
                 .unwrap_or_default(),
             diagnosis: Some(self.diagnosis.clone()),
             beyond_model: BEYOND_MODEL.map(Into::into).into(),
-            warnings: self.differential.warnings.clone(),
+            warnings: self.differential.sentences(),
             files: FILES
                 .map(|(name, holds)| (name.into(), holds.into()))
                 .into(),

@@ -109,20 +109,18 @@ fn summary(found: &Evaluation, warned: usize) -> Vec<Fact> {
         );
     }
     for own in found.contact.iter().take(4) {
-        let band = (1.0 + GOOD_OVERSHOOT) * own.force;
-        let slide = own.slide_peak.map_or_else(String::new, |peak| {
-            format!(", slide: at most {} of {} N", short(peak), short(own.force))
+        let before = own.slide_peak.map_or_else(String::new, |_| {
+            let before = short(100.0 * own.overshoot_before_slide);
+            format!(", {before} % before the slide")
         });
-        let good = own.overshoot <= GOOD_OVERSHOOT
-            && own.slide_peak.is_none_or(|peak| peak <= band)
-            && own.warnings.is_empty();
+        let good = own.overshoot <= GOOD_OVERSHOOT && own.warnings.is_empty();
         facts.push(
             Fact::new(
                 format!("Force overshoot, {}", own.law.name()),
                 short(100.0 * own.overshoot),
             )
             .unit("%")
-            .note(format!("{}{slide}", own.model))
+            .note(format!("{}{before}", own.model))
             .tone(tone(good)),
         );
     }
@@ -311,7 +309,7 @@ fn contact_row(own: &Contact) -> Vec<String> {
     vec![
         short(1e3 * own.impact_speed),
         some(own.rise),
-        short(100.0 * own.overshoot),
+        short(100.0 * own.overshoot_before_slide),
         some(own.settling),
         short(own.steady_error),
         own.bounces.to_string(),
@@ -350,6 +348,7 @@ fn force_tables(laws: &[Contact]) -> Vec<Block> {
         let row = |own: &Contact| {
             vec![
                 some(own.slide_peak),
+                some(own.slide_peak.map(|_| 100.0 * own.overshoot)),
                 some(own.slide_force),
                 some(own.slide_error.map(|v| 1e3 * v)),
             ]
@@ -358,6 +357,7 @@ fn force_tables(laws: &[Contact]) -> Vec<Block> {
             "Forces during the slide",
             vec![
                 Column::number("Largest force", "N"),
+                Column::number("Overshoot, whole contact", "%"),
                 Column::number("Force error, RMS", "N"),
                 Column::number("Path error, RMS", "mm"),
             ],
@@ -374,7 +374,7 @@ fn force_tables(laws: &[Contact]) -> Vec<Block> {
             "Overshoot with wrong parameters",
             columns,
             rows.collect(),
-            "Overshoot before the slide.",
+            "Overshoot of the whole contact, slide included.",
         ));
     }
     tables

@@ -13,7 +13,7 @@ use rig_report::{Block, Column, Document, NoteKind, Section, Table};
 /// Composes the page of an identification.
 pub fn identification(robot: &Robot, found: &Identification, context: &Context) -> Document {
     let mut sections: Vec<Section> = Vec::new();
-    sections.extend(parts::warnings(&[&found.warnings, &context.warnings]));
+    sections.extend(parts::warnings(&[&found.sentences(), &context.warnings]));
     sections.push(parameters(found));
     sections.push(not_excited(found));
     sections.push(fit(robot, found));

@@ -12,7 +12,7 @@ const CHANNELS: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
 /// Composes the page of an identified load.
 pub fn load(
     found: &LoadIdentification,
-    controllers: &ControllerNumbers,
+    controllers: Option<&ControllerNumbers>,
     context: &Context,
 ) -> Document {
     let mut sections: Vec<Section> = parts::warnings(&[&found.warnings, &context.warnings])
@@ -44,17 +44,25 @@ fn half(value: &Value) -> String {
 }
 
 fn summary(found: &LoadIdentification, context: &Context) -> Vec<Fact> {
-    let note = "± half the 95 % interval";
-    let [x, y, z] = &found.centre;
-    let mut facts = vec![
-        Fact::new("Mass", half(&found.mass))
-            .unit("kg")
-            .note(note)
-            .tone(Tone::Good),
-        Fact::new("Centre of mass x", half(x)).unit("m").note(note),
-        Fact::new("Centre of mass y", half(y)).unit("m").note(note),
-        Fact::new("Centre of mass z", half(z)).unit("m").note(note),
-    ];
+    let fact = |label: &str, value: &Value, unit: &str, shown: bool| {
+        let fact = Fact::new(label, half(value)).unit(unit);
+        match shown {
+            true => fact.note("± half the 95 % interval"),
+            false => fact
+                .note("± half the 95 % interval; not shown by these data")
+                .tone(Tone::Notice),
+        }
+    };
+    let mass = fact("Mass", &found.mass, "kg", found.mass_shown());
+    let mut facts = vec![match found.mass_shown() {
+        true => mass.tone(Tone::Good),
+        false => mass,
+    }];
+    let shown = found.centre_shown();
+    for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        let label = format!("Centre of mass {axis}");
+        facts.push(fact(&label, &found.centre[k], "m", shown[k]));
+    }
     if !found.inertia_shown {
         facts.push(
             Fact::new("Inertia", "not shown")
@@ -285,7 +293,10 @@ fn torques(found: &LoadIdentification) -> Option<Section> {
             caption: "Residual of the torques with the load".into(),
             columns: vec![Column::text("Joint"), Column::number("RMS", "N·m or N")],
             rows: rows
-                .map(|(name, rms)| vec![name.clone(), format_significant(*rms, 3)])
+                .map(|(name, rms)| {
+                    let rms = rms.map_or("not used".to_owned(), |rms| format_significant(rms, 3));
+                    vec![name.clone(), rms]
+                })
                 .collect(),
             note: String::new(),
         })),
@@ -321,7 +332,14 @@ fn agreement(found: &LoadIdentification) -> Option<Section> {
     )
 }
 
-fn for_controllers(found: &LoadIdentification, numbers: &ControllerNumbers) -> Section {
+fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumbers>) -> Section {
+    let Some(numbers) = numbers else {
+        return Section::new(
+            "controllers",
+            "For the controller",
+            "These data do not show mass and centre of mass, so there are no numbers for a controller.",
+        );
+    };
     let lead = match found.inertia_shown {
         true => "The flange frame of the description must be that of the controller.",
         false => {

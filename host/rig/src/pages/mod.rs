@@ -13,6 +13,7 @@ mod estimators;
 mod friction;
 mod friction_map;
 mod identification;
+mod inspect;
 mod load;
 mod parts;
 mod residuals;
@@ -34,6 +35,7 @@ pub use demo::{
 pub use diagnosis::{PICTURE_NAMES, diagnosis, pictures, verdict};
 pub use friction_map::friction_map;
 pub use identification::identification;
+pub use inspect::{inspect, time_in_words, without_options};
 pub use load::load;
 pub use simulated::{simulated_overview, simulated_robot};
 pub use validation::validation;

@@ -103,7 +103,9 @@ fn an_identification_shows_every_parameter_warning_and_reason() {
     let robot = robot();
     let data = recording(&robot);
     let mut found = identify(&robot, &[&data], &[&data], &Options::default()).unwrap();
-    found.warnings.push("The <third> warning.".into());
+    found
+        .warnings
+        .push("The <third> warning.".to_owned().into());
     let context = Context {
         command: "rig identify --robot r.toml".into(),
         identified: Some((

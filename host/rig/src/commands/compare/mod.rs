@@ -14,11 +14,13 @@ use super::identify::{Fit, Model, lead, speed};
 use super::input::{
     Inputs, Use, Watched, command_line, described, recordings, refuse_faults, refuse_twice,
 };
+use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
 use rig_compare::{CompareOptions, Comparison, Grade, RecordingSet, compare, pooled_robot};
+use rig_data::EffortNeed;
 use rig_data::prepare::{Choice, PrepareOptions};
 use rig_identify::Options;
 use rig_model::robot::Robot;
@@ -81,6 +83,11 @@ pub(crate) struct Args {
     /// Compare although columns of the recordings look wrong; prints the faults
     #[arg(long)]
     even_if_wrong: bool,
+    #[command(flatten)]
+    columns: MapArg,
+    /// Print the result as JSON, as in the file, instead of sentences
+    #[arg(long)]
+    json: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -154,6 +161,13 @@ impl Args {
     }
 }
 
+impl Args {
+    /// Returns the file to print if the result is wanted as JSON.
+    pub(crate) fn json_file(&self) -> Option<PathBuf> {
+        self.json.then(|| self.out.join(FILES[0]))
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -181,9 +195,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let files: Vec<PathBuf> = sets.iter().flat_map(|s| s.files.iter().cloned()).collect();
     refuse_twice(&files, "give every recording to one set")?;
     let robot = described(description, &args.chain, ui)?.robot;
-    let inputs = (sets.iter())
-        .map(|set| Inputs::read(&robot, &set.files))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mapping = args.columns.mapping()?;
+    let read =
+        |set: &NamedSet| Inputs::read_mapped(&robot, &set.files, EffortNeed::Required, &mapping);
+    let inputs = (sets.iter()).map(read).collect::<Result<Vec<_>, _>>()?;
     let read: Vec<String> = inputs.iter().flat_map(Inputs::warnings).collect();
     for warning in &read {
         ui.remark(warning);

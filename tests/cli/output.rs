@@ -1,0 +1,145 @@
+//! What programs read: `--json`, `--quiet`, exit statuses, completions; and models of MuJoCo as `--robot`.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::run::{rig, robot, succeed};
+
+fn arm() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/mjcf/arm.xml")
+}
+
+/// Writes a recording of a link: 0.11 kg·m² with gravity and friction, positions times `factor`.
+fn recording(path: &Path, factor: f64) {
+    let mut text = String::from("t,q1,tau1\n");
+    for k in 0..4000 {
+        let t = 0.002 * f64::from(k);
+        let q = 0.9 * (1.7 * t).sin() + 0.5 * (4.1 * t).sin();
+        let qd = 0.9 * 1.7 * (1.7 * t).cos() + 0.5 * 4.1 * (4.1 * t).cos();
+        let qdd = -0.9 * 1.7 * 1.7 * (1.7 * t).sin() - 0.5 * 4.1 * 4.1 * (4.1 * t).sin();
+        let rest = 0.003 * (611.0 * t).sin() + 0.003 * (487.0 * t).cos();
+        let tau = 0.11 * qdd + 2.5 * q.cos() + 0.4 * qd.signum() + 0.3 * qd + rest;
+        writeln!(text, "{t:.3},{:.7},{tau:.5}", factor * q).unwrap();
+    }
+    fs::write(path, text).unwrap();
+}
+
+#[test]
+fn json_on_the_standard_output_is_that_of_the_file_and_quiet_leaves_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, out) = (folder.path().join("a.csv"), folder.path().join("out"));
+    recording(&data, 1.0);
+    let output = rig()
+        .args([
+            "identify",
+            "--json",
+            "--quiet",
+            "--compare",
+            "none",
+            "--robot",
+        ])
+        .arg(robot("one-link.toml"))
+        .arg("--data")
+        .arg(&data)
+        .arg("--out")
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{output:?}"
+    );
+    let file = fs::read(out.join("identification.json")).unwrap();
+    assert!(output.stdout == file);
+    let again = rig()
+        .args(["init", "edda", "--quiet", "--out"])
+        .arg(folder.path().join("e.toml"))
+        .output();
+    let again = again.unwrap();
+    assert!(again.status.success() && again.stdout.is_empty() && again.stderr.is_empty());
+}
+
+#[test]
+fn the_verdict_is_the_exit_status_if_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("degrees.csv");
+    recording(&data, 57.3);
+    for (asked, want) in [(false, 0), (true, 13)] {
+        let mut command = rig();
+        command
+            .args(["diagnose", "--json", "--robot"])
+            .arg(robot("one-link.toml"));
+        command
+            .arg("--data")
+            .arg(&data)
+            .arg("--out")
+            .arg(folder.path().join(format!("{asked}")));
+        if asked {
+            command.arg("--exit-code");
+        }
+        let output = command.output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(want), "{text}");
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(found["verdict"], "data-fault");
+    }
+}
+
+#[test]
+fn a_model_of_mujoco_is_a_robot_and_gets_its_joints_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let toml = folder.path().join("arm.toml");
+    succeed(
+        rig()
+            .args(["init", "--from"])
+            .arg(arm())
+            .arg("--out")
+            .arg(&toml),
+    );
+    let count = |path: &Path| {
+        let text = succeed(rig().args(["base", "--json", "--robot"]).arg(path));
+        let found: Value = serde_json::from_str(&text).unwrap();
+        found["count"].as_u64().unwrap()
+    };
+    let of_xml = count(&arm());
+    assert_eq!(of_xml, count(&toml));
+    let joints = folder.path().join("joints.xml");
+    succeed(
+        rig()
+            .args(["mjcf", "--robot"])
+            .arg(&toml)
+            .arg("--out")
+            .arg(&joints),
+    );
+    let text = fs::read_to_string(&joints).unwrap();
+    assert!(
+        text.contains("<default class=\"lift\">") && text.contains("damping=\"1.5\""),
+        "{text}"
+    );
+    // A chain that ends at another body, chosen as in a URDF, has fewer parameters.
+    let short = succeed(
+        rig()
+            .args(["base", "--json", "--tip", "shoulder", "--robot"])
+            .arg(arm()),
+    );
+    let short: Value = serde_json::from_str(&short).unwrap();
+    assert!(short["count"].as_u64().unwrap() < of_xml);
+}
+
+#[test]
+fn shells_complete_every_command() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = succeed(rig().args(["completions", shell]));
+        for word in ["inspect", "identify", "friction-map", "--holdout"] {
+            let word = if shell == "fish" {
+                word.trim_start_matches('-')
+            } else {
+                word
+            };
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+}
