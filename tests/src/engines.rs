@@ -16,6 +16,22 @@ fn has_engines(python: &Path) -> bool {
         .is_ok_and(|o| o.status.success())
 }
 
+/// Runs a script and returns what it printed.
+///
+/// # Panics
+/// If it fails, with what it said.
+pub fn printed(script: &mut Command) -> String {
+    let output = script
+        .output()
+        .unwrap_or_else(|error| panic!("{script:?}: {error}"));
+    assert!(
+        output.status.success(),
+        "{script:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
 /// Returns a Python with MuJoCo and Pinocchio: the one named in RIG_PYTHON, `python3`, or else one that is furnished with
 /// pip in the folder `place`. Says so if there is none.
 pub fn python(place: &Path) -> Option<&'static PathBuf> {

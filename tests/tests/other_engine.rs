@@ -15,7 +15,7 @@ use rig_data::prepare::Recording;
 use rig_identify::{Estimator, ModelKind, Options, identified_robot, identify};
 use rig_model::robot::{Description, IRP6_TEMPLATE, Robot};
 use rig_output::data_dir;
-use rig_tests::engines::{self, scripts};
+use rig_tests::engines::{self, printed, scripts};
 
 /// A Python with both engines.
 fn python() -> Option<&'static PathBuf> {
@@ -24,24 +24,13 @@ fn python() -> Option<&'static PathBuf> {
 
 /// robot.urdf, train.csv, holdout.csv and truth.json of an arm, made in `place`.
 fn record(python: &Path, place: &Path, arm: &str, engine: &str, seed: u64) {
-    let made = Command::new(python)
-        .arg(scripts().join("record.py"))
-        .args([
-            "--arm",
-            arm,
-            "--engine",
-            engine,
-            "--seed",
-            &seed.to_string(),
-            "--out",
-        ])
-        .arg(place)
-        .output()
-        .unwrap();
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
+    let seed = seed.to_string();
+    let options = ["--arm", arm, "--engine", engine, "--seed", &seed, "--out"];
+    printed(
+        Command::new(python)
+            .arg(scripts().join("record.py"))
+            .args(options)
+            .arg(place),
     );
 }
 
@@ -122,20 +111,14 @@ fn reads_as(python: &Path, robot: &Robot, urdf: &str) {
     let [description, file] = ["robot.toml", "robot.urdf"].map(|name| place.path().join(name));
     std::fs::write(&description, robot.to_toml().unwrap()).unwrap();
     std::fs::write(&file, urdf).unwrap();
-    let checked = Command::new(python)
-        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/urdf/check.py"))
-        .args([&description, &file])
-        .args(["--most", "1e-11"])
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&checked.stdout);
-    println!("{}", said.trim());
-    assert!(
-        checked.status.success() && said.contains("torques differ by"),
-        "{}: {}",
-        robot.name,
-        String::from_utf8_lossy(&checked.stderr)
+    let said = printed(
+        Command::new(python)
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/urdf/check.py"))
+            .args([&description, &file])
+            .args(["--most", "1e-11"]),
     );
+    println!("{}", said.trim());
+    assert!(said.contains("torques differ by"), "{}", robot.name);
 }
 
 #[test]
@@ -201,18 +184,13 @@ fn mujoco_takes_the_values_of_joints_from_a_written_fragment() {
     let path = folder.path().join("joints.xml");
     std::fs::write(&path, robot.to_mjcf_joints().text).unwrap();
     let names = robot.joints.iter().map(|joint| joint.name.as_str());
-    let made = Command::new(python)
-        .arg(mjcf.join("load.py"))
-        .arg(&path)
-        .args(names)
-        .output()
-        .unwrap();
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
+    let said = printed(
+        Command::new(python)
+            .arg(mjcf.join("load.py"))
+            .arg(&path)
+            .args(names),
     );
-    let found: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&said).unwrap();
     for (name, key, want) in [
         ("pan", "armature", 0.01),
         ("lift", "armature", 0.3),

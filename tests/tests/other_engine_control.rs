@@ -17,7 +17,7 @@ use rig_model::simulate::Model;
 use rig_shared::control::arm::{Inputs, Law, Operational, Task, impedance};
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::trajectory::Reference;
-use rig_tests::engines::{python, scripts};
+use rig_tests::engines::{printed, python, scripts};
 use serde_json::{Value, json};
 
 fn templates() -> [(&'static str, Robot); 2] {
@@ -27,18 +27,12 @@ fn templates() -> [(&'static str, Robot); 2] {
 
 /// Runs the script on a folder and returns what it found.
 fn ask(python: &Path, what: &str, folder: &Path) -> Value {
-    let output = Command::new(python)
-        .arg(scripts().join("contact.py"))
-        .arg(what)
-        .arg(folder)
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
+    let said = printed(
+        Command::new(python)
+            .arg(scripts().join("contact.py"))
+            .arg(what)
+            .arg(folder),
     );
-    let said = String::from_utf8_lossy(&output.stdout);
     println!("{}", said.trim());
     serde_json::from_str(&said).unwrap()
 }
@@ -162,15 +156,7 @@ fn record(name: &str, robot: &Robot, law: LawKind) -> tempfile::TempDir {
         ..ContactOptions::default()
     };
     let task = ContactTask::choose(&model, &options, &settings).unwrap();
-    let samples = (task.duration * settings.rate) as usize;
-    let still = |q: &f64| {
-        let at = Reference {
-            position: *q,
-            ..Reference::default()
-        };
-        vec![at; samples]
-    };
-    let reference: Vec<_> = task.pose.iter().map(still).collect();
+    let reference = task.joint_reference((task.duration * settings.rate) as usize);
     let bench = Bench {
         robot,
         truth: &Model::from_robot(robot).unwrap(),

@@ -297,6 +297,18 @@ fn inertias(
 }
 
 impl ContactTask {
+    /// Returns the reference of the joints, joint by joint: the start pose at rest, over `ticks` control ticks.
+    pub fn joint_reference(&self, ticks: usize) -> Vec<Vec<Reference<f64>>> {
+        let at_rest = |q: &f64| {
+            let at = Reference {
+                position: *q,
+                ..Reference::default()
+            };
+            vec![at; ticks]
+        };
+        self.pose.iter().map(at_rest).collect()
+    }
+
     /// Chooses a task for the model of a law, with defaults where the options leave them open.
     ///
     /// # Errors

@@ -82,49 +82,6 @@ pub(super) fn columns(arrays: Vec<Array>) -> Columns {
     found
 }
 
-/// Type of the numbers of an array.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Type {
-    Float(usize),
-    Signed(usize),
-    Unsigned(usize),
-}
-
-impl Type {
-    /// Returns the length of a number, bytes.
-    pub(super) fn size(self) -> usize {
-        match self {
-            Self::Float(n) | Self::Signed(n) | Self::Unsigned(n) => n,
-        }
-    }
-
-    /// Reads numbers of this type.
-    pub(super) fn read(self, bytes: &[u8], is_big_endian: bool) -> Vec<f64> {
-        bytes
-            .chunks_exact(self.size())
-            .map(|own| self.number(own, is_big_endian))
-            .collect()
-    }
-
-    fn number(self, bytes: &[u8], is_big_endian: bool) -> f64 {
-        let size = bytes.len();
-        let mut raw = [0; 8];
-        for (k, byte) in bytes.iter().enumerate() {
-            raw[if is_big_endian { size - 1 - k } else { k }] = *byte;
-        }
-        let bits = u64::from_le_bytes(raw);
-        match self {
-            Self::Float(4) => f64::from(f32::from_bits(bits as u32)),
-            Self::Float(_) => f64::from_bits(bits),
-            Self::Unsigned(_) => bits as f64,
-            Self::Signed(n) => {
-                let spare = 64 - 8 * n as u32;
-                ((bits << spare) as i64 >> spare) as f64
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

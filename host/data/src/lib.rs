@@ -24,6 +24,7 @@
 mod array;
 mod bag;
 mod bag_table;
+mod binary_number;
 mod block;
 mod bursts;
 mod channel;
@@ -107,6 +108,8 @@ pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 mod bag_table_test;
 #[cfg(test)]
 mod csv_test;
+#[cfg(test)]
+mod made_for_tests;
 #[cfg(test)]
 mod mapping_test;
 #[cfg(test)]

@@ -2,28 +2,11 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use super::made_for_tests::{of_others, robot};
 use super::{Block, DataError, EffortNeed, Mapping, Source};
-use rig_model::robot::{JointKind, ONE_LINK_TEMPLATE, Robot};
-
-fn of_others(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/recordings")
-        .join(name)
-}
-
-/// A robot with joints of these names, without drives and limits.
-fn robot(names: &[&str]) -> Robot {
-    let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
-    let mut joint = robot.joints.remove(0);
-    (joint.drive, joint.limits, joint.friction, joint.inertial) = (None, None, None, None);
-    for name in names {
-        joint.name = (*name).into();
-        robot.joints.push(joint.clone());
-    }
-    robot
-}
+use rig_model::robot::{JointKind, Robot};
 
 fn mapping(columns: &[&str], units: &[&str]) -> Mapping {
     let mut mapping = Mapping::default();

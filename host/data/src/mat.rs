@@ -3,7 +3,8 @@
 //! Format: "MAT-File Format" (MathWorks, R2019b), level 5. Fields of a structure of one element are read as arrays of their
 //! own. Left out: cells, text, sparse and imaginary numbers, and structures in structures, which are passed over.
 
-use super::array::{Array, Type};
+use super::array::Array;
+use super::binary_number::BinaryNumber;
 
 /// First bytes of the file.
 pub(super) const MAGIC: &[u8] = b"MATLAB 5.0 MAT-file";
@@ -104,7 +105,7 @@ fn matrix(
         false => *flags.first()?,
     };
     let (_, shape) = reader.next()?;
-    let shape = Type::Signed(4).read(shape, is_big_endian);
+    let shape = BinaryNumber::Signed(4).values(shape, is_big_endian);
     let shape: Vec<usize> = shape.into_iter().map(|n| n.max(0.0) as usize).collect();
     let (_, name) = reader.next()?;
     let name = match of {
@@ -114,7 +115,7 @@ fn matrix(
     match class {
         6..=15 => {
             let (kind, data) = reader.next()?;
-            let values = number_type(kind)?.read(data, is_big_endian);
+            let values = number_type(kind)?.values(data, is_big_endian);
             let count = shape.iter().try_fold(1usize, |n, k| n.checked_mul(*k));
             if count != Some(values.len()) {
                 return None;
@@ -127,7 +128,7 @@ fn matrix(
         }
         STRUCTURE if of.is_none() && shape.iter().product::<usize>() == 1 => {
             let (_, length) = reader.next()?;
-            let length = Type::Signed(4).read(length, is_big_endian);
+            let length = BinaryNumber::Signed(4).values(length, is_big_endian);
             let length = (*length.first()?).max(1.0) as usize;
             let (_, names) = reader.next()?;
             for field in names.chunks(length) {
@@ -143,18 +144,18 @@ fn matrix(
 }
 
 /// Returns the type of stored numbers, which may be smaller than that of the array.
-fn number_type(kind: u32) -> Option<Type> {
+fn number_type(kind: u32) -> Option<BinaryNumber> {
     Some(match kind {
-        1 => Type::Signed(1),
-        2 => Type::Unsigned(1),
-        3 => Type::Signed(2),
-        4 => Type::Unsigned(2),
-        5 => Type::Signed(4),
-        6 => Type::Unsigned(4),
-        7 => Type::Float(4),
-        9 => Type::Float(8),
-        12 => Type::Signed(8),
-        13 => Type::Unsigned(8),
+        1 => BinaryNumber::Signed(1),
+        2 => BinaryNumber::Unsigned(1),
+        3 => BinaryNumber::Signed(2),
+        4 => BinaryNumber::Unsigned(2),
+        5 => BinaryNumber::Signed(4),
+        6 => BinaryNumber::Unsigned(4),
+        7 => BinaryNumber::Float(4),
+        9 => BinaryNumber::Float(8),
+        12 => BinaryNumber::Signed(8),
+        13 => BinaryNumber::Unsigned(8),
         _ => return None,
     })
 }

@@ -5,22 +5,11 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::contents::contents;
+use super::made_for_tests::robot;
 use super::{Block, EffortNeed, Mapping, Quantity, Source};
-use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_model::robot::Robot;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-
-/// A robot with joints of these names, without drives and limits.
-fn robot(names: &[&str]) -> Robot {
-    let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
-    let mut joint = robot.joints.remove(0);
-    (joint.drive, joint.limits, joint.friction, joint.inertial) = (None, None, None, None);
-    for name in names {
-        joint.name = (*name).into();
-        robot.joints.push(joint.clone());
-    }
-    robot
-}
 
 fn record(code: u8, body: &[u8]) -> Vec<u8> {
     [&[code], (body.len() as u64).to_le_bytes().as_slice(), body].concat()

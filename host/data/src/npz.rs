@@ -3,7 +3,8 @@
 //! Formats: "NEP 1 — A Simple File Format for NumPy Arrays"; ".ZIP File Format Specification" 6.3 (PKWARE). Left out: archives
 //! above 4 GiB, structured and complex arrays, objects and text, which are passed over.
 
-use super::array::{Array, Type};
+use super::array::Array;
+use super::binary_number::BinaryNumber;
 
 /// Longest array, bytes after decompression.
 const LONGEST: usize = 4 << 30;
@@ -152,7 +153,7 @@ fn array(name: &str, bytes: &[u8]) -> Result<Option<Array>, String> {
         .map(|s| s.parse().map_err(|_| damaged()))
         .collect::<Result<_, _>>()?;
     let count = shape.iter().try_fold(1usize, |n, k| n.checked_mul(*k));
-    let values = of.read(&bytes[end..], is_big_endian);
+    let values = of.values(&bytes[end..], is_big_endian);
     if count != Some(values.len()) {
         return Err(damaged());
     }
@@ -178,16 +179,16 @@ fn value<'a>(header: &'a str, key: &str) -> Option<&'a str> {
 }
 
 /// Returns the type that `descr` states, and whether it is big-endian.
-fn kind(descr: &str) -> Option<(Type, bool)> {
+fn kind(descr: &str) -> Option<(BinaryNumber, bool)> {
     let text = descr.strip_prefix('\'')?.split('\'').next()?;
     let (order, rest) = text.split_at_checked(1)?;
     let (letter, size) = rest.split_at_checked(1)?;
-    let size: usize = size.parse().ok()?;
+    let size: u8 = size.parse().ok()?;
     let is_whole = [1, 2, 4, 8].contains(&size);
     let of = match letter {
-        "f" if size == 4 || size == 8 => Type::Float(size),
-        "i" if is_whole => Type::Signed(size),
-        "u" | "b" if is_whole => Type::Unsigned(size),
+        "f" if size == 4 || size == 8 => BinaryNumber::Float(size),
+        "i" if is_whole => BinaryNumber::Signed(size),
+        "u" | "b" if is_whole => BinaryNumber::Unsigned(size),
         _ => return None,
     };
     Some((of, order == ">"))

@@ -1,5 +1,6 @@
 //! Layout of a ROS message, from the definition stored by the recorder.
 
+use super::binary_number::BinaryNumber;
 use std::collections::BTreeMap;
 
 /// Maximum nesting of definitions: deeper ones do not belong to a message.
@@ -27,27 +28,10 @@ const KNOWN: [(&str, &str); 6] = [
 /// `std_msgs/Header` of ROS 1.
 const ROS1_HEADER: &str = "uint32 seq\ntime stamp\nstring frame_id";
 
-/// A number type in a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Number {
-    Unsigned(u8),
-    Signed(u8),
-    Float(u8),
-}
-
-impl Number {
-    /// Returns the length in bytes.
-    pub(super) fn size(self) -> usize {
-        match self {
-            Self::Unsigned(n) | Self::Signed(n) | Self::Float(n) => usize::from(n),
-        }
-    }
-}
-
 /// Type of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Kind {
-    Number(Number),
+    Number(BinaryNumber),
     Text,
     Nested(Vec<Field>),
 }
@@ -215,16 +199,16 @@ fn array(ty: &str) -> Option<(&str, Count)> {
 
 fn primitive(base: &str) -> Option<Kind> {
     let number = match base {
-        "bool" | "byte" | "char" | "uint8" => Number::Unsigned(1),
-        "int8" => Number::Signed(1),
-        "uint16" => Number::Unsigned(2),
-        "int16" => Number::Signed(2),
-        "uint32" => Number::Unsigned(4),
-        "int32" => Number::Signed(4),
-        "uint64" => Number::Unsigned(8),
-        "int64" => Number::Signed(8),
-        "float32" => Number::Float(4),
-        "float64" => Number::Float(8),
+        "bool" | "byte" | "char" | "uint8" => BinaryNumber::Unsigned(1),
+        "int8" => BinaryNumber::Signed(1),
+        "uint16" => BinaryNumber::Unsigned(2),
+        "int16" => BinaryNumber::Signed(2),
+        "uint32" => BinaryNumber::Unsigned(4),
+        "int32" => BinaryNumber::Signed(4),
+        "uint64" => BinaryNumber::Unsigned(8),
+        "int64" => BinaryNumber::Signed(8),
+        "float32" => BinaryNumber::Float(4),
+        "float64" => BinaryNumber::Float(8),
         "string" => return Some(Kind::Text),
         // Of ROS 1.
         "time" | "duration" => return Some(seconds(Part::None, Part::None)),
@@ -237,7 +221,7 @@ fn primitive(base: &str) -> Option<Kind> {
 fn seconds(whole: Part, nanoseconds: Part) -> Kind {
     let field = |name: &str, part| Field {
         name: name.to_owned(),
-        kind: Kind::Number(Number::Unsigned(4)),
+        kind: Kind::Number(BinaryNumber::Unsigned(4)),
         count: Count::One,
         part,
     };
@@ -260,7 +244,7 @@ fn qualified(definitions: &BTreeMap<String, String>, base: &str, within: &str) -
 }
 
 fn part(path: &str, kind: &Kind, count: Count) -> Part {
-    let numbers = matches!(kind, Kind::Number(Number::Float(_))) && count != Count::One;
+    let numbers = matches!(kind, Kind::Number(BinaryNumber::Float(_))) && count != Count::One;
     match (path, kind) {
         (".header", Kind::Nested(_)) if count == Count::One => Part::Header,
         (".header.stamp.sec" | ".header.stamp.secs", Kind::Number(_)) => Part::Seconds,

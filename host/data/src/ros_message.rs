@@ -1,6 +1,7 @@
 //! Reads one joint state from the bytes of a ROS message.
 
-use super::ros_layout::{Count, Field, Kind, Number, Part};
+use super::binary_number::BinaryNumber;
+use super::ros_layout::{Count, Field, Kind, Part};
 
 /// Binary encoding of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,7 +169,7 @@ impl<'a> Cursor<'a> {
         Some(taken)
     }
 
-    pub(super) fn pass(&mut self, number: Number, count: usize) -> Option<()> {
+    pub(super) fn pass(&mut self, number: BinaryNumber, count: usize) -> Option<()> {
         if count > 0 {
             self.align(number.size());
             self.take(number.size().checked_mul(count)?)?;
@@ -176,27 +177,15 @@ impl<'a> Cursor<'a> {
         Some(())
     }
 
-    pub(super) fn number(&mut self, number: Number) -> Option<f64> {
+    pub(super) fn number(&mut self, number: BinaryNumber) -> Option<f64> {
         let size = number.size();
         self.align(size);
-        let mut raw = [0; 8];
-        for (k, byte) in self.take(size)?.iter().enumerate() {
-            raw[if self.is_big_endian { size - 1 - k } else { k }] = *byte;
-        }
-        let bits = u64::from_le_bytes(raw);
-        Some(match number {
-            Number::Float(4) => f64::from(f32::from_bits(bits as u32)),
-            Number::Float(_) => f64::from_bits(bits),
-            Number::Unsigned(_) => bits as f64,
-            Number::Signed(_) => {
-                let spare = 64 - 8 * size as u32;
-                ((bits << spare) as i64 >> spare) as f64
-            }
-        })
+        let is_big_endian = self.is_big_endian;
+        Some(number.value(self.take(size)?, is_big_endian))
     }
 
     pub(super) fn count(&mut self) -> Option<usize> {
-        Some(self.number(Number::Unsigned(4))? as usize)
+        Some(self.number(BinaryNumber::Unsigned(4))? as usize)
     }
 
     pub(super) fn text(&mut self) -> Option<&'a [u8]> {

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::made_for_tests::robot;
 use super::*;
 use rig_model::robot::{EMPS, JointKind, JointLimits, ONE_LINK_TEMPLATE, Robot};
 
@@ -13,14 +14,8 @@ fn rig() -> Robot {
 
 /// A robot of `n` joints without drives and limits.
 fn arm(n: usize) -> Robot {
-    let mut robot = rig();
-    let mut joint = robot.joints.remove(0);
-    (joint.drive, joint.limits, joint.friction, joint.inertial) = (None, None, None, None);
-    for k in 1..=n {
-        joint.name = format!("joint {k}");
-        robot.joints.push(joint.clone());
-    }
-    robot
+    let names: Vec<String> = (1..=n).map(|k| format!("joint {k}")).collect();
+    robot(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
 struct Folder(tempfile::TempDir);

@@ -12,7 +12,6 @@ use rig_model::robot::Robot;
 use rig_model::simulate::Model;
 use rig_shared::control::arm::impedance::Target;
 use rig_shared::multibody::potential_energy;
-use rig_shared::trajectory::Reference;
 
 fn options(stiffness: f64) -> ContactOptions {
     ContactOptions {
@@ -39,15 +38,7 @@ fn press_wrong(
 ) -> Run<Contact> {
     let truth = Model::from_robot(robot).unwrap();
     let model = LawModel::of(robot).unwrap();
-    let samples = (task.duration * settings.rate) as usize;
-    let still = |q: &f64| {
-        let at = Reference {
-            position: *q,
-            ..Reference::default()
-        };
-        vec![at; samples]
-    };
-    let reference: Vec<_> = task.pose.iter().map(still).collect();
+    let reference = task.joint_reference((task.duration * settings.rate) as usize);
     let bench = Bench {
         robot,
         truth: &truth,
@@ -308,14 +299,7 @@ fn impedance_swings_with_the_frequency_and_damping_of_its_target() {
         task.duration = 2.0;
         let truth = Model::from_robot(&robot).unwrap();
         let model = LawModel::of(&robot).unwrap();
-        let still = |q: &f64| {
-            let at = Reference {
-                position: *q,
-                ..Reference::default()
-            };
-            vec![at; 10_000]
-        };
-        let reference: Vec<_> = task.pose.iter().map(still).collect();
+        let reference = task.joint_reference(10_000);
         let mut controller = crate::controller::Controller::design(
             LawKind::Impedance,
             &model,

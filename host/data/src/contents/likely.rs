@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::names::{Named, number, quantity, wrench};
 use super::proposal::{Proposal, Proposed};
-use super::topic::{Channel, Topic};
+use super::topic::{Channel, TimeSource, Topic};
 use crate::block::WRENCH_COLUMNS;
 use crate::columns::Signal;
 use crate::joint_names::{is_in_joint, joint_in};
@@ -68,8 +68,7 @@ fn time(topic: &Topic, proposal: &mut Proposal) {
     if !topic.name.is_empty() {
         return;
     }
-    let Some(name) = (topic.time.source.strip_prefix("column `")).and_then(|s| s.strip_suffix('`'))
-    else {
+    let TimeSource::Column(name) = &topic.time.source else {
         let rising: Vec<&str> = (topic.channels.iter())
             .filter(|c| c.is_rising() && c.missing == 0)
             .map(|c| c.name.as_str())

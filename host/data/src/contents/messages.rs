@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::topic::{Channel, Topic};
+use super::topic::{Channel, TimeSource, Topic};
 use crate::decoder::decoder;
 use crate::error::DataError;
 use crate::flat_message::{Decoder, FlatMessage};
@@ -158,9 +158,9 @@ impl Scan {
         if number == 1 {
             self.is_stamped = is_read && self.flat.stamp.is_some_and(|stamp| stamp != (0, 0));
             self.topic.time.source = match (self.own_time, self.is_stamped) {
-                (Some(_), _) => "key `t` of the messages".into(),
-                (None, true) => "header stamp".into(),
-                (None, false) => "log time of the recorder".into(),
+                (Some(_), _) => TimeSource::Key,
+                (None, true) => TimeSource::HeaderStamp,
+                (None, false) => TimeSource::LogTime,
             };
         }
         let own_time = (self.own_time.filter(|_| is_read)).and_then(|k| self.flat.values.get(k));

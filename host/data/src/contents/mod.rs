@@ -17,7 +17,7 @@ mod topic;
 pub use picture::Picture;
 pub use proposal::{Proposal, Proposed};
 pub use read::contents;
-pub use topic::{Channel, Contents, Step, Time, Topic};
+pub use topic::{Channel, Contents, Step, Time, TimeSource, Topic};
 
 #[cfg(test)]
 mod tests;

@@ -2,32 +2,13 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::{Contents, contents};
-use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
-
-/// A file that another program wrote (`tests/recordings/make.py`).
-fn of_others(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/recordings")
-        .join(name)
-}
-
-/// A robot with joints of these names, without drives; `None` without names.
-fn robot(joints: &[&str]) -> Option<Robot> {
-    let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
-    let mut joint = robot.joints.remove(0);
-    (joint.drive, joint.limits, joint.friction, joint.inertial) = (None, None, None, None);
-    for name in joints {
-        joint.name = (*name).into();
-        robot.joints.push(joint.clone());
-    }
-    (!joints.is_empty()).then_some(robot)
-}
+use crate::made_for_tests::{of_others, robot};
 
 fn read(path: &Path, joints: &[&str]) -> Contents {
-    let robot = robot(joints);
+    let robot = (!joints.is_empty()).then(|| robot(joints));
     contents(path, robot.as_ref(), &mut |_| {}).unwrap()
 }
 

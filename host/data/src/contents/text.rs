@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use super::topic::{Channel, Topic};
+use super::topic::Topic;
 use crate::csv::TextLines;
 use crate::csv_header::{Lines, Separator, find_header};
 use crate::error::DataError;
 use crate::iso_time::iso_time;
 use crate::number::number;
-use crate::time_names::is_time;
 
 /// What a text file holds.
 pub(super) struct Text {
@@ -53,18 +52,7 @@ pub(super) fn text(path: &Path, advance: &mut dyn FnMut(u64)) -> Result<Text, Da
             "column `{again}` is there twice; every column must have a name of its own."
         ));
     }
-    let time = (found.names.iter().position(|n| n == "t"))
-        .or_else(|| found.names.iter().position(|n| is_time(n)));
-    let mut topic = Topic::default();
-    let named = |k: &usize| Some(*k) != time;
-    let channels: Vec<usize> = (0..found.names.len()).filter(named).collect();
-    topic.channels = (channels.iter())
-        .map(|k| Channel::new(found.names[*k].clone()))
-        .collect();
-    topic.time.source = match time {
-        Some(k) => format!("column `{}`", found.names[k]),
-        None => "number of the row, because no column is named as a time".into(),
-    };
+    let (mut topic, time, channels) = Topic::of_table(&found.names, "column");
     let mut reader = Rows {
         separator: found.separator,
         expected: found.names.len(),

@@ -1,11 +1,14 @@
 //! Channels, their times and values.
 
-use serde::Serialize;
+use std::fmt;
+
+use serde::{Serialize, Serializer};
 
 use super::names::{unit, unit_of_array};
 use super::picture::Picture;
 use super::proposal::Proposal;
 use crate::sampling::Sampling;
+use crate::time_names::is_time;
 use crate::unit::Unit;
 
 /// Number of intervals that determine the period.
@@ -46,6 +49,28 @@ pub struct Topic {
 }
 
 impl Topic {
+    /// Creates the table of a file whose columns have these names; `of` is what it calls them (`column` or `array`). Returns
+    /// also the index of the time among the names, and those of the channels.
+    pub(super) fn of_table(
+        names: &[String],
+        of: &'static str,
+    ) -> (Self, Option<usize>, Vec<usize>) {
+        let time =
+            (names.iter().position(|n| n == "t")).or_else(|| names.iter().position(|n| is_time(n)));
+        let channels: Vec<usize> = (0..names.len()).filter(|k| Some(*k) != time).collect();
+        let mut topic = Self {
+            channels: (channels.iter())
+                .map(|k| Channel::new(names[*k].clone()))
+                .collect(),
+            ..Self::default()
+        };
+        topic.time.source = match time {
+            Some(k) => TimeSource::Column(names[k].clone()),
+            None => TimeSource::RowNumber { of },
+        };
+        (topic, time, channels)
+    }
+
     /// Adds a row at time `t`; channels without a value get none.
     pub(super) fn add(&mut self, t: f64, values: &[f64]) {
         self.rows += 1;
@@ -67,11 +92,53 @@ pub struct Step {
     pub step: f64,
 }
 
+/// Where the time of rows comes from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum TimeSource {
+    /// Not known: no message was read.
+    #[default]
+    Unknown,
+    /// Key `t` of the messages of this program.
+    Key,
+    /// Header stamp of the messages.
+    HeaderStamp,
+    /// Time at which the recorder wrote a message.
+    LogTime,
+    /// A column or an array with this name.
+    Column(String),
+    /// The number of the row: nothing is named as a time.
+    RowNumber {
+        /// `column` or `array`.
+        of: &'static str,
+    },
+}
+
+impl fmt::Display for TimeSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown => Ok(()),
+            Self::Key => f.write_str("key `t` of the messages"),
+            Self::HeaderStamp => f.write_str("header stamp"),
+            Self::LogTime => f.write_str("log time of the recorder"),
+            Self::Column(name) => write!(f, "column `{name}`"),
+            Self::RowNumber { of } => {
+                write!(f, "number of the row, because no {of} is named as a time")
+            }
+        }
+    }
+}
+
+impl Serialize for TimeSource {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// Times of rows.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Time {
-    /// Where the time comes from.
-    pub source: String,
+    /// Where the time comes from; text in JSON.
+    pub source: TimeSource,
     /// Unit of the times: as the name of the column states, or as its values are likely; `None` without a column of time.
     pub unit: Option<&'static str>,
     /// Rows per second, from the period.

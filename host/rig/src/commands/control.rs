@@ -416,15 +416,7 @@ impl Whole<'_> {
         };
         let task = ContactTask::choose(first, &options, &settings)?;
         add_notes(&mut evaluation.notes, task.notes.clone());
-        let samples = (task.duration * settings.rate).ceil() as usize;
-        let still = |q: &f64| {
-            let at = Reference {
-                position: *q,
-                ..Reference::default()
-            };
-            vec![at; samples]
-        };
-        let reference: Vec<Vec<Reference<f64>>> = task.pose.iter().map(still).collect();
+        let reference = task.joint_reference((task.duration * settings.rate).ceil() as usize);
         let bench = self.bench(&reference, task.tool, settings);
         let mut progress = ui.progress("simulating", (laws.len() * self.models.len()) as u64);
         self.each(laws, |law, model, name, motion| {
