@@ -15,6 +15,7 @@ mod load;
 mod memory;
 mod output;
 mod overwrite;
+mod project;
 mod robots;
 mod run;
 mod simulate;
