@@ -34,6 +34,8 @@ pub(super) struct TextLines {
     /// The last line, without its end.
     line: Vec<u8>,
     number: u64,
+    /// True if a line end stands behind the last line.
+    has_end: bool,
     bytes: u64,
     /// Byte that ends a line: a line feed, or a carriage return if the file has only those.
     end: u8,
@@ -59,6 +61,7 @@ impl TextLines {
             reader,
             line: Vec::new(),
             number: 0,
+            has_end: true,
             bytes: 0,
             end: if is_return_alone { b'\r' } else { b'\n' },
         })
@@ -67,6 +70,12 @@ impl TextLines {
     /// Returns the number of bytes read so far.
     pub(super) fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// Returns true if the last line is the end of the file without a line end, as where a file was cut off: a number at its
+    /// end may lack digits.
+    pub(super) fn is_cut(&self) -> bool {
+        !self.has_end && !self.line.trim_ascii().is_empty()
     }
 }
 
@@ -84,8 +93,9 @@ impl Lines for TextLines {
             return Ok(false);
         }
         self.number += 1;
+        self.has_end = self.line.last() == Some(&self.end);
         self.bytes += read as u64 * self.reader.get_ref().bytes_a_character();
-        if self.line.last() == Some(&self.end) {
+        if self.has_end {
             self.line.pop();
         } else if read == LONGEST_LINE {
             let (path, line) = (self.path.clone(), self.number);
@@ -203,6 +213,10 @@ impl CsvRows {
             return self.only_empty_lines_left(layout).map(|()| None);
         }
         let row = self.lines.number;
+        if self.lines.is_cut() {
+            self.remarks.push(Remark::CutRow { line: row });
+            return Ok(None);
+        }
         // Put back below: the fields are read from it while the state of the file changes.
         let line = std::mem::take(&mut self.lines.line);
         let found = match self.separator {

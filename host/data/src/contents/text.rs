@@ -8,6 +8,7 @@ use crate::csv_header::{Lines, Separator, find_header};
 use crate::error::DataError;
 use crate::iso_time::iso_time;
 use crate::number::number;
+use crate::remark::Remark;
 
 /// What a text file holds.
 pub(super) struct Text {
@@ -65,6 +66,11 @@ pub(super) fn text(path: &Path, advance: &mut dyn FnMut(u64)) -> Result<Text, Da
     };
     let mut values = vec![f64::NAN; found.names.len()];
     while std::mem::take(&mut has_row) || lines.next_line()? {
+        if lines.is_cut() {
+            let line = lines.number();
+            faults.push(format!("{}.", Remark::CutRow { line }));
+            break;
+        }
         reader.row(lines.line(), lines.number(), &mut values, &mut topic);
         if topic.rows % 4096 == 0 {
             advance(lines.bytes());
