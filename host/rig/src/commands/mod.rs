@@ -12,6 +12,7 @@ mod compliance;
 mod control;
 mod demo;
 mod diagnose;
+mod doctor;
 mod error;
 mod excite;
 mod flash;
@@ -68,6 +69,7 @@ enum Command {
     Board(board::Args),
     Flash(flash::Args),
     Base(base::Args),
+    Doctor(doctor::Args),
     Completions(completions::Args),
 }
 
@@ -86,6 +88,7 @@ impl Cli {
             Some(Command::Live(args)) => live::run(&args, &ui),
             Some(Command::Board(args)) => board::run(&args, &ui),
             Some(Command::Flash(args)) => flash::run(&args, &ui),
+            Some(Command::Doctor(args)) => return doctor::run(&args, &ui),
             Some(Command::Base(args)) => base::run(&args, &ui),
             Some(Command::Completions(args)) => {
                 completions::run(&args, &mut Self::command(), &ui);
