@@ -9,6 +9,7 @@ mod control;
 mod diagnose;
 mod doctor;
 mod excite;
+mod export;
 mod friction_map;
 mod inspect;
 mod live;

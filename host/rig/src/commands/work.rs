@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use super::error::CommandError;
 use super::ui::Ui;
 use super::{
-    compare, compliance, control, diagnose, excite, friction_map, identify, init, inspect, load,
-    mjcf, record, simulate, urdf, validate,
+    compare, compliance, control, convert, diagnose, excite, friction_map, header, identify, init,
+    inspect, load, mjcf, record, simulate, table, urdf, validate,
 };
 
 /// A command that makes files from files.
@@ -17,12 +17,15 @@ pub(crate) enum Work {
     Excite(excite::Args),
     Record(record::Args),
     Simulate(simulate::Args),
+    Convert(convert::Args),
     Urdf(urdf::Args),
     Mjcf(mjcf::Args),
+    Header(header::Args),
     Identify(identify::Args),
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
     Diagnose(diagnose::Args),
+    Table(table::Args),
     Load(load::Args),
     Compare(compare::Args),
     Compliance(compliance::Args),
@@ -49,8 +52,11 @@ impl Work {
             Self::Excite(args) => excite::run(args, ui),
             Self::Record(args) => record::run(args, ui),
             Self::Simulate(args) => simulate::run(args, ui),
+            Self::Convert(args) => convert::run(args, ui),
             Self::Urdf(args) => urdf::run(args, ui),
             Self::Mjcf(args) => mjcf::run(args, ui),
+            Self::Header(args) => header::run(args, ui),
+            Self::Table(args) => table::run(args, ui),
             Self::Identify(args) => ui.with_json(args.json_file(), |ui| identify::run(args, ui)),
             Self::FrictionMap(args) => {
                 ui.with_json(args.json_file(), |ui| friction_map::run(args, ui))

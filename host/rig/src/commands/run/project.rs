@@ -12,12 +12,15 @@ use crate::commands::error::CommandError;
 const COMMAND: &str = "command";
 
 /// Commands with one output file, and the ending of that file. The others write a folder.
-const FILE_ENDINGS: [(&str, &str); 6] = [
+const FILE_ENDINGS: [(&str, &str); 9] = [
+    ("convert", "npz"),
     ("excite", "toml"),
+    ("header", "h"),
     ("init", "toml"),
     ("mjcf", "xml"),
     ("record", "csv"),
     ("simulate", "csv"),
+    ("table", "md"),
     ("urdf", "urdf"),
 ];
 
@@ -220,7 +223,10 @@ fn step(
             values,
         });
     }
-    step.words.push(format!("--out={}", step.out));
+    step.words.push(match argument(described, "out") {
+        Some(out) if out.is_positional() => step.out.clone(),
+        _ => format!("--out={}", step.out),
+    });
     Ok(step)
 }
 
@@ -343,5 +349,54 @@ fn word(value: &Value) -> Result<String, String> {
             "{} is neither text in quotation marks nor a number",
             other.to_string().trim()
         )),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// `rig run` gives every step an output and may have to replace it.
+    #[test]
+    fn every_command_that_can_be_a_step_has_out_and_force() {
+        let words = Words::command();
+        assert!(words.get_subcommands().count() >= 15);
+        for command in words.get_subcommands() {
+            for option in ["out", "force"] {
+                assert!(
+                    argument(command, option).is_some(),
+                    "{} {option}",
+                    command.get_name()
+                );
+            }
+        }
+        for (name, _) in FILE_ENDINGS {
+            assert!(words.find_subcommand(name).is_some(), "{name}");
+        }
+    }
+
+    #[test]
+    fn tables_become_the_words_of_the_command() {
+        let text = "unit = { q = \"deg\", t = \"ms\" }\n\n[a]\ncommand = \"identify\"\nrobot = \"arm.urdf\"\ndata = [\"1.csv\", \"2.csv\"]\nlock.finger = -0.5\nas-described = true\neven-if-wrong = false\n\n[b]\ncommand = \"excite\"\nrobot = \"arm.urdf\"\nstart = [-1.5, 0]\n\n[c]\ncommand = \"convert\"\nfile = \"1.csv\"\n\n[d]\ncommand = \"compare\"\nrobot = \"arm.urdf\"\nset = { cold = [\"1.csv\", \"2.csv\"] }\n";
+        let found = steps(Path::new("lab.toml"), text).unwrap();
+        let words: Vec<String> = found.iter().map(|step| step.words.join(" ")).collect();
+        assert_eq!(
+            words,
+            [
+                "identify --unit=q=deg --unit=t=ms --robot=arm.urdf --data=1.csv --data=2.csv --lock=finger=-0.5 --as-described --out=a",
+                "excite --robot=arm.urdf --start=-1.5,0 --out=b.toml",
+                "convert --unit=q=deg --unit=t=ms 1.csv c.npz",
+                "compare --unit=q=deg --unit=t=ms --robot=arm.urdf --set=cold=1.csv,2.csv --out=d",
+            ]
+        );
+        for step in found {
+            let all = std::iter::once("rig").chain(step.words.iter().map(String::as_str));
+            assert!(
+                <Words as clap::Parser>::try_parse_from(all).is_ok(),
+                "{}",
+                step.name
+            );
+        }
     }
 }
