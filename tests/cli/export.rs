@@ -44,13 +44,14 @@ fn a_recording_is_the_same_in_every_format() {
     let own = |name: &str| folder.path().join(name);
     // The truth that the files hold: q = (0.5 sin 3t, 0.3 cos 2t), tau = (2 q1, -4 q2).
     let text = succeed(&mut convert(&of_others("bag_mcap"), &own("bag.csv")));
-    assert!(text.contains("200 rows of t, q1, q2"), "{text}");
+    // The joints in the file: gripper, elbow, shoulder.
+    assert!(text.contains("200 rows of t, q1, q2, q3"), "{text}");
     let (names, bag) = columns(&own("bag.csv"));
     let at = |name: &str| names.iter().position(|own| own == name).unwrap();
     for row in [0, 57, 199] {
         let t = bag[0][row];
         assert!((t - 0.002 * row as f64).abs() < 1e-9);
-        let (q, tau) = (bag[at("q1")][row], bag[at("tau1")][row]);
+        let (q, tau) = (bag[at("q2")][row], bag[at("tau2")][row]);
         assert!((q - 0.5 * (3.0 * t).sin()).abs() < 1e-9 && (tau - 2.0 * q).abs() < 1e-9);
     }
     // Through every other format and back.
@@ -65,7 +66,7 @@ fn a_recording_is_the_same_in_every_format() {
     }
     let again = refuse(&mut convert(&own("bag.csv"), &own("bag.npz")));
     assert!(again.contains("--force"), "{again}");
-    // The order of a description; of a motor the current stays a current.
+    // A motor current stays a current.
     let parquet = refuse(&mut convert(&own("bag.csv"), &own("bag.parquet")));
     assert!(
         parquet.contains(".npz") && parquet.contains("to_parquet"),
@@ -100,7 +101,7 @@ fn numpy_reads_what_is_converted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.npz");
     succeed(&mut convert(&of_others("bag_mcap"), &path));
-    let script = "import sys, numpy\nf = numpy.load(sys.argv[1])\nassert f['q'].shape == (200, 2) and f['t'].shape == (200,), f['q'].shape\nt = f['t']\nassert abs(f['q'][:, 0] - 0.5 * numpy.sin(3 * t)).max() < 1e-9\nassert abs(f['tau'][:, 0] - 2 * f['q'][:, 0]).max() < 1e-9\n";
+    let script = "import sys, numpy\nf = numpy.load(sys.argv[1])\nassert f['q'].shape == (200, 3) and f['t'].shape == (200,), f['q'].shape\nt = f['t']\nassert abs(f['q'][:, 1] - 0.5 * numpy.sin(3 * t)).max() < 1e-9\nassert abs(f['tau'][:, 1] - 2 * f['q'][:, 1]).max() < 1e-9\n";
     let output = Command::new(&python)
         .args(["-c", script])
         .arg(&path)

@@ -139,7 +139,7 @@ fn a_change_runs_the_steps_that_depend_on_it_and_no_others() {
     fs::write(&identified, format!("# mine\n{before}")).unwrap();
     let refused = refuse_last(&mut run(own, &[]));
     for words in [
-        "lab.toml:20: [found]",
+        "lab.toml:19: [found]",
         "found/identified.toml was changed",
         "--force",
     ] {

@@ -26,7 +26,8 @@ pub fn write_npz(path: &Path, names: &[String], values: &[Vec<f64>]) -> Result<(
     let mut archive = Archive::default();
     for (name, columns) in arrays(names) {
         let columns: Vec<&[f64]> = columns.iter().map(|k| values[*k].as_slice()).collect();
-        archive.add(&name, &columns).map_err(failed)?;
+        let is_of_joints = !names.contains(&name);
+        archive.add(&name, &columns, is_of_joints).map_err(failed)?;
     }
     let bytes = archive.finish().map_err(failed)?;
     let written = temporary(path).and_then(|mut file| {
@@ -67,10 +68,9 @@ struct Archive {
 }
 
 impl Archive {
-    /// Adds an array of doubles. One column named otherwise than a joint's quantity has one index, others have two.
-    fn add(&mut self, name: &str, columns: &[&[f64]]) -> std::io::Result<()> {
+    /// Adds an array of doubles: rows × joints, or of one index.
+    fn add(&mut self, name: &str, columns: &[&[f64]], is_of_joints: bool) -> std::io::Result<()> {
         let rows = columns.first().map_or(0, |column| column.len());
-        let is_of_joints = Signal::split(&format!("{name}1")).is_some();
         let shape = match is_of_joints {
             true => format!("({rows}, {})", columns.len()),
             false => format!("({rows},)"),

@@ -12,7 +12,9 @@ use clap::{Args as ClapArgs, Parser};
 use self::project::{Step, steps};
 use self::state::{Done, State, inputs, snapshot, written};
 use super::error::CommandError;
+use super::interrupts;
 use super::overwrite::refuse_file;
+use super::pictures::forget;
 use super::ui::Ui;
 use super::work::{Words, Work};
 use crate::pages::{self, RunStep};
@@ -167,7 +169,9 @@ fn refuse_order(steps: &[Step], file: &Path) -> Result<(), CommandError> {
             let reads = (step.options.iter()).find(|option| {
                 let texts = option.values.iter().flat_map(|text| text.split(['=', ',']));
                 let mut paths = texts.map(Path::new);
-                option.name != "out" && paths.any(|path| path.starts_with(&later.out))
+                // The name of a joint may be that of a step.
+                let is_file = option.values.iter().any(|text| text.contains(['.', '/']));
+                option.name != "out" && is_file && paths.any(|path| path.starts_with(&later.out))
             });
             if let Some(option) = reads {
                 return Err(CommandError::Sentence(format!(
@@ -216,7 +220,8 @@ impl Run<'_> {
         let version = (step.command != "record").then_some(env!("CARGO_PKG_VERSION"));
         let read = inputs(step)?;
         let before = self.state.of(&step.name).cloned();
-        let edited = before.as_ref().map(Done::edited).transpose()?.flatten();
+        let edited = before.as_ref().map(|done| done.edited(&step.out));
+        let edited = edited.transpose()?.flatten();
         let why = match &before {
             None => None,
             Some(done) => done
@@ -246,8 +251,10 @@ impl Run<'_> {
         } else {
             work.run(&ui)?
         };
+        // A recording waits for the link to come to rest; the steps after it end at once.
+        interrupts::end_at_once();
         let outputs = written(&step.out, &there)?;
-        forget_earlier(before.as_ref(), &outputs)?;
+        forget_earlier(before.as_ref(), &step.out, &outputs)?;
         self.state.put(Done {
             name: step.name.clone(),
             command,
@@ -287,14 +294,17 @@ impl Run<'_> {
     }
 }
 
-/// Removes files of an earlier run of a step that the new run did not write, so that nobody takes them for its results.
+/// Removes files that an earlier run of a step wrote to this place and the new run did not, so that nobody takes them for its
+/// results.
 fn forget_earlier(
     before: Option<&Done>,
+    out: &str,
     outputs: &BTreeMap<String, String>,
 ) -> Result<(), CommandError> {
     let earlier = before.into_iter().flat_map(|done| done.outputs.keys());
-    for path in earlier.filter(|path| !outputs.contains_key(*path)) {
-        super::pictures::forget(Path::new(path))?;
+    let old = earlier.filter(|path| !outputs.contains_key(*path));
+    for path in old.map(Path::new).filter(|path| path.starts_with(out)) {
+        forget(path)?;
     }
     Ok(())
 }

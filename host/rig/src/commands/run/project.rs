@@ -142,42 +142,10 @@ fn step(
 ) -> Result<Step, CommandError> {
     let top = source.line(root.key(name).and_then(toml_edit::Key::span));
     let wrong = |line, text: &str| source.error(line, Some(name), text);
-    if !name
-        .chars()
-        .all(|c| c.is_alphanumeric() || "-_".contains(c))
-    {
-        return Err(wrong(
-            top,
-            "the name of a step is also that of its files; use letters, digits, - and _.",
-        ));
-    }
-    let words = Words::command();
-    let names: Vec<&str> = words
-        .get_subcommands()
-        .map(clap::Command::get_name)
-        .collect();
-    let Some(command) = table.get(COMMAND).and_then(Item::as_str) else {
-        return Err(wrong(
-            top,
-            &format!(
-                "the table has no `{COMMAND}`; write {COMMAND} = \"identify\", or one of {}.",
-                names.join(", ")
-            ),
-        ));
-    };
-    let Some(described) = words.find_subcommand(command) else {
-        let line = source.line(table.key(COMMAND).and_then(toml_edit::Key::span));
-        return Err(wrong(
-            line,
-            &format!(
-                "`{command}` is no command for a step; take one of {}.",
-                names.join(", ")
-            ),
-        ));
-    };
+    let described = command(source, name, table, top)?;
     let mut all: Vec<(&str, usize, &Item)> = Vec::new();
     for (k, (key, item)) in shared.iter().enumerate() {
-        if argument(described, key).is_some() {
+        if argument(&described, key).is_some() {
             used[k] = true;
             let line = source.line(root.key(key).and_then(toml_edit::Key::span));
             if !table.contains_key(key) {
@@ -186,26 +154,23 @@ fn step(
         }
     }
     for (key, item) in table.iter().filter(|(key, _)| *key != COMMAND) {
-        all.push((
-            key,
-            source.line(table.key(key).and_then(toml_edit::Key::span)),
-            item,
-        ));
+        let line = source.line(table.key(key).and_then(toml_edit::Key::span));
+        all.push((key, line, item));
     }
     let mut step = Step {
         name: name.to_owned(),
         place: format!("{}:{top}: [{name}]", source.path.display()),
-        command: command.to_owned(),
-        words: vec![command.to_owned()],
+        command: described.get_name().to_owned(),
+        words: vec![described.get_name().to_owned()],
         options: Vec::new(),
-        out: default_out(command, name),
+        out: default_out(described.get_name(), name),
     };
     for (key, line, item) in all {
         if let Some((_, why)) = NOT_IN_A_STEP.iter().find(|(own, _)| *own == key) {
             return Err(wrong(line, &format!("a step has no `{key}`: {why}.")));
         }
-        let Some(argument) = argument(described, key) else {
-            return Err(wrong(line, &unknown(described, key)));
+        let Some(argument) = argument(&described, key) else {
+            return Err(wrong(line, &unknown(&described, key)));
         };
         let value = item.clone().into_value();
         let value = value.map_err(|_| "it is a list of tables".to_owned());
@@ -223,11 +188,52 @@ fn step(
             values,
         });
     }
-    step.words.push(match argument(described, "out") {
+    step.words.push(match argument(&described, "out") {
         Some(out) if out.is_positional() => step.out.clone(),
         _ => format!("--out={}", step.out),
     });
     Ok(step)
+}
+
+/// Returns the command of a table whose name is in line `top`.
+fn command(
+    source: &Source,
+    name: &str,
+    table: &Table,
+    top: usize,
+) -> Result<clap::Command, CommandError> {
+    let wrong = |line, text: &str| source.error(line, Some(name), text);
+    if !name
+        .chars()
+        .all(|c| c.is_alphanumeric() || "-_".contains(c))
+    {
+        return Err(wrong(
+            top,
+            "the name of a step is also that of its files; use letters, digits, - and _.",
+        ));
+    }
+    let words = Words::command();
+    let names = || {
+        let names: Vec<&str> = (words.get_subcommands())
+            .map(clap::Command::get_name)
+            .collect();
+        names.join(", ")
+    };
+    let Some(command) = table.get(COMMAND).and_then(Item::as_str) else {
+        let text = format!(
+            "the table has no `{COMMAND}`; write {COMMAND} = \"identify\", or one of {}.",
+            names()
+        );
+        return Err(wrong(top, &text));
+    };
+    words.find_subcommand(command).cloned().ok_or_else(|| {
+        let line = source.line(table.key(COMMAND).and_then(toml_edit::Key::span));
+        let text = format!(
+            "`{command}` is no command for a step; take one of {}.",
+            names()
+        );
+        wrong(line, &text)
+    })
 }
 
 /// Returns the output of a step that names none.

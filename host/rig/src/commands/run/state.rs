@@ -133,14 +133,17 @@ impl Done {
         (self.outputs.keys()).any(|path| Path::new(path).starts_with(out))
     }
 
-    /// Returns the first file that the step wrote and somebody changed since.
+    /// Returns the first file that the step wrote to this place and somebody changed since.
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub(super) fn edited(&self) -> Result<Option<&str>, CommandError> {
+    pub(super) fn edited(&self, out: &str) -> Result<Option<&str>, CommandError> {
         for (path, before) in &self.outputs {
             let path = path.as_str();
-            if Path::new(path).exists() && &fingerprint(Path::new(path))? != before {
+            if Path::new(path).starts_with(out)
+                && Path::new(path).exists()
+                && &fingerprint(Path::new(path))? != before
+            {
                 return Ok(Some(path));
             }
         }
