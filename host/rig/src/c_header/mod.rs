@@ -17,6 +17,8 @@ use rig_shared::effects::Kind;
 pub struct CHeader {
     /// The file.
     pub text: String,
+    /// The joints with the effects that are in it, one entry a joint: `link with stribeck`.
+    pub holds: Vec<String>,
     /// Effects that are not in it, one sentence each.
     pub left_out: Vec<String>,
 }
@@ -60,8 +62,18 @@ pub fn c_header(robot: &Robot, from: &str) -> CHeader {
     let others = placed
         .iter()
         .filter(|own| laws::law(own.effect.kind).is_none());
+    let holds = robot.joints.iter().enumerate().map(|(k, joint)| {
+        let own = placed.iter().filter(|p| p.joint == k);
+        let own = own.filter(|p| laws::law(p.effect.kind).is_some());
+        let names: Vec<String> = own.map(|p| title_of(p.effect.kind)).collect();
+        match names.is_empty() {
+            true => joint.name.clone(),
+            false => format!("{} with {}", joint.name, names.join(", ")),
+        }
+    });
     CHeader {
         text,
+        holds: holds.collect(),
         left_out: others.map(out).collect(),
     }
 }

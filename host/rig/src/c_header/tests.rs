@@ -1,4 +1,5 @@
 //! The header, compiled by the system's C compiler, against the laws in Rust.
+#![allow(clippy::unwrap_used)]
 
 use std::fmt::Write as _;
 use std::path::Path;

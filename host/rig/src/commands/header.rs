@@ -42,10 +42,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(sentence);
     }
     ui.answer(&format!(
-        "{}: {} joints with {} effects",
+        "{}: friction of {}",
         args.out.display(),
-        robot.joints.len(),
-        robot.effects.len() - header.left_out.len()
+        header.holds.join(", ")
     ));
     Ok(())
 }

@@ -113,7 +113,8 @@ pub(super) fn steps(path: &Path, text: &str) -> Result<Vec<Step>, CommandError> 
         };
         steps.push(step(&source, name, table, (root, &shared, &mut used))?);
     }
-    for ((key, _), _) in shared.iter().zip(&used).filter(|(_, used)| !**used) {
+    let unused = shared.iter().zip(&used).find(|(_, used)| !**used);
+    if let Some(((key, _), _)) = unused {
         let line = source.line(root.key(key).and_then(toml_edit::Key::span));
         return Err(source.error(
             line,
