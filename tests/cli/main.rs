@@ -7,6 +7,7 @@ mod compare;
 mod compliance;
 mod control;
 mod diagnose;
+mod documented;
 mod excite;
 mod friction_map;
 mod inspect;
