@@ -8,6 +8,7 @@ mod compliance;
 mod control;
 mod diagnose;
 mod doctor;
+mod documented;
 mod excite;
 mod export;
 mod friction_map;

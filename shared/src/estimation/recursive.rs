@@ -81,6 +81,12 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
         config
     }
 
+    /// Returns the same for parameters that are constant: the estimator never restarts.
+    pub fn of_constant_parameters(mut self) -> Self {
+        self.residuals = self.residuals.without_alarm();
+        self
+    }
+
     /// Replaces the adaptation gain matrix Γ of the gradient update, given in the parameters' units over
     /// torque: Δθ = Γφ·e/(1 + φᵀΓφ). Must be symmetric and positive definite.
     pub fn with_adaptation(mut self, gain: &[[T; N]; N]) -> Self {

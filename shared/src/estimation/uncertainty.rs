@@ -38,6 +38,7 @@ pub struct Config<T> {
     block: u32,
     inverse_block: T,
     max_blocks: T,
+    watches: bool,
 }
 
 impl<T: Real<Mask = bool>> Config<T> {
@@ -49,6 +50,15 @@ impl<T: Real<Mask = bool>> Config<T> {
             block,
             inverse_block: T::ONE / T::from_f64(f64::from(block)),
             max_blocks: memory_blocks.clamp_to(T::from_f64(MIN_BLOCKS), T::from_f64(MAX_BLOCKS)),
+            watches: true,
+        }
+    }
+
+    /// Returns the same for parameters that are constant: no block is an alarm, and all are averaged.
+    pub fn without_alarm(self) -> Self {
+        Self {
+            watches: false,
+            ..self
         }
     }
 }
@@ -178,7 +188,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.squares = T::ZERO;
         self.rows = [T::ZERO; N];
         self.filled = 0;
-        if self.is_known {
+        if self.is_known && config.watches {
             let expected = self.noise * config.inverse_block + spread;
             let alarm = (expected * T::from_f64(ALARM_MEAN)).lt(mean * mean)
                 || (self.mean_square * T::from_f64(ALARM_POWER)).lt(square);

@@ -33,8 +33,6 @@ pub(super) struct Online {
     pub values: Vec<Vec<f64>>,
     /// Standard deviations at the end; none before enough residuals were seen.
     pub std: Vec<Option<f64>>,
-    /// Number of restarts after a jump of the residual.
-    pub changes: u32,
 }
 
 /// Sums of squares of an equation.
@@ -98,7 +96,6 @@ fn run<const N: usize>(
         t: Vec::new(),
         values: Vec::new(),
         std: Vec::new(),
-        changes: 0,
     };
     let every = total.div_ceil(POINTS).max(1);
     let mut index = 0;
@@ -127,7 +124,6 @@ fn run<const N: usize>(
         .map(|(std, half)| (std < half).then_some(*std))
         .take(p)
         .collect();
-    found_so_far.changes = state.changes();
     Ok(found_so_far)
 }
 
@@ -142,8 +138,8 @@ fn pass(
     each_row(robot, base, &[recording], found, model, take)
 }
 
-/// Returns the constants of the recursion and the half-widths of the bands. Nothing is forgotten, and every band is
-/// symmetric about zero.
+/// Returns the constants of the recursion and the half-widths of the bands. Nothing is forgotten, no residual is taken for a
+/// change of the parameters, and every band is symmetric about zero.
 fn config<const N: usize>(sizes: &[Sizes], p: usize, instants: u32) -> (Config<f64, N>, [f64; N]) {
     let (mut lower, mut upper) = ([0.0; N], [0.0; N]);
     for c in 0..p {
@@ -162,5 +158,5 @@ fn config<const N: usize>(sizes: &[Sizes], p: usize, instants: u32) -> (Config<f
         0.0,
         instants * sizes.len() as u32,
     );
-    (config, upper)
+    (config.of_constant_parameters(), upper)
 }
