@@ -138,6 +138,9 @@ impl Lines for TextLines {
     }
 }
 
+/// Rows from which a last row without a line end is left out. In a file with fewer rows each may be a pose that counts.
+pub(super) const SPARED: u64 = 256;
+
 /// Rows of a CSV file in order.
 pub(super) struct CsvRows {
     lines: TextLines,
@@ -150,6 +153,8 @@ pub(super) struct CsvRows {
     /// Whole seconds of the first time that is a date or a time of day.
     iso_origin: Option<i64>,
     quoted: QuotedRow,
+    /// Number of rows so far.
+    rows: u64,
 }
 
 /// A row with quoted fields: the joined text, and the end of each field.
@@ -180,6 +185,7 @@ impl CsvRows {
                 text: Vec::new(),
                 ends: Vec::new(),
             },
+            rows: 0,
         };
         let mut header = Header::of(found.names);
         header.line = Some(found.line);
@@ -213,7 +219,8 @@ impl CsvRows {
             return self.only_empty_lines_left(layout).map(|()| None);
         }
         let row = self.lines.number;
-        if self.lines.is_cut() {
+        let is_cut = self.lines.is_cut();
+        if is_cut && self.rows >= SPARED {
             self.remarks.push(Remark::CutRow { line: row });
             return Ok(None);
         }
@@ -224,13 +231,25 @@ impl CsvRows {
             _ => self.plain_fields(layout, values, &line),
         };
         self.lines.line = line;
-        let found = match found? {
-            Some(found) => found,
-            None => self.quoted_fields(layout, values)?,
+        let found = match found {
+            Ok(None) => self.quoted_fields(layout, values),
+            found => found.map(Option::unwrap_or_default),
         };
+        if is_cut {
+            let is_whole = matches!(found, Ok(found) if found == layout.columns.len());
+            let remark = match is_whole {
+                true => Remark::OpenEnd { line: row },
+                false => Remark::CutRow { line: row },
+            };
+            self.remarks.push(remark);
+            self.rows += u64::from(is_whole);
+            return Ok(is_whole.then_some(row));
+        }
+        let found = found?;
         if found != layout.columns.len() {
             return Err(self.field_count(layout, row, found));
         }
+        self.rows += 1;
         Ok(Some(row))
     }
 

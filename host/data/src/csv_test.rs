@@ -363,30 +363,46 @@ fn names_with_blanks_before_their_units_are_split_at_the_other_separator() {
 
 #[test]
 fn the_last_row_of_a_file_that_is_cut_off_is_no_row() {
-    let whole = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.25,3\n";
-    holds(whole, 2, &[]);
+    let rows: String = (0..300).map(|k| format!("{k}e-3,0.25,3\n")).collect();
+    let whole = format!("t,q1,tau1\n{rows}");
+    let holds_rows = |text: &str, remarks: &[&str]| {
+        let (blocks, warnings) = read(text).unwrap();
+        assert_eq!(blocks[0].t.len(), 300, "{warnings:?}");
+        assert_eq!(warnings.len(), remarks.len(), "{warnings:?}");
+        for (warning, remark) in warnings.iter().zip(remarks) {
+            assert!(warning.contains(remark), "{warning}");
+        }
+    };
+    holds_rows(&whole, &[]);
     // Each is a row of its own with another torque, position or time, or too few fields.
-    for cut in [
-        "0.002,0.75,1.2",
-        "0.002,0.75,1",
-        "0.002,0.75,",
-        "0.002,0.7",
-        "0.00",
-    ] {
+    for cut in ["0.3,0.75,1.2", "0.3,0.75,1", "0.3,0.75,", "0.3,0.7", "0.3"] {
         for separator in [",", ";", "\t"] {
             let text = format!("{whole}{cut}").replace(',', separator);
+            let said = "line 302, the last one, has no line end: the file may be";
             let remarks: &[&str] = match separator {
-                "," => &["line 4, the last one, has no line end"],
-                _ => &[
-                    "columns are separated",
-                    "line 4, the last one, has no line end",
-                ],
+                "," => &[said],
+                _ => &["columns are separated", said],
             };
-            holds(text, 2, remarks);
+            holds_rows(&text, remarks);
         }
     }
     // Blanks at the end are no row.
-    holds(format!("{whole}  "), 2, &[]);
+    holds_rows(&format!("{whole}  "), &[]);
+}
+
+/// In a file of few rows, each may be a pose: the last one is left out only if it lacks a field.
+#[test]
+fn the_last_of_few_rows_counts_without_a_line_end() {
+    let whole = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.25,3";
+    holds(
+        whole,
+        2,
+        &["line 3, the last one, has no line end: if the file was cut off"],
+    );
+    for cut in ["\n0.002,0.7", "\n0.002,0.7,", "\n0.00"] {
+        let said = "line 4, the last one, has no line end: the file may be";
+        holds(format!("{whole}{cut}"), 2, &[said]);
+    }
 }
 
 #[test]

@@ -143,6 +143,14 @@ pub enum Remark {
         /// The line.
         line: u64,
     },
+    /// A text file of few rows whose last line has no end; the row is used.
+    #[error(
+        "line {line}, the last one, has no line end: if the file was cut off, its last number may lack digits"
+    )]
+    OpenEnd {
+        /// The line.
+        line: u64,
+    },
     /// Times that are counted from the first row.
     #[error("t is counted from the first row, because the times of the file are {what}")]
     CountedTime {
@@ -225,6 +233,7 @@ impl Remark {
             Self::UnknownUnit { .. } => 18,
             Self::LikelyTime { .. } => 19,
             Self::CutRow { .. } => 20,
+            Self::OpenEnd { .. } => 21,
         }
     }
 }

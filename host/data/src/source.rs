@@ -196,7 +196,10 @@ impl Source {
         let is_late = |r: &Remark| {
             matches!(
                 r,
-                Remark::CutOff { .. } | Remark::LeftOut { .. } | Remark::CutRow { .. }
+                Remark::CutOff { .. }
+                    | Remark::LeftOut { .. }
+                    | Remark::CutRow { .. }
+                    | Remark::OpenEnd { .. }
             )
         };
         let kept = remarks.filter(|remark| !is_late(remark));

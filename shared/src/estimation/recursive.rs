@@ -81,12 +81,6 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
         config
     }
 
-    /// Returns the same for parameters that are constant: the estimator never restarts.
-    pub fn of_constant_parameters(mut self) -> Self {
-        self.residuals = self.residuals.without_alarm();
-        self
-    }
-
     /// Replaces the adaptation gain matrix Γ of the gradient update, given in the parameters' units over
     /// torque: Δθ = Γφ·e/(1 + φᵀΓφ). Must be symmetric and positive definite.
     pub fn with_adaptation(mut self, gain: &[[T; N]; N]) -> Self {
@@ -105,18 +99,18 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
     }
 }
 
-/// State of the estimator.
+/// State of the estimator. Without `WATCHES` the parameters are constant, and it never restarts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State<T, const N: usize> {
+pub struct State<T, const N: usize, const WATCHES: bool = true> {
     x: [T; N],
     carry: [T; N],
     p: UdFactor<T, N>,
-    uncertainty: Uncertainty<T, N>,
+    uncertainty: Uncertainty<T, N, WATCHES>,
     at_bound: [u32; N],
     changes: u32,
 }
 
-impl<T: Real<Mask = bool>, const N: usize> Default for State<T, N> {
+impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> Default for State<T, N, WATCHES> {
     fn default() -> Self {
         Self {
             x: [T::ZERO; N],
@@ -129,7 +123,7 @@ impl<T: Real<Mask = bool>, const N: usize> Default for State<T, N> {
     }
 }
 
-impl<T: Real<Mask = bool>, const N: usize> State<T, N> {
+impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> State<T, N, WATCHES> {
     /// Returns the diagonal of P in scaled units (prior: 1). It is not the variance of the estimate: see [`report`].
     pub fn gain_variances(&self) -> [T; N] {
         self.p.variances()
@@ -143,9 +137,9 @@ impl<T: Real<Mask = bool>, const N: usize> State<T, N> {
 
 /// Processes one measurement y = row·θ + noise. Input that is not finite changes nothing.
 #[inline]
-pub fn update<T: Real<Mask = bool>, const N: usize>(
+pub fn update<T: Real<Mask = bool>, const N: usize, const WATCHES: bool>(
     config: &Config<T, N>,
-    state: &mut State<T, N>,
+    state: &mut State<T, N, WATCHES>,
     row: &[T; N],
     y: T,
 ) -> Update {
@@ -209,9 +203,9 @@ pub fn update<T: Real<Mask = bool>, const N: usize>(
 }
 
 /// Returns the current results.
-pub fn report<T: Real<Mask = bool>, const N: usize>(
+pub fn report<T: Real<Mask = bool>, const N: usize, const WATCHES: bool>(
     config: &Config<T, N>,
-    state: &State<T, N>,
+    state: &State<T, N, WATCHES>,
 ) -> Report<T, N> {
     let mut out = Report {
         value: config.centre,

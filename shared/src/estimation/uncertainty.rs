@@ -38,7 +38,6 @@ pub struct Config<T> {
     block: u32,
     inverse_block: T,
     max_blocks: T,
-    watches: bool,
 }
 
 impl<T: Real<Mask = bool>> Config<T> {
@@ -50,15 +49,6 @@ impl<T: Real<Mask = bool>> Config<T> {
             block,
             inverse_block: T::ONE / T::from_f64(f64::from(block)),
             max_blocks: memory_blocks.clamp_to(T::from_f64(MIN_BLOCKS), T::from_f64(MAX_BLOCKS)),
-            watches: true,
-        }
-    }
-
-    /// Returns the same for parameters that are constant: no block is an alarm, and all are averaged.
-    pub fn without_alarm(self) -> Self {
-        Self {
-            watches: false,
-            ..self
         }
     }
 }
@@ -72,9 +62,10 @@ pub enum Block {
     Changed,
 }
 
-/// Error covariance and residual statistics of N scaled parameters.
+/// Error covariance and residual statistics of N scaled parameters. Without `WATCHES` the parameters are constant: no block is an
+/// alarm, and all are averaged.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Uncertainty<T, const N: usize> {
+pub struct Uncertainty<T, const N: usize, const WATCHES: bool = true> {
     sigma: [[T; N]; N],
     sum: T,
     squares: T,
@@ -89,7 +80,7 @@ pub struct Uncertainty<T, const N: usize> {
     alarms: u8,
 }
 
-impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
+impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> Uncertainty<T, N, WATCHES> {
     /// Returns the initial state: Σ is the prior's, diagonal `variance` in units of the assumed residual variance.
     pub fn new(variance: T) -> Self {
         let mut sigma = [[T::ZERO; N]; N];
@@ -188,7 +179,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.squares = T::ZERO;
         self.rows = [T::ZERO; N];
         self.filled = 0;
-        if self.is_known && config.watches {
+        if self.is_known && WATCHES {
             let expected = self.noise * config.inverse_block + spread;
             let alarm = (expected * T::from_f64(ALARM_MEAN)).lt(mean * mean)
                 || (self.mean_square * T::from_f64(ALARM_POWER)).lt(square);

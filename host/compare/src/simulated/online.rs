@@ -91,7 +91,7 @@ fn run<const N: usize>(
     let scales: Vec<f64> = (sizes.iter())
         .map(|s| (s.rows.max(1.0) / s.y.max(f64::MIN_POSITIVE)).sqrt())
         .collect();
-    let mut state = State::<f64, N>::default();
+    let mut state = State::<f64, N, false>::default();
     let mut found_so_far = Online {
         t: Vec::new(),
         values: Vec::new(),
@@ -158,5 +158,5 @@ fn config<const N: usize>(sizes: &[Sizes], p: usize, instants: u32) -> (Config<f
         0.0,
         instants * sizes.len() as u32,
     );
-    (config.of_constant_parameters(), upper)
+    (config, upper)
 }

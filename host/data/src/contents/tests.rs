@@ -412,7 +412,7 @@ fn a_second_time_and_a_cut_row_are_told() {
     let text = of_text("stamp,time,q1,tau1\n0,0,0,0\n1,0.1,0,0\n2,0.2,0,0\n");
     assert!(text.proposal.doubts[0].contains("time is named as a time, too"));
     let cut = of_text("t,q1,tau1\n0,0,0\n0.1,0,0\n0.2,0,0.12");
-    assert_eq!(cut.topics[0].rows, 2);
+    assert_eq!(cut.topics[0].rows, 3);
     assert!(cut.faults[0].contains("no line end"), "{:?}", cut.faults);
     // Times since 1970 need no option.
     let row = |k: u64| format!("{},0.5,1\n", 1_700_000_000_000_000_000 + 2_000_000 * k);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::topic::Topic;
-use crate::csv::TextLines;
+use crate::csv::{SPARED, TextLines};
 use crate::csv_header::{Lines, Separator, find_header};
 use crate::error::DataError;
 use crate::iso_time::iso_time;
@@ -68,8 +68,11 @@ pub(super) fn text(path: &Path, advance: &mut dyn FnMut(u64)) -> Result<Text, Da
     while std::mem::take(&mut has_row) || lines.next_line()? {
         if lines.is_cut() {
             let line = lines.number();
-            faults.push(format!("{}.", Remark::CutRow { line }));
-            break;
+            if topic.rows >= SPARED {
+                faults.push(format!("{}.", Remark::CutRow { line }));
+                break;
+            }
+            faults.push(format!("{}.", Remark::OpenEnd { line }));
         }
         reader.row(lines.line(), lines.number(), &mut values, &mut topic);
         if topic.rows % 4096 == 0 {
