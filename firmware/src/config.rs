@@ -120,6 +120,7 @@ impl Config {
                 stuck_ticks: rate / 20,
                 stuck_duty: 0.02,
                 thermal_time: 10.0,
+                late_window: rate / 10,
             },
             ratings: ratings(limits, 1.0 / counts_per_radian),
             calibration_ticks: rate / 2,

@@ -6,13 +6,14 @@ mod estimation;
 use rig_shared::control::{Measured, current, law};
 use rig_shared::encoder;
 use rig_shared::safety::monitor::{self, Readings};
-use rig_shared::safety::{Fault, FaultRecord, Limit, LimitSet, Mode, SnapshotSample};
+use rig_shared::safety::{Fault, FaultRecord, Limit, LimitSet, Mode, Reaction, SnapshotSample};
 use rig_shared::trajectory::Reference;
 use rig_shared::units::Duty;
 use rig_shared::wire::message::{Estimate, StateSample};
 
 use crate::calibration::calibrate;
 use crate::config::Config;
+use crate::motor_brake::MotorBrake;
 use crate::reference::Braking;
 use crate::sample::{Command, Sample};
 use crate::state::{Run, State};
@@ -56,10 +57,11 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         })
         .or_else(|| check_host(config, state));
     if let Some((fault, value)) = fault {
-        output.fault = latch_fault(state, fault, value);
+        output.fault = latch_fault(config, state, &readings, fault, value);
     }
 
     let mut limits = LimitSet::default();
+    limits.set(Limit::LateTick, readings.driving && readings.late_ticks > 0);
     state.reference = reference(config, state, &mut limits);
     let DriveOutput {
         duty,
@@ -68,7 +70,10 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     } = if state.mode.drives() && state.tick >= state.run.bridge_ready_tick {
         drive(config, state, &readings, &mut limits)
     } else {
-        DriveOutput::default()
+        DriveOutput {
+            duty: brake_duty(config, state, &readings),
+            ..DriveOutput::default()
+        }
     };
     state.drive_torque = torque;
     state.limits = limits;
@@ -97,7 +102,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     output.estimate = estimation::feed_estimator(config, state, &tick);
     output.command = Command {
         duty: Duty(duty),
-        bridge: state.mode.drives(),
+        bridge: state.mode.drives() || state.motor_brake.is_some(),
     };
     state.duty = duty;
     state.tick += 1;
@@ -134,7 +139,7 @@ fn convert(config: &Config, state: &mut State, sample: Sample) -> Readings {
     Readings {
         driver_fault: sample.driver_fault,
         comparator: sample.comparator,
-        overrun: sample.overrun,
+        late_ticks: sample.late_ticks,
         current_code: sample.current.0,
         current_at_rail: sample.current.at_rail(),
         current: (f32::from(sample.current.0) - state.calibration.zero_code)
@@ -148,6 +153,7 @@ fn convert(config: &Config, state: &mut State, sample: Sample) -> Readings {
         duty: state.duty,
         lost_voltage: state.compensated_voltage,
         driving: state.mode.drives() && state.tick > state.run.bridge_ready_tick,
+        braking: state.motor_brake.is_some(),
     }
 }
 
@@ -173,8 +179,24 @@ fn check_host(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
         .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
 }
 
-/// Switches the bridge off, latches the fault and keeps the snapshot.
-fn latch_fault(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
+/// Ends every motion as the fault allows, latches the fault and keeps the snapshot. Not inlined because it is rare.
+#[inline(never)]
+fn latch_fault(
+    config: &Config,
+    state: &mut State,
+    readings: &Readings,
+    fault: Fault,
+    value: f32,
+) -> Option<FaultRecord> {
+    match fault.reaction() {
+        // Also while the rig brakes after another fault.
+        Reaction::Coast => state.motor_brake = None,
+        Reaction::Brake if state.mode.drives() => {
+            state.motor_brake = Some(MotorBrake::begin(&config.drive, readings));
+        }
+        // A bridge that is off stays off.
+        Reaction::Brake => {}
+    }
     let record = FaultRecord {
         fault,
         tick: state.tick,
@@ -193,6 +215,16 @@ fn latch_fault(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecor
         state.snapshot.freeze();
     }
     first.then_some(record)
+}
+
+/// Returns the duty cycle with which the motor brakes after a fault; 0 if it does not.
+#[inline(always)]
+fn brake_duty(config: &Config, state: &mut State, readings: &Readings) -> f32 {
+    let peak = state.settings.limits.peak_current;
+    match &mut state.motor_brake {
+        Some(brake) => brake.step(&config.drive, &state.derived.current, peak, readings),
+        None => 0.0,
+    }
 }
 
 /// Begins a controlled stop from the present reference.

@@ -8,9 +8,10 @@ use crate::capture::Capture;
 use crate::config::{Config, Settings};
 use crate::event::{Event, FollowUp, RecordedTick};
 use crate::prechecked_request::PrecheckedRequest;
-use crate::request::execute;
+use crate::request::{execute, execute_urgent};
 use crate::state::State;
 use crate::step::Output;
+use crate::urgent_request::UrgentRequest;
 
 /// Destination of events.
 pub trait EventSink {
@@ -87,6 +88,35 @@ impl TickSession {
         let acknowledge = self.answer_log.record(id, result);
         events.push(Event::Answer(acknowledge, follow_up));
         None
+    }
+
+    /// Executes an urgent request and emits the answer as an event. Not inlined because it is rare.
+    #[inline(never)]
+    pub fn serve_urgent(
+        &mut self,
+        state: &mut State,
+        request: UrgentRequest,
+        events: &mut impl EventSink,
+    ) {
+        state.last_contact_tick = state.tick;
+        let acknowledge = match self.answer_log.stored_answer(request.id) {
+            Some(earlier) => earlier,
+            None => {
+                let result = execute_urgent(state, request.body);
+                self.answer_log.record(request.id, result)
+            }
+        };
+        events.push(Event::Answer(acknowledge, FollowUp::None));
+    }
+
+    /// Refuses a request without executing it, and emits the answer as an event. Not inlined because it is rare.
+    #[inline(never)]
+    pub fn refuse(&mut self, id: u16, refusal: Refusal, events: &mut impl EventSink) {
+        let acknowledge = match self.answer_log.stored_answer(id) {
+            Some(earlier) => earlier,
+            None => self.answer_log.record(id, Err(refusal)),
+        };
+        events.push(Event::Answer(acknowledge, FollowUp::None));
     }
 
     /// Ends storing the settings, and answers the request. Not inlined because it is rare.

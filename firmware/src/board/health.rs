@@ -3,9 +3,9 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_stm32::pac::RCC;
-use rig_shared::wire::message::{Health, ResetCause, SettingsOrigin};
+use rig_shared::wire::message::{Crash, Health, ResetCause, SettingsOrigin};
 
-use super::clock::CORE_HZ;
+use super::clock::{self, CORE_HZ};
 use super::stack;
 
 /// Damaged requests; counted by the command task.
@@ -26,6 +26,7 @@ pub(crate) struct StartInfo {
     pub(crate) reset: ResetCause,
     pub(crate) settings: SettingsOrigin,
     pub(crate) crystal: bool,
+    pub(crate) crash: Option<Crash>,
 }
 
 impl HealthMonitor {
@@ -55,12 +56,14 @@ impl HealthMonitor {
             settings: self.start_info.settings,
             clock_hz: CORE_HZ,
             crystal: self.start_info.crystal,
+            boost: clock::is_boosted(),
             tick_cycles_max: self.max,
             // At 10 kHz the sum of a second is far below 2³²: every tick is shorter than its period.
             tick_cycles_mean: self.sum / self.ticks.max(1),
             stack_free: stack::free(),
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
             dropped,
+            crash: self.start_info.crash,
         };
         *self = Self::new(self.start_info, self.report_ticks);
         Some(health)

@@ -4,6 +4,7 @@ mod adc;
 mod ccm_code;
 mod clock;
 mod comparator;
+mod crash;
 mod cycles;
 mod encoder;
 mod fault;

@@ -153,6 +153,7 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
         Refusal::StorageFailed => {
             "the memory did not take the settings; those stored before still stand"
         }
+        Refusal::Overtaken => "a disarm or stop that was sent later came first",
         Refusal::NotCompensable(kind) => {
             let about = kind.about();
             return Cow::Owned(format!(

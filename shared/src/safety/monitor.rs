@@ -35,6 +35,8 @@ pub struct MonitorConfig {
     pub stuck_duty: f32,
     /// Thermal time constant of the winding behind the i²t limit, s.
     pub thermal_time: f32,
+    /// Ticks after a late one within which another is a fault.
+    pub late_window: u32,
 }
 
 /// Share of the thermal rating below which an overloaded motor counts as cooled: 0.7 thermal times without current.
@@ -49,8 +51,8 @@ pub struct Readings {
     pub driver_fault: bool,
     /// True if a comparator has detected over-current.
     pub comparator: bool,
-    /// The previous tick overran.
-    pub overrun: bool,
+    /// Ticks that were missed or finished late since the last one.
+    pub late_ticks: u8,
     /// Converter code of the current.
     pub current_code: u16,
     /// True if that code is at a rail.
@@ -75,6 +77,8 @@ pub struct Readings {
     pub lost_voltage: f32,
     /// True if the bridge drives.
     pub driving: bool,
+    /// True if the motor brakes after a fault.
+    pub braking: bool,
 }
 
 /// Counters behind the checks.
@@ -90,6 +94,8 @@ pub struct MonitorState {
     last_code: u16,
     duty_low: f32,
     duty_high: f32,
+    /// Ticks for which the last late one still counts.
+    late_left: u32,
     /// Filtered square of the current, A².
     pub heat: f32,
     /// True from the moment the heat exceeds its limit until the motor has cooled.
@@ -142,7 +148,7 @@ pub fn step(
             && now.position <= limits.position_high + config.position_margin);
     let jumped = now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs();
     let lost = now.encoder_open || lost && !converter_suspect;
-    let late = now.overrun && now.driving;
+    let late = is_late_again(config, state, now);
     let current_failed = at_rail | stuck | over_current | now.comparator;
     let motion_failed = jumped | lost | over_speed | outside;
     let rest_failed = now.driver_fault | bad_supply | hot | state.overloaded | late;
@@ -160,11 +166,12 @@ pub fn step(
             Fault::OverCurrent,
             now.current,
         ),
+        // Before all that lets the rig brake, which needs the supply.
+        (bad_supply, Fault::Supply, now.supply),
         (jumped, Fault::EncoderJump, now.encoder_step as f32),
         (lost, Fault::EncoderLost, state.voltage.unexplained),
         (over_speed, Fault::OverSpeed, now.velocity),
         (outside, Fault::Position, now.position),
-        (bad_supply, Fault::Supply, now.supply),
         (hot, Fault::Temperature, now.temperature),
         (state.overloaded, Fault::Overload, state.heat),
         (late, Fault::Deadline, 0.0),
@@ -177,6 +184,19 @@ pub fn step(
     })
 }
 
+/// Returns true if control ticks were late beyond what the loops tolerate: two at once, or one within `late_window` after
+/// another. A single one doubles one period, which is far below the loops' time constants.
+#[inline(always)]
+fn is_late_again(config: &MonitorConfig, state: &mut MonitorState, now: &Readings) -> bool {
+    if now.late_ticks == 0 {
+        state.late_left = state.late_left.saturating_sub(1);
+        return false;
+    }
+    let again = now.late_ticks > 1 || state.late_left > 0;
+    state.late_left = config.late_window;
+    again && now.driving
+}
+
 /// Updates the heat of the winding, and whether the motor is overloaded.
 #[inline(always)]
 fn update_heat(
@@ -186,7 +206,7 @@ fn update_heat(
     now: &Readings,
 ) {
     // With the bridge off the winding is open, so a current reading of a broken converter heats nothing.
-    let heating = if now.driving {
+    let heating = if now.driving || now.braking {
         now.current * now.current
     } else {
         0.0

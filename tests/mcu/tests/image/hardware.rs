@@ -8,10 +8,10 @@ use rig_mcu::rig::power_on;
 use rig_mcu::time::{NEVER, from_seconds};
 use rig_shared::safety::Fault;
 use rig_shared::trajectory::{Staircase, Trajectory};
-use rig_shared::wire::message::{Refusal, RequestBody, ResetCause};
+use rig_shared::wire::message::{CrashKind, Refusal, RequestBody, ResetCause};
 use rig_tests::{calibrated, excitation, wait};
 
-use crate::faults::{off_after, refused};
+use crate::faults::{latched_after, off_after, refused};
 use crate::{
     BoardSession, bench, board, captured, greeted, health, image, moving, place, plant, snapshot,
 };
@@ -92,7 +92,7 @@ fn a_cut_encoder_wire_is_found_at_rest() {
         board(&mut line).with_board(|b| {
             [b.faults.channel_a_cut, b.faults.channel_b_cut] = cut;
         });
-        let after = off_after(&mut line, 0.03);
+        let after = latched_after(&mut line, 0.03);
         println!("{cut:?}: {after:?} s");
         assert!(
             after.is_some_and(|after| after < 0.015),
@@ -154,7 +154,7 @@ fn a_missed_a_false_and_a_skewed_encoder_signal_are_told_apart() {
         let mut line = moving(78 + k as u64);
         let from = board(&mut line).with_board(|b| b.plant().truth().motor_position);
         board(&mut line).with_chip(injure);
-        assert!(off_after(&mut line, 1.0).is_some(), "{name}");
+        assert!(latched_after(&mut line, 1.0).is_some(), "{name}");
         let (record, _) = snapshot(&mut line);
         let to = board(&mut line).with_board(|b| b.plant().truth().motor_position);
         let counts = (to - from).abs() / core::f64::consts::TAU * f64::from(turn);
@@ -228,7 +228,10 @@ fn lock_up_and_flash_errors_take_the_outputs_in_hardware() {
         board(&mut line).resets[..],
         [(_, Cause::Software)]
     ));
-    assert_eq!(health(&mut line).reset, ResetCause::Software);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Software);
+    let kind = report.crash.map(|crash| crash.kind);
+    assert_eq!(kind, Some(CrashKind::FlashError));
 
     // In the settings' bank, as an interrupted store leaves it: off all the same, but the program goes on.
     let mut line = moving(85);
