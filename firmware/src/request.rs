@@ -11,6 +11,7 @@ use crate::prechecked_request::{PrecheckedRequest, Prepared};
 use crate::state::{Calibration, Run, State};
 use crate::step::brake;
 use crate::urgent_request::UrgentBody;
+use crate::validation;
 
 /// Executes a request, or refuses it without any change.
 ///
@@ -101,9 +102,15 @@ fn replace(state: &mut State, body: &RequestBody, prepared: &Prepared) -> Result
             state.settings.estimator = *settings;
             state.replace_estimator(estimator);
         }
-        (RequestBody::SetGains(gains), _) => state.settings.gains = *gains,
+        (RequestBody::SetGains(gains), _) => {
+            validation::loops(gains, &state.settings.model)?;
+            state.settings.gains = *gains;
+        }
         (RequestBody::SetControl(kind), _) => state.settings.control = *kind,
-        (RequestBody::SetModel(model), _) => state.settings.model = *model,
+        (RequestBody::SetModel(model), _) => {
+            validation::loops(&state.settings.gains, model)?;
+            state.settings.model = *model;
+        }
         (RequestBody::SetFriction(friction), _) => state.settings.friction = *friction,
         (RequestBody::SetPrecompensation(precompensation), _) => {
             state.settings.precompensation = *precompensation;
@@ -144,6 +151,7 @@ fn store(state: &mut State) -> Result<(), Refusal> {
 fn arm(config: &Config, state: &mut State) -> Result<(), Refusal> {
     match state.mode {
         Mode::Disarmed => {
+            validation::arming(&state.settings.limits, state.position, state.velocity)?;
             state.run = Run {
                 base: state.position,
                 bridge_ready_tick: state.tick + u64::from(config.wake_ticks),

@@ -57,11 +57,11 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         })
         .or_else(|| check_host(config, state));
     if let Some((fault, value)) = fault {
-        output.fault = latch_fault(config, state, &readings, fault, value);
+        output.fault = latch_fault(state, fault, value);
     }
 
     let mut limits = LimitSet::default();
-    limits.set(Limit::LateTick, readings.driving && readings.late_ticks > 0);
+    limits.set(Limit::LateTick, sample.late_ticks > 0);
     state.reference = reference(config, state, &mut limits);
     let DriveOutput {
         duty,
@@ -70,10 +70,14 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     } = if state.mode.drives() && state.tick >= state.run.bridge_ready_tick {
         drive(config, state, &readings, &mut limits)
     } else {
-        DriveOutput {
-            duty: brake_duty(config, state, &readings),
-            ..DriveOutput::default()
-        }
+        DriveOutput::default()
+    };
+    let (duty, bridge) = if state.motor_brake.is_some() {
+        // Single values: a reference to what is returned would have it copied in every tick.
+        let winding = [readings.current, readings.supply];
+        (brake_after_fault(config, state, winding), true)
+    } else {
+        (duty, state.mode.drives())
     };
     state.drive_torque = torque;
     state.limits = limits;
@@ -102,7 +106,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     output.estimate = estimation::feed_estimator(config, state, &tick);
     output.command = Command {
         duty: Duty(duty),
-        bridge: state.mode.drives() || state.motor_brake.is_some(),
+        bridge,
     };
     state.duty = duty;
     state.tick += 1;
@@ -153,7 +157,6 @@ fn convert(config: &Config, state: &mut State, sample: Sample) -> Readings {
         duty: state.duty,
         lost_voltage: state.compensated_voltage,
         driving: state.mode.drives() && state.tick > state.run.bridge_ready_tick,
-        braking: state.motor_brake.is_some(),
     }
 }
 
@@ -179,22 +182,35 @@ fn check_host(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
         .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
 }
 
+/// Returns the duty cycle while the motor brakes, from its current, A, and the supply, V. Not inlined because it is rare.
+#[inline(never)]
+fn brake_after_fault(config: &Config, state: &mut State, [current, supply]: [f32; 2]) -> f32 {
+    // The checks count a current while the rig drives only.
+    monitor::add_heat(&config.monitor, &mut state.monitor, current);
+    let now = SnapshotSample {
+        current,
+        duty: state.duty,
+        supply,
+        ..SnapshotSample::default()
+    };
+    let peak = state.settings.limits.peak_current;
+    match &mut state.motor_brake {
+        Some(brake) => brake.step(&config.drive, &state.derived.current, peak, &now),
+        None => 0.0,
+    }
+}
+
 /// Ends every motion as the fault allows, latches the fault and keeps the snapshot. Not inlined because it is rare.
 #[inline(never)]
-fn latch_fault(
-    config: &Config,
-    state: &mut State,
-    readings: &Readings,
-    fault: Fault,
-    value: f32,
-) -> Option<FaultRecord> {
+fn latch_fault(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
     match fault.reaction() {
         // Also while the rig brakes after another fault.
         Reaction::Coast => state.motor_brake = None,
-        Reaction::Brake if state.mode.drives() => {
-            state.motor_brake = Some(MotorBrake::begin(&config.drive, readings));
+        // The brake limits the current, so it needs its sensor.
+        Reaction::Brake if state.mode.drives() && !state.monitor.converter_is_suspect() => {
+            state.motor_brake = Some(MotorBrake::default());
         }
-        // A bridge that is off stays off.
+        // A bridge that is off stays off. So does one whose current may not be known.
         Reaction::Brake => {}
     }
     let record = FaultRecord {
@@ -215,16 +231,6 @@ fn latch_fault(
         state.snapshot.freeze();
     }
     first.then_some(record)
-}
-
-/// Returns the duty cycle with which the motor brakes after a fault; 0 if it does not.
-#[inline(always)]
-fn brake_duty(config: &Config, state: &mut State, readings: &Readings) -> f32 {
-    let peak = state.settings.limits.peak_current;
-    match &mut state.motor_brake {
-        Some(brake) => brake.step(&config.drive, &state.derived.current, peak, readings),
-        None => 0.0,
-    }
 }
 
 /// Begins a controlled stop from the present reference.

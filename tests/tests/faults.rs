@@ -1,4 +1,4 @@
-//! Faults injected at the plant: bridge off, the right one latched first, explained by its snapshot, cleared.
+//! Faults injected at the plant: brake or bridge off, the right one latched first, explained by its snapshot, cleared.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use rig_link::LinkError;
@@ -6,9 +6,9 @@ use rig_plant::effect::dead_time::DeadTime;
 use rig_plant::effect::end_stops::EndStops;
 use rig_plant::effect::winding_temperature::WindingTemperature;
 use rig_plant::{Faults, PlantConfig};
-use rig_shared::safety::{Fault, Mode};
+use rig_shared::safety::{Fault, Mode, Reaction};
 use rig_shared::trajectory::{Staircase, Trajectory};
-use rig_shared::wire::message::{Refusal, RequestBody};
+use rig_shared::wire::message::{Bounded, Refusal, RequestBody};
 use rig_tests::{
     Line, bench, calibrated, connect, driven, excitation, in_parallel, nameplate, snapshot, wait,
 };
@@ -54,9 +54,9 @@ fn check_snapshot(line: &mut Line, fault: Fault) {
 }
 
 #[test]
-fn each_fault_takes_the_bridge_off_in_time_and_the_rig_works_again() {
+fn each_fault_ends_the_motion_in_time_and_the_rig_works_again() {
     type Change = fn(&mut Faults);
-    // Fault, what is done, seconds until the bridge must be off, whether its cause can be seen with the bridge off.
+    // Fault, what is done, seconds until it must latch, whether its cause can be seen afterwards.
     let cases: [(Fault, Change, f64, bool); 9] = [
         (Fault::EncoderLost, |f| f.encoder_cut = true, 1.0, false),
         (Fault::EncoderJump, |f| f.encoder_jump = 2000, 0.001, false),
@@ -101,6 +101,8 @@ fn each_fault_takes_the_bridge_off_in_time_and_the_rig_works_again() {
             ));
             continue;
         }
+        let brakes = fault.reaction() == Reaction::Brake;
+        assert_eq!(line.port().device().state().brakes(), brakes, "{fault:?}");
         assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
         check_snapshot(&mut line, fault);
         wait(&mut line, 0.2);
@@ -384,4 +386,59 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
         refused(&mut line, RequestBody::SetPosition(0.0)),
         Refusal::WrongMode
     );
+}
+
+/// The quantity and the bound of a refusal.
+fn bound(refusal: Refusal) -> (Bounded, f32) {
+    match refusal {
+        Refusal::OutOfBounds {
+            quantity, bound, ..
+        } => (quantity, bound),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A link that is out of its range, or moves, is not armed: the reference would jump, or the link be caught with a jerk. And
+/// no holding rig takes gains or models that it cannot have.
+#[test]
+fn what_a_user_may_not_ask_is_refused_with_its_bound() {
+    let (mut line, plant) = bench(20);
+    let limits = nameplate(&plant).settings.limits;
+    for (position, expected) in [
+        (limits.position_high + 0.09, limits.position_high),
+        (limits.position_low - 0.09, limits.position_low),
+    ] {
+        line.request(RequestBody::SetPosition(position)).unwrap();
+        let refusal = refused(&mut line, RequestBody::Arm);
+        assert_eq!(bound(refusal), (Bounded::ArmPosition, expected));
+    }
+    line.request(RequestBody::SetPosition(plant.initial_position as f32))
+        .unwrap();
+    inject(&mut line, |f| f.external_torque = 3.0);
+    wait(&mut line, 0.1);
+    let refusal = refused(&mut line, RequestBody::Arm);
+    assert_eq!(bound(refusal).0, Bounded::ArmVelocity);
+    inject(&mut line, |f| f.external_torque = 0.0);
+    wait(&mut line, 3.0);
+
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.1);
+    let own = nameplate(&plant).settings;
+    let mut gains = own.gains;
+    (gains.proportional, gains.derivative) = (1e9, 1e-6);
+    let mut model = own.model;
+    model.gravity_cos = 1e20;
+    let mut friction = own.friction;
+    friction.coulomb = 1e20;
+    let before = *line.port().device().state().settings();
+    for (body, quantity) in [
+        (RequestBody::SetGains(gains), Bounded::PositionLoop),
+        (RequestBody::SetModel(model), Bounded::Gravity),
+        (RequestBody::SetFriction(friction), Bounded::DryFriction),
+    ] {
+        assert_eq!(bound(refused(&mut line, body)).0, quantity);
+    }
+    assert_eq!(*line.port().device().state().settings(), before);
+    wait(&mut line, 0.1);
+    assert_eq!(mode(&line), Mode::Holding);
 }

@@ -12,7 +12,7 @@ use embassy_time::{Duration, Ticker, Timer, with_timeout};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer};
 use rig_firmware::config::Config;
-use rig_firmware::event::Event;
+use rig_firmware::event::{BoardStart, Event};
 use rig_firmware::prechecked_request::{PrecheckedRequest, precheck};
 use rig_firmware::report_sender::ReportSender;
 use rig_firmware::urgent_request::UrgentRequest;
@@ -25,6 +25,7 @@ use super::clock::LINK_PRIORITY;
 use super::health::BAD_REQUESTS;
 use super::pins::LinkPins;
 use super::probe;
+use super::queue::{Numbered, URGENT_WAITS};
 use super::watchdog::{Task, check_in};
 
 /// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
@@ -72,11 +73,12 @@ pub(crate) fn open(pins: LinkPins) -> Result<(Sender, Receiver), ConfigError> {
 #[embassy_executor::task]
 pub(crate) async fn telemetry(
     config: &'static Config,
+    start: BoardStart,
     mut line: Sender,
     mut probe: probe::Outgoing,
     mut events: Consumer<'static, Event>,
 ) -> ! {
-    let mut report_sender = ReportSender::new();
+    let mut report_sender = ReportSender::for_board(start);
     let bytes = SEND_BUFFER.take();
     let mut ticker = Ticker::every(Duration::from_millis(1));
     let mut mode = Mode::default();
@@ -120,13 +122,6 @@ fn log(event: &Event, mode: &mut Mode) {
     }
 }
 
-/// A request with the number of urgent requests that were received before it.
-#[derive(Clone)]
-pub(crate) struct Numbered<T> {
-    pub(crate) request: T,
-    pub(crate) urgent_before: u32,
-}
-
 /// Passes decoded requests on: urgent ones to the tick, the others to the task that prechecks them.
 struct Distributor {
     urgent: Producer<'static, UrgentRequest>,
@@ -143,6 +138,7 @@ impl Distributor {
             Some(Ok(request)) => match UrgentRequest::from_request(&request) {
                 Some(urgent) => {
                     let accepted = self.urgent.enqueue(urgent).is_ok();
+                    URGENT_WAITS.store(true, Ordering::Relaxed);
                     self.urgent_count = self.urgent_count.wrapping_add(u32::from(accepted));
                     accepted
                 }

@@ -7,7 +7,7 @@ use embassy_time::{Duration, Ticker};
 use heapless::spsc;
 use rig_firmware::capture::Capture;
 use rig_firmware::config::{Config, Settings};
-use rig_firmware::event::Event;
+use rig_firmware::event::{BoardStart, Event};
 use rig_firmware::nameplate;
 use rig_firmware::prechecked_request::PrecheckedRequest;
 use rig_firmware::state::State;
@@ -18,13 +18,12 @@ use rig_shared::wire::message::Request;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
-use super::clock::{self, LINK_PRIORITY, RECEIVE_PRIORITY, TASK_PRIORITY};
+use super::clock::{self, CORE_HZ, LINK_PRIORITY, RECEIVE_PRIORITY, TASK_PRIORITY};
 use super::encoder::EncoderTimer;
-use super::health::{HealthMonitor, StartInfo};
-use super::link::Numbered;
+use super::health::HealthMonitor;
 use super::pins::Pins;
 use super::pwm::Bridge;
-use super::queue::{QueueReceiver, QueueSender};
+use super::queue::{Numbered, QueueReceiver, QueueSender};
 use super::storage::Storage;
 use super::tick::{EVENTS, RECEIVED, REQUESTS, Tick, URGENT};
 use super::watchdog::{Task, Watchdog, check_in};
@@ -72,7 +71,12 @@ pub(crate) fn run() -> ! {
     let (storage, selection) = Storage::open(config);
     let settings = selection.settings.unwrap_or(default_settings);
     let thresholds = config.current_thresholds();
-    let bridge = Bridge::new(pins.bridge, config.rates.control_hz, thresholds);
+    let bridge = Bridge::new(
+        pins.bridge,
+        config.rates.control_hz,
+        config.wake_ticks,
+        thresholds,
+    );
     let state = state(config, settings);
     state.restore_heat(heat::load().unwrap_or_default());
     let (event_in, event_out) = EVENT_QUEUE.init(spsc::Queue::new()).split();
@@ -101,15 +105,7 @@ pub(crate) fn run() -> ! {
         period_cycles: Tick::period(config.rates.control_hz),
         entered: 0,
         next_waiting: false,
-        health_monitor: HealthMonitor::new(
-            StartInfo {
-                reset,
-                settings: selection.origin,
-                crystal,
-                crash,
-            },
-            config.rates.control_hz,
-        ),
+        health_monitor: HealthMonitor::new(config.rates.control_hz),
         to_store: QueueSender(to_store),
     });
     if let Some(crash) = crash {
@@ -123,9 +119,16 @@ pub(crate) fn run() -> ! {
         );
     }
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
+    let start = BoardStart {
+        reset,
+        settings: selection.origin,
+        clock_hz: CORE_HZ,
+        crystal,
+        crash,
+    };
     // Each task is spawned once. Its memory is reserved at compile time.
     let tasks = (
-        link::telemetry(config, sender, probe_out, event_out),
+        link::telemetry(config, start, sender, probe_out, event_out),
         indicator(watchdog, pins.led),
         link::receive(receiver, probe_in, urgent_in, received_in),
         link::precheck_requests(config, received_out, request_in),

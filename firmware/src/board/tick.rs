@@ -22,9 +22,8 @@ use super::cycles;
 use super::encoder::EncoderTimer;
 use super::health::HealthMonitor;
 use super::heat;
-use super::link::Numbered;
 use super::pwm::{Break, Bridge};
-use super::queue::{QueueReceiver, QueueSender};
+use super::queue::{Numbered, QueueReceiver, QueueSender, URGENT_WAITS};
 use super::stack;
 use super::watchdog::{Task, check_in};
 use super::wire_check::WireCheck;
@@ -74,7 +73,7 @@ impl Tick {
         let motion = self.encoder.read();
         let late_ticks = self.late_ticks(entered.wrapping_sub(self.entered));
         self.entered = entered;
-        if self.urgent.oldest().is_some() {
+        if URGENT_WAITS.load(Ordering::Relaxed) {
             self.serve_urgent();
         }
         let break_cause = self.bridge.break_cause();
@@ -101,8 +100,8 @@ impl Tick {
         check_in(Task::Tick);
         let cycles = cycles::now().wrapping_sub(entered);
         let (tick, dropped) = (self.state.tick, self.tick_session.dropped_windows());
-        if let Some(health) = self.health_monitor.record_tick(cycles, tick, dropped) {
-            self.events.push(Event::Health(health));
+        if let Some(measured) = self.health_monitor.record_tick(cycles, tick, dropped) {
+            self.events.push(Event::Health(measured));
         }
         self.next_waiting = self.converter.is_waiting();
     }
@@ -114,13 +113,17 @@ impl Tick {
     fn late_ticks(&self, elapsed: u32) -> u8 {
         let (period, half) = (self.period_cycles, self.period_cycles / 2);
         // A tick and a half since the last one: an interrupt was late or missing.
-        u8::from(self.next_waiting || elapsed > period + half)
-            + u8::from(elapsed > 2 * period + half)
+        if !self.next_waiting && elapsed <= period + half {
+            return 0;
+        }
+        1 + u8::from(elapsed > 2 * period + half)
     }
 
     /// Serves urgent requests before the control step, so that they act in this tick. Not inlined because it is rare.
     #[inline(never)]
     fn serve_urgent(&mut self) {
+        // Before the queue is read: a request that comes meanwhile sets it again.
+        URGENT_WAITS.store(false, Ordering::Relaxed);
         while let Some(request) = self.urgent.oldest() {
             self.tick_session
                 .serve_urgent(self.state, *request, &mut self.events);
@@ -216,4 +219,6 @@ fn ADC1_2() {
     #[allow(unsafe_code)]
     let tick = unsafe { (*TICK.0.get()).assume_init_mut() };
     tick.run();
+    // The last store must not overlap the return (Cortex-M4 erratum 838869).
+    cortex_m::asm::dsb();
 }

@@ -77,8 +77,6 @@ pub struct Readings {
     pub lost_voltage: f32,
     /// True if the bridge drives.
     pub driving: bool,
-    /// True if the motor brakes after a fault.
-    pub braking: bool,
 }
 
 /// Counters behind the checks.
@@ -100,6 +98,13 @@ pub struct MonitorState {
     pub heat: f32,
     /// True from the moment the heat exceeds its limit until the motor has cooled.
     pub overloaded: bool,
+}
+
+impl MonitorState {
+    /// Returns true if the converter of the current may be stuck: its code has not changed for longer than noise allows.
+    pub fn converter_is_suspect(&self) -> bool {
+        self.same_code >= CODE_NOISE_TICKS
+    }
 }
 
 /// Counts consecutive failures; returns true from `persistence` ticks on.
@@ -184,12 +189,19 @@ pub fn step(
     })
 }
 
+/// Adds the heat of one tick's current, A, in which the bridge conducts although it does not drive.
+pub fn add_heat(config: &MonitorConfig, state: &mut MonitorState, current: f32) {
+    state.heat += current * current * (config.period / config.thermal_time);
+}
+
 /// Returns true if control ticks were late beyond what the loops tolerate: two at once, or one within `late_window` after
 /// another. A single one doubles one period, which is far below the loops' time constants.
 #[inline(always)]
 fn is_late_again(config: &MonitorConfig, state: &mut MonitorState, now: &Readings) -> bool {
     if now.late_ticks == 0 {
-        state.late_left = state.late_left.saturating_sub(1);
+        if state.late_left > 0 {
+            state.late_left -= 1;
+        }
         return false;
     }
     let again = now.late_ticks > 1 || state.late_left > 0;
@@ -206,7 +218,7 @@ fn update_heat(
     now: &Readings,
 ) {
     // With the bridge off the winding is open, so a current reading of a broken converter heats nothing.
-    let heating = if now.driving || now.braking {
+    let heating = if now.driving {
         now.current * now.current
     } else {
         0.0

@@ -261,6 +261,18 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
             "0a01ae0201080c27f31c00"
         ),
         (
+            "Acknowledge, out of bounds",
+            Report::Acknowledge(Acknowledge {
+                id: 7,
+                result: Err(Refusal::OutOfBounds {
+                    quantity: Bounded::Gravity,
+                    value: 16.0,
+                    bound: 10.0
+                })
+            }),
+            "060107010b050103804101072041d28c436600"
+        ),
+        (
             "Acknowledge, not compensable",
             Report::Acknowledge(Acknowledge {
                 id: 303,

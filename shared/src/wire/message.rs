@@ -147,8 +147,31 @@ pub struct Acknowledge {
     pub result: Result<(), Refusal>,
 }
 
-/// Reason for a refused request. Nothing has changed then.
+/// A quantity with a bound that a request has exceeded, with its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Bounded {
+    /// Position of the link when armed, rad; bound: the end of the position range.
+    ArmPosition,
+    /// Speed of the link when armed, rad/s.
+    ArmVelocity,
+    /// Natural frequency √(kp/J) of the position loop, rad/s; bound: a share of the current loop's bandwidth.
+    PositionLoop,
+    /// Bandwidth kd/J of the velocity loop, rad/s; bound: likewise.
+    VelocityLoop,
+    /// Inertia of the model, kg·m².
+    Inertia,
+    /// Gravity torque of the model, N·m; bound: the torque rating.
+    Gravity,
+    /// Friction torque at rest, N·m; bound: the torque rating.
+    DryFriction,
+    /// Viscous friction, N·m·s/rad.
+    ViscousFriction,
+    /// Constant torque of the model, N·m; bound: the torque rating.
+    Offset,
+}
+
+/// Reason for a refused request. Nothing has changed then.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
     /// The mode does not allow it (start while disarmed, upload while running, …).
     WrongMode,
@@ -172,6 +195,15 @@ pub enum Refusal {
     NotCompensable(Kind),
     /// A later `Disarm` or `Stop` came first.
     Overtaken,
+    /// A quantity is beyond its bound.
+    OutOfBounds {
+        /// The quantity.
+        quantity: Bounded,
+        /// Its value.
+        value: f32,
+        /// Its bound.
+        bound: f32,
+    },
 }
 
 /// Consecutive state samples, oldest first.

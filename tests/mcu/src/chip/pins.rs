@@ -17,10 +17,10 @@ impl Chip {
         }
     }
 
-    /// Sets the pins that the board holds high: the receiving line idle, the fault line released.
+    /// Sets the pins that the board drives: the receiving line idle, the fault line.
     pub(super) fn set_pins(&mut self) {
         self.gpio[0].set_outside(3, true);
-        let fault = self.board.fault_pin();
+        let fault = self.board.fault_pin(self.work.now);
         self.gpio[1].set_outside(12, fault);
     }
 
@@ -41,7 +41,7 @@ impl Chip {
 
     /// Updates the pins that the board drives.
     pub(super) fn update_pins(&mut self) {
-        let high = self.board.fault_pin();
+        let high = self.board.fault_pin(self.work.now);
         if self.gpio[1].set_outside(12, high) && self.syscfg.port_of(12) == 1 {
             self.exti.edge(12, high);
         }

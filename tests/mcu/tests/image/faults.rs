@@ -172,7 +172,8 @@ fn each_fault_ends_the_motion_in_time_latches_and_keeps_its_snapshot() {
             Reaction::Brake => latched_after(&mut line, within),
         };
         let Some(after) = after.filter(|after| *after <= within) else {
-            wrong.push(format!("{name}: nothing after {within} s, but {after:?}"));
+            let latched = snapshot_of_fault(&mut line);
+            wrong.push(format!("{name}: not in {within} s, {after:?} {latched:?}"));
             continue;
         };
         // Against 60 N·m from outside no brake of the motor holds: its current reaches the comparators.
