@@ -13,7 +13,8 @@ use rig_tests::{calibrated, excitation, wait};
 
 use crate::faults::{latched_after, off_after, refused};
 use crate::{
-    BoardSession, bench, board, captured, greeted, health, image, moving, place, plant, snapshot,
+    BoardSession, bench, board, captured, greeted, hang_still, health, image, moving, place, plant,
+    snapshot,
 };
 
 /// Whether TIM1's outputs are on, after so many seconds in which the processor does nothing.
@@ -52,6 +53,7 @@ fn a_short_is_switched_off_by_the_comparators_and_kept_in_the_capture() {
         assert!(ticks[..at].iter().any(|tick| tick.duty != 0.0));
         assert!(ticks[at + 1..].iter().all(|tick| tick.duty == 0.0));
         line.request(RequestBody::ClearFault).unwrap();
+        hang_still(&mut line);
         line.request(RequestBody::Arm).unwrap();
         wait(&mut line, 0.05);
         assert!(board(&mut line).with_board(|b| b.bridge().enabled));
@@ -259,6 +261,7 @@ fn lock_up_and_flash_errors_take_the_outputs_in_hardware() {
     assert_eq!(snapshot(&mut line).0.fault, Fault::Driver);
     assert_eq!(board(&mut line).resets, []);
     line.request(RequestBody::ClearFault).unwrap();
+    hang_still(&mut line);
     line.request(RequestBody::Arm).unwrap();
 }
 

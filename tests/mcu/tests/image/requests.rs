@@ -16,7 +16,7 @@ use rig_tests::{excitation, wait};
 
 use crate::budget::{Budget, PERIOD, mixed_effects};
 use crate::faults::off_after;
-use crate::{BoardSession, bench, board, health, moving};
+use crate::{BoardSession, bench, board, hang_still, health, moving};
 
 /// Name of a request; a new one does not compile before it is here, and does not pass before it is in [`all`].
 fn name(body: &RequestBody) -> &'static str {
@@ -118,6 +118,7 @@ fn every_request_keeps_to_the_budget_whatever_the_rig_does() {
                 for told in ready {
                     line.request(told.clone()).unwrap();
                 }
+                hang_still(&mut line);
                 line.request(RequestBody::Arm).unwrap();
                 wait(&mut line, 0.3);
                 if state == "running" {
