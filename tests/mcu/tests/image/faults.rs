@@ -514,8 +514,8 @@ fn a_panic_switches_off_and_starts_anew() {
         .image()
         .function_ending("rust_begin_unwind")
         .unwrap();
-    // What the handler is given: a message and a place in a file, both where the stack never comes. The compiler chooses the
-    // order of their fields: every word of the one points to the other, and every word of that is the line.
+    // What the handler is given, where the stack never comes: a message with a pointer to a place in a file, of which every
+    // word is the line. Debian's compiler passes the place itself, whose third word is the line.
     let (end, _) = emulated.image().symbol("_stack_end").unwrap();
     let (info, place) = (end, end + 16);
     let store = |cpu: &mut dyn Memory, address: u32, words: &[u32]| {
@@ -523,7 +523,7 @@ fn a_panic_switches_off_and_starts_anew() {
         assert!(cpu.store(address, &bytes));
     };
     let paint = emulated.word(end + 64);
-    store(emulated.cpu(), info, &[place; 4]);
+    store(emulated.cpu(), info, &[place, place, 1234, place]);
     store(emulated.cpu(), place, &[1234; 4]);
     assert_eq!(paint, 0xCCCC_CCCC);
     emulated.cpu().set(Register::General(0), info);
