@@ -185,6 +185,39 @@ fn latched(line: &Line) -> Option<Fault> {
     line.port().device().state().latch.first().map(|r| r.fault)
 }
 
+/// The current's reading freezes beyond the peak while the motor brakes after another fault. Believed, it would drive the
+/// link on, in the direction in which it moves. The bridge goes off instead, and the first fault stays latched.
+#[test]
+fn a_current_reading_that_freezes_during_the_brake_ends_it() {
+    for (seed, frozen) in [(1, 3.21_f64), (2, 3.6), (3, 4.7)] {
+        let mut line = moving(seed);
+        let truth = |line: &mut Line| line.port_mut().device_mut().plant_mut().truth();
+        let mut waited = 0;
+        while truth(&mut line).velocity.abs() < 2.0 {
+            wait(&mut line, 1e-3);
+            waited += 1;
+            assert!(waited < 5000);
+        }
+        inject(&mut line, |f| f.temperature_stuck = Some(2000));
+        wait(&mut line, 0.005);
+        assert_eq!(latched(&line), Some(Fault::Temperature));
+        assert!(line.port().device().state().brakes());
+        let begin = truth(&mut line).velocity;
+        // 33 A on 4096 codes.
+        let code = 2048.0 - frozen.copysign(begin) * 4096.0 / 33.0;
+        inject(&mut line, |f| f.current_stuck = Some(code as u16));
+        let mut fastest = 0.0_f64;
+        for _ in 0..300 {
+            wait(&mut line, 1e-3);
+            fastest = fastest.max(truth(&mut line).velocity * begin.signum());
+        }
+        println!("{begin:.2} rad/s, then {fastest:.2} rad/s at most");
+        assert!(fastest < begin.abs() + 0.1, "{begin} {fastest}");
+        assert!(!line.port().device().state().brakes());
+        assert_eq!(latched(&line), Some(Fault::Temperature));
+    }
+}
+
 /// Cut while the rig holds: found from the winding's voltage once something moves the link, before it has moved far.
 #[test]
 fn an_encoder_lost_while_holding_is_found_when_the_link_moves() {

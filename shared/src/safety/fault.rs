@@ -47,7 +47,7 @@ pub enum Reaction {
     /// sensor cannot be trusted.
     Coast,
     /// The motor brakes by its own voltage at a limited current, then with short-circuited wires. It needs neither the
-    /// encoder nor a model of the link.
+    /// encoder nor a model of the link. It coasts once its current sensor fails or its speed grows.
     Brake,
 }
 

@@ -77,6 +77,8 @@ pub struct Readings {
     pub lost_voltage: f32,
     /// True if the bridge drives.
     pub driving: bool,
+    /// True if the motor brakes after a fault: the bridge is on too.
+    pub braking: bool,
 }
 
 /// Counters behind the checks.
@@ -189,11 +191,6 @@ pub fn step(
     })
 }
 
-/// Adds the heat of one tick's current, A, in which the bridge conducts although it does not drive.
-pub fn add_heat(config: &MonitorConfig, state: &mut MonitorState, current: f32) {
-    state.heat += current * current * (config.period / config.thermal_time);
-}
-
 /// Returns true if control ticks were late beyond what the loops tolerate: two at once, or one within `late_window` after
 /// another. A single one doubles one period, which is far below the loops' time constants.
 #[inline(always)]
@@ -218,7 +215,7 @@ fn update_heat(
     now: &Readings,
 ) {
     // With the bridge off the winding is open, so a current reading of a broken converter heats nothing.
-    let heating = if now.driving {
+    let heating = if now.driving || now.braking {
         now.current * now.current
     } else {
         0.0
@@ -256,9 +253,10 @@ fn voltage_is_unexplained(
     )
 }
 
-/// Returns true if the converter is stuck: a live one follows the duty, a stuck one keeps its code.
+/// Returns true if the converter is stuck: a live one follows the duty, a stuck one keeps its code. The bridge must be on,
+/// to drive or to brake.
 fn converter_is_stuck(config: &MonitorConfig, state: &mut MonitorState, now: &Readings) -> bool {
-    if !now.driving || now.current_code != state.last_code {
+    if !(now.driving || now.braking) || now.current_code != state.last_code {
         state.last_code = now.current_code;
         state.same_code = 0;
         state.duty_low = now.duty;
