@@ -82,17 +82,18 @@ impl Converter {
         adc.cr().modify(|w| w.set_adcaldif(Adcaldif::SINGLE_ENDED));
         adc.cr().modify(|w| w.set_adcal(true));
         while adc.cr().read().adcal() {}
+        // Only while ADEN = 0 (RM0440, ADC_DIFSEL).
+        adc.difsel().write(|w| {
+            for channel in 0..18 {
+                w.set_difsel(channel, Difsel::SINGLE_ENDED);
+            }
+        });
         // ADEN must not be set within four converter clocks after calibration (RM0440, ADC, "ADC on-off control").
         cortex_m::asm::delay(64);
         adc.isr().write(|w| w.set_adrdy(true));
         adc.cr().modify(|w| w.set_aden(true));
         while !adc.isr().read().adrdy() {}
 
-        adc.difsel().write(|w| {
-            for channel in 0..18 {
-                w.set_difsel(channel, Difsel::SINGLE_ENDED);
-            }
-        });
         let supply_ratio = measure_supply_ratio();
         adc.smpr().write(|w| {
             for channel in [CURRENT_CHANNEL, SUPPLY_CHANNEL, TEMPERATURE_CHANNEL] {

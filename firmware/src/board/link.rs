@@ -26,6 +26,7 @@ use super::health::BAD_REQUESTS;
 use super::pins::LinkPins;
 use super::probe;
 use super::queue::{Numbered, URGENT_WAITS};
+use super::return_barrier::ReturnBarrier;
 use super::watchdog::{Task, check_in};
 
 /// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
@@ -41,9 +42,9 @@ static RING_BUFFER: ConstStaticCell<[u8; RECEIVE_BYTES]> = ConstStaticCell::new(
 static SEND_BUFFER: ConstStaticCell<Vec<u8, SEND_BYTES>> = ConstStaticCell::new(Vec::new());
 
 bind_interrupts!(struct Interrupts {
-    LPUART1 => InterruptHandler<LPUART1>;
-    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
-    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
+    LPUART1 => InterruptHandler<LPUART1>, ReturnBarrier;
+    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>, ReturnBarrier;
+    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>, ReturnBarrier;
 });
 
 /// Outgoing half.

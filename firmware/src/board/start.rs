@@ -24,6 +24,7 @@ use super::health::HealthMonitor;
 use super::pins::Pins;
 use super::pwm::Bridge;
 use super::queue::{Numbered, QueueReceiver, QueueSender};
+use super::return_barrier::finish_stores;
 use super::storage::Storage;
 use super::tick::{EVENTS, RECEIVED, REQUESTS, Tick, URGENT};
 use super::watchdog::{Task, Watchdog, check_in};
@@ -159,6 +160,7 @@ fn CORDIC() {
     unsafe {
         HIGH_PRIORITY_EXECUTOR.on_interrupt();
     }
+    finish_stores();
 }
 
 /// Runs the receiving task, likewise.
@@ -169,6 +171,7 @@ fn FMAC() {
     unsafe {
         RECEIVE_EXECUTOR.on_interrupt();
     }
+    finish_stores();
 }
 
 /// Returns the state at power on, built in place: it is half as large as the stack.

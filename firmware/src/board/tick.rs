@@ -24,6 +24,7 @@ use super::health::HealthMonitor;
 use super::heat;
 use super::pwm::{Break, Bridge};
 use super::queue::{Numbered, QueueReceiver, QueueSender, URGENT_WAITS};
+use super::return_barrier::finish_stores;
 use super::stack;
 use super::watchdog::{Task, check_in};
 use super::wire_check::WireCheck;
@@ -219,6 +220,5 @@ fn ADC1_2() {
     #[allow(unsafe_code)]
     let tick = unsafe { (*TICK.0.get()).assume_init_mut() };
     tick.run();
-    // The last store must not overlap the return (Cortex-M4 erratum 838869).
-    cortex_m::asm::dsb();
+    finish_stores();
 }

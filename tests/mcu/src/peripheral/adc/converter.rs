@@ -13,6 +13,7 @@ const SQR1: u32 = 0x30;
 pub(super) const DR: u32 = 0x40;
 pub(super) const JSQR: u32 = 0x4C;
 pub(super) const JDR1: u32 = 0x80;
+pub(super) const DIFSEL: u32 = 0xB0;
 pub(super) const COMMON: u32 = 0x308;
 
 pub(super) const ADEN: u32 = 1;
@@ -67,7 +68,7 @@ const REGISTERS: &[Register] = &[
     Register(0x8C, "ADC_JDR4", 0, 0),
     Register(0xA0, "ADC_AWD2CR", 0, 0),
     Register(0xA4, "ADC_AWD3CR", 0, 0),
-    Register(0xB0, "ADC_DIFSEL", 0, 0),
+    Register(DIFSEL, "ADC_DIFSEL", 0, 0),
     Register(0xB4, "ADC_CALFACT", 0, 0x007F_007F),
     Register(0xC0, "ADC_GCOMP", 0x1000, 0),
 ];
