@@ -68,7 +68,7 @@ const REGISTERS: &[Register] = &[
     Register(0x8C, "ADC_JDR4", 0, 0),
     Register(0xA0, "ADC_AWD2CR", 0, 0),
     Register(0xA4, "ADC_AWD3CR", 0, 0),
-    Register(DIFSEL, "ADC_DIFSEL", 0, 0),
+    Register(0xB0, "ADC_DIFSEL", 0, 0),
     Register(0xB4, "ADC_CALFACT", 0, 0x007F_007F),
     Register(0xC0, "ADC_GCOMP", 0x1000, 0),
 ];
