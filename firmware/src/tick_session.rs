@@ -46,6 +46,12 @@ pub struct TickSession {
     dropped_windows: u32,
 }
 
+/// Emits an answer as an event. Not inlined because it is rare, and its copies take room.
+#[inline(never)]
+fn send_answer(acknowledge: Acknowledge, follow_up: FollowUp, events: &mut impl EventSink) {
+    events.push(Event::Answer(acknowledge, follow_up));
+}
+
 impl TickSession {
     /// Returns the state at power on.
     pub fn new() -> Self {
@@ -69,7 +75,7 @@ impl TickSession {
             self.answer_log.clear();
         }
         if let Some(earlier) = self.answer_log.stored_answer(id) {
-            events.push(Event::Answer(earlier, FollowUp::None));
+            send_answer(earlier, FollowUp::None, events);
             return None;
         }
         // A repeated request while storing: the answer is still to come.
@@ -86,7 +92,7 @@ impl TickSession {
             Err(_) => FollowUp::None,
         };
         let acknowledge = self.answer_log.record(id, result);
-        events.push(Event::Answer(acknowledge, follow_up));
+        send_answer(acknowledge, follow_up, events);
         None
     }
 
@@ -106,7 +112,7 @@ impl TickSession {
                 self.answer_log.record(request.id, result)
             }
         };
-        events.push(Event::Answer(acknowledge, FollowUp::None));
+        send_answer(acknowledge, FollowUp::None, events);
     }
 
     /// Refuses a request without executing it, and emits the answer as an event. Not inlined because it is rare.
@@ -116,7 +122,7 @@ impl TickSession {
             Some(earlier) => earlier,
             None => self.answer_log.record(id, Err(refusal)),
         };
-        events.push(Event::Answer(acknowledge, FollowUp::None));
+        send_answer(acknowledge, FollowUp::None, events);
     }
 
     /// Ends storing the settings, and answers the request. Not inlined because it is rare.
@@ -130,7 +136,7 @@ impl TickSession {
         state.storing = false;
         if let Some(id) = self.pending_store.take() {
             let acknowledge: Acknowledge = self.answer_log.record(id, result);
-            events.push(Event::Answer(acknowledge, FollowUp::None));
+            send_answer(acknowledge, FollowUp::None, events);
         }
     }
 

@@ -74,7 +74,8 @@ fn within(quantity: Bounded, value: f32, bound: f32) -> Result<(), Refusal> {
     }
 }
 
-/// Checks a model against the ratings of the rig.
+/// Checks a model against the ratings of the rig. Not inlined, like the checks below: each is called from two places.
+#[inline(never)]
 pub(crate) fn model(config: &Config, model: &LinkParameters<f32>) -> Result<(), Refusal> {
     let physical = model.to_array().iter().all(|value| value.is_finite())
         && model.inertia > 0.0
@@ -84,7 +85,10 @@ pub(crate) fn model(config: &Config, model: &LinkParameters<f32>) -> Result<(), 
         return Err(Refusal::BadValue);
     }
     let torque = config.ratings.torque;
-    let gravity = libm::hypotf(model.gravity_cos, model.gravity_sin);
+    let (cos, sin) = (model.gravity_cos, model.gravity_sin);
+    // Each alone first, so that the squares are finite.
+    within(Bounded::Gravity, cos.abs().max(sin.abs()), torque)?;
+    let gravity = libm::sqrtf(cos * cos + sin * sin);
     within(Bounded::Inertia, model.inertia, torque / MIN_ACCELERATION)?;
     within(Bounded::Gravity, gravity, torque)?;
     within(Bounded::ViscousFriction, model.viscous, torque / MIN_SPEED)?;
@@ -93,6 +97,7 @@ pub(crate) fn model(config: &Config, model: &LinkParameters<f32>) -> Result<(), 
 }
 
 /// Checks a friction law against the ratings of the rig.
+#[inline(never)]
 pub(crate) fn friction(config: &Config, friction: &Friction<f32>) -> Result<(), Refusal> {
     friction.check().map_err(|_| Refusal::BadValue)?;
     let torque = config.ratings.torque;
@@ -106,6 +111,7 @@ pub(crate) fn friction(config: &Config, friction: &Friction<f32>) -> Result<(), 
 }
 
 /// Checks that gains leave the current loop room, for the inertia of the model.
+#[inline(never)]
 pub(crate) fn loops(gains: &Gains<f32>, model: &LinkParameters<f32>) -> Result<(), Refusal> {
     let bound = MAX_LOOP_SHARE * core::f32::consts::TAU * gains.current_bandwidth;
     let natural = libm::sqrtf(gains.proportional / model.inertia);

@@ -1,6 +1,6 @@
 //! LPUART1 to the ST-LINK's serial port: input by a DMA ring, output by DMA.
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2, LPUART1};
@@ -17,7 +17,7 @@ use rig_firmware::prechecked_request::{PrecheckedRequest, precheck};
 use rig_firmware::report_sender::ReportSender;
 use rig_firmware::urgent_request::UrgentRequest;
 use rig_shared::safety::Mode;
-use rig_shared::wire::message::Request;
+use rig_shared::wire::message::{Request, RequestBody};
 use rig_shared::wire::{DecodeError, MAX_FRAME, MessageDecoder};
 use static_cell::ConstStaticCell;
 
@@ -123,14 +123,28 @@ fn log(event: &Event, mode: &mut Mode) {
     }
 }
 
+/// True while a request is between the two queues of [`precheck_requests`].
+static PRECHECKING: AtomicBool = AtomicBool::new(false);
+
 /// Passes decoded requests on: urgent ones to the tick, the others to the task that prechecks them.
 struct Distributor {
     urgent: Producer<'static, UrgentRequest>,
     requests: Producer<'static, Numbered<Request>>,
     urgent_count: u32,
+    /// Number of the last request that was passed to the precheck.
+    last_id: Option<u16>,
 }
 
 impl Distributor {
+    /// Returns true for a repetition of a request that still waits for its precheck or is being prechecked. The host
+    /// repeats a request after 0.1 s, and the longest precheck takes 0.12 s: a second precheck would give the same answer,
+    /// later. The requests are prechecked in their order, so the last one waits as long as any does. A `Hello` may come
+    /// from another host with a number that was used before.
+    fn is_repeated(&self, request: &Request) -> bool {
+        let waits = self.requests.len() > 0 || PRECHECKING.load(Ordering::Relaxed);
+        waits && self.last_id == Some(request.id) && !matches!(request.body, RequestBody::Hello)
+    }
+
     /// Passes one on. A request that finds no room is counted like a damaged one: the host gets no answer and repeats it.
     fn pass(&mut self, decoded: Option<Result<Request, DecodeError>>) {
         let accepted = match decoded {
@@ -143,12 +157,18 @@ impl Distributor {
                     self.urgent_count = self.urgent_count.wrapping_add(u32::from(accepted));
                     accepted
                 }
+                None if self.is_repeated(&request) => return,
                 None => {
+                    let id = request.id;
                     let numbered = Numbered {
                         request,
                         urgent_before: self.urgent_count,
                     };
-                    self.requests.enqueue(numbered).is_ok()
+                    let accepted = self.requests.enqueue(numbered).is_ok();
+                    if accepted {
+                        self.last_id = Some(id);
+                    }
+                    accepted
                 }
             },
         };
@@ -173,6 +193,7 @@ pub(crate) async fn receive(
         urgent,
         requests,
         urgent_count: 0,
+        last_id: None,
     };
     let mut bytes = [0; 64];
     loop {
@@ -206,15 +227,20 @@ pub(crate) async fn precheck_requests(
     loop {
         check_in(Task::Precheck);
         Timer::after_millis(1).await;
-        while to_tick.ready()
-            && let Some(numbered) = requests.dequeue()
-        {
+        while to_tick.ready() {
+            // Before the queue is emptied, as the receiving task may interrupt this one anywhere.
+            PRECHECKING.store(true, Ordering::Relaxed);
+            let Some(numbered) = requests.dequeue() else {
+                PRECHECKING.store(false, Ordering::Relaxed);
+                break;
+            };
             let prechecked = Numbered {
                 request: precheck(config, numbered.request),
                 urgent_before: numbered.urgent_before,
             };
             // Room was found before, and nobody else fills this queue.
             let _taken = to_tick.enqueue(prechecked).is_ok();
+            PRECHECKING.store(false, Ordering::Relaxed);
             check_in(Task::Precheck);
             // Other tasks of this priority run between two requests.
             Timer::after_ticks(0).await;

@@ -57,6 +57,8 @@ pub(crate) struct Bridge {
     wake_ticks: u32,
     /// Ticks of them that are left; 0 if the bridge sleeps or is awake.
     waking: u32,
+    /// True if the bridge is awake and its outputs are on. Reading the enable's pin takes longer.
+    awake: bool,
 }
 
 impl Bridge {
@@ -137,6 +139,7 @@ impl Bridge {
             enable: pins.connect(),
             wake_ticks,
             waking: 0,
+            awake: false,
         }
     }
 
@@ -158,7 +161,7 @@ impl Bridge {
         } else if !flags.bif(0) || self.waking > 0 {
             None
         } else if is_fault_line_low() {
-            self.enable.is_set_high().then_some(Break::Driver)
+            self.awake.then_some(Break::Driver)
         } else {
             // The line is up, so the bridge is not the cause: a bridge fault holds it low for a millisecond or more.
             Some(Break::Comparator)
@@ -172,7 +175,7 @@ impl Bridge {
             switch_off();
             // The update before the next command loads this: the bridge starts with duty 0, not with its last duty.
             brake();
-            self.waking = 0;
+            (self.waking, self.awake) = (0, false);
             clear_breaks();
             return;
         }
@@ -184,16 +187,24 @@ impl Bridge {
             (braking, HIGH)
         };
         compare(one, two);
-        if !self.enable.is_set_high() {
+        if !self.awake {
+            self.wake();
+        }
+    }
+
+    /// Enables the bridge and, in later ticks, waits until it is awake and switches the outputs on.
+    fn wake(&mut self) {
+        if self.waking == 0 {
             self.enable.set_high();
             self.waking = self.wake_ticks;
-        } else if self.waking > 0 {
-            self.waking -= 1;
-            if self.waking == 0 {
-                // The fault line is valid from now on; what it said before does not count.
-                clear_breaks();
-                TIM1.bdtr().modify(|w| w.set_moe(true));
-            }
+            return;
+        }
+        self.waking -= 1;
+        if self.waking == 0 {
+            self.awake = true;
+            // The fault line is valid from now on; what it said before does not count.
+            clear_breaks();
+            TIM1.bdtr().modify(|w| w.set_moe(true));
         }
     }
 }

@@ -103,7 +103,6 @@ pub(crate) fn run() -> ! {
         converter,
         encoder,
         wire_check: WireCheck::new(),
-        period_cycles: Tick::period(config.rates.control_hz),
         entered: 0,
         next_waiting: false,
         health_monitor: HealthMonitor::new(config.rates.control_hz),

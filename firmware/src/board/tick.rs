@@ -8,6 +8,7 @@ use embassy_stm32::interrupt;
 use rig_firmware::capture::Capture;
 use rig_firmware::config::{Config, Settings};
 use rig_firmware::event::Event;
+use rig_firmware::nameplate::RATES;
 use rig_firmware::prechecked_request::PrecheckedRequest;
 use rig_firmware::sample::Sample;
 use rig_firmware::state::State;
@@ -53,7 +54,6 @@ pub(crate) struct Tick {
     pub(crate) converter: Converter,
     pub(crate) encoder: EncoderTimer,
     pub(crate) wire_check: WireCheck,
-    pub(crate) period_cycles: u32,
     pub(crate) entered: u32,
     pub(crate) next_waiting: bool,
     pub(crate) health_monitor: HealthMonitor,
@@ -112,12 +112,14 @@ impl Tick {
     /// Returns the ticks that were missed or late, `elapsed` cycles after the last one began.
     #[inline(always)]
     fn late_ticks(&self, elapsed: u32) -> u8 {
-        let (period, half) = (self.period_cycles, self.period_cycles / 2);
+        const PERIOD: u32 = Tick::period(RATES.control_hz);
+        const LATE: u32 = PERIOD + PERIOD / 2;
+        const MISSED: u32 = 2 * PERIOD + PERIOD / 2;
         // A tick and a half since the last one: an interrupt was late or missing.
-        if !self.next_waiting && elapsed <= period + half {
+        if !self.next_waiting && elapsed <= LATE {
             return 0;
         }
-        1 + u8::from(elapsed > 2 * period + half)
+        1 + u8::from(elapsed > MISSED)
     }
 
     /// Serves urgent requests before the control step, so that they act in this tick. Not inlined because it is rare.

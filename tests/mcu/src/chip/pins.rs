@@ -94,10 +94,14 @@ impl Chip {
         Ok(())
     }
 
+    /// Returns for each channel of the encoder whether the chip pulls its pin up, PA0 and PA1.
+    pub fn encoder_pulls(&self) -> [bool; 2] {
+        [0, 1].map(|pin| self.gpio[0].pulls_up(pin))
+    }
+
     /// Passes the encoder's edges up to now to the timers that count and time them: PA0, PA1 by alternate function 1.
     pub(super) fn count_edges(&mut self) {
-        let pulls = [0, 1].map(|pin| self.gpio[0].pulls_up(pin));
-        let edges = self.board.edges(self.work.now, pulls);
+        let edges = self.board.edges(self.work.now, self.encoder_pulls());
         for (pin, level) in self.board.levels().into_iter().enumerate() {
             self.gpio[0].set_outside(pin as u32, level);
         }

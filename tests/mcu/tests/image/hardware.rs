@@ -84,13 +84,36 @@ fn too_high_a_supply_is_a_fault_as_too_low_a_one_is() {
     );
 }
 
-/// At rest, where no motion could tell: a wire that nothing drives follows the chip's own pull.
+/// Waits until a cut of these wires changes as many levels as asked for: the chip's pulls take them over.
+fn wait_for_changes(line: &mut BoardSession, cut: [bool; 2], wanted: &[usize]) {
+    for _ in 0..1000 {
+        let changes = board(line).with_chip(|chip| {
+            let (levels, pulls) = (chip.board.levels(), chip.encoder_pulls());
+            (0..2).filter(|&k| cut[k] && levels[k] != pulls[k]).count()
+        });
+        if wanted.contains(&changes) {
+            return;
+        }
+        board(line).run_for(1e-4).unwrap();
+    }
+    panic!("a cut of {cut:?} never changes {wanted:?} levels");
+}
+
+/// At rest, where no motion could tell: a wire that nothing drives follows the chip's own pull. A whole cable may come off
+/// while both pulls differ from the levels: both channels then change at once, which is a wrong step of its own.
 #[test]
 fn a_cut_encoder_wire_is_found_at_rest() {
-    for (seed, cut) in [(74, [true, true]), (75, [true, false]), (76, [false, true])] {
+    let both = [true, true];
+    for (seed, cut, changes, expected) in [
+        (74, both, &[0, 1][..], Fault::EncoderLost),
+        (74, both, &[2], Fault::EncoderSignal),
+        (75, [true, false], &[0, 1], Fault::EncoderLost),
+        (76, [false, true], &[0, 1], Fault::EncoderLost),
+    ] {
         let mut line = bench(seed);
         line.request(RequestBody::Arm).unwrap();
         wait(&mut line, 0.5);
+        wait_for_changes(&mut line, cut, changes);
         board(&mut line).with_board(|b| {
             [b.faults.channel_a_cut, b.faults.channel_b_cut] = cut;
         });
@@ -100,8 +123,11 @@ fn a_cut_encoder_wire_is_found_at_rest() {
             after.is_some_and(|after| after < 0.015),
             "{cut:?}: {after:?}"
         );
-        assert_eq!(snapshot(&mut line).0.fault, Fault::EncoderLost, "{cut:?}");
+        let (record, _) = snapshot(&mut line);
+        assert_eq!(record.fault, expected, "{cut:?}");
+        assert!(expected != Fault::EncoderSignal || record.value == 0.0);
         // It acts whether the bridge is on or off.
+        wait(&mut line, 0.015);
         let clear = RequestBody::ClearFault;
         assert_eq!(refused(&mut line, clear), Refusal::CauseActing);
     }
