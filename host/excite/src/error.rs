@@ -65,20 +65,40 @@ pub enum ExciteError {
         /// Range over all poses, rad.
         turned: [f64; 2],
     },
-    /// A torque limit that cannot hold the arm at any pose.
+    /// A torque limit that cannot start a motion at any pose.
     #[error(
-        "{} of joint \"{joint}\" is {} {unit}, but to hold the arm against gravity takes {} {unit} or more at every pose within the limits: give more than that, or correct masses, gravity, gear_ratio or the position limits",
-        of.words(), format_significant(*limit, 3), format_significant(*least, 3), unit = of.unit()
+        "{} of joint \"{joint}\" is {} {unit}, but to hold the arm against gravity and to move it against dry friction takes {} {unit} or more at every pose within the limits ({} for gravity, {} for friction): give more than that, or correct masses, gravity, friction, gear_ratio or the position limits",
+        of.words(), format_significant(*limit, 3), format_significant(*gravity + *coulomb, 3),
+        format_significant(*gravity, 3), format_significant(*coulomb, 3), unit = of.unit()
     )]
-    Holding {
+    Weak {
         /// The joint's name.
         joint: String,
         /// Whose limit it is.
-        of: HeldLimit,
+        of: LimitedTorque,
         /// The limit, N·m or N.
         limit: f64,
         /// The least holding torque, N·m or N.
-        least: f64,
+        gravity: f64,
+        /// The Coulomb friction, N·m or N.
+        coulomb: f64,
+    },
+    /// A limit so low that a motion over the range would take too long.
+    #[error(
+        "a motion over the range of joint \"{joint}\" needs a period of {} s at its {limit} of {} {unit}, but a period lasts 3600 s at most: correct the limit, narrow the position limits, or give the period",
+        format_significant(*period, 3), format_significant(*value, 3)
+    )]
+    Slow {
+        /// The joint's name.
+        joint: String,
+        /// The words for the limit.
+        limit: &'static str,
+        /// The limit.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// The period that it needs, s.
+        period: f64,
     },
     /// The limits leave no room for a staged motion.
     #[error("no {kind} fits joint \"{joint}\": {why}")]
@@ -192,16 +212,16 @@ pub enum ExciteError {
     },
 }
 
-/// Whose torque limit cannot hold the arm.
+/// Whose torque limit cannot move the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeldLimit {
+pub enum LimitedTorque {
     /// The joint's, with the limit of its own motor at a constant ratio; true if it is revolute.
     Joint(bool),
     /// The motor's, on its side of coupled drives or of a screw.
     Motor,
 }
 
-impl HeldLimit {
+impl LimitedTorque {
     fn words(self) -> &'static str {
         match self {
             Self::Joint(_) => {

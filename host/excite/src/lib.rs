@@ -71,7 +71,7 @@ mod tests;
 pub use certificate::{MotorReach, Reach};
 pub use criterion::{Criterion, Values};
 pub use effort::Effort;
-pub use error::{ExciteError, HeldLimit};
+pub use error::{ExciteError, LimitedTorque};
 pub use optimum::{Clearance, Design, design, design_measured};
 pub use options::{Options, Parameters, Scaling};
 pub use period::default_period;

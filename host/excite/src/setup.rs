@@ -226,7 +226,6 @@ pub(super) fn frame_of(
 ) -> Result<(Frame, Vec<String>, Vec<String>), ExciteError> {
     let room = Room::new(options.margin, options.speed_share)?;
     let (bounds, mut notes) = bounds_of(robot, room, options.start.as_deref())?;
-    let schedule = schedule_of(&bounds, options)?;
     let combined = Combined::of(robot);
     if let Some(start) = &options.start {
         check_start(robot, start, &bounds, &combined)?;
@@ -234,7 +233,8 @@ pub(super) fn frame_of(
     let mut model = Model::from_robot(robot)?;
     let drives = Drives::of(robot, model.motors.take(), &bounds, room.speed)?;
     let known = prior(robot, &model);
-    refuse_unreachable(robot, &bounds, drives.as_ref(), known.is_ok())?;
+    refuse_unreachable(robot, &bounds, &combined, drives.as_ref(), known.is_ok())?;
+    let schedule = schedule_of(robot, &bounds, options)?;
     let (parameters, on_torque) = torque_notes(robot, options, &bounds, known);
     notes.extend(on_torque);
     let motors = drives.as_ref().map_or(&[][..], |drives| &drives.limits);

@@ -8,13 +8,15 @@ use rig_shared::trajectory::{
 };
 
 use crate::bounds::{Bounds, Room, bounds_of, prior};
-use crate::drives::{Combined, into_cranks};
+use crate::drives::{Combined, Drives, into_cranks};
+use crate::feasible::refuse_unreachable;
 use crate::motor_limits::exceeded;
 use crate::quintic_move::{micros, move_time};
 use crate::torque_share::torque_share;
 use crate::{ExciteError, JointTrajectory, TrajectoryFile};
 use rig_model::robot::{JointKind, Robot};
 use rig_model::simulate::Model;
+use rig_output::format_significant;
 
 /// Ratio of a sweep's fastest speed to its slowest. Friction of gears weakens below 0.01 to 0.3 rad/s
 /// (Armstrong-Hélouvry, Dupont & Canudas de Wit 1994), and joints reach some rad/s: the slowest passes must lie below
@@ -169,7 +171,9 @@ impl Allowance<'_> {
         move_time(distance, self.velocity, self.acceleration)
     }
 
-    fn build(&self, kind: StagedKind) -> Option<Trajectory<f64>> {
+    /// Returns the motion, or the reason why there is none.
+    fn build(&self, kind: StagedKind) -> Result<Trajectory<f64>, String> {
+        self.micros(self.distance / self.velocity)?;
         match kind {
             StagedKind::Chirp => self.chirp(),
             StagedKind::Staircase => self.staircase(),
@@ -178,7 +182,20 @@ impl Allowance<'_> {
         }
     }
 
-    fn chirp(&self) -> Option<Trajectory<f64>> {
+    /// Rounds a time up to whole microseconds, or returns the reason why a motion cannot have it.
+    fn micros(&self, seconds: f64) -> Result<u32, String> {
+        micros(seconds).ok_or_else(|| {
+            format!(
+                "a part of it would take {} s, and none may take more than {:.0} s: it moves {} to either side, at {} per second at most (the velocity limit, less a margin); correct the limits, or give another amplitude, speed or band",
+                format_significant(seconds, 3),
+                1e-6 * f64::from(u32::MAX),
+                format_significant(self.distance, 3),
+                format_significant(self.velocity, 3),
+            )
+        })
+    }
+
+    fn chirp(&self) -> Result<Trajectory<f64>, String> {
         // From a frequency at which the range bounds the amplitude to one at which acceleration clearly does.
         let [start_hz, end_hz] = self.asked.band.unwrap_or_else(|| {
             let start_hz = 0.25 * self.velocity / (TAU * self.distance);
@@ -188,12 +205,12 @@ impl Allowance<'_> {
         // About five periods in the slowest octave, so that the sweep is slow compared with its own frequency.
         let octaves = (end_hz / start_hz).log2();
         let duration = 5.0 * octaves / start_hz;
-        Some(Trajectory::Chirp(Chirp {
+        Ok(Trajectory::Chirp(Chirp {
             start_hz,
             end_hz,
             sweep: Sweep::Logarithmic,
-            duration_us: micros(duration)?,
-            ramp_us: micros(0.5 / start_hz)?,
+            duration_us: self.micros(duration)?,
+            ramp_us: self.micros(0.5 / start_hz)?,
             amplitude: self.distance,
             velocity: self.velocity,
             acceleration: self.acceleration,
@@ -201,20 +218,20 @@ impl Allowance<'_> {
         }))
     }
 
-    fn staircase(&self) -> Option<Trajectory<f64>> {
+    fn staircase(&self) -> Result<Trajectory<f64>, String> {
         // Up to one end, down to the other, back up: every level except the ends from both sides.
         let quarters = [1, 2, 3, 4, 3, 2, 1, 0, -1, -2, -3, -4, -3, -2, -1];
-        Some(Trajectory::Staircase(Staircase {
+        Ok(Trajectory::Staircase(Staircase {
             levels: quarters
                 .iter()
                 .map(|k| self.distance * f64::from(*k) / 4.0)
                 .collect(),
-            move_us: micros(self.move_time(0.25 * self.distance))?,
+            move_us: self.micros(self.move_time(0.25 * self.distance))?,
             dwell_us: 1_000_000,
         }))
     }
 
-    fn reversals(&self) -> Option<Trajectory<f64>> {
+    fn reversals(&self) -> Result<Trajectory<f64>, String> {
         // A hundredth of the velocity limit is below the Stribeck velocity of usual gears.
         let asked = self.asked.speeds.as_ref().and_then(|s| s.first().copied());
         let speed = asked.unwrap_or(0.01 * self.velocity);
@@ -228,10 +245,17 @@ impl Allowance<'_> {
             .map(|share| (share * largest).max(least))
             .collect();
         let cycles = self.asked.cycles.unwrap_or(2);
-        SlowReversals::new(speed, turn, &amplitudes, cycles).map(Trajectory::SlowReversals)
+        self.micros(largest / speed)?;
+        SlowReversals::new(speed, turn, &amplitudes, cycles)
+            .map(Trajectory::SlowReversals)
+            .ok_or_else(|| {
+                format!(
+                    "{amplitudes:.3?} to either side leave no time at {speed:.3} per second between turns of {turn:.3} s; give a larger --amplitude or a lower --speed"
+                )
+            })
     }
 
-    fn sweep(&self) -> Option<Trajectory<f64>> {
+    fn sweep(&self) -> Result<Trajectory<f64>, String> {
         let default = [self.velocity / SPEED_SPAN, self.velocity];
         let [slowest, fastest] = self.asked.span().unwrap_or(default);
         let count = self.asked.count.unwrap_or(12).max(2);
@@ -247,8 +271,15 @@ impl Allowance<'_> {
             whole.min(FASTEST_PASS * fastest)
         };
         let half_span = 0.5 * (travel + fastest * ramp);
+        self.micros(2.0 * half_span / slowest)?;
         FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half_span))
             .map(Trajectory::FrictionSweep)
+            .ok_or_else(|| {
+                format!(
+                    "at {fastest:.3} per second it needs all of its {:.3} to either side to reach its speed; give a lower --speed or a larger --amplitude",
+                    self.distance
+                )
+            })
     }
 }
 
@@ -377,6 +408,10 @@ pub fn staged(
                 .into(),
         );
     }
+    let mut model = Model::from_robot(robot)?;
+    let with_torque = prior(robot, &model).is_ok();
+    let drives = Drives::of(robot, model.motors.take(), &bounds, 1.0)?;
+    refuse_unreachable(robot, &bounds, &combined, drives.as_ref(), with_torque)?;
     let start = start_of(options.start.as_deref(), &bounds, &combined)?;
     let no_room = |why: String| ExciteError::NoRoom {
         kind: kind.name(),
@@ -461,9 +496,12 @@ impl Within<'_> {
                 asked: options,
             };
             factor *= SLOWER;
-            let Some(trajectory) = allowance.build(kind) else {
-                why = "its distances, speeds and times do not fit each other".into();
-                continue;
+            let trajectory = match allowance.build(kind) {
+                Ok(trajectory) => trajectory,
+                Err(reason) => {
+                    why = reason;
+                    continue;
+                }
             };
             // In single precision, as on the rig.
             let checked: Result<Extremes<f64>, _> = trajectory

@@ -180,19 +180,74 @@ fn limits_of_motors_that_no_pose_keeps_are_refused_before_the_search() {
             "{text}"
         );
     }
-    // The upper arm never points up or down, so its screw always carries it.
-    let text = said(
-        "upper_arm",
-        MotorLimits {
-            torque: Some(1e-3),
-            ..MotorLimits::default()
-        },
-    );
+    let torque = |limit| MotorLimits {
+        torque: Some(limit),
+        ..MotorLimits::default()
+    };
+    // Within the range of its crank the upper arm never points up or down, so its screw always carries it.
+    let text = said("upper_arm", torque(1e-3));
     assert!(
-        text.contains("upper_arm") && text.contains("0.001 N·m") && text.contains("hold the arm"),
+        text.contains("upper_arm")
+            && text.contains("0.00100 N·m")
+            && text.contains("hold the arm")
+            && text.contains("0.537 for gravity"),
+        "{text}"
+    );
+    // The lower arm passes a pose of balance: what is left is the friction of its motor.
+    let text = said("lower_arm", torque(0.05));
+    assert!(
+        text.contains("lower_arm") && text.contains("(0 for gravity, 0.0800 for friction)"),
         "{text}"
     );
     assert!(!searched.get());
+}
+
+/// Limits below the Coulomb friction, or too slow for an hour, are named with joint and value, whatever the motion.
+#[test]
+fn limits_below_friction_or_without_speed_name_themselves() {
+    let said = |limits: MotorLimits, kind: Option<StagedKind>| {
+        let mut robot = one_link();
+        robot.joints[0].drive.as_mut().unwrap().limits = Some(limits);
+        let refused = match kind {
+            None => design(&robot, &options(), |_, _| panic!("a search began")).unwrap_err(),
+            Some(kind) => staged(&robot, kind, &StagedOptions::default()).unwrap_err(),
+        };
+        refused.to_string()
+    };
+    let kinds = [
+        None,
+        Some(StagedKind::Chirp),
+        Some(StagedKind::Staircase),
+        Some(StagedKind::Reversals),
+        Some(StagedKind::Sweep),
+    ];
+    let joint = one_link().joints.remove(0);
+    let coulomb = joint.friction.unwrap().coulomb / joint.drive.unwrap().gear_ratio;
+    for kind in kinds {
+        for share in [1e-6, 0.5, 0.99] {
+            let torque = Some(share * coulomb);
+            let text = said(
+                MotorLimits {
+                    torque,
+                    ..MotorLimits::default()
+                },
+                kind,
+            );
+            assert!(
+                text.contains("friction") && text.contains("torque limit"),
+                "{kind:?}: {text}"
+            );
+        }
+        let velocity = Some(1e-9);
+        let text = said(
+            MotorLimits {
+                velocity,
+                ..MotorLimits::default()
+            },
+            kind,
+        );
+        assert!(text.contains("velocity limit"), "{kind:?}: {text}");
+    }
 }
 
 #[test]
