@@ -141,7 +141,7 @@ impl Distributor {
     /// later. The requests are prechecked in their order, so the last one waits as long as any does. A `Hello` may come
     /// from another host with a number that was used before.
     fn is_repeated(&self, request: &Request) -> bool {
-        let waits = self.requests.len() > 0 || PRECHECKING.load(Ordering::Relaxed);
+        let waits = !self.requests.is_empty() || PRECHECKING.load(Ordering::Relaxed);
         waits && self.last_id == Some(request.id) && !matches!(request.body, RequestBody::Hello)
     }
 
