@@ -39,10 +39,7 @@ pub(crate) fn latched_after(line: &mut BoardSession, within: f64) -> Option<f64>
     let emulated = board(line);
     let begin = emulated.with_chip(|chip| chip.triggers);
     emulated.run_for(within).unwrap();
-    match snapshot_of_fault(line) {
-        Some(record) => Some((record.tick.saturating_sub(begin)) as f64 * 1e-4),
-        None => None,
-    }
+    snapshot_of_fault(line).map(|record| record.tick.saturating_sub(begin) as f64 * 1e-4)
 }
 
 /// The latched fault, if there is one.
