@@ -56,6 +56,22 @@ fn blocks(page: &Path) -> Vec<(String, String)> {
     found
 }
 
+/// A page without its fenced blocks.
+fn sentences(page: &Path) -> String {
+    let text = fs::read_to_string(page).unwrap();
+    let mut fenced = false;
+    let mut outside = String::new();
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced {
+            outside += line;
+            outside.push('\n');
+        }
+    }
+    outside
+}
+
 /// The calls of `rig` in a block of shell commands, as words.
 fn calls(block: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
@@ -97,15 +113,17 @@ fn commands_within_sentences_have_their_options() {
     let mut wrong = Vec::new();
     let mut count = 0;
     for page in pages() {
-        let text = fs::read_to_string(&page).unwrap();
+        let text = sentences(&page);
         for quoted in text.split('`').skip(1).step_by(2) {
             let mut words = quoted.split_whitespace().peekable();
             if words.next() != Some("rig") {
                 continue;
             }
             let mut command = &program;
+            let mut own: Vec<&clap::Arg> = program.get_arguments().collect();
             while let Some(next) = words.peek().and_then(|w| command.find_subcommand(w)) {
                 command = next;
+                own.extend(next.get_arguments());
                 words.next();
             }
             let named = command.get_name() != program.get_name();
@@ -119,8 +137,7 @@ fn commands_within_sentences_have_their_options() {
                     a.get_long() == Some(name)
                         || a.get_all_aliases().is_some_and(|all| all.contains(&name))
                 };
-                let own = program.get_arguments().chain(command.get_arguments());
-                if !["help", "version"].contains(&name) && !own.into_iter().any(known) {
+                if !["help", "version"].contains(&name) && !own.iter().any(|a| known(a)) {
                     wrong.push(format!("{}: `{quoted}`: no --{name}", page.display()));
                 }
             }
