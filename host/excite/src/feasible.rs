@@ -33,7 +33,7 @@ const HALVINGS: i32 = 12;
 /// are described.
 ///
 /// # Errors
-/// [`ExciteError::MotorAngle`], [`ExciteError::Holding`].
+/// [`ExciteError::MotorAngle`], [`ExciteError::Weak`].
 pub(super) fn refuse_unreachable(
     robot: &Robot,
     bounds: &[Bounds],

@@ -1,4 +1,4 @@
-//! Numbers as text, grouped sentences, commented TOML, and atomic writing of files.
+//! Numbers as text, grouped sentences, misspelt words, commented TOML, and atomic writing of files.
 //!
 //! The other crates use it for messages and results. It does not depend on robots.
 //!
@@ -9,6 +9,7 @@
 mod files;
 mod finding;
 mod format;
+mod spelling;
 mod toml_text;
 
 pub use files::{WriteError, can_take, data_dir, folder, persist, temporary, write_whole};
@@ -17,4 +18,5 @@ pub use format::{
     fixed, format_interval, format_p_value, format_short, format_significant, format_time,
     format_trimmed, format_unit, format_value, listed, power_of_ten,
 };
+pub use spelling::edit_distance;
 pub use toml_text::{comment_toml, toml_document, toml_tables};

@@ -1,5 +1,7 @@
 //! Similar names: what a misspelt word was meant to be.
 
+use rig_output::edit_distance;
+
 /// Returns the known name within two typing errors of `written`: missing, added or exchanged letters, or another case.
 /// Names of up to four letters allow one error.
 pub(super) fn nearest<'n>(written: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
@@ -17,24 +19,8 @@ pub(super) fn nearest_long<'n>(
 
 fn within<'n>(written: &str, names: impl Iterator<Item = &'n str>, most: usize) -> Option<&'n str> {
     let written = written.to_lowercase();
-    let near = names.map(|name| (slips(&written, &name.to_lowercase()), name));
+    let near = names.map(|name| (edit_distance(&written, &name.to_lowercase()), name));
     near.filter(|(slips, _)| *slips <= most)
         .min_by_key(|(slips, _)| *slips)
         .map(|(_, name)| name)
-}
-
-/// Returns the number of letters to insert, delete or exchange to turn `a` into `b` (Levenshtein 1966).
-fn slips(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut corner = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let exchanged = corner + usize::from(x != *y);
-            corner = row[j + 1];
-            row[j + 1] = exchanged.min(row[j] + 1).min(corner + 1);
-        }
-    }
-    row[b.len()]
 }

@@ -7,6 +7,7 @@ use toml_edit::{Document, InlineTable, Item, Table, Value};
 
 use super::super::work::Words;
 use crate::commands::error::CommandError;
+use rig_output::edit_distance;
 
 /// Key of the command of a step.
 const COMMAND: &str = "command";
@@ -261,7 +262,7 @@ fn unknown(command: &clap::Command, key: &str) -> String {
         .filter(|own| NOT_IN_A_STEP.iter().all(|(not, _)| not != own))
         .collect();
     let near = (names.iter())
-        .map(|own| (distance(own, key), own))
+        .map(|own| (edit_distance(own, key), own))
         .min()
         .filter(|(distance, own)| 2 * distance <= own.chars().count());
     match near {
@@ -273,22 +274,6 @@ fn unknown(command: &clap::Command, key: &str) -> String {
             names.join(", ")
         ),
     }
-}
-
-/// Number of letters to insert, remove or replace between two words (Levenshtein 1966).
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut corner = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let replaced = corner + usize::from(x != *y);
-            corner = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(corner + 1);
-        }
-    }
-    row[b.len()]
 }
 
 /// Returns an option as words for the command line, and the texts of its values.
