@@ -22,7 +22,7 @@ use crate::significance::{FAMILY_LEVEL, TEST_LEVEL, chi2_p, holm};
 use crate::single::{Single, Spread, spread};
 use crate::torque::torque_matrix;
 use crate::trades::trades;
-use crate::warnings::{brief_warnings, warnings};
+use crate::warnings::{brief_warnings, drifting, warnings};
 
 /// Compares the parameters that several sets of recordings of one robot give. Memory does not grow with the recordings.
 ///
@@ -99,6 +99,7 @@ fn compared(
         parameters: &parameters,
         joint: joint_test.as_ref(),
         without: &without,
+        drifting: &drifting(sets, robot),
         torque: &torque,
         causes: causes.as_ref(),
         tolerance: options.tolerance,

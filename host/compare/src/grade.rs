@@ -13,6 +13,8 @@ pub(crate) struct Graded<'a> {
     pub joint: Option<&'a JointTest>,
     /// By set, the same test of all other sets.
     pub without: &'a [JointTest],
+    /// Sentences on friction that changes during the recordings.
+    pub drifting: &'a [String],
     /// Torque residuals.
     pub torque: &'a TorqueMatrix,
     /// Tested causes.
@@ -77,13 +79,14 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
     if differ && let Some(causes) = of.causes {
         reasons.push(causes.sentence.clone());
     }
+    reasons.extend_from_slice(of.drifting);
     let grade = match (differ, matters) {
         (false, false) => Grade::Agree,
         (false, true) => Grade::Undecided,
         (true, false) => Grade::DifferWithoutEffect,
         (true, true) => Grade::DifferAndMatter,
     };
-    if grade == Grade::Undecided {
+    if grade == Grade::Undecided && of.drifting.is_empty() {
         reasons.push("The errors of the parameters are too large to tell whether the sets differ: longer or livelier recordings would decide it.".into());
     }
     (grade, reasons)

@@ -7,6 +7,7 @@ use rig_identify::{
 use rig_model::robot::Robot;
 
 use crate::error::CompareError;
+use crate::friction_drift::{Drift, Stretches};
 use crate::matrices::pseudo_inverse;
 use crate::rows::each_row;
 use crate::set::RecordingSet;
@@ -32,6 +33,8 @@ pub(crate) struct IdentifiedSet {
     pub factors: Vec<TriangularFactor>,
     /// RMS torque, speed and acceleration of each joint.
     pub sizes: Sizes,
+    /// By joint, the change of its friction during the recordings, if they are long enough to show one.
+    pub drifts: Vec<Drift>,
 }
 
 impl IdentifiedSet {
@@ -55,9 +58,15 @@ impl IdentifiedSet {
             ..options.clone()
         };
         let found = identify(robot, &set.recordings, &[], &options).map_err(failed)?;
-        let (factors, sizes) = rows(robot, base, set, &found).map_err(failed)?;
         let details = &found.details;
         let of_base = &details.combination * pseudo_inverse(&base.combination);
+        let values = DVector::from_column_slice(&details.estimate.values);
+        let of_rows = pseudo_inverse(&of_base) * &values;
+        let OfRows {
+            factors,
+            sizes,
+            drifts,
+        } = rows(robot, base, set, &found, of_rows.as_slice()).map_err(failed)?;
         let own: Vec<usize> = (details.columns.iter())
             .filter_map(|c| base.columns.iter().position(|b| b == c))
             .collect();
@@ -76,13 +85,14 @@ impl IdentifiedSet {
         .ok_or_else(|| CompareError::Singular(set.name.clone()))?;
         Ok(Self {
             name: set.name.clone(),
-            values: DVector::from_column_slice(&details.estimate.values),
+            values,
             covariance: shrunk.covariance,
             shrinkage: shrunk.weight,
             inverse_factor: shrunk.inverse_factor,
             of_base,
             factors,
             sizes,
+            drifts,
             found,
         })
     }
@@ -120,17 +130,27 @@ struct Motion {
     acceleration: f64,
 }
 
-/// Streams the rows of a set into one factor a joint.
+/// What the rows of a set show.
+struct OfRows {
+    factors: Vec<TriangularFactor>,
+    sizes: Sizes,
+    drifts: Vec<Drift>,
+}
+
+/// Streams the rows of a set into one factor a joint. `values`: base parameters of the set.
 fn rows(
     robot: &Robot,
     base: &Base,
     set: &RecordingSet,
     found: &Identification,
-) -> Result<(Vec<TriangularFactor>, Sizes), IdentifyError> {
+    values: &[f64],
+) -> Result<OfRows, IdentifyError> {
     let joints = robot.joints.len();
     let p = base.len();
     let mut factors = vec![TriangularFactor::new(p); joints];
     let mut motion = vec![Motion::default(); joints];
+    let mut stretches = vec![Stretches::new(); joints];
+    let mut start = (0, f64::NAN);
     let differential = ModelKind::Differential;
     each_row(
         robot,
@@ -138,11 +158,18 @@ fn rows(
         &set.recordings,
         found,
         differential,
-        &mut |rows| {
+        &mut |recording, rows| {
+            if let Some(first) = rows.t.first()
+                && (start.1.is_nan() || start.0 != recording)
+            {
+                start = (recording, *first);
+            }
             for (j, (factor, equation)) in factors.iter_mut().zip(&rows.equations).enumerate() {
                 for k in 0..rows.t.len() {
                     if equation.keep[k] {
                         factor.push(&equation.x[k * p..(k + 1) * p], equation.y[k], 1.0);
+                        let time = rows.t[k] - start.1;
+                        stretches[j].push(base, j, (equation, k), values, time);
                     }
                     motion[j].rows += 1.0;
                     motion[j].speed += rows.qd[j][k].powi(2);
@@ -165,5 +192,11 @@ fn rows(
         speed: rms(|m| m.speed),
         acceleration: rms(|m| m.acceleration),
     };
-    Ok((factors, sizes))
+    Ok(OfRows {
+        factors,
+        sizes,
+        drifts: (stretches.iter().enumerate())
+            .filter_map(|(j, own)| own.drift(j))
+            .collect(),
+    })
 }

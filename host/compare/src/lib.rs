@@ -14,6 +14,7 @@ mod common;
 mod compare;
 mod content;
 mod error;
+mod friction_drift;
 mod grade;
 mod identified_set;
 mod matrices;

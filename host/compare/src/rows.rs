@@ -10,7 +10,7 @@ use rig_model::effects::Effects;
 use rig_model::robot::Robot;
 
 /// Streams the rows of recordings over the base parameters, with the treatment of an identification and without the
-/// torque of the described effects. `model` tells which equations; those of the integral model have the windows of
+/// torque of the described effects. `take` gets the place of the recording, too. `model` tells which equations; those of the integral model have the windows of
 /// `found`, which must then be of that model.
 ///
 /// # Errors
@@ -21,7 +21,7 @@ pub(crate) fn each_row(
     recordings: &[&dyn Recording],
     found: &Identification,
     model: ModelKind,
-    take: &mut dyn FnMut(&Rows),
+    take: &mut dyn FnMut(usize, &Rows),
 ) -> Result<(), IdentifyError> {
     let joints = robot.joints.len();
     let (_, usable) = surveyed(recordings, joints)?;
@@ -42,10 +42,10 @@ pub(crate) fn each_row(
     };
     let (identified, _) = identified_robot(robot, found);
     let effects = Effects::of(&identified).map_err(|e| IdentifyError::Model(e.to_string()))?;
-    for recording in as_recordings(&usable) {
+    for (place, recording) in as_recordings(&usable).into_iter().enumerate() {
         let freed = Compensated::new(recording, &effects, &chain, treatment, true)?;
         each_rows(&freed, &plan, model, &mut |rows| {
-            take(rows);
+            take(place, rows);
             Ok(())
         })?;
     }

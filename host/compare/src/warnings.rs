@@ -1,9 +1,11 @@
-//! Warnings of the identifications, in full and one of each kind.
+//! Warnings of the identifications, in full and one of each kind; friction that changes during a recording.
 
 use rig_identify::Warning;
+use rig_model::robot::Robot;
 use rig_output::worst_first;
 
 use crate::identified_set::IdentifiedSet;
+use crate::significance::{FAMILY_LEVEL, holm};
 
 /// A warning of a set.
 struct SetWarning<'a> {
@@ -58,6 +60,29 @@ fn line(own: &[SetWarning]) -> String {
         ),
     };
     format!("Set {}: {}{rest}", first.set, first.warning)
+}
+
+/// Returns a sentence for each set and joint whose friction changes.
+pub(crate) fn drifting(sets: &[IdentifiedSet], robot: &Robot) -> Vec<String> {
+    let all = || {
+        (sets.iter()).flat_map(|set| {
+            set.drifts
+                .iter()
+                .map(move |drift| (set.name.as_str(), drift))
+        })
+    };
+    let p: Vec<f64> = all().map(|(_, drift)| drift.p).collect();
+    (all().zip(holm(&p)))
+        .filter(|(_, p)| *p < FAMILY_LEVEL)
+        .map(|((set, drift), _)| {
+            format!(
+                "The friction of {} {} by about {:.0} % during the recordings of {set}: the joint warms up, or the torque constant or the friction changes otherwise. Its values then depend on when they were recorded. Move the joint until its friction stays, or compare later parts of the recordings; \"rig diagnose\" tells what changes.",
+                robot.joints[drift.joint].name,
+                if drift.change < 0.0 { "falls" } else { "rises" },
+                100.0 * drift.change.abs(),
+            )
+        })
+        .collect()
 }
 
 #[cfg(test)]

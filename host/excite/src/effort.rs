@@ -37,7 +37,8 @@ impl Meter {
         Self {
             begun: Instant::now(),
             work: AtomicU64::new(0),
-            processor: processor_time().is_some(),
+            // A system that does not count gives zero, even for the thread that began the program.
+            processor: spent("/proc/self/schedstat").is_some_and(|time| !time.is_zero()),
         }
     }
 
@@ -64,10 +65,44 @@ impl Meter {
     }
 }
 
-/// Returns the processor time of the calling thread, where the system tells it: the first number of Linux's
-/// `/proc/thread-self/schedstat`, ns.
+/// Returns the processor time of the calling thread, where the system tells it; zero if it has only begun.
 fn processor_time() -> Option<Duration> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let nanoseconds: u64 = text.split_whitespace().next()?.parse().ok()?;
-    (nanoseconds > 0).then(|| Duration::from_nanos(nanoseconds))
+    spent("/proc/thread-self/schedstat")
+}
+
+/// Returns the first number of a file of Linux's scheduler, ns.
+fn spent(file: &str) -> Option<Duration> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let nanoseconds = text.split_whitespace().next()?.parse().ok()?;
+    Some(Duration::from_nanos(nanoseconds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// More threads than cores: the processor time of new threads does not exceed what all cores can give.
+    #[test]
+    fn waiting_threads_do_not_count_as_work() {
+        let meter = Meter::new();
+        if !meter.processor {
+            println!("SKIPPED: this system does not tell the processor time of a thread.");
+            return;
+        }
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let count = 6 * cores;
+        std::thread::scope(|scope| {
+            for _ in 0..count {
+                scope.spawn(|| {
+                    meter.measure(|| {
+                        let sum: f64 = (0..10_000_000).map(|k| f64::from(k).sqrt()).sum();
+                        assert!(sum > 0.0);
+                    });
+                });
+            }
+        });
+        let effort = meter.effort(count);
+        println!("{:.2} of {cores} cores", effort.speed_up());
+        assert!(effort.speed_up() < 1.5 * cores as f64);
+    }
 }

@@ -135,7 +135,9 @@ fn pass(
     take: &mut dyn FnMut(&Rows),
 ) -> Result<(), IdentifyError> {
     let model: ModelKind = found.model;
-    each_row(robot, base, &[recording], found, model, take)
+    each_row(robot, base, &[recording], found, model, &mut |_, rows| {
+        take(rows);
+    })
 }
 
 /// Returns the constants of the recursion and the half-widths of the bands. Nothing is forgotten, no residual is taken for a

@@ -160,7 +160,7 @@ fn factors(
         &[recording],
         found,
         differential,
-        &mut |rows| {
+        &mut |_, rows| {
             for (factor, equation) in all.iter_mut().zip(&rows.equations) {
                 for k in (0..rows.t.len()).filter(|&k| equation.keep[k]) {
                     factor.push(&equation.x[k * p..(k + 1) * p], equation.y[k], 1.0);

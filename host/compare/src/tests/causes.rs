@@ -118,3 +118,29 @@ fn several_changes_at_once_are_not_given_one_name() {
         assert_eq!(found.grade, Grade::DifferAndMatter);
     }
 }
+
+/// Friction that falls while a joint warms up is told, with its joint; friction that stays is not.
+#[test]
+fn friction_that_warms_up_within_a_recording_is_told() {
+    let said = |draw: u64, third: &Truth| {
+        let found = with_third(draw, third);
+        let drifts = |reason: &&String| reason.contains("during the recordings of");
+        let reasons: Vec<String> = found.reasons.iter().filter(drifts).cloned().collect();
+        reasons
+    };
+    let cold = Truth {
+        cold: [0.3, 8.0],
+        ..Truth::default()
+    };
+    let (mut told, mut alarms) = (0, 0);
+    for draw in 0..DRAWS {
+        let found = said(draw, &cold);
+        let of_third = |reason: &String| reason.contains("falls") && reason.contains("of set 2:");
+        told += u32::from(found.iter().any(of_third));
+        alarms += found.iter().filter(|reason| !of_third(reason)).count();
+        alarms += said(draw, &Truth::default()).len();
+    }
+    println!("told in {told} of {DRAWS}, {alarms} alarms");
+    assert!(told >= 19, "{told}");
+    assert!(alarms <= 1, "{alarms}");
+}

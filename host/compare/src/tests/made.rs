@@ -27,6 +27,8 @@ pub(super) struct Truth {
     pub friction: [[f64; 3]; 2],
     /// Factor of all torques as recorded.
     pub scale: f64,
+    /// Share by which the viscous friction of each joint is higher at the start, and its time constant, s.
+    pub cold: [f64; 2],
 }
 
 impl Default for Truth {
@@ -36,6 +38,7 @@ impl Default for Truth {
             second: [0.12, 0.2, 0.35, -0.02],
             friction: [[0.8, 1.2, 0.1], [0.4, 0.6, -0.05]],
             scale: 1.0,
+            cold: [0.0, 8.0],
         }
     }
 }
@@ -75,7 +78,8 @@ impl Truth {
     }
 
     /// Returns the torques by Lagrange's equations.
-    fn torque(&self, q: [f64; 2], v: [f64; 2], w: [f64; 2]) -> [f64; 2] {
+    fn torque(&self, time: f64, [q, v, w]: [[f64; 2]; 3]) -> [f64; 2] {
+        let cold = 1.0 + self.cold[0] * (-time / self.cold[1]).exp();
         let [inertia, mx1, my1] = self.first;
         let [izz2, ia2, mx2, my2] = self.second;
         let (s2, c2) = q[1].sin_cos();
@@ -91,7 +95,7 @@ impl Truth {
             + weight;
         let rub = |j: usize| {
             let [fv, fc, off] = self.friction[j];
-            fv * v[j] + fc * v[j].signum() + off
+            cold * fv * v[j] + fc * v[j].signum() + off
         };
         [first + rub(0), second + rub(1)].map(|t| t * self.scale)
     }
@@ -171,7 +175,7 @@ impl Made {
                     w[j] -= a * omega * omega * s;
                 }
             }
-            let tau = truth.torque(q, v, w);
+            let tau = truth.torque(time, [q, v, w]);
             for j in 0..2 {
                 coloured[j] = rho * coloured[j] + (1.0 - rho * rho).sqrt() * self.noise * normal();
                 joints[j].q.push(q[j] + 1e-5 * normal());

@@ -18,7 +18,7 @@ use rig_load::{
     By, ControllerNumbers, FEWEST_ROWS, LoadIdentification, LoadOptions, Value, controller_numbers,
     identify_load, urdf_link,
 };
-use rig_model::robot::{Load, Reads, Robot, WristSensor};
+use rig_model::robot::{Description, Load, Original, Reads, Robot, WristSensor};
 use rig_output::{can_take, folder, format_significant, format_value, write_whole};
 
 /// Files that the command writes.
@@ -103,9 +103,22 @@ enum ReadsArg {
     Robot,
 }
 
+/// Says which links are fixed beyond the flange; `None` if there are none.
+fn beyond_flange(urdf: &Original) -> Option<String> {
+    let beyond = urdf.beyond_tip();
+    let last = beyond.last()?;
+    Some(format!(
+        "The flange frame is that of link {}. Fixed to it, with frames of their own: {}. If the flange of your controller is one of these, give it, for example --tip {last}.",
+        urdf.tip(),
+        beyond.join(", ")
+    ))
+}
+
 /// The result with the numbers for controllers, as written to load.json.
 #[derive(Serialize)]
 struct Written<'a> {
+    /// Link whose frame is the flange, if a URDF describes the robot.
+    flange: Option<&'a str>,
     #[serde(flatten)]
     found: &'a LoadIdentification,
     /// Absent (null) if the data do not show mass and centre of mass.
@@ -140,7 +153,9 @@ fn check(args: &Args) -> Result<(), CommandError> {
 /// A sentence that names the wrong file, line or value.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     check(args)?;
-    let mut robot = args.robot.load(ui)?;
+    let Description {
+        mut robot, urdf, ..
+    } = args.robot.describe(ui)?;
     sensor(args, &mut robot)?;
     let need = match args.by {
         Measured::Sensor => EffortNeed::Optional,
@@ -189,6 +204,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &recordings(&without.listened()),
         &options,
     )?;
+    found.warnings.extend(urdf.as_ref().and_then(beyond_flange));
     found.warnings.extend(with.heard());
     found.warnings.extend(without.heard());
     let numbers = controller_numbers(&found);
@@ -197,12 +213,16 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         warnings: with.warnings().chain(without.warnings()).collect(),
         ..Context::default()
     };
-    write(args, &found, numbers.as_ref(), &context)?;
+    let flange = urdf.as_ref().map(Original::tip);
+    write(args, &found, (flange, numbers.as_ref()), &context)?;
     for warning in &found.warnings {
         ui.remark(warning);
     }
     for line in lines(&robot, &found, numbers.as_ref()) {
         ui.answer(&line);
+    }
+    if let Some(link) = flange {
+        ui.answer(&format!("flange frame: that of link {link}"));
     }
     ui.say(&format!(
         "report: {}",
@@ -261,18 +281,23 @@ fn sensor(args: &Args, robot: &mut Robot) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Writes all files of the result.
+/// Writes all files of the result. `flange`: link whose frame it is.
 ///
 /// # Errors
 /// A file cannot be written.
 fn write(
     args: &Args,
     found: &LoadIdentification,
-    controllers: Option<&ControllerNumbers>,
+    (flange, controllers): (Option<&str>, Option<&ControllerNumbers>),
     context: &Context,
 ) -> Result<(), CommandError> {
     folder(&args.out)?;
-    let json = serde_json::to_string_pretty(&Written { found, controllers }).map_err(|error| {
+    let written = Written {
+        flange,
+        found,
+        controllers,
+    };
+    let json = serde_json::to_string_pretty(&written).map_err(|error| {
         CommandError::Sentence(format!("The load cannot be written as JSON: {error}."))
     })?;
     write_whole(&args.out.join("load.json"), (json + "\n").as_bytes())?;

@@ -226,6 +226,8 @@ impl<'t, 'a> Selected<'t, 'a> {
             base: "world".into(),
             bodies,
             tip: frame,
+            tip_link: String::new(),
+            beyond_tip: Vec::new(),
             remarks: remark.into_iter().collect(),
         })
     }

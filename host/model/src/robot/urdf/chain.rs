@@ -44,6 +44,10 @@ pub(in crate::robot) struct Chain {
     pub bodies: Vec<Body>,
     /// Frame of the link that the chain ends at, in that of the link that the last joint moves.
     pub tip: Isometry3<f64>,
+    /// Name of that link.
+    pub tip_link: String,
+    /// Links beyond it that fixed joints hold, and that have another frame.
+    pub beyond_tip: Vec<String>,
     /// Remarks for the user, one sentence each.
     pub remarks: Vec<String>,
 }

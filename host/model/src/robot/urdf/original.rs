@@ -84,6 +84,16 @@ impl Original {
         &self.chain
     }
 
+    /// Returns the link that the chain ends at. Its frame is the flange.
+    pub fn tip(&self) -> &str {
+        &self.chain.tip_link
+    }
+
+    /// Returns the links beyond [`Self::tip`] that fixed joints hold, and that have another frame.
+    pub fn beyond_tip(&self) -> &[String] {
+        &self.chain.beyond_tip
+    }
+
     /// Returns the link that joint `joint` (from 0) moves.
     pub fn link(&self, joint: usize) -> Option<&str> {
         self.chain.bodies.get(joint).map(|body| body.link.as_str())

@@ -110,6 +110,24 @@ impl<'a> Selected<'_, 'a> {
         Ok(rigid)
     }
 
+    /// Returns the links beyond the tip that fixed joints hold, and whose frames differ from its own.
+    fn beyond_tip(&self, reader: &Reader<'a>) -> Result<Vec<String>, RobotError> {
+        let mut found = Vec::new();
+        let mut pending = vec![(self.selection.tip, Isometry3::identity())];
+        while let Some((link, pose)) = pending.pop() {
+            if pose != Isometry3::identity() {
+                found.push(link.to_owned());
+            }
+            for index in self.tree.below(link) {
+                let joint = &self.tree.joints[index];
+                if joint.motion == Motion::Fixed {
+                    pending.push((joint.child, pose * reader.origin(joint.node)?));
+                }
+            }
+        }
+        Ok(found)
+    }
+
     /// Returns a locked joint as the user is told, and the pose of its child link.
     fn locked(
         &self,
@@ -241,6 +259,8 @@ impl<'a> Reader<'a> {
             base: selection.root.to_owned(),
             bodies,
             tip,
+            tip_link: selection.tip.to_owned(),
+            beyond_tip: chosen.beyond_tip(self)?,
             remarks: self.remarks.take(),
         })
     }

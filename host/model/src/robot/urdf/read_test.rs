@@ -529,3 +529,36 @@ fn links_without_values_are_massless_and_a_massless_end_is_told() {
         0.0
     );
 }
+
+/// A tool frame that is fixed beyond the last moved link is listed, unless it is chosen or has the same frame.
+#[test]
+fn links_beyond_the_tip_are_listed() {
+    let text = format!(
+        "<robot name='r'>{}{}{}{}{}{}{}</robot>",
+        link("base", 1.0, [0.0; 3], 0.1),
+        link("arm", 2.0, [0.1, 0.0, 0.0], 0.1),
+        "<link name='same'/>",
+        "<link name='tool'/>",
+        joint(
+            "turn",
+            "revolute",
+            ["base", "arm"],
+            "<axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='9' velocity='1'/>"
+        ),
+        joint("none", "fixed", ["arm", "same"], ""),
+        joint(
+            "far",
+            "fixed",
+            ["same", "tool"],
+            "<origin xyz='0 0 0.107'/>"
+        ),
+    );
+    let whole = read(&text, &choice(None, None, &[])).unwrap();
+    assert_eq!(
+        (whole.tip(), whole.beyond_tip()),
+        ("arm", &["tool".to_owned()][..])
+    );
+    let chosen = read(&text, &choice(None, Some("tool"), &[])).unwrap();
+    assert_eq!((chosen.tip(), chosen.beyond_tip().len()), ("tool", 0));
+    assert!((chosen.robot().last_link.translation.z - 0.107).abs() < 1e-12);
+}
