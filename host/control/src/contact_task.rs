@@ -22,7 +22,7 @@ const FORCE: f64 = 20.0;
 /// Largest default approach speed, m/s.
 const APPROACH: f64 = 0.05;
 /// Kinetic energy at contact over the elastic energy at the wanted force, square root. At a half the impact alone presses
-/// with half of the wanted force.
+/// with half of the wanted force. The surface's damping presses with the same share at most, before its spring does.
 const IMPACT: f64 = 0.5;
 /// Damping by the late force over that of the force loop, 1: k·τ/(Λ·kv). At one both are equal, and the force settles in
 /// about twice the time. Without dry friction the one-link rig settled on 10⁵ N/m in 0.03 s at 0.63, in 0.16 s at 2.5 and in
@@ -44,6 +44,12 @@ const SHARES: [f64; 3] = [0.25, 0.5, 0.75];
 const TRIED: usize = 6;
 /// Time between contact, slide and end, s.
 const SETTLE: f64 = 3.0;
+/// Time of the impedance's approach, as a share of that before the slide.
+const IMPEDANCE_SHARE: f64 = 0.6;
+/// Highest speed of a fifth-degree motion over its mean.
+const QUINTIC_PEAK: f64 = 15.0 / 8.0;
+/// Longest approach that is simulated, s.
+const LONGEST: f64 = 600.0;
 
 /// What to press, and where; `None` for a default that fits the robot.
 #[derive(Clone, Debug, Default)]
@@ -354,15 +360,27 @@ impl ContactTask {
             ));
         }
         let stiffest = IMPACT * force / (surface.stiffness * inertia[0]).sqrt();
+        // Without damping it is infinite.
+        let damped = IMPACT * force / surface.damping;
         let target = 0.2 * settings.bandwidth;
         let omega = core::f64::consts::TAU * target;
-        let targets = inertia.iter().map(|mass| {
-            let stiffness = options.stiffness.unwrap_or(mass * omega * omega);
-            Target::design(stiffness, target, 1.0)
-        });
-        let approach = stiffest.min(APPROACH);
-        let slide_start =
-            1.2 * surface.gap / planned_speed(approach, force, &surface, settings) + SETTLE;
+        let targets: Vec<_> = (inertia.iter())
+            .map(|mass| {
+                let stiffness = options.stiffness.unwrap_or(mass * omega * omega);
+                Target::design(stiffness, target, 1.0)
+            })
+            .collect();
+        let approach = stiffest.min(damped).min(APPROACH);
+        let speed = planned_speed(approach, force, &surface, settings);
+        let way = surface.gap + depth(force, &targets, &surface);
+        let slide_start = (1.2 * surface.gap / speed + SETTLE)
+            .max(QUINTIC_PEAK * way / (IMPEDANCE_SHARE * damped));
+        if !(slide_start < LONGEST) {
+            return Err(ControlError::Unreachable(format!(
+                "With {force} N on this surface the tool comes at {:.2e} m/s, so that the approach takes {slide_start:.0} s, of which {LONGEST:.0} are simulated. Give a larger --press, a smaller --gap, or a softer or less damped surface.",
+                speed
+            )));
+        }
         let slides = count > 1 && options.slide > 0.0;
         if options.slide > 0.0 && !slides {
             notes.push("There is no slide: the arm moves the tool along no direction of the surface without leaving it.".to_owned());
@@ -373,7 +391,7 @@ impl ContactTask {
             pose,
             origin,
             directions: directions.iter().map(|d| (*d).into()).collect(),
-            targets: targets.collect(),
+            targets,
             inertia,
             force,
             approach,
@@ -399,10 +417,8 @@ impl ContactTask {
     pub(crate) fn reference(&self, law: LawKind, t: f64) -> [Reference<f64>; 3] {
         let mut out = [Reference::default(); 3];
         if law == LawKind::Impedance {
-            let depth =
-                self.force / self.targets[0].stiffness + self.force / self.surface.stiffness;
-            // A fifth-degree motion is fastest in its middle, at 15/8 of its mean.
-            out[0] = quintic(self.surface.gap + depth, 0.6 * self.slide_start, t);
+            let way = self.surface.gap + depth(self.force, &self.targets, &self.surface);
+            out[0] = quintic(way, IMPEDANCE_SHARE * self.slide_start, t);
         }
         let since = t - self.slide_start;
         if self.slide > 0.0 && (0.0..SETTLE).contains(&since) {
@@ -416,6 +432,12 @@ impl ContactTask {
         }
         out
     }
+}
+
+/// Returns how far behind the surface the reference of the impedance goes to press with `force`, m.
+fn depth(force: f64, targets: &[Target<f64>], surface: &Surface) -> f64 {
+    let arm = targets.first().map_or(0.0, |own| force / own.stiffness);
+    arm + force / surface.stiffness
 }
 
 /// Returns the bandwidth of the force loop, Hz: as high as the rate allows, and at most [`FASTEST`] times that of the

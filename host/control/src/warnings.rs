@@ -50,8 +50,34 @@ pub(crate) fn of_adaptation(learnt: &Adaptation) -> Option<String> {
     })
 }
 
-/// Returns a sentence if the force of the hybrid law peaks during the slide, with the rate at which the loop is fastest.
+/// Returns a sentence for each phase in which the force peaks: at the contact, and for the hybrid law during the slide,
+/// with the rate at which its loop is fastest.
 pub(crate) fn of_force(
+    law: LawKind,
+    found: &ForceMeasures,
+    task: &ContactTask,
+    settings: &Settings,
+) -> Vec<String> {
+    let contact = at_contact(found, task);
+    contact
+        .into_iter()
+        .chain(in_slide(law, found, task, settings))
+        .collect()
+}
+
+fn at_contact(found: &ForceMeasures, task: &ContactTask) -> Option<String> {
+    let before = found.overshoot_before_slide;
+    (before > OVERSHOOT).then(|| {
+        format!(
+            "the force peaks at {:.1} N of {:.1} N after the contact at {:.4} m/s. Give a better model, a larger --press, or a softer or less damped surface.",
+            (1.0 + before) * task.force,
+            task.force,
+            found.impact_speed
+        )
+    })
+}
+
+fn in_slide(
     law: LawKind,
     found: &ForceMeasures,
     task: &ContactTask,
