@@ -9,6 +9,7 @@
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 use rig_shared::multibody::{Chain, gravity_vector};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::advice::advice;
 use super::fit::{Fit, Row, fit};
@@ -29,8 +30,8 @@ const HELD: f64 = 0.02;
 const TWIST: f64 = 0.2;
 /// Arm below which the tool point lies on the axes, m.
 const ARMLESS: f64 = 1e-9;
-/// Standard deviations beyond which a negative hysteresis is impossible.
-const IMPOSSIBLE: f64 = 2.0;
+/// Probability that noise alone makes the hysteresis of any drive look impossible.
+const IMPOSSIBLE: f64 = 0.01;
 /// Share of the range of the load after a turning point in which friction changes its sign.
 const TRANSITION: f64 = 0.15;
 /// Share of the largest load times arm from which on a drive's turning points count.
@@ -314,7 +315,7 @@ fn drive(
             found.estimate.values[n + k],
             found.estimate.std(n + k),
         ));
-        if own.value < -IMPOSSIBLE * own.std {
+        if own.value < -beyond_chance(n) * own.std {
             result.warnings.push(format!(
                 "The hysteresis of joint \"{}\" comes out as {} ± {}, but friction makes it positive: the displacement does not belong to this load. Check --tool, and axes and signs of force and displacement.",
                 result.joint,
@@ -328,6 +329,11 @@ fn drive(
         result.add_gap(found.value(column), gap.zero);
     }
     Ok(result)
+}
+
+/// Returns the standard deviations below zero that any of `drives` values reaches with the probability [`IMPOSSIBLE`].
+fn beyond_chance(drives: usize) -> f64 {
+    Normal::standard().inverse_cdf(1.0 - IMPOSSIBLE / drives.max(1) as f64)
 }
 
 /// Says that the displacement follows the force with the wrong sign.
