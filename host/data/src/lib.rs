@@ -69,6 +69,7 @@ mod reference;
 mod remark;
 mod ros_layout;
 mod ros_message;
+mod rounded_time;
 pub mod runs;
 mod sample_hold;
 mod sampling;
