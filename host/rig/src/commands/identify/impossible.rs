@@ -2,7 +2,7 @@
 
 use rig_shared::multibody::{COLUMNS, column};
 
-use rig_identify::Identification;
+use rig_identify::{Identification, LEAST_ERROR};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit, listed};
 
@@ -31,10 +31,12 @@ impl Impossible {
     /// Judges the values of an identification.
     pub fn of(robot: &Robot, found: &Identification) -> Self {
         let details = &found.details;
-        let below_zero = |row: usize| {
+        // Half-width of the 95 % interval.
+        let half = |row: usize| {
             let [value, _, high] = details.free[row];
-            value + CLEARLY * (high - value) < 0.0
+            (high - value) * widened(found, details.columns[row])
         };
+        let below_zero = |row: usize| details.free[row][0] + CLEARLY * half(row) < 0.0;
         let positive = [
             column::MASS,
             // Ixx, Iyy, Izz of Ixx Ixy Ixz Iyy Iyz Izz.
@@ -78,7 +80,7 @@ impl Impossible {
         };
         let (mut refused, mut doubtful) = (Vec::new(), Vec::new());
         for row in wrong.iter().filter(alone) {
-            let [value, _, high] = details.free[*row];
+            let value = details.free[*row][0];
             let own = &found.base_parameters[*row];
             let column = details.columns[*row];
             let friction = [column::VISCOUS, column::COULOMB].contains(&(column % COLUMNS));
@@ -92,7 +94,7 @@ impl Impossible {
                 robot.joints[column / COLUMNS].name,
                 format_significant(value, 3),
                 format_unit(&own.unit),
-                format_significant(-value * WIDTH / (high - value), 2),
+                format_significant(-value * WIDTH / half(*row), 2),
             ));
         }
         let said = |list: Vec<String>| match list.is_empty() {
@@ -107,4 +109,16 @@ impl Impossible {
             doubtful: said(doubtful),
         }
     }
+}
+
+/// Returns the factor by which an interval is wider if no torque is known better than by [`LEAST_ERROR`]. Friction acts
+/// on its own joint alone, a link on all joints before it too.
+fn widened(found: &Identification, column: usize) -> f64 {
+    let joint = column / COLUMNS;
+    let friction = column % COLUMNS >= column::VISCOUS;
+    let first = if friction { joint } else { 0 };
+    (found.joints.iter().take(joint + 1).skip(first))
+        .map(|own| LEAST_ERROR / own.train_relative_error)
+        .filter(|factor| factor.is_finite())
+        .fold(1.0, f64::max)
 }
