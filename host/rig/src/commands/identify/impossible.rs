@@ -12,8 +12,6 @@ use rig_output::{format_significant, format_unit, listed};
 const CLEARLY: f64 = 2.5;
 /// Half-width of a 95 % interval in standard deviations, about.
 const WIDTH: f64 = 2.0;
-/// Coefficients of a base parameter below this are rounding errors.
-const ROUNDING: f64 = 1e-9;
 
 /// Sentences about friction and inertia that lie below zero by many standard deviations.
 ///
@@ -37,25 +35,8 @@ impl Impossible {
             (high - value) * widened(found, details.columns[row])
         };
         let below_zero = |row: usize| details.free[row][0] + CLEARLY * half(row) < 0.0;
-        let positive = [
-            column::MASS,
-            // Ixx, Iyy, Izz of Ixx Ixy Ixz Iyy Iyz Izz.
-            column::INERTIA,
-            column::INERTIA + 3,
-            column::INERTIA + 5,
-            column::DRIVE_INERTIA,
-            column::VISCOUS,
-            column::COULOMB,
-        ];
-        let is_sum = |row: usize| {
-            let own = details.combination.row(row);
-            let may = |(c, x): (usize, &f64)| {
-                x.abs() < ROUNDING || (*x > 0.0 && positive.contains(&(c % COLUMNS)))
-            };
-            own.iter().enumerate().all(may)
-        };
         let wrong: Vec<usize> = (0..details.free.len())
-            .filter(|row| below_zero(*row) && is_sum(*row))
+            .filter(|row| below_zero(*row) && found.is_positive_sum(*row))
             .collect();
         let of = |j: usize, place: usize| {
             let column = j * COLUMNS + place;
