@@ -48,6 +48,7 @@ mod joint_states;
 mod json_samples;
 mod layout;
 mod likely_time;
+mod lost_rows;
 mod mapping;
 mod mat;
 mod mcap_index;
