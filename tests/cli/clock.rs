@@ -5,8 +5,6 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use rand::{RngExt, SeedableRng};
-
 use crate::run::{refuse, rig, robot, succeed};
 
 /// Weight in line with the link, N·m, and inertia about the axis, kg·m².
@@ -61,12 +59,15 @@ fn stamps_in_whole_milliseconds_give_the_values_of_exact_stamps() {
         (2.02e-3, 0.0),
         (4e-3, 0.2e-3),
     ] {
-        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
         let (mut now, mut text) = (0.0, String::from("t,q1,tau1\n"));
-        for _ in 0..(24.0 / step) as usize {
+        for row in 0..(24.0 / step) as u64 {
             let [q, tau] = motion(now, FRICTION);
             let _ = writeln!(text, "{now:.3},{q:.5},{tau:.4}");
-            now += step + jitter * (2.0 * rng.random::<f64>() - 1.0);
+            // 64-bit mixing (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators").
+            let mixed = (row + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let share = (mixed >> 11) as f64 / (1_u64 << 53) as f64;
+            now += step + jitter * (2.0 * share - 1.0);
         }
         fs::write(&data, text).unwrap();
         succeed(&mut identify(&data, &out));
