@@ -224,7 +224,8 @@ mod tests {
         for rate in [1000.0, 250.0] {
             for seed in 0..5 {
                 let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed + 20);
-                let rows = (0..10_000).map(|k| 10 * k + 3 + (4.0 * rng.random::<f64>()).round() as usize);
+                let rows =
+                    (0..10_000).map(|k| 10 * k + 3 + (4.0 * rng.random::<f64>()).round() as usize);
                 let mut block = recorded(10.0 * rate, 1e-7, rows, seed);
                 block.t = (0..10_000).map(|k| f64::from(k) / rate).collect();
                 assert_eq!(advances(&block), Advances::default(), "{rate} {seed}");
@@ -261,7 +262,10 @@ mod tests {
             let lost = advances(&recorded(rate, count, kept, 3)).lost.unwrap();
             let part = lost.rows / many as f64;
             let only = lost.places == 1 && lost.row == 3999;
-            assert!(only && (0.8..1.2).contains(&part), "{rate} {count}: {lost:?}");
+            assert!(
+                only && (0.8..1.2).contains(&part),
+                "{rate} {count}: {lost:?}"
+            );
         }
     }
 

@@ -77,7 +77,10 @@ impl Heard<'_> {
         }
         let stretches = self.instants as f64 / (10.0 * self.estimate.memory_rows);
         // Rounding of a recording without noise has no memory that counts.
-        let inexact = self.train.iter().any(|own| own.relative_error > LEAST_ERROR);
+        let inexact = self
+            .train
+            .iter()
+            .any(|own| own.relative_error > LEAST_ERROR);
         if stretches < 8.0 && inexact {
             warnings.push(Warning::FewStretches {
                 memory: self.estimate.memory_rows * row_period,
