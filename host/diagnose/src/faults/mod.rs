@@ -11,6 +11,7 @@
 mod alike;
 mod candidates;
 mod columns;
+mod delay;
 mod described;
 mod factors;
 mod finding;

@@ -8,7 +8,7 @@ use clap::Args as ClapArgs;
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
-use rig_data::prepare::{PrepareError, Recording};
+use rig_data::prepare::{LongestPart, PrepareError, Recording};
 use rig_data::{
     Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Mapping, Source, StrangeReference,
     Warning, plausibility, strange_rates, strange_references,
@@ -102,6 +102,8 @@ pub struct Faults {
     pub described: Vec<String>,
     /// Possible faults: the description may be wrong instead, or the motion is too short to decide.
     pub doubtful: Vec<String>,
+    /// What was not checked.
+    pub remarks: Vec<String>,
 }
 
 /// Recordings that fit the robot.
@@ -167,16 +169,24 @@ impl Outside {
     }
 }
 
+/// Returns the longest part of the first rows of a recording.
+fn first_part(source: &Source) -> Result<LongestPart, CommandError> {
+    let mut found = LongestPart::among(JUDGED_ROWS);
+    for block in source.blocks(JUDGED_ROWS) {
+        if !found.push(&block?) {
+            break;
+        }
+    }
+    Ok(found)
+}
+
 /// Applies the check `look` to the first rows of a recording.
 fn at_start<T>(
     source: &Source,
     robot: &Robot,
     look: fn(&Block, &Robot) -> Vec<T>,
 ) -> Result<Vec<T>, CommandError> {
-    match source.blocks(JUDGED_ROWS).next() {
-        Some(block) => Ok(look(&block?, robot)),
-        None => Ok(Vec::new()),
-    }
+    Ok(look(&first_part(source)?.rows(), robot))
 }
 
 /// Puts all faults of a recording into one sentence.
@@ -238,10 +248,7 @@ impl Inputs {
     /// Names the error in a file and its line. One sentence lists all units that look wrong.
     pub(crate) fn refuse_units(&self, robot: &Robot, least: usize) -> Result<(), CommandError> {
         for source in &self.sources {
-            let Some(block) = source.blocks(JUDGED_ROWS).next() else {
-                continue;
-            };
-            let block = block?;
+            let block = first_part(source)?.rows();
             if block.len() < least {
                 continue;
             }
@@ -263,9 +270,15 @@ impl Inputs {
     pub fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
         let mut faults = Faults::default();
         for source in &self.sources {
-            let (doubts, wrong): (Vec<_>, Vec<_>) = (at_start(source, robot, plausibility)?
-                .into_iter())
-            .partition(Implausible::is_doubt);
+            let first = first_part(source)?;
+            if first.more() {
+                faults.remarks.push(format!(
+                    "{}: only the first {JUDGED_ROWS} rows were checked for faults of its columns.",
+                    source.path().display()
+                ));
+            }
+            let (doubts, wrong): (Vec<_>, Vec<_>) =
+                (plausibility(&first.rows(), robot).into_iter()).partition(Implausible::is_doubt);
             if !doubts.is_empty() {
                 faults.doubtful.push(sentence(source, &doubts));
             }
@@ -532,7 +545,7 @@ pub(crate) fn refuse_faults(
             Use::Fit => (found.described, Vec::new()),
             Use::Compare => (Vec::new(), found.described),
         };
-        for sentence in told.iter().chain(&found.doubtful) {
+        for sentence in told.iter().chain(&found.doubtful).chain(&found.remarks) {
             ui.remark(sentence);
         }
         wrong.extend(found.wrong.into_iter().chain(refused));

@@ -147,3 +147,50 @@ fn hidden_cogging_at_slow_reversals_is_no_late_torque() {
         assert_eq!(certain(&robot, &read(&robot, &path, 0)), [""; 0], "{seed}");
     }
 }
+
+/// Friction that builds up over the travel after a reversal takes longer in a slow motion, like a torque that is late.
+#[test]
+fn presliding_friction_of_a_slow_motion_is_no_late_torque() {
+    let late = 0.3;
+    for (share, seed) in [(0.05, 1), (0.05, 2), (0.1, 3), (0.2, 4), (0.3, 5)] {
+        let (robot, runs) = gentle_runs(share, seed);
+        assert_eq!(certain(&robot, &runs), [""; 0], "{share} {seed}");
+        // At a lower speed a delay is as little travel as presliding friction needs.
+        if share < 0.2 {
+            continue;
+        }
+        let injured = injured(&runs, |run| {
+            let by = (late * run.rate) as usize;
+            run.joints[0].tau.rotate_right(by);
+        });
+        let found = certain(&robot, &injured);
+        assert!(
+            found.iter().any(|text| text.contains("behind")),
+            "{share} {seed}: {found:?}"
+        );
+    }
+}
+
+/// Returns a recording of a designed motion at a share of the speed.
+fn gentle_runs(share: f64, seed: u64) -> (Robot, Vec<Run>) {
+    let robot = text("one-link.toml", template("one-link").unwrap());
+    let plant = PlantConfig::laboratory(seed);
+    let home = plant.initial_position;
+    let options = rig_excite::Options {
+        start: Some(vec![home]),
+        seed,
+        speed_share: share,
+        ..rig_excite::Options::default()
+    };
+    let design = rig_excite::design(&robot, &options, |_, _| ()).unwrap();
+    let motion = design.file.joints[0].trajectory.clone();
+    let nameplate = Nameplate::from_robot(&robot).unwrap();
+    let rig = EmulatedRig::new(&nameplate, plant, seed).unwrap();
+    let mut line = Session::open(EmulatedPort::new(rig), SessionSettings::default()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("gentle.csv");
+    let told = vec![RequestBody::SetPosition(home as f32)];
+    RecordedRun::record(&mut line, told, &motion, 0.2, &path).unwrap();
+    let runs = read(&robot, &path, 0);
+    (robot, runs)
+}
