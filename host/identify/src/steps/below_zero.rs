@@ -28,8 +28,10 @@ impl Identification {
     /// cannot be negative.
     pub fn is_positive_sum(&self, parameter: usize) -> bool {
         let own = self.details.combination.row(parameter);
+        // Columns of motors that move several joints come after those of the joints.
+        let links = self.joints.len() * COLUMNS;
         let may = |(c, x): (usize, &f64)| {
-            x.abs() < ROUNDING || (*x > 0.0 && POSITIVE.contains(&(c % COLUMNS)))
+            x.abs() < ROUNDING || (*x > 0.0 && c < links && POSITIVE.contains(&(c % COLUMNS)))
         };
         own.iter().enumerate().all(may)
     }
@@ -40,8 +42,10 @@ impl Identification {
             let standard = self.details.columns[row];
             let kind = standard % COLUMNS;
             let concerned = ![column::COULOMB, column::MASS].contains(&kind);
+            // Motors that move several joints have no joint of their own.
+            let joint = self.joints.get(standard / COLUMNS)?;
             // Without noise a value of zero is a rounding error below it.
-            let least = LEAST_ERROR / self.joints[standard / COLUMNS].train_relative_error;
+            let least = LEAST_ERROR / joint.train_relative_error;
             let rounding = least.is_finite() && least > 1.0 && -own.value <= least * own.std;
             let below = own.value < 0.0 && concerned && self.is_positive_sum(row);
             (below && !rounding).then(|| {

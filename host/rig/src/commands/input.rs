@@ -102,8 +102,6 @@ pub struct Faults {
     pub described: Vec<String>,
     /// Possible faults: the description may be wrong instead, or the motion is too short to decide.
     pub doubtful: Vec<String>,
-    /// What was not checked.
-    pub remarks: Vec<String>,
 }
 
 /// Recordings that fit the robot.
@@ -115,6 +113,8 @@ pub struct Inputs {
     ranges: Vec<Range>,
     /// For each recording: positions beyond these limits, from the pass that read the most rows.
     outside: Vec<RefCell<Outside>>,
+    /// Sentences about rows that were not checked for faults.
+    unchecked: RefCell<Vec<String>>,
 }
 
 /// Name of a joint, its finite position limits (if any) and its unit.
@@ -238,6 +238,7 @@ impl Inputs {
             heard,
             ranges: robot.joints.iter().map(Range::of).collect(),
             outside,
+            unchecked: RefCell::default(),
         })
     }
 
@@ -269,10 +270,11 @@ impl Inputs {
     /// Names the error in a file and its line.
     pub fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
         let mut faults = Faults::default();
+        let mut unchecked = Vec::new();
         for source in &self.sources {
             let first = first_part(source)?;
             if first.more() {
-                faults.remarks.push(format!(
+                unchecked.push(format!(
                     "{}: only the first {JUDGED_ROWS} rows were checked for faults of its columns.",
                     source.path().display()
                 ));
@@ -305,6 +307,7 @@ impl Inputs {
                 }
             }
         }
+        self.unchecked.replace(unchecked);
         Ok(faults)
     }
 
@@ -364,9 +367,10 @@ impl Inputs {
         })
     }
 
-    /// Warnings about the rows: for each recording and kind one line, with the worst row and the number of others.
+    /// Warnings about the rows: those that were not checked for faults, then for each recording and kind one line, with the
+    /// worst row and the number of others.
     pub fn heard(&self) -> Vec<String> {
-        let mut all = Vec::new();
+        let mut all = self.unchecked.borrow().clone();
         for (source, heard) in self.sources.iter().zip(&self.heard) {
             let (path, heard) = (source.path().display(), heard.borrow());
             let at_least = match heard.len() {
@@ -545,7 +549,7 @@ pub(crate) fn refuse_faults(
             Use::Fit => (found.described, Vec::new()),
             Use::Compare => (Vec::new(), found.described),
         };
-        for sentence in told.iter().chain(&found.doubtful).chain(&found.remarks) {
+        for sentence in told.iter().chain(&found.doubtful) {
             ui.remark(sentence);
         }
         wrong.extend(found.wrong.into_iter().chain(refused));
