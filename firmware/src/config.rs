@@ -65,6 +65,9 @@ pub struct Encoder {
     pub index_levels: u8,
 }
 
+/// Thermal time constant of the winding, s.
+const THERMAL_TIME: f32 = 10.0;
+
 /// Values that are fixed while the rig runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
@@ -119,7 +122,9 @@ impl Config {
                 voltage: VoltageModel::new(&drive, encoder.counts_per_motor_turn, period),
                 stuck_ticks: rate / 20,
                 stuck_duty: 0.02,
-                thermal_time: 10.0,
+                thermal_time: THERMAL_TIME,
+                heat_forget: period / THERMAL_TIME,
+                late_window: rate / 10,
             },
             ratings: ratings(limits, 1.0 / counts_per_radian),
             calibration_ticks: rate / 2,

@@ -1,7 +1,9 @@
 //! Events of a control tick, small enough for a queue; other code converts them to bytes.
 
 use rig_shared::safety::{FaultRecord, SnapshotSample};
-use rig_shared::wire::message::{Acknowledge, Estimate, Health, StateSample};
+use rig_shared::wire::message::{
+    Acknowledge, Crash, Estimate, Health, ResetCause, SettingsOrigin, StateSample,
+};
 
 /// One event to report to the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +26,62 @@ pub enum Event {
     Snapshot(RecordedTick),
     /// One control tick of the triggered capture.
     Capture(RecordedTick),
-    /// State of the board.
-    Health(Health),
+    /// Measurements of the board; what it found at its start is added outside the tick.
+    Health(BoardMeasurement),
+}
+
+/// Measurements of the board since its last health report.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoardMeasurement {
+    /// As [`Health::tick`].
+    pub tick: u64,
+    /// As [`Health::boost`].
+    pub boost: bool,
+    /// As [`Health::tick_cycles_max`].
+    pub tick_cycles_max: u32,
+    /// As [`Health::tick_cycles_mean`].
+    pub tick_cycles_mean: u32,
+    /// As [`Health::stack_free`].
+    pub stack_free: u32,
+    /// As [`Health::bad_requests`].
+    pub bad_requests: u32,
+    /// As [`Health::dropped`].
+    pub dropped: u32,
+}
+
+/// What the board found at its start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoardStart {
+    /// As [`Health::reset`].
+    pub reset: ResetCause,
+    /// As [`Health::settings`].
+    pub settings: SettingsOrigin,
+    /// As [`Health::clock_hz`].
+    pub clock_hz: u32,
+    /// As [`Health::crystal`].
+    pub crystal: bool,
+    /// As [`Health::crash`].
+    pub crash: Option<Crash>,
+}
+
+impl BoardStart {
+    /// Returns the health report with these measurements.
+    pub fn health(&self, measured: &BoardMeasurement) -> Health {
+        Health {
+            tick: measured.tick,
+            reset: self.reset,
+            settings: self.settings,
+            clock_hz: self.clock_hz,
+            crystal: self.crystal,
+            boost: measured.boost,
+            tick_cycles_max: measured.tick_cycles_max,
+            tick_cycles_mean: measured.tick_cycles_mean,
+            stack_free: measured.stack_free,
+            bad_requests: measured.bad_requests,
+            dropped: measured.dropped,
+            crash: self.crash,
+        }
+    }
 }
 
 /// Consequence of an accepted request for the session.

@@ -15,6 +15,7 @@ pub mod capture;
 pub mod config;
 pub mod derived;
 pub mod event;
+mod motor_brake;
 pub mod nameplate;
 pub mod prechecked_request;
 pub mod reference;
@@ -26,6 +27,7 @@ pub mod settings_storage;
 pub mod state;
 pub mod step;
 pub mod tick_session;
+pub mod urgent_request;
 pub mod validation;
 pub mod window;
 

@@ -17,6 +17,14 @@ use crate::config::{Config, Encoder, Rates, Settings};
 /// Rates of all periodic work.
 pub const RATES: Rates = Rates::TEMPLATE;
 
+/// Time from an edge at the bridge's inputs to the current amplifier's answer at the converter, ns: propagation and dead time
+/// of the bridge, delay of the amplifier, and of a filter at the pin. The samples of the current are centred on the middle
+/// of a braking interval, later by this time.
+///
+/// 600 ns for the bridge and 400 ns for the amplifier (400 kHz of bandwidth) are estimates for the listed parts. Measure it
+/// on your board with an oscilloscope (docs/firmware.md, "Scaling").
+pub const SENSE_DELAY_NS: u32 = 1000;
+
 /// Returns the one-link rig of the template: its fixed values, and the settings until the host replaces them.
 pub fn one_link() -> (Config, Settings) {
     one_link_at(RATES)

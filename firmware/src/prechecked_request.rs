@@ -68,8 +68,12 @@ fn prepare(config: &Config, body: &RequestBody) -> Result<Prepared, Refusal> {
                 .map_err(|_| Refusal::BadValue);
         }
         RequestBody::SetGains(gains) => validation::gains(config, gains),
-        RequestBody::SetModel(model) => validation::model(model),
-        RequestBody::SetFriction(friction) => friction.check().is_ok(),
+        RequestBody::SetModel(model) => {
+            return validation::model(config, model).map(|()| Prepared::Nothing);
+        }
+        RequestBody::SetFriction(friction) => {
+            return validation::friction(config, friction).map(|()| Prepared::Nothing);
+        }
         RequestBody::SetPrecompensation(precompensation) => {
             validation::precompensation(precompensation)
         }

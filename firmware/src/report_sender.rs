@@ -6,7 +6,7 @@ use rig_shared::wire::message::{Batch, Greeting, Report, SNAPSHOT_PART, Snapshot
 use rig_shared::wire::{Batcher, MAX_FRAME, PROTOCOL_VERSION, encode, schema};
 
 use crate::config::Config;
-use crate::event::{Event, FollowUp, RecordedTick};
+use crate::event::{BoardStart, Event, FollowUp, RecordedTick};
 
 /// Destination of frames.
 pub trait Transmit {
@@ -55,12 +55,22 @@ pub struct ReportSender {
     batcher: Batcher,
     snapshot: Part,
     capture: Part,
+    /// Present on a board.
+    board: Option<BoardStart>,
 }
 
 impl ReportSender {
     /// Returns the state at power on.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Returns the state at power on of a board, which sends health reports.
+    pub fn for_board(start: BoardStart) -> Self {
+        Self {
+            board: Some(start),
+            ..Self::default()
+        }
     }
 
     /// Sends the content of an event to the host.
@@ -97,8 +107,10 @@ impl ReportSender {
                     send(&Report::Capture(part), transmit);
                 }
             }
-            Event::Health(health) => {
-                send(&Report::Health(*health), transmit);
+            Event::Health(measured) => {
+                if let Some(start) = &self.board {
+                    send(&Report::Health(start.health(measured)), transmit);
+                }
             }
         }
     }

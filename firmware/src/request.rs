@@ -10,6 +10,8 @@ use crate::config::Config;
 use crate::prechecked_request::{PrecheckedRequest, Prepared};
 use crate::state::{Calibration, Run, State};
 use crate::step::brake;
+use crate::urgent_request::UrgentBody;
+use crate::validation;
 
 /// Executes a request, or refuses it without any change.
 ///
@@ -35,25 +37,13 @@ pub fn execute(
         | RequestBody::GetSnapshot
         | RequestBody::Capture(_)
         | RequestBody::GetCapture => Ok(()),
-        RequestBody::Disarm => {
-            if state.mode.drives() {
-                state.mode = Mode::Disarmed;
-            }
-            Ok(())
-        }
+        RequestBody::Disarm => execute_urgent(state, UrgentBody::Disarm),
+        RequestBody::Stop => execute_urgent(state, UrgentBody::Stop),
         // No action that depends on every tick may start while the flash is being written.
         _ if state.storing => Err(Refusal::Busy),
         RequestBody::Store => store(state),
         RequestBody::Arm => arm(config, state),
         RequestBody::Start => start(config, state),
-        RequestBody::Stop => match state.mode {
-            Mode::Running => {
-                brake(state);
-                Ok(())
-            }
-            Mode::Holding | Mode::Stopping => Ok(()),
-            _ => Err(mode_refusal(state)),
-        },
         RequestBody::ClearFault => clear_fault(config, state),
         RequestBody::SetPosition(position) => set_position(state, *position),
         RequestBody::SetLimits(_) if state.mode.drives() => Err(Refusal::WrongMode),
@@ -66,6 +56,30 @@ pub fn execute(
                 prechecked.prepared.as_ref().map_err(|refusal| *refusal)?,
             )
         }
+    }
+}
+
+/// Executes an urgent request, or refuses it without any change.
+///
+/// # Errors
+/// The [`Refusal`] that is sent to the host.
+pub fn execute_urgent(state: &mut State, body: UrgentBody) -> Result<(), Refusal> {
+    match body {
+        UrgentBody::Disarm => {
+            if state.mode.drives() {
+                state.mode = Mode::Disarmed;
+            }
+            state.motor_brake = None;
+            Ok(())
+        }
+        UrgentBody::Stop => match state.mode {
+            Mode::Running => {
+                brake(state);
+                Ok(())
+            }
+            Mode::Holding | Mode::Stopping => Ok(()),
+            _ => Err(mode_refusal(state)),
+        },
     }
 }
 
@@ -88,9 +102,15 @@ fn replace(state: &mut State, body: &RequestBody, prepared: &Prepared) -> Result
             state.settings.estimator = *settings;
             state.replace_estimator(estimator);
         }
-        (RequestBody::SetGains(gains), _) => state.settings.gains = *gains,
+        (RequestBody::SetGains(gains), _) => {
+            validation::loops(gains, &state.settings.model)?;
+            state.settings.gains = *gains;
+        }
         (RequestBody::SetControl(kind), _) => state.settings.control = *kind,
-        (RequestBody::SetModel(model), _) => state.settings.model = *model,
+        (RequestBody::SetModel(model), _) => {
+            validation::loops(&state.settings.gains, model)?;
+            state.settings.model = *model;
+        }
         (RequestBody::SetFriction(friction), _) => state.settings.friction = *friction,
         (RequestBody::SetPrecompensation(precompensation), _) => {
             state.settings.precompensation = *precompensation;
@@ -131,6 +151,7 @@ fn store(state: &mut State) -> Result<(), Refusal> {
 fn arm(config: &Config, state: &mut State) -> Result<(), Refusal> {
     match state.mode {
         Mode::Disarmed => {
+            validation::arming(&state.settings.limits, state.position, state.velocity)?;
             state.run = Run {
                 base: state.position,
                 bridge_ready_tick: state.tick + u64::from(config.wake_ticks),
@@ -202,6 +223,7 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
     // After a fault during the measurement, the measurement must be completed.
     let offset = offset || state.calibration.ticks < config.calibration_ticks;
     state.latch.clear();
+    state.motor_brake = None;
     state.snapshot.release();
     if offset {
         state.calibration = Calibration {

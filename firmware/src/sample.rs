@@ -24,8 +24,8 @@ pub struct Sample {
     pub driver_fault: bool,
     /// A comparator has pulled the break input: over-current.
     pub comparator: bool,
-    /// The previous tick had not finished when this one was due.
-    pub overrun: bool,
+    /// Control ticks that were missed since the last one, or finished after the next was due.
+    pub late_ticks: u8,
     /// Counts by which the encoder's index disagrees, or 0 if both channels changed at once; `None` without
     /// contradiction.
     pub encoder_wrong: Option<i32>,

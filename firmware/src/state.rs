@@ -10,6 +10,7 @@ use rig_shared::trajectory::{Extremes, PreparedTrajectory, Reference};
 
 use crate::config::{Config, Settings};
 use crate::derived::Derived;
+use crate::motor_brake::MotorBrake;
 use crate::reference::Braking;
 use crate::window::Window;
 
@@ -93,6 +94,8 @@ pub struct State {
     /// Duty cycle that acts during this tick.
     pub(crate) duty: f32,
     pub(crate) run: Run,
+    /// Present if the motor brakes after a fault.
+    pub(crate) motor_brake: Option<MotorBrake>,
 }
 
 /// The motion under way.
@@ -204,6 +207,7 @@ impl State {
             report_due: false,
             duty: 0.0,
             run: Run::default(),
+            motor_brake: None,
         }
     }
 
@@ -217,6 +221,11 @@ impl State {
     pub fn restore_heat(&mut self, heat: f32) {
         self.monitor.heat = if heat > 0.0 { heat } else { 0.0 };
         self.monitor.overloaded = true;
+    }
+
+    /// Returns true if the motor brakes after a fault: the bridge is on although no law drives it.
+    pub fn brakes(&self) -> bool {
+        self.motor_brake.is_some()
     }
 
     /// Returns the present values of the settings that the host may replace.

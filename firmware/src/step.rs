@@ -6,13 +6,14 @@ mod estimation;
 use rig_shared::control::{Measured, current, law};
 use rig_shared::encoder;
 use rig_shared::safety::monitor::{self, Readings};
-use rig_shared::safety::{Fault, FaultRecord, Limit, LimitSet, Mode, SnapshotSample};
+use rig_shared::safety::{Fault, FaultRecord, Limit, LimitSet, Mode, Reaction, SnapshotSample};
 use rig_shared::trajectory::Reference;
 use rig_shared::units::Duty;
 use rig_shared::wire::message::{Estimate, StateSample};
 
 use crate::calibration::calibrate;
 use crate::config::Config;
+use crate::motor_brake::MotorBrake;
 use crate::reference::Braking;
 use crate::sample::{Command, Sample};
 use crate::state::{Run, State};
@@ -60,6 +61,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     }
 
     let mut limits = LimitSet::default();
+    limits.set(Limit::LateTick, sample.late_ticks > 0);
     state.reference = reference(config, state, &mut limits);
     let DriveOutput {
         duty,
@@ -69,6 +71,14 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         drive(config, state, &readings, &mut limits)
     } else {
         DriveOutput::default()
+    };
+    let (duty, bridge) = if state.motor_brake.is_some() {
+        // Single values: a reference to what is returned would have it copied in every tick.
+        let motor = [readings.current, readings.supply, readings.velocity];
+        let duty = brake_after_fault(config, state, motor);
+        (duty, state.motor_brake.is_some())
+    } else {
+        (duty, state.mode.drives())
     };
     state.drive_torque = torque;
     state.limits = limits;
@@ -97,7 +107,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     output.estimate = estimation::feed_estimator(config, state, &tick);
     output.command = Command {
         duty: Duty(duty),
-        bridge: state.mode.drives(),
+        bridge,
     };
     state.duty = duty;
     state.tick += 1;
@@ -134,7 +144,7 @@ fn convert(config: &Config, state: &mut State, sample: Sample) -> Readings {
     Readings {
         driver_fault: sample.driver_fault,
         comparator: sample.comparator,
-        overrun: sample.overrun,
+        late_ticks: sample.late_ticks,
         current_code: sample.current.0,
         current_at_rail: sample.current.at_rail(),
         current: (f32::from(sample.current.0) - state.calibration.zero_code)
@@ -148,6 +158,7 @@ fn convert(config: &Config, state: &mut State, sample: Sample) -> Readings {
         duty: state.duty,
         lost_voltage: state.compensated_voltage,
         driving: state.mode.drives() && state.tick > state.run.bridge_ready_tick,
+        braking: state.motor_brake.is_some(),
     }
 }
 
@@ -173,20 +184,65 @@ fn check_host(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
         .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
 }
 
-/// Switches the bridge off, latches the fault and keeps the snapshot.
+/// Returns the duty cycle while the motor brakes, from its current, A, the supply, V, and the joint's velocity, rad/s. Ends
+/// the brake if it gives a voltage although its current may not be known, or the speed has grown. Without a voltage the
+/// motor is short-circuited, which cannot drive it. Not inlined because it is rare.
+#[inline(never)]
+fn brake_after_fault(
+    config: &Config,
+    state: &mut State,
+    [current, supply, velocity]: [f32; 3],
+) -> f32 {
+    let Some(brake) = &mut state.motor_brake else {
+        return 0.0;
+    };
+    let now = SnapshotSample {
+        current,
+        duty: state.duty,
+        supply,
+        ..SnapshotSample::default()
+    };
+    let limits = &state.settings.limits;
+    let hard_limit = limits.velocity * config.monitor.velocity_margin;
+    let grown = brake.speed_has_grown(velocity, [limits.velocity, hard_limit]);
+    let peak = limits.peak_current;
+    let duty = brake.step(&config.drive, &state.derived, peak, &now);
+    if duty != 0.0 && (grown || state.monitor.converter_is_suspect()) {
+        state.motor_brake = None;
+        return 0.0;
+    }
+    duty
+}
+
+/// Ends every motion as the fault allows, latches the fault and keeps the snapshot. Not inlined because it is rare.
+#[inline(never)]
 fn latch_fault(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
+    let encoder_failed = matches!(
+        fault,
+        Fault::EncoderJump | Fault::EncoderLost | Fault::EncoderSignal
+    );
+    match fault.reaction() {
+        // Also while the rig brakes after another fault.
+        Reaction::Coast => state.motor_brake = None,
+        // The brake limits the current, so it needs its sensor.
+        Reaction::Brake if state.mode.drives() && !state.monitor.converter_is_suspect() => {
+            state.motor_brake = Some(MotorBrake::default());
+        }
+        // A bridge that is off stays off. So does one whose current may not be known. A brake goes on.
+        Reaction::Brake => {}
+    }
     let record = FaultRecord {
         fault,
         tick: state.tick,
         value,
     };
     state.mode = Mode::Fault;
-    if matches!(
-        fault,
-        Fault::EncoderJump | Fault::EncoderLost | Fault::EncoderSignal
-    ) {
-        // After this fault the encoder no longer gives the position of the link.
+    if encoder_failed {
+        // After this fault the encoder no longer gives the position of the link, nor its speed.
         state.position_known = false;
+        if let Some(brake) = &mut state.motor_brake {
+            brake.ignore_encoder();
+        }
     }
     let first = state.latch.latch(record);
     if first {
@@ -347,13 +403,16 @@ fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, St
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    extern crate std;
+
     use super::*;
     use crate::nameplate::one_link;
     use crate::prechecked_request::precheck;
     use crate::request::execute;
     use rig_shared::effects::{Effect, Kind};
-    use rig_shared::units::AdcCode;
+    use rig_shared::units::{AdcCode, EncoderCount};
     use rig_shared::wire::message::{Request, RequestBody};
+    use std::{format, println};
 
     /// A sensor reading of 5 A is an over-current although an effect counts 0.4 A of it as an error; 4.6 A is none. The
     /// record holds the sensor's reading.
@@ -439,6 +498,162 @@ mod tests {
                 );
             }
             assert_ne!(state.position_error, 0.0);
+        }
+    }
+
+    /// A winding and a link without friction behind a bridge, in steps of a tenth of a tick.
+    struct Bench {
+        config: Config,
+        state: State,
+        velocity: f32,
+        position: f32,
+        current: f32,
+        command: Command,
+    }
+
+    impl Bench {
+        /// The rig measures its offset and is armed, then the link is brought to `velocity`, rad/s.
+        fn turning(velocity: f32) -> Self {
+            let (config, settings) = one_link();
+            let mut bench = Self {
+                state: State::new(&config, settings).unwrap(),
+                config,
+                velocity: 0.0,
+                position: 0.0,
+                current: 0.0,
+                command: Command::default(),
+            };
+            while bench.state.mode == Mode::Calibrating {
+                bench.tick(2048);
+            }
+            // The observer of the velocity follows this acceleration without overshoot.
+            for tick in 0..2000_u16 {
+                bench.velocity = velocity * f32::from(tick.min(1000)) / 1000.0;
+                bench.tick(2048 + tick % 3);
+            }
+            bench.state.mode = Mode::Holding;
+            bench
+        }
+
+        /// One tick in which the converter reads `code`.
+        fn tick(&mut self, code: u16) -> Output {
+            let drive = self.config.drive;
+            let counts = self.position / self.state.derived.radians_per_count;
+            let sample = Sample {
+                encoder: EncoderCount(counts as i64 as u16),
+                current: AdcCode(code),
+                supply: AdcCode((24.0 / self.config.scaling.supply_per_code) as u16),
+                temperature: AdcCode(900),
+                ..Sample::default()
+            };
+            let output = step(&self.config, &mut self.state, sample);
+            let dt = 0.1 * self.state.derived.period;
+            for _ in 0..10 {
+                let voltage = self.command.duty.0 * 24.0;
+                let rest =
+                    voltage - drive.resistance * self.current - drive.back_emf(self.velocity);
+                self.current += dt * rest / drive.inductance;
+                if !self.command.bridge {
+                    self.current = 0.0;
+                }
+                let torque = drive.joint_torque(self.current);
+                self.velocity += dt * torque / 0.17;
+                self.position += dt * self.velocity;
+            }
+            self.command = output.command;
+            output
+        }
+
+        /// The fault comes while the motor already brakes at 3.2 A.
+        fn brake(&mut self, fault: Fault) {
+            self.current = -3.2_f32.copysign(self.velocity);
+            let voltage = self.config.drive.back_emf(self.velocity) + 0.6 * self.current;
+            self.command = Command {
+                duty: Duty(voltage / 24.0),
+                bridge: true,
+            };
+            self.state.duty = self.command.duty.0;
+            latch_fault(&mut self.state, fault, 0.0);
+            assert!(self.state.brakes());
+        }
+    }
+
+    /// Code of a current, A.
+    fn code_of(config: &Config, current: f32) -> u16 {
+        (2048.0 + current / config.scaling.current_per_code) as u16
+    }
+
+    /// The reading of the current stays beyond the peak while the rig brakes, from the start or after 5 ms: an integrator
+    /// that believes it would drive the link on. The bridge goes off within 3 ms, and the link is hardly faster.
+    #[test]
+    fn a_brake_whose_current_reading_freezes_never_drives() {
+        for velocity in [1.0_f32, 3.0, 6.0, -6.0] {
+            for frozen in [3.21, 3.5, 4.7_f32] {
+                for sound in [0, 50] {
+                    let mut bench = Bench::turning(velocity);
+                    bench.brake(Fault::HostSilent);
+                    for _ in 0..sound {
+                        let code = code_of(&bench.config, bench.current);
+                        bench.tick(code);
+                    }
+                    let begin = bench.velocity.abs();
+                    let code = code_of(&bench.config, -frozen.copysign(velocity));
+                    let (mut fastest, mut on) = (0.0_f32, 0);
+                    for _ in 0..5000 {
+                        on += i32::from(bench.tick(code).command.bridge);
+                        fastest = fastest.max(bench.velocity.abs());
+                    }
+                    let case = format!("{velocity} {frozen} {sound}: {begin} {fastest} {on}");
+                    assert!(fastest < begin + 0.05, "{case}");
+                    assert!(on < 30 && !bench.state.brakes(), "{case}");
+                }
+            }
+        }
+    }
+
+    /// The reading is wrong but alive: its code changes. The voltage stays below the back-EMF at first, and the growing speed
+    /// ends the brake, or the hard limit does.
+    #[test]
+    fn a_brake_that_lets_the_speed_grow_ends() {
+        for velocity in [1.0_f32, 3.0, 6.0, 7.2, 8.0] {
+            let mut bench = Bench::turning(velocity);
+            bench.brake(Fault::HostSilent);
+            let mut fastest = 0.0_f32;
+            for tick in 0..20_000 {
+                let code = code_of(&bench.config, -4.0) + tick % 3;
+                bench.tick(code);
+                fastest = fastest.max(bench.velocity.abs());
+            }
+            let case = format!("{velocity}: {fastest}");
+            println!("{case}");
+            assert!(!bench.state.brakes(), "{case}");
+            let allowed = (velocity + 1.5).min(7.5_f32.max(velocity + 0.375));
+            assert!(fastest < allowed + 0.1, "{case}");
+        }
+    }
+
+    /// With a sound sensor the same bench brakes to rest, also after the encoder has failed and shows another speed.
+    #[test]
+    fn a_brake_with_a_sound_sensor_comes_to_rest() {
+        for (velocity, fault) in [
+            (6.0, Fault::HostSilent),
+            (-8.0, Fault::OverSpeed),
+            (6.0, Fault::EncoderLost),
+        ] {
+            let mut bench = Bench::turning(velocity);
+            bench.brake(fault);
+            let mut largest = 0.0_f32;
+            for tick in 0..5000_u16 {
+                if fault == Fault::EncoderLost {
+                    bench.position += 2e-6 * f32::from(tick);
+                }
+                let code = code_of(&bench.config, bench.current) + tick % 3;
+                bench.tick(code);
+                largest = largest.max(bench.current.abs());
+            }
+            let case = format!("{fault:?}: {} rad/s, {largest} A", bench.velocity);
+            assert!(bench.state.brakes(), "{case}");
+            assert!(bench.velocity.abs() < 0.05 && largest < 4.0, "{case}");
         }
     }
 }

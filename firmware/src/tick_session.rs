@@ -8,9 +8,10 @@ use crate::capture::Capture;
 use crate::config::{Config, Settings};
 use crate::event::{Event, FollowUp, RecordedTick};
 use crate::prechecked_request::PrecheckedRequest;
-use crate::request::execute;
+use crate::request::{execute, execute_urgent};
 use crate::state::State;
 use crate::step::Output;
+use crate::urgent_request::UrgentRequest;
 
 /// Destination of events.
 pub trait EventSink {
@@ -45,6 +46,12 @@ pub struct TickSession {
     dropped_windows: u32,
 }
 
+/// Emits an answer as an event. Not inlined because it is rare, and its copies take room.
+#[inline(never)]
+fn send_answer(acknowledge: Acknowledge, follow_up: FollowUp, events: &mut impl EventSink) {
+    events.push(Event::Answer(acknowledge, follow_up));
+}
+
 impl TickSession {
     /// Returns the state at power on.
     pub fn new() -> Self {
@@ -68,7 +75,7 @@ impl TickSession {
             self.answer_log.clear();
         }
         if let Some(earlier) = self.answer_log.stored_answer(id) {
-            events.push(Event::Answer(earlier, FollowUp::None));
+            send_answer(earlier, FollowUp::None, events);
             return None;
         }
         // A repeated request while storing: the answer is still to come.
@@ -85,8 +92,37 @@ impl TickSession {
             Err(_) => FollowUp::None,
         };
         let acknowledge = self.answer_log.record(id, result);
-        events.push(Event::Answer(acknowledge, follow_up));
+        send_answer(acknowledge, follow_up, events);
         None
+    }
+
+    /// Executes an urgent request and emits the answer as an event. Not inlined because it is rare.
+    #[inline(never)]
+    pub fn serve_urgent(
+        &mut self,
+        state: &mut State,
+        request: UrgentRequest,
+        events: &mut impl EventSink,
+    ) {
+        state.last_contact_tick = state.tick;
+        let acknowledge = match self.answer_log.stored_answer(request.id) {
+            Some(earlier) => earlier,
+            None => {
+                let result = execute_urgent(state, request.body);
+                self.answer_log.record(request.id, result)
+            }
+        };
+        send_answer(acknowledge, FollowUp::None, events);
+    }
+
+    /// Refuses a request without executing it, and emits the answer as an event. Not inlined because it is rare.
+    #[inline(never)]
+    pub fn refuse(&mut self, id: u16, refusal: Refusal, events: &mut impl EventSink) {
+        let acknowledge = match self.answer_log.stored_answer(id) {
+            Some(earlier) => earlier,
+            None => self.answer_log.record(id, Err(refusal)),
+        };
+        send_answer(acknowledge, FollowUp::None, events);
     }
 
     /// Ends storing the settings, and answers the request. Not inlined because it is rare.
@@ -100,7 +136,7 @@ impl TickSession {
         state.storing = false;
         if let Some(id) = self.pending_store.take() {
             let acknowledge: Acknowledge = self.answer_log.record(id, result);
-            events.push(Event::Answer(acknowledge, FollowUp::None));
+            send_answer(acknowledge, FollowUp::None, events);
         }
     }
 

@@ -4,9 +4,11 @@ use core::fmt;
 
 use rig_shared::compensation::Compensation;
 use rig_shared::control::Gains;
+use rig_shared::friction::Friction;
 use rig_shared::link::LinkParameters;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
+use rig_shared::wire::message::{Bounded, Refusal};
 
 use crate::config::{Config, Settings};
 
@@ -23,12 +25,24 @@ const MAX_VELOCITY_SLOPE: f32 = 0.5;
 /// counts as lost.
 const MAX_VOLTAGE_LOSS: f32 = 0.125;
 
+/// Largest bandwidth of the position and velocity loops as a share of the current loop's: there the current's lag takes 14°
+/// of phase (the arc tangent of a quarter).
+const MAX_LOOP_SHARE: f32 = 0.25;
+/// Smallest acceleration, rad/s², and speed, rad/s, that the torque rating must give an inertia and a viscous friction. A
+/// slower rig moves in no experiment of this project.
+const MIN_ACCELERATION: f32 = 1.0;
+const MIN_SPEED: f32 = 1.0;
+/// Highest speed at which the rig may be armed, rad/s: ten times the velocity observer's ripple at rest, and a hold catches
+/// the link within 0.01 rad.
+pub const MAX_ARM_VELOCITY: f32 = 0.2;
+
 /// Checks all settings that the host may replace.
 pub(crate) fn settings(config: &Config, settings: &Settings) -> bool {
     limits(config, &settings.limits)
         && gains(config, &settings.gains)
-        && settings.friction.check().is_ok()
-        && model(&settings.model)
+        && friction(config, &settings.friction).is_ok()
+        && model(config, &settings.model).is_ok()
+        && loops(&settings.gains, &settings.model).is_ok()
         && precompensation(&settings.precompensation)
         && settings
             .estimator
@@ -47,11 +61,80 @@ pub(crate) fn gains(config: &Config, gains: &Gains<f32>) -> bool {
     gains.is_valid() && (MIN_CURRENT_BANDWIDTH..=MAX_CURRENT_BANDWIDTH).contains(&share)
 }
 
-pub(crate) fn model(model: &LinkParameters<f32>) -> bool {
-    model.to_array().iter().all(|value| value.is_finite())
+/// Returns a refusal unless the value is at most its bound. NaN is refused.
+fn within(quantity: Bounded, value: f32, bound: f32) -> Result<(), Refusal> {
+    if value <= bound {
+        Ok(())
+    } else {
+        Err(Refusal::OutOfBounds {
+            quantity,
+            value,
+            bound,
+        })
+    }
+}
+
+/// Checks a model against the ratings of the rig. Not inlined, like the checks below: each is called from two places.
+#[inline(never)]
+pub(crate) fn model(config: &Config, model: &LinkParameters<f32>) -> Result<(), Refusal> {
+    let physical = model.to_array().iter().all(|value| value.is_finite())
         && model.inertia > 0.0
         && model.viscous >= 0.0
-        && model.coulomb >= 0.0
+        && model.coulomb >= 0.0;
+    if !physical {
+        return Err(Refusal::BadValue);
+    }
+    let torque = config.ratings.torque;
+    let (cos, sin) = (model.gravity_cos, model.gravity_sin);
+    // Each alone first, so that the squares are finite.
+    within(Bounded::Gravity, cos.abs().max(sin.abs()), torque)?;
+    let gravity = libm::sqrtf(cos * cos + sin * sin);
+    within(Bounded::Inertia, model.inertia, torque / MIN_ACCELERATION)?;
+    within(Bounded::Gravity, gravity, torque)?;
+    within(Bounded::ViscousFriction, model.viscous, torque / MIN_SPEED)?;
+    within(Bounded::DryFriction, model.coulomb, torque)?;
+    within(Bounded::Offset, model.offset.abs(), torque)
+}
+
+/// Checks a friction law against the ratings of the rig.
+#[inline(never)]
+pub(crate) fn friction(config: &Config, friction: &Friction<f32>) -> Result<(), Refusal> {
+    friction.check().map_err(|_| Refusal::BadValue)?;
+    let torque = config.ratings.torque;
+    let dry = friction.coulomb + friction.breakaway_excess + friction.load_coefficient * torque;
+    within(Bounded::DryFriction, dry, torque)?;
+    within(
+        Bounded::ViscousFriction,
+        friction.viscous,
+        torque / MIN_SPEED,
+    )
+}
+
+/// Checks that gains leave the current loop room, for the inertia of the model.
+#[inline(never)]
+pub(crate) fn loops(gains: &Gains<f32>, model: &LinkParameters<f32>) -> Result<(), Refusal> {
+    let bound = MAX_LOOP_SHARE * core::f32::consts::TAU * gains.current_bandwidth;
+    let natural = libm::sqrtf(gains.proportional / model.inertia);
+    within(Bounded::PositionLoop, natural, bound)?;
+    within(
+        Bounded::VelocityLoop,
+        gains.derivative / model.inertia,
+        bound,
+    )
+}
+
+/// Checks that a link may be armed where it is and at its speed, rad and rad/s.
+pub(crate) fn arming(limits: &Limits<f32>, position: f32, velocity: f32) -> Result<(), Refusal> {
+    let quantity = Bounded::ArmPosition;
+    within(quantity, position, limits.position_high)?;
+    if position < limits.position_low {
+        return Err(Refusal::OutOfBounds {
+            quantity,
+            value: position,
+            bound: limits.position_low,
+        });
+    }
+    within(Bounded::ArmVelocity, velocity.abs(), MAX_ARM_VELOCITY)
 }
 
 pub(crate) fn precompensation(settings: &PrecompensationSettings<f32>) -> bool {
@@ -149,6 +232,45 @@ mod tests {
     fn the_nameplate_s_own_settings_are_usable() {
         let (config, own) = one_link();
         assert!(settings(&config, &own));
+    }
+
+    /// What a rig cannot be is refused with the value and its bound: loops faster than the current's, torques beyond the
+    /// rating of 10 N·m.
+    #[test]
+    fn absurd_gains_and_models_are_refused_with_their_bounds() {
+        let (config, own) = one_link();
+        let bound_of = |refused: Result<(), Refusal>| match refused {
+            Err(Refusal::OutOfBounds {
+                quantity,
+                value,
+                bound,
+            }) if !(value <= bound) => Some((quantity, bound)),
+            _ => None,
+        };
+        let quarter = 0.25 * core::f32::consts::TAU * 500.0;
+        for (proportional, derivative, expected) in [
+            (1e9, 1e-6, Some((Bounded::PositionLoop, quarter))),
+            (241.6, 1e4, Some((Bounded::VelocityLoop, quarter))),
+            (241.6, 12.8, None),
+        ] {
+            let gains = Gains {
+                proportional,
+                derivative,
+                ..own.gains
+            };
+            assert_eq!(bound_of(loops(&gains, &own.model)), expected);
+        }
+        let mut heavy = own.model;
+        heavy.gravity_cos = 1e20;
+        let gravity = Some((Bounded::Gravity, config.ratings.torque));
+        assert_eq!(bound_of(model(&config, &heavy)), gravity);
+        let mut stiff = own.friction;
+        stiff.coulomb = 1e20;
+        let dry = Some((Bounded::DryFriction, config.ratings.torque));
+        assert_eq!(bound_of(friction(&config, &stiff)), dry);
+        let mut broken = own.model;
+        broken.inertia = f32::NAN;
+        assert_eq!(model(&config, &broken), Err(Refusal::BadValue));
     }
 
     fn is_allowed(effect: Effect<f32>) -> bool {

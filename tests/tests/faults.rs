@@ -1,4 +1,4 @@
-//! Faults injected at the plant: bridge off, the right one latched first, explained by its snapshot, cleared.
+//! Faults injected at the plant: brake or bridge off, the right one latched first, explained by its snapshot, cleared.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use rig_link::LinkError;
@@ -6,9 +6,9 @@ use rig_plant::effect::dead_time::DeadTime;
 use rig_plant::effect::end_stops::EndStops;
 use rig_plant::effect::winding_temperature::WindingTemperature;
 use rig_plant::{Faults, PlantConfig};
-use rig_shared::safety::{Fault, Mode};
+use rig_shared::safety::{Fault, Mode, Reaction};
 use rig_shared::trajectory::{Staircase, Trajectory};
-use rig_shared::wire::message::{Refusal, RequestBody};
+use rig_shared::wire::message::{Bounded, Refusal, RequestBody};
 use rig_tests::{
     Line, bench, calibrated, connect, driven, excitation, in_parallel, nameplate, snapshot, wait,
 };
@@ -54,9 +54,9 @@ fn check_snapshot(line: &mut Line, fault: Fault) {
 }
 
 #[test]
-fn each_fault_takes_the_bridge_off_in_time_and_the_rig_works_again() {
+fn each_fault_ends_the_motion_in_time_and_the_rig_works_again() {
     type Change = fn(&mut Faults);
-    // Fault, what is done, seconds until the bridge must be off, whether its cause can be seen with the bridge off.
+    // Fault, what is done, seconds until it must latch, whether its cause can be seen afterwards.
     let cases: [(Fault, Change, f64, bool); 9] = [
         (Fault::EncoderLost, |f| f.encoder_cut = true, 1.0, false),
         (Fault::EncoderJump, |f| f.encoder_jump = 2000, 0.001, false),
@@ -101,6 +101,8 @@ fn each_fault_takes_the_bridge_off_in_time_and_the_rig_works_again() {
             ));
             continue;
         }
+        let brakes = fault.reaction() == Reaction::Brake;
+        assert_eq!(line.port().device().state().brakes(), brakes, "{fault:?}");
         assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
         check_snapshot(&mut line, fault);
         wait(&mut line, 0.2);
@@ -181,6 +183,41 @@ fn over_speed_position_and_overload_from_outside() {
 
 fn latched(line: &Line) -> Option<Fault> {
     line.port().device().state().latch.first().map(|r| r.fault)
+}
+
+/// The current's reading freezes beyond the peak while the motor brakes after another fault. Believed, it would drive the
+/// link on, in the direction in which it moves. The bridge goes off instead, and the first fault stays latched.
+#[test]
+fn a_current_reading_that_freezes_during_the_brake_ends_it() {
+    for (seed, frozen) in [(1, 3.21_f64), (2, 3.6), (3, 4.7)] {
+        let mut line = moving(seed);
+        let truth = |line: &mut Line| line.port_mut().device_mut().plant_mut().truth();
+        let mut waited = 0;
+        while truth(&mut line).velocity.abs() < 2.0 {
+            wait(&mut line, 1e-3);
+            waited += 1;
+            assert!(waited < 5000);
+        }
+        inject(&mut line, |f| f.temperature_stuck = Some(2000));
+        wait(&mut line, 0.005);
+        assert_eq!(latched(&line), Some(Fault::Temperature));
+        assert!(line.port().device().state().brakes());
+        let begin = truth(&mut line).velocity;
+        // 33 A on 4096 codes.
+        let code = 2048.0 - frozen.copysign(begin) * 4096.0 / 33.0;
+        inject(&mut line, |f| f.current_stuck = Some(code as u16));
+        // Once the bridge is off, the link falls.
+        let (mut fastest, mut braked) = (0.0_f64, 0);
+        while line.port().device().state().brakes() && braked < 300 {
+            wait(&mut line, 1e-3);
+            fastest = fastest.max(truth(&mut line).velocity * begin.signum());
+            braked += 1;
+        }
+        println!("{begin:.2} rad/s, then {fastest:.2} rad/s at most in {braked} ms");
+        assert!(fastest < begin.abs() + 0.1, "{begin} {fastest}");
+        assert!(!line.port().device().state().brakes());
+        assert_eq!(latched(&line), Some(Fault::Temperature));
+    }
 }
 
 /// Cut while the rig holds: found from the winding's voltage once something moves the link, before it has moved far.
@@ -384,4 +421,59 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
         refused(&mut line, RequestBody::SetPosition(0.0)),
         Refusal::WrongMode
     );
+}
+
+/// The quantity and the bound of a refusal.
+fn bound(refusal: Refusal) -> (Bounded, f32) {
+    match refusal {
+        Refusal::OutOfBounds {
+            quantity, bound, ..
+        } => (quantity, bound),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A link that is out of its range, or moves, is not armed: the reference would jump, or the link be caught with a jerk. And
+/// no holding rig takes gains or models that it cannot have.
+#[test]
+fn what_a_user_may_not_ask_is_refused_with_its_bound() {
+    let (mut line, plant) = bench(20);
+    let limits = nameplate(&plant).settings.limits;
+    for (position, expected) in [
+        (limits.position_high + 0.09, limits.position_high),
+        (limits.position_low - 0.09, limits.position_low),
+    ] {
+        line.request(RequestBody::SetPosition(position)).unwrap();
+        let refusal = refused(&mut line, RequestBody::Arm);
+        assert_eq!(bound(refusal), (Bounded::ArmPosition, expected));
+    }
+    line.request(RequestBody::SetPosition(plant.initial_position as f32))
+        .unwrap();
+    inject(&mut line, |f| f.external_torque = 3.0);
+    wait(&mut line, 0.1);
+    let refusal = refused(&mut line, RequestBody::Arm);
+    assert_eq!(bound(refusal).0, Bounded::ArmVelocity);
+    inject(&mut line, |f| f.external_torque = 0.0);
+    wait(&mut line, 3.0);
+
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.1);
+    let own = nameplate(&plant).settings;
+    let mut gains = own.gains;
+    (gains.proportional, gains.derivative) = (1e9, 1e-6);
+    let mut model = own.model;
+    model.gravity_cos = 1e20;
+    let mut friction = own.friction;
+    friction.coulomb = 1e20;
+    let before = *line.port().device().state().settings();
+    for (body, quantity) in [
+        (RequestBody::SetGains(gains), Bounded::PositionLoop),
+        (RequestBody::SetModel(model), Bounded::Gravity),
+        (RequestBody::SetFriction(friction), Bounded::DryFriction),
+    ] {
+        assert_eq!(bound(refused(&mut line, body)).0, quantity);
+    }
+    assert_eq!(*line.port().device().state().settings(), before);
+    wait(&mut line, 0.1);
+    assert_eq!(mode(&line), Mode::Holding);
 }

@@ -2,14 +2,15 @@
 //!
 //! An injected sequence of three. Each conversion is the mean of four (RM0440, ADC, "Oversampler"), taken within 3.5
 //! µs: with 12-bit codes as before, this halves white noise. The current comes first. It is held at 0.62, 1.49, 2.37
-//! and 3.24 µs after the trigger, 1.93 µs ([`SAMPLING_LEAD`]) in the mean. The trigger comes this time before the
-//! middle of a braking interval. Otherwise the current would read low by (R·i + Kₑ·ω)/L times the delay, like a smaller
+//! and 3.24 µs after the trigger, 1.93 µs in the mean. The trigger comes this time, less the delay of bridge and amplifier,
+//! before the middle of a braking interval ([`SAMPLING_LEAD`]). Otherwise the current would read low by (R·i + Kₑ·ω)/L times the delay, like a smaller
 //! friction.
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::adc::vals::{Adcaldif, Difsel, Exten, SampleTime};
 use embassy_stm32::pac::adccommon::vals::{Ckmode, Presc};
 use embassy_stm32::pac::{ADC1, ADC12_COMMON, RCC, VREFINTCAL};
+use rig_firmware::nameplate::{RATES, SENSE_DELAY_NS};
 use rig_shared::units::AdcCode;
 
 use super::clock::{CORE_HZ, TICK_PRIORITY};
@@ -28,8 +29,17 @@ const SAMPLING: u16 = 2 * 24 + 1;
 const APPROXIMATION: u16 = 2 * 12 + 1;
 /// Core cycles from the trigger to the mean instant at which the current's samples are held, each at the end of its
 /// sampling time.
-pub(crate) const SAMPLING_LEAD: u16 =
+const MEAN_HOLD: u16 =
     (2 * (LATENCY + SAMPLING) + (CONVERSIONS - 1) * (SAMPLING + APPROXIMATION)) * PRESCALER / 4;
+/// Delay of bridge and amplifier, core cycles, in whole converter cycles.
+const SENSE_DELAY: u16 =
+    (SENSE_DELAY_NS * (CORE_HZ / 1_000_000) / 1000) as u16 / PRESCALER * PRESCALER;
+/// Core cycles from the trigger to the middle of a braking interval at the bridge's inputs. The samples are centred on that
+/// interval as the amplifier shows it, later by its delay.
+pub(crate) const SAMPLING_LEAD: u16 = MEAN_HOLD - SENSE_DELAY;
+// A trigger in step with the divided clock is taken without jitter (errata ES0430, 2.7.11), and comes before the interval.
+const _: () = assert!(SENSE_DELAY < MEAN_HOLD && SAMPLING_LEAD.is_multiple_of(PRESCALER));
+const _: () = assert!((CORE_HZ / RATES.control_hz).is_multiple_of(PRESCALER as u32));
 /// Start-up time of the voltage regulator, µs (DS12288, t_ADCVREG_STUP).
 const REGULATOR_US: u32 = 20;
 
@@ -72,17 +82,18 @@ impl Converter {
         adc.cr().modify(|w| w.set_adcaldif(Adcaldif::SINGLE_ENDED));
         adc.cr().modify(|w| w.set_adcal(true));
         while adc.cr().read().adcal() {}
+        // Only while ADEN = 0 (RM0440, ADC_DIFSEL).
+        adc.difsel().write(|w| {
+            for channel in 0..18 {
+                w.set_difsel(channel, Difsel::SINGLE_ENDED);
+            }
+        });
         // ADEN must not be set within four converter clocks after calibration (RM0440, ADC, "ADC on-off control").
         cortex_m::asm::delay(64);
         adc.isr().write(|w| w.set_adrdy(true));
         adc.cr().modify(|w| w.set_aden(true));
         while !adc.isr().read().adrdy() {}
 
-        adc.difsel().write(|w| {
-            for channel in 0..18 {
-                w.set_difsel(channel, Difsel::SINGLE_ENDED);
-            }
-        });
         let supply_ratio = measure_supply_ratio();
         adc.smpr().write(|w| {
             for channel in [CURRENT_CHANNEL, SUPPLY_CHANNEL, TEMPERATURE_CHANNEL] {

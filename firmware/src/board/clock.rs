@@ -1,12 +1,13 @@
 //! Clocks and priorities: 170 MHz from the board's crystal or, if it does not start, from the chip's own oscillator.
 
-use embassy_stm32::Config;
 use embassy_stm32::interrupt::Priority;
 use embassy_stm32::pac::{PWR, RCC};
 use embassy_stm32::rcc::{
-    APBPrescaler, Hse, HseMode, LsConfig, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux,
+    self, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk,
+    mux,
 };
 use embassy_stm32::time::Hertz;
+use embassy_stm32::{Config, Peripherals};
 
 /// Core, buses and timers, Hz: 24 MHz / 6 · 85 / 2, or 16 MHz / 4 · 85 / 2.
 pub(crate) const CORE_HZ: u32 = 170_000_000;
@@ -24,7 +25,7 @@ const CRYSTAL_WAIT_MS: u32 = 20;
 const RESET_KHZ: u32 = 16_000;
 
 /// Returns true if the crystal starts. A rig with a clock error of 1 % identifies inertia with an error of 2 %.
-pub(crate) fn start_crystal() -> bool {
+fn start_crystal() -> bool {
     RCC.cr().modify(|w| w.set_hseon(true));
     for _ in 0..10 * CRYSTAL_WAIT_MS {
         if RCC.cr().read().hserdy() {
@@ -36,36 +37,63 @@ pub(crate) fn start_crystal() -> bool {
     false
 }
 
-/// Raises the core voltage for clocks above 150 MHz (range 1 boost mode, RM0440 section 6.1.5): clears PWR_CR5.R1MODE,
-/// bit 8. The register description behind [`embassy_stm32::init`] (stm32-metapac 21.0.0) has it in bit 0, so a request
-/// there has no effect.
-pub(crate) fn boost() {
-    RCC.apb1enr1().modify(|w| w.set_pwren(true));
-    PWR.cr5().modify(|w| w.0 &= !(1 << 8));
+/// PWR_CR5.R1MODE: set in the normal mode of range 1, for clocks up to 150 MHz; clear in its boost mode. The register
+/// description behind [`embassy_stm32::init`] (stm32-metapac 21.0.0) has it in bit 0, so a request there has no effect.
+const R1MODE: u32 = 1 << 8;
+
+/// Raises the core voltage for clocks above 150 MHz (range 1 boost mode, RM0440 section 6.1.5).
+///
+/// Call it after [`embassy_stm32::init`], which resets the power control (RCC_APB1RSTR1.PWRRST) and so its mode.
+fn boost() {
+    PWR.cr5().modify(|w| w.0 &= !R1MODE);
+}
+
+/// Returns true if the core has the voltage of clocks above 150 MHz now.
+#[inline(always)]
+pub(crate) fn is_boosted() -> bool {
+    PWR.cr5().read().0 & R1MODE == 0
+}
+
+/// Initialises the chip, then raises core voltage and clock. Returns also true if the crystal runs.
+///
+/// The first step stays at the 16 MHz of a reset: it resets the power control, so a voltage that was raised before it
+/// would be lost, and 170 MHz would run in the range for 150 MHz.
+pub(crate) fn start() -> (Peripherals, bool) {
+    let mut plain = Config::default();
+    plain.rcc.hsi48 = None;
+    plain.rcc.ls = LsConfig::off();
+    plain.bdma_interrupt_priority = LINK_PRIORITY;
+    let mut peripherals = embassy_stm32::init(plain);
+    let crystal = start_crystal();
+    boost();
+    embassy_stm32::rcc::reinit(tree(crystal), &mut peripherals.RCC);
+    enable_clock_security(crystal);
+    (peripherals, crystal)
 }
 
 /// Watches a crystal that started. If it stops, the chip continues on its own oscillator, a break switches the outputs
 /// off, and the non-maskable interrupt restarts the program (RM0440, RCC, "Clock security system").
-pub(crate) fn enable_clock_security(crystal: bool) {
+fn enable_clock_security(crystal: bool) {
     if crystal {
         RCC.cr().modify(|w| w.set_csson(true));
     }
 }
 
+/// Priority of the task that receives: below the line's interrupts, which wake it, and above all other tasks.
+pub(crate) const RECEIVE_PRIORITY: Priority = Priority::P9;
 /// Priority of the tasks that must not wait for other tasks.
 pub(crate) const TASK_PRIORITY: Priority = Priority::P10;
 
-/// Returns the configuration for the start of the chip.
-pub(crate) fn config(crystal: bool) -> Config {
-    let mut config = Config::default();
-    let rcc = &mut config.rcc;
-    rcc.hsi = true;
-    rcc.hse = crystal.then_some(Hse {
+/// Returns the clock tree of 170 MHz.
+fn tree(crystal: bool) -> rcc::Config {
+    let mut tree = rcc::Config::default();
+    tree.hsi = true;
+    tree.hse = crystal.then_some(Hse {
         freq: CRYSTAL,
         mode: HseMode::Oscillator,
     });
-    rcc.hsi48 = None;
-    rcc.pll = Some(Pll {
+    tree.hsi48 = None;
+    tree.pll = Some(Pll {
         source: if crystal {
             PllSource::HSE
         } else {
@@ -81,15 +109,14 @@ pub(crate) fn config(crystal: bool) -> Config {
         divq: None,
         divr: Some(PllRDiv::DIV2),
     });
-    rcc.sys = Sysclk::PLL1_R;
-    // Range 1 boost mode, needed above 150 MHz (RM0440, PWR, "Dynamic voltage scaling management").
-    rcc.boost = true;
-    rcc.apb1_pre = APBPrescaler::DIV1;
-    rcc.apb2_pre = APBPrescaler::DIV1;
-    rcc.mux.adc12sel = mux::Adcsel::SYS;
-    rcc.mux.lpuart1sel = mux::Uartsel::PCLK1;
+    tree.sys = Sysclk::PLL1_R;
+    // The steps of the change to range 1 boost mode (RM0440, PWR, "Dynamic voltage scaling management").
+    tree.boost = true;
+    tree.apb1_pre = APBPrescaler::DIV1;
+    tree.apb2_pre = APBPrescaler::DIV1;
+    tree.mux.adc12sel = mux::Adcsel::SYS;
+    tree.mux.lpuart1sel = mux::Uartsel::PCLK1;
     // The watchdog starts its own oscillator.
-    rcc.ls = LsConfig::off();
-    config.bdma_interrupt_priority = LINK_PRIORITY;
-    config
+    tree.ls = LsConfig::off();
+    tree
 }

@@ -3,36 +3,27 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_stm32::pac::RCC;
-use rig_shared::wire::message::{Health, ResetCause, SettingsOrigin};
+use rig_firmware::event::BoardMeasurement;
+use rig_shared::wire::message::ResetCause;
 
-use super::clock::CORE_HZ;
+use super::clock;
 use super::stack;
 
 /// Damaged requests; counted by the command task.
 pub(crate) static BAD_REQUESTS: AtomicU32 = AtomicU32::new(0);
 
-/// Cycles of the ticks since the last report, and constant values.
+/// Cycles of the ticks since the last report.
 pub(crate) struct HealthMonitor {
-    start_info: StartInfo,
     report_ticks: u32,
     ticks: u32,
     sum: u32,
     max: u32,
 }
 
-/// Findings at the start.
-#[derive(Clone, Copy)]
-pub(crate) struct StartInfo {
-    pub(crate) reset: ResetCause,
-    pub(crate) settings: SettingsOrigin,
-    pub(crate) crystal: bool,
-}
-
 impl HealthMonitor {
     /// Makes a report after every `report_ticks` ticks.
-    pub(crate) fn new(start_info: StartInfo, report_ticks: u32) -> Self {
+    pub(crate) fn new(report_ticks: u32) -> Self {
         Self {
-            start_info,
             report_ticks,
             ticks: 0,
             sum: 0,
@@ -42,19 +33,21 @@ impl HealthMonitor {
 
     /// Counts a tick; returns the report if it is due. `tick` is its number, `dropped` the windows lost so far.
     #[inline(always)]
-    pub(crate) fn record_tick(&mut self, cycles: u32, tick: u64, dropped: u32) -> Option<Health> {
+    pub(crate) fn record_tick(
+        &mut self,
+        cycles: u32,
+        tick: u64,
+        dropped: u32,
+    ) -> Option<BoardMeasurement> {
         self.ticks += 1;
         self.sum = self.sum.saturating_add(cycles);
         self.max = self.max.max(cycles);
         if self.ticks < self.report_ticks {
             return None;
         }
-        let health = Health {
+        let measured = BoardMeasurement {
             tick,
-            reset: self.start_info.reset,
-            settings: self.start_info.settings,
-            clock_hz: CORE_HZ,
-            crystal: self.start_info.crystal,
+            boost: clock::is_boosted(),
             tick_cycles_max: self.max,
             // At 10 kHz the sum of a second is far below 2³²: every tick is shorter than its period.
             tick_cycles_mean: self.sum / self.ticks.max(1),
@@ -62,8 +55,8 @@ impl HealthMonitor {
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
             dropped,
         };
-        *self = Self::new(self.start_info, self.report_ticks);
-        Some(health)
+        *self = Self::new(self.report_ticks);
+        Some(measured)
     }
 }
 

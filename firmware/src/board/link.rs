@@ -1,6 +1,6 @@
 //! LPUART1 to the ST-LINK's serial port: input by a DMA ring, output by DMA.
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2, LPUART1};
@@ -12,10 +12,12 @@ use embassy_time::{Duration, Ticker, Timer, with_timeout};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer};
 use rig_firmware::config::Config;
-use rig_firmware::event::Event;
+use rig_firmware::event::{BoardStart, Event};
 use rig_firmware::prechecked_request::{PrecheckedRequest, precheck};
 use rig_firmware::report_sender::ReportSender;
-use rig_shared::wire::message::Request;
+use rig_firmware::urgent_request::UrgentRequest;
+use rig_shared::safety::Mode;
+use rig_shared::wire::message::{Request, RequestBody};
 use rig_shared::wire::{DecodeError, MAX_FRAME, MessageDecoder};
 use static_cell::ConstStaticCell;
 
@@ -23,24 +25,26 @@ use super::clock::LINK_PRIORITY;
 use super::health::BAD_REQUESTS;
 use super::pins::LinkPins;
 use super::probe;
+use super::queue::{Numbered, URGENT_WAITS};
+use super::return_barrier::ReturnBarrier;
 use super::watchdog::{Task, check_in};
 
 /// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
 const BAUD: u32 = 921_600;
-/// Input buffer while the command task is busy, bytes: 11 ms of data.
+/// Input buffer while the receiving task is busy, bytes: 11 ms of data.
 const RECEIVE_BYTES: usize = 1024;
 /// Output buffer, bytes: two of the longest frames.
 const SEND_BYTES: usize = 2 * MAX_FRAME;
-/// Longest wait for bytes, so that the command task reports to the watchdog while no data arrive.
+/// Longest wait for bytes, so that the receiving task reports to the watchdog while no data arrive.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
 
 static RING_BUFFER: ConstStaticCell<[u8; RECEIVE_BYTES]> = ConstStaticCell::new([0; RECEIVE_BYTES]);
 static SEND_BUFFER: ConstStaticCell<Vec<u8, SEND_BYTES>> = ConstStaticCell::new(Vec::new());
 
 bind_interrupts!(struct Interrupts {
-    LPUART1 => InterruptHandler<LPUART1>;
-    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
-    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
+    LPUART1 => InterruptHandler<LPUART1>, ReturnBarrier;
+    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>, ReturnBarrier;
+    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>, ReturnBarrier;
 });
 
 /// Outgoing half.
@@ -70,13 +74,15 @@ pub(crate) fn open(pins: LinkPins) -> Result<(Sender, Receiver), ConfigError> {
 #[embassy_executor::task]
 pub(crate) async fn telemetry(
     config: &'static Config,
+    start: BoardStart,
     mut line: Sender,
     mut probe: probe::Outgoing,
     mut events: Consumer<'static, Event>,
 ) -> ! {
-    let mut report_sender = ReportSender::new();
+    let mut report_sender = ReportSender::for_board(start);
     let bytes = SEND_BUFFER.take();
     let mut ticker = Ticker::every(Duration::from_millis(1));
+    let mut mode = Mode::default();
     loop {
         ticker.next().await;
         check_in(Task::Telemetry);
@@ -84,6 +90,7 @@ pub(crate) async fn telemetry(
         while bytes.len() + MAX_FRAME <= SEND_BYTES
             && let Some(event) = events.dequeue()
         {
+            log(&event, &mut mode);
             report_sender.send_event(config, &event, &mut |frame: &[u8]| {
                 bytes.extend_from_slice(frame).is_ok()
             });
@@ -99,42 +106,98 @@ pub(crate) async fn telemetry(
     }
 }
 
-/// Passes a request to the tick, then yields to other tasks. Prechecking a request may take a fifth of a second, and
-/// reading does not yield while bytes wait.
-async fn forward_request(
-    config: &Config,
-    decoded: Option<Result<Request, DecodeError>>,
-    requests: &mut Producer<'static, PrecheckedRequest>,
-) {
-    let accepted = match decoded {
-        None => return,
-        // The host gets no answer and repeats its request.
-        Some(Err(_)) => {
-            BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
-            true
+/// Logs faults and changes of the mode; `mode` is the last one. It runs in a task, because a log takes time.
+fn log(event: &Event, mode: &mut Mode) {
+    match event {
+        Event::Fault(record) => defmt::error!(
+            "fault {=str} at tick {=u64}: {=f32}",
+            record.fault.name(),
+            record.tick,
+            record.value
+        ),
+        Event::Sample { sample, .. } if sample.mode != *mode => {
+            defmt::info!("mode {=str}, was {=str}", sample.mode.name(), mode.name());
+            *mode = sample.mode;
         }
-        Some(Ok(request)) => requests.enqueue(precheck(config, request)).is_ok(),
-    };
-    if !accepted {
-        defmt::warn!("more requests than can be served");
+        _ => {}
     }
-    check_in(Task::Commands);
-    Timer::after_ticks(0).await;
 }
 
-/// Reads bytes from the host, decodes requests and passes them to the tick.
+/// True while a request is between the two queues of [`precheck_requests`].
+static PRECHECKING: AtomicBool = AtomicBool::new(false);
+
+/// Passes decoded requests on: urgent ones to the tick, the others to the task that prechecks them.
+struct Distributor {
+    urgent: Producer<'static, UrgentRequest>,
+    requests: Producer<'static, Numbered<Request>>,
+    urgent_count: u32,
+    /// Number of the last request that was passed to the precheck.
+    last_id: Option<u16>,
+}
+
+impl Distributor {
+    /// Returns true for a repetition of a request that still waits for its precheck or is being prechecked. The host
+    /// repeats a request after 0.1 s, and the longest precheck takes 0.12 s: a second precheck would give the same answer,
+    /// later. The requests are prechecked in their order, so the last one waits as long as any does. A `Hello` may come
+    /// from another host with a number that was used before.
+    fn is_repeated(&self, request: &Request) -> bool {
+        let waits = !self.requests.is_empty() || PRECHECKING.load(Ordering::Relaxed);
+        waits && self.last_id == Some(request.id) && !matches!(request.body, RequestBody::Hello)
+    }
+
+    /// Passes one on. A request that finds no room is counted like a damaged one: the host gets no answer and repeats it.
+    fn pass(&mut self, decoded: Option<Result<Request, DecodeError>>) {
+        let accepted = match decoded {
+            None => return,
+            Some(Err(_)) => false,
+            Some(Ok(request)) => match UrgentRequest::from_request(&request) {
+                Some(urgent) => {
+                    let accepted = self.urgent.enqueue(urgent).is_ok();
+                    URGENT_WAITS.store(true, Ordering::Relaxed);
+                    self.urgent_count = self.urgent_count.wrapping_add(u32::from(accepted));
+                    accepted
+                }
+                None if self.is_repeated(&request) => return,
+                None => {
+                    let id = request.id;
+                    let numbered = Numbered {
+                        request,
+                        urgent_before: self.urgent_count,
+                    };
+                    let accepted = self.requests.enqueue(numbered).is_ok();
+                    if accepted {
+                        self.last_id = Some(id);
+                    }
+                    accepted
+                }
+            },
+        };
+        if !accepted {
+            BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Reads bytes from the host and decodes requests. It has a priority of its own above all other tasks, so that `Disarm` and
+/// `Stop` wait for none of them.
 #[embassy_executor::task]
-pub(crate) async fn commands(
-    config: &'static Config,
+pub(crate) async fn receive(
     mut line: Receiver,
     mut probe: probe::Incoming,
-    mut requests: Producer<'static, PrecheckedRequest>,
+    urgent: Producer<'static, UrgentRequest>,
+    requests: Producer<'static, Numbered<Request>>,
 ) -> ! {
     let mut line_decoder = MessageDecoder::<Request>::default();
     let mut probe_decoder = MessageDecoder::<Request>::default();
+    let mut distributor = Distributor {
+        urgent,
+        requests,
+        urgent_count: 0,
+        last_id: None,
+    };
     let mut bytes = [0; 64];
     loop {
-        check_in(Task::Commands);
+        check_in(Task::Receive);
         let count = match with_timeout(READ_TIMEOUT, line.read(&mut bytes)).await {
             Ok(Ok(count)) => count,
             // A damaged or additional byte: the check sum of the frame detects it, and the host repeats its request.
@@ -145,11 +208,42 @@ pub(crate) async fn commands(
             Err(_) => 0,
         };
         for &byte in bytes.iter().take(count) {
-            forward_request(config, line_decoder.push(byte), &mut requests).await;
+            distributor.pass(line_decoder.push(byte));
         }
         let count = probe.read(&mut bytes);
         for &byte in bytes.iter().take(count) {
-            forward_request(config, probe_decoder.push(byte), &mut requests).await;
+            distributor.pass(probe_decoder.push(byte));
+        }
+    }
+}
+
+/// Prechecks requests, which may take a fifth of a second each, and passes them to the tick.
+#[embassy_executor::task]
+pub(crate) async fn precheck_requests(
+    config: &'static Config,
+    mut requests: Consumer<'static, Numbered<Request>>,
+    mut to_tick: Producer<'static, Numbered<PrecheckedRequest>>,
+) -> ! {
+    loop {
+        check_in(Task::Precheck);
+        Timer::after_millis(1).await;
+        while to_tick.ready() {
+            // Before the queue is emptied, as the receiving task may interrupt this one anywhere.
+            PRECHECKING.store(true, Ordering::Relaxed);
+            let Some(numbered) = requests.dequeue() else {
+                PRECHECKING.store(false, Ordering::Relaxed);
+                break;
+            };
+            let prechecked = Numbered {
+                request: precheck(config, numbered.request),
+                urgent_before: numbered.urgent_before,
+            };
+            // Room was found before, and nobody else fills this queue.
+            let _taken = to_tick.enqueue(prechecked).is_ok();
+            PRECHECKING.store(false, Ordering::Relaxed);
+            check_in(Task::Precheck);
+            // Other tasks of this priority run between two requests.
+            Timer::after_ticks(0).await;
         }
     }
 }

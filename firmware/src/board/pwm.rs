@@ -6,9 +6,12 @@
 //!
 //! The repetition counter makes every fourth overflow or underflow an update, 10 000 a second, always at the underflow.
 //! There the new duty takes effect. It is the middle of a braking interval, where the current equals its mean over the
-//! period. Samples must be centred on it, so their trigger comes [`SAMPLING_LEAD`] before it. TIM4 counts the same
+//! period. Samples must be centred on it, as the amplifier shows it, so their trigger comes [`SAMPLING_LEAD`] before it. TIM4 counts the same
 //! clock with the period of the updates. It starts with TIM1's counter (trigger mode, TIM1's enable as TRGO, ITR0;
 //! RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"), ahead by this lead, and never loses or gains a count.
+//!
+//! The enable comes first and the outputs when the bridge is awake (`wake_ticks`): until then its fault line, which acts on
+//! the break, may be low.
 
 use embassy_stm32::gpio::Output;
 use embassy_stm32::pac::timer::vals::{
@@ -50,11 +53,22 @@ pub(crate) enum Break {
 /// The bridge.
 pub(crate) struct Bridge {
     enable: Output<'static>,
+    /// Ticks from the enable to valid outputs and a valid fault line.
+    wake_ticks: u32,
+    /// Ticks of them that are left; 0 if the bridge sleeps or is awake.
+    waking: u32,
+    /// True if the bridge is awake and its outputs are on. Reading the enable's pin takes longer.
+    awake: bool,
 }
 
 impl Bridge {
     /// Sets TIM1 up with idle outputs and a disabled bridge; `thresholds` are those of the comparators.
-    pub(crate) fn new(pins: BridgePins, control_hz: u32, thresholds: [u16; 2]) -> Self {
+    pub(crate) fn new(
+        pins: BridgePins,
+        control_hz: u32,
+        wake_ticks: u32,
+        thresholds: [u16; 2],
+    ) -> Self {
         RCC.apb2enr().modify(|w| {
             w.set_tim1en(true);
             w.set_syscfgen(true);
@@ -123,6 +137,9 @@ impl Bridge {
         start_sample_trigger(control_hz);
         Self {
             enable: pins.connect(),
+            wake_ticks,
+            waking: 0,
+            awake: false,
         }
     }
 
@@ -133,35 +150,33 @@ impl Bridge {
     }
 
     /// Returns the cause that has switched the outputs off since the bridge was last switched on, or acts now.
+    ///
+    /// A bridge that sleeps or wakes may hold its fault line low, which then means nothing.
     #[inline(always)]
     pub(crate) fn break_cause(&self) -> Option<Break> {
         let flags = TIM1.sr().read();
         // A fault inside the chip has its own flag, which also keeps the outputs off (RM0440, TIM1_SR.SBIF).
-        if flags.sbif() || flags.bif(0) && is_fault_line_low() {
+        if flags.sbif() {
             Some(Break::Driver)
-        } else if flags.bif(0) {
+        } else if !flags.bif(0) || self.waking > 0 {
+            None
+        } else if is_fault_line_low() {
+            self.awake.then_some(Break::Driver)
+        } else {
             // The line is up, so the bridge is not the cause: a bridge fault holds it low for a millisecond or more.
             Some(Break::Comparator)
-        } else {
-            None
         }
     }
 
     /// Applies a command to the outputs, effective from the next update. Switching off acts at once.
     #[inline(always)]
     pub(crate) fn apply(&mut self, command: Command) {
-        let timer = TIM1;
         if !command.bridge {
             switch_off();
             // The update before the next command loads this: the bridge starts with duty 0, not with its last duty.
             brake();
-            // A fault that has ended may be cleared: a fault that still acts sets its flag again at once.
-            timer.sr().write(|w| {
-                // Writing zero clears a flag, writing one keeps it (rc_w0).
-                *w = embassy_stm32::pac::timer::regs::SrAdv(!0);
-                w.set_bif(0, false);
-                w.set_sbif(false);
-            });
+            (self.waking, self.awake) = (0, false);
+            clear_breaks();
             return;
         }
         let high = f32::from(TOP);
@@ -172,11 +187,37 @@ impl Bridge {
             (braking, HIGH)
         };
         compare(one, two);
-        if !self.enable.is_set_high() {
-            timer.bdtr().modify(|w| w.set_moe(true));
-            self.enable.set_high();
+        if !self.awake {
+            self.wake();
         }
     }
+
+    /// Enables the bridge and, in later ticks, waits until it is awake and switches the outputs on.
+    fn wake(&mut self) {
+        if self.waking == 0 {
+            self.enable.set_high();
+            self.waking = self.wake_ticks;
+            return;
+        }
+        self.waking -= 1;
+        if self.waking == 0 {
+            self.awake = true;
+            // The fault line is valid from now on; what it said before does not count.
+            clear_breaks();
+            TIM1.bdtr().modify(|w| w.set_moe(true));
+        }
+    }
+}
+
+/// Clears the flags of the break. A fault that has ended is forgotten; one that still acts sets its flag again at once.
+#[inline(always)]
+fn clear_breaks() {
+    TIM1.sr().write(|w| {
+        // Writing zero clears a flag, writing one keeps it (rc_w0).
+        *w = embassy_stm32::pac::timer::regs::SrAdv(!0);
+        w.set_bif(0, false);
+        w.set_sbif(false);
+    });
 }
 
 /// Sets the compare values of the outputs from the next update on.

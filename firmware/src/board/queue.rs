@@ -1,8 +1,20 @@
 //! Lock-free queues between the tick and the tasks (heapless), with a hint for the compiler.
 
+use core::sync::atomic::AtomicBool;
+
 use heapless::spsc::{Consumer, Producer};
 use rig_firmware::event::Event;
 use rig_firmware::tick_session::EventSink;
+
+/// A request with the number of urgent requests that were received before it.
+#[derive(Clone)]
+pub(crate) struct Numbered<T> {
+    pub(crate) request: T,
+    pub(crate) urgent_before: u32,
+}
+
+/// True if the queue of urgent requests may hold one. The tick looks at it in place of the queue, which takes longer.
+pub(crate) static URGENT_WAITS: AtomicBool = AtomicBool::new(false);
 
 /// Bound on the length of every queue here.
 const CAPACITY_BOUND: usize = 1024;

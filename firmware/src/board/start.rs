@@ -7,26 +7,29 @@ use embassy_time::{Duration, Ticker};
 use heapless::spsc;
 use rig_firmware::capture::Capture;
 use rig_firmware::config::{Config, Settings};
-use rig_firmware::event::Event;
+use rig_firmware::event::{BoardStart, Event};
 use rig_firmware::nameplate;
 use rig_firmware::prechecked_request::PrecheckedRequest;
 use rig_firmware::state::State;
 use rig_firmware::tick_session::TickSession;
+use rig_firmware::urgent_request::UrgentRequest;
 use rig_shared::estimation::OneLinkEstimator;
+use rig_shared::wire::message::Request;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
-use super::clock::{self, LINK_PRIORITY, TASK_PRIORITY};
+use super::clock::{self, CORE_HZ, LINK_PRIORITY, RECEIVE_PRIORITY, TASK_PRIORITY};
 use super::encoder::EncoderTimer;
-use super::health::{HealthMonitor, StartInfo};
+use super::health::HealthMonitor;
 use super::pins::Pins;
 use super::pwm::Bridge;
-use super::queue::{QueueReceiver, QueueSender};
+use super::queue::{Numbered, QueueReceiver, QueueSender};
+use super::return_barrier::finish_stores;
 use super::storage::Storage;
-use super::tick::{EVENTS, REQUESTS, Tick};
+use super::tick::{EVENTS, RECEIVED, REQUESTS, Tick, URGENT};
 use super::watchdog::{Task, Watchdog, check_in};
 use super::wire_check::WireCheck;
-use super::{cycles, health, heat, link, probe, stack, tick};
+use super::{crash, cycles, health, heat, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -34,8 +37,13 @@ static STATE: StaticCell<State> = StaticCell::new();
 static CAPTURE: ConstStaticCell<Capture> = ConstStaticCell::new(Capture::new());
 // A ring of n places holds n − 1.
 static EVENT_QUEUE: StaticCell<spsc::Queue<Event, { EVENTS + 1 }>> = StaticCell::new();
-static REQUEST_QUEUE: StaticCell<spsc::Queue<PrecheckedRequest, { REQUESTS + 1 }>> =
+static REQUEST_QUEUE: StaticCell<spsc::Queue<Numbered<PrecheckedRequest>, { REQUESTS + 1 }>> =
     StaticCell::new();
+static RECEIVED_QUEUE: StaticCell<spsc::Queue<Numbered<Request>, { RECEIVED + 1 }>> =
+    StaticCell::new();
+static URGENT_QUEUE: StaticCell<spsc::Queue<UrgentRequest, { URGENT + 1 }>> = StaticCell::new();
+/// The task that must not wait for any other.
+static RECEIVE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static STORE_QUEUE: StaticCell<spsc::Queue<Settings, 2>> = StaticCell::new();
 /// Tasks that must not wait while a trajectory is prechecked, which takes about 0.1 s.
 static HIGH_PRIORITY_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
@@ -45,11 +53,9 @@ static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
 pub(crate) fn run() -> ! {
     let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
-    let crystal = clock::start_crystal();
+    let crash = crash::take();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
-    clock::boost();
-    let peripherals = embassy_stm32::init(clock::config(crystal));
-    clock::enable_clock_security(crystal);
+    let (peripherals, crystal) = clock::start();
     cycles::start(&mut core.DCB, &mut core.DWT);
     interrupt::TIM3.set_priority(LINK_PRIORITY);
     let pins = Pins::new(peripherals);
@@ -66,12 +72,19 @@ pub(crate) fn run() -> ! {
     let (storage, selection) = Storage::open(config);
     let settings = selection.settings.unwrap_or(default_settings);
     let thresholds = config.current_thresholds();
-    let bridge = Bridge::new(pins.bridge, config.rates.control_hz, thresholds);
+    let bridge = Bridge::new(
+        pins.bridge,
+        config.rates.control_hz,
+        config.wake_ticks,
+        thresholds,
+    );
     let state = state(config, settings);
     state.restore_heat(heat::load().unwrap_or_default());
     let (event_in, event_out) = EVENT_QUEUE.init(spsc::Queue::new()).split();
     let (to_store, settings_from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
     let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
+    let (received_in, received_out) = RECEIVED_QUEUE.init(spsc::Queue::new()).split();
+    let (urgent_in, urgent_out) = URGENT_QUEUE.init(spsc::Queue::new()).split();
     let encoder = EncoderTimer::new(pins.encoder, &config.encoder);
     let Ok((sender, receiver)) = link::open(pins.link) else {
         unreachable!()
@@ -83,41 +96,57 @@ pub(crate) fn run() -> ! {
         capture: CAPTURE.take(),
         tick_session: TickSession::new(),
         requests: QueueReceiver(request_out),
+        urgent: QueueReceiver(urgent_out),
+        urgent_count: 0,
         events: QueueSender(event_in),
         bridge,
         converter,
         encoder,
         wire_check: WireCheck::new(),
-        period_cycles: Tick::period(config.rates.control_hz),
         entered: 0,
         next_waiting: false,
-        health_monitor: HealthMonitor::new(
-            StartInfo {
-                reset,
-                settings: selection.origin,
-                crystal,
-            },
-            config.rates.control_hz,
-        ),
+        health_monitor: HealthMonitor::new(config.rates.control_hz),
         to_store: QueueSender(to_store),
     });
+    if let Some(crash) = crash {
+        defmt::error!(
+            "restarted after a failure: pc {=u32:#x}, lr {=u32:#x}, CFSR {=u32:#x}, address {=u32:#x}, line {=u32}",
+            crash.pc,
+            crash.lr,
+            crash.status,
+            crash.address,
+            crash.line
+        );
+    }
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
+    let start = BoardStart {
+        reset,
+        settings: selection.origin,
+        clock_hz: CORE_HZ,
+        crystal,
+        crash,
+    };
     // Each task is spawned once. Its memory is reserved at compile time.
     let tasks = (
-        link::telemetry(config, sender, probe_out, event_out),
+        link::telemetry(config, start, sender, probe_out, event_out),
         indicator(watchdog, pins.led),
-        link::commands(config, receiver, probe_in, request_in),
+        link::receive(receiver, probe_in, urgent_in, received_in),
+        link::precheck_requests(config, received_out, request_in),
         storage_task(storage, settings_from_tick),
     );
-    let (Ok(telemetry), Ok(indicator), Ok(commands), Ok(storage_task)) = tasks else {
+    let (Ok(telemetry), Ok(indicator), Ok(receive), Ok(precheck_requests), Ok(storage_task)) =
+        tasks
+    else {
         unreachable!()
     };
+    interrupt::FMAC.set_priority(RECEIVE_PRIORITY);
+    RECEIVE_EXECUTOR.start(interrupt::FMAC).spawn(receive);
     interrupt::CORDIC.set_priority(TASK_PRIORITY);
     let high_priority = HIGH_PRIORITY_EXECUTOR.start(interrupt::CORDIC);
     high_priority.spawn(telemetry);
     high_priority.spawn(indicator);
     THREAD_EXECUTOR.init(Executor::new()).run(|spawner| {
-        spawner.spawn(commands);
+        spawner.spawn(precheck_requests);
         spawner.spawn(storage_task);
     })
 }
@@ -130,6 +159,18 @@ fn CORDIC() {
     unsafe {
         HIGH_PRIORITY_EXECUTOR.on_interrupt();
     }
+    finish_stores();
+}
+
+/// Runs the receiving task, likewise.
+#[interrupt]
+fn FMAC() {
+    // The executor was started with this interrupt.
+    #[allow(unsafe_code)]
+    unsafe {
+        RECEIVE_EXECUTOR.on_interrupt();
+    }
+    finish_stores();
 }
 
 /// Returns the state at power on, built in place: it is half as large as the stack.

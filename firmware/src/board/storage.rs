@@ -43,7 +43,7 @@ fn read_copy(slot: usize) -> StoredCopy {
     let mut bytes = [0; MAX_COPY_BYTES];
     for (word, chunk) in bytes.chunks_exact_mut(4).enumerate() {
         // Inside the page, aligned; volatile, because the compiler does not see changes of the flash. A word that
-        // cannot be corrected ends in `fault::non_maskable`, which allows it to be read unchanged.
+        // cannot be corrected ends in `fault::NonMaskableInt`, which allows it to be read unchanged.
         #[allow(unsafe_code)]
         let value = unsafe { address(slot).wrapping_add(word).read_volatile() };
         chunk.copy_from_slice(&value.to_le_bytes());
@@ -93,8 +93,22 @@ impl Storage {
         Ok(())
     }
 
+    /// Erases the page of the present slot and writes the bytes.
+    ///
+    /// The data cache is off meanwhile: reads of bank 1 while bank 2 is being programmed may corrupt it (errata ES0430,
+    /// 2.2.2, "Data cache might be corrupted during Flash memory read-while-write operation").
     async fn write(&self, bytes: &[u8]) -> Result<(), FlashError> {
         wait_ready().await?;
+        set_data_cache(false);
+        let result = self.erase_and_program(bytes).await;
+        // An operation that did not end in time may still run: then the cache stays off until the next reset.
+        if !FLASH.sr().read().bsy() {
+            set_data_cache(true);
+        }
+        result
+    }
+
+    async fn erase_and_program(&self, bytes: &[u8]) -> Result<(), FlashError> {
         clear_errors();
         FLASH.cr().modify(|w| {
             w.set_per(true);
@@ -107,11 +121,6 @@ impl Storage {
             w.set_per(false);
             w.set_bker(false);
         });
-        // Earlier readings must not come from the data cache again.
-        FLASH.acr().modify(|w| w.set_dcen(false));
-        FLASH.acr().modify(|w| w.set_dcrst(true));
-        FLASH.acr().modify(|w| w.set_dcrst(false));
-        FLASH.acr().modify(|w| w.set_dcen(true));
         erased?;
         for (index, word) in bytes.chunks_exact(8).enumerate() {
             FLASH.cr().modify(|w| w.set_pg(true));
@@ -133,6 +142,16 @@ impl Storage {
             written?;
         }
         Ok(())
+    }
+}
+
+/// Switches the data cache on, emptied, or off. Earlier readings must not come from it again.
+fn set_data_cache(on: bool) {
+    FLASH.acr().modify(|w| w.set_dcen(false));
+    if on {
+        FLASH.acr().modify(|w| w.set_dcrst(true));
+        FLASH.acr().modify(|w| w.set_dcrst(false));
+        FLASH.acr().modify(|w| w.set_dcen(true));
     }
 }
 

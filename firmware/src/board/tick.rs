@@ -8,11 +8,13 @@ use embassy_stm32::interrupt;
 use rig_firmware::capture::Capture;
 use rig_firmware::config::{Config, Settings};
 use rig_firmware::event::Event;
+use rig_firmware::nameplate::RATES;
 use rig_firmware::prechecked_request::PrecheckedRequest;
 use rig_firmware::sample::Sample;
 use rig_firmware::state::State;
 use rig_firmware::step::step;
 use rig_firmware::tick_session::{EventSink as _, TickSession};
+use rig_firmware::urgent_request::{UrgentRequest, is_revoked};
 use rig_shared::wire::message::Refusal;
 
 use super::adc::Converter;
@@ -22,15 +24,20 @@ use super::encoder::EncoderTimer;
 use super::health::HealthMonitor;
 use super::heat;
 use super::pwm::{Break, Bridge};
-use super::queue::{QueueReceiver, QueueSender};
+use super::queue::{Numbered, QueueReceiver, QueueSender, URGENT_WAITS};
+use super::return_barrier::finish_stores;
 use super::stack;
 use super::watchdog::{Task, check_in};
 use super::wire_check::WireCheck;
 
 /// Notes that the queue to the telemetry task holds.
 pub(crate) const EVENTS: usize = 64;
-/// Requests that the queue from the command task holds.
-pub(crate) const REQUESTS: usize = 4;
+/// Prechecked requests that the queue to the tick holds: the tick takes one within two periods.
+pub(crate) const REQUESTS: usize = 1;
+/// Received requests that the queue to the prechecking task holds. A host that waits for each answer needs one.
+pub(crate) const RECEIVED: usize = 5;
+/// Urgent requests that the queue to the tick holds: the line brings one in a tick.
+pub(crate) const URGENT: usize = 4;
 
 /// Everything that the interrupt owns.
 pub(crate) struct Tick {
@@ -38,13 +45,15 @@ pub(crate) struct Tick {
     pub(crate) state: &'static mut State,
     pub(crate) capture: &'static mut Capture,
     pub(crate) tick_session: TickSession,
-    pub(crate) requests: QueueReceiver<PrecheckedRequest>,
+    pub(crate) requests: QueueReceiver<Numbered<PrecheckedRequest>>,
+    pub(crate) urgent: QueueReceiver<UrgentRequest>,
+    /// Urgent requests so far.
+    pub(crate) urgent_count: u32,
     pub(crate) events: QueueSender<Event>,
     pub(crate) bridge: Bridge,
     pub(crate) converter: Converter,
     pub(crate) encoder: EncoderTimer,
     pub(crate) wire_check: WireCheck,
-    pub(crate) period_cycles: u32,
     pub(crate) entered: u32,
     pub(crate) next_waiting: bool,
     pub(crate) health_monitor: HealthMonitor,
@@ -63,10 +72,11 @@ impl Tick {
         let entered = cycles::now();
         let codes = self.converter.read();
         let motion = self.encoder.read();
-        // A tick and a half since the last one: an interrupt was late or missing.
-        let elapsed = entered.wrapping_sub(self.entered);
-        let overrun = self.next_waiting || elapsed > self.period_cycles + self.period_cycles / 2;
+        let late_ticks = self.late_ticks(entered.wrapping_sub(self.entered));
         self.entered = entered;
+        if URGENT_WAITS.load(Ordering::Relaxed) {
+            self.serve_urgent();
+        }
         let break_cause = self.bridge.break_cause();
         let sample = Sample {
             encoder: motion.count,
@@ -75,7 +85,7 @@ impl Tick {
             supply: codes.supply,
             temperature: codes.temperature,
             driver_fault: break_cause == Some(Break::Driver),
-            overrun,
+            late_ticks,
             comparator: break_cause == Some(Break::Comparator),
             encoder_wrong: motion.error,
             // Not in the tick of the estimator's update, an even one with a high load.
@@ -91,14 +101,40 @@ impl Tick {
         check_in(Task::Tick);
         let cycles = cycles::now().wrapping_sub(entered);
         let (tick, dropped) = (self.state.tick, self.tick_session.dropped_windows());
-        if let Some(health) = self.health_monitor.record_tick(cycles, tick, dropped) {
-            self.events.push(Event::Health(health));
+        if let Some(measured) = self.health_monitor.record_tick(cycles, tick, dropped) {
+            self.events.push(Event::Health(measured));
         }
         self.next_waiting = self.converter.is_waiting();
     }
 }
 
 impl Tick {
+    /// Returns the ticks that were missed or late, `elapsed` cycles after the last one began.
+    #[inline(always)]
+    fn late_ticks(&self, elapsed: u32) -> u8 {
+        const PERIOD: u32 = Tick::period(RATES.control_hz);
+        const LATE: u32 = PERIOD + PERIOD / 2;
+        const MISSED: u32 = 2 * PERIOD + PERIOD / 2;
+        // A tick and a half since the last one: an interrupt was late or missing.
+        if !self.next_waiting && elapsed <= LATE {
+            return 0;
+        }
+        1 + u8::from(elapsed > MISSED)
+    }
+
+    /// Serves urgent requests before the control step, so that they act in this tick. Not inlined because it is rare.
+    #[inline(never)]
+    fn serve_urgent(&mut self) {
+        // Before the queue is read: a request that comes meanwhile sets it again.
+        URGENT_WAITS.store(false, Ordering::Relaxed);
+        while let Some(request) = self.urgent.oldest() {
+            self.tick_session
+                .serve_urgent(self.state, *request, &mut self.events);
+            self.urgent.release();
+            self.urgent_count = self.urgent_count.wrapping_add(1);
+        }
+    }
+
     /// Serves at most one request, in a tick that has time.
     #[inline(always)]
     fn serve(&mut self) {
@@ -115,9 +151,20 @@ impl Tick {
         if !self.state.accepts_request() || !self.events.has_room() {
             return;
         }
-        let Some(prechecked) = self.requests.oldest() else {
+        let Some(Numbered {
+            request: prechecked,
+            urgent_before,
+        }) = self.requests.oldest()
+        else {
             return;
         };
+        if *urgent_before != self.urgent_count && is_revoked(&prechecked.request.body) {
+            let id = prechecked.request.id;
+            self.tick_session
+                .refuse(id, Refusal::Overtaken, &mut self.events);
+            self.requests.release();
+            return;
+        }
         let to_store = self.tick_session.serve(
             self.config,
             self.state,
@@ -175,4 +222,5 @@ fn ADC1_2() {
     #[allow(unsafe_code)]
     let tick = unsafe { (*TICK.0.get()).assume_init_mut() };
     tick.run();
+    finish_stores();
 }

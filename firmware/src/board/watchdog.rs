@@ -20,14 +20,16 @@ pub(crate) enum Task {
     Tick = 1,
     /// The task that sends.
     Telemetry = 2,
-    /// The task that listens.
-    Commands = 4,
+    /// The task that receives.
+    Receive = 4,
     /// The task that stores.
     Storage = 8,
+    /// The task that prechecks.
+    Precheck = 16,
 }
 
 const DEADLINE_TASKS: u8 = Task::Tick as u8 | Task::Telemetry as u8;
-const ALL: u8 = DEADLINE_TASKS | Task::Commands as u8 | Task::Storage as u8;
+const ALL: u8 = DEADLINE_TASKS | Task::Receive as u8 | Task::Storage as u8 | Task::Precheck as u8;
 
 static CHECKED_IN: AtomicU8 = AtomicU8::new(0);
 

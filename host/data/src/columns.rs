@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use super::error::{DataError, Warning};
+use super::likely_time::likely_time;
 use super::motors::MotorSide;
 use super::place::Place;
 use super::remark::Remark;
+use super::unit::Unit;
 
 /// Whether every joint needs a torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -207,6 +209,24 @@ pub(super) struct Layout {
 const SINCE_1970: f64 = 1e8;
 
 impl Layout {
+    /// Takes the unit of times since 1970 from the size of the first one, where nothing states it.
+    pub(super) fn guess_unit_of_time(&mut self, raw: &[f64]) {
+        let likely = likely_time(raw.get(self.time).copied(), None);
+        let (Some(column), Some((name, why))) = (self.columns.get_mut(self.time), likely) else {
+            return;
+        };
+        if let Some(unit) = Unit::named(name) {
+            column.factor = unit.factor;
+            self.warnings.push(Warning::Reading {
+                remark: Remark::LikelyTime {
+                    label: column.label.clone(),
+                    unit: unit.name,
+                    why,
+                },
+            });
+        }
+    }
+
     /// Counts the times from this row, the first one, if they are times since 1970 in another unit than s.
     pub(super) fn count_from(&mut self, raw: &[f64]) {
         let (Some(column), Some(t)) = (self.columns.get(self.time), raw.get(self.time)) else {

@@ -34,6 +34,8 @@ pub(super) struct TextLines {
     /// The last line, without its end.
     line: Vec<u8>,
     number: u64,
+    /// True if a line end stands behind the last line.
+    has_end: bool,
     bytes: u64,
     /// Byte that ends a line: a line feed, or a carriage return if the file has only those.
     end: u8,
@@ -59,6 +61,7 @@ impl TextLines {
             reader,
             line: Vec::new(),
             number: 0,
+            has_end: true,
             bytes: 0,
             end: if is_return_alone { b'\r' } else { b'\n' },
         })
@@ -67,6 +70,12 @@ impl TextLines {
     /// Returns the number of bytes read so far.
     pub(super) fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// Returns true if the last line is the end of the file without a line end, as where a file was cut off: a number at its
+    /// end may lack digits.
+    pub(super) fn is_cut(&self) -> bool {
+        !self.has_end && !self.line.trim_ascii().is_empty()
     }
 }
 
@@ -84,8 +93,9 @@ impl Lines for TextLines {
             return Ok(false);
         }
         self.number += 1;
+        self.has_end = self.line.last() == Some(&self.end);
         self.bytes += read as u64 * self.reader.get_ref().bytes_a_character();
-        if self.line.last() == Some(&self.end) {
+        if self.has_end {
             self.line.pop();
         } else if read == LONGEST_LINE {
             let (path, line) = (self.path.clone(), self.number);
@@ -128,6 +138,9 @@ impl Lines for TextLines {
     }
 }
 
+/// Rows from which a last row without a line end is left out. In a file with fewer rows each may be a pose that counts.
+pub(super) const SPARED: u64 = 256;
+
 /// Rows of a CSV file in order.
 pub(super) struct CsvRows {
     lines: TextLines,
@@ -140,6 +153,8 @@ pub(super) struct CsvRows {
     /// Whole seconds of the first time that is a date or a time of day.
     iso_origin: Option<i64>,
     quoted: QuotedRow,
+    /// Number of rows so far.
+    rows: u64,
 }
 
 /// A row with quoted fields: the joined text, and the end of each field.
@@ -170,6 +185,7 @@ impl CsvRows {
                 text: Vec::new(),
                 ends: Vec::new(),
             },
+            rows: 0,
         };
         let mut header = Header::of(found.names);
         header.line = Some(found.line);
@@ -203,6 +219,11 @@ impl CsvRows {
             return self.only_empty_lines_left(layout).map(|()| None);
         }
         let row = self.lines.number;
+        let is_cut = self.lines.is_cut();
+        if is_cut && self.rows >= SPARED {
+            self.remarks.push(Remark::CutRow { line: row });
+            return Ok(None);
+        }
         // Put back below: the fields are read from it while the state of the file changes.
         let line = std::mem::take(&mut self.lines.line);
         let found = match self.separator {
@@ -210,13 +231,25 @@ impl CsvRows {
             _ => self.plain_fields(layout, values, &line),
         };
         self.lines.line = line;
-        let found = match found? {
-            Some(found) => found,
-            None => self.quoted_fields(layout, values)?,
+        let found = match found {
+            Ok(None) => self.quoted_fields(layout, values),
+            found => found.map(Option::unwrap_or_default),
         };
+        if is_cut {
+            let is_whole = matches!(found, Ok(found) if found == layout.columns.len());
+            let remark = match is_whole {
+                true => Remark::OpenEnd { line: row },
+                false => Remark::CutRow { line: row },
+            };
+            self.remarks.push(remark);
+            self.rows += u64::from(is_whole);
+            return Ok(is_whole.then_some(row));
+        }
+        let found = found?;
         if found != layout.columns.len() {
             return Err(self.field_count(layout, row, found));
         }
+        self.rows += 1;
         Ok(Some(row))
     }
 

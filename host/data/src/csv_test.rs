@@ -173,8 +173,9 @@ fn wide_text_is_read_by_its_byte_order_mark() {
             })
             .collect();
         holds(&bytes, 2, &["tabs"]);
-        let cut = read(&bytes[..bytes.len() - 11]).unwrap_err();
-        assert!(cut.contains("a.csv:3:"), "{cut}");
+        let (blocks, warnings) = read(&bytes[..bytes.len() - 11]).unwrap();
+        assert_eq!(blocks[0].t, [0.0]);
+        assert!(warnings[1].contains("line 3, the last one"), "{warnings:?}");
     }
 }
 
@@ -212,7 +213,7 @@ fn what_stands_before_the_header_is_passed_over() {
 #[test]
 fn carriage_returns_alone_end_lines() {
     holds("t,q1,tau1\r0,0.5,-12.5\r0.001,0.25,3\r", 2, &[]);
-    holds("t;q1;tau1\r0;0,5;-12,5\r0,001;0,25;3", 2, &["`;`"]);
+    holds("t;q1;tau1\r0;0,5;-12,5\r0,001;0,25;3\r", 2, &["`;`"]);
     holds(
         "\r\rt,q1,tau1\r0,0.5,-12.5\r0.001,0.25,3\r\r",
         4,
@@ -358,4 +359,115 @@ fn names_with_blanks_before_their_units_are_split_at_the_other_separator() {
     // Blanks separate where they fit the rows, also with decimal commas and a comma in a name.
     let text = "t q1 tau1 at(x,y)\n0 0,5 -12,5 1\n0,001 0,25 3 1\n";
     holds(text, 2, &[&by("blanks")]);
+}
+
+#[test]
+fn the_last_row_of_a_file_that_is_cut_off_is_no_row() {
+    let rows: String = (0..300).map(|k| format!("{k}e-3,0.25,3\n")).collect();
+    let whole = format!("t,q1,tau1\n{rows}");
+    let holds_rows = |text: &str, remarks: &[&str]| {
+        let (blocks, warnings) = read(text).unwrap();
+        assert_eq!(blocks[0].t.len(), 300, "{warnings:?}");
+        assert_eq!(warnings.len(), remarks.len(), "{warnings:?}");
+        for (warning, remark) in warnings.iter().zip(remarks) {
+            assert!(warning.contains(remark), "{warning}");
+        }
+    };
+    holds_rows(&whole, &[]);
+    // Each is a row of its own with another torque, position or time, or too few fields.
+    for cut in ["0.3,0.75,1.2", "0.3,0.75,1", "0.3,0.75,", "0.3,0.7", "0.3"] {
+        for separator in [",", ";", "\t"] {
+            let text = format!("{whole}{cut}").replace(',', separator);
+            let said = "line 302, the last one, has no line end: the file may be";
+            let remarks: &[&str] = match separator {
+                "," => &[said],
+                _ => &["columns are separated", said],
+            };
+            holds_rows(&text, remarks);
+        }
+    }
+    // Blanks at the end are no row.
+    holds_rows(&format!("{whole}  "), &[]);
+}
+
+/// In a file of few rows, each may be a pose: the last one is left out only if it lacks a field.
+#[test]
+fn the_last_of_few_rows_counts_without_a_line_end() {
+    let whole = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.25,3";
+    holds(
+        whole,
+        2,
+        &["line 3, the last one, has no line end: if the file was cut off"],
+    );
+    for cut in ["\n0.002,0.7", "\n0.002,0.7,", "\n0.00"] {
+        let said = "line 4, the last one, has no line end: the file may be";
+        holds(format!("{whole}{cut}"), 2, &[said]);
+    }
+}
+
+#[test]
+fn times_since_1970_need_no_unit() {
+    for (unit, factor) in [("ms", 1e3), ("us", 1e6), ("ns", 1e9)] {
+        // 4 ms, which nanoseconds since 1970 resolve to 256 ns as doubles.
+        let time = |k: u64| (1_700_000_000 * factor as u64) + k * (4 * factor as u64 / 1000);
+        let rows = |k: u64| format!("{},{k},0\n", time(k));
+        let rows: String = (0..50).map(rows).collect();
+        let (blocks, warnings) = read(format!("t,q1,tau1\n{rows}")).unwrap();
+        assert_eq!(blocks.len(), 1, "{warnings:?}");
+        let end = blocks[0].t[49];
+        assert!(
+            blocks[0].t[0] == 0.0 && (end - 0.196).abs() < 1e-6,
+            "{unit}: {end}"
+        );
+        let words = format!("are read as {unit}, because");
+        assert!(warnings.iter().any(|w| w.contains(&words)), "{warnings:?}");
+        assert!(warnings.iter().any(|w| w.contains("since 1970")));
+    }
+}
+
+#[test]
+fn a_unit_that_is_not_known_is_named_with_those_that_are() {
+    let message = read("t,q1,tau1 [oz-in]\n0,0,0\n1,0,0\n").unwrap_err();
+    for words in ["`tau1 [oz-in]`", "its unit `oz-in` is not known", "mNm"] {
+        assert!(message.contains(words), "{message}");
+    }
+    // Where the column is not needed, it is said as well.
+    let (_, warnings) = read("t,q1,tau1,qd1 [grad/s]\n0,0,0,0\n1,0,0,0\n").unwrap();
+    assert!(
+        warnings[0].contains("`grad/s` is not known"),
+        "{warnings:?}"
+    );
+    let (blocks, _) = read("t,q1,tau1 [Nmm]\n0,0,500\n1,0,0\n").unwrap();
+    assert_eq!(blocks[0].joints[0].tau[0], 0.5);
+}
+
+#[test]
+fn several_columns_of_time_are_named() {
+    let message = read("time,timestamp,q1,tau1\n0,0,0,0\n1,1,0,0\n").unwrap_err();
+    for words in [
+        "time and timestamp are all named as a time",
+        "--map 't=time'",
+    ] {
+        assert!(message.contains(words), "{message}");
+    }
+}
+
+#[test]
+fn a_file_of_matlab_4_is_named() {
+    for is_big in [false, true] {
+        let number = |n: u32| match is_big {
+            true => n.to_be_bytes(),
+            false => n.to_le_bytes(),
+        };
+        // A column of three doubles with the name `t`.
+        let kind = if is_big { 1000 } else { 0 };
+        let mut bytes: Vec<u8> = [kind, 3, 1, 0, 2].into_iter().flat_map(number).collect();
+        bytes.extend(b"t\0");
+        bytes.extend([0; 24]);
+        let message = read(&bytes).unwrap_err();
+        assert!(
+            message.contains("MATLAB file of version 4") && message.contains("-v7"),
+            "{message}"
+        );
+    }
 }

@@ -221,6 +221,19 @@ pub enum DataError {
     },
 }
 
+impl DataError {
+    /// Adds to an error about columns what the remarks say about missing ones.
+    pub(super) fn explained<'a>(mut self, remarks: impl IntoIterator<Item = &'a Remark>) -> Self {
+        if let Self::Header { message, .. } | Self::Mapping { message } = &mut self {
+            let about = |remark: &&Remark| remark.is_about_missing_columns();
+            for remark in remarks.into_iter().filter(about) {
+                message.push_str(&format!("; {remark}"));
+            }
+        }
+        self
+    }
+}
+
 /// Describes how time fails to grow.
 fn not_growing(previous: f64, now: f64) -> String {
     let (from, to) = (format_time(previous), format_time(now));

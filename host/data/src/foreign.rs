@@ -39,7 +39,12 @@ pub enum ForeignFormat {
     /// Any other zip archive.
     #[error("a zip archive; unpack it and give the .csv or .mcap file inside")]
     Zip,
-    /// MATLAB of version 4 or 7.3; others are read.
+    /// MATLAB of version 4, which begins with no name.
+    #[error(
+        "a MATLAB file of version 4; save it with `save('out.mat', 't', 'q', 'tau', '-v7')` (in Python: `scipy.io.savemat(\"out.mat\", {{\"t\": t, \"q\": q, \"tau\": tau}})`)"
+    )]
+    Matlab4,
+    /// MATLAB of version 7.3; versions 5 to 7.2 are read.
     #[error(
         "a MATLAB file of version 7.3, which is HDF5; save it with `save('out.mat', 't', 'q', 'tau', '-v7')`"
     )]
@@ -140,8 +145,45 @@ impl ForeignFormat {
         };
         known
             .map(|(_, format)| *format)
+            .or_else(|| is_matlab_4(head).then_some(Self::Matlab4))
             .or_else(|| begins_json().then_some(Self::Json))
             .or_else(|| wide(0).then_some(Self::Wide(BIG)))
             .or_else(|| wide(1).then_some(Self::Wide(LITTLE)))
     }
+}
+
+/// Returns true for the header of a matrix in a MATLAB file of version 4 ("MAT-File Format", MathWorks R2019b, appendix): five
+/// whole numbers (type, rows, columns, imaginary part, length of the name) and the name, which ends with a zero byte.
+fn is_matlab_4(head: &[u8]) -> bool {
+    let number = |at: usize, is_big: bool| {
+        let bytes = *head.get(4 * at..)?.first_chunk()?;
+        Some(match is_big {
+            true => u32::from_be_bytes(bytes),
+            false => u32::from_le_bytes(bytes),
+        })
+    };
+    let fits = |is_big: bool| {
+        let numbers = [0, 1, 2, 3, 4].map(|at| number(at, is_big));
+        let [
+            Some(kind),
+            Some(rows),
+            Some(columns),
+            Some(imaginary),
+            Some(length),
+        ] = numbers
+        else {
+            return false;
+        };
+        // Thousands: byte order; tens: precision; ones: full, text or sparse.
+        let is_kind = kind / 1000 == u32::from(is_big) && kind % 1000 < 60 && kind % 10 < 3;
+        let name = head.get(20..20 + (length as usize).min(HEAD));
+        let is_name = name
+            .and_then(<[u8]>::split_last)
+            .is_some_and(|(end, name)| {
+                let is_letter = |b: &u8| b.is_ascii_alphanumeric() || *b == b'_';
+                *end == 0 && !name.is_empty() && name.iter().all(is_letter)
+            });
+        is_kind && is_name && imaginary < 2 && rows > 0 && columns > 0
+    };
+    fits(false) || fits(true)
 }

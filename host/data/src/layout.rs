@@ -10,8 +10,10 @@ use super::error::{DataError, Warning};
 use super::header::Header;
 use super::motors::MotorSide;
 use super::place::Place;
+use super::time_names::is_time;
 use super::unit::Unit;
 use rig_model::robot::{JointKind, Robot};
+use rig_output::listed;
 
 /// Returns the columns of a file for `robot`.
 ///
@@ -139,6 +141,13 @@ fn find(names: &[String], name: &str) -> Option<usize> {
 fn time_column(names: &[String]) -> Result<usize, String> {
     find(names, "t").ok_or_else(|| {
         let only = names.first().map_or("", String::as_str);
+        let times: Vec<String> = names.iter().filter(|n| is_time(n)).cloned().collect();
+        if let [first, _, ..] = times.as_slice() {
+            return format!(
+                "there is no column `t` (time in s), and {} are all named as a time; choose one, for instance by --map 't={first}'",
+                listed(&times)
+            );
+        }
         let hint = if only.parse::<f64>().is_ok() {
             "; the first line must name the columns"
         } else {

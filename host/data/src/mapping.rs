@@ -185,6 +185,13 @@ impl Mapping {
     fn rename_with_units(&self, header: &mut Header) {
         for k in 0..header.names.len() {
             let Some((bare, unit)) = Unit::split(&header.names[k]) else {
+                let unknown = Unit::unknown(&header.names[k]);
+                if let Some((_, unit)) = unknown.filter(|(bare, _)| kind(bare).is_some()) {
+                    header.remarks.push(Remark::UnknownUnit {
+                        label: header.labels[k].clone(),
+                        unit: unit.to_owned(),
+                    });
+                }
                 continue;
             };
             let fits = kind(bare).is_some_and(|of| of.contains(&unit.of));

@@ -352,6 +352,18 @@ fn arrays_of_numpy_and_matlab_are_columns() {
             .any(|w| w.contains("rate (1 × 1)") && w.contains("note")),
         "{warnings:?}"
     );
+    // They are named as well where a column is missing.
+    let three = crate::made_for_tests::robot(&["elbow", "shoulder", "wrist"]);
+    for (robot, mapping) in [
+        (&three, Mapping::default()),
+        (&robot, mapping(&["tau1=x"], &[])),
+    ] {
+        let error = read(&of_others("structure.mat"), robot, &mapping).unwrap_err();
+        assert!(
+            error.to_string().contains("no columns: rate (1 × 1)"),
+            "{error}"
+        );
+    }
     let folder = tempfile::tempdir().unwrap();
     for name in ["arrays.npz", "arrays.mat"] {
         let path = folder.path().join(name);

@@ -121,6 +121,45 @@ pub enum Remark {
         /// The unit.
         unit: &'static str,
     },
+    /// A unit that is not known.
+    #[error(
+        "column `{label}` is not read, because its unit `{unit}` is not known; units are {list}",
+        list = crate::unit::Unit::list()
+    )]
+    UnknownUnit {
+        /// Its name in the file.
+        label: String,
+        /// The text in its brackets.
+        unit: String,
+    },
+    /// Times since 1970 in a unit that nothing states.
+    #[error(
+        "the times of column `{label}` are read as {unit}, because {why}; give --unit t=UNIT if they are not"
+    )]
+    LikelyTime {
+        /// Its name in the file.
+        label: String,
+        /// The unit.
+        unit: &'static str,
+        /// The reason, one clause.
+        why: &'static str,
+    },
+    /// A text file whose last line has no end.
+    #[error(
+        "line {line}, the last one, has no line end: the file may be cut off within a number, so this row is not used"
+    )]
+    CutRow {
+        /// The line.
+        line: u64,
+    },
+    /// A text file of few rows whose last line has no end; the row is used.
+    #[error(
+        "line {line}, the last one, has no line end: if the file was cut off, its last number may lack digits"
+    )]
+    OpenEnd {
+        /// The line.
+        line: u64,
+    },
     /// Times that are counted from the first row.
     #[error("t is counted from the first row, because the times of the file are {what}")]
     CountedTime {
@@ -174,6 +213,11 @@ pub enum Remark {
 }
 
 impl Remark {
+    /// Returns true if it tells why a column may be missing.
+    pub(super) fn is_about_missing_columns(&self) -> bool {
+        matches!(self, Self::OtherArrays { .. } | Self::UnknownUnit { .. })
+    }
+
     /// Returns the number of its kind, from 0.
     pub(super) fn kind(&self) -> usize {
         match self {
@@ -195,7 +239,11 @@ impl Remark {
             Self::CountedTime { .. } => 15,
             Self::StandardDefinition { .. } => 16,
             Self::OtherArrays { .. } => 17,
-            Self::RoundedStamps { .. } => 18,
+            Self::UnknownUnit { .. } => 18,
+            Self::LikelyTime { .. } => 19,
+            Self::CutRow { .. } => 20,
+            Self::OpenEnd { .. } => 21,
+            Self::RoundedStamps { .. } => 22,
         }
     }
 }

@@ -41,7 +41,8 @@ pub struct Source {
     bytes: u64,
 }
 
-enum Rows {
+/// Reader of the rows of any format.
+pub(super) enum Rows {
     Csv(Box<CsvRows>),
     Messages(Box<JoinedRows>),
     Arrays(Box<TableRows>),
@@ -66,16 +67,18 @@ impl Rows {
             }
             Form::Arrays(form) => {
                 let (rows, mut header) = TableRows::open(path, *form)?;
-                mapping.rename(path, &mut header)?;
+                let renamed = mapping.rename(path, &mut header);
+                renamed.map_err(|error| error.explained(&rows.remarks()))?;
                 (Self::Arrays(Box::new(rows)), header)
             }
         };
-        mapping.set_units(path, joints, &mut header)?;
+        let set = mapping.set_units(path, joints, &mut header);
+        set.map_err(|error| error.explained(header.remarks.iter().chain(&rows.remarks())))?;
         Ok((rows, header))
     }
 
     /// Returns the assumptions and omissions so far.
-    fn remarks(&self) -> Vec<Remark> {
+    pub(super) fn remarks(&self) -> Vec<Remark> {
         match self {
             Self::Csv(r) => r.remarks(),
             Self::Messages(r) => r.remarks(),
@@ -84,7 +87,7 @@ impl Rows {
     }
 
     /// Checks that time grows from row to row.
-    fn check_growth(
+    pub(super) fn check_growth(
         &self,
         path: &Path,
         row: u64,
@@ -109,7 +112,11 @@ impl Rows {
     }
 
     /// Reads the next row in SI units into `values`.
-    fn next_row(&mut self, layout: &Layout, values: &mut [f64]) -> Result<Option<u64>, DataError> {
+    pub(super) fn next_row(
+        &mut self,
+        layout: &Layout,
+        values: &mut [f64],
+    ) -> Result<Option<u64>, DataError> {
         let row = self.next_raw(layout, values);
         layout.convert(values);
         row
@@ -124,7 +131,7 @@ impl Rows {
         }
     }
 
-    fn bytes_read(&self) -> u64 {
+    pub(super) fn bytes_read(&self) -> u64 {
         match self {
             Self::Csv(r) => r.bytes_read(),
             Self::Messages(r) => r.bytes_read(),
@@ -156,13 +163,17 @@ impl Source {
         let (form, bytes) = Form::of(path)?;
         let joints: Vec<String> = robot.joints.iter().map(|j| j.name.clone()).collect();
         let (mut rows, header) = Rows::open(path, &form, &joints, mapping)?;
-        let mut layout = layout(path, &header, robot, need)?;
+        let mut layout = layout(path, &header, robot, need)
+            .map_err(|error| error.explained(header.remarks.iter().chain(&rows.remarks())))?;
         let mut values = vec![0.0; layout.columns.len()];
         let mut times = Vec::new();
         while times.len() < PROBED_ROWS
             && let Some(line) = rows.next_raw(&layout, &mut values)?
         {
             if times.is_empty() {
+                if header.units.get(layout.time).is_none_or(Option::is_none) {
+                    layout.guess_unit_of_time(&values);
+                }
                 layout.count_from(&values);
             }
             layout.convert(&mut values);
@@ -191,7 +202,15 @@ impl Source {
             .cloned()
             .chain(rows.remarks())
             .chain(rounded);
-        let is_late = |r: &Remark| matches!(r, Remark::CutOff { .. } | Remark::LeftOut { .. });
+        let is_late = |r: &Remark| {
+            matches!(
+                r,
+                Remark::CutOff { .. }
+                    | Remark::LeftOut { .. }
+                    | Remark::CutRow { .. }
+                    | Remark::OpenEnd { .. }
+            )
+        };
         let kept = remarks.filter(|remark| !is_late(remark));
         layout
             .warnings
@@ -208,7 +227,7 @@ impl Source {
     }
 
     /// Opens the rows for another pass.
-    fn rows(&self) -> Result<Rows, DataError> {
+    pub(super) fn rows(&self) -> Result<Rows, DataError> {
         Rows::open(&self.path, &self.form, &self.joints, &self.mapping).map(|(rows, _)| rows)
     }
 

@@ -44,7 +44,11 @@ const UNITS: [(&[&str], f64, &str); 29] = [
     (&["m/s"], 1.0, SPEED),
     (&["mm/s"], 1e-3, SPEED),
     (&["Nm", "N·m", "N*m", "N.m"], 1.0, EFFORT),
-    (&["mNm", "mN·m", "mN*m", "mN.m"], 1e-3, EFFORT),
+    (
+        &["mNm", "mN·m", "mN*m", "mN.m", "Nmm", "N·mm", "N*mm"],
+        1e-3,
+        EFFORT,
+    ),
     (&["cNm", "Ncm", "N·cm"], 1e-2, EFFORT),
     (&["kNm", "kN·m"], 1e3, EFFORT),
     (&["kgcm", "kgfcm", "kgf·cm", "kg·cm"], 0.098_066_5, EFFORT),
@@ -100,6 +104,17 @@ impl Unit {
             .flatten()
     }
 
+    /// Splits `q1 [grad]` into name and text in the brackets, if that is no known unit.
+    pub(super) fn unknown(name: &str) -> Option<(&str, &str)> {
+        let name = name.trim();
+        [('[', ']'), ('(', ')')]
+            .into_iter()
+            .find_map(|(open, close)| {
+                let (bare, unit) = name.strip_suffix(close)?.rsplit_once(open)?;
+                Self::named(unit).is_none().then(|| (bare.trim_end(), unit))
+            })
+    }
+
     /// Splits a name like [`Unit::split`], also one whose unit stands before a number: `q_deg_1`, `tau_mNm2`.
     pub fn stated(name: &str) -> Option<(&str, Self)> {
         let before = name.trim().trim_end_matches(|c: char| c.is_ascii_digit());
@@ -145,6 +160,9 @@ mod tests {
         for text in ["q1", "q_m", "position_2", "tau_J", "i [x]", "_deg"] {
             assert!(Unit::split(text).is_none(), "{text}");
         }
+        assert_eq!(Unit::unknown("q1 [grad]"), Some(("q1", "grad")));
+        assert!(Unit::unknown("q1 [deg]").is_none() && Unit::unknown("q1").is_none());
+        assert_eq!(Unit::named("Nmm").unwrap().factor, 1e-3);
         for (text, unit) in [
             ("q_deg1", "deg"),
             ("tau_mNm_2", "mNm"),

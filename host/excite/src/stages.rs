@@ -496,13 +496,8 @@ impl Within<'_> {
                 asked: options,
             };
             factor *= SLOWER;
-            let trajectory = match allowance.build(kind) {
-                Ok(trajectory) => trajectory,
-                Err(reason) => {
-                    why = reason;
-                    continue;
-                }
-            };
+            let built = allowance.build(kind).map_err(|reason| why = reason);
+            let Ok(trajectory) = built else { continue };
             // In single precision, as on the rig.
             let checked: Result<Extremes<f64>, _> = trajectory
                 .to_f32()

@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::io;
 use std::time::Duration;
 
+use rig_output::format_significant;
 use rig_shared::compensation::Role;
-use rig_shared::wire::message::Refusal;
+use rig_shared::wire::message::{Bounded, Refusal};
 use rig_shared::wire::{EncodeError, EndMismatch};
 
 /// An error of the line; each text is a whole sentence.
@@ -153,6 +154,12 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
         Refusal::StorageFailed => {
             "the memory did not take the settings; those stored before still stand"
         }
+        Refusal::OutOfBounds {
+            quantity,
+            value,
+            bound,
+        } => return Cow::Owned(out_of_bounds(quantity, value, bound)),
+        Refusal::Overtaken => "a disarm or stop that was sent later came first",
         Refusal::NotCompensable(kind) => {
             let about = kind.about();
             return Cow::Owned(format!(
@@ -163,4 +170,36 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
             ));
         }
     })
+}
+/// Describes a quantity beyond its bound, with the remedy.
+fn out_of_bounds(quantity: Bounded, value: f32, bound: f32) -> String {
+    let (what, unit, remedy) = match quantity {
+        Bounded::ArmPosition => (
+            "the position of the link",
+            "rad",
+            "move the link into its range, correct --home, or widen the limits while disarmed",
+        ),
+        Bounded::ArmVelocity => (
+            "the speed of the link",
+            "rad/s",
+            "wait until it hangs still",
+        ),
+        Bounded::PositionLoop => (
+            "the natural frequency of the position loop, sqrt(kp/J),",
+            "rad/s",
+            "lower the proportional gain or raise the bandwidth of the current loop",
+        ),
+        Bounded::VelocityLoop => (
+            "the bandwidth of the velocity loop, kd/J,",
+            "rad/s",
+            "lower the derivative gain or raise the bandwidth of the current loop",
+        ),
+        Bounded::Inertia => ("the inertia of the model", "kg*m^2", "check its unit"),
+        Bounded::Gravity => ("the gravity torque of the model", "N*m", "check its unit"),
+        Bounded::DryFriction => ("the friction torque at rest", "N*m", "check its unit"),
+        Bounded::ViscousFriction => ("the viscous friction", "N*m*s/rad", "check its unit"),
+        Bounded::Offset => ("the constant torque of the model", "N*m", "check its unit"),
+    };
+    let [value, bound] = [value, bound].map(|number| format_significant(f64::from(number), 4));
+    format!("{what} is {value} {unit}, and the bound is {bound} {unit}: {remedy}")
 }

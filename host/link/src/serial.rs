@@ -1,6 +1,7 @@
 //! A serial port of this computer.
 
 use std::io;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serialport::{ErrorKind, SerialPort};
@@ -65,17 +66,26 @@ fn not_found(name: String) -> LinkError {
 
 #[cfg(unix)]
 fn permission(name: &str) -> String {
-    use std::os::unix::fs::MetadataExt;
-    let group = std::fs::metadata(name).ok().and_then(|data| {
-        let table = std::fs::read_to_string("/etc/group").ok()?;
-        group_name(&table, data.gid())
-    });
-    match group {
+    match group_of(Path::new(name), Path::new("/etc/group")) {
         Some(group) => format!(
             "it belongs to the group {group}: run `sudo usermod -aG {group} $USER` and log in again"
         ),
         None => format!("ask its owner (`ls -l {name}`) for read and write access"),
     }
+}
+
+/// Returns the name of the group that a file belongs to, from a table in the format of `/etc/group`.
+#[cfg(unix)]
+pub fn group_of(file: &Path, table: &Path) -> Option<String> {
+    use std::os::unix::fs::MetadataExt;
+    let gid = std::fs::metadata(file).ok()?.gid();
+    group_name(&std::fs::read_to_string(table).ok()?, gid)
+}
+
+/// Returns none: this system has no groups of files.
+#[cfg(not(unix))]
+pub fn group_of(_file: &Path, _table: &Path) -> Option<String> {
+    None
 }
 
 #[cfg(not(unix))]

@@ -223,7 +223,7 @@ impl Plant {
             temperature: faults.temperature_stuck.map_or(temperature, AdcCode),
             driver_fault: faults.driver,
             comparator: false,
-            overrun: faults.overrun,
+            late_ticks: u8::from(faults.overrun),
             // The plant has no board.
             encoder_wrong: None,
             encoder_open: false,

@@ -24,12 +24,16 @@
     return fixed(v, Math.min(3 - Math.floor(Math.log10(span)), 8));
   }
 
-  // The same ticks as in the still pictures.
+  // The same ticks as in the still pictures: three or more.
+  function within(lo, hi, step) { return Math.floor(hi / step + 1e-9) - Math.ceil(lo / step - 1e-9) + 1; }
   function linearTicks(lo, hi, n) {
     var span = hi - lo;
     if (!(span > 0) || !isFinite(span)) return [];
     var raw = span / n, dec = Math.floor(Math.log10(raw)), r = raw / Math.pow(10, dec), f = 1, e = dec;
     if (r > 5.000001) e += 1; else if (r > 2.000001) f = 5; else if (r > 1.000001) f = 2;
+    for (var i = 0; i < 4 && within(lo, hi, f * Math.pow(10, e)) < 3; i++) {
+      if (f === 1) { f = 5; e -= 1; } else f = f === 5 ? 2 : 1;
+    }
     var step = f * Math.pow(10, e), big = Math.floor(Math.log10(Math.max(Math.abs(lo), Math.abs(hi))));
     var out = [], last = Math.floor(hi / step + 1e-9);
     for (var k = Math.ceil(lo / step - 1e-9); k <= last && out.length < 4 * n + 4; k++) {

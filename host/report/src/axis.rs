@@ -52,7 +52,15 @@ pub(crate) struct Tick {
     pub(crate) label: String,
 }
 
-/// Returns about `count` ticks at multiples of 1, 2 or 5 times a power of ten within the range.
+/// Least number of ticks of a linear axis: two do not show that the steps are even.
+const LEAST: usize = 3;
+
+/// Returns the number of multiples of a step within a range.
+fn within(low: f64, high: f64, step: f64) -> usize {
+    ((high / step + 1e-9).floor() - (low / step - 1e-9).ceil() + 1.0).max(0.0) as usize
+}
+
+/// Returns about `count` ticks, three or more, at multiples of 1, 2 or 5 times a power of ten within the range.
 pub(crate) fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) || count == 0 {
@@ -60,13 +68,22 @@ pub(crate) fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     }
     let raw = span / count as f64;
     let decade = raw.log10().floor() as i32;
-    let unit = 10f64.powi(decade);
-    let (factor, exponent) = match raw / unit {
+    let (mut factor, mut exponent) = match raw / 10f64.powi(decade) {
         r if r <= 1.0 + 1e-9 => (1.0, decade),
         r if r <= 2.0 + 1e-9 => (2.0, decade),
         r if r <= 5.0 + 1e-9 => (5.0, decade),
         _ => (1.0, decade + 1),
     };
+    // A step of a third of the span or less fits three times; four finer steps are at most a tenth.
+    for _ in 0..4 {
+        if within(low, high, factor * 10f64.powi(exponent)) < LEAST {
+            (factor, exponent) = match factor {
+                5.0 => (2.0, exponent),
+                2.0 => (1.0, exponent),
+                _ => (5.0, exponent - 1),
+            };
+        }
+    }
     let step = factor * 10f64.powi(exponent);
     let slack = span * 1e-9;
     let first = ((low - slack) / step).ceil();
@@ -152,11 +169,17 @@ mod tests {
     #[test]
     fn ticks_are_within_the_range_evenly_spaced_and_not_too_many() {
         for scale in [1e-140, 1e-9, 0.37, 1.0, 42.0, 1e7, 1e140] {
-            for (low, high) in [(-1.0, 1.0), (0.93, 1.0), (0.0, 7.7), (-3.3, -1.1)] {
-                for count in [2, 5, 9] {
+            for (low, high) in [
+                (-1.0, 1.0),
+                (0.93, 1.0),
+                (0.0, 7.7),
+                (-3.3, -1.1),
+                (-0.75, 0.28),
+            ] {
+                for count in [2, 3, 5, 9] {
                     let (low, high) = (low * scale, high * scale);
                     let ticks = linear_ticks(low, high, count);
-                    assert!(!ticks.is_empty() && ticks.len() <= count + 1);
+                    assert!(ticks.len() >= 3 && ticks.len() <= count.max(5) + 1);
                     let slack = (high - low) * 1e-6;
                     for tick in &ticks {
                         assert!(tick.at >= low - slack && tick.at <= high + slack);

@@ -99,18 +99,18 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
     }
 }
 
-/// State of the estimator.
+/// State of the estimator. Without `WATCHES` the parameters are constant, and it never restarts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State<T, const N: usize> {
+pub struct State<T, const N: usize, const WATCHES: bool = true> {
     x: [T; N],
     carry: [T; N],
     p: UdFactor<T, N>,
-    uncertainty: Uncertainty<T, N>,
+    uncertainty: Uncertainty<T, N, WATCHES>,
     at_bound: [u32; N],
     changes: u32,
 }
 
-impl<T: Real<Mask = bool>, const N: usize> Default for State<T, N> {
+impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> Default for State<T, N, WATCHES> {
     fn default() -> Self {
         Self {
             x: [T::ZERO; N],
@@ -123,7 +123,7 @@ impl<T: Real<Mask = bool>, const N: usize> Default for State<T, N> {
     }
 }
 
-impl<T: Real<Mask = bool>, const N: usize> State<T, N> {
+impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> State<T, N, WATCHES> {
     /// Returns the diagonal of P in scaled units (prior: 1). It is not the variance of the estimate: see [`report`].
     pub fn gain_variances(&self) -> [T; N] {
         self.p.variances()
@@ -137,9 +137,9 @@ impl<T: Real<Mask = bool>, const N: usize> State<T, N> {
 
 /// Processes one measurement y = row·θ + noise. Input that is not finite changes nothing.
 #[inline]
-pub fn update<T: Real<Mask = bool>, const N: usize>(
+pub fn update<T: Real<Mask = bool>, const N: usize, const WATCHES: bool>(
     config: &Config<T, N>,
-    state: &mut State<T, N>,
+    state: &mut State<T, N, WATCHES>,
     row: &[T; N],
     y: T,
 ) -> Update {
@@ -203,9 +203,9 @@ pub fn update<T: Real<Mask = bool>, const N: usize>(
 }
 
 /// Returns the current results.
-pub fn report<T: Real<Mask = bool>, const N: usize>(
+pub fn report<T: Real<Mask = bool>, const N: usize, const WATCHES: bool>(
     config: &Config<T, N>,
-    state: &State<T, N>,
+    state: &State<T, N, WATCHES>,
 ) -> Report<T, N> {
     let mut out = Report {
         value: config.centre,

@@ -62,9 +62,10 @@ pub enum Block {
     Changed,
 }
 
-/// Error covariance and residual statistics of N scaled parameters.
+/// Error covariance and residual statistics of N scaled parameters. Without `WATCHES` the parameters are constant: no block is an
+/// alarm, and all are averaged.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Uncertainty<T, const N: usize> {
+pub struct Uncertainty<T, const N: usize, const WATCHES: bool = true> {
     sigma: [[T; N]; N],
     sum: T,
     squares: T,
@@ -79,7 +80,7 @@ pub struct Uncertainty<T, const N: usize> {
     alarms: u8,
 }
 
-impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
+impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> Uncertainty<T, N, WATCHES> {
     /// Returns the initial state: Σ is the prior's, diagonal `variance` in units of the assumed residual variance.
     pub fn new(variance: T) -> Self {
         let mut sigma = [[T::ZERO; N]; N];
@@ -178,7 +179,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.squares = T::ZERO;
         self.rows = [T::ZERO; N];
         self.filled = 0;
-        if self.is_known {
+        if self.is_known && WATCHES {
             let expected = self.noise * config.inverse_block + spread;
             let alarm = (expected * T::from_f64(ALARM_MEAN)).lt(mean * mean)
                 || (self.mean_square * T::from_f64(ALARM_POWER)).lt(square);

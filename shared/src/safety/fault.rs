@@ -1,9 +1,9 @@
-//! Faults: reasons to switch the bridge off. They are latched.
+//! Faults: reasons to end every motion. They are latched, and each has a reaction.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// A reason to switch the bridge off. Latched: the first one stays until cleared.
+/// A reason to end every motion ([`Fault::reaction`]). Latched: the first one stays until cleared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Fault {
     /// The driver chip or comparator pulled the break input.
@@ -29,7 +29,7 @@ pub enum Fault {
     Temperature,
     /// Long-term heating (i²t) beyond the motor's rating; the value is the thermal mean current in A.
     Overload,
-    /// The control tick did not finish in its period.
+    /// Control ticks were missed or did not finish in their period: two at once, or one soon after another.
     Deadline,
     /// The host has been silent for longer than allowed; the value is in s.
     HostSilent,
@@ -38,6 +38,61 @@ pub enum Fault {
     EncoderSignal,
     /// The stack is nearly full; the value is the free bytes.
     Stack,
+}
+
+/// What the bridge does after a fault. Neither is a safety function: both need a working program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reaction {
+    /// The bridge goes off: the motor is open-circuit and the link falls. For faults after which bridge, supply or current
+    /// sensor cannot be trusted.
+    Coast,
+    /// The motor brakes by its own voltage at a limited current, then with short-circuited wires. It needs neither the
+    /// encoder nor a model of the link. It coasts once its current sensor fails or its speed grows.
+    Brake,
+}
+
+impl Fault {
+    /// Returns what the bridge does if it was on when this fault came.
+    pub const fn reaction(self) -> Reaction {
+        match self {
+            Self::Driver
+            | Self::OverCurrent
+            | Self::AdcStuck
+            | Self::CurrentOffset
+            | Self::Supply => Reaction::Coast,
+            Self::EncoderJump
+            | Self::EncoderLost
+            | Self::EncoderSignal
+            | Self::OverSpeed
+            | Self::Position
+            | Self::Temperature
+            | Self::Overload
+            | Self::Deadline
+            | Self::HostSilent
+            | Self::Stack => Reaction::Brake,
+        }
+    }
+
+    /// Returns the name for logs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Driver => "Driver",
+            Self::OverCurrent => "OverCurrent",
+            Self::AdcStuck => "AdcStuck",
+            Self::CurrentOffset => "CurrentOffset",
+            Self::EncoderJump => "EncoderJump",
+            Self::EncoderLost => "EncoderLost",
+            Self::OverSpeed => "OverSpeed",
+            Self::Position => "Position",
+            Self::Supply => "Supply",
+            Self::Temperature => "Temperature",
+            Self::Overload => "Overload",
+            Self::Deadline => "Deadline",
+            Self::HostSilent => "HostSilent",
+            Self::EncoderSignal => "EncoderSignal",
+            Self::Stack => "Stack",
+        }
+    }
 }
 
 /// The first fault since the last clearing.

@@ -67,16 +67,19 @@ pub enum Limit {
     Position = 8,
     /// The host is silent: the rig comes to rest.
     HostSilent = 16,
+    /// A control tick was missed or finished late. The next one within a tenth of a second is a fault.
+    LateTick = 32,
 }
 
 impl Limit {
     /// Every limit, for iteration.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Torque,
         Self::Current,
         Self::Voltage,
         Self::Position,
         Self::HostSilent,
+        Self::LateTick,
     ];
 
     /// Returns the name for plots and tables.
@@ -87,6 +90,7 @@ impl Limit {
             Self::Voltage => "voltage",
             Self::Position => "position",
             Self::HostSilent => "host silent",
+            Self::LateTick => "late tick",
         }
     }
 }

@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 ///      │ offset out of band      │   └──Disarm────┤   └─at rest─ Stopping ◄──┘ end, Stop,
 ///      │                         │                │                 │          host silent
 ///      ▼                ClearFault                ▼                 ▼
-///    Fault ◄──────────────────────────── a fault, from any mode; the bridge is off
+///    Fault ◄──────────────────────────── a fault, from any mode; the motor brakes or coasts
 /// ```
 ///
-/// `Disarm` is accepted in every mode with the bridge on. Nothing moves without `Arm`. The first reference of `Holding`
+/// `Disarm` is accepted in every mode with the bridge on, and ends the braking after a fault. Nothing moves without `Arm`. The first reference of `Holding`
 /// is the position of the link at that moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Mode {
@@ -32,12 +32,12 @@ pub enum Mode {
     Running,
     /// Coming to rest under control.
     Stopping,
-    /// A fault is latched; bridge off.
+    /// A fault is latched: the motor brakes or coasts ([`Fault::reaction`](super::Fault::reaction)).
     Fault,
 }
 
 impl Mode {
-    /// Returns true if the bridge's outputs are driven.
+    /// Returns true if the rig controls the motor.
     pub const fn drives(self) -> bool {
         matches!(self, Self::Holding | Self::Running | Self::Stopping)
     }

@@ -261,6 +261,18 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
             "0a01ae0201080c27f31c00"
         ),
         (
+            "Acknowledge, out of bounds",
+            Report::Acknowledge(Acknowledge {
+                id: 7,
+                result: Err(Refusal::OutOfBounds {
+                    quantity: Bounded::Gravity,
+                    value: 16.0,
+                    bound: 10.0
+                })
+            }),
+            "060107010b050103804101072041d28c436600"
+        ),
+        (
             "Acknowledge, not compensable",
             Report::Acknowledge(Acknowledge {
                 id: 303,
@@ -293,13 +305,22 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 settings: SettingsOrigin::Damaged,
                 clock_hz: 170_000_000,
                 crystal: true,
+                boost: true,
                 tick_cycles_max: 5000,
                 tick_cycles_mean: 3000,
                 stack_free: 20_000,
                 bad_requests: 1,
-                dropped: 8
+                dropped: 8,
+                crash: Some(Crash {
+                    kind: CrashKind::ProcessorFault,
+                    pc: 0x0800_1234,
+                    lr: 0x0800_0101,
+                    status: 0x8200,
+                    address: 0x4000_0000,
+                    line: 0,
+                }),
             }),
-            "1808904e030380fd8751018827b817a09c0101089e59a71d00"
+            "2708904e030380fd875101018827b817a09c0101080101b4a4804081828040808402808080800405b191b85f00"
         ),
     ]
 }

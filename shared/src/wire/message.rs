@@ -147,8 +147,31 @@ pub struct Acknowledge {
     pub result: Result<(), Refusal>,
 }
 
-/// Reason for a refused request. Nothing has changed then.
+/// A quantity with a bound that a request has exceeded, with its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Bounded {
+    /// Position of the link when armed, rad; bound: the end of the position range.
+    ArmPosition,
+    /// Speed of the link when armed, rad/s.
+    ArmVelocity,
+    /// Natural frequency √(kp/J) of the position loop, rad/s; bound: a share of the current loop's bandwidth.
+    PositionLoop,
+    /// Bandwidth kd/J of the velocity loop, rad/s; bound: likewise.
+    VelocityLoop,
+    /// Inertia of the model, kg·m².
+    Inertia,
+    /// Gravity torque of the model, N·m; bound: the torque rating.
+    Gravity,
+    /// Friction torque at rest, N·m; bound: the torque rating.
+    DryFriction,
+    /// Viscous friction, N·m·s/rad.
+    ViscousFriction,
+    /// Constant torque of the model, N·m; bound: the torque rating.
+    Offset,
+}
+
+/// Reason for a refused request. Nothing has changed then.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
     /// The mode does not allow it (start while disarmed, upload while running, …).
     WrongMode,
@@ -170,6 +193,17 @@ pub enum Refusal {
     StorageFailed,
     /// No torque and no corrected reading compensates effects of this kind.
     NotCompensable(Kind),
+    /// A later `Disarm` or `Stop` came first.
+    Overtaken,
+    /// A quantity is beyond its bound.
+    OutOfBounds {
+        /// The quantity.
+        quantity: Bounded,
+        /// Its value.
+        value: f32,
+        /// Its bound.
+        bound: f32,
+    },
 }
 
 /// Consecutive state samples, oldest first.
@@ -273,6 +307,38 @@ pub enum ResetCause {
     Other,
 }
 
+/// Kind of a failure of the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum CrashKind {
+    /// The program found an error in itself.
+    Panic,
+    /// The processor could not carry out an instruction.
+    ProcessorFault,
+    /// The crystal stopped.
+    ClockStopped,
+    /// A word of the program's flash memory had two wrong bits.
+    FlashError,
+    /// An exception came that the program does not use.
+    UnexpectedException,
+}
+
+/// A failure of the program, after which the chip restarted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Crash {
+    /// What happened.
+    pub kind: CrashKind,
+    /// Address of the instruction; 0 if it is unknown.
+    pub pc: u32,
+    /// Link register: the address to which its function would have returned; 0 if it is unknown.
+    pub lr: u32,
+    /// The processor's fault status (CFSR).
+    pub status: u32,
+    /// Address of the access that failed; 0 if there was none.
+    pub address: u32,
+    /// Line of a panic in its source file, or number of an unexpected exception; else 0.
+    pub line: u32,
+}
+
 /// State of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Health {
@@ -286,6 +352,8 @@ pub struct Health {
     pub clock_hz: u32,
     /// True if a crystal sets the clock (some 50 ppm); else the chip's oscillator does (1 %, as every time then is).
     pub crystal: bool,
+    /// True if the core has the voltage of this clock (on the STM32G474 PWR_CR5.R1MODE, read for this report).
+    pub boost: bool,
     /// Processor cycles of the longest control tick since the last report, without interrupt entry.
     pub tick_cycles_max: u32,
     /// Mean processor cycles of a control tick since the last report.
@@ -296,4 +364,6 @@ pub struct Health {
     pub bad_requests: u32,
     /// Telemetry windows dropped for lack of room since power on.
     pub dropped: u32,
+    /// The failure of the program before the last start; `None` if there was none, or if the power was off since.
+    pub crash: Option<Crash>,
 }

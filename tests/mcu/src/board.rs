@@ -28,6 +28,11 @@ pub struct Bridge {
 /// Longest time from the enable input to the outputs (DRV8874, SLVSF66, t_WAKE), s.
 const WAKE: f64 = 1e-3;
 
+/// Propagation and dead time of the bridge, and delay of an amplifier with 400 kHz of bandwidth, s: estimates for a DRV8874
+/// and an INA240.
+const BRIDGE_DELAY: f64 = 0.6e-6;
+const AMPLIFIER_DELAY: f64 = 0.4e-6;
+
 /// Faults on the board; [`Plant::faults_mut`] has the faults of the rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoardFaults {
@@ -115,6 +120,8 @@ pub struct Board {
     pub enable_edges: Vec<(Instant, bool)>,
     /// Duty of the half bridges when last switched on.
     pub first_duty: f64,
+    /// Time from an edge at the bridge's inputs to the current sense at the converter, s.
+    pub sense_delay: f64,
 }
 
 impl Board {
@@ -150,6 +157,7 @@ impl Board {
             looked: 0,
             enable_edges: Vec::new(),
             first_duty: 0.0,
+            sense_delay: BRIDGE_DELAY + AMPLIFIER_DELAY,
         }
     }
 
@@ -168,14 +176,21 @@ impl Board {
         self.bridge
     }
 
+    /// Returns the time from which the bridge's outputs follow its enable.
+    pub fn awake(&self) -> Instant {
+        self.awake
+    }
+
     /// Returns the next instant at which the rig moves.
     pub fn due(&self) -> Instant {
         self.next
     }
 
-    /// Returns true if the break input's pin is high.
-    pub fn fault_pin(&self) -> bool {
-        !(self.faults.driver || self.faults.fault_line)
+    /// Returns true if the break input's pin is high at `now`. A bridge that sleeps or wakes holds it low: parts of this
+    /// family differ, and this is the worst.
+    pub fn fault_pin(&self, now: Instant) -> bool {
+        let awake = self.bridge.enable && now >= self.awake;
+        awake && !(self.faults.driver || self.faults.fault_line)
     }
 
     /// Changes the half bridges at `now`.
@@ -289,7 +304,8 @@ impl Board {
 
     /// Returns the present ripple of the current within a pulse.
     pub fn ripple(&self) -> Ripple {
-        if !self.bridge.enabled {
+        // A stuck converter does not see it either.
+        if !self.bridge.enabled || self.faults.stuck[0].is_some() {
             return Ripple::default();
         }
         let config = self.plant.config();
@@ -297,6 +313,7 @@ impl Board {
         let drop = motor.resistance * self.truth.current
             + motor.torque_constant * self.truth.motor_velocity;
         Ripple {
+            delay: self.sense_delay,
             braking: -drop / motor.inductance,
             duty: self.bridge.duty.abs().min(1.0),
             codes_per_ampere: 1.0 / f64::from(config.sensors.scaling.current_per_code),

@@ -12,6 +12,8 @@ const LARGEST: f64 = 4095.0;
 /// The sawtooth; zero by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ripple {
+    /// Delay from the pulses to the sense, s.
+    pub delay: f64,
     /// Slope while braking, A/s.
     pub braking: f64,
     /// Share of a pulse that drives.
@@ -24,6 +26,7 @@ impl Ripple {
     /// Returns the difference of the current from its mean, A, `after` seconds from the middle of a braking interval.
     pub fn at(&self, after: f64) -> f64 {
         let half = 0.5 / PULSES;
+        let after = after - self.delay;
         let within = after - (after * PULSES).round() / PULSES;
         let edge = half * (1.0 - self.duty);
         let distance = within.abs();
@@ -49,6 +52,7 @@ mod test {
     #[test]
     fn a_sawtooth_about_its_mean_with_both_its_slopes() {
         let ripple = Ripple {
+            delay: 0.0,
             braking: -20_000.0,
             duty: 0.4,
             codes_per_ampere: 100.0,
@@ -59,6 +63,11 @@ mod test {
         // The edge at 15 µs, and the midpoint back to the middle of driving.
         assert!(close(ripple.at(15e-6), -0.3) && close(ripple.at(20e-6), -0.15));
         assert!(close(ripple.at(52e-6), -0.04) && close(ripple.at(-52e-6), 0.04));
+        let late = Ripple {
+            delay: 1e-6,
+            ..ripple
+        };
+        assert!(close(late.at(1e-6), 0.0) && close(late.at(3e-6), -0.04));
         assert_eq!(ripple.on(2048, 2e-6), 2044);
         assert_eq!(ripple.on(2, 10e-6), 0);
     }

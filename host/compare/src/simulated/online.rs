@@ -33,8 +33,6 @@ pub(super) struct Online {
     pub values: Vec<Vec<f64>>,
     /// Standard deviations at the end; none before enough residuals were seen.
     pub std: Vec<Option<f64>>,
-    /// Number of restarts after a jump of the residual.
-    pub changes: u32,
 }
 
 /// Sums of squares of an equation.
@@ -93,12 +91,11 @@ fn run<const N: usize>(
     let scales: Vec<f64> = (sizes.iter())
         .map(|s| (s.rows.max(1.0) / s.y.max(f64::MIN_POSITIVE)).sqrt())
         .collect();
-    let mut state = State::<f64, N>::default();
+    let mut state = State::<f64, N, false>::default();
     let mut found_so_far = Online {
         t: Vec::new(),
         values: Vec::new(),
         std: Vec::new(),
-        changes: 0,
     };
     let every = total.div_ceil(POINTS).max(1);
     let mut index = 0;
@@ -127,7 +124,6 @@ fn run<const N: usize>(
         .map(|(std, half)| (std < half).then_some(*std))
         .take(p)
         .collect();
-    found_so_far.changes = state.changes();
     Ok(found_so_far)
 }
 
@@ -142,8 +138,8 @@ fn pass(
     each_row(robot, base, &[recording], found, model, take)
 }
 
-/// Returns the constants of the recursion and the half-widths of the bands. Nothing is forgotten, and every band is
-/// symmetric about zero.
+/// Returns the constants of the recursion and the half-widths of the bands. Nothing is forgotten, no residual is taken for a
+/// change of the parameters, and every band is symmetric about zero.
 fn config<const N: usize>(sizes: &[Sizes], p: usize, instants: u32) -> (Config<f64, N>, [f64; N]) {
     let (mut lower, mut upper) = ([0.0; N], [0.0; N]);
     for c in 0..p {

@@ -76,13 +76,6 @@ pub fn simulated(
     }
     for found in [&differential, &integral] {
         let run = online(robot, &base, &training.recording, found)?;
-        if run.changes > 0 {
-            notes.push(format!(
-                "The on-line estimate by the {} model started again {} times after a jump of its residual.",
-                name(found.model),
-                run.changes
-            ));
-        }
         let (estimate, values) = judge.online(found.model, &run);
         estimates.push(estimate);
         bases.push(values);

@@ -102,7 +102,7 @@ fn intervals_of_many_parameters_hold_the_truth() {
     }
     for [held, all] in inside {
         println!("{held} of {all}");
-        // Over 28 recordings the shares were 0.915 to 0.962. Before the rows' band ended below the cut-off, 0.892 off-line.
+        // Over 16 motions the shares were 0.910 to 0.970. Before the rows' band ended below the cut-off, 0.892 off-line.
         let share = if count < 5 { 0.8 } else { 0.9 };
         assert!(
             held as f64 >= share * all as f64 && all >= 57 * count as usize / 2,

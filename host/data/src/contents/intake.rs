@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::proposal::{Proposal, Proposed};
-use super::topic::Topic;
+use super::topic::{Contents, Topic};
 use crate::block::WRENCH_COLUMNS;
 use crate::columns::{EffortNeed, Signal};
 use crate::mapping::Mapping;
@@ -56,6 +56,12 @@ pub(super) fn refusal(
         Ok::<(), crate::error::DataError>(())
     };
     read().err().map(|error| error.to_string())
+}
+
+/// Returns a robot with the joints that the probable columns of a file state, for reading the file without a description. Its
+/// drives turn nothing: gear ratio and torque constant are 1. `None` if the template of a joint cannot be read.
+pub fn stand_in(found: &Contents) -> Option<Robot> {
+    joints_of(&found.proposal, &found.topics)
 }
 
 /// Returns true if columns of a wrist sensor are proposed.

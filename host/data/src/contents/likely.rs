@@ -47,12 +47,18 @@ pub(super) fn propose(topics: &[Topic], joints: &[String]) -> Proposal {
     // `max_by_key` returns the last of equal ones.
     if let Some(topic) = topics.iter().rev().max_by_key(rank) {
         time(topic, &mut proposal);
-        joint_columns(topic, joints, &mut proposal);
+        joint_columns(topic, joints, &Named::ALL, &mut proposal);
         let is_bag = !topic.name.is_empty();
+        // A time since 1970 needs no option.
+        let is_si = |p: &Proposed| {
+            let is_epoch = p.column == "t" && likely_time(topic.time.first, None).is_some();
+            p.unit.is_none() || (is_epoch && Unit::split(&p.channel).is_none())
+        };
         proposal.is_plain = match is_bag {
             true => topic.name == TOPIC || is_joint_state(&topic.of),
-            false => (proposal.columns.iter()).all(|p| p.column == p.channel && p.unit.is_none()),
+            false => (proposal.columns.iter()).all(|p| p.column == p.channel && is_si(p)),
         };
+        efforts_elsewhere(topic, topics, joints, &mut proposal);
     }
     wrench_columns(topics, &mut proposal);
     missing(topics, joints, &mut proposal);
@@ -61,6 +67,41 @@ pub(super) fn propose(topics: &[Topic], joints: &[String]) -> Proposal {
         proposal.options = options(&proposal.columns);
     }
     proposal
+}
+
+/// Proposes torques or currents from another topic, if the topic of the positions has none.
+fn efforts_elsewhere(main: &Topic, topics: &[Topic], joints: &[String], proposal: &mut Proposal) {
+    const EFFORTS: [Named; 3] = [Named::Effort, Named::MotorEffort, Named::Current];
+    let has = |named: Named, own: &Proposed| {
+        let number = own.column.strip_prefix(named.column());
+        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let columns = &proposal.columns;
+    let has_effort = (EFFORTS.iter()).any(|named| columns.iter().any(|own| has(*named, own)));
+    let positions = columns.iter().filter(|own| has(Named::Position, own));
+    let positions: Vec<&Proposed> = positions.collect();
+    if has_effort || positions.is_empty() || main.name.is_empty() {
+        return;
+    }
+    // The other topic may have the joints in another order: their names are those of the positions.
+    let label = |own: &&Proposed| Some(own.channel.rsplit_once('/')?.1.to_owned());
+    let known: Option<Vec<String>> = positions.iter().map(label).collect();
+    let known = match joints {
+        [] => known.unwrap_or_default(),
+        given => given.to_vec(),
+    };
+    let count = |topic: &Topic| {
+        let found = candidates(topic, &known);
+        found.iter().filter(|c| EFFORTS.contains(&c.named)).count()
+    };
+    let others = topics.iter().filter(|topic| topic.name != main.name);
+    let Some(topic) = others.rev().max_by_key(|topic| count(topic)) else {
+        return;
+    };
+    let before = proposal.columns.len();
+    joint_columns(topic, &known, &EFFORTS, proposal);
+    // Only options join two topics.
+    proposal.is_plain &= proposal.columns.len() == before;
 }
 
 /// Proposes the column of time of a text file.
@@ -93,6 +134,14 @@ fn time(topic: &Topic, proposal: &mut Proposal) {
         (None, Some((_, why))) => format!("its name states time; {why}"),
         _ => "its name states time".to_owned(),
     };
+    let others = topic.channels.iter().map(|channel| channel.name.as_str());
+    let others: Vec<&str> = others.filter(|other| is_time(other)).collect();
+    if !others.is_empty() && name != "t" {
+        proposal.doubts.push(format!(
+            "{} is named as a time, too: look which of them is that of the samples.",
+            others.join(" and ")
+        ));
+    }
     proposal.columns.push(Proposed {
         column: "t".into(),
         topic: String::new(),
@@ -123,7 +172,9 @@ fn candidates<'a>(topic: &'a Topic, joints: &[String]) -> Vec<Candidate<'a>> {
             _ => (bare, None),
         };
         let kind_words = words(kind);
-        let named = quantity(&kind_words).or_else(|| quantity(&words(bare)))?;
+        // `Float64MultiArray` calls its array `data`; the topic says of what.
+        let of_topic = || quantity(&words(&topic.name)).filter(|_| kind == "data");
+        let named = quantity(&kind_words).or_else(|| quantity(&words(bare)).or_else(of_topic))?;
         let joint = match label {
             Some(label) => match label.parse() {
                 Ok(k) => Joint::Number(k),
@@ -162,10 +213,11 @@ fn named(signal: Signal) -> Option<Named> {
     })
 }
 
-/// Proposes the columns of the joints.
-fn joint_columns(topic: &Topic, joints: &[String], proposal: &mut Proposal) {
+/// Proposes the columns of the joints, of these quantities.
+fn joint_columns(topic: &Topic, joints: &[String], wanted: &[Named], proposal: &mut Proposal) {
     let mut groups: BTreeMap<Named, Vec<Candidate>> = BTreeMap::new();
-    for candidate in candidates(topic, joints) {
+    let all = candidates(topic, joints);
+    for candidate in all.into_iter().filter(|c| wanted.contains(&c.named)) {
         groups.entry(candidate.named).or_default().push(candidate);
     }
     let mut taken: BTreeSet<String> = BTreeSet::new();

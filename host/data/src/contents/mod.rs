@@ -14,6 +14,7 @@ mod table;
 mod text;
 mod topic;
 
+pub use intake::stand_in;
 pub use picture::Picture;
 pub use proposal::{Proposal, Proposed};
 pub use read::contents;

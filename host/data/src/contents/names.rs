@@ -20,6 +20,21 @@ pub(super) enum Named {
 }
 
 impl Named {
+    /// All quantities.
+    pub(super) const ALL: [Self; 11] = [
+        Self::Position,
+        Self::MotorPosition,
+        Self::LinkPosition,
+        Self::Velocity,
+        Self::Acceleration,
+        Self::Effort,
+        Self::MotorEffort,
+        Self::Current,
+        Self::Voltage,
+        Self::Temperature,
+        Self::Reference,
+    ];
+
     /// Returns the column without its number.
     pub(super) fn column(self) -> &'static str {
         match self {

@@ -338,3 +338,86 @@ fn columns_of_a_text_file_are_found_by_the_names_of_the_joints() {
         "{missing:?}"
     );
 }
+
+/// Writes a log of messages in JSON, one topic after the other at 500 Hz.
+fn json_log(path: &Path, topics: &[(&str, &dyn Fn(f64) -> String)]) {
+    let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
+    let mut out = ::mcap::WriteOptions::new()
+        .compression(None)
+        .create(file)
+        .unwrap();
+    let schema = out.add_schema("Any", "jsonschema", b"{}").unwrap();
+    for (topic, text) in topics {
+        let none = std::collections::BTreeMap::new();
+        let channel = out.add_channel(schema, topic, "json", &none).unwrap();
+        for k in 0..200u32 {
+            let time = 2_000_000 * u64::from(k);
+            let header = ::mcap::records::MessageHeader {
+                channel_id: channel,
+                sequence: k,
+                log_time: time,
+                publish_time: time,
+            };
+            let data = text(0.002 * f64::from(k));
+            out.write_to_known_channel(&header, data.as_bytes())
+                .unwrap();
+        }
+    }
+    out.finish().unwrap();
+}
+
+#[test]
+fn torques_on_another_topic_are_proposed_by_the_joints_of_the_positions() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.mcap");
+    let moved = |t: f64| format!("{{\"position\": {{\"elbow\": {t}, \"wrist\": {}}}}}", -t);
+    // In another order.
+    let torque = |t: f64| {
+        format!(
+            "{{\"torque\": {{\"wrist\": {}, \"elbow\": {}}}}}",
+            2.0 * t,
+            3.0 * t
+        )
+    };
+    json_log(&path, &[("/joints", &moved), ("/drives", &torque)]);
+    let found = read(&path, &[]);
+    let named = columns(&found);
+    has(&named, "q1", "joints/position/elbow", None);
+    has(&named, "tau1", "drives/torque/elbow", None);
+    has(&named, "tau2", "drives/torque/wrist", None);
+    assert!(
+        found.proposal.missing.is_empty(),
+        "{:?}",
+        found.proposal.missing
+    );
+    assert_eq!(found.proposal.refusal, None);
+    let options = &found.proposal.options;
+    assert!(
+        options.contains(&"--map tau2=drives/torque/wrist".to_owned()),
+        "{options:?}"
+    );
+    // In the order of the robot.
+    let named = columns(&read(&path, &["wrist", "elbow"]));
+    has(&named, "tau1", "drives/torque/wrist", None);
+    // An array without names, on a topic that says of what.
+    let torque = |t: f64| format!("{{\"data\": [{}, {}]}}", 2.0 * t, 3.0 * t);
+    json_log(&path, &[("/joints", &moved), ("/joint_torques", &torque)]);
+    let found = read(&path, &[]);
+    has(&columns(&found), "tau2", "joint_torques/data/1", None);
+    assert_eq!(found.proposal.refusal, None);
+}
+
+#[test]
+fn a_second_time_and_a_cut_row_are_told() {
+    let text = of_text("stamp,time,q1,tau1\n0,0,0,0\n1,0.1,0,0\n2,0.2,0,0\n");
+    assert!(text.proposal.doubts[0].contains("time is named as a time, too"));
+    let cut = of_text("t,q1,tau1\n0,0,0\n0.1,0,0\n0.2,0,0.12");
+    assert_eq!(cut.topics[0].rows, 3);
+    assert!(cut.faults[0].contains("no line end"), "{:?}", cut.faults);
+    // Times since 1970 need no option.
+    let row = |k: u64| format!("{},0.5,1\n", 1_700_000_000_000_000_000 + 2_000_000 * k);
+    let text: String = (0..50).map(row).collect();
+    let found = of_text(&format!("t,q1,tau1\n{text}"));
+    has(&columns(&found), "t", "t", Some("ns"));
+    assert!(found.proposal.is_plain && found.proposal.refusal.is_none());
+}

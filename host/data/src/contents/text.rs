@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use super::topic::Topic;
-use crate::csv::TextLines;
+use crate::csv::{SPARED, TextLines};
 use crate::csv_header::{Lines, Separator, find_header};
 use crate::error::DataError;
 use crate::iso_time::iso_time;
 use crate::number::number;
+use crate::remark::Remark;
 
 /// What a text file holds.
 pub(super) struct Text {
@@ -65,6 +66,14 @@ pub(super) fn text(path: &Path, advance: &mut dyn FnMut(u64)) -> Result<Text, Da
     };
     let mut values = vec![f64::NAN; found.names.len()];
     while std::mem::take(&mut has_row) || lines.next_line()? {
+        if lines.is_cut() {
+            let line = lines.number();
+            if topic.rows >= SPARED {
+                faults.push(format!("{}.", Remark::CutRow { line }));
+                break;
+            }
+            faults.push(format!("{}.", Remark::OpenEnd { line }));
+        }
         reader.row(lines.line(), lines.number(), &mut values, &mut topic);
         if topic.rows % 4096 == 0 {
             advance(lines.bytes());

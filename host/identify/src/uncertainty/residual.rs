@@ -89,6 +89,8 @@ pub struct Series {
     pub measured: Vec<f64>,
     /// Predicted torque, N·m or N.
     pub predicted: Vec<f64>,
+    /// True where the row counts; false where it is masked.
+    pub used: Vec<bool>,
 }
 
 struct Binned {
@@ -245,6 +247,7 @@ impl ResidualStream {
             self.series.t.push(t);
             self.series.measured.push(measured);
             self.series.predicted.push(predicted);
+            self.series.used.push(used);
         }
         let e = measured - predicted;
         self.all.0 += 1;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings, refuse_twice};
+use super::input::{Inputs, RobotArg, recordings, refuse_twice};
 use super::map_arg::UnitArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
@@ -137,7 +137,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     found.warnings.extend(load.heard());
     found.warnings.extend(response.heard());
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         warnings: load.warnings().chain(response.warnings()).collect(),
         ..Context::default()
     };
@@ -146,7 +146,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(warning);
     }
     for line in lines(&robot, &found) {
-        ui.say(&line);
+        ui.answer(&line);
     }
     ui.say(&format!(
         "report: {}",

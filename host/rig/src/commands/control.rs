@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::error::CommandError;
-use super::input::{RobotArg, command_line, described};
+use super::input::{RobotArg, described};
 use super::overwrite::{refuse_file, refuse_folder};
 use super::ui::Ui;
 use crate::pages;
@@ -235,9 +235,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for warning in evaluation.warnings() {
         ui.remark(&format!("Warning: {warning}"));
     }
-    write(args, &robot, &evaluation, &motions)?;
+    write(args, &robot, &evaluation, &motions, ui)?;
     for line in lines(&evaluation) {
-        ui.say(&line);
+        ui.answer(&line);
     }
     let report = args.out.join("report.html");
     ui.say(&format!("report: {}", report.display()));
@@ -561,6 +561,7 @@ fn write(
     robot: &Robot,
     evaluation: &Evaluation,
     motions: &[Motion],
+    ui: &Ui,
 ) -> Result<(), CommandError> {
     folder(&args.out)?;
     remove_earlier(&args.out)?;
@@ -572,7 +573,7 @@ fn write(
         save(&args.out.join(name), robot, trace, reference)?;
     }
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         ..Context::default()
     };
     rig_report::write(

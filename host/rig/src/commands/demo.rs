@@ -6,7 +6,6 @@ use std::time::Instant;
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::command_line;
 use super::overwrite::{DEMONSTRATION, free_folder, refuse_folder};
 use super::pictures;
 use super::ui::Ui;
@@ -60,9 +59,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     })?;
     drop(progress);
     let path = out.join("report.html");
-    rig_report::write(&path, &demo.page(&command_line())?)?;
+    rig_report::write(&path, &demo.page(&ui.command_line())?)?;
     let found = out.join("diagnosis.html");
-    rig_report::write(&found, &demo.diagnosis_page(&command_line())?)?;
+    rig_report::write(&found, &demo.diagnosis_page(&ui.command_line())?)?;
     let json = serde_json::to_string_pretty(&demo.diagnosis).map_err(|error| {
         CommandError::Sentence(format!("The diagnosis cannot be written as JSON: {error}."))
     })?;

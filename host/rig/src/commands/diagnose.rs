@@ -9,9 +9,7 @@ use clap::Args as ClapArgs;
 use rig_shared::effects::Kind;
 
 use super::error::CommandError;
-use super::input::{
-    Inputs, RobotArg, command_line, recordings, refuse_as_rest, refuse_shared, refuse_twice,
-};
+use super::input::{Inputs, RobotArg, recordings, refuse_as_rest, refuse_shared, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::pictures::{self, forget};
@@ -150,7 +148,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
         let names = args.without.join(", ");
         (found.words).push(format!("Left out of the library, as asked: {names}."));
     }
-    write_diagnosis(&args.out, &found, &model, command_line(), warnings)?;
+    write_diagnosis(&args.out, &found, &model, ui.command_line(), warnings)?;
     printed::print(ui, &found, &args.out.join(REPORT));
     Ok(if args.exit_code {
         status(found.verdict)

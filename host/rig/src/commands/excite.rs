@@ -354,7 +354,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for note in notes {
         ui.remark(&note);
     }
-    ui.say(&format!(
+    ui.answer(&format!(
         "{}: the motion, {} of {:.1} s.",
         args.out.display(),
         kind.name(),
@@ -381,7 +381,7 @@ fn at_rest(args: &Args, count: usize, robot: &Robot, ui: &Ui) -> Result<(), Comm
     for line in summary_of_poses(&found) {
         ui.say(&line);
     }
-    ui.say(&format!(
+    ui.answer(&format!(
         "{}: the motion, {:.1} s, with a rest of {:.1} s at each pose.",
         args.out.display(),
         found.file.duration(),
@@ -476,10 +476,13 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         ui.say(&line);
     }
     ui.say(&speed_up(&effort));
-    ui.say(&format!(
-        "{}: the motion, {:.1} s from rest to rest. Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
+    ui.answer(&format!(
+        "{}: the motion, {:.1} s from rest to rest.",
         args.out.display(),
-        found.file.duration(),
+        found.file.duration()
+    ));
+    ui.say(&format!(
+        "Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
         args.robot.display(),
         args.out.display()
     ));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, Use, command_line, recordings, refuse_faults};
+use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
@@ -130,9 +130,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             ui.remark(warning);
         }
         let warnings = training.warnings().chain(sweep.warnings()).chain(heard);
-        write(&args.out, &robot, &map, warnings.collect())?;
-        for line in lines(&map, robot.joints[joint].kind) {
-            ui.say(&line);
+        write(&args.out, &robot, &map, warnings.collect(), ui)?;
+        let lines = lines(&map, robot.joints[joint].kind);
+        // The law and the decision are the last two lines.
+        for (k, line) in lines.iter().enumerate() {
+            match k + 2 < lines.len() {
+                true => ui.say(line),
+                false => ui.answer(line),
+            }
         }
     }
     ui.say(&format!(
@@ -151,9 +156,10 @@ fn write(
     robot: &Robot,
     map: &FrictionMap,
     warnings: Vec<String>,
+    ui: &Ui,
 ) -> Result<(), CommandError> {
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         warnings,
         ..Context::default()
     };

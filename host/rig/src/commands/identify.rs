@@ -11,9 +11,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 
 pub use self::impossible::Impossible;
 use super::error::CommandError;
-use super::input::{
-    Inputs, RobotArg, Use, command_line, recordings, refuse_faults, refuse_shared, refuse_twice,
-};
+use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults, refuse_shared, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
@@ -283,7 +281,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     let found = identified(robot, args, [&training, &holdout], ui)?;
     folder(&args.out)?;
-    let said = write_identification(&args.out, &description, &found, command_line(), warnings)?;
+    let said = write_identification(&args.out, &description, &found, ui.command_line(), warnings)?;
     printed::print(ui, &found);
     if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
         ui.say(&format!(

@@ -624,23 +624,6 @@ pub fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError>
     Ok(())
 }
 
-/// The command line as typed, for the section "How to repeat this" of a report.
-pub(crate) fn command_line() -> String {
-    let mut words = vec!["rig".to_string()];
-    words.extend(std::env::args().skip(1).map(|word| {
-        if word
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "-_./=:,".contains(c))
-            && !word.is_empty()
-        {
-            word
-        } else {
-            format!("'{}'", word.replace('\'', "'\\''"))
-        }
-    }));
-    words.join(" ")
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::panic)]
 mod tests {

@@ -6,7 +6,7 @@ use clap::Args as ClapArgs;
 
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
-use super::input::{command_line, described};
+use super::input::described;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::pages;
@@ -79,7 +79,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     folder(out)?;
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         ..Context::default()
     };
     write_whole(&out.join(JSON), json.as_bytes())?;
@@ -116,7 +116,7 @@ fn as_json(path: &Path, found: &Contents) -> String {
 }
 
 fn print(path: &Path, found: &Contents, ui: &Ui) {
-    ui.say(&format!(
+    ui.answer(&format!(
         "{}: {}, {} bytes, {}",
         path.display(),
         found.format,

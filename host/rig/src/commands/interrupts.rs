@@ -40,6 +40,12 @@ pub(super) fn listen(unfinished: Option<&Path>) -> Result<(), CommandError> {
         .map_err(|error| CommandError::Sentence(format!("Ctrl-C cannot be caught: {error}.")))
 }
 
+/// Lets the next request end the program at once, after a recording.
+pub(super) fn end_at_once() {
+    writing(None);
+    ASKED.store(true, Ordering::Relaxed);
+}
+
 /// Replaces the file that is being written.
 pub(super) fn writing(unfinished: Option<&Path>) {
     *UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner) = unfinished.map(Path::to_path_buf);

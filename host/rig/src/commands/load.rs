@@ -6,9 +6,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use serde::Serialize;
 
 use super::error::CommandError;
-use super::input::{
-    Inputs, RobotArg, Use, command_line, real, recordings, refuse_faults, refuse_twice,
-};
+use super::input::{Inputs, RobotArg, Use, real, recordings, refuse_faults, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
@@ -195,7 +193,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     found.warnings.extend(without.heard());
     let numbers = controller_numbers(&found);
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         warnings: with.warnings().chain(without.warnings()).collect(),
         ..Context::default()
     };
@@ -204,7 +202,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(warning);
     }
     for line in lines(&robot, &found, numbers.as_ref()) {
-        ui.say(&line);
+        ui.answer(&line);
     }
     ui.say(&format!(
         "report: {}",

@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for remark in &written.remarks {
         ui.remark(remark);
     }
-    ui.say(&format!(
+    ui.answer(&format!(
         "{}: {} joints",
         args.out.display(),
         robot.joints.len()

@@ -10,12 +10,15 @@ mod compare;
 mod completions;
 mod compliance;
 mod control;
+mod convert;
 mod demo;
 mod diagnose;
+mod doctor;
 mod error;
 mod excite;
 mod flash;
 mod friction_map;
+mod header;
 mod identify;
 mod init;
 mod input;
@@ -28,10 +31,13 @@ mod mjcf;
 mod overwrite;
 mod pictures;
 mod record;
+mod run;
 mod simulate;
+mod table;
 mod ui;
 mod urdf;
 mod validate;
+mod work;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
@@ -41,6 +47,7 @@ pub use identify::{Compare, Impossible, write_identification};
 pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
 pub use overwrite::{refuse_file, refuse_folder};
 use ui::Ui;
+use work::Work;
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
 ///
@@ -58,25 +65,14 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
-    Init(init::Args),
-    Inspect(inspect::Args),
-    Record(record::Args),
+    Run(run::Args),
+    #[command(flatten)]
+    Work(Work),
     Live(live::Args),
     Board(board::Args),
     Flash(flash::Args),
-    Excite(excite::Args),
-    Simulate(simulate::Args),
     Base(base::Args),
-    Urdf(urdf::Args),
-    Mjcf(mjcf::Args),
-    Identify(identify::Args),
-    FrictionMap(friction_map::Args),
-    Validate(validate::Args),
-    Diagnose(diagnose::Args),
-    Load(load::Args),
-    Compare(compare::Args),
-    Compliance(compliance::Args),
-    Control(control::Args),
+    Doctor(doctor::Args),
     Completions(completions::Args),
 }
 
@@ -90,42 +86,16 @@ impl Cli {
         match self.command {
             None => demo::run(&demo::Args::default(), &ui),
             Some(Command::Demo(args)) => demo::run(&args, &ui),
-            Some(Command::Init(args)) => init::run(&args, &ui),
-            Some(Command::Inspect(args)) => inspect::run(&args, &ui),
-            Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Run(args)) => return run::run(&args, &ui),
+            Some(Command::Work(work)) => return work.run(&ui),
             Some(Command::Live(args)) => live::run(&args, &ui),
             Some(Command::Board(args)) => board::run(&args, &ui),
             Some(Command::Flash(args)) => flash::run(&args, &ui),
-            Some(Command::Excite(args)) => excite::run(&args, &ui),
-            Some(Command::Simulate(args)) => simulate::run(&args, &ui),
+            Some(Command::Doctor(args)) => return doctor::run(&args, &ui),
             Some(Command::Base(args)) => base::run(&args, &ui),
-            Some(Command::Urdf(args)) => urdf::run(&args, &ui),
-            Some(Command::Mjcf(args)) => mjcf::run(&args, &ui),
-            Some(Command::Identify(args)) => {
-                ui.with_json(args.json_file(), |ui| identify::run(&args, ui))
-            }
-            Some(Command::FrictionMap(args)) => {
-                ui.with_json(args.json_file(), |ui| friction_map::run(&args, ui))
-            }
-            Some(Command::Validate(args)) => {
-                ui.with_json(args.json_file(), |ui| validate::run(&args, ui))
-            }
-            Some(Command::Diagnose(args)) => {
-                return ui.with_json(args.json_file(), |ui| diagnose::run(&args, ui));
-            }
             Some(Command::Completions(args)) => {
                 completions::run(&args, &mut Self::command(), &ui);
                 Ok(())
-            }
-            Some(Command::Load(args)) => ui.with_json(args.json_file(), |ui| load::run(&args, ui)),
-            Some(Command::Compare(args)) => {
-                ui.with_json(args.json_file(), |ui| compare::run(&args, ui))
-            }
-            Some(Command::Compliance(args)) => {
-                ui.with_json(args.json_file(), |ui| compliance::run(&args, ui))
-            }
-            Some(Command::Control(args)) => {
-                ui.with_json(args.json_file(), |ui| control::run(&args, ui))
             }
         }
         .map(|()| 0)

@@ -134,7 +134,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         doubt(&rig, &robot, motion.as_ref(), ui)?;
         record(EmulatedPort::new(rig), &experiment, &args.out, "", ui)?
     };
-    ui.say(&format!("{}: {losses}", args.out.display()));
+    ui.answer(&format!("{}: {losses}", args.out.display()));
     Ok(())
 }
 

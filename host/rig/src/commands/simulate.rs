@@ -131,7 +131,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(note);
     }
     let rows = done.motion.q.first().map_or(0, Vec::len);
-    ui.say(&format!(
+    ui.answer(&format!(
         "{}: {rows} samples, {:.1} s.",
         args.out.display(),
         rows as f64 * done.period
@@ -236,7 +236,7 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError
         .last()
         .zip(done.t.first())
         .map_or(0.0, |(end, begin)| end - begin);
-    ui.say(&format!(
+    ui.answer(&format!(
         "{}: {} samples, {length:.1} s, under voltage in the closed loop of [joint.voltage_controller].",
         args.out.display(),
         done.t.len()

@@ -1,7 +1,9 @@
 //! Output for the user while a command works: a progress bar on a terminal, and sentences.
 
+use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -9,13 +11,17 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::error::CommandError;
 
 /// Prints messages for the user. Results go to standard output, everything else to standard error.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Ui {
     terminal: bool,
     /// True if results are printed as sentences.
     has_results: bool,
     /// True if remarks are printed.
     has_remarks: bool,
+    /// The words of the command, without the name of the program.
+    words: Vec<String>,
+    /// The lines of the result that answer the question of the command.
+    answers: Rc<RefCell<Vec<String>>>,
 }
 
 impl Ui {
@@ -25,6 +31,8 @@ impl Ui {
             terminal: std::io::stderr().is_terminal(),
             has_results: true,
             has_remarks: true,
+            words: std::env::args().skip(1).collect(),
+            answers: Rc::default(),
         }
     }
 
@@ -34,15 +42,39 @@ impl Ui {
             terminal: false,
             has_results: false,
             has_remarks: false,
+            ..Self::new()
         }
     }
 
     /// Returns this output without sentences about results.
-    fn without_results(self) -> Self {
+    fn without_results(&self) -> Self {
         Self {
             has_results: false,
-            ..self
+            ..self.clone()
         }
+    }
+
+    /// Returns the output of a command with these words that is a step of another. Its results are printed if
+    /// `has_results`.
+    pub(crate) fn of_step(&self, words: &[String], has_results: bool) -> Self {
+        Self {
+            has_results: self.has_results && has_results,
+            words: words.to_vec(),
+            answers: Rc::default(),
+            ..self.clone()
+        }
+    }
+
+    /// Returns the command line that repeats the result, for reports: its words in quotation marks where a shell needs them.
+    pub(crate) fn command_line(&self) -> String {
+        let words = self.words.iter().map(|word| quoted(word));
+        let words: Vec<String> = std::iter::once("rig".to_owned()).chain(words).collect();
+        words.join(" ")
+    }
+
+    /// Returns the lines that [`Self::answer`] printed or would have printed.
+    pub(crate) fn answers(&self) -> Vec<String> {
+        self.answers.borrow().clone()
     }
 
     /// Runs a command. If `file` is one of its results, prints that instead of sentences.
@@ -70,6 +102,12 @@ impl Ui {
         if self.has_results {
             self.print(text);
         }
+    }
+
+    /// Prints a line of the result that answers the question of the command: a summary of several commands has it too.
+    pub(crate) fn answer(&self, text: &str) {
+        self.answers.borrow_mut().push(text.to_owned());
+        self.say(text);
     }
 
     /// Prints what is asked for as JSON.
@@ -106,6 +144,15 @@ impl Ui {
             bar,
             started: Some(std::time::Instant::now()),
         }
+    }
+}
+
+/// Puts a word in quotation marks if a shell needs them.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
     }
 }
 

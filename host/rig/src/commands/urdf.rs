@@ -83,7 +83,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         (Some(_), Some(_)) => "the URDF file with the description's values",
         (None, _) => "the link frames are those of the description",
     };
-    ui.say(&format!(
+    ui.answer(&format!(
         "{}: {} joints; {what}.",
         out.display(),
         robot.joints.len()

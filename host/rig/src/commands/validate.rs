@@ -6,7 +6,7 @@ use clap::Args as ClapArgs;
 use serde::Serialize;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, Use, command_line, recordings, refuse_faults};
+use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
@@ -110,7 +110,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     drop(progress);
     validation.warnings.extend(inputs.heard());
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         warnings: inputs.warnings().collect(),
         ..Context::default()
     };
@@ -147,7 +147,7 @@ fn opened(
 /// Prints the answer, the warnings and the path of the report.
 fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
     for line in answer {
-        ui.say(line);
+        ui.answer(line);
     }
     for warning in warnings {
         ui.remark(warning);
@@ -174,7 +174,7 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result
     let mut found = validate_voltage(robot, &recordings(&inputs.listened()))?;
     found.warnings.extend(inputs.heard());
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         warnings: inputs.warnings().collect(),
         ..Context::default()
     };

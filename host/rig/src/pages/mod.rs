@@ -17,6 +17,7 @@ mod inspect;
 mod load;
 mod parts;
 mod residuals;
+mod run;
 mod simulated;
 #[cfg(test)]
 mod tests;
@@ -37,6 +38,7 @@ pub use friction_map::friction_map;
 pub use identification::identification;
 pub use inspect::{inspect, time_in_words, without_options};
 pub use load::load;
+pub use run::{RunStep, run};
 pub use simulated::{simulated_overview, simulated_robot};
 pub use validation::validation;
 pub use validation_voltage::validation_voltage;

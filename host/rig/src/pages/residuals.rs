@@ -7,34 +7,60 @@ use rig_numerics::statistics::median;
 use rig_output::format_significant;
 use rig_report::{Axis, Block, Marker, Plot, Role, Series, Style};
 
-/// Inserts a gap at each jump of time, so that no line joins two recordings.
-fn with_gaps(curves: &Curves) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+/// Curves over time with a gap at each jump of time, so that no line joins two recordings.
+#[derive(Default)]
+struct Gapped {
+    t: Vec<f64>,
+    measured: Vec<f64>,
+    predicted: Vec<f64>,
+    used: Vec<bool>,
+}
+
+fn with_gaps(curves: &Curves) -> Gapped {
     let steps: Vec<f64> = curves.t.windows(2).map(|w| w[1] - w[0]).collect();
     let usual = median(steps.clone()).unwrap_or(0.0);
-    let (mut t, mut a, mut b) = (Vec::new(), Vec::new(), Vec::new());
+    let mut found = Gapped::default();
+    let mut push = |t, measured, predicted, used| {
+        found.t.push(t);
+        found.measured.push(measured);
+        found.predicted.push(predicted);
+        found.used.push(used);
+    };
     for (i, time) in curves.t.iter().enumerate() {
         let step = i.checked_sub(1).and_then(|k| steps.get(k));
         if step.is_some_and(|s| *s < 0.0 || *s > 5.0 * usual) {
-            t.push(*time);
-            a.push(f64::NAN);
-            b.push(f64::NAN);
+            push(*time, f64::NAN, f64::NAN, true);
         }
-        t.push(*time);
-        a.push(curves.measured[i]);
-        b.push(curves.predicted[i]);
+        let used = curves.used.get(i).is_none_or(|used| *used);
+        push(*time, curves.measured[i], curves.predicted[i], used);
     }
-    (t, a, b)
+    found
+}
+
+/// Returns the residual of the rows that count, and of the masked ones with the rows beside them, so that the lines meet.
+fn used_and_masked(curves: &Gapped) -> [Vec<f64>; 2] {
+    let n = curves.t.len();
+    let masked = |k: usize| curves.used.get(k).is_some_and(|used| !used);
+    let residual = |k: usize| curves.measured[k] - curves.predicted[k];
+    let shown = |show: &dyn Fn(usize) -> bool| -> Vec<f64> {
+        let value = |k| if show(k) { residual(k) } else { f64::NAN };
+        (0..n).map(value).collect()
+    };
+    let beside = |k: usize| masked(k) || masked(k + 1) || (k > 0 && masked(k - 1));
+    [shown(&|k| !masked(k)), shown(&beside)]
 }
 
 /// Draws measured and predicted torque and the residual over time.
 pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> Vec<Block> {
     let (what, torque) = (parts::effort(joint.kind), parts::units(joint.kind)[2]);
-    let (t, measured, predicted) = with_gaps(&report.series);
-    let residual: Vec<f64> = measured
-        .iter()
-        .zip(&predicted)
-        .map(|(a, b)| a - b)
-        .collect();
+    let curves = with_gaps(&report.series);
+    let [counted, masked] = used_and_masked(&curves);
+    let Gapped {
+        t,
+        measured,
+        predicted,
+        ..
+    } = curves;
     let note = format!(
         "{} rows, residual RMS {} {torque}, {what} RMS {} {torque}: the residual is {} % of it.",
         parts::count(report.rows),
@@ -64,10 +90,11 @@ pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> 
         Axis::new("time", "s"),
         Axis::new("residual", torque),
     )
-    .with(Series::line("residual", Role::Residual, t, residual))
+    .with(Series::line("masked, not counted", Role::Noise, t.clone(), masked))
+    .with(Series::line("residual", Role::Residual, t, counted))
     .mark(Marker::horizontal(0.0, ""))
     .note(format!(
-        "{} rows, RMS {} {torque}. Masked rows are drawn but not counted.",
+        "{} rows, RMS {} {torque}. Grey rows are masked and not counted; \"Treatment of the data\" says why.",
         parts::count(report.rows),
         format_significant(report.rms, 3)
     ));

@@ -7,10 +7,13 @@ use crate::cost::{REFILL, WAIT_STATES};
 use crate::cpu::{Block, Bus, Masks, Memory};
 use crate::map::{self, Peripheral};
 use crate::peripheral::adc::Adc;
+use crate::peripheral::comp::Comp;
+use crate::peripheral::dac::Dac;
 use crate::peripheral::dma::Dma;
 use crate::peripheral::dmamux::Dmamux;
 use crate::peripheral::gpio::Gpio;
 use crate::peripheral::rcc::Rcc;
+use crate::peripheral::syscfg::Syscfg;
 use crate::peripheral::tim::Tim;
 use crate::peripheral::{Refusal, told};
 
@@ -105,7 +108,7 @@ impl Chip {
         match peripheral {
             Peripheral::Tim(number) => self.store_timer(number, offset, value)?,
             Peripheral::Iwdg => self.iwdg.write(now, offset, value)?,
-            Peripheral::Pwr => self.pwr.write(offset, value)?,
+            Peripheral::Pwr => self.store_power(offset, value)?,
             Peripheral::Lpuart => self.lpuart.write(now, offset, value)?,
             Peripheral::Syscfg => self.syscfg.write(offset, value)?,
             Peripheral::Exti => self.exti.write(offset, value)?,
@@ -156,10 +159,17 @@ impl Chip {
         if Rcc::is_reset(offset) {
             self.reset_held();
         }
-        if changed {
+        // A reset of the power control or of the flash interface changes core voltage or wait states.
+        if changed || Rcc::is_reset(offset) {
             self.clocks_changed()?;
         }
         Ok(())
+    }
+
+    /// Stores to the power control: the clock must suit the core voltage afterwards too.
+    fn store_power(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
+        self.pwr.write(offset, value)?;
+        self.clocks_changed()
     }
 
     /// Stores to a port of pins.
@@ -236,6 +246,19 @@ impl Chip {
         }
         if self.rcc.is_held(Peripheral::Adc12) {
             self.adc = Adc::default();
+        }
+        if self.rcc.is_held(Peripheral::Pwr) {
+            self.pwr.reset();
+        }
+        if self.rcc.is_held(Peripheral::Flash) {
+            self.flash.reset();
+        }
+        if self.rcc.is_held(Peripheral::Syscfg) {
+            self.syscfg = Syscfg::default();
+            self.comp = Comp::default();
+        }
+        if self.rcc.is_held(Peripheral::Dac3) {
+            self.dac = Dac::default();
         }
         if self.rcc.is_held(Peripheral::Lpuart) {
             self.lpuart.reset();

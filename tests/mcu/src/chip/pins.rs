@@ -17,10 +17,10 @@ impl Chip {
         }
     }
 
-    /// Sets the pins that the board holds high: the receiving line idle, the fault line released.
+    /// Sets the pins that the board drives: the receiving line idle, the fault line.
     pub(super) fn set_pins(&mut self) {
         self.gpio[0].set_outside(3, true);
-        let fault = self.board.fault_pin();
+        let fault = self.board.fault_pin(self.work.now);
         self.gpio[1].set_outside(12, fault);
     }
 
@@ -41,7 +41,7 @@ impl Chip {
 
     /// Updates the pins that the board drives.
     pub(super) fn update_pins(&mut self) {
-        let high = self.board.fault_pin();
+        let high = self.board.fault_pin(self.work.now);
         if self.gpio[1].set_outside(12, high) && self.syscfg.port_of(12) == 1 {
             self.exti.edge(12, high);
         }
@@ -94,10 +94,14 @@ impl Chip {
         Ok(())
     }
 
+    /// Returns for each channel of the encoder whether the chip pulls its pin up, PA0 and PA1.
+    pub fn encoder_pulls(&self) -> [bool; 2] {
+        [0, 1].map(|pin| self.gpio[0].pulls_up(pin))
+    }
+
     /// Passes the encoder's edges up to now to the timers that count and time them: PA0, PA1 by alternate function 1.
     pub(super) fn count_edges(&mut self) {
-        let pulls = [0, 1].map(|pin| self.gpio[0].pulls_up(pin));
-        let edges = self.board.edges(self.work.now, pulls);
+        let edges = self.board.edges(self.work.now, self.encoder_pulls());
         for (pin, level) in self.board.levels().into_iter().enumerate() {
             self.gpio[0].set_outside(pin as u32, level);
         }

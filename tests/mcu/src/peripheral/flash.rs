@@ -21,6 +21,9 @@ const SR: u32 = 0x10;
 const CR: u32 = 0x14;
 const ECCR: u32 = 0x18;
 
+/// Data cache: on, reset.
+const DCEN: u32 = 1 << 10;
+const DCRST: u32 = 1 << 12;
 /// Writing one clears it.
 const ECCD: u32 = 1 << 31;
 const EOP: u32 = 1;
@@ -99,6 +102,14 @@ impl Flash {
     /// Handles the reading of a word with two wrong bits in bank 1 or 2 (FLASH_ECCR: ECCD, BK_ECC).
     pub fn double_error(&mut self, bank: u8) {
         self.bank.put(ECCR, ECCD | u32::from(bank == 2) << 21);
+    }
+
+    /// Handles AHB1RSTR.FLASHRST: the registers return to their values after reset; work done is still counted.
+    pub fn reset(&mut self) {
+        *self = Self {
+            work: self.work,
+            ..Self::default()
+        };
     }
 
     /// Returns the end of the present operation.
@@ -193,6 +204,11 @@ impl Flash {
                 if self.job.is_some() {
                     return told("a double word was programmed while the flash memory was busy");
                 }
+                if self.bank.get(ACR) & DCEN != 0 {
+                    return told(
+                        "a double word was programmed with the data cache on (FLASH_ACR.DCEN): reads of the other bank may then corrupt the cache (errata ES0430, 2.2.2)",
+                    );
+                }
                 self.job = Some((now + PROGRAM, Job::Program(first, bytes)));
                 let status = self.bank.get(SR) | BSY;
                 self.bank.put(SR, status);
@@ -234,6 +250,19 @@ impl Flash {
                 Ok(())
             }
             CR => self.control(now, value),
+            ACR => {
+                let before = self.bank.write(ACR, value)?;
+                // Section 3.7.1: a cache may be reset only while it is off.
+                if value & DCRST != 0 && before & DCEN != 0 {
+                    return told("the data cache was reset while it was on (FLASH_ACR.DCRST)");
+                }
+                if value & !before & DCEN != 0 && self.job.is_some() {
+                    return told(
+                        "the data cache was switched on while the flash memory was busy (errata ES0430, 2.2.2)",
+                    );
+                }
+                Ok(())
+            }
             ECCR => {
                 let kept = self.bank.get(ECCR) & !(value & ECCD);
                 self.bank.put(ECCR, kept);

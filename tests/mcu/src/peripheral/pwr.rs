@@ -44,6 +44,15 @@ impl Pwr {
         self.0.write(offset, value).map(|_| ())
     }
 
+    /// Handles APB1RSTR1.PWRRST: every register returns to its value after reset, except CR3 and CR4 (section 6.4).
+    pub fn reset(&mut self) {
+        let kept = [0x08, 0x0C].map(|offset| (offset, self.0.get(offset)));
+        self.0 = Bank::new(REGISTERS);
+        for (offset, value) in kept {
+            self.0.put(offset, value);
+        }
+    }
+
     /// Returns true if the voltage detector is on (CR2.PVDE) and `supply`, V, below its level (CR2.PLS, section 6.4.2).
     pub fn detects_low(&self, supply: f64) -> bool {
         let control = self.0.get(0x04);
@@ -59,5 +68,23 @@ impl Pwr {
             (1, _) => 150_000_000,
             _ => 26_000_000,
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A reset by PWRRST takes the core voltage back; the pulls of the pins in standby (CR3.APC) stay.
+    #[test]
+    fn a_reset_ends_the_boost() {
+        let mut pwr = Pwr::default();
+        pwr.write(0x80, 0).unwrap();
+        pwr.write(0x08, 1 << 10).unwrap();
+        assert_eq!(pwr.fastest(), 170_000_000);
+        pwr.reset();
+        assert_eq!(pwr.fastest(), 150_000_000);
+        assert_eq!(pwr.read(0x08), Ok(1 << 10));
     }
 }

@@ -349,12 +349,22 @@ impl Rcc {
             Peripheral::Tim(8) => (APB2RSTR, 13),
             Peripheral::Tim(n @ 15..=17) => (APB2RSTR, u32::from(n) + 1),
             Peripheral::Tim(_) => (APB2RSTR, 20),
+            Peripheral::Pwr => (0x38, 28),
             Peripheral::Lpuart => (0x3C, 0),
+            // One reset for the configuration, the comparators and the reference buffer.
+            Peripheral::Syscfg | Peripheral::Comp => (APB2RSTR, 0),
             Peripheral::Dma(n) => (AHB1RSTR, u32::from(n) - 1),
             Peripheral::Dmamux => (AHB1RSTR, 2),
+            Peripheral::Flash => (AHB1RSTR, 8),
             Peripheral::Gpio(n) => (0x2C, u32::from(n)),
             Peripheral::Adc12 => (0x2C, 13),
-            _ => return false,
+            Peripheral::Dac3 => (0x2C, 18),
+            Peripheral::Exti
+            | Peripheral::Rcc
+            | Peripheral::Iwdg
+            | Peripheral::Dwt
+            | Peripheral::Scs
+            | Peripheral::Dbgmcu => return false,
         };
         self.bank.get(register) & 1 << bit != 0
     }

@@ -30,6 +30,11 @@ fn it_boots_samples_at_ten_kilohertz_and_moves_nothing() {
     assert_eq!(report.reset, ResetCause::Power);
     assert_eq!(report.settings, SettingsOrigin::Defaults);
     assert!(report.crystal);
+    assert!(
+        report.boost,
+        "170 MHz at the core voltage for 150 MHz (PWR_CR5.R1MODE)"
+    );
+    assert_eq!(report.crash, None);
 }
 
 /// Bytes of a conversation of seven seconds: armed, in motion, at rest again.

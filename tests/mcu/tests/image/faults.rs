@@ -6,12 +6,15 @@ use rig_mcu::chip::{CONTROL_EXCEPTION, Chip};
 use rig_mcu::cpu::{Cpu, Memory, Register};
 use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::time::{NEVER, from_seconds, to_seconds};
-use rig_shared::safety::Fault;
+use rig_shared::safety::{Fault, FaultRecord, Limit, Reaction};
+use rig_shared::trajectory::{Staircase, Trajectory};
 use rig_shared::wire::encode;
-use rig_shared::wire::message::{Refusal, Request, RequestBody, ResetCause};
+use rig_shared::wire::message::{CrashKind, Refusal, Report, Request, RequestBody, ResetCause};
 use rig_tests::{calibrated, excitation, wait};
 
-use crate::{BoardSession, bench, board, greeted, health, moving, powered, snapshot};
+use crate::{
+    BoardSession, awaited, bench, board, greeted, hang_still, health, moving, powered, snapshot,
+};
 
 /// Seconds from now until the bridge is off for good; none if it is still on after `within`.
 pub(crate) fn off_after(line: &mut BoardSession, within: f64) -> Option<f64> {
@@ -31,6 +34,38 @@ pub(crate) fn off_after(line: &mut BoardSession, within: f64) -> Option<f64> {
     None
 }
 
+/// Seconds from now until a fault has latched, in a run of `within` seconds; none if it has not.
+pub(crate) fn latched_after(line: &mut BoardSession, within: f64) -> Option<f64> {
+    let emulated = board(line);
+    let begin = emulated.with_chip(|chip| chip.triggers);
+    emulated.run_for(within).unwrap();
+    snapshot_of_fault(line).map(|record| record.tick.saturating_sub(begin) as f64 * 1e-4)
+}
+
+/// The latched fault, if there is one.
+fn snapshot_of_fault(line: &mut BoardSession) -> Option<FaultRecord> {
+    match line.request(RequestBody::Arm) {
+        Err(LinkError::Refused {
+            refusal: Refusal::FaultLatched,
+            ..
+        }) => Some(snapshot(line).0),
+        _ => None,
+    }
+}
+
+/// Asserts that the motor has braked: the bridge is on with both wires at one potential, and the link hardly moves.
+pub(crate) fn assert_braked(line: &mut BoardSession, name: &str) {
+    let (bridge, truth) = board(line).with_board(|b| (b.bridge(), b.plant().truth()));
+    let resets = board(line).resets.clone();
+    let text = format!("{name}: {bridge:?}, {resets:?}, {truth:?}");
+    assert!(bridge.enabled && bridge.duty == 0.0, "{text}");
+    assert!(
+        truth.velocity.abs() < 0.3,
+        "{name}: {} rad/s",
+        truth.velocity
+    );
+}
+
 pub(crate) fn refused(line: &mut BoardSession, body: RequestBody) -> Refusal {
     match line.request(body) {
         Err(LinkError::Refused { refusal, .. }) => refusal,
@@ -45,9 +80,9 @@ fn cut(faults: &mut BoardFaults) {
 }
 
 #[test]
-fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
+fn each_fault_ends_the_motion_in_time_latches_and_keeps_its_snapshot() {
     type Injury = fn(&mut Chip);
-    // What is done, what must be latched, seconds until the bridge must be off.
+    // What is done, what must be latched, seconds until the bridge must be off or brake.
     let cases: [(&str, Injury, Fault, f64); 12] = [
         (
             "encoder's cable cut",
@@ -131,10 +166,20 @@ fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
     for (case, (name, injure, expected, within)) in cases.into_iter().enumerate() {
         let mut line = moving(case as u64 + 10);
         board(&mut line).with_chip(injure);
-        let Some(after) = off_after(&mut line, within) else {
-            wrong.push(format!("{name}: the bridge is on after {within} s"));
+        let after = match expected.reaction() {
+            Reaction::Coast => off_after(&mut line, within),
+            Reaction::Brake => latched_after(&mut line, within),
+        };
+        let Some(after) = after.filter(|after| *after <= within) else {
+            let latched = snapshot_of_fault(&mut line);
+            wrong.push(format!("{name}: not in {within} s, {after:?} {latched:?}"));
             continue;
         };
+        // Against 60 N·m from outside no brake of the motor holds: its current reaches the comparators.
+        if expected.reaction() == Reaction::Brake && name != "external torque" {
+            wait(&mut line, 0.5);
+            assert_braked(&mut line, name);
+        }
         let (record, ticks) = snapshot(&mut line);
         text += &format!(
             "{name:<32} {:?} after {:.2} ms\n",
@@ -183,6 +228,7 @@ fn after_a_sag_of_its_own_supply_the_board_drives_again_from_standstill() {
     board(&mut line).with_board(|b| b.faults.logic_supply = None);
     wait(&mut line, 0.5);
     line.request(RequestBody::ClearFault).unwrap();
+    hang_still(&mut line);
     line.request(RequestBody::Arm).unwrap();
     wait(&mut line, 0.01);
     let (output, bridge, first) = board(&mut line).with_chip(|chip| {
@@ -206,6 +252,7 @@ fn clearing_a_fault_takes_no_longer_than_another_tick() {
     let cost = board(&mut line).cost(CONTROL_EXCEPTION);
     println!("{} cycles in the worst tick", cost.worst_cycles);
     assert!(cost.count > 3 && cost.worst_cycles < 8500, "{cost:?}");
+    hang_still(&mut line);
     line.request(RequestBody::Arm).unwrap();
 }
 
@@ -221,6 +268,10 @@ fn a_crystal_that_stops_switches_off_and_starts_anew_without_it() {
     ));
     let report = health(&mut line);
     assert!(!report.crystal && report.reset == ResetCause::Software);
+    assert_eq!(
+        report.crash.map(|crash| crash.kind),
+        Some(CrashKind::ClockStopped)
+    );
     assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
 }
 
@@ -264,10 +315,70 @@ fn the_break_input_acts_without_the_processor() {
 #[test]
 fn a_silent_host_is_waited_for_then_stopped_then_latched() {
     let mut line = moving(31);
-    let after = off_after(&mut line, 2.0).unwrap();
+    let after = latched_after(&mut line, 2.0).unwrap();
     assert!((1.4..=1.6).contains(&after), "{after} s of silence");
+    assert_braked(&mut line, "host silent");
     assert_eq!(snapshot(&mut line).0.fault, Fault::HostSilent);
     assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
+    // The brake goes with the fault, or before it by a request.
+    line.request(RequestBody::Disarm).unwrap();
+    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+    line.request(RequestBody::ClearFault).unwrap();
+}
+
+/// A link held level falls with the bridge off. After the host has died, the short-circuited motor lets it sink.
+#[test]
+fn a_link_held_level_sinks_slowly_when_the_host_has_died() {
+    let mut line = bench(43);
+    let start = board(&mut line).with_board(|b| b.plant().truth().position);
+    let level = Staircase {
+        levels: [-start as f32].into_iter().collect(),
+        move_us: 2_000_000,
+        dwell_us: 20_000_000,
+    };
+    line.request(RequestBody::SetTrajectory(Trajectory::Staircase(level)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 2.8);
+    let held = board(&mut line).with_board(|b| b.plant().truth());
+    assert!(held.position.abs() < 0.1 && held.velocity.abs() < 0.01);
+    let mut fastest = 0.0_f64;
+    for _ in 0..4000 {
+        board(&mut line).run_for(1e-3).unwrap();
+        let velocity = board(&mut line).with_board(|b| b.plant().truth().velocity);
+        fastest = fastest.max(velocity.abs());
+    }
+    let end = board(&mut line).with_board(|b| b.plant().truth().position);
+    println!("{fastest:.3} rad/s at most, at {end:.2} rad after 4 s without a host");
+    assert_eq!(snapshot(&mut line).0.fault, Fault::HostSilent);
+    assert!(fastest > 0.05 && fastest < 0.3, "{fastest} rad/s");
+}
+
+/// One control tick that comes late is told in the recording, and the motion goes on; another soon after it is a fault.
+#[test]
+fn a_single_late_tick_is_tolerated_and_told() {
+    let mut line = moving(44);
+    line.request(RequestBody::StartStream).unwrap();
+    let late = |line: &mut BoardSession| {
+        board(line).with_chip(|chip| chip.held_until = chip.work.now + from_seconds(135e-6));
+    };
+    late(&mut line);
+    awaited(&mut line, |report| match report {
+        Report::Batch(batch) => batch
+            .samples
+            .iter()
+            .any(|sample| sample.limits.has(Limit::LateTick))
+            .then_some(()),
+        _ => None,
+    });
+    wait(&mut line, 0.2);
+    assert_eq!(snapshot_of_fault(&mut line), None);
+    for _ in 0..2 {
+        late(&mut line);
+        board(&mut line).run_for(0.01).unwrap();
+    }
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Deadline);
 }
 
 /// A command to switch off, once for each of its bits wrong, while the rig moves: none is carried out.
@@ -309,8 +420,10 @@ fn a_stack_near_its_end_is_a_fault() {
     let (end, _) = board(&mut line).image().symbol("_stack_end").unwrap();
     // As deep as if the stack had come down to its guard.
     assert!(board(&mut line).cpu().store(end + 1024, &[0x11; 16]));
-    assert!(off_after(&mut line, 0.001).is_some());
+    assert!(latched_after(&mut line, 0.001).is_some());
     assert_eq!(snapshot(&mut line).0.fault, Fault::Stack);
+    wait(&mut line, 0.5);
+    assert_braked(&mut line, "stack");
     assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
 }
 
@@ -365,8 +478,8 @@ fn a_motor_loaded_beyond_its_rating_is_switched_off_and_must_cool() {
     line.request(RequestBody::Arm).unwrap();
     line.request(RequestBody::Start).unwrap();
     wait(&mut line, 3.0);
-    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
     assert_eq!(snapshot(&mut line).0.fault, Fault::Overload);
+    assert_braked(&mut line, "overload");
     assert_eq!(
         refused(&mut line, RequestBody::ClearFault),
         Refusal::CauseActing
@@ -398,11 +511,82 @@ fn a_panic_switches_off_and_starts_anew() {
         .image()
         .function_ending("rust_begin_unwind")
         .unwrap();
+    // What the handler is given, where the stack never comes: a message with a pointer to a place in a file, of which every
+    // word is the line. Debian's compiler passes the place itself, whose third word is the line.
+    let (end, _) = emulated.image().symbol("_stack_end").unwrap();
+    let (info, place) = (end, end + 16);
+    let store = |cpu: &mut dyn Memory, address: u32, words: &[u32]| {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        assert!(cpu.store(address, &bytes));
+    };
+    let paint = emulated.word(end + 64);
+    store(emulated.cpu(), info, &[place, place, 1234, place]);
+    store(emulated.cpu(), place, &[1234; 4]);
+    assert_eq!(paint, 0xCCCC_CCCC);
+    emulated.cpu().set(Register::General(0), info);
     emulated.cpu().set(Register::Pc, handler);
     assert!(off_after(&mut line, 1e-4).is_some());
     board(&mut line).run_for(0.1).unwrap();
     let emulated = board(&mut line);
     assert!(matches!(emulated.resets[..], [(_, Cause::Software)]));
     assert!(emulated.with_board(|b| b.enable_edges.len() == 2 && !b.bridge().enabled));
-    assert_eq!(health(&mut line).reset, ResetCause::Software);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Software);
+    let crash = report.crash.unwrap();
+    assert_eq!((crash.kind, crash.line), (CrashKind::Panic, 1234));
+    // The next start has a reason of its own.
+    board(&mut line).reset(Cause::Pin);
+    wait(&mut line, 0.1);
+    assert_eq!(health(&mut line).crash, None);
+}
+
+/// An instruction that the processor cannot carry out: the next start tells where it was and what it wanted.
+#[test]
+fn a_processor_fault_is_recorded_with_its_place() {
+    let mut line = moving(45);
+    let emulated = board(&mut line);
+    emulated.faults_expected = true;
+    // No memory there.
+    let nowhere = 0x0A00_0100;
+    emulated.cpu().set(Register::Lr, 0x0800_0201);
+    emulated.cpu().set(Register::Pc, nowhere);
+    assert!(off_after(&mut line, 1e-4).is_some());
+    wait(&mut line, 0.1);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Software);
+    let crash = report.crash.unwrap();
+    println!("{crash:x?}");
+    assert_eq!(crash.kind, CrashKind::ProcessorFault);
+    assert_eq!((crash.pc & !1, crash.lr), (nowhere, 0x0800_0201));
+    assert!(crash.status != 0 && crash.address == nowhere, "{crash:x?}");
+}
+
+/// Bytes that the logs have written to the debug probe's channel: its write position, in a ring that nobody reads.
+fn logged(line: &mut BoardSession) -> u32 {
+    let emulated = board(line);
+    let (block, _) = emulated.image().symbol("_SEGGER_RTT").unwrap();
+    // Behind the name and the two numbers of channels: name, buffer, size, write, read of the first.
+    let [write, read] = [block + 24 + 12, block + 24 + 16];
+    let at = emulated.word(write);
+    // As a probe that has read everything.
+    assert!(emulated.cpu().store(read, &at.to_le_bytes()));
+    at
+}
+
+/// Each fault and each change of the mode leaves a line in the log, and a tick without any leaves none.
+#[test]
+fn faults_and_changes_of_the_mode_are_logged() {
+    let mut line = bench(46);
+    let mut last = logged(&mut line);
+    let mut grown = |line: &mut BoardSession| {
+        wait(line, 0.1);
+        let now = logged(line);
+        core::mem::replace(&mut last, now) != now
+    };
+    assert!(!grown(&mut line));
+    line.request(RequestBody::Arm).unwrap();
+    assert!(grown(&mut line));
+    board(&mut line).with_board(|b| b.faults.driver = true);
+    assert!(grown(&mut line));
+    assert!(!grown(&mut line));
 }

@@ -8,12 +8,13 @@ use rig_mcu::rig::power_on;
 use rig_mcu::time::{NEVER, from_seconds};
 use rig_shared::safety::Fault;
 use rig_shared::trajectory::{Staircase, Trajectory};
-use rig_shared::wire::message::{Refusal, RequestBody, ResetCause};
+use rig_shared::wire::message::{CrashKind, Refusal, RequestBody, ResetCause};
 use rig_tests::{calibrated, excitation, wait};
 
-use crate::faults::{off_after, refused};
+use crate::faults::{latched_after, off_after, refused};
 use crate::{
-    BoardSession, bench, board, captured, greeted, health, image, moving, place, plant, snapshot,
+    BoardSession, bench, board, captured, greeted, hang_still, health, image, moving, place, plant,
+    snapshot,
 };
 
 /// Whether TIM1's outputs are on, after so many seconds in which the processor does nothing.
@@ -52,6 +53,7 @@ fn a_short_is_switched_off_by_the_comparators_and_kept_in_the_capture() {
         assert!(ticks[..at].iter().any(|tick| tick.duty != 0.0));
         assert!(ticks[at + 1..].iter().all(|tick| tick.duty == 0.0));
         line.request(RequestBody::ClearFault).unwrap();
+        hang_still(&mut line);
         line.request(RequestBody::Arm).unwrap();
         wait(&mut line, 0.05);
         assert!(board(&mut line).with_board(|b| b.bridge().enabled));
@@ -82,24 +84,50 @@ fn too_high_a_supply_is_a_fault_as_too_low_a_one_is() {
     );
 }
 
-/// At rest, where no motion could tell: a wire that nothing drives follows the chip's own pull.
+/// Waits until a cut of these wires changes as many levels as asked for: the chip's pulls take them over.
+fn wait_for_changes(line: &mut BoardSession, cut: [bool; 2], wanted: &[usize]) {
+    for _ in 0..1000 {
+        let changes = board(line).with_chip(|chip| {
+            let (levels, pulls) = (chip.board.levels(), chip.encoder_pulls());
+            (0..2).filter(|&k| cut[k] && levels[k] != pulls[k]).count()
+        });
+        if wanted.contains(&changes) {
+            return;
+        }
+        board(line).run_for(1e-4).unwrap();
+    }
+    panic!("a cut of {cut:?} never changes {wanted:?} levels");
+}
+
+/// At rest, where no motion could tell: a wire that nothing drives follows the chip's own pull. A whole cable may come off
+/// while both pulls differ from the levels: both channels then change at once, which is a wrong step of its own.
 #[test]
 fn a_cut_encoder_wire_is_found_at_rest() {
-    for (seed, cut) in [(74, [true, true]), (75, [true, false]), (76, [false, true])] {
+    let both = [true, true];
+    for (seed, cut, changes, expected) in [
+        (74, both, &[0, 1][..], Fault::EncoderLost),
+        (74, both, &[2], Fault::EncoderSignal),
+        (75, [true, false], &[0, 1], Fault::EncoderLost),
+        (76, [false, true], &[0, 1], Fault::EncoderLost),
+    ] {
         let mut line = bench(seed);
         line.request(RequestBody::Arm).unwrap();
         wait(&mut line, 0.5);
+        wait_for_changes(&mut line, cut, changes);
         board(&mut line).with_board(|b| {
             [b.faults.channel_a_cut, b.faults.channel_b_cut] = cut;
         });
-        let after = off_after(&mut line, 0.03);
+        let after = latched_after(&mut line, 0.03);
         println!("{cut:?}: {after:?} s");
         assert!(
             after.is_some_and(|after| after < 0.015),
             "{cut:?}: {after:?}"
         );
-        assert_eq!(snapshot(&mut line).0.fault, Fault::EncoderLost, "{cut:?}");
+        let (record, _) = snapshot(&mut line);
+        assert_eq!(record.fault, expected, "{cut:?}");
+        assert!(expected != Fault::EncoderSignal || record.value == 0.0);
         // It acts whether the bridge is on or off.
+        wait(&mut line, 0.015);
         let clear = RequestBody::ClearFault;
         assert_eq!(refused(&mut line, clear), Refusal::CauseActing);
     }
@@ -154,7 +182,7 @@ fn a_missed_a_false_and_a_skewed_encoder_signal_are_told_apart() {
         let mut line = moving(78 + k as u64);
         let from = board(&mut line).with_board(|b| b.plant().truth().motor_position);
         board(&mut line).with_chip(injure);
-        assert!(off_after(&mut line, 1.0).is_some(), "{name}");
+        assert!(latched_after(&mut line, 1.0).is_some(), "{name}");
         let (record, _) = snapshot(&mut line);
         let to = board(&mut line).with_board(|b| b.plant().truth().motor_position);
         let counts = (to - from).abs() / core::f64::consts::TAU * f64::from(turn);
@@ -171,20 +199,38 @@ fn the_bridge_is_given_its_time_to_wake() {
     let mut line = bench(81);
     for _ in 0..2 {
         line.request(RequestBody::Arm).unwrap();
-        let enabled = board(&mut line).with_board(|b| b.enable_edges.last().copied());
-        let (at, on) = enabled.unwrap();
-        assert!(on);
-        let first = board(&mut line).with_chip(|chip| (chip.work.now, chip.board.first_duty));
-        // The answer may have come later than that.
-        if first.0 < at + from_seconds(1e-3) {
-            let duty = board(&mut line).with_board(|b| b.bridge().duty);
-            assert_eq!(duty, 0.0);
-        }
+        // Enabled first; the outputs stay off until it is awake.
+        let enabled = (0..200).any(|_| {
+            board(&mut line).run_for(1e-5).unwrap();
+            board(&mut line).with_board(|b| b.bridge().enable)
+        });
+        assert!(enabled);
         wait(&mut line, 0.1);
+        let (at, on) = board(&mut line).with_board(|b| b.enable_edges[b.enable_edges.len() - 1]);
+        assert!(on && at >= board(&mut line).with_board(|b| b.awake()));
         assert_eq!(board(&mut line).with_board(|b| b.first_duty), 0.0);
         assert_ne!(board(&mut line).with_board(|b| b.bridge().duty), 0.0);
         line.request(RequestBody::Disarm).unwrap();
     }
+}
+
+/// A bridge that sleeps or wakes holds its fault line low. That is no fault, and the outputs come when the line is valid; a
+/// line that stays low is one.
+#[test]
+fn a_fault_line_is_judged_only_while_the_bridge_is_awake() {
+    let mut line = bench(87);
+    assert!(!board(&mut line).with_chip(|chip| chip.board.fault_pin(chip.work.now)));
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.1);
+    assert!(board(&mut line).with_board(|b| b.bridge().enabled));
+    // To sleep and awake again.
+    line.request(RequestBody::Disarm).unwrap();
+    wait(&mut line, 0.1);
+    board(&mut line).with_board(|b| b.faults.fault_line = true);
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.01);
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Driver);
+    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
 }
 
 /// The chip's supply is the converter's reference: at 3.2 V every code is 3 % more, and is taken for what it is.
@@ -228,7 +274,10 @@ fn lock_up_and_flash_errors_take_the_outputs_in_hardware() {
         board(&mut line).resets[..],
         [(_, Cause::Software)]
     ));
-    assert_eq!(health(&mut line).reset, ResetCause::Software);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Software);
+    let kind = report.crash.map(|crash| crash.kind);
+    assert_eq!(kind, Some(CrashKind::FlashError));
 
     // In the settings' bank, as an interrupted store leaves it: off all the same, but the program goes on.
     let mut line = moving(85);
@@ -238,6 +287,7 @@ fn lock_up_and_flash_errors_take_the_outputs_in_hardware() {
     assert_eq!(snapshot(&mut line).0.fault, Fault::Driver);
     assert_eq!(board(&mut line).resets, []);
     line.request(RequestBody::ClearFault).unwrap();
+    hang_still(&mut line);
     line.request(RequestBody::Arm).unwrap();
 }
 

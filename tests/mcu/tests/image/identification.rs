@@ -158,9 +158,16 @@ fn equal_bit_for_bit(seed: u64, told: &[RequestBody]) {
     let mut line = greeted(emulated);
     // The position stays what it was at power on: where the origin is put depends on the very tick.
     wait(&mut line, 0.7);
-    for body in told {
-        line.request(body.clone()).unwrap();
-    }
+    // The triggers between which each is carried out.
+    let told: Vec<(RequestBody, [u64; 2])> = told
+        .iter()
+        .map(|body| {
+            let from = board(&mut line).with_chip(|chip| chip.triggers);
+            line.request(body.clone()).unwrap();
+            let to = board(&mut line).with_chip(|chip| chip.triggers);
+            (body.clone(), [from, to])
+        })
+        .collect();
     wait(&mut line, 0.1);
     let motion = excitation(seed, 5, 1);
     let run = recorded(
@@ -190,27 +197,21 @@ fn equal_bit_for_bit(seed: u64, told: &[RequestBody]) {
     let sent: Vec<&Estimate> = run.estimates.iter().collect();
     assert!(sent.len() > 80, "{} estimates", sent.len());
 
-    // Arming shows in the first tick after the request; the start waits for the bridge to wake, and comes later where the line
-    // took longer than that; and by the tick in which the rig was told where it stands its link may have crept on by a few
-    // counts. Which ticks and counts these are, is tried.
-    let (config, _) = nameplate::one_link();
-    let later = core::iter::once(0)
-        .chain(u64::from(config.wake_ticks)..)
-        .take(21);
-    let crept: &[i64] = if told.is_empty() {
-        &[0]
-    } else {
-        &[0, 1, -1, 2, -2, 3, -3]
-    };
+    // The outputs come when the bridge is awake, a time after the request to arm; the start waits for that too, and comes later
+    // where the line took longer; and in the tick in which the rig was told where it stands its link may have stood some counts
+    // from where it stands at the end of the request. Which ticks and counts these are, is tried.
+    let wake = u64::from(nameplate::one_link().0.wake_ticks);
+    let later = core::iter::once(0).chain(wake..).take(21);
+    let crept = counts_crept(&samples, &told);
     let tried = later.flat_map(|later| {
-        let ticks = move |back| (tick_at(armed) - back, later);
+        let ticks = move |back| (tick_at(armed) - wake - back, later);
         (0..3_u64).map(ticks)
     });
     let mut best = 0;
     'found: for (armed, later) in tried {
-        for crept in crept {
+        for &crept in &crept {
             let ticks = [armed, armed + later, tick_at(disarmed)];
-            best = best.max(replay(&samples, ticks, (told, *crept), &motion, &sent));
+            best = best.max(replay(&samples, ticks, (&told, crept), &motion, &sent));
             if best == sent.len() {
                 break 'found;
             }
@@ -220,11 +221,33 @@ fn equal_bit_for_bit(seed: u64, told: &[RequestBody]) {
     assert_eq!(best, sent.len());
 }
 
+/// By how many counts the link may have crept from the tick in which a position was told to the end of that request.
+fn counts_crept(samples: &[(u64, Sample)], told: &[(RequestBody, [u64; 2])]) -> Vec<i64> {
+    let Some((_, [from, to])) = told
+        .iter()
+        .find(|(body, _)| matches!(body, RequestBody::SetPosition(_)))
+    else {
+        return vec![0];
+    };
+    let during = samples
+        .iter()
+        .filter(|(trigger, _)| (from..=to).contains(&trigger));
+    let counts: Vec<u16> = during.map(|(_, sample)| sample.encoder.0).collect();
+    let end = *counts.last().unwrap();
+    let mut crept: Vec<i64> = counts
+        .iter()
+        .map(|count| i64::from(end.wrapping_sub(*count).cast_signed()))
+        .collect();
+    crept.sort_unstable();
+    crept.dedup();
+    crept
+}
+
 /// Runs the desktop's library over the samples; gives how many of the estimates sent it equals bit for bit.
 fn replay(
     samples: &[(u64, Sample)],
     [armed, started, disarmed]: [u64; 3],
-    (told, crept): (&[RequestBody], i64),
+    (told, crept): (&[(RequestBody, [u64; 2])], i64),
     motion: &Trajectory<f32>,
     sent: &[&Estimate],
 ) -> usize {
@@ -251,11 +274,7 @@ fn replay(
             }
         }
         // One after the other, as over the wire: each may cost the estimator a window.
-        let place = told
-            .iter()
-            .zip(1..)
-            .find(|(_, k)| tick + 900 == armed + 50 * k);
-        if let Some((body, _)) = place {
+        if let Some((body, _)) = told.iter().find(|(_, [_, to])| to == trigger) {
             let counts = config.encoder.counts_per_motor_turn as f32 * config.drive.gear_ratio;
             let shift = crept as f32 * core::f32::consts::TAU / counts;
             ask(

@@ -100,6 +100,18 @@ fn moving(seed: u64) -> BoardSession {
     line
 }
 
+/// Waits until the link hangs still: a moving one is not armed.
+fn hang_still(line: &mut BoardSession) {
+    for _ in 0..100 {
+        let velocity = board(line).with_board(|board| board.plant().truth().velocity);
+        if velocity.abs() < 0.05 {
+            return;
+        }
+        wait(line, 0.1);
+    }
+    panic!("the link still moves");
+}
+
 /// Waits for a report.
 fn awaited<T>(line: &mut BoardSession, wanted: impl Fn(&Report) -> Option<T>) -> T {
     for _ in 0..5000 {

@@ -10,12 +10,13 @@ use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::time::{from_seconds, to_seconds};
 use rig_shared::control::ControlKind;
 use rig_shared::trajectory::{HARMONICS, Trajectory};
-use rig_shared::wire::message::{Refusal, Request, RequestBody};
-use rig_shared::wire::{MAX_FRAME, encode};
+use rig_shared::wire::message::{Refusal, Report, Request, RequestBody};
+use rig_shared::wire::{MAX_FRAME, MessageDecoder, encode};
 use rig_tests::{excitation, wait};
 
 use crate::budget::{Budget, PERIOD, mixed_effects};
-use crate::{BoardSession, bench, board, health, moving};
+use crate::faults::off_after;
+use crate::{BoardSession, bench, board, hang_still, health, moving};
 
 /// Name of a request; a new one does not compile before it is here, and does not pass before it is in [`all`].
 fn name(body: &RequestBody) -> &'static str {
@@ -117,6 +118,7 @@ fn every_request_keeps_to_the_budget_whatever_the_rig_does() {
                 for told in ready {
                     line.request(told.clone()).unwrap();
                 }
+                hang_still(&mut line);
                 line.request(RequestBody::Arm).unwrap();
                 wait(&mut line, 0.3);
                 if state == "running" {
@@ -170,7 +172,7 @@ fn each_part_that_stops_is_found_by_the_watchdog() {
         });
     }
     // Seconds within which the chip must start anew; the watchdog's clock is right to a few per cent (DS12288, LSI).
-    let parts: [(&str, Stop, f64); 4] = [
+    let parts: [(&str, Stop, f64); 5] = [
         (
             "tick",
             |line| board(line).with_board(|b| b.faults.trigger_lost = true),
@@ -182,8 +184,9 @@ fn each_part_that_stops_is_found_by_the_watchdog() {
             |line| board(line).with_board(|b| b.faults.line_blocked = true),
             0.17,
         ),
-        ("commands", |line| silence(line, 4), 0.65),
-        ("keeper", |line| silence(line, 8), 0.65),
+        ("receiver", |line| silence(line, 4), 0.65),
+        ("storage", |line| silence(line, 8), 0.65),
+        ("precheck", |line| silence(line, 16), 0.65),
     ];
     for (part, stop, within) in parts {
         let mut line = moving(91);
@@ -206,23 +209,104 @@ fn each_part_that_stops_is_found_by_the_watchdog() {
     }
 }
 
-/// The longest that there is to examine, again and again while the flash is written: nobody is starved, nothing starts anew.
-#[test]
-fn long_requests_in_a_row_starve_nobody() {
-    let mut line = bench(92);
-    let mut longest = excitation(92, 5, 1);
+/// The motion that takes longest to precheck.
+fn longest(seed: u64) -> Trajectory<f32> {
+    let mut longest = excitation(seed, 5, 1);
     if let Trajectory::Fourier(motion) = &mut longest {
         motion.sine = [1e-5; HARMONICS].into_iter().collect();
         motion.cosine = motion.sine.clone();
         // As many points as there can be: two ramps of four periods.
         motion.ramp_us = 4 * motion.period_us;
     }
+    longest
+}
+
+/// Sends a request without waiting for its answer; returns the seconds that its bytes take.
+fn send(line: &mut BoardSession, id: u16, body: RequestBody) -> f64 {
+    let mut frame = [0; MAX_FRAME];
+    let length = encode(&Request { id, body }, &mut frame).unwrap();
+    board(line).with_chip(|chip| chip.send(&frame[..length]));
+    // Start bit, eight bits, stop bit.
+    length as f64 * 10.0 / 921_600.0
+}
+
+/// The answers to requests of [`send`] that come within `seconds`, in their order.
+fn answers(line: &mut BoardSession, seconds: f64) -> Vec<(u16, Result<(), Refusal>)> {
+    wait(line, seconds);
+    let bytes = line.port_mut().device_mut().heard.replace(Vec::new());
+    let mut answers = Vec::new();
+    MessageDecoder::<Report>::default().feed(&bytes.unwrap_or_default(), |report| {
+        if let Ok(Report::Acknowledge(answer)) = report
+            && answer.id >= 0x8000
+        {
+            answers.push((answer.id, answer.result));
+        }
+    });
+    answers
+}
+
+/// `Disarm` acts within two tenths of a millisecond of its last byte, and `Stop` is answered at once, while two motions are
+/// being prechecked, which takes a quarter of a second.
+#[test]
+fn disarm_and_stop_wait_for_no_precheck() {
+    let mut line = bench(93);
+    assert_eq!(answers(&mut line, 0.0), []);
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.3);
+    for id in [0x8000, 0x8001] {
+        send(&mut line, id, RequestBody::SetTrajectory(longest(93)));
+        board(&mut line).run_for(0.004).unwrap();
+    }
+    let sent = send(&mut line, 0x8002, RequestBody::Disarm);
+    let after = off_after(&mut line, 0.5).unwrap() - sent;
+    println!("off {:.0} µs after the last byte of Disarm", 1e6 * after);
+    assert!((0.0..2e-4).contains(&after), "{after} s");
+    // The motions were being prechecked meanwhile.
+    let order: Vec<u16> = answers(&mut line, 0.5).iter().map(|(id, _)| *id).collect();
+    assert_eq!(order, [0x8002, 0x8000, 0x8001]);
+
+    let mut line = moving(94);
+    assert_eq!(answers(&mut line, 0.0), []);
+    send(&mut line, 0x8000, RequestBody::SetTrajectory(longest(94)));
+    board(&mut line).run_for(0.004).unwrap();
+    send(&mut line, 0x8001, RequestBody::Stop);
+    let stopped = answers(&mut line, 0.02);
+    assert_eq!(stopped, [(0x8001, Ok(()))]);
+}
+
+/// A request that would move the rig, sent before a `Disarm` that overtakes it, must not be carried out after it.
+#[test]
+fn what_a_disarm_overtakes_does_not_arm() {
+    let mut line = bench(95);
+    assert_eq!(answers(&mut line, 0.0), []);
+    send(&mut line, 0x8000, RequestBody::SetTrajectory(longest(95)));
+    board(&mut line).run_for(0.004).unwrap();
+    send(&mut line, 0x8001, RequestBody::Arm);
+    board(&mut line).run_for(0.002).unwrap();
+    send(&mut line, 0x8002, RequestBody::Disarm);
+    let mut all = answers(&mut line, 0.5);
+    all.sort_by_key(|(id, _)| *id);
+    let expected = [
+        (0x8000, Ok(())),
+        (0x8001, Err(Refusal::Overtaken)),
+        (0x8002, Ok(())),
+    ];
+    assert_eq!(all, expected);
+    assert_eq!(board(&mut line).with_board(|b| b.enable_edges.clone()), []);
+    // A later one is.
+    line.request(RequestBody::Arm).unwrap();
+}
+
+/// The longest that there is to examine, again and again while the flash is written: nobody is starved, nothing starts anew.
+#[test]
+fn long_requests_in_a_row_starve_nobody() {
+    let mut line = bench(92);
+    let longest = longest(92);
     let begin = board(&mut line).seconds();
     line.request(RequestBody::SetTrajectory(longest.clone()))
         .unwrap();
     let one = board(&mut line).seconds() - begin;
     // Without waiting for answers, as a host that repeats them would.
-    let mut frame = [0; MAX_FRAME];
     for (id, body) in (0x8000..).zip([
         RequestBody::SetTrajectory(longest.clone()),
         RequestBody::Store,
@@ -231,8 +315,7 @@ fn long_requests_in_a_row_starve_nobody() {
         RequestBody::SetTrajectory(longest.clone()),
         RequestBody::SetTrajectory(longest),
     ]) {
-        let length = encode(&Request { id, body }, &mut frame).unwrap();
-        board(&mut line).with_chip(|chip| chip.send(&frame[..length]));
+        send(&mut line, id, body);
         board(&mut line).run_for(0.004).unwrap();
     }
     board(&mut line).run_for(3.0).unwrap();

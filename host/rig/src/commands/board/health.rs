@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use rig_shared::wire::message::{Greeting, Health, Report, SettingsOrigin};
+use rig_shared::wire::message::{Crash, CrashKind, Greeting, Health, Report, SettingsOrigin};
 
 use super::super::error::CommandError;
 use rig_link::{Port, Session};
@@ -48,7 +48,7 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
          running for     {:.1} s\n\
          started by      {:?}\n\
          started with    {settings}\n\
-         clock           {:.3} MHz, {}\n\
+         clock           {:.3} MHz, {}{}\n\
          control tick    {:.1} % of its time on average, {:.1} % at most in the last second\n\
          stack           {} bytes never used\n\
          line            {} damaged requests, {} telemetry samples without room",
@@ -61,10 +61,39 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
         } else {
             "from the chip's internal oscillator: times may be wrong by 1 %"
         },
+        if health.boost {
+            ""
+        } else {
+            "; THE CORE VOLTAGE IS TOO LOW FOR IT: do not drive, build and flash the firmware again"
+        },
         share(health.tick_cycles_mean),
         share(health.tick_cycles_max),
         health.stack_free,
         health.bad_requests,
         health.dropped,
-    )
+    ) + &health.crash.map_or(String::new(), |crash| {
+        format!("\nlast failure    {}", describe_crash(&crash))
+    })
+}
+
+/// Describes the failure of the program before the last start.
+fn describe_crash(crash: &Crash) -> String {
+    let what = match crash.kind {
+        CrashKind::Panic if crash.line == 0 => "a panic".to_owned(),
+        CrashKind::Panic => format!("a panic in line {} of its source file", crash.line),
+        CrashKind::ProcessorFault => "a processor fault".to_owned(),
+        CrashKind::ClockStopped => "the crystal stopped".to_owned(),
+        CrashKind::FlashError => "a word of the flash memory has two wrong bits".to_owned(),
+        CrashKind::UnexpectedException => format!("exception {} came unexpectedly", crash.line),
+    };
+    let numbers = [
+        ("pc", crash.pc),
+        ("lr", crash.lr),
+        ("CFSR", crash.status),
+        ("address", crash.address),
+    ];
+    let known = numbers.iter().filter(|(_, value)| *value != 0);
+    known.fold(what, |text, (name, value)| {
+        format!("{text}, {name} {value:#010x}")
+    })
 }

@@ -11,9 +11,7 @@ use self::simulated::Simulated;
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::identify::{Fit, Model, lead, speed};
-use super::input::{
-    Inputs, Use, Watched, command_line, described, recordings, refuse_faults, refuse_twice,
-};
+use super::input::{Inputs, Use, Watched, described, recordings, refuse_faults, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
@@ -227,7 +225,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(pages::SEE_IDENTIFY);
     }
     found.warnings.extend(own);
-    write(args, &robot, &found, read)?;
+    write(args, &robot, &found, read, ui)?;
+    ui.answer(grade(&found));
     for line in lines(&found) {
         ui.say(&line);
     }
@@ -244,6 +243,7 @@ fn write(
     robot: &Robot,
     found: &Comparison,
     read: Vec<String>,
+    ui: &Ui,
 ) -> Result<(), CommandError> {
     let (pooled, remarks) = pooled_robot(robot, found);
     let text = pooled.to_toml()?;
@@ -256,7 +256,7 @@ fn write(
     write_whole(&args.out.join(FILES[0]), (json + "\n").as_bytes())?;
     write_whole(&args.out.join(FILES[1]), text.as_bytes())?;
     let context = Context {
-        command: command_line(),
+        command: ui.command_line(),
         identified: Some((FILES[1].into(), text)),
         remarks,
         warnings: read,
@@ -266,9 +266,9 @@ fn write(
     Ok(())
 }
 
-/// Returns the printed answer.
-fn lines(found: &Comparison) -> Vec<String> {
-    let grade = match found.grade {
+/// Returns the answer in a sentence.
+fn grade(found: &Comparison) -> &'static str {
+    match found.grade {
         Grade::Agree => "The sets agree.",
         Grade::DifferWithoutEffect => {
             "The sets differ, and the difference does not matter for the torque."
@@ -278,9 +278,12 @@ fn lines(found: &Comparison) -> Vec<String> {
             "The sets do not differ significantly, but their errors are too large to rely on it."
         }
         Grade::NotComparable => "The sets are not comparable.",
-    };
-    let mut lines = vec![grade.to_owned()];
-    lines.extend(found.reasons.iter().cloned());
+    }
+}
+
+/// Returns what is printed after the answer.
+fn lines(found: &Comparison) -> Vec<String> {
+    let mut lines = found.reasons.clone();
     for set in &found.sets {
         if !set.not_shown.is_empty() {
             lines.push(format!(

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::chain_arg::ChainArg;
 use super::super::error::CommandError;
-use super::super::input::{command_line, described};
+use super::super::input::described;
 use super::super::overwrite::refuse_folder;
 use super::super::ui::Ui;
 use crate::pages::{self, Context};
@@ -88,19 +88,19 @@ impl Simulated<'_> {
             all.push((name, found));
         }
         drop(bar);
-        self.write(&all)?;
+        self.write(&all, ui)?;
         for (name, found) in &all {
             for line in lines(name, found) {
-                ui.say(&line);
+                ui.answer(&line);
             }
         }
         ui.say(&format!("report: {}", self.out.join(FILES[1]).display()));
         Ok(())
     }
 
-    fn write(&self, all: &[(String, SimulatedRobot)]) -> Result<(), CommandError> {
+    fn write(&self, all: &[(String, SimulatedRobot)], ui: &Ui) -> Result<(), CommandError> {
         let context = Context {
-            command: command_line(),
+            command: ui.command_line(),
             ..Context::default()
         };
         folder(self.out)?;

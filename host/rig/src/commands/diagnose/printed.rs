@@ -7,6 +7,9 @@ use crate::pages;
 use rig_diagnose::outcome::{DataFault, Diagnosis, Step, Verdict};
 use rig_output::{format_significant, format_unit};
 
+/// Number of lines that answer the question: the verdict, and the sentence that explains it.
+const ANSWER: usize = 2;
+
 /// Prints the result in short, and the path of the report.
 pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
     let lines = summary(found);
@@ -16,8 +19,11 @@ pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
             recording => format!("{recording}: {}", fault.text),
         });
     }
-    for line in lines {
-        ui.say(&line);
+    for (k, line) in lines.iter().enumerate() {
+        match k < ANSWER {
+            true => ui.answer(line),
+            false => ui.say(line),
+        }
     }
     if found.verdict == Verdict::DataFault {
         let way_on = match found.data_faults.iter().all(DataFault::leaves_rows) {

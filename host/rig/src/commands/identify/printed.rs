@@ -38,13 +38,13 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
             _ => String::new(),
         };
         if joint.train_residual_rms.is_nan() {
-            ui.say(&format!(
+            ui.answer(&format!(
                 "{}: no row of its torque was used{holdout}",
                 joint.name
             ));
             continue;
         }
-        ui.say(&format!(
+        ui.answer(&format!(
             "{}: residual {:.4} rms, {}{holdout}",
             joint.name,
             joint.train_residual_rms,

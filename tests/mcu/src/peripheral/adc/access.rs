@@ -1,8 +1,8 @@
 //! Loads and stores.
 
 use super::converter::{
-    ADCAL, ADDIS, ADEN, ADRDY, ADSTART, ADVREGEN, Adc, CALIBRATION, COMMON, CR, Codes, DEEPPWD, DR,
-    EOC, ISR, JADSTART, JEOC, JSQR, REGULATOR,
+    ADCAL, ADDIS, ADEN, ADRDY, ADSTART, ADVREGEN, Adc, CALIBRATION, COMMON, CR, Codes, DEEPPWD,
+    DIFSEL, DR, EOC, ISR, JADSTART, JEOC, JSQR, REGULATOR,
 };
 use crate::peripheral::{Refusal, told};
 use crate::time::{Instant, NEVER};
@@ -66,6 +66,11 @@ impl Adc {
             CR => self.control(now, value, system, kernel, codes)?,
             JSQR if self.bank.get(CR) & JADSTART != 0 => {
                 return told("JSQR was written while the sequence is armed");
+            }
+            DIFSEL if self.bank.get(CR) & ADEN != 0 => {
+                return told(
+                    "ADC_DIFSEL was written while the ADC was on (RM0440: only while ADEN = 0)",
+                );
             }
             _ => {
                 self.bank.write(offset, value)?;

@@ -13,6 +13,7 @@ const SQR1: u32 = 0x30;
 pub(super) const DR: u32 = 0x40;
 pub(super) const JSQR: u32 = 0x4C;
 pub(super) const JDR1: u32 = 0x80;
+pub(super) const DIFSEL: u32 = 0xB0;
 pub(super) const COMMON: u32 = 0x308;
 
 pub(super) const ADEN: u32 = 1;

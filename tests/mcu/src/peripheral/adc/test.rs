@@ -24,7 +24,9 @@ fn a_triggered_sequence_takes_its_time_and_flags_its_end() {
     write(&mut adc, t, CR, ADVREGEN | ADCAL).unwrap();
     assert!(adc.read(t, CR).unwrap() & ADCAL != 0);
     assert!(adc.read(t + 116 * 96, CR).unwrap() & ADCAL == 0);
+    write(&mut adc, t, DIFSEL, 0).unwrap();
     write(&mut adc, t, CR, ADVREGEN | ADEN).unwrap();
+    assert!(write(&mut adc, t, DIFSEL, 0).is_err());
     write(&mut adc, t, SMPR1, 2 << 18 | 2 << 21 | 2 << 24).unwrap();
     write(
         &mut adc,

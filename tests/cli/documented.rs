@@ -1,0 +1,238 @@
+//! What README and pages of `docs/` show: every command exists with its options, the walkthroughs run, and they print what the
+//! page says.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use clap::{CommandFactory, Parser};
+use rig::commands::Cli;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The pages that users read.
+fn pages() -> Vec<PathBuf> {
+    let mut found = vec![root().join("README.md"), root().join("CONTRIBUTING.md")];
+    let mut folders = vec![root().join("docs")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "md") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Fenced blocks of a page: their language and text, without the indent of a list.
+fn blocks(page: &Path) -> Vec<(String, String)> {
+    let text = fs::read_to_string(page).unwrap();
+    let mut found = Vec::new();
+    let mut open: Option<(String, usize, String)> = None;
+    for line in text.lines() {
+        let fence = line.trim_start().strip_prefix("```");
+        open = match (open, fence) {
+            (None, Some(language)) => {
+                let indent = line.len() - line.trim_start().len();
+                Some((language.trim().to_owned(), indent, String::new()))
+            }
+            (Some((language, _, block)), Some(_)) => {
+                found.push((language, block));
+                None
+            }
+            (Some((language, indent, block)), None) => {
+                let line = line.get(indent..).unwrap_or_default();
+                Some((language, indent, block + line + "\n"))
+            }
+            (None, None) => None,
+        };
+    }
+    found
+}
+
+/// The calls of `rig` in a block of shell commands, as words.
+fn calls(block: &str) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    for line in block.lines() {
+        let line = line.split(" #").next().unwrap_or_default();
+        for part in line.split([';', '|', '>']).flat_map(|p| p.split("&&")) {
+            let part = part.trim().trim_start_matches("do ").trim();
+            if part.starts_with("rig ") {
+                let words = part.replace("$k", "1");
+                found.push(words.split_whitespace().map(str::to_owned).collect());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn commands_of_the_pages_are_understood() {
+    let mut count = 0;
+    let mut wrong = Vec::new();
+    for page in pages() {
+        for (language, block) in blocks(&page) {
+            for call in calls(&block).iter().filter(|_| language == "sh") {
+                count += 1;
+                if let Err(error) = Cli::try_parse_from(call) {
+                    wrong.push(format!("{}: {call:?}: {error}", page.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count > 50, "only {count} commands were found");
+}
+
+/// Text such as `rig excite --load` names commands and options that exist.
+#[test]
+fn commands_within_sentences_have_their_options() {
+    let program = Cli::command();
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for quoted in text.split('`').skip(1).step_by(2) {
+            let mut words = quoted.split_whitespace().peekable();
+            if words.next() != Some("rig") {
+                continue;
+            }
+            let mut command = &program;
+            while let Some(next) = words.peek().and_then(|w| command.find_subcommand(w)) {
+                command = next;
+                words.next();
+            }
+            let named = command.get_name() != program.get_name();
+            if !named && !words.peek().is_none_or(|w| w.starts_with('-')) {
+                wrong.push(format!("{}: `{quoted}`: no such command", page.display()));
+            }
+            for option in words.filter_map(|w| w.strip_prefix("--")) {
+                count += 1;
+                let name = option.split(['=', ',']).next().unwrap_or_default();
+                let known = |a: &clap::Arg| {
+                    a.get_long() == Some(name)
+                        || a.get_all_aliases().is_some_and(|all| all.contains(&name))
+                };
+                let own = program.get_arguments().chain(command.get_arguments());
+                if !["help", "version"].contains(&name) && !own.into_iter().any(known) {
+                    wrong.push(format!("{}: `{quoted}`: no --{name}", page.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count > 20, "only {count} options were found");
+}
+
+/// Links to files of the project, and to headings of other pages, lead somewhere.
+#[test]
+fn links_of_the_pages_lead_somewhere() {
+    let anchor = |heading: &str| -> String {
+        let kept = |c: char| c.is_alphanumeric() || c == ' ' || c == '-' || c == '_';
+        let text = heading.trim_start_matches('#').trim().to_lowercase();
+        text.chars()
+            .filter(|c| kept(*c))
+            .collect::<String>()
+            .replace(' ', "-")
+    };
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for link in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split(')').next())
+        {
+            if link.contains("://") || link.starts_with("mailto:") {
+                continue;
+            }
+            count += 1;
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = match file {
+                "" => page.clone(),
+                file => page.parent().unwrap().join(file),
+            };
+            let found = target.exists()
+                && (heading.is_empty()
+                    || fs::read_to_string(&target)
+                        .unwrap()
+                        .lines()
+                        .any(|line| line.starts_with('#') && anchor(line) == heading));
+            if !found {
+                wrong.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count > 50, "only {count} links were found");
+}
+
+/// Runs the first `count` blocks of shell commands of a page, one after the other in an empty folder. A block without a
+/// language after them holds lines of the output.
+fn walk(page: &str, count: usize) {
+    let folder = tempfile::tempdir().unwrap();
+    let program = Path::new(env!("CARGO_BIN_EXE_rig")).parent().unwrap();
+    let path = std::env::join_paths(
+        std::iter::once(program.to_owned())
+            .chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
+    )
+    .unwrap();
+    let mut said = String::new();
+    let mut ran = 0;
+    for (language, block) in blocks(&root().join(page)) {
+        match language.as_str() {
+            "sh" if ran == count => break,
+            "sh" => {
+                ran += 1;
+                let output = Command::new("sh")
+                    .args(["-e", "-c", &block])
+                    .env("PATH", &path)
+                    .current_dir(folder.path())
+                    .output()
+                    .unwrap();
+                said = String::from_utf8(output.stdout).unwrap();
+                let errors = String::from_utf8_lossy(&output.stderr);
+                assert!(output.status.success(), "{page}: {block}\n{said}\n{errors}");
+            }
+            "" if ran > 0 => {
+                for line in block.lines() {
+                    assert!(said.contains(line), "{page} has:\n{line}\nprinted:\n{said}");
+                }
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(ran, count, "{page}");
+}
+
+#[test]
+fn the_load_is_found_as_the_page_says() {
+    walk("docs/load.md", 2);
+}
+
+#[test]
+fn four_days_are_compared_as_the_page_says() {
+    walk("docs/compare.md", 1);
+}
+
+#[test]
+fn the_stiffness_is_found_as_the_page_says() {
+    walk("docs/compliance.md", 3);
+}
+
+#[test]
+fn the_exercise_runs_as_the_page_says() {
+    walk("docs/exercise.md", 5);
+}
+
+#[test]
+fn control_laws_run_as_the_page_says() {
+    walk("docs/control.md", 1);
+}
