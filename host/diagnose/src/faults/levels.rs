@@ -11,5 +11,3 @@ pub(crate) const MUCH_BETTER: f64 = 0.2;
 pub(crate) const EXACT: f64 = 1e-6;
 /// Rows of one trial.
 pub(crate) const TRIAL: usize = 500;
-/// Ratio of residuals below which a trial is believed, if its own is below [`GOOD`] too.
-pub(crate) const BETTER: f64 = 0.35;

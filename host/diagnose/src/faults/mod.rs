@@ -11,7 +11,6 @@
 mod alike;
 mod candidates;
 mod columns;
-mod delay;
 mod described;
 mod factors;
 mod finding;

@@ -1,10 +1,10 @@
-//! Faults of torque cuts and position scales, by a refitted simple model.
+//! Faults of clocks, torque cuts and position scales, by a refitted simple model.
 
 use crate::DiagnoseError;
 use crate::faults::finding::Fault;
 use crate::faults::fit::{Fit, Measured};
 use crate::faults::judge::Judge;
-use crate::faults::levels::{BETTER, EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
+use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
 use crate::faults::misfit::Misfit;
 use crate::faults::names;
 use crate::faults::rows::Rows;
@@ -13,8 +13,28 @@ use crate::faults::undo::Undo;
 use rig_model::robot::JointKind;
 use rig_numerics::statistics;
 
+/// Residual share of the torque's variance above which other units or times are tried for a single joint, whose few
+/// parameters cannot compensate them; and for a shift in time of any robot, as many parameters of a slow arm compensate
+/// most of it.
+const POOR_ALONE: f64 = 0.01;
+/// Ratio of residuals below which a trial is believed, if its own is below [`GOOD`] too.
+const BETTER: f64 = 0.35;
+/// Ratio of residuals below which a shift is suspected; the trial decides.
+const LESS: f64 = 0.7;
 /// The same as [`MUCH_BETTER`] for a small misfit.
 const FAR_BETTER: f64 = 0.1;
+/// Largest shift from filters and buses instead of clocks, s: half a row. The second is for several joints, whose many
+/// parameters may prefer a small shift by chance.
+const SHIFT: [f64; 2] = [0.01, 0.03];
+/// Largest shift that counts as small, s.
+const SMALL: f64 = 0.1;
+/// Largest shift that is tried, s; at most a quarter of the recording.
+const FARTHEST: f64 = 5.0;
+/// Time in motion that shows a shift, as a multiple of it. A shift can explain any single short motion (the last second
+/// of the Stäubli TX40's fifth joint).
+const SHOWN_BY: f64 = 5.0;
+/// Share of a joint's highest speed above which it moves.
+const IN_MOTION: f64 = 0.05;
 /// Least misfit of cut rows, in noises of the others, if all rows are fitted: the rows of a plateau in steps have one.
 const MISFIT: f64 = 2.0;
 /// Ratio of the levels of both sides up to which they are one limit.
@@ -63,6 +83,38 @@ impl Judge<'_> {
         };
         (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level.abs()))
             .then(|| Fault::of_joint(j, found))
+    }
+
+    /// Suspects a torque that is shifted in time against the motion.
+    pub(crate) fn shifted(&self, j: usize) -> Option<Suspicion> {
+        let fit = self.fits[j].as_ref()?;
+        if fit.unexplained() < POOR_ALONE {
+            return None;
+        }
+        let time = self.rows.len() as f64 * self.rows.period;
+        let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
+        let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+        if left[reach] < POOR_ALONE || least > LESS * left[reach] {
+            return None;
+        }
+        // For a periodic motion, the nearest period.
+        let at = (0..left.len())
+            .filter(|k| left[*k] <= 1.3 * least)
+            .min_by_key(|k| k.abs_diff(reach))?;
+        let shift = (at as f64 - reach as f64) * self.rows.period;
+        if shift.abs() <= SMALL && least > BETTER * left[reach] {
+            return None;
+        }
+        let speed = &self.rows.qd[j];
+        let fastest = speed.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let moving = speed.iter().filter(|v| v.abs() > IN_MOTION * fastest);
+        let shown = moving.count() as f64 * self.rows.period > SHOWN_BY * shift.abs();
+        (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
+            let left = [left[reach], least];
+            let fault = Fault::of_joint(j, Misfit::Shifted { shift, left });
+            Suspicion::new(fault, Undo::Earlier(j, at as i64 - reach as i64))
+        })
     }
 
     /// Suspects positions that gravity and coupling show as multiples of the joint's.
