@@ -110,8 +110,21 @@ pub struct State<T, const N: usize, const WATCHES: bool = true> {
     changes: u32,
 }
 
-impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> Default for State<T, N, WATCHES> {
+impl<T: Real<Mask = bool>, const N: usize> Default for State<T, N> {
     fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real<Mask = bool>, const N: usize> State<T, N, false> {
+    /// Returns the initial state for parameters that are constant.
+    pub fn of_constant_parameters() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> State<T, N, WATCHES> {
+    fn new() -> Self {
         Self {
             x: [T::ZERO; N],
             carry: [T::ZERO; N],
@@ -121,9 +134,7 @@ impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> Default for Stat
             changes: 0,
         }
     }
-}
 
-impl<T: Real<Mask = bool>, const N: usize, const WATCHES: bool> State<T, N, WATCHES> {
     /// Returns the diagonal of P in scaled units (prior: 1). It is not the variance of the estimate: see [`report`].
     pub fn gain_variances(&self) -> [T; N] {
         self.p.variances()

@@ -91,7 +91,7 @@ fn run<const N: usize>(
     let scales: Vec<f64> = (sizes.iter())
         .map(|s| (s.rows.max(1.0) / s.y.max(f64::MIN_POSITIVE)).sqrt())
         .collect();
-    let mut state = State::<f64, N, false>::default();
+    let mut state = State::<f64, N, false>::of_constant_parameters();
     let mut found_so_far = Online {
         t: Vec::new(),
         values: Vec::new(),
