@@ -167,16 +167,16 @@ pub enum Implausible {
     },
     /// Rows that repeat the row before while the joints move.
     #[error(
-        "t counts repeated rows: {share} % of the rows in motion (the first at t = {} s) have the positions and torques of the row before; {how}",
-        format_time(*at)
+        "t counts repeated rows: {} % of the rows in motion (the first at t = {} s) have the positions and torques of the row before; {}",
+        format_significant(*percent, 2), format_time(*at), repeated_how(*percent, *made_up)
     )]
     RepeatedRows {
         /// Time of the first repeated row, s.
         at: f64,
         /// Share of the rows in motion, %.
-        share: String,
-        /// What happened, and what would be right.
-        how: &'static str,
+        percent: f64,
+        /// True if the next row makes up for most of them, so that all other rows have their right time.
+        made_up: bool,
     },
     /// An effort that keeps each value for several rows.
     #[error(
@@ -312,9 +312,10 @@ impl Implausible {
 }
 
 impl Implausible {
-    /// Returns true if the column may still be correct, so that it is reported but not refused.
+    /// Returns true if the column may still be correct, or is wrong by a share that the sentence gives, so that it is
+    /// reported but not refused.
     pub fn is_doubt(&self) -> bool {
-        matches!(self, Self::HeldEffort { .. })
+        matches!(self, Self::HeldEffort { .. } | Self::RepeatedRows { .. })
     }
 
     /// Returns true if motion or torque cannot be analysed before a correction.
@@ -325,7 +326,6 @@ impl Implausible {
                 | Self::Spike { .. }
                 | Self::HeldPosition { .. }
                 | Self::LostRows { .. }
-                | Self::RepeatedRows { .. }
                 | Self::Unsigned { .. }
         )
     }
@@ -415,16 +415,21 @@ fn miscounted(block: &Block) -> Option<Implausible> {
     }
     repeated.map(|found| Implausible::RepeatedRows {
         at: block.t[found.row + 1],
-        share: format_significant(100.0 * found.places as f64 / found.judged.max(1) as f64, 2),
-        how: match made_up {
-            true => {
-                "the logger kept the last value where none had arrived, so that velocity and acceleration are wrong there: take these rows out, and up to five missing rows in a row are interpolated"
-            }
-            false => {
-                "they were written twice: take them out, and count t without them"
-            }
-        },
+        percent: 100.0 * found.places as f64 / found.judged.max(1) as f64,
+        made_up,
     })
+}
+
+/// Says why rows repeat the row before, what follows, and what would be right.
+fn repeated_how(percent: f64, made_up: bool) -> String {
+    match made_up {
+        true => "the logger kept the last value where none had arrived. The other rows are right and outweigh them; without them, up to five missing rows in a row are interpolated".to_owned(),
+        false => format!(
+            "they were written twice, so that velocities come out {} % and accelerations {} % too small on average: take them out, and count t without them",
+            format_significant(percent, 2),
+            format_significant(2.0 * percent, 2)
+        ),
+    }
 }
 
 /// Finds positions and efforts that keep each value for several rows; joints with the same rate are grouped.

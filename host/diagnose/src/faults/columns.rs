@@ -183,13 +183,13 @@ pub(crate) fn units(robot: &Robot, runs: &[&Run]) -> Vec<Fault> {
             ..Block::default()
         };
         for problem in plausibility(&block, robot) {
-            if is_of_rows(&problem) {
-                return vec![Fault::of_recording(Finding::Clock(problem))];
-            }
             let Some(fault) = of_column(robot, problem) else {
                 continue;
             };
             let certain = fault.is_certain();
+            if certain && fault.joint.is_none() {
+                return vec![fault];
+            }
             let known = |own: &Fault| own.joint == fault.joint && own.is_certain() == certain;
             if !found.iter().any(known) {
                 found.push(fault);
@@ -199,15 +199,7 @@ pub(crate) fn units(robot: &Robot, runs: &[&Run]) -> Vec<Fault> {
     found
 }
 
-/// Returns true if rows were lost or written twice, which all joints show.
-fn is_of_rows(problem: &Implausible) -> bool {
-    matches!(
-        problem,
-        Implausible::LostRows { .. } | Implausible::RepeatedRows { .. }
-    )
-}
-
-/// Returns an implausible position or torque of a joint as a fault; `None` for other columns.
+/// Returns an implausible position or torque of a joint, or miscounted rows, as a fault; `None` for other columns.
 fn of_column(robot: &Robot, problem: Implausible) -> Option<Fault> {
     let (joint, about) = match &problem {
         Implausible::HeldPosition { joints, .. } => (joints[0], About::Motion),
@@ -225,9 +217,10 @@ fn of_column(robot: &Robot, problem: Implausible) -> Option<Fault> {
         | Implausible::Unsigned { joint, .. }
         | Implausible::Spike { joint, .. }
         | Implausible::NoEffort { joint } => (*joint, About::Torque),
+        Implausible::LostRows { .. } | Implausible::RepeatedRows { .. } => {
+            return Some(Fault::of_recording(Finding::Clock(problem)));
+        }
         Implausible::NotSeconds { .. }
-        | Implausible::LostRows { .. }
-        | Implausible::RepeatedRows { .. }
         | Implausible::ReferenceScale { .. }
         | Implausible::NoRate { .. }
         | Implausible::RateSpike { .. } => return None,
