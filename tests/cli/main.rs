@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod cases;
+mod clock;
 mod compare;
 mod compliance;
 mod control;

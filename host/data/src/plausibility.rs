@@ -4,6 +4,7 @@
 //! Without limits in the robot's description, the columns are only compared with each other.
 
 use super::block::{Block, JointColumns};
+use super::lost_rows::{Advances, LostRows, advances};
 use super::position_jump::largest_position_jump;
 use super::rate_spike::rate_spike;
 use super::sample_hold::repeated_rows;
@@ -149,6 +150,34 @@ pub enum Implausible {
         /// Rate of the rows, Hz.
         fast: String,
     },
+    /// Rows that are missing while t goes on evenly.
+    #[error(
+        "t counts on over missing rows: at {places} (first at t = {} s) the positions advance in one row by what {advance} take{each}, so that velocity and acceleration are wrong there; record the time of each row, or give the parts between these places one by one",
+        format_time(*at)
+    )]
+    LostRows {
+        /// Time of the row before the first place, s.
+        at: f64,
+        /// Number of places in words.
+        places: String,
+        /// Number of rows that one row replaces there, in words.
+        advance: String,
+        /// Number of missing rows in words; empty if there is one place.
+        each: String,
+    },
+    /// Rows that repeat the row before while the joints move.
+    #[error(
+        "t counts repeated rows: {} % of the rows in motion (the first at t = {} s) have the positions and torques of the row before; {}",
+        format_significant(*percent, 2), format_time(*at), repeated_how(*percent, *made_up)
+    )]
+    RepeatedRows {
+        /// Time of the first repeated row, s.
+        at: f64,
+        /// Share of the rows in motion, %.
+        percent: f64,
+        /// True if the next row makes up for most of them, so that all other rows have their right time.
+        made_up: bool,
+    },
     /// An effort that keeps each value for several rows.
     #[error(
         "{} only in every {}: values of {slow} Hz in a recording of {fast} Hz. A measured torque is then late by {late} ms on average, and inertia and friction are biased: record it at the rate of the rows. A command that the drive holds for that long is right as it stands", changes("tau", joints), nth(*rows)
@@ -275,15 +304,18 @@ impl Implausible {
             | Self::Spike { joint, .. } => format!("tau{joint}"),
             Self::HeldPosition { joints, .. } => columns_of("q", joints),
             Self::HeldEffort { joints, .. } => columns_of("tau", joints),
-            Self::NotSeconds { .. } => "t".into(),
+            Self::NotSeconds { .. } | Self::LostRows { .. } | Self::RepeatedRows { .. } => {
+                "t".into()
+            }
         }
     }
 }
 
 impl Implausible {
-    /// Returns true if the column may still be correct, so that it is reported but not refused.
+    /// Returns true if the column may still be correct, or is wrong by a share that the sentence gives, so that it is
+    /// reported but not refused.
     pub fn is_doubt(&self) -> bool {
-        matches!(self, Self::HeldEffort { .. })
+        matches!(self, Self::HeldEffort { .. } | Self::RepeatedRows { .. })
     }
 
     /// Returns true if motion or torque cannot be analysed before a correction.
@@ -293,6 +325,7 @@ impl Implausible {
             Self::Jump { .. }
                 | Self::Spike { .. }
                 | Self::HeldPosition { .. }
+                | Self::LostRows { .. }
                 | Self::Unsigned { .. }
         )
     }
@@ -341,8 +374,62 @@ pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
         check_joint(k, &block.t, columns, joint, &mut found);
     }
-    found.extend(repeated(block));
+    let held = repeated(block);
+    let jumps = |own: &Implausible| matches!(own, Implausible::Jump { .. });
+    // A column that is no motion says nothing about rows.
+    if held.is_empty() && !found.iter().any(jumps) {
+        found.extend(miscounted(block));
+    }
+    found.extend(held);
     found
+}
+
+/// Finds rows that were lost or written twice while the time was counted on.
+fn miscounted(block: &Block) -> Option<Implausible> {
+    let Advances {
+        lost,
+        repeated,
+        made_up,
+    } = advances(block);
+    if let Some(LostRows {
+        row, places, rows, ..
+    }) = lost
+    {
+        let whole = rows.round().max(1.0);
+        let one = places == 1;
+        return Some(Implausible::LostRows {
+            at: block.t[row],
+            places: match one {
+                true => "one place".to_owned(),
+                false => format!("{places} places"),
+            },
+            advance: match one {
+                true => format!("{} rows", whole + 1.0),
+                false => "two or more rows".to_owned(),
+            },
+            each: match one {
+                true => String::new(),
+                false => format!(" ({whole} rows in all)"),
+            },
+        });
+    }
+    repeated.map(|found| Implausible::RepeatedRows {
+        at: block.t[found.row + 1],
+        percent: 100.0 * found.places as f64 / found.judged.max(1) as f64,
+        made_up,
+    })
+}
+
+/// Says why rows repeat the row before, what follows, and what would be right.
+fn repeated_how(percent: f64, made_up: bool) -> String {
+    match made_up {
+        true => "the logger kept the last value where none had arrived. The other rows are right and outweigh them; without them, up to five missing rows in a row are interpolated".to_owned(),
+        false => format!(
+            "they were written twice, so that velocities come out {} % and accelerations {} % too small on average: take them out, and count t without them",
+            format_significant(percent, 2),
+            format_significant(2.0 * percent, 2)
+        ),
+    }
 }
 
 /// Finds positions and efforts that keep each value for several rows; joints with the same rate are grouped.
@@ -464,7 +551,7 @@ fn position_fault(
             mend: if joint.kind == JointKind::Revolute && (turns - 1.0).abs() < 0.02 {
                 "that is a turn: give the angle counted on beyond it"
             } else {
-                "give recordings that were put together one by one, and check the encoder for lost counts"
+                "rows are missing there, or recordings were put together: give the parts one by one; or the encoder lost counts"
             },
             unit,
         });

@@ -32,6 +32,15 @@ pub enum Remark {
         /// `#` or `%`.
         sign: char,
     },
+    /// Stamps that were rounded more coarsely than the clock of the rows.
+    #[error(
+        "the stamps are rounded to {} s, which is coarse beside the step of the rows: each row gets the time of an even clock within half of that",
+        rig_output::format_short(*resolution)
+    )]
+    RoundedStamps {
+        /// Resolution of the stamps, s.
+        resolution: f64,
+    },
     /// An MCAP file whose end is missing.
     #[error(
         "{} breaks off at byte {at}, as after a power loss or a recorder that was killed: {messages} messages are read, the last at t = {until} s; {lost}",
@@ -234,6 +243,7 @@ impl Remark {
             Self::LikelyTime { .. } => 19,
             Self::CutRow { .. } => 20,
             Self::OpenEnd { .. } => 21,
+            Self::RoundedStamps { .. } => 22,
         }
     }
 }

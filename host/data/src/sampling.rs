@@ -2,6 +2,7 @@
 
 use super::error::Warning;
 use super::place::Place;
+use super::rounded_time::{RoundedTime, resolution};
 
 /// Spread of the intervals (5th to 95th percentile over the median) above which the recording counts
 /// as irregular. Clocked recordings stay below 0.03 (KUKA LWR over a network: 0.02), polled servos
@@ -28,10 +29,36 @@ pub struct Sampling {
     /// True if the intervals vary (5th to 95th percentile more than 5 % of the median apart). The rows must then not be
     /// treated as evenly spaced.
     pub irregular: bool,
+    /// Resolution of the stamps whose rounding shows in their steps, s; 0 if it does not. The times of the rows are then
+    /// those of a clock within half of it.
+    pub resolution: f64,
 }
 
 impl Sampling {
-    pub(super) fn of(times: &[f64]) -> Self {
+    /// Determines the sampling from the first stamps.
+    pub(super) fn of(stamps: &[f64]) -> Self {
+        let plain = Self::of_times(stamps);
+        let Some(resolution) = resolution(stamps) else {
+            return plain;
+        };
+        let rounded = Self {
+            resolution,
+            ..plain
+        };
+        let times = rounded.corrected().map(|rows| rows.of_all(stamps));
+        Self {
+            resolution,
+            ..Self::of_times(&times.unwrap_or_default())
+        }
+    }
+
+    /// Returns the correction of rounded stamps; `None` if they need none.
+    pub(super) fn corrected(&self) -> Option<RoundedTime> {
+        let longest = IRREGULAR_GAP * self.period;
+        (self.resolution > 0.0).then(|| RoundedTime::new(self.resolution, longest))
+    }
+
+    fn of_times(times: &[f64]) -> Self {
         let mut intervals: Vec<f64> = times
             .iter()
             .zip(times.iter().skip(1))
@@ -42,6 +69,7 @@ impl Sampling {
             return Self {
                 period: 0.0,
                 irregular: false,
+                resolution: 0.0,
             };
         };
         let at = |share: f64| intervals[(share * last as f64).round() as usize];
@@ -49,17 +77,20 @@ impl Sampling {
         Self {
             period,
             irregular: at(0.95) - at(0.05) > IRREGULAR * period,
+            resolution: 0.0,
         }
     }
 
     /// Returns the longest interval that is not a gap, s.
     pub fn longest_interval(&self) -> f64 {
-        self.period * if self.irregular { IRREGULAR_GAP } else { GAP }
+        let periods = if self.irregular { IRREGULAR_GAP } else { GAP };
+        periods * self.period + self.resolution
     }
 
     /// Returns true if this interval separates two blocks.
     pub(super) fn parts(&self, interval: f64) -> bool {
-        let uneven = !self.irregular && (interval - self.period).abs() > UNEVEN * self.period;
+        let allowed = UNEVEN * self.period + self.resolution;
+        let uneven = !self.irregular && (interval - self.period).abs() > allowed;
         uneven || interval > self.longest_interval()
     }
 

@@ -16,6 +16,7 @@ use super::motors::{MotorPass, MotorSide};
 use super::place::Place;
 use super::quantity::Quantity;
 use super::remark::Remark;
+use super::rounded_time::RoundedTime;
 use super::sampling::Sampling;
 use super::table_rows::TableRows;
 use rig_model::robot::Robot;
@@ -192,7 +193,15 @@ impl Source {
         }
         let sampling = Sampling::of(&times);
         // What the end of the file shows is reported by the pass that reaches it.
-        let remarks = header.remarks.iter().cloned().chain(rows.remarks());
+        let rounded = (sampling.resolution > 0.0).then_some(Remark::RoundedStamps {
+            resolution: sampling.resolution,
+        });
+        let remarks = header
+            .remarks
+            .iter()
+            .cloned()
+            .chain(rows.remarks())
+            .chain(rounded);
         let is_late = |r: &Remark| {
             matches!(
                 r,
@@ -301,6 +310,7 @@ impl Source {
             gaps: 0,
             named_extras: vec![false; self.layout.columns.len()],
             motors: self.layout.motors.as_ref().map(MotorSide::pass),
+            rounded: self.sampling.corrected(),
         }
     }
 
@@ -346,6 +356,8 @@ pub struct Blocks<'a> {
     gaps: u64,
     named_extras: Vec<bool>,
     motors: Option<MotorPass>,
+    /// Correction of rounded stamps.
+    rounded: Option<RoundedTime>,
 }
 
 impl Blocks<'_> {
@@ -498,9 +510,41 @@ impl Blocks<'_> {
             self.values = values;
             return Ok(Some(line));
         }
-        match self.rows.as_mut() {
-            Some(rows) => rows.next_row(&self.source.layout, &mut self.values),
-            None => Ok(None),
+        if let (None, Some(rows)) = (&self.rounded, self.rows.as_mut()) {
+            return rows.next_row(&self.source.layout, &mut self.values);
+        }
+        let Some((line, values)) = self.next_row()? else {
+            return Ok(None);
+        };
+        self.values = values;
+        Ok(Some(line))
+    }
+
+    /// Reads the next row: its line and its values, the time among them corrected if the stamps are rounded.
+    fn next_row(&mut self) -> Result<Option<(u64, Vec<f64>)>, DataError> {
+        let source = self.source;
+        let Some(rows) = self.rows.as_mut() else {
+            return Ok(None);
+        };
+        let time = source.layout.time;
+        loop {
+            let mut values = vec![0.0; self.values.len()];
+            let full = self.rounded.as_ref().is_some_and(RoundedTime::is_full);
+            let read = match full {
+                true => None,
+                false => rows.next_row(&source.layout, &mut values)?,
+            };
+            let Some(rounded) = self.rounded.as_mut() else {
+                return Ok(read.map(|line| (line, values)));
+            };
+            let Some(line) = read else {
+                return Ok(rounded.pop().map(|(line, now, mut values)| {
+                    values[time] = now;
+                    (line, values)
+                }));
+            };
+            rows.check_growth(&source.path, line, rounded.last_stamp(), values[time])?;
+            rounded.push(line, values[time], values);
         }
     }
 
@@ -511,11 +555,7 @@ impl Blocks<'_> {
         if sampling.irregular {
             return Ok(false);
         }
-        let mut values = vec![0.0; self.values.len()];
-        let Some(rows) = self.rows.as_mut() else {
-            return Ok(false);
-        };
-        let Some(next) = rows.next_row(&self.source.layout, &mut values)? else {
+        let Some((next, values)) = self.next_row()? else {
             return Ok(false);
         };
         let then = values[self.source.layout.time];

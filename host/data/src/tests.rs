@@ -4,6 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use rand::{RngExt, SeedableRng};
+
 use super::made_for_tests::robot;
 use super::*;
 use rig_model::robot::{EMPS, JointKind, JointLimits, ONE_LINK_TEMPLATE, Robot};
@@ -336,6 +338,63 @@ fn irregular_recordings_are_flagged_not_split() {
     assert!(source.sampling().irregular);
     let (blocks, warnings) = source.read_all().unwrap();
     assert_eq!((blocks.len(), warnings.len()), (1, 0));
+}
+
+/// A joint that swings, with stamps in whole milliseconds of a loop with this step and jitter (uniform, s); the rows of
+/// `lost` are missing.
+fn stamped_in_ms(step: f64, jitter: f64, lost: std::ops::Range<usize>) -> String {
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+    let (mut now, mut text) = (0.0, "t,q1,tau1\n".to_owned());
+    for row in 0..8000 {
+        now += step + jitter * (2.0 * rng.random::<f64>() - 1.0);
+        if !lost.contains(&row) {
+            let (q, tau) = ((3.0f64 * now).sin(), 2.0 * (3.0f64 * now).cos());
+            text += &format!("{:.3},{q},{tau}\n", now);
+        }
+    }
+    text
+}
+
+#[test]
+fn stamps_in_whole_milliseconds_hold_no_lost_rows() {
+    let folder = Folder::new();
+    for (step, jitter) in [
+        (2e-3, 0.09e-3),
+        (2e-3, 0.17e-3),
+        (2e-3, 0.35e-3),
+        (2.02e-3, 0.0),
+        (2.002e-3, 0.0),
+        (3.33e-3, 0.1e-3),
+    ] {
+        let path = folder.file(stamped_in_ms(step, jitter, 0..0));
+        let source = Source::open(&path, &rig()).unwrap();
+        let (blocks, _) = source.read_all().unwrap();
+        assert_eq!(blocks.len(), 1, "{step} {jitter}: {:?}", source.sampling());
+        assert_eq!(plausibility(&blocks[0], &rig()), [], "{step} {jitter}");
+        assert!(blocks[0].t.windows(2).all(|t| t[1] > t[0]));
+        // The motion is that of the corrected times: rounding alone leaves 0.29 ms at 3 rad/s.
+        let off = (blocks[0].t.iter().zip(&blocks[0].joints[0].q))
+            .map(|(t, q)| (q - (3.0 * t).sin()).powi(2))
+            .sum::<f64>();
+        let off = (off / blocks[0].t.len() as f64).sqrt();
+        println!("{step} {jitter}: {off}");
+        assert!(off < 0.58e-3, "{step} {jitter}: {off}");
+    }
+}
+
+#[test]
+fn a_gap_between_rounded_stamps_stays_one() {
+    let folder = Folder::new();
+    let path = folder.file(stamped_in_ms(2e-3, 0.1e-3, 4000..4020));
+    let (blocks, _) = Source::open(&path, &rig()).unwrap().read_all().unwrap();
+    let lengths: Vec<usize> = blocks.iter().map(Block::len).collect();
+    assert_eq!(lengths, [4000, 3980]);
+    assert!((blocks[1].t[0] - blocks[0].t[3999] - 0.042).abs() < 2e-3);
+    let source = Source::open(&path, &rig()).unwrap();
+    let small: Result<Vec<Block>, DataError> = source.blocks(7).collect();
+    let times: Vec<f64> = small.unwrap().iter().flat_map(|b| b.t.clone()).collect();
+    let whole: Vec<f64> = blocks.iter().flat_map(|b| b.t.clone()).collect();
+    assert_eq!(times, whole);
 }
 
 fn columns() -> Vec<Column> {

@@ -1,4 +1,4 @@
-//! A text file as UTF-8, whatever encoding its byte order mark names.
+//! A text file as UTF-8, whatever encoding its byte order mark or its first character shows.
 //!
 //! UTF-16 is decoded while it is read, so that memory does not grow with the file. Bytes that are no character become
 //! U+FFFD, which no number and no column name holds. Other files are read as they are.
@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{Read, Result, Seek, SeekFrom};
 use std::path::Path;
 
-use encoding_rs::{CoderResult, Decoder, Encoding, UTF_8};
+use encoding_rs::{CoderResult, Decoder, Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 /// Bytes of the file that are decoded at once.
 const CHUNK: usize = 1 << 16;
@@ -33,7 +33,7 @@ struct Decoding {
 }
 
 impl TextFile {
-    /// Opens a file and detects its byte order mark.
+    /// Opens a file and detects its encoding.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let mut file = File::open(path)?;
         let mut mark = [0; 3];
@@ -45,7 +45,14 @@ impl TextFile {
             }
         }
         file.seek(SeekFrom::Start(0))?;
-        let encoding = Encoding::for_bom(&mark[..length]).map_or(UTF_8, |(encoding, _)| encoding);
+        let marked = Encoding::for_bom(&mark[..length]).map(|(encoding, _)| encoding);
+        // Without a mark, one byte of the first character is 0, which UTF-8 text never has.
+        let wide = || match mark {
+            [low, 0, _] if low != 0 && length > 1 => UTF_16LE,
+            [0, low, _] if low != 0 && length > 1 => UTF_16BE,
+            _ => UTF_8,
+        };
+        let encoding = marked.unwrap_or_else(wide);
         let decoding = (encoding != UTF_8).then(|| Decoding {
             decoder: encoding.new_decoder_with_bom_removal(),
             raw: Vec::new(),
@@ -153,6 +160,8 @@ mod tests {
             let bytes = wide(&text, big);
             for at_once in [1, 3, 17, 1000, 1 << 17] {
                 assert!(read(&bytes, at_once) == text.as_bytes(), "{big} {at_once}");
+                let bare = read(&bytes[2..], at_once);
+                assert!(bare == text.as_bytes(), "{big} {at_once} without a mark");
             }
             // A byte is missing at the end.
             let cut = read(&bytes[..bytes.len() - 1], 1000);

@@ -105,7 +105,7 @@ pub use uncertainty::estimate::Ellipse;
 pub use uncertainty::estimate::Estimate;
 pub use uncertainty::estimate::t_quantile;
 pub use uncertainty::jackknife::{LeaveOut, Refit};
-pub use uncertainty::residual::{Dependence, ResidualReport, Series};
+pub use uncertainty::residual::{Dependence, LEAST_ERROR, ResidualReport, Series};
 pub use uncertainty::torque_residuals::torque_residuals;
 pub use unmodelled::field_torque::FieldTorque;
 pub use unmodelled::position::PositionTorque;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::mem::{Discriminant, discriminant};
 
-use rig_output::{format_significant, format_unit};
+use rig_output::{format_significant, format_unit, listed};
 use serde::{Serialize, Serializer};
 
 use crate::estimator::Estimator;
@@ -66,6 +66,8 @@ pub enum Warning {
         /// Condition number of the scaled regressor.
         condition: f64,
     },
+    /// Inertias or viscous friction that came out below zero: each with its joint, value, standard deviation and unit.
+    BelowZero(Vec<String>),
     /// Joints with one kind of finding, the worst first.
     Joints(Vec<JointFinding>),
     /// The prior rests on stand-ins.
@@ -386,6 +388,10 @@ impl Warning {
             ),
             Self::IllConditioned { condition } => format!(
                 "The condition number of the scaled regressor is {condition:.0}: the motion tells some parameters apart badly; look at their intervals."
+            ),
+            Self::BelowZero(list) => format!(
+                "Inertia or viscous friction came out below zero: {}. These recordings do not show it to be positive. Do not use such a value; a motion with more acceleration, or more speed for friction, tells more.",
+                listed(list)
             ),
             Self::StandIns => "The prior rests on stand-ins for what the description does not state; values that the data do not determine are guesses.".to_owned(),
             Self::Distrusted(why) => format!(

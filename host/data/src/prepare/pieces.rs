@@ -53,6 +53,75 @@ pub fn first_block(recording: &dyn Recording, rows: usize) -> Result<Option<Bloc
     }
 }
 
+/// The longest stretch without a gap among the first rows of a recording: what a short stretch holds, for example
+/// torques of one sign, may be chance.
+#[derive(Debug)]
+pub struct LongestPart {
+    longest: Block,
+    part: Block,
+    /// Rows that are still looked at.
+    left: usize,
+    more: bool,
+}
+
+impl LongestPart {
+    /// Begins; looks at no more than `rows` rows.
+    pub fn among(rows: usize) -> Self {
+        Self {
+            longest: Block::default(),
+            part: Block::default(),
+            left: rows,
+            more: false,
+        }
+    }
+
+    /// Takes the next block. Returns false if there are more rows than are looked at.
+    pub fn push(&mut self, block: &Block) -> bool {
+        self.more = block.len() > self.left;
+        let own = stretch(block, 0, block.len().min(self.left));
+        if !own.continues {
+            self.close();
+        }
+        self.left -= own.len();
+        append(&mut self.part, own);
+        !self.more
+    }
+
+    fn close(&mut self) {
+        let part = std::mem::take(&mut self.part);
+        if part.len() > self.longest.len() {
+            self.longest = part;
+        }
+    }
+
+    /// Returns true if the recording has more rows than were looked at.
+    pub fn more(&self) -> bool {
+        self.more
+    }
+
+    /// Returns the rows; none if the recording has none.
+    pub fn rows(mut self) -> Block {
+        self.close();
+        self.longest
+    }
+}
+
+/// Returns the longest stretch without a gap among the first `rows` rows of a recording.
+///
+/// # Errors
+/// Errors of the reader up to there.
+pub fn longest_part(recording: &dyn Recording, rows: usize) -> Result<LongestPart, PrepareError> {
+    let mut found = LongestPart::among(rows);
+    let read = recording.each_block(rows, &mut |block| match found.push(&block) {
+        true => Ok(()),
+        false => Err(PrepareError::Stopped("enough".to_owned())),
+    });
+    if !found.more {
+        read?;
+    }
+    Ok(found)
+}
+
 /// A recording of the rig with all external loads on its joints removed.
 pub struct Unburdened<'a>(pub &'a dyn Recording);
 
@@ -337,6 +406,34 @@ mod tests {
             self.0.iter().try_for_each(|block| take(block.clone()))?;
             Err(PrepareError::Read("line 9 is no number".into()))
         }
+    }
+
+    #[test]
+    fn the_longest_part_is_judged_wherever_it_is() {
+        let block = |from: usize, to: usize, continues: bool| Block {
+            t: (from..to).map(|k| k as f64).collect(),
+            continues,
+            ..Block::default()
+        };
+        let parts = [
+            block(0, 3, false),
+            block(10, 14, false),
+            block(14, 18, true),
+            block(30, 35, false),
+        ];
+        let recording = InMemory {
+            blocks: parts.to_vec(),
+            ..InMemory::default()
+        };
+        let found = longest_part(&recording, 100).unwrap();
+        assert!(!found.more());
+        let times: Vec<f64> = (10..18).map(f64::from).collect();
+        assert_eq!(found.rows().t, times);
+        let found = longest_part(&recording, 5).unwrap();
+        assert!(found.more());
+        assert_eq!(found.rows().t, [0.0, 1.0, 2.0]);
+        let none = longest_part(&InMemory::default(), 5).unwrap();
+        assert!(none.rows().is_empty());
     }
 
     #[test]

@@ -21,7 +21,8 @@ pub struct JointSurvey {
     pub torque_rms: f64,
     /// Lowest and highest torque.
     pub torque: [f64; 2],
-    /// Torque limits at which the recording was clipped: its extreme value repeats for at least `CLIPPED_RUN` rows.
+    /// Torque limits at which the recording was clipped: its extreme value repeats for at least `CLIPPED_RUN` rows, and
+    /// more often than the top level of a smooth torque in steps.
     pub clipped: [Option<f64>; 2],
     /// Spectrum of the position.
     pub spectrum: PositionSpectrum,
@@ -30,6 +31,9 @@ pub struct JointSurvey {
 /// Number of consecutive rows at the extreme torque that counts as clipping. Noise never repeats a value that often,
 /// but a command held at a limit does.
 pub(super) const CLIPPED_RUN: usize = 5;
+/// Least ratio of the rows at the extreme torque to the rows at the next level. A parabola, the peak of a smooth torque,
+/// stays in its top level up to 1/(√2 − 1) = 2.41 times as long as in the level below; a plateau of friction less.
+pub const PILE_UP: f64 = 2.5;
 
 /// Survey of a whole recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -52,6 +56,10 @@ struct Extreme {
     value: f64,
     run: usize,
     longest: usize,
+    /// Rows at the extreme value.
+    rows: usize,
+    /// The next value inwards, and its rows.
+    next: (f64, usize),
 }
 
 impl Extreme {
@@ -60,20 +68,30 @@ impl Extreme {
             value: f64::NEG_INFINITY,
             run: 0,
             longest: 0,
+            rows: 0,
+            next: (f64::NEG_INFINITY, 0),
         }
     }
     fn push(&mut self, x: f64) {
         if x > self.value {
-            (self.value, self.run, self.longest) = (x, 1, 1);
+            self.next = (self.value, self.rows);
+            (self.value, self.run, self.longest, self.rows) = (x, 1, 1, 1);
         } else if x == self.value {
             self.run += 1;
+            self.rows += 1;
             self.longest = self.longest.max(self.run);
         } else {
             self.run = 0;
+            if x > self.next.0 {
+                self.next = (x, 1);
+            } else if x == self.next.0 {
+                self.next.1 += 1;
+            }
         }
     }
     fn clipped(&self) -> Option<f64> {
-        (self.longest >= CLIPPED_RUN).then_some(self.value)
+        let piled_up = self.rows as f64 > PILE_UP * self.next.1 as f64;
+        (self.longest >= CLIPPED_RUN && piled_up).then_some(self.value)
     }
 }
 
@@ -303,6 +321,25 @@ mod tests {
     use super::*;
     use crate::prepare::InMemory;
     use crate::{Block, JointColumns};
+
+    /// A torque in steps stays at its highest step at each peak and on each plateau of friction; a limit holds it there
+    /// far longer than one step below.
+    #[test]
+    fn steps_and_plateaus_are_no_limit() {
+        let clipped = |torque: &dyn Fn(f64) -> f64| {
+            let mut high = Extreme::new();
+            (0..10_000).for_each(|k| high.push(torque(0.02 * f64::from(k))));
+            high.clipped()
+        };
+        let steps = |x: f64| 0.1 * (10.0 * x).round();
+        assert_eq!(clipped(&|t| steps(1.408 * (0.11 * t).sin())), None);
+        let friction = |t: f64| (0.3 * t).sin().signum() + 0.12 * (0.11 * t).sin();
+        assert_eq!(clipped(&|t| steps(friction(t))), None);
+        let limited = |t: f64| 2.0 * (0.3 * t).sin();
+        assert_eq!(clipped(&|t| limited(t).min(1.4)), Some(1.4));
+        let found = clipped(&|t| steps(limited(t).min(1.4)));
+        assert_eq!(found, Some(steps(1.4)));
+    }
 
     /// Lost rows split a recording into stretches shorter than the longest spectrum segments: shorter ones are used.
     #[test]

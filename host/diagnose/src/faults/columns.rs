@@ -6,7 +6,7 @@ use crate::DiagnoseError;
 use crate::faults::finding::{Fault, Finding, Short};
 use crate::faults::names;
 use crate::outcome::{About, FaultKind};
-use rig_data::prepare::{Recording, first_block};
+use rig_data::prepare::{Recording, longest_part};
 use rig_data::runs::Run;
 use rig_data::runs::{JointRun, resolution};
 use rig_data::{Block, Implausible, JUDGED_ROWS, JointColumns, plausibility, velocity_scale};
@@ -33,7 +33,12 @@ const STEPS: f64 = 3.0;
 
 /// Returns true if a column has no derivative or no size to compare with a model: every joint would look wrong.
 pub(crate) fn spoils_the_model(fault: &Fault) -> bool {
-    let spoilt = [FaultKind::Jump, FaultKind::Held, FaultKind::Unsigned];
+    let spoilt = [
+        FaultKind::Jump,
+        FaultKind::Held,
+        FaultKind::Unsigned,
+        FaultKind::Clock,
+    ];
     fault.is_certain() && spoilt.contains(&fault.finding.kind())
 }
 
@@ -155,8 +160,8 @@ pub(crate) fn spoilt(
     robot: &Robot,
     recording: &dyn Recording,
 ) -> Result<Vec<Fault>, DiagnoseError> {
-    let problems = first_block(recording, JUDGED_ROWS)?.map(|block| plausibility(&block, robot));
-    let spoilt = problems.into_iter().flatten().filter(Implausible::spoils);
+    let problems = plausibility(&longest_part(recording, JUDGED_ROWS)?.rows(), robot);
+    let spoilt = problems.into_iter().filter(Implausible::spoils);
     Ok(spoilt.filter_map(|found| of_column(robot, found)).collect())
 }
 
@@ -182,6 +187,9 @@ pub(crate) fn units(robot: &Robot, runs: &[&Run]) -> Vec<Fault> {
                 continue;
             };
             let certain = fault.is_certain();
+            if certain && fault.joint.is_none() {
+                return vec![fault];
+            }
             let known = |own: &Fault| own.joint == fault.joint && own.is_certain() == certain;
             if !found.iter().any(known) {
                 found.push(fault);
@@ -191,7 +199,7 @@ pub(crate) fn units(robot: &Robot, runs: &[&Run]) -> Vec<Fault> {
     found
 }
 
-/// Returns an implausible position or torque of a joint as a fault; `None` for other columns.
+/// Returns an implausible position or torque of a joint, or miscounted rows, as a fault; `None` for other columns.
 fn of_column(robot: &Robot, problem: Implausible) -> Option<Fault> {
     let (joint, about) = match &problem {
         Implausible::HeldPosition { joints, .. } => (joints[0], About::Motion),
@@ -209,6 +217,9 @@ fn of_column(robot: &Robot, problem: Implausible) -> Option<Fault> {
         | Implausible::Unsigned { joint, .. }
         | Implausible::Spike { joint, .. }
         | Implausible::NoEffort { joint } => (*joint, About::Torque),
+        Implausible::LostRows { .. } | Implausible::RepeatedRows { .. } => {
+            return Some(Fault::of_recording(Finding::Clock(problem)));
+        }
         Implausible::NotSeconds { .. }
         | Implausible::ReferenceScale { .. }
         | Implausible::NoRate { .. }

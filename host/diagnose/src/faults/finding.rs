@@ -124,7 +124,7 @@ impl Fault {
 
     /// Returns true if nothing without a fault explains the data.
     pub(crate) fn is_certain(&self) -> bool {
-        let doubt = matches!(&self.finding, Finding::Column(problem, _) if problem.is_doubt());
+        let doubt = matches!(&self.finding, Finding::Column(problem, _) | Finding::Clock(problem) if problem.is_doubt());
         !doubt && !matches!(self.beside, Beside::NoFault(_))
     }
 }

@@ -35,25 +35,38 @@ const FARTHEST: f64 = 5.0;
 const SHOWN_BY: f64 = 5.0;
 /// Share of a joint's highest speed above which it moves.
 const IN_MOTION: f64 = 0.05;
+/// Least misfit of cut rows, in noises of the others, if all rows are fitted: the rows of a plateau in steps have one.
+const MISFIT: f64 = 2.0;
+/// Ratio of the levels of both sides up to which they are one limit.
+const SAME_LIMIT: f64 = 1.02;
 /// Position range above which a joint moves, rad or m.
 const STIRS: f64 = 0.01;
 /// Share of a joint's range by which a position may lie outside it: limits are described with some care.
 const OUTSIDE: f64 = 0.2;
 
 impl Judge<'_> {
-    /// Returns a fault if a torque was cut where the motion needs more: a fit to the other rows exceeds the cut.
+    /// Returns a fault if a torque was cut where the motion needs more: it piles up at its extreme value, a fit to the
+    /// other rows exceeds that there, and no parameters fit all rows as well. The last tells a cut from plateaus of
+    /// friction in coarse steps: without those the other rows determine friction hardly, and predict anything there
+    /// (Chow 1960, "Tests of equality between sets of coefficients in two linear regressions").
     pub(crate) fn clipped(&self, j: usize) -> Option<Fault> {
         let cut = &self.rows.cut[j];
-        let (at, free): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
+        let (at, others): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
         if at.len() < 10 || 50 * at.len() < cut.len() {
             return None;
         }
         let tau = &self.rows.tau[j];
         // Rows with part of a cut belong to neither.
-        let free: Vec<usize> = free.into_iter().filter(|k| cut[*k] == 0.0).collect();
+        let free: Vec<usize> = others.into_iter().filter(|k| cut[*k] == 0.0).collect();
         let rest: Vec<f64> = free.iter().map(|k| tau[*k]).collect();
         let fit = Fit::of(&self.matrices[j].select_rows(&free), &rest, &self.order)?;
         let noise = (fit.residual.norm_squared() / rest.len() as f64).sqrt();
+        let whole = &self.fits[j].as_ref()?.residual;
+        let squares = |rows: &[usize]| rows.iter().map(|k| whole[*k].powi(2)).sum::<f64>();
+        let more = squares(&at) + squares(&free) - fit.residual.norm_squared();
+        if more < (MISFIT * noise).powi(2) * at.len() as f64 {
+            return None;
+        }
         let beyond = fit.predict(&self.matrices[j].select_rows(&at));
         let middle = 0.5 * (extreme(tau, f64::max) + extreme(tau, f64::min));
         let excess = at
@@ -62,13 +75,13 @@ impl Judge<'_> {
             .map(|(k, predicted)| (predicted - tau[*k]) * (tau[*k] - middle).signum())
             .sum::<f64>()
             / at.len() as f64;
-        let level = at.iter().map(|k| tau[*k].abs()).sum::<f64>() / at.len() as f64;
+        let level = level(at.iter().map(|k| tau[*k]).collect(), middle);
         let found = Misfit::Clipped {
             level,
             excess,
             percent: 100.0 * at.len() as f64 / cut.len() as f64,
         };
-        (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level))
+        (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level.abs()))
             .then(|| Fault::of_joint(j, found))
     }
 
@@ -246,4 +259,19 @@ impl Judge<'_> {
 
 fn extreme(values: &[f64], of: fn(f64, f64) -> f64) -> f64 {
     values.iter().copied().reduce(of).unwrap_or(0.0)
+}
+
+/// Returns the torque at which these rows stand: that of the side with more rows, or the size if both sides have one.
+fn level(torques: Vec<f64>, middle: f64) -> f64 {
+    let sizes: Vec<f64> = torques.iter().map(|v| v.abs()).collect();
+    let (above, below): (Vec<f64>, Vec<f64>) = torques.into_iter().partition(|v| *v > middle);
+    if above.is_empty() || below.is_empty() {
+        return statistics::mean(if above.is_empty() { &below } else { &above });
+    }
+    let (high, low) = (statistics::mean(&above), statistics::mean(&below));
+    match (-high / low).ln().abs() < SAME_LIMIT.ln() {
+        true => statistics::mean(&sizes),
+        false if above.len() >= below.len() => high,
+        false => low,
+    }
 }

@@ -5,6 +5,7 @@ use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission};
 
 use crate::DiagnoseError;
+use rig_data::prepare::PILE_UP;
 use rig_data::runs::Run;
 use rig_identify::{chain_of, transmission_of};
 use rig_model::batch::ChainBatch;
@@ -57,8 +58,24 @@ pub(crate) struct Rows {
     pub(crate) qd: Vec<Vec<f64>>,
     pub(crate) qdd: Vec<Vec<f64>>,
     pub(crate) tau: Vec<Vec<f64>>,
-    /// Share of the samples of each row at the highest or lowest torque of the recording.
+    /// Share of the samples of each row at the highest or lowest torque of the recording, if they pile up there.
     pub(crate) cut: Vec<Vec<f64>>,
+}
+
+/// Returns the highest torque if more samples are `near` it than a smooth torque in steps has in its top level;
+/// infinity if not.
+fn pile(values: &[f64], near: f64) -> f64 {
+    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let below = values.iter().copied().filter(|v| *v < top - near);
+    let next = below.fold(f64::NEG_INFINITY, f64::max);
+    let at = |level: f64| {
+        let own = values.iter().filter(|v| (**v - level).abs() <= near);
+        own.count() as f64
+    };
+    match at(top) > PILE_UP * at(next) {
+        true => top,
+        false => f64::INFINITY,
+    }
 }
 
 impl Rows {
@@ -75,14 +92,11 @@ impl Rows {
             cut: vec![Vec::new(); joints],
         };
         for j in 0..joints {
-            let (low, high) = runs
-                .iter()
-                .filter_map(|run| run.joints.get(j))
-                .flat_map(|joint| &joint.tau)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                });
-            let near = 1e-6 * low.abs().max(high.abs());
+            let own = runs.iter().filter_map(|run| run.joints.get(j));
+            let all: Vec<f64> = own.flat_map(|own| own.tau.iter().copied()).collect();
+            let near = 1e-6 * all.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+            let high = pile(&all, near);
+            let low = -pile(&all.iter().map(|v| -v).collect::<Vec<_>>(), near);
             for run in runs {
                 let Some(joint) = run.joints.get(j) else {
                     continue;

@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod alike;
+mod coarse;
 mod doubts;
 mod mounts;
 mod scales;

@@ -8,7 +8,7 @@ use crate::voltage::fit::WINDOW;
 use crate::voltage::free_run::travel;
 use crate::voltage::log::{Log, floor};
 use crate::voltage::plant::Plant;
-use crate::voltage::start::{left_of_voltage, start};
+use crate::voltage::start::{back_emf, left_of_voltage, start};
 use rig_data::prepare::{Recording, first_block};
 use rig_data::{Implausible, JUDGED_ROWS, plausibility};
 use rig_model::robot::{Joint, JointKind, Robot};
@@ -171,10 +171,10 @@ fn position_scale(joint: &Joint, logs: &[Log]) -> Option<Wrong> {
     })
 }
 
-/// Returns a fault if the back-EMF is a thousand times the described, or a thousandth.
+/// Returns a fault if the recordings show the back-EMF, and it is a thousand times the described, or a thousandth.
 fn voltage_scale(joint: &Joint, plant: &Plant, logs: &[Log]) -> Option<Wrong> {
     let emf = joint.drive.as_ref()?.torque_constant * plant.ratio.abs();
-    let found = start(plant, logs, false)?[2];
+    let found = back_emf(plant, logs)?;
     let factor = found / emf;
     let milli = match factor {
         f if (f / 1e3).ln().abs() < THOUSAND.ln() => true,

@@ -29,10 +29,25 @@ const TINY: f64 = 1e-12;
 
 /// Non-negative: drive inertia, torque per volt, its product with the back-EMF, Coulomb and viscous friction.
 const NOT_NEGATIVE: usize = 5;
+/// Place of the torque per volt.
+const GAIN: usize = 1;
+/// Place of its product with the back-EMF.
+const BACK_EMF: usize = 2;
+/// Standard deviations above zero from which the back-EMF is known.
+const KNOWN: f64 = 3.0;
 
-/// Returns non-negative nominal parameters by least squares; `None` if the voltage does not drive the joint. `viscous`
-/// separates viscous friction from the back-EMF, by rows with the drive off.
-pub(crate) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f64>> {
+/// Normal equations of the nominal parameters over all pieces.
+struct Normal {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Sum of the squares of the known side.
+    squares: f64,
+    /// Number of pieces.
+    pieces: usize,
+}
+
+/// Sets up the equations; see [`start`].
+fn normal(plant: &Plant, logs: &[Log], viscous: bool) -> Normal {
     let velocities: Vec<Vec<f64>> = (logs.iter())
         .map(|log| (0..log.t.len()).map(|k| log.slope(k)[0]).collect())
         .collect();
@@ -41,6 +56,7 @@ pub(crate) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f6
     let slow = SLOW * (squares / rows as f64).sqrt();
     let mut normal = DMatrix::<f64>::zeros(NOMINAL, NOMINAL);
     let mut right = DVector::<f64>::zeros(NOMINAL);
+    let (mut known_squares, mut count) = (0.0, 0);
     for (log, velocity) in logs.iter().zip(&velocities) {
         for [from, to] in pieces(log) {
             let still = velocity[from..to].iter().filter(|v| v.abs() < slow).count();
@@ -49,6 +65,8 @@ pub(crate) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f6
                 continue;
             }
             let (row, known) = equation(plant, log, velocity, [from, to], viscous);
+            known_squares += known * known;
+            count += 1;
             for i in 0..NOMINAL {
                 right[i] += row[i] * known;
                 for j in 0..NOMINAL {
@@ -60,8 +78,49 @@ pub(crate) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f6
     for i in 0..NOMINAL {
         normal[(i, i)] += 1.0e-15 + 1.0e-9 * normal[(i, i)];
     }
-    let bounded: Vec<bool> = (0..NOMINAL).map(|k| k < NOT_NEGATIVE).collect();
-    let x = nnls(&normal, &right, &bounded, &mut [true; NOMINAL], ROUNDS)?;
+    Normal {
+        matrix: normal,
+        right,
+        squares: known_squares,
+        pieces: count,
+    }
+}
+
+impl Normal {
+    /// Returns the non-negative solution.
+    fn solution(&self) -> Option<DVector<f64>> {
+        let bounded: Vec<bool> = (0..NOMINAL).map(|k| k < NOT_NEGATIVE).collect();
+        nnls(
+            &self.matrix,
+            &self.right,
+            &bounded,
+            &mut [true; NOMINAL],
+            ROUNDS,
+        )
+    }
+}
+
+/// Returns the back-EMF, V·s/rad, where the recordings show it; `None` if it is zero or not known to a third. Pieces
+/// overlap by half, so half of them are independent.
+pub(crate) fn back_emf(plant: &Plant, logs: &[Log]) -> Option<f64> {
+    let normal = normal(plant, logs, false);
+    let x = normal.solution()?;
+    let own = |k: usize| x[k] > 0.0 || k >= NOT_NEGATIVE;
+    let free: Vec<usize> = (0..NOMINAL).filter(|k| own(*k)).collect();
+    let place = free.iter().position(|k| *k == BACK_EMF)?;
+    let reduced = normal.matrix.select_rows(&free).select_columns(&free);
+    let left = normal.squares - 2.0 * normal.right.dot(&x) + x.dot(&(&normal.matrix * &x));
+    let independent = (0.5 * normal.pieces as f64 - free.len() as f64).max(1.0);
+    let inverse = reduced.try_inverse()?;
+    let variance = left.max(0.0) / independent * inverse[(place, place)];
+    let known = variance.is_finite() && x[BACK_EMF] > KNOWN * variance.sqrt();
+    (known && x[GAIN] > 0.0).then(|| x[BACK_EMF] / x[GAIN])
+}
+
+/// Returns non-negative nominal parameters by least squares; `None` if the voltage does not drive the joint. `viscous`
+/// separates viscous friction from the back-EMF, by rows with the drive off.
+pub(crate) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f64>> {
+    let x = normal(plant, logs, viscous).solution()?;
     let weight = plant.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
     let gain = if x[1] > 0.0 { x[1] } else { return None };
     Some(vec![

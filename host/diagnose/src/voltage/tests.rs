@@ -296,11 +296,34 @@ fn voltages_that_are_none_and_units_are_told() {
     }
     let millivolts = fault_of(|joint| volts(joint, &|u| 1000.0 * u));
     assert!(millivolts.contains("u1 looks like mV"), "{millivolts}");
+    let kilovolts = fault_of(|joint| volts(joint, &|u| 0.001 * u));
+    assert!(kilovolts.contains("u1 looks like kV"), "{kilovolts}");
     for (factor, words) in [
         (1.0 / std::f64::consts::TAU, "it looks like turns"),
         (0.5, "it is half what it should be"),
     ] {
         let scaled = fault_of(|joint| joint.q.iter_mut().for_each(|q| *q *= factor));
         assert!(scaled.contains(words), "{scaled}");
+    }
+}
+
+/// Real recordings of lifts and drops, in which friction hides the back-EMF: no unit is accused.
+#[test]
+fn recordings_that_hide_the_back_emf_accuse_no_unit() {
+    let Some(data) = rig_output::data_dir() else {
+        println!("SKIPPED: the folder of real recordings is not there; set RIG_DATA to it.");
+        return;
+    };
+    let robot = robot();
+    for gain in [100, 200, 800] {
+        let name = format!("rhoban_xl330/lift_and_drop_kp{gain}_m0.49_l0.1.csv");
+        let source =
+            rig_data::Source::open_with(&data.join(name), &robot, rig_data::EffortNeed::Optional)
+                .unwrap();
+        let train: [&dyn Recording; 1] = [&source];
+        let read = logs(&train).unwrap();
+        let plant = plant::Plant::of(&robot).unwrap();
+        let found = faults::faults(&robot, &plant, &[&train, &[]], &[&read, &[]]).unwrap();
+        assert!(found.is_empty(), "{gain}: {found:?}");
     }
 }

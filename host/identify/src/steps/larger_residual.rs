@@ -3,6 +3,7 @@
 use super::outcome::Outcome;
 use crate::comparison::compared::Comparison;
 use crate::estimators::problem::Problem;
+use crate::uncertainty::residual::LEAST_ERROR;
 use crate::warning::Warning;
 
 /// Ratio of a residual to that of the weighted fit above which a warning is given.
@@ -25,8 +26,9 @@ pub(crate) fn larger_residual(
             .collect()
     };
     let mut more: Vec<(String, f64)> = Vec::new();
+    let torque = squares(&vec![0.0; plain.len()]);
     for (k, (own, plain)) in squares(result.full).iter().zip(squares(&plain)).enumerate() {
-        if *own > MUCH_MORE * plain {
+        if *own > MUCH_MORE * plain && *own > LEAST_ERROR * torque[k] {
             let joint = problem.robot.joints.get(k).map_or("", |j| j.name.as_str());
             more.push((joint.to_owned(), own / plain));
         }

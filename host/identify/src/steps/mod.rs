@@ -1,5 +1,6 @@
 //! The steps of an identification.
 
+pub(crate) mod below_zero;
 pub(crate) mod check;
 pub(crate) mod estimated;
 pub(crate) mod freed;

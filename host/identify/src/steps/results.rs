@@ -66,6 +66,7 @@ impl Results<'_> {
     ) -> Result<Identification, IdentifyError> {
         let problem = self.problem;
         let (robot, options, data) = (problem.robot, problem.options, problem.data);
+        let described = self.described;
         let remembered: Vec<f64> = (self.train.iter())
             .map(|r| correlation_time(&r.autocorrelation, r.rows))
             .collect();
@@ -103,7 +104,7 @@ impl Results<'_> {
             free,
             ..
         } = beyond;
-        Ok(Identification {
+        let mut found = Identification {
             schema: "rig-identification/1".into(),
             robot: robot.name.clone(),
             model: options.model,
@@ -121,7 +122,10 @@ impl Results<'_> {
             procedure,
             details: self.details(estimate, free, named.combination, named.columns),
             base_parameters: named.parameters,
-        })
+        };
+        let below_zero = found.below_zero(described);
+        found.warnings.extend(below_zero);
+        Ok(found)
     }
 
     /// Returns the RMS torques of training data and hold-out per joint, if effects were subtracted from the rows.

@@ -6,7 +6,7 @@ use crate::estimators::fit::MOST_PASSES;
 use crate::options::{ModelKind, Options};
 use crate::treatment::cutoff;
 use crate::uncertainty::estimate::Estimate;
-use crate::uncertainty::residual::ResidualReport;
+use crate::uncertainty::residual::{LEAST_ERROR, ResidualReport};
 use crate::unmodelled::lag::Lag;
 use crate::warning::{AtJoint, JointFinding, Part, Unsettled, Warning};
 use rig_data::prepare::{PreprocessingPlan, Survey};
@@ -76,7 +76,12 @@ impl Heard<'_> {
             });
         }
         let stretches = self.instants as f64 / (10.0 * self.estimate.memory_rows);
-        if stretches < 8.0 {
+        // Rounding of a recording without noise has no memory that counts.
+        let inexact = self
+            .train
+            .iter()
+            .any(|own| own.relative_error > LEAST_ERROR);
+        if stretches < 8.0 && inexact {
             warnings.push(Warning::FewStretches {
                 memory: self.estimate.memory_rows * row_period,
                 stretches,
@@ -111,6 +116,7 @@ impl Heard<'_> {
         }
         if let Some(held) = self.holdout.map(|held| &held[j])
             && held.rms > 1.5 * report.rms
+            && held.relative_error > LEAST_ERROR
         {
             findings.push(AtJoint::WorseOnHoldout {
                 rms: held.rms,

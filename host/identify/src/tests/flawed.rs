@@ -84,6 +84,36 @@ fn noise_that_is_not_white_is_not_taken_for_motion() {
     }
 }
 
+/// A torque without a little more than its viscous part gives a viscous friction just below zero. That is told, though
+/// it is less than five standard deviations; a sound recording has no such warning.
+#[test]
+fn friction_just_below_zero_is_a_warning() {
+    let told = |share: f64| {
+        let mut recording = swing(3, 20.0, false);
+        let joint = &mut recording.blocks[0].joints[0];
+        let q = joint.q.clone();
+        for (k, tau) in joint.tau.iter_mut().enumerate() {
+            let [before, after] = [k.saturating_sub(5), (k + 5).min(q.len() - 1)];
+            let speed = (q[after] - q[before]) / (2e-3 * (after - before) as f64);
+            *tau -= share * TRUTH[3] * speed;
+        }
+        let found = identify(&pendulum(), &[&recording], &[], &Options::default()).unwrap();
+        let own = &found.base_parameters[3];
+        println!("{share}: {} ± {}", own.value, own.std);
+        let below = own.value < 0.0;
+        let warnings = found.warnings.into_iter();
+        let told: Vec<_> = warnings
+            .filter(|warning| matches!(warning, Warning::BelowZero(_)))
+            .collect();
+        (below, told)
+    };
+    assert_eq!(told(0.0), (false, Vec::new()));
+    let (below, list) = told(1.02);
+    assert!(below && list.len() == 1, "{list:?}");
+    let said = list[0].to_string();
+    assert!(said.contains("below zero: fv1 of joint"), "{said}");
+}
+
 /// The first of these recordings with the spectrum's cut-off: shows the need for the choice by torque.
 #[test]
 fn the_spectrum_alone_takes_filtered_noise_for_motion() {

@@ -15,6 +15,10 @@ const TEST_LAGS: usize = 20;
 /// Largest number of points of a time series for plots.
 pub(crate) const SERIES_POINTS: usize = 4000;
 
+/// Least relative error of a torque that counts. The residual of a recording without noise shows neither the errors of
+/// filters and derivatives nor those of sensors: it is rounding, and a standard deviation from it tends to zero.
+pub const LEAST_ERROR: f64 = 1e-3;
+
 /// Mean residual as a function of one coordinate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Dependence {

@@ -8,7 +8,7 @@ use clap::Args as ClapArgs;
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
-use rig_data::prepare::{PrepareError, Recording};
+use rig_data::prepare::{LongestPart, PrepareError, Recording};
 use rig_data::{
     Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Mapping, Source, StrangeReference,
     Warning, plausibility, strange_rates, strange_references,
@@ -113,6 +113,8 @@ pub struct Inputs {
     ranges: Vec<Range>,
     /// For each recording: positions beyond these limits, from the pass that read the most rows.
     outside: Vec<RefCell<Outside>>,
+    /// Sentences about rows that were not checked for faults.
+    unchecked: RefCell<Vec<String>>,
 }
 
 /// Name of a joint, its finite position limits (if any) and its unit.
@@ -167,16 +169,24 @@ impl Outside {
     }
 }
 
+/// Returns the longest part of the first rows of a recording.
+fn first_part(source: &Source) -> Result<LongestPart, CommandError> {
+    let mut found = LongestPart::among(JUDGED_ROWS);
+    for block in source.blocks(JUDGED_ROWS) {
+        if !found.push(&block?) {
+            break;
+        }
+    }
+    Ok(found)
+}
+
 /// Applies the check `look` to the first rows of a recording.
 fn at_start<T>(
     source: &Source,
     robot: &Robot,
     look: fn(&Block, &Robot) -> Vec<T>,
 ) -> Result<Vec<T>, CommandError> {
-    match source.blocks(JUDGED_ROWS).next() {
-        Some(block) => Ok(look(&block?, robot)),
-        None => Ok(Vec::new()),
-    }
+    Ok(look(&first_part(source)?.rows(), robot))
 }
 
 /// Puts all faults of a recording into one sentence.
@@ -228,6 +238,7 @@ impl Inputs {
             heard,
             ranges: robot.joints.iter().map(Range::of).collect(),
             outside,
+            unchecked: RefCell::default(),
         })
     }
 
@@ -238,10 +249,7 @@ impl Inputs {
     /// Names the error in a file and its line. One sentence lists all units that look wrong.
     pub(crate) fn refuse_units(&self, robot: &Robot, least: usize) -> Result<(), CommandError> {
         for source in &self.sources {
-            let Some(block) = source.blocks(JUDGED_ROWS).next() else {
-                continue;
-            };
-            let block = block?;
+            let block = first_part(source)?.rows();
             if block.len() < least {
                 continue;
             }
@@ -262,10 +270,17 @@ impl Inputs {
     /// Names the error in a file and its line.
     pub fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
         let mut faults = Faults::default();
+        let mut unchecked = Vec::new();
         for source in &self.sources {
-            let (doubts, wrong): (Vec<_>, Vec<_>) = (at_start(source, robot, plausibility)?
-                .into_iter())
-            .partition(Implausible::is_doubt);
+            let first = first_part(source)?;
+            if first.more() {
+                unchecked.push(format!(
+                    "{}: only the first {JUDGED_ROWS} rows were checked for faults of its columns.",
+                    source.path().display()
+                ));
+            }
+            let (doubts, wrong): (Vec<_>, Vec<_>) =
+                (plausibility(&first.rows(), robot).into_iter()).partition(Implausible::is_doubt);
             if !doubts.is_empty() {
                 faults.doubtful.push(sentence(source, &doubts));
             }
@@ -292,6 +307,7 @@ impl Inputs {
                 }
             }
         }
+        self.unchecked.replace(unchecked);
         Ok(faults)
     }
 
@@ -351,9 +367,10 @@ impl Inputs {
         })
     }
 
-    /// Warnings about the rows: for each recording and kind one line, with the worst row and the number of others.
+    /// Warnings about the rows: those that were not checked for faults, then for each recording and kind one line, with the
+    /// worst row and the number of others.
     pub fn heard(&self) -> Vec<String> {
-        let mut all = Vec::new();
+        let mut all = self.unchecked.borrow().clone();
         for (source, heard) in self.sources.iter().zip(&self.heard) {
             let (path, heard) = (source.path().display(), heard.borrow());
             let at_least = match heard.len() {

@@ -40,7 +40,7 @@ pub(crate) fn short(found: &Short) -> String {
 /// Returns a sentence on an implausible time column.
 fn clock(problem: &Implausible) -> String {
     let Implausible::NotSeconds { step } = problem else {
-        return problem.to_string();
+        return format!("{problem}.");
     };
     let unit = unit_of_steps(*step);
     format!("t looks like {unit}: its steps are {step:.4}, where seconds would be right.")

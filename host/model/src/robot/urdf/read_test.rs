@@ -478,6 +478,14 @@ fn the_drive_that_a_file_states_is_read_and_the_rest_is_told() {
             "<ros2_control name='c' type='system'><joint name='j1'><command_interface name='position'><param name='min'>-1</param></command_interface></joint></ros2_control>",
             "limits of commands in <ros2_control> are not read",
         ),
+        (
+            "<ros2_control name='c' type='system'><joint name='j1'><param name='gear_ratio'>100</param></joint><joint name='j2'><param name='gear_ratio'>1.0</param></joint></ros2_control>",
+            "the parameter `gear_ratio` of <ros2_control> is not read",
+        ),
+        (
+            "<ros2_control name='c' type='system'><joint name='j2'><param name='reduction'>-50</param></joint></ros2_control>",
+            "the parameter `reduction` of <ros2_control> is not read",
+        ),
     ] {
         let original = read(&with(text), &ChainChoice::default()).unwrap();
         let [remark] = original.remarks() else {
@@ -496,6 +504,18 @@ fn the_drive_that_a_file_states_is_read_and_the_rest_is_told() {
         (
             "<transmission name='t'><joint name='j1'/><actuator name='m'><mechanicalReducton>5</mechanicalReducton></actuator></transmission>",
             "is <mechanicalReduction> meant?",
+        ),
+        (
+            "<ros2_control name='c' type='system'><transmission name='t'><plugin>p</plugin><joint name='j1' role='joint1'><mechanical_reducton>5</mechanical_reducton></joint></transmission></ros2_control>",
+            "is <mechanical_reduction> meant?",
+        ),
+        (
+            "<ros2_control name='c' type='system'><transmission name='t'><joint name='j1'><param name='mechanical_reducton'>5</param></joint></transmission></ros2_control>",
+            "is `mechanical_reduction` meant?",
+        ),
+        (
+            "<ros2_control name='c' type='system'><joint name='j1'><param name='mechanicalReducton'>5</param></joint></ros2_control>",
+            "is `mechanicalReduction` meant?",
         ),
         (
             "<transmission name='t'><joint name='j1'/><actuator name='m'><drake:rotor_inertia value='-1'/></actuator></transmission>",

@@ -43,6 +43,18 @@ const KNOWN: [&str; 14] = [
     "gear_ratio",
 ];
 
+/// Names of the gear ratio in ROS 1 and ROS 2.
+const REDUCTIONS: [&str; 2] = ["mechanicalReduction", "mechanical_reduction"];
+/// Names of gear ratios among the parameters of a hardware driver, in lower case without `_`.
+const RATIOS: [&str; 6] = [
+    "mechanicalreduction",
+    "gearratio",
+    "reduction",
+    "reductionratio",
+    "gearreduction",
+    "transmissionratio",
+];
+
 /// A number of a transmission that a motor has one of.
 struct Stated<'a> {
     node: Xml<'a>,
@@ -101,16 +113,18 @@ impl<'a> Reader<'a> {
             self.unread(name, node, count);
         }
         self.command_limits(active);
+        self.parameters_of_hardware(active)?;
         Ok(motors)
     }
 
     /// Refuses misspelt elements of a transmission.
     fn spelt(&self, transmission: Xml<'a>) -> Result<(), RobotError> {
+        // ROS 2 states the reduction within <joint>.
         let inner = |node: &Xml<'a>| {
             node.parent() == Some(transmission)
                 || node
                     .parent()
-                    .is_some_and(|own| own.has_tag_name("actuator"))
+                    .is_some_and(|own| own.has_tag_name("actuator") || own.has_tag_name("joint"))
         };
         let own = transmission.descendants().filter(Xml::is_element);
         for node in own
@@ -124,8 +138,23 @@ impl<'a> Reader<'a> {
                     format!("<{tag}> is no element of <transmission>; is <{meant}> meant?"),
                 ));
             }
+            if tag == "param" {
+                self.spelt_parameter(node)?;
+            }
         }
         Ok(())
+    }
+
+    /// Refuses a parameter whose name is nearly that of a reduction.
+    fn spelt_parameter(&self, node: Xml<'a>) -> Result<(), RobotError> {
+        let name = node.attribute("name").unwrap_or_default();
+        match nearest(name, REDUCTIONS.into_iter()).filter(|meant| *meant != name) {
+            Some(meant) if !KNOWN.contains(&name) => Err(self.error(
+                node,
+                format!("the parameter `{name}` is none of <transmission>; is `{meant}` meant?"),
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// Returns the names of the joints of a transmission. `driven`: the joints that some transmission of the file names.
@@ -252,6 +281,44 @@ impl<'a> Reader<'a> {
         ));
     }
 
+    /// Adds a remark on gear ratios among the parameters of a driver in `<ros2_control>`, and refuses misspelt ones. Each
+    /// driver defines its parameters itself.
+    ///
+    /// # Errors
+    /// A name is misspelt.
+    fn parameters_of_hardware(&self, active: &[&str]) -> Result<(), RobotError> {
+        let of_joint = |node: &Xml<'a>| {
+            let joint = node.parent().filter(|own| own.has_tag_name("joint"));
+            let control = joint.and_then(|joint| joint.parent());
+            control.is_some_and(|own| own.has_tag_name("ros2_control"))
+                && (joint.and_then(|joint| joint.attribute("name")))
+                    .is_some_and(|name| active.contains(&name))
+        };
+        let root = self.document.root_element();
+        let mut first = None;
+        for node in (root.descendants()).filter(|node| node.has_tag_name("param") && of_joint(node))
+        {
+            let name = node.attribute("name").unwrap_or_default();
+            // A ratio of 1 is the placeholder for "none".
+            let is_one = node
+                .text()
+                .is_some_and(|text| text.trim().parse() == Ok(1.0));
+            if is_ratio(name) {
+                first = first.or((!is_one).then_some((node, name)));
+            } else {
+                self.spelt_parameter(node)?;
+            }
+        }
+        if let Some((node, name)) = first {
+            self.remarks.borrow_mut().push(format!(
+                "{}:{}: the parameter `{name}` of <ros2_control> is not read, for each driver defines its own; give <mechanical_reduction> in a <transmission>, or `gear_ratio` of [joint.drive] in TOML (`rig init --from`).",
+                self.path.display(),
+                self.place(node)
+            ));
+        }
+        Ok(())
+    }
+
     /// Adds a remark on limits of commands in `<ros2_control>`, which are those of a controller.
     fn command_limits(&self, active: &[&str]) {
         let root = self.document.root_element();
@@ -276,11 +343,19 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// Returns true if a parameter is named like a gear ratio.
+fn is_ratio(name: &str) -> bool {
+    let plain: String = (name.chars().filter(|c| !matches!(c, '_' | '-' | ' ')))
+        .flat_map(char::to_lowercase)
+        .collect();
+    RATIOS.contains(&plain.as_str())
+}
+
 /// Returns the numbers of a transmission: ROS 1 has `<mechanicalReduction>`, ROS 2 `<mechanical_reduction>`, Drake
 /// `<drake:gear_ratio value>` and `<drake:rotor_inertia value>`, the inertia on the motor side (Drake, "Supported formats",
 /// multibody parsing).
 fn stated<'a>(transmission: Xml<'a>) -> impl Iterator<Item = Stated<'a>> {
-    let is_name = |name: &str| ["mechanicalReduction", "mechanical_reduction"].contains(&name);
+    let is_name = |name: &str| REDUCTIONS.contains(&name);
     (transmission.descendants().filter(Xml::is_element)).filter_map(move |node| {
         let tag = node.tag_name().name();
         let text = node.text().unwrap_or_default();

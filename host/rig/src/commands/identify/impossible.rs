@@ -2,7 +2,7 @@
 
 use rig_shared::multibody::{COLUMNS, column};
 
-use rig_identify::Identification;
+use rig_identify::{Identification, LEAST_ERROR};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit, listed};
 
@@ -12,8 +12,6 @@ use rig_output::{format_significant, format_unit, listed};
 const CLEARLY: f64 = 2.5;
 /// Half-width of a 95 % interval in standard deviations, about.
 const WIDTH: f64 = 2.0;
-/// Coefficients of a base parameter below this are rounding errors.
-const ROUNDING: f64 = 1e-9;
 
 /// Sentences about friction and inertia that lie below zero by many standard deviations.
 ///
@@ -31,29 +29,14 @@ impl Impossible {
     /// Judges the values of an identification.
     pub fn of(robot: &Robot, found: &Identification) -> Self {
         let details = &found.details;
-        let below_zero = |row: usize| {
+        // Half-width of the 95 % interval.
+        let half = |row: usize| {
             let [value, _, high] = details.free[row];
-            value + CLEARLY * (high - value) < 0.0
+            (high - value) * widened(found, details.columns[row])
         };
-        let positive = [
-            column::MASS,
-            // Ixx, Iyy, Izz of Ixx Ixy Ixz Iyy Iyz Izz.
-            column::INERTIA,
-            column::INERTIA + 3,
-            column::INERTIA + 5,
-            column::DRIVE_INERTIA,
-            column::VISCOUS,
-            column::COULOMB,
-        ];
-        let is_sum = |row: usize| {
-            let own = details.combination.row(row);
-            let may = |(c, x): (usize, &f64)| {
-                x.abs() < ROUNDING || (*x > 0.0 && positive.contains(&(c % COLUMNS)))
-            };
-            own.iter().enumerate().all(may)
-        };
+        let below_zero = |row: usize| details.free[row][0] + CLEARLY * half(row) < 0.0;
         let wrong: Vec<usize> = (0..details.free.len())
-            .filter(|row| below_zero(*row) && is_sum(*row))
+            .filter(|row| below_zero(*row) && found.is_positive_sum(*row))
             .collect();
         let of = |j: usize, place: usize| {
             let column = j * COLUMNS + place;
@@ -78,7 +61,7 @@ impl Impossible {
         };
         let (mut refused, mut doubtful) = (Vec::new(), Vec::new());
         for row in wrong.iter().filter(alone) {
-            let [value, _, high] = details.free[*row];
+            let value = details.free[*row][0];
             let own = &found.base_parameters[*row];
             let column = details.columns[*row];
             let friction = [column::VISCOUS, column::COULOMB].contains(&(column % COLUMNS));
@@ -92,7 +75,7 @@ impl Impossible {
                 robot.joints[column / COLUMNS].name,
                 format_significant(value, 3),
                 format_unit(&own.unit),
-                format_significant(-value * WIDTH / (high - value), 2),
+                format_significant(-value * WIDTH / half(*row), 2),
             ));
         }
         let said = |list: Vec<String>| match list.is_empty() {
@@ -107,4 +90,16 @@ impl Impossible {
             doubtful: said(doubtful),
         }
     }
+}
+
+/// Returns the factor by which an interval is wider if no torque is known better than by [`LEAST_ERROR`]. Friction acts
+/// on its own joint alone, a link on all joints before it too.
+fn widened(found: &Identification, column: usize) -> f64 {
+    let joint = column / COLUMNS;
+    let friction = column % COLUMNS >= column::VISCOUS;
+    let first = if friction { joint } else { 0 };
+    (found.joints.iter().take(joint + 1).skip(first))
+        .map(|own| LEAST_ERROR / own.train_relative_error)
+        .filter(|factor| factor.is_finite())
+        .fold(1.0, f64::max)
 }
