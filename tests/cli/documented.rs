@@ -12,6 +12,22 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
+/// Compares a page that is made from other texts with what they give now. Writes it instead if `RIG_WRITE_DOCS` is set.
+pub(crate) fn made_page(path: &str, text: &str, test: &str) {
+    let place = root().join(path);
+    if std::env::var_os("RIG_WRITE_DOCS").is_some() {
+        fs::write(place, text).unwrap();
+        return;
+    }
+    let found = fs::read_to_string(place).unwrap_or_default();
+    let mut lines = found.lines().zip(text.lines()).enumerate();
+    let differs = lines.find(|(_, (found, made))| found != made);
+    assert!(
+        found == text,
+        "{path} is stale: `RIG_WRITE_DOCS=1 cargo test -p rig --test cli {test}` renews it. First difference: {differs:?}"
+    );
+}
+
 /// The pages that users read.
 fn pages() -> Vec<PathBuf> {
     let mut found = vec![root().join("README.md"), root().join("CONTRIBUTING.md")];
@@ -189,6 +205,108 @@ fn links_of_the_pages_lead_somewhere() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(count > 50, "only {count} links were found");
+}
+
+/// Returns the title of a page, as plain text.
+fn title(page: &Path) -> String {
+    let text = fs::read_to_string(page).unwrap();
+    let line = text.lines().next().unwrap_or_default();
+    let title = line.strip_prefix("# ");
+    title
+        .unwrap_or_else(|| panic!("{} does not begin with a title", page.display()))
+        .replace('`', "")
+}
+
+/// The links of a line of the guide to pages beside it: a second page of a line stands below the first.
+fn links_of(line: &str) -> Vec<&str> {
+    (line.split("](").skip(1))
+        .filter_map(|rest| rest.split(')').next())
+        .filter(|link| !link.contains('#') && !link.starts_with("../"))
+        .collect()
+}
+
+/// The contents of the book are the guide's groups and links with the titles of the pages, and the guide has every page.
+#[test]
+fn the_summary_of_the_book_is_made_from_the_guide() {
+    let docs = root().join("docs");
+    let guide = fs::read_to_string(docs.join("README.md")).unwrap();
+    let mut summary = format!(
+        "# Summary\n\n<!-- Made from README.md: RIG_WRITE_DOCS=1 cargo test -p rig --test cli the_summary -->\n\n[{}](README.md)\n",
+        title(&docs.join("README.md"))
+    );
+    let mut linked = vec![docs.join("README.md"), docs.join("SUMMARY.md")];
+    for line in guide.lines() {
+        if let Some(group) = line.strip_prefix("**").and_then(|l| l.strip_suffix("**")) {
+            summary += &format!("\n# {group}\n\n");
+        } else if line.starts_with("* ") {
+            for link in links_of(line) {
+                let page = docs.join(link);
+                summary += &format!("- [{}]({link})\n", title(&page));
+                linked.push(page);
+            }
+        }
+    }
+    let missing: Vec<_> = (pages().into_iter())
+        .filter(|page| page.starts_with(&docs) && !linked.contains(page))
+        .collect();
+    assert!(missing.is_empty(), "docs/README.md lacks {missing:?}");
+    made_page("docs/SUMMARY.md", &summary, "the_summary");
+}
+
+/// Builds the book with `mdbook`, where it is installed: no warning, and every link of it leads somewhere.
+#[test]
+fn the_book_builds_without_a_warning_and_its_links_lead_somewhere() {
+    if Command::new("mdbook").arg("--version").output().is_err() {
+        println!("skipped: there is no mdbook");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new("mdbook")
+        .args(["build", "--dest-dir"])
+        .arg(folder.path())
+        .arg(root().join("docs"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(!said.contains("WARN") && !said.contains("ERROR"), "{said}");
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for page in pages() {
+        let Ok(place) = page.strip_prefix(root().join("docs")) else {
+            continue;
+        };
+        if place.ends_with("SUMMARY.md") {
+            continue;
+        }
+        let name = place.to_string_lossy().replace("README", "index");
+        let html = folder.path().join(name).with_extension("html");
+        let text = fs::read_to_string(&html).unwrap();
+        for link in text
+            .split("href=\"")
+            .skip(1)
+            .filter_map(|r| r.split('"').next())
+        {
+            if link.contains("://") || link.starts_with("mailto:") {
+                continue;
+            }
+            count += 1;
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = match file {
+                "" => html.clone(),
+                file => html.parent().unwrap().join(file),
+            };
+            let has = |heading: &str| {
+                let text = fs::read_to_string(&target).unwrap_or_default();
+                heading.is_empty() || text.contains(&format!("id=\"{heading}\""))
+            };
+            if !target.exists() || !has(heading) {
+                wrong.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count > 300, "only {count} links were found");
 }
 
 /// Runs the first `count` blocks of shell commands of a page, one after the other in an empty folder. A block without a

@@ -143,3 +143,46 @@ fn shells_complete_every_command() {
         }
     }
 }
+
+#[test]
+fn every_command_has_a_page_for_man() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("man1");
+    let write = || {
+        let mut command = rig();
+        command.arg("man").arg("--out").arg(&out);
+        command
+    };
+    succeed(&mut write());
+    let page = |name: &str| fs::read_to_string(out.join(name)).unwrap();
+    // Roff writes a hyphen as \-.
+    assert!(page("rig-identify.1").contains("\\-\\-holdout"));
+    assert!(page("rig-board-upload.1").contains("\\-\\-leave\\-out"));
+    let first = page("rig.1");
+    let help = String::from_utf8(rig().arg("--help").output().unwrap().stdout).unwrap();
+    let listed = (help
+        .lines()
+        .skip_while(|line| !line.starts_with("Commands:"))
+        .skip(1))
+    .take_while(|line| line.starts_with(' '))
+    .filter(|line| !line.starts_with("   "))
+    .filter_map(|line| line.split_whitespace().next())
+    .filter(|name| *name != "help");
+    let mut count = 0;
+    for name in listed {
+        count += 1;
+        assert!(
+            first.contains(&format!("rig\\-{}(1)", name.replace('-', "\\-"))),
+            "{name}"
+        );
+        assert!(out.join(format!("rig-{name}.1")).exists(), "{name}");
+    }
+    assert!(count > 20, "only {count} commands were listed");
+    let refused = write().output().unwrap();
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        !refused.status.success() && said.contains("--force"),
+        "{said}"
+    );
+    succeed(write().arg("--force"));
+}

@@ -257,6 +257,7 @@ fn summaries(given: &[RecordingSet], sets: &[IdentifiedSet], basis: &Basis) -> V
             rank: set.found.rank,
             degrees_of_freedom: set.found.details.estimate.degrees_of_freedom,
             shrinkage: set.shrinkage,
+            rows: set.found.details.estimate.rows,
             relative_error: (set.found.joints.iter())
                 .map(|j| j.train_relative_error)
                 .collect(),

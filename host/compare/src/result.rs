@@ -96,6 +96,8 @@ pub struct SetSummary {
     pub degrees_of_freedom: usize,
     /// Weight of the regressor's covariance in its own, 0 to 1.
     pub shrinkage: f64,
+    /// Rows that were used, over all joints.
+    pub rows: u64,
     /// By joint, RMS of the residual over RMS of the torque.
     pub relative_error: Vec<f64>,
     /// Parameters that another set shows and this one does not.
@@ -235,15 +237,27 @@ pub struct TorqueMatrix {
 impl TorqueMatrix {
     /// Returns the largest added residual of one set's parameters on another's motion: share, joint, motion, parameters.
     pub fn worst(&self) -> Option<(f64, usize, usize, usize)> {
-        let mut worst: Option<(f64, usize, usize, usize)> = None;
-        for (j, by_motion) in self.added.iter().enumerate() {
-            for (motion, row) in by_motion.iter().enumerate() {
-                // The last entry belongs to the pooled values.
-                for (set, share) in row.iter().take(by_motion.len()).enumerate() {
-                    let more = worst.is_none_or(|(most, ..)| *share > most);
-                    if set != motion && share.is_finite() && more {
-                        worst = Some((*share, j, motion, set));
-                    }
+        (0..self.added.len())
+            .filter_map(|j| {
+                self.worst_of(j)
+                    .map(|(share, motion, set)| (share, j, motion, set))
+            })
+            .fold(None, |worst, found| match worst {
+                Some(most) if most.0 >= found.0 => Some(most),
+                _ => Some(found),
+            })
+    }
+
+    /// Returns the same for one joint: share, motion, parameters.
+    pub fn worst_of(&self, joint: usize) -> Option<(f64, usize, usize)> {
+        let mut worst: Option<(f64, usize, usize)> = None;
+        let by_motion = self.added.get(joint)?;
+        for (motion, row) in by_motion.iter().enumerate() {
+            // The last entry belongs to the pooled values.
+            for (set, share) in row.iter().take(by_motion.len()).enumerate() {
+                let more = worst.is_none_or(|(most, ..)| *share > most);
+                if set != motion && share.is_finite() && more {
+                    worst = Some((*share, motion, set));
                 }
             }
         }

@@ -28,7 +28,7 @@ pub(crate) fn shown(files: &[&Files], text: &str) -> String {
         .fold(text.to_owned(), |text, file| file.shown(&text))
 }
 
-/// Writes recordings as the argument of a call, for the section "How to repeat this" of a report.
+/// Writes recordings as the argument of a call, for the section "Command" of a report.
 pub(crate) fn argument(files: &Files) -> String {
     let list: Vec<String> = files.iter().map(|f| format!("{:?}", f.label())).collect();
     format!("[{}]", list.join(", "))

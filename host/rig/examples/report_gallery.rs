@@ -272,7 +272,7 @@ fn document() -> Document {
             Fact::new("Not testable", "2 effects").note("these data can neither show nor exclude them").tone(Tone::Warning),
         ],
         sections: vec![
-            Section::new("fit", "How well the model fits", "Measured torque, and torque predicted with the identified parameters, behind the same filters. The hold-out was not used in the fit.")
+            Section::new("fit", "Residual of the fit", "Measured torque, and torque predicted with the identified parameters, behind the same filters. The hold-out was not used in the fit.")
                 .with(Block::Plot(torque()))
                 .with(Block::Note { kind: NoteKind::Good, text: "The residual on the hold-out is as small as on the training data.".into() })
                 .with(Block::Plot(bars())),

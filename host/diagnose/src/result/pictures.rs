@@ -103,11 +103,13 @@ fn telling(profile: &FittedCandidate, all: &[Coordinate], joints: &[Joint]) -> O
         | Kind::TorqueRipple
         | Kind::GearEccentricity
         | Kind::EncoderEccentricityMotor => return wave(profile.shapes[0]),
-        Kind::PositionFriction
-        | Kind::Spring
-        | Kind::GravityTilt
-        | Kind::Payload
-        | Kind::EncoderEccentricityJoint => POSITION,
+        Kind::PositionFriction => {
+            let of = |name: &str| all.iter().find(|c| c.name == name);
+            return Some(by_direction(of(POSITION)?, of(VELOCITY)?));
+        }
+        Kind::Spring | Kind::GravityTilt | Kind::Payload | Kind::EncoderEccentricityJoint => {
+            POSITION
+        }
         Kind::PreslidingDahl | Kind::PreslidingLugre | Kind::PreslidingMaxwell | Kind::Backlash => {
             WAY
         }
@@ -130,6 +132,22 @@ fn telling(profile: &FittedCandidate, all: &[Coordinate], joints: &[Joint]) -> O
         | Kind::TorqueOffset => VELOCITY,
     };
     all.iter().find(|c| c.name == name).cloned()
+}
+
+/// Returns the position above the lowest one, with the sign of the velocity: the mean of friction over both directions is
+/// zero at every position.
+fn by_direction(position: &Coordinate, velocity: &Coordinate) -> Coordinate {
+    let lowest = position
+        .values
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    let pairs = position.values.iter().zip(&velocity.values);
+    Coordinate {
+        name: "position above the lowest, by direction".to_owned(),
+        unit: position.unit,
+        values: pairs.map(|(q, v)| v.signum() * (q - lowest)).collect(),
+    }
 }
 
 /// Computes mean residuals of a joint over a coordinate; the joint's name and unit stay empty. Their difference is the

@@ -26,6 +26,7 @@ mod inspect;
 mod interrupts;
 mod live;
 mod load;
+mod man;
 mod map_arg;
 mod mjcf;
 mod overwrite;
@@ -74,6 +75,7 @@ enum Command {
     Base(base::Args),
     Doctor(doctor::Args),
     Completions(completions::Args),
+    Man(man::Args),
 }
 
 impl Cli {
@@ -93,6 +95,7 @@ impl Cli {
             Some(Command::Flash(args)) => flash::run(&args, &ui),
             Some(Command::Doctor(args)) => return doctor::run(&args, &ui),
             Some(Command::Base(args)) => base::run(&args, &ui),
+            Some(Command::Man(args)) => man::run(&args, Self::command(), &ui),
             Some(Command::Completions(args)) => {
                 completions::run(&args, &mut Self::command(), &ui);
                 Ok(())

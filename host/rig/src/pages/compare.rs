@@ -24,16 +24,14 @@ pub fn compare(found: &Comparison, context: &Context) -> Document {
         })
         .into_iter()
         .collect();
-    sections.push(
-        Section::new("grade", "The grade and its reasons", "")
-            .with(Block::List(found.reasons.clone())),
-    );
+    sections.push(Section::new("grade", "Grade", "").with(Block::List(found.reasons.clone())));
     sections.push(sets(found));
     sections.push(values(found));
     sections.push(forests(found));
     sections.push(torque(found));
     sections.extend(causes(found));
     sections.push(trades(found));
+    sections.push(treated(found));
     sections.push(parts::repeat(context));
     Document {
         title: format!("{}: {} results compared", found.robot, found.sets.len()),
@@ -119,7 +117,7 @@ fn sets(found: &Comparison) -> Section {
             },
         ]
     });
-    Section::new("sets", "The sets", "Each set is identified on its own.").with(Block::Table(Table {
+    Section::new("sets", "Sets", "Each set is identified on its own.").with(Block::Table(Table {
         caption: "Sets of recordings".into(),
         columns: vec![
             Column::text("Set"),
@@ -260,13 +258,72 @@ fn torque(found: &Comparison) -> Section {
     let matrix = &found.torque;
     let mut section = Section::new(
         "torque",
-        "Does it matter for the torque?",
+        "Effect on the torque",
         "Each row is the motion of a set, each column the parameters of one. The number is the residual that these parameters add to that of the set's own fit, as a share of the joint's torque RMS.",
     );
-    for j in 0..matrix.joints.len() {
-        section = section.with(Block::Table(by_joint(found, matrix, j)));
+    let joints = matrix.joints.len();
+    if joints > 1 {
+        section = section.with(Block::Plot(all_joints(matrix)));
+    }
+    for (j, name) in matrix.joints.iter().enumerate() {
+        let table = Block::Table(by_joint(found, matrix, j));
+        section
+            .blocks
+            .extend(parts::of_joint(name, joints, "added residual", vec![table]));
     }
     section
+}
+
+/// Draws the largest residual that the parameters of another set add at each joint.
+fn all_joints(matrix: &TorqueMatrix) -> Plot {
+    let names: Vec<&str> = matrix.joints.iter().map(String::as_str).collect();
+    let worst = (0..names.len())
+        .map(|j| 100.0 * matrix.worst_of(j).map_or(f64::NAN, |(share, ..)| share))
+        .collect();
+    parts::joint_bars(
+        "Largest added residual of all joints",
+        &names,
+        Axis::new("added residual over torque RMS", "%"),
+        vec![("parameters of another set", Role::Model, worst)],
+        "The parameters of each set on the motions of the others.",
+    )
+}
+
+/// Filter and rows of each set.
+fn treated(found: &Comparison) -> Section {
+    let rows = found
+        .sets
+        .iter()
+        .zip(&found.pooled.bands)
+        .map(|(set, band)| {
+            let speeds: Vec<String> = (band.min_speed.iter())
+                .map(|v| format_significant(*v, 3))
+                .collect();
+            vec![
+                set.name.clone(),
+                format_significant(band.cutoff, 3),
+                format_significant(band.rate, 4),
+                parts::count(set.rows),
+                speeds.join(" · "),
+            ]
+        });
+    Section::new(
+        "rows",
+        "Filter and rows",
+        "Each set is prepared on its own; the report of an identification has the reasons.",
+    )
+    .with(Block::Table(Table {
+        caption: "Filter and rows of each set".into(),
+        columns: vec![
+            Column::text("Set"),
+            Column::number("Cut-off of the position filter", "Hz"),
+            Column::number("Rows a second", ""),
+            Column::number("Rows used", ""),
+            Column::number("Least speed by joint", "rad/s or m/s"),
+        ],
+        rows: rows.collect(),
+        note: "Rows at less than the least speed, and rows at a torque limit, are not used.".into(),
+    }))
 }
 
 fn by_joint(found: &Comparison, matrix: &TorqueMatrix, j: usize) -> Table {
@@ -323,7 +380,7 @@ fn causes(found: &Comparison) -> Option<Section> {
         ]
     });
     Some(
-        Section::new("causes", "What differs?", &causes.sentence).with(Block::Table(Table {
+        Section::new("causes", "Cause of the differences", &causes.sentence).with(Block::Table(Table {
             caption: "Hypotheses, the most likely first".into(),
             columns: vec![
                 Column::text("Hypothesis"),
@@ -346,7 +403,7 @@ fn causes(found: &Comparison) -> Option<Section> {
 fn trades(found: &Comparison) -> Section {
     let section = Section::new(
         "trades",
-        "Which parameters absorb each other?",
+        "Correlated parameters",
         "A pair trades if the errors of the two are strongly correlated within a set and their differences between two sets nearly cancel in the torque. Then only their sum in the torque is certain, and a difference of one of them alone means little.",
     );
     if found.trades.is_empty() {

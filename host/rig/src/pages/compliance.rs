@@ -641,7 +641,7 @@ fn chart(found: &Compliance, map: &ComplianceMap) -> Section {
 
 /// What the model leaves out.
 fn limits() -> Section {
-    Section::new("limits", "What is left out", "").with(Block::List(vec![
+    Section::new("limits", "Not modelled", "").with(Block::List(vec![
         "Elasticity of links, bearings, base and tool: a measured displacement contains it, K_p does not.".into(),
         "The position loop: the motors count as held.".into(),
         "Geometric stiffness: the torque of a preloaded arm changes as it moves. It matters where gravity or the force is large against stiffness over arm.".into(),

@@ -18,7 +18,7 @@ pub fn control(robot: &Robot, found: &Evaluation, context: &Context) -> Document
     let mut sections: Vec<Section> = parts::warnings(&[&warned]).into_iter().collect();
     if !found.notes.is_empty() {
         let notes = found.notes.iter().map(|note| parts::info(note.as_str()));
-        let section = Section::new("assumed", "What was assumed", "");
+        let section = Section::new("assumed", "Assumptions", "");
         sections.push(notes.fold(section, Section::with));
     }
     if !found.tracking.is_empty() {
@@ -227,7 +227,7 @@ fn joints(robot: &Robot, laws: &[Tracking]) -> Section {
             ]
         })
     });
-    Section::new("joints", "Joint by joint", "").with(Block::Table(Table {
+    Section::new("joints", "Errors and torques by joint", "").with(Block::Table(Table {
         caption: "Errors and torques of each joint".into(),
         columns: vec![
             Column::text("Law"),
@@ -265,7 +265,7 @@ fn adaptation(k: usize, own: &Tracking, learnt: &Adaptation) -> Section {
     };
     Section::new(
         format!("adaptation-{}", k + 1),
-        format!("What the adaptive law learnt, {}", own.model),
+        format!("Adaptation, {}", own.model),
         format!(
             "The motion excites {} of {} directions of the base parameters: an error of one parameter size there makes at least 1 % of the motion's torque. The law reduces the torque error in these directions: their error went from {} to {} parameter sizes, the torque error of the model from {} to {} % of the limits. Errors in the other directions make less torque than that, and hardly change.",
             learnt.excited,
@@ -431,7 +431,7 @@ fn contact(found: &Evaluation) -> Section {
             short(1e3 * task.approach)
         );
     }
-    let section = Section::new("contact", "On the surface", lead)
+    let section = Section::new("contact", "Contact", lead)
         .with(Block::Plot(force))
         .with(Block::Plot(depth));
     force_tables(laws).into_iter().fold(section, Section::with)
@@ -443,7 +443,7 @@ fn settings(found: &Evaluation) -> Section {
         true => "acts one tick after its measurement",
         false => "acts in the tick of its measurement",
     };
-    Section::new("settings", "The loop", "").with(Block::List(vec![
+    Section::new("settings", "Control loop", "").with(Block::List(vec![
         format!(
             "{} ticks a second; the torque {delay} and is held in between.",
             short(s.rate)

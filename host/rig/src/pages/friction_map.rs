@@ -79,7 +79,7 @@ fn summary(kind: JointKind, map: &FrictionMap, context: &Context) -> Vec<Fact> {
 /// All stretches that gave a point.
 fn points(kind: JointKind, map: &FrictionMap) -> Section {
     let [_, velocity, torque] = parts::units(kind);
-    Section::new("points", "The points", "").with(Block::Details {
+    Section::new("points", "Stretches of constant speed", "").with(Block::Details {
         summary: format!("All {} stretches", map.points.len()),
         blocks: vec![Block::Table(Table {
             caption: "Stretches of constant speed".into(),
@@ -130,7 +130,7 @@ fn dropped(map: &FrictionMap, velocity: &'static str) -> Option<Section> {
         rows: rows.collect(),
         note: String::new(),
     };
-    Some(Section::new("dropped", "Left out", "").with(Block::Table(table)))
+    Some(Section::new("dropped", "Stretches left out", "").with(Block::Table(table)))
 }
 
 /// The friction law that the points support.

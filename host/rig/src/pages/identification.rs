@@ -5,18 +5,22 @@ mod summary;
 
 use super::context::Context;
 use super::{parts, residuals, treatment};
-use rig_identify::{Identification, ModelKind};
+use rig_identify::{Identification, JointFigures, ModelKind};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_value};
-use rig_report::{Block, Column, Document, NoteKind, Section, Table};
+use rig_report::{Axis, Block, Column, Document, NoteKind, Plot, Role, Section, Table};
 
 /// Composes the page of an identification.
 pub fn identification(robot: &Robot, found: &Identification, context: &Context) -> Document {
     let mut sections: Vec<Section> = Vec::new();
     sections.extend(parts::warnings(&[&found.sentences(), &context.warnings]));
-    sections.push(parameters(found));
-    sections.push(not_excited(found));
-    sections.push(fit(robot, found));
+    let fit = fit(robot, found);
+    // The figure of all joints comes before the long table of an arm.
+    if robot.joints.len() > 1 {
+        sections.extend([fit, parameters(found), not_excited(found)]);
+    } else {
+        sections.extend([parameters(found), not_excited(found), fit]);
+    }
     sections.extend(super::estimators::sections(robot, found));
     sections.push(confidence::section(found));
     sections.push(data(robot, found));
@@ -128,10 +132,11 @@ fn not_excited(found: &Identification) -> Section {
 fn fit(robot: &Robot, found: &Identification) -> Section {
     let mut section = Section::new(
         "fit",
-        "How well the model fits",
+        "Residual of the fit",
         "Measured torque, and torque predicted with the identified parameters, behind the same filters. The hold-out was not used in the fit.",
     );
     if found.joints.len() > 1 {
+        section = section.with(Block::Plot(by_joint(found)));
         let optional = |v: Option<f64>, f: &dyn Fn(f64) -> String| v.map_or("–".into(), f);
         section = section.with(Block::Table(Table {
             caption: "Residuals by joint".into(),
@@ -170,25 +175,46 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
         }));
     }
     for (j, joint) in robot.joints.iter().enumerate() {
-        if let Some(report) = found
-            .details
-            .holdout_residuals
-            .as_ref()
-            .and_then(|h| h.get(j))
-        {
-            section
-                .blocks
-                .extend(residuals::torque_plots(joint, report, "hold-out"));
+        let mut blocks = Vec::new();
+        let held = found.details.holdout_residuals.as_ref();
+        if let Some(report) = held.and_then(|h| h.get(j)) {
+            blocks.extend(residuals::torque_plots(joint, report, "hold-out"));
         }
         if let Some(report) = found.details.train.get(j) {
-            section
-                .blocks
-                .extend(residuals::torque_plots(joint, report, "training data"));
+            blocks.extend(residuals::torque_plots(joint, report, "training data"));
         }
+        let of = robot.joints.len();
+        section
+            .blocks
+            .extend(parts::of_joint(&joint.name, of, "torque over time", blocks));
     }
     section.with(parts::info(
         "Drag over a plot to zoom; double-click to reset.",
     ))
+}
+
+/// Draws the residual of every joint beside those of the others.
+fn by_joint(found: &Identification) -> Plot {
+    let names: Vec<&str> = found.joints.iter().map(|j| j.name.as_str()).collect();
+    let share = |of: &dyn Fn(&JointFigures) -> f64| -> Vec<f64> {
+        found.joints.iter().map(|j| 100.0 * of(j)).collect()
+    };
+    let mut bars = vec![("training", Role::Before, share(&|j| j.train_relative_error))];
+    if found
+        .joints
+        .iter()
+        .any(|j| j.holdout_relative_error.is_some())
+    {
+        let held = share(&|j| j.holdout_relative_error.unwrap_or(f64::NAN));
+        bars.push(("hold-out", Role::After, held));
+    }
+    parts::joint_bars(
+        "Residual of all joints",
+        &names,
+        Axis::new("residual RMS over torque RMS", "%"),
+        bars,
+        "On the rows that count; the table has the figures on all rows too.",
+    )
 }
 
 fn data(robot: &Robot, found: &Identification) -> Section {
@@ -256,20 +282,19 @@ fn residuals(robot: &Robot, found: &Identification) -> Section {
     let d = &found.details;
     let mut section = Section::new(
         "residuals",
-        "Residual",
+        "Tests of the residual",
         "A residual that depends on one of these quantities shows that the model lacks an effect. The tests use the training data.",
     );
     let period = 1.0 / d.treatment.kept_rate();
     for (joint, report) in robot.joints.iter().zip(&d.train) {
         let blocks = residuals::residual_tests(joint, report, period);
-        if robot.joints.len() == 1 {
-            section.blocks.extend(blocks);
-        } else {
-            section.blocks.push(Block::Details {
-                summary: format!("Joint {}", joint.name),
-                blocks,
-            });
-        }
+        let of = robot.joints.len();
+        section.blocks.extend(parts::of_joint(
+            &joint.name,
+            of,
+            "tests of the residual",
+            blocks,
+        ));
     }
     section
 }

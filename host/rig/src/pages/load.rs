@@ -1,7 +1,7 @@
 //! The page of an identified load.
 
 use super::context::Context;
-use super::parts;
+use super::{parts, treatment};
 use rig_load::{ControllerNumbers, LoadIdentification, SensorFindings, Trace, Value};
 use rig_output::{format_significant, format_unit, format_value};
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
@@ -27,6 +27,7 @@ pub fn load(
     sections.extend(torques(found));
     sections.extend(agreement(found));
     sections.push(for_controllers(found, controllers));
+    sections.extend(treated(found));
     sections.push(parts::repeat(context));
     Document {
         title: format!("{}: the load at the flange", found.robot),
@@ -105,7 +106,7 @@ fn body(found: &LoadIdentification) -> Section {
     });
     let mut section = Section::new(
         "load",
-        "The load",
+        "Inertial parameters of the load",
         "The flange frame is the frame of the last joint (TOML) or of the last link (URDF).",
     )
     .with(Block::Table(Table {
@@ -164,7 +165,7 @@ fn not_shown(found: &LoadIdentification) -> Option<Section> {
         )
     });
     Some(
-        Section::new("not-shown", "What these data do not show", "")
+        Section::new("not-shown", "Parameters that are not determined", "")
             .with(Block::List(items.collect())),
     )
 }
@@ -252,7 +253,7 @@ fn biases(sensor: &SensorFindings) -> Section {
             .map(|(k, name)| Column::number(*name, if k < 3 { "N" } else { "N·m" })),
     );
     let [roll, pitch, yaw] = sensor.rotation.map(|v| format!("{v:.4}"));
-    Section::new("bias", "The sensor", "")
+    Section::new("bias", "Bias and axes of the sensor", "")
         .with(Block::Table(Table {
             caption: "Bias, as read without a load".into(),
             columns,
@@ -332,11 +333,42 @@ fn agreement(found: &LoadIdentification) -> Option<Section> {
     )
 }
 
+/// Filter and rows behind the load.
+fn treated(found: &LoadIdentification) -> Option<Section> {
+    let mut section = Section::new("rows", "Filter and rows", "");
+    if let Some(sensor) = &found.sensor {
+        let mut text = format!(
+            "Sensor: {} rows or poses were used",
+            parts::count(sensor.rows)
+        );
+        text += &match sensor.saturated {
+            0 => ".".to_owned(),
+            cut => format!(
+                ", and {} were left out because a channel was saturated.",
+                parts::count(cut)
+            ),
+        };
+        if sensor.prepared.is_none() {
+            text += " Poses at rest are not filtered.";
+        }
+        section = section.with(Block::Text(text));
+    }
+    if let Some(plan) = found.sensor.as_ref().and_then(|s| s.prepared.as_ref()) {
+        section = section.with(Block::List(treatment::sentences(plan)));
+    }
+    if let Some(torque) = &found.torque {
+        section = section
+            .with(Block::Text("Joint torques:".into()))
+            .with(Block::List(treatment::sentences(&torque.prepared)));
+    }
+    (!section.blocks.is_empty()).then_some(section)
+}
+
 fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumbers>) -> Section {
     let Some(numbers) = numbers else {
         return Section::new(
             "controllers",
-            "For the controller",
+            "Settings for robot controllers",
             "These data do not show mass and centre of mass, so there are no numbers for a controller.",
         );
     };
@@ -346,7 +378,7 @@ fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumber
             "The flange frame of the description must be that of the controller. The inertia is not shown by the data and is given as zero."
         }
     };
-    Section::new("controllers", "For the controller", lead).with(Block::Code(format!(
+    Section::new("controllers", "Settings for robot controllers", lead).with(Block::Code(format!(
         "Universal Robots  {}\nKUKA              {}\nFranka            {}",
         numbers.universal_robots, numbers.kuka, numbers.franka
     )))

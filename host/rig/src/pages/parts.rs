@@ -5,7 +5,7 @@ pub(super) use rig_output::format_unit as unit;
 use super::context::Context;
 use rig_model::robot::JointKind;
 use rig_output::format_significant;
-use rig_report::{Block, Fact, NoteKind, Section, Tone};
+use rig_report::{Axis, Block, Fact, NoteKind, Plot, Role, Section, Series, Style, Tone};
 
 /// Returns "torque" or "force".
 pub(super) fn effort(kind: JointKind) -> &'static str {
@@ -50,6 +50,50 @@ pub(super) fn percent(share: f64) -> String {
     format_significant(value, if value.abs() < 10.0 { 2 } else { 3 })
 }
 
+/// Number of letters that fit below the axis of a figure in a narrow window.
+pub(super) const ROOM: usize = 48;
+
+/// Draws bars of all joints side by side. Where the names of the joints do not fit below the axis, they are numbers there,
+/// and the caption has the names.
+pub(super) fn joint_bars(
+    title: &str,
+    joints: &[&str],
+    y: Axis,
+    bars: Vec<(&str, Role, Vec<f64>)>,
+    note: &str,
+) -> Plot {
+    let longest = joints.iter().map(|n| n.chars().count()).max();
+    let (names, caption) = if longest.unwrap_or(0) * joints.len() <= ROOM {
+        (
+            joints.iter().map(|n| (*n).to_owned()).collect(),
+            String::new(),
+        )
+    } else {
+        let numbered = joints.iter().enumerate();
+        let list: Vec<String> = numbered.map(|(k, n)| format!("{} {n}", k + 1)).collect();
+        let numbers = (1..=joints.len()).map(|k| k.to_string()).collect();
+        (numbers, format!(" Joints: {}.", list.join(", ")))
+    };
+    let places: Vec<f64> = (0..joints.len()).map(|k| k as f64).collect();
+    let mut plot = Plot::new(title.to_owned(), Axis::categories("joint", names), y);
+    for (name, role, values) in bars {
+        plot = plot.with(Series::new(name, role, Style::Bars, places.clone(), values));
+    }
+    plot.height = 240;
+    plot.note(format!("{note}{caption}"))
+}
+
+/// Returns the blocks about one joint of `joints`: folded if there are several.
+pub(super) fn of_joint(name: &str, joints: usize, what: &str, blocks: Vec<Block>) -> Vec<Block> {
+    if joints == 1 || blocks.is_empty() {
+        return blocks;
+    }
+    vec![Block::Details {
+        summary: format!("Joint {name}: {what}"),
+        blocks,
+    }]
+}
+
 /// Half the width of an interval.
 pub(super) fn half(interval: [f64; 2]) -> f64 {
     0.5 * (interval[1] - interval[0])
@@ -88,7 +132,7 @@ pub(super) fn warnings(groups: &[&[String]]) -> Option<Section> {
     let blocks: Vec<Block> = groups.iter().copied().flatten().map(warning).collect();
     (!blocks.is_empty()).then(|| Section {
         id: "warnings".into(),
-        title: "Read this first".into(),
+        title: "Warnings".into(),
         lead: String::new(),
         blocks,
     })
@@ -108,7 +152,7 @@ pub(super) fn warning_count(warnings: usize) -> Fact {
 /// The command that repeats the result, and the description that was written.
 pub(super) fn repeat(context: &Context) -> Section {
     let mut section =
-        Section::new("repeat", "How to repeat this", "").with(Block::Code(context.command.clone()));
+        Section::new("repeat", "Command", "").with(Block::Code(context.command.clone()));
     if let Some((name, text)) = &context.identified {
         if !context.remarks.is_empty() {
             section = section.with(Block::List(context.remarks.clone()));

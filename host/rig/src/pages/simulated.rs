@@ -18,7 +18,7 @@ pub fn simulated_robot(found: &SimulatedRobot, context: &Context) -> Document {
     sections.push(holdout(found));
     if !found.notes.is_empty() {
         sections.push(
-            Section::new("notes", "What was simulated", "").with(Block::List(found.notes.clone())),
+            Section::new("notes", "Simulated robots", "").with(Block::List(found.notes.clone())),
         );
     }
     sections.push(parts::repeat(context));
@@ -91,7 +91,7 @@ pub fn simulated_overview(all: &[(String, SimulatedRobot)], context: &Context) -
             })
             .collect(),
         sections: vec![
-            Section::new("errors", "How near is the truth?", "").with(Block::Table(errors)),
+            Section::new("errors", "Estimation error", "").with(Block::Table(errors)),
             Section::new("holdout", "Measured and predicted torque", "").with(Block::Table(joints)),
             Section::new("reports", "Reports of the robots", RECURSION)
                 .with(Block::Links(reports.collect())),
@@ -143,7 +143,7 @@ fn accuracy(found: &SimulatedRobot) -> Section {
         .map(|e| vec![words(e), parts::percent(e.torque_error), inside_of(e)]);
     Section::new(
         "accuracy",
-        "How near is the truth?",
+        "Estimation error",
         "The torque error is the RMS torque of the difference to the true parameters on the training motion, as a share of the torque, over all joints.",
     )
     .with(Block::Table(Table {

@@ -145,6 +145,57 @@ fn an_identification_shows_every_parameter_warning_and_reason() {
     assert!(page.contains("cut-off"));
 }
 
+/// Titles of the figures that are not folded.
+fn unfolded(page: &rig_report::Document) -> Vec<&str> {
+    let blocks = page.sections.iter().flat_map(|s| &s.blocks);
+    let plots = blocks.filter_map(|block| match block {
+        rig_report::Block::Plot(plot) => Some(plot.title.as_str()),
+        _ => None,
+    });
+    plots.collect()
+}
+
+#[test]
+fn an_arm_shows_all_joints_in_one_figure_first_and_folds_each() {
+    let mut robot = robot();
+    let data = recording(&robot);
+    let mut found = identify(&robot, &[&data], &[&data], &Options::default()).unwrap();
+    let page = identification(&robot, &found, &Context::default());
+    assert!(unfolded(&page).iter().any(|t| t.starts_with("Joint link")));
+    // Two more joints with the same figures: only the number of joints matters.
+    for name in ["second_joint_of_a_long_name", "third_joint_of_a_long_name"] {
+        let mut joint = robot.joints[0].clone();
+        joint.name = name.into();
+        robot.joints.push(joint);
+        let mut figures = found.joints[0].clone();
+        figures.name = name.into();
+        found.joints.push(figures);
+        let details = &mut found.details;
+        details.train.push(details.train[0].clone());
+        let held = details.holdout_residuals.as_mut().unwrap();
+        held.push(held[0].clone());
+        let spectra = &mut details.treatment.spectra;
+        spectra.push(spectra[0].clone());
+        for trial in &mut details.treatment.trials {
+            trial.relative_error.push(trial.relative_error[0]);
+        }
+    }
+    let page = identification(&robot, &found, &Context::default());
+    let open = unfolded(&page);
+    assert_eq!(open.first(), Some(&"Residual of all joints"), "{open:?}");
+    assert!(!open.iter().any(|t| t.starts_with("Joint ")), "{open:?}");
+    let html = render(&page).unwrap();
+    // The names do not fit below the axis.
+    assert!(html.contains("Joints: 1 link, 2 second_joint_of_a_long_name, 3 third_joint"));
+    for word in [
+        "torque over time",
+        "tests of the residual",
+        "spectrum of the position",
+    ] {
+        assert!(html.contains(&format!("Joint link: {word}")), "{word}");
+    }
+}
+
 #[test]
 fn a_validation_says_what_was_not_simulated() {
     let robot = robot();

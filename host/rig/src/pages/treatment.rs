@@ -37,8 +37,8 @@ fn over_cutoff(joints: &[Joint], treatment: &PreprocessingPlan) -> Plot {
     )
 }
 
-/// Treatment of the data: sentences, and the spectra behind them.
-pub(super) fn treatment(joints: &[Joint], treatment: &PreprocessingPlan) -> Vec<Block> {
+/// Sentences about the treatment of the data.
+pub(super) fn sentences(treatment: &PreprocessingPlan) -> Vec<String> {
     let rate = treatment.sample_rate;
     let mut items = vec![
         format!(
@@ -61,12 +61,23 @@ pub(super) fn treatment(joints: &[Joint], treatment: &PreprocessingPlan) -> Vec<
             format_significant(1e3 * treatment.torque_lead, 3)
         ));
     }
-    let mut blocks = vec![Block::List(items)];
+    items
+}
+
+/// Treatment of the data: sentences, and the spectra behind them.
+pub(super) fn treatment(joints: &[Joint], treatment: &PreprocessingPlan) -> Vec<Block> {
+    let mut blocks = vec![Block::List(sentences(treatment))];
     if !treatment.trials.is_empty() {
         blocks.push(Block::Plot(over_cutoff(joints, treatment)));
     }
     for (joint, spectrum) in joints.iter().zip(&treatment.spectra) {
-        blocks.push(Block::Plot(over_frequency(joint, spectrum, treatment)));
+        let plot = Block::Plot(over_frequency(joint, spectrum, treatment));
+        blocks.extend(parts::of_joint(
+            &joint.name,
+            joints.len(),
+            "spectrum of the position",
+            vec![plot],
+        ));
     }
     blocks
 }

@@ -164,7 +164,7 @@ fn overview(found: &Validation) -> Section {
     );
     Section::new(
         "overview",
-        "All figures",
+        "Overview",
         if replayed {
             "Torque: predicted for the measured motion. Simulation: the recorded torque drives the model, and a controller corrects the deviation from the recorded motion; the error of the simulated torque is the torque of this controller."
         } else {

@@ -75,7 +75,7 @@ fn overview(found: &VoltageValidation) -> Section {
         .collect();
     Section::new(
         "overview",
-        "All figures",
+        "Overview",
         "Each recording is simulated from its first state for 10 s at most, without using the measured motion. In the closed loop, the controller identified from the recording follows the recorded reference.",
     )
     .with(Block::Table(Table {

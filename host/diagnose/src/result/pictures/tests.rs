@@ -73,6 +73,29 @@ fn weakening_friction_is_drawn_over_the_speed() {
     println!("{:#?}\n{:#?}", found.not_testable, found.next_experiment);
 }
 
+/// Friction that varies with the position has opposite signs in the two directions: over the position alone the means of its
+/// residual cancel, and the picture would show nothing.
+#[test]
+fn friction_that_varies_with_the_position_is_drawn_by_direction() {
+    let effect = Effect::PositionFriction {
+        amplitude: 0.2,
+        order: 2.0,
+        phase: 0.4,
+    };
+    let made = Scenario {
+        seconds: [40.0, 20.0],
+        ..Scenario::new(vec![Hidden { joint: 0, effect }], 5)
+    }
+    .make()
+    .unwrap();
+    let (found, _) = made.diagnosed(&made.robot, &Options::default());
+    assert_eq!(found.steps[0].effect, "position_friction");
+    let map = found.maps.iter().find(|m| m.step == Some(0)).unwrap();
+    let size = |list: &[[f64; 2]]| list.iter().map(|v| v[0] * v[0]).sum::<f64>();
+    assert!(size(&map.after) < 0.1 * size(&map.before), "{map:?}");
+    assert!(map.at[0] < 0.0 && map.at[map.at.len() - 1] > 0.0);
+}
+
 /// Bins by equal numbers of rows, for a joint that runs at 0.05 rad/s for long. Those within the noise of that speed
 /// are drawn as one; those near rest and far out stay separate.
 #[test]

@@ -20,7 +20,7 @@ pub fn demo(figures: &DemoFigures) -> Document {
     sections.extend(figures.diagnosis.as_ref().map(missing::section));
     sections.push(beyond(figures));
     let mut repeat =
-        Section::new("repeat", "How to repeat this", "").with(Block::Code(figures.command.clone()));
+        Section::new("repeat", "Command", "").with(Block::Code(figures.command.clone()));
     if !figures.files.is_empty() {
         repeat = repeat.with(Block::Table(Table {
             caption: "Files beside this page".into(),

@@ -19,20 +19,24 @@ pub(super) fn section(found: &Diagnosis) -> Option<Section> {
     if !found.motion_how.is_empty() {
         section = section.with(Block::Text(found.motion_how.clone()));
     }
+    let joints = drawn.len();
     for curves in drawn {
+        let mut blocks = Vec::new();
         let unit = found
             .waterfall
             .iter()
             .find(|w| w.joint == curves.joint)
             .map_or("", |w| w.unit.as_str());
         if curves.torque.iter().any(|t| !t.is_empty()) {
-            section.blocks.extend(torque(curves, unit).map(Block::Plot));
+            blocks.extend(torque(curves, unit).map(Block::Plot));
         }
         if curves.motion.iter().any(|m| !m.is_empty()) {
-            section
-                .blocks
-                .extend(motion(curves, words::position_unit(unit)).map(Block::Plot));
+            blocks.extend(motion(curves, words::position_unit(unit)).map(Block::Plot));
         }
+        let what = "torque and motion over time";
+        section
+            .blocks
+            .extend(parts::of_joint(&curves.joint, joints, what, blocks));
     }
     Some(section)
 }

@@ -7,8 +7,6 @@ use rig_diagnose::what_falls;
 use rig_output::{format_p_value, format_significant};
 use rig_report::{self, Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table};
 
-/// Number of letters that fit below the axis in a narrow window. Longer names are shortened or replaced by numbers.
-const ROOM: usize = 48;
 /// Smallest share of the gap that is printed as a sentence.
 const LEAST_SHARE: f64 = 0.005;
 /// Ratio of highest residual to noise floor from which on the axis is logarithmic, to show the last steps.
@@ -55,13 +53,18 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
             found.noise_floor_how
         )));
     }
+    if found.waterfall.len() > 1 {
+        section.blocks.extend(by_joint(found).map(Block::Plot));
+    }
     let (moved, still): (Vec<&Waterfall>, Vec<&Waterfall>) =
         found.waterfall.iter().partition(|w| {
             found.waterfall.len() == 1 || found.steps.iter().any(|step| step.joint == w.joint)
         });
-    section
-        .blocks
-        .extend(moved.iter().map(|w| Block::Plot(bars(found, w, ROOM))));
+    section.blocks.extend(
+        moved
+            .iter()
+            .map(|w| Block::Plot(bars(found, w, parts::ROOM))),
+    );
     if !still.is_empty() {
         section.blocks.push(Block::Details {
             summary: format!(
@@ -70,11 +73,47 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
             ),
             blocks: still
                 .iter()
-                .map(|w| Block::Plot(bars(found, w, ROOM)))
+                .map(|w| Block::Plot(bars(found, w, parts::ROOM)))
                 .collect(),
         });
     }
     Some(section.with(figures(found)))
+}
+
+/// Draws the residual of every joint over its noise floor, refitted and with the effects. None if no floor is known.
+fn by_joint(found: &Diagnosis) -> Option<Plot> {
+    let joints: Vec<&str> = found.waterfall.iter().map(|w| w.joint.as_str()).collect();
+    let held = held_out(found);
+    let over_floor = |model: &dyn Fn(&[f64]) -> Option<f64>| -> Vec<f64> {
+        let ratio = |w: &Waterfall| {
+            let rms = if held { &w.holdout } else { &w.train };
+            let floor = if held { w.judged_floor() } else { w.floor };
+            model(rms)
+                .filter(|_| floor > 0.0)
+                .map_or(f64::NAN, |rms| rms / floor)
+        };
+        found.waterfall.iter().map(ratio).collect()
+    };
+    // The description comes first, then the refit, then each effect.
+    let refitted = over_floor(&|rms| rms.get(1).copied());
+    let last = over_floor(&|rms| rms.last().copied());
+    if last.iter().all(|ratio| ratio.is_nan()) {
+        return None;
+    }
+    let data = if held { "hold-out" } else { "training data" };
+    Some(
+        parts::joint_bars(
+            "Residual of all joints",
+            &joints,
+            Axis::new("residual RMS over noise floor", ""),
+            vec![
+                ("refitted", Role::Before, refitted),
+                ("with the effects", Role::After, last),
+            ],
+            &format!("On the {data}. At 1 only noise remains."),
+        )
+        .mark(Marker::horizontal(1.0, "noise floor")),
+    )
 }
 
 /// Draws the residual of a joint for each model. If the names of the models need more than `room` letters, the laws of
@@ -217,7 +256,7 @@ pub(super) fn places(found: &Diagnosis) -> Option<Section> {
     let texts: Vec<String> = texts(&found.places, found.waterfall.len() > 1);
     let mut section = Section::new(
         "where",
-        "Where the gap is",
+        "Dependence of the residual",
         "Quantities that the residual of the refitted model depends on, before any effect is added. Noise depends on none of them; a dependence shows that the model lacks an effect.",
     );
     if found.places.is_empty() {

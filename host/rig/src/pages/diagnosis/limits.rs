@@ -78,7 +78,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
     }
     let mut section = Section::new(
         "limits",
-        "What these data cannot show",
+        "Limits of detection",
         "An effect that was not found may still be present. These data cannot show some effects at all, and show others only above a certain size.",
     );
     if !found.not_testable.is_empty() {

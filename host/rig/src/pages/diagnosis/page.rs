@@ -112,7 +112,7 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
 }
 
 fn opening(found: &Diagnosis) -> Section {
-    let mut section = Section::new("verdict", "The verdict", "").with(Block::Note {
+    let mut section = Section::new("verdict", "Verdict", "").with(Block::Note {
         kind: words::note(found.verdict),
         text: format!(
             "{}. {}",

@@ -62,6 +62,32 @@ fn a_page_says_all_that_the_diagnosis_says() {
 }
 
 #[test]
+fn an_arm_shows_all_joints_over_their_noise_floor_first() {
+    let mut found = made_up::explained();
+    let mut other = found.waterfall[0].clone();
+    other.joint = "other".into();
+    // The floor of this joint is not known: its bars are left out.
+    other.floor = 0.0;
+    other.holdout_floor = 0.0;
+    found.waterfall.push(other);
+    let document = diagnosis(&found, &context());
+    let mut blocks = section(&document, "gap").unwrap().blocks.iter();
+    let first = blocks.find_map(|block| match block {
+        Block::Plot(plot) => Some(plot),
+        _ => None,
+    });
+    let first = first.unwrap();
+    assert_eq!(first.title, "Residual of all joints");
+    let refitted = &first.series[0].y;
+    assert!(
+        (refitted[0] - 0.224 / 0.051).abs() < 1e-9 && refitted[1].is_nan(),
+        "{refitted:?}"
+    );
+    found.waterfall.truncate(1);
+    assert!(!page(&found).contains("Residual of all joints"));
+}
+
+#[test]
 fn no_section_of_any_verdict_is_empty() {
     for (name, found) in made_up::all() {
         let document = diagnosis(&found, &context());
