@@ -38,6 +38,7 @@ mod effects;
 mod error;
 mod evaluate;
 mod law_model;
+mod loop_margin;
 mod measures;
 mod mobility;
 mod plant;

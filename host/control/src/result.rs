@@ -60,6 +60,8 @@ pub struct Tracking {
     pub law: LawKind,
     /// The law's model.
     pub model: String,
+    /// Bandwidth of its position loops, Hz: that of the settings, or a lower one that keeps the gain margin.
+    pub bandwidth: f64,
     /// Measures of each joint.
     pub joints: Vec<JointMeasures>,
     /// RMS tracking error of the tool, m.

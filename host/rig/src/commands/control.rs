@@ -14,7 +14,7 @@ use rig_control::{
     Bench, ContactOptions, ContactTask, Evaluation, LawKind, LawModel, Settings, Surface, Trace,
     default_reference, references, resolution, save, tool_point,
 };
-use rig_excite::load_reference;
+use rig_excite::{SampledReference, reference_at};
 use rig_model::robot::Robot;
 use rig_model::simulate::{Model, controllers};
 use rig_output::{can_take, folder, format_significant, write_whole};
@@ -345,30 +345,32 @@ impl Whole<'_> {
         }
     }
 
+    /// Returns the motion at `rate` (Hz), and notes how it was interpolated.
+    fn motion(&self, rate: f64, notes: &mut Vec<String>) -> Result<SampledReference, CommandError> {
+        let Some(path) = &self.args.trajectory else {
+            return Ok(default_reference(self.robot, rate, self.args.duration));
+        };
+        let (sampled, from) = reference_at(path, self.robot, rate)?;
+        notes.extend(from.map(|from| {
+            format!(
+                "{}: the reference is sampled at {} Hz; quintics through its samples give position, velocity and acceleration at the {} Hz of the control loop (--rate).",
+                path.display(),
+                format_significant(from, 6),
+                format_significant(rate, 6)
+            )
+        }));
+        Ok(sampled)
+    }
+
     fn track(
         &self,
         laws: &[LawKind],
-        mut settings: Settings,
+        settings: Settings,
         evaluation: &mut Evaluation,
         motions: &mut Vec<Motion>,
         ui: &Ui,
     ) -> Result<(), CommandError> {
-        let sampled = match &self.args.trajectory {
-            Some(path) => load_reference(path, self.robot, settings.rate)?,
-            None => default_reference(self.robot, settings.rate, self.args.duration),
-        };
-        let rate = 1.0 / sampled.period;
-        if (rate / settings.rate - 1.0).abs() > 1e-6 {
-            let given = self.args.rate.map_or(String::new(), |given| {
-                format!(" --rate {given} was not used.")
-            });
-            evaluation.notes.push(format!(
-                "The laws run at {rate:.6} Hz, the rate of the sampled trajectory; a .toml trajectory runs at any rate.{given}"
-            ));
-            settings.rate = rate;
-            settings.check()?;
-            evaluation.settings = settings;
-        }
+        let sampled = self.motion(settings.rate, &mut evaluation.notes)?;
         let reference = references(&sampled)?;
         let tool = match three("tool", self.args.contact.tool.as_deref())? {
             Some(tool) => tool,
