@@ -191,18 +191,16 @@ fn at_poses(
     Ok((computed, map))
 }
 
-/// Refuses a pose beyond the limits and a turn that would lie within them as degrees.
+/// Refuses a pose in degrees, by the rule for recordings: more than five times the farthest limit, and in degrees near it.
 fn refuse_pose_in_degrees(robot: &Robot, pose: &[f64]) -> Result<(), ComplianceError> {
     let in_degrees = robot.joints.iter().zip(pose).find(|(joint, q)| {
         let Some(limits) = joint.limits.as_ref() else {
             return false;
         };
-        let [low, high] = limits.position;
-        let within = |q: f64| q >= low && q <= high;
+        let reach = limits.position[0].abs().max(limits.position[1].abs());
         joint.kind == JointKind::Revolute
-            && q.abs() > std::f64::consts::TAU
-            && !within(**q)
-            && within(q.to_radians())
+            && q.abs() > 5.0 * reach
+            && q.to_radians().abs() <= 1.2 * reach
     });
     match in_degrees {
         None => Ok(()),
