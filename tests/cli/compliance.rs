@@ -208,3 +208,65 @@ fn recordings_that_show_no_stiffness_are_refused() {
     assert!(refused("--static", &at("missing.csv"), &[]).contains("missing.csv"));
     assert!(!at("out").exists());
 }
+
+/// Recordings of a held arm: the gear has 1500 N·m/rad, the arm 0.5 m. The file may have other units and names.
+#[test]
+fn units_and_names_of_held_recordings_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let held = |name: &str, head: &str, q: f64, torque: &str| {
+        let mut text = format!("{head}\n");
+        for k in 0..2000 {
+            let force = 20.0 * (0.0063 * f64::from(k)).sin();
+            let deflection = 0.25 * force / 1500.0;
+            let t = 0.02 * f64::from(k);
+            text.push_str(&format!(
+                "{t:.2},{q},0,0,{force:.5},{deflection:.9}{torque}\n"
+            ));
+        }
+        fs::write(at(name), text).unwrap();
+        at(name)
+    };
+    let rig = robot("one-link.toml");
+    let run = |data: &Path, out: &str, options: &[&str]| {
+        let mut command = compliance(&rig, &at(out));
+        command
+            .arg("--static")
+            .arg(data)
+            .args(["--tool", "0.5", "0", "0"]);
+        command.args(options);
+        command
+    };
+    let head = "t,q1,fx,fy,fz,dz";
+    let good = held("good.csv", head, 0.0, "");
+    let said = succeed(&mut run(&good, "good", &["--pose", "0"]));
+    assert!(said.contains("stiffness 1500"), "{said}");
+    // Motors held at 68.75° and torques in N·mm.
+    let said = refuse(&mut run(&held("deg.csv", head, 68.75, ""), "out", &[]));
+    assert!(said.contains("q1 looks like degrees"), "{said}");
+    let many = held("nmm.csv", "t,q1,fx,fy,fz,dz,tau1", 0.0, ",2900");
+    let said = refuse(&mut run(&many, "out", &[]));
+    assert!(said.contains("tau1") && said.contains("2900"), "{said}");
+    // A pose in degrees.
+    let said = refuse(&mut run(&good, "out", &["--pose", "-90"]));
+    assert!(
+        said.contains("looks like degrees") && said.contains("-1.571"),
+        "{said}"
+    );
+    // Other names: listed, then mapped.
+    let other = held("names.csv", "t,q1,push_x,push_y,push_z,dz", 0.0, "");
+    let said = refuse(&mut run(&other, "out", &[]));
+    for word in ["`push_z`", "--map", "--mapping", "rig inspect"] {
+        assert!(said.contains(word), "{said}");
+    }
+    let maps = [
+        "--map",
+        "fx=push_x",
+        "--map",
+        "fy=push_y",
+        "--map",
+        "fz=push_z",
+    ];
+    let said = succeed(&mut run(&other, "mapped", &maps));
+    assert!(said.contains("stiffness 1500"), "{said}");
+}

@@ -130,6 +130,31 @@ fn wrong_options_are_refused_in_a_sentence() {
         ("edda.toml", &["--wrong", "95"], "--wrong 95"),
         ("edda.toml", &["--scale", "0"], "--scale 0"),
         ("edda.toml", &["--draws", "0"], "--draws 0"),
+        // Negative values reach the check of the value.
+        ("edda.toml", &["--scale", "-1"], "--scale -1"),
+        ("edda.toml", &["--damping", "-0.5"], "damping -0.5"),
+        ("edda.toml", &["--law", "contact", "--press", "-20"], "-20"),
+        (
+            "edda.toml",
+            &["--law", "contact", "--gap", "-0.01"],
+            "-0.01",
+        ),
+        // Options without effect.
+        (
+            "edda.toml",
+            &["--law", "pid", "--stiffness", "5"],
+            "--stiffness belongs to --law",
+        ),
+        (
+            "edda.toml",
+            &["--law", "hybrid", "--impedance", "5"],
+            "--impedance belongs to --law impedance",
+        ),
+        (
+            "edda.toml",
+            &["--law", "contact", "--duration", "3"],
+            "--duration belongs to --law",
+        ),
         (
             "edda.toml",
             &["--trajectory", "nowhere.toml"],
@@ -170,4 +195,85 @@ fn recordings_of_an_earlier_run_are_removed_with_force() {
     succeed(&mut run(&["pid", "--force"]));
     assert!(out.join("pid.csv").is_file() && out.join("mine.csv").is_file());
     assert!(!out.join("computed-torque.csv").exists());
+}
+
+/// A recording of 100 rows a second is followed at the rate of the loop, as well as the motion that it was made from.
+#[test]
+fn a_slow_recording_is_followed_at_the_rate_of_the_loop() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // Two sines from rest, written by this test.
+    let motion = |rate: f64, name: &str| {
+        let mut text = "t,q1,ref1,q2,ref2\n".to_owned();
+        for k in 0..=(6.0 * rate) as usize {
+            let t = k as f64 / rate;
+            let ease = (t / 2.0).min(1.0).powi(3)
+                * (10.0 - 15.0 * (t / 2.0).min(1.0) + 6.0 * (t / 2.0).min(1.0).powi(2));
+            let [a, b] = [0.8, 1.3].map(|w| 0.5 * ease * (w * 3.0 * t).sin());
+            text.push_str(&format!("{t},{a},{a},{b},{b}\n"));
+        }
+        fs::write(at(name), text).unwrap();
+        at(name)
+    };
+    let error = |path: &Path, name: &str, options: &[&str]| {
+        let mut command = control("edda.toml", &["--law", "all"], &at(name));
+        succeed(command.args(options).arg("--trajectory").arg(path));
+        let found = result(&at(name));
+        let list = found["tracking"].as_array().unwrap();
+        let errors: Vec<f64> = list
+            .iter()
+            .map(|own| own["tool_rms"].as_f64().unwrap())
+            .collect();
+        (errors, found)
+    };
+    let (fast, _) = error(&motion(1000.0, "fast.csv"), "fast", &[]);
+    let slow = motion(100.0, "slow.csv");
+    let (errors, found) = error(&slow, "slow", &[]);
+    for (a, b) in errors.iter().zip(&fast) {
+        assert!((a / b - 1.0).abs() < 0.2, "{errors:?} {fast:?}");
+    }
+    let notes = found["notes"].to_string();
+    assert!(
+        notes.contains("slow.csv") && notes.contains("sampled at 100"),
+        "{notes}"
+    );
+    let (_, found) = error(&slow, "asked", &["--rate", "2000"]);
+    assert_eq!(found["settings"]["rate"], 2000.0);
+    let coarse = motion(2.0, "coarse.csv");
+    let mut command = control("edda.toml", &[], &at("coarse"));
+    let said = refuse(command.arg("--trajectory").arg(coarse));
+    assert!(said.contains("too seldom for this motion"), "{said}");
+}
+
+/// One law that fails does not take the others along.
+#[test]
+fn an_unstable_law_is_told_and_the_others_are_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let text = fs::read_to_string(robot("edda.toml")).unwrap();
+    // Without torque limits an unstable loop leaves all bounds.
+    let text: String = text
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("torque = "))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let free = folder.path().join("free.toml");
+    fs::write(&free, text).unwrap();
+    let mut command = rig();
+    command.args(["control", "--duration", "2", "--scale", "4", "--robot"]);
+    let run = command.arg(&free).arg("--out").arg(&out).output().unwrap();
+    let said = String::from_utf8(run.stderr).unwrap();
+    assert_eq!(run.status.code(), Some(1), "{said}");
+    let found = result(&out);
+    let [failed, done] = ["failed", "tracking"].map(|key| found[key].as_array().unwrap().len());
+    assert!(failed >= 1 && done >= 1, "{failed} {done}: {said}");
+    assert!(
+        said.contains("unstable") && said.contains("The other laws are in"),
+        "{said}"
+    );
+    assert!(
+        String::from_utf8(run.stdout)
+            .unwrap()
+            .contains("with free.toml")
+    );
 }

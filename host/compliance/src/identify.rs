@@ -1,7 +1,7 @@
 //! The whole: stiffness of the drives from all sources, and the compliance of the tool point.
 
 use rig_data::prepare::Recording;
-use rig_model::robot::Robot;
+use rig_model::robot::{JointKind, Robot};
 use rig_output::{format_significant, format_unit};
 use serde::Serialize;
 
@@ -167,6 +167,9 @@ fn at_poses(
         [] => vec![robot.middle_position()],
         given => given.to_vec(),
     };
+    for pose in &poses {
+        refuse_pose_in_degrees(robot, pose)?;
+    }
     warnings.extend(poses.iter().filter_map(|pose| outside(robot, pose)));
     let computed: Vec<ToolCompliance> = (poses.iter())
         .map(|pose| tool.compliance(pose, drives))
@@ -186,6 +189,30 @@ fn at_poses(
         ));
     }
     Ok((computed, map))
+}
+
+/// Refuses a pose in degrees, by the rule for recordings: more than five times the farthest limit, and in degrees near it.
+fn refuse_pose_in_degrees(robot: &Robot, pose: &[f64]) -> Result<(), ComplianceError> {
+    let in_degrees = robot.joints.iter().zip(pose).find(|(joint, q)| {
+        let Some(limits) = joint.limits.as_ref() else {
+            return false;
+        };
+        let reach = limits.position[0].abs().max(limits.position[1].abs());
+        joint.kind == JointKind::Revolute
+            && q.abs() > 5.0 * reach
+            && q.to_radians().abs() <= 1.2 * reach
+    });
+    match in_degrees {
+        None => Ok(()),
+        Some((joint, q)) => Err(ComplianceError::Option(format!(
+            "The pose {} has joint \"{}\" at {} rad, far beyond its limits, which looks like degrees; give positions in rad ({}° is {} rad).",
+            listed_pose(pose),
+            joint.name,
+            format_significant(*q, 4),
+            format_significant(*q, 4),
+            format_significant(q.to_radians(), 4)
+        ))),
+    }
 }
 
 /// Names the joints that a pose puts beyond their limits.

@@ -53,6 +53,50 @@ impl Signals {
             .map(|(_, values)| values.as_slice())
     }
 
+    /// Lists the columns that belong to no joint, with the options that name them.
+    pub(crate) fn other_columns(&self) -> String {
+        let names: Vec<String> = (self.extra.iter())
+            .map(|(name, _)| format!("`{name}`"))
+            .collect();
+        match names.is_empty() {
+            true => "It has no column beside those of the joints.".to_owned(),
+            false => format!(
+                "Its columns beside those of the joints are {}; for other names give --map fx=NAME or --mapping FILE (`rig inspect` lists the columns).",
+                names.join(", ")
+            ),
+        }
+    }
+
+    /// Returns the same signals with the values of the columns `from` in the columns `to`; `None` if one is missing.
+    pub(crate) fn exchanged(&self, to: [&str; 3], from: [&str; 3]) -> Option<Self> {
+        let mut own = self.clone();
+        for (to, from) in to.into_iter().zip(from) {
+            let values = self.column(from)?.to_vec();
+            own.extra.iter_mut().find(|(name, _)| name == to)?.1 = values;
+        }
+        Some(own)
+    }
+
+    /// Returns the same signals without some columns.
+    pub(crate) fn without_columns(&self, names: &[&str]) -> Self {
+        let mut own = self.clone();
+        own.extra
+            .retain(|(name, _)| !names.contains(&name.as_str()));
+        own
+    }
+
+    /// Returns the same signals with the positions of the marked joints taken as degrees.
+    pub(crate) fn in_radians(&self, revolute: &[bool]) -> Self {
+        let mut own = self.clone();
+        for (joint, _) in own.joints.iter_mut().zip(revolute).filter(|(_, r)| **r) {
+            let lists = [Some(&mut joint.q), joint.link.as_mut()];
+            for list in lists.into_iter().flatten() {
+                list.iter_mut().for_each(|q| *q = q.to_radians());
+            }
+        }
+        own
+    }
+
     fn append(&mut self, block: Block) {
         if self.joints.is_empty() {
             self.joints = vec![JointSignals::default(); block.joints.len()];

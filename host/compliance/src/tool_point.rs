@@ -120,6 +120,25 @@ impl<'a> ToolPoint<'a> {
         Ok(self)
     }
 
+    /// Returns true if wrenches are readings of the wrist sensor.
+    pub(crate) fn is_sensed(&self) -> bool {
+        self.sensor.is_some()
+    }
+
+    /// Takes wrenches on the robot at the tool point, in the axes of the base.
+    pub(crate) fn in_base_axes(mut self) -> Self {
+        self.sensor = None;
+        self
+    }
+
+    /// Takes wrenches on the robot at the tool point, in the axes of the flange after a turn about its z axis, rad.
+    pub(crate) fn in_flange_axes(mut self, angle: f64) -> Self {
+        let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        let place = self.robot.last_link * nalgebra::Translation3::from(Vector3::from(self.offset));
+        self.sensor = Some((frame(&(place * turn)), 1.0));
+        self
+    }
+
     /// Returns the rotation from the axes of a wrench's readings to the base, the sign that makes them the wrench on the robot,
     /// and the Jacobian of the point that they are about.
     pub(crate) fn wrench_frame(

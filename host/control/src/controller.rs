@@ -6,8 +6,10 @@ use super::design;
 use super::effects::Compensated;
 use super::error::ControlError;
 use super::law_model::LawModel;
+use super::loop_margin::{MARGIN, fastest};
 use super::sensing::resolution;
 use super::settings::{LawKind, Settings};
+use rig_output::format_significant;
 use rig_shared::control::arm::hybrid::{Axis, ForceGains};
 use rig_shared::control::arm::impedance::Target;
 use rig_shared::control::arm::pid::PidGains;
@@ -84,6 +86,66 @@ pub(crate) fn limits(model: &LawModel, reference: &[Vec<Reference<f64>>]) -> Vec
         .collect()
 }
 
+/// Returns the settings with the bandwidth at which a law that tracks a motion keeps its gain margin, and a sentence if
+/// it is lower than the wanted one.
+fn slowed(
+    kind: LawKind,
+    model: &LawModel,
+    inertias: Option<&design::Inertias>,
+    settings: &Settings,
+) -> (Settings, Option<String>) {
+    if kind.is_contact() {
+        return (*settings, None);
+    }
+    let bandwidth = fastest(kind, inertias.map_or(1.0, |own| own.lambda), settings);
+    if bandwidth >= settings.bandwidth {
+        return (*settings, None);
+    }
+    let late = match settings.delay {
+        true => "one tick late",
+        false => "held over a tick",
+    };
+    let cause = inertias.filter(|own| own.lambda > 1.0).map(|own| {
+        let joints = &model.robot.joints;
+        let bare: Vec<&str> = (joints.iter())
+            .filter(|joint| joint.drive.as_ref().is_none_or(|drive| drive.rotor_inertia <= 0.0))
+            .map(|joint| joint.name.as_str())
+            .collect();
+        let rotors = match bare.is_empty() {
+            true => String::new(),
+            false => format!(
+                " No rotor inertia is described for {} ([joint.drive] rotor_inertia and gear_ratio), which would add to it.",
+                bare.join(", ")
+            ),
+        };
+        format!(
+            " Its gains are for each joint's own inertia, and {} of it moves where the other joints give way (most of it joint \"{}\").{rotors}",
+            share(1.0 / own.lambda),
+            joints[own.lightest].name
+        )
+    });
+    let note = format!(
+        "Warning: {} runs at {} Hz instead of {} Hz (--bandwidth): at {} ticks a second, with the torque {late}, a faster loop has less than a gain margin of {MARGIN}.{} --rate {} keeps the bandwidth.",
+        kind.name(),
+        format_significant(bandwidth, 3),
+        format_significant(settings.bandwidth, 3),
+        format_significant(settings.rate, 4),
+        cause.unwrap_or_default(),
+        // Everything scales with the ratio of both.
+        (settings.rate * settings.bandwidth / bandwidth / 100.0).ceil() * 100.0
+    );
+    let slower = Settings {
+        bandwidth,
+        ..*settings
+    };
+    (slower, Some(note))
+}
+
+/// Returns a share in words.
+fn share(value: f64) -> String {
+    format!("{} %", format_significant(100.0 * value, 2))
+}
+
 impl<'a> Controller<'a> {
     /// Designs a law for the positions of a motion.
     pub(crate) fn design(
@@ -99,16 +161,25 @@ impl<'a> Controller<'a> {
             .step_by((samples / 50).max(1))
             .map(|k| reference.iter().map(|series| series[k].position).collect())
             .collect();
+        let inertias = match kind {
+            LawKind::Pid => Some(design::inertias(model, &positions, true)?),
+            LawKind::Adaptive => Some(design::inertias(model, &positions, false)?),
+            _ => None,
+        };
+        let (settings, slower) = slowed(kind, model, inertias.as_ref(), settings);
+        let settings = &settings;
+        let largest = inertias.map_or_else(Vec::new, |own| own.largest);
         let omega = settings.omega();
         let gains = [omega * omega, 2.0 * settings.damping * omega].map(|gain| vec![gain; n]);
         let inner = match (kind, task) {
             (LawKind::Pid, _) => Inner::Pid {
-                gains: design::pid(model, &positions, settings)?,
+                gains: (largest.iter())
+                    .map(|j| PidGains::design(*j, settings.bandwidth, settings.damping))
+                    .collect(),
                 state: pid::State::default(),
             },
             (LawKind::Adaptive, _) => {
-                let inertias = design::inertias(model, &positions, false)?;
-                Inner::Adaptive(Box::new(adapting(model, reference, &inertias, settings)?))
+                Inner::Adaptive(Box::new(adapting(model, reference, &largest, settings)?))
             }
             (LawKind::Hybrid, Some(task)) => Inner::Hybrid {
                 axes: axes(task, settings),
@@ -119,6 +190,8 @@ impl<'a> Controller<'a> {
             },
             _ => Inner::ComputedTorque,
         };
+        let mut effects = Compensated::of(model, settings.friction(), settings.period());
+        effects.notes.extend(slower);
         Ok(Self {
             model,
             settings: *settings,
@@ -126,14 +199,19 @@ impl<'a> Controller<'a> {
             gains,
             task,
             inner,
-            effects: Compensated::of(model, settings.friction(), settings.period()),
+            effects,
             known: vec![0.0; n],
             load: vec![0.0; n],
             kind,
         })
     }
 
-    /// Returns sentences on what the law leaves out of its model.
+    /// Returns the bandwidth that the law was designed for, Hz.
+    pub(crate) fn bandwidth(&self) -> f64 {
+        self.settings.bandwidth
+    }
+
+    /// Returns sentences on what the law leaves out of its model, and on a lower bandwidth.
     pub(crate) fn notes(&self) -> &[String] {
         &self.effects.notes
     }

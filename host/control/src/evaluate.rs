@@ -53,12 +53,12 @@ impl Bench<'_> {
         law: LawKind,
         model: &LawModel,
         task: Option<&ContactTask>,
-    ) -> Result<(Trace, Vec<String>), ControlError> {
+    ) -> Result<(Trace, Vec<String>, f64), ControlError> {
         PositionLimits::of(self.robot).check(self.reference, self.settings.period())?;
         let mut controller = Controller::design(law, model, self.reference, task, &self.settings)?;
         let truth = (self.robot, self.truth);
         let trace = closed_loop(truth, &mut controller, self.reference, task, &self.settings)?;
-        Ok((trace, controller.notes().to_vec()))
+        Ok((trace, controller.notes().to_vec(), controller.bandwidth()))
     }
 
     /// Runs and measures a law that tracks a motion. `name` is that of the model.
@@ -71,7 +71,7 @@ impl Bench<'_> {
         model: &LawModel,
         name: &str,
     ) -> Result<Run<Tracking>, ControlError> {
-        let (trace, notes) = self.run(law, model, None)?;
+        let (trace, notes, bandwidth) = self.run(law, model, None)?;
         let [tool_rms, tool_largest] =
             measures::tool(&self.truth.chain, self.tool, &trace, self.reference)?;
         let measure = |trace: &Trace| {
@@ -89,6 +89,7 @@ impl Bench<'_> {
         let measures = Tracking {
             law,
             model: name.to_owned(),
+            bandwidth,
             joints: measures::joints(self.robot, &trace, self.reference),
             tool_rms,
             tool_largest,
@@ -119,7 +120,7 @@ impl Bench<'_> {
         task: &ContactTask,
     ) -> Result<Run<Contact>, ControlError> {
         task_path::check(self.robot, task)?;
-        let (trace, notes) = self.run(law, model, Some(task))?;
+        let (trace, notes, _) = self.run(law, model, Some(task))?;
         let found = measures::force(law, task, &trace)?;
         let measure = |trace: &Trace| measures::force(law, task, trace).map(|own| own.overshoot);
         let mut warnings = warnings::of_motion(self.robot, &trace, true);
@@ -190,7 +191,7 @@ impl Bench<'_> {
                     } {
                         let value = self
                             .run(law, model, task)
-                            .and_then(|(trace, _)| measure(&trace));
+                            .and_then(|(trace, ..)| measure(&trace));
                         if let (Ok(value), Ok(mut list)) = (value, found.lock()) {
                             list[k] = value;
                         }

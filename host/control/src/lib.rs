@@ -38,6 +38,7 @@ mod effects;
 mod error;
 mod evaluate;
 mod law_model;
+mod loop_margin;
 mod measures;
 mod mobility;
 mod plant;
@@ -62,7 +63,9 @@ pub use evaluate::{Bench, Run};
 pub use law_model::LawModel;
 pub use recording::save;
 pub use reference::{default_reference, references};
-pub use result::{Adaptation, Adapted, Contact, Evaluation, JointMeasures, Robustness, Tracking};
+pub use result::{
+    Adaptation, Adapted, Contact, Evaluation, Failed, JointMeasures, Robustness, Tracking,
+};
 pub use sensing::resolution;
 pub use settings::{LawKind, Settings};
 pub use surface::Surface;

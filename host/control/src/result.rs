@@ -19,6 +19,8 @@ pub struct Evaluation {
     pub tracking: Vec<Tracking>,
     /// Laws that press on a surface.
     pub contact: Vec<Contact>,
+    /// Laws that did not finish their motion.
+    pub failed: Vec<Failed>,
     /// What was assumed or left out, one sentence each.
     pub notes: Vec<String>,
 }
@@ -34,8 +36,22 @@ impl Evaluation {
         let tracking = tracking.flat_map(|own| of(own.law, &own.model, &own.warnings));
         let contact = self.contact.iter();
         let contact = contact.flat_map(|own| of(own.law, &own.model, &own.warnings));
-        tracking.chain(contact).collect()
+        let failed = self.failed.iter();
+        let failed =
+            failed.map(|own| format!("{} with {}: {}", own.law.name(), own.model, own.reason));
+        failed.chain(tracking).chain(contact).collect()
     }
+}
+
+/// A law that did not finish its motion.
+#[derive(Clone, Debug, Serialize)]
+pub struct Failed {
+    /// The law.
+    pub law: LawKind,
+    /// The law's model.
+    pub model: String,
+    /// Reason and remedy, a whole sentence.
+    pub reason: String,
 }
 
 /// One joint in a motion.
@@ -60,6 +76,8 @@ pub struct Tracking {
     pub law: LawKind,
     /// The law's model.
     pub model: String,
+    /// Bandwidth of its position loops, Hz: that of the settings, or a lower one that keeps the gain margin.
+    pub bandwidth: f64,
     /// Measures of each joint.
     pub joints: Vec<JointMeasures>,
     /// RMS tracking error of the tool, m.

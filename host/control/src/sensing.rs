@@ -23,7 +23,7 @@ pub(crate) struct Encoders {
 }
 
 /// Share of the control rate at which the velocity observer has −3 dB: the largest that the observer allows.
-const OBSERVER_SHARE: f64 = 0.1;
+pub(crate) const OBSERVER_SHARE: f64 = 0.1;
 
 /// Returns the encoder step of a joint, rad or m at the joint: the described one, otherwise the default.
 pub fn resolution(robot: &Robot, joint: usize, default: f64) -> f64 {

@@ -7,6 +7,7 @@ use super::position_limits::PositionLimits;
 use super::result::Adaptation;
 use super::settings::{LawKind, Settings};
 use rig_model::robot::Robot;
+use rig_output::listed;
 
 /// Share of the ticks at the torque limit above which the limit governs the loop: in most ticks the law does not act.
 const AT_LIMIT: f64 = 0.5;
@@ -25,15 +26,16 @@ pub(crate) fn of_motion(robot: &Robot, trace: &Trace, on_surface: bool) -> Vec<S
         true => "a smaller --press, or a shorter --slide",
         false => "a slower motion, or a better model",
     };
-    for (joint, count) in robot.joints.iter().zip(&trace.saturated) {
-        let share = *count as f64 / ticks;
-        if share > AT_LIMIT {
-            warnings.push(format!(
-                "joint \"{}\" is at its torque limit in {:.0} % of the ticks, so the law does not control it. Give a lower --bandwidth, {remedy}.",
-                joint.name,
-                100.0 * share
-            ));
-        }
+    let limited: Vec<String> = (robot.joints.iter().zip(&trace.saturated))
+        .map(|(joint, count)| (joint, *count as f64 / ticks))
+        .filter(|(_, share)| *share > AT_LIMIT)
+        .map(|(joint, share)| format!("joint \"{}\" in {:.0} %", joint.name, 100.0 * share))
+        .collect();
+    if !limited.is_empty() {
+        warnings.push(format!(
+            "at the torque limit in more than half of the ticks, so that the law does not control it: {}. Give a lower --bandwidth, {remedy}.",
+            listed(&limited)
+        ));
     }
     warnings
 }

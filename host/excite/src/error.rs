@@ -210,6 +210,23 @@ pub enum ExciteError {
         /// Line, or number of the message, from 1.
         row: u64,
     },
+    /// Samples that do not show the motion between them.
+    #[error(
+        "{}: the samples come at {} Hz, too seldom for this motion: every second one of joint \"{joint}\" tells the others within {} % of its motion only, and {} % are needed; give samples at a higher rate, or the .toml file of `rig excite`",
+        path.display(), format_significant(*rate, 4), format_significant(100.0 * missed, 2), format_significant(100.0 * most, 2)
+    )]
+    Coarse {
+        /// The file.
+        path: PathBuf,
+        /// The joint's name.
+        joint: String,
+        /// Samples a second.
+        rate: f64,
+        /// Share of the motion that every second sample misses.
+        missed: f64,
+        /// Largest share for an interpolation.
+        most: f64,
+    },
 }
 
 /// Whose torque limit cannot move the arm.

@@ -42,6 +42,7 @@ mod feasible;
 mod fit;
 mod frame;
 mod identified;
+mod interpolation;
 mod interval;
 mod lanes;
 mod motor_limits;
@@ -82,5 +83,6 @@ pub use replay::{Noise, Replay, SETTLING, replay, replay_carrying};
 pub use stages::{StagedKind, StagedOptions, staged};
 pub use trajectory_file::{
     COASTING, DesignRecord, JointTrajectory, SampledReference, TrajectoryFile, load_reference,
+    reference_at,
 };
 pub use wrist_readings::Carried;

@@ -6,6 +6,7 @@ use std::path::Path;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
+use super::interpolation::Samples;
 use super::random::drawn;
 use super::wrist_readings::{Carried, WristReadings, wrench_columns};
 use super::{ExciteError, SampledReference};
@@ -278,15 +279,18 @@ fn cells(period: f64) -> (f64, usize) {
     (period / cells, cells as usize)
 }
 
-/// Interpolates the series with `cells` values per sample, by cubics with slopes from the neighbouring samples (Catmull
-/// and Rom 1974). It is at rest before it begins; its second difference is constant at the end.
+/// Interpolates the series with `cells` values per sample. It is at rest before it begins.
 fn refined(list: &[f64], cells: usize) -> Vec<f64> {
+    if cells == 1 {
+        return list.to_vec();
+    }
     let count = list.len().saturating_sub(1) * cells + list.len().min(1);
-    let value = |cell: usize| {
-        let [a, b, c, d] = around(list, cell / cells);
-        let u = (cell % cells) as f64 / cells as f64;
-        b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
+    let samples = Samples {
+        period: 1.0,
+        position: list,
+        rates: None,
     };
+    let value = |cell: usize| samples.at(cell as f64 / cells as f64).position;
     (0..count).map(value).collect()
 }
 

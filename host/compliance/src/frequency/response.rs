@@ -19,8 +19,11 @@ use crate::value::Value;
 
 /// Fewest bands with significant coherence. The model has seven parameters, and a band has two equations.
 const FEWEST: usize = 12;
-/// Share of the frequency range that must lie beyond the antiresonance on either side.
-const MARGIN: f64 = 0.1;
+/// Relative distance from the antiresonance on either side within which the response must be coherent. By judgement: an
+/// antiresonance of usual damping (a few per cent) is narrower, so that the response shows it and its flanks.
+const FLANK: f64 = 0.3;
+/// Share of the bands there whose coherence must be significant: in the antiresonance itself the velocity is small.
+const COHERENT: f64 = 0.5;
 /// Misfit of a rigid joint over that of two masses from which on an antiresonance is evident. On the emulated rig it was
 /// above 10 000 where the band held the antiresonance, and 2 where it ended far below.
 const EVIDENT: f64 = 10.0;
@@ -163,7 +166,7 @@ pub(crate) fn respond(
             unit = described.unit
         ));
     }
-    within(&found, range, name, &described)?;
+    within(&found, &bands(&spectra), name, &described)?;
     Ok(result(
         robot, stretches, k, spectra, &found, &described, known, warnings,
     ))
@@ -235,9 +238,9 @@ fn check_motion(
 /// Returns the range of the bands with significant coherence, Hz.
 fn excited(bands: &[BandBins<'_>], name: &str) -> Result<[f64; 2], ComplianceError> {
     let used: Vec<&Band> = bands.iter().map(|b| &b.band).filter(|b| b.used).collect();
-    match (used.first(), used.last()) {
-        (Some(first), Some(last)) if used.len() >= FEWEST => Ok([first.frequency, last.frequency]),
-        _ => {
+    match used.len() >= FEWEST {
+        true => Ok(coherent_range(bands)),
+        false => {
             let best = bands.iter().map(|b| b.band.coherence).fold(0.0, f64::max);
             Err(ComplianceError::Recording(format!(
                 "Torque and velocity of joint \"{name}\" are coherent in {} of {} bands, {FEWEST} are needed (largest coherence {best:.2}): the motion excites too little, or the noise is too large. Record a chirp (`rig excite --kind chirp --joint {name} --band 1,50`), with more amplitude or repeated.",
@@ -248,18 +251,42 @@ fn excited(bands: &[BandBins<'_>], name: &str) -> Result<[f64; 2], ComplianceErr
     }
 }
 
-/// Checks that the antiresonance lies within the excited band.
+/// Returns the longest range of neighbouring bands with significant coherence, Hz. Single bands far from it are coherent
+/// by chance, or at the resonance, where noise alone moves the joint.
+fn coherent_range(bands: &[BandBins<'_>]) -> [f64; 2] {
+    let runs = bands.chunk_by(|a, b| a.band.used == b.band.used);
+    let longest = (runs.filter(|run| run[0].band.used)).max_by_key(|run| run.len());
+    longest.map_or([f64::NAN; 2], |run| {
+        [run[0].band.frequency, run[run.len() - 1].band.frequency]
+    })
+}
+
+/// Returns true if the response is coherent on both flanks of a frequency, Hz.
+fn is_measured(bands: &[BandBins<'_>], at: f64) -> bool {
+    let [low, high] = [at / (1.0 + FLANK), at * (1.0 + FLANK)];
+    [[low, at], [at, high]].iter().all(|[from, to]| {
+        let flank = (bands.iter().map(|b| &b.band))
+            .filter(|band| band.frequency >= *from && band.frequency <= *to);
+        let (all, used) = flank.fold((0, 0), |(all, used), band| {
+            (all + 1, used + usize::from(band.used))
+        });
+        used > 0 && used as f64 >= COHERENT * all as f64
+    })
+}
+
+/// Checks that the response shows the antiresonance and its flanks.
 fn within(
     found: &Fitted,
-    [low, high]: [f64; 2],
+    bands: &[BandBins<'_>],
     name: &str,
     described: &Described,
 ) -> Result<(), ComplianceError> {
     let at = found.model.antiresonance() / TAU;
     let evident = found.rigid_misfit > EVIDENT * found.misfit.max(1.0);
-    if evident && at > low * (1.0 + MARGIN) && at < high * (1.0 - MARGIN) {
+    if evident && is_measured(bands, at) {
         return Ok(());
     }
+    let [low, high] = coherent_range(bands);
     let bound = described.link.map_or(String::new(), |link| {
         format!(
             " With the described inertia of the links a stiffness of less than {} would show.",

@@ -1,5 +1,6 @@
 //! Static loading: which recordings show what.
 
+use super::another_reading::another_reading;
 use super::link::by_links;
 use super::result::LoadingFindings;
 use super::tool::by_tool;
@@ -26,22 +27,34 @@ pub(crate) fn loading(
         let tool = has_displacement(signals);
         if tool && !has_wrench(signals) {
             return Err(ComplianceError::Recording(format!(
-                "{} has a displacement of the tool point, but no force (columns fx fy fz, N, base axes).",
-                signals.label
+                "{} has a displacement of the tool point, but no force (columns fx fy fz, N, base axes). {}",
+                signals.label,
+                signals.other_columns()
             )));
         }
         if !link && !tool {
             return Err(ComplianceError::Recording(format!(
-                "{} shows no deflection: static loading needs an encoder on a link (column ql<k>), or the displacement of the tool point (dx dy dz, m, base axes) with its force (fx fy fz, N).",
-                signals.label
+                "{} shows no deflection: static loading needs an encoder on a link (column ql<k>), or the displacement of the tool point (dx dy dz, m, base axes) with its force (fx fy fz, N). {}",
+                signals.label,
+                signals.other_columns()
             )));
         }
     }
     if !displaced.is_empty() {
-        let (drives, residual, told) = by_tool(tool, &displaced)?;
-        found.drives.extend(drives);
-        found.residual = Some(residual);
-        found.warnings.extend(told);
+        let mut seen = by_tool(tool, &displaced)?;
+        let other = seen
+            .told
+            .as_ref()
+            .and_then(|_| another_reading(tool, &displaced, &seen.lack));
+        if let Some(other) = &other {
+            let drives = seen.drives.iter_mut();
+            for drive in drives.filter(|drive| drive.missing.is_some()) {
+                drive.missing = Some(other.clone());
+            }
+        }
+        found.drives.extend(seen.drives);
+        found.residual = Some(seen.lack.residual);
+        found.warnings.extend(other.or(seen.told));
     }
     if !linked.is_empty() {
         found.drives.extend(by_links(tool, &linked)?);

@@ -103,6 +103,19 @@ impl Fit {
         self.friction[k]
     }
 
+    /// What the regression leaves of the reading of a row.
+    pub(super) fn left(&self, row: &Row) -> f64 {
+        let values = &self.estimate.values;
+        let springs: f64 = row.x.iter().zip(values.iter()).map(|(a, b)| a * b).sum();
+        let gaps = self.gaps.iter().zip(&values.as_slice()[row.x.len()..]);
+        let gaps = gaps.map(|(gap, half)| {
+            let k = gap.drive;
+            let spring = row.loads[k] - self.friction[k] * row.directions[k];
+            row.arms[k] * (spring - gap.zero).signum() * half
+        });
+        row.y - springs - gaps.sum::<f64>()
+    }
+
     /// Returns true if the torque of the spring has both signs.
     pub(super) fn reverses(&self, rows: &[Row], k: usize) -> bool {
         sides(&springs(rows, k, &self.friction), 0.0)
@@ -140,6 +153,11 @@ pub(super) fn fit(rows: &[Row], count: usize, search: bool) -> Option<Fit> {
         best = next;
     }
     Some(best)
+}
+
+/// Solves the regression of `count` drives without gaps. `None` for too few rows.
+pub(super) fn without_gaps(rows: &[Row], count: usize) -> Option<Fit> {
+    solve(rows, count, &[], &vec![0.0; count])
 }
 
 /// Adds the gap that explains most; `None` if it is not significant.

@@ -1,6 +1,7 @@
 //! Stiffness of the drives from static loading.
 
 mod advice;
+mod another_reading;
 mod findings;
 mod fit;
 mod instrument;

@@ -6,13 +6,15 @@
 //!
 //! Leaves out: gaps that are crossed at other torques than the described weight tells, if several recordings have several such torques; the change of the weight's torque as the links themselves yield, elasticity of base and links, which counts as that of the drives.
 
+use std::collections::BTreeMap;
+
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 use rig_shared::multibody::{Chain, gravity_vector};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::advice::advice;
-use super::fit::{Fit, Row, fit};
+use super::fit::{Fit, Lack, Row, fit, without_gaps};
 use super::link::{NEGATIVE, NOT_SHOWN, range};
 use super::result::{Deflection, DriveLoading};
 use super::windows::{Course, courses, means, window_rows};
@@ -36,6 +38,8 @@ const IMPOSSIBLE: f64 = 0.01;
 const TRANSITION: f64 = 0.15;
 /// Share of the largest load times arm from which on a drive's turning points count.
 const MATERIAL: f64 = 0.05;
+/// Share of the largest arm from which on a window is shown in the figure of a drive: over a small arm its residual says nothing.
+const SHOWN_ARM: f64 = 0.3;
 /// Fewest windows.
 const FEWEST: usize = 12;
 
@@ -51,6 +55,66 @@ struct Held {
     displacement: [Option<Vec<f64>>; 3],
 }
 
+/// Reads all stretches. Returns them, the rows of the regression and the number of windows.
+fn read(
+    tool: &ToolPoint<'_>,
+    stretches: &[&Signals],
+) -> Result<(Vec<Held>, Vec<Row>, usize), ComplianceError> {
+    let size = window_rows(stretches.iter().map(|s| s.len()).sum());
+    let held = (stretches.iter())
+        .map(|signals| hold(tool, signals, size))
+        .collect::<Result<Vec<_>, _>>()?;
+    let ranges: Vec<f64> = (0..tool.count())
+        .map(|k| range(held.iter().flat_map(|h| &h.loads[k])))
+        .collect();
+    let (rows, windows) = rows(&held, &ranges);
+    Ok((held, rows, windows))
+}
+
+/// How well the springs explain displacements.
+pub(super) struct Judged {
+    pub lack: Lack,
+    /// Number of drives whose stiffness is shown.
+    pub shown: usize,
+    /// Number of drives whose stiffness would be negative.
+    pub negative: usize,
+}
+
+impl Judged {
+    /// Returns true if stiffness is shown, with one sign.
+    pub(super) fn positive(&self) -> bool {
+        (self.shown > 0) != (self.negative > 0)
+    }
+}
+
+/// Judges how well the springs, without gaps, explain displacements; `None` if they cannot be read.
+pub(super) fn judged(tool: &ToolPoint<'_>, stretches: &[&Signals]) -> Option<Judged> {
+    let (_, rows, windows) = read(tool, stretches).ok()?;
+    let found = (windows >= FEWEST)
+        .then(|| without_gaps(&rows, tool.count()))
+        .flatten()?;
+    let seen = |k: &usize| !found.estimate.hidden[*k];
+    let shown = |k: &usize| {
+        let own = found.value(*k);
+        own.value > 0.0 && own.relative() < NOT_SHOWN
+    };
+    let negative = |k: &usize| found.value(*k).value < -NEGATIVE * found.value(*k).std;
+    let count = |of: &dyn Fn(&usize) -> bool| (0..tool.count()).filter(seen).filter(of).count();
+    Some(Judged {
+        shown: count(&shown),
+        negative: count(&negative),
+        lack: found.lack,
+    })
+}
+
+/// What displacements of the tool point show.
+pub(super) struct ByTool {
+    pub drives: Vec<DriveLoading>,
+    pub lack: Lack,
+    /// Says that the displacement is not that of springs.
+    pub told: Option<String>,
+}
+
 /// Finds the stiffness of all drives from displacements of the tool point.
 ///
 /// # Errors
@@ -58,17 +122,9 @@ struct Held {
 pub(super) fn by_tool(
     tool: &ToolPoint<'_>,
     stretches: &[&Signals],
-) -> Result<(Vec<DriveLoading>, f64, Vec<String>), ComplianceError> {
-    let size = window_rows(stretches.iter().map(|s| s.len()).sum());
-    let mut held = Vec::new();
-    for signals in stretches {
-        held.push(hold(tool, signals, size)?);
-    }
+) -> Result<ByTool, ComplianceError> {
     let n = tool.count();
-    let ranges: Vec<f64> = (0..n)
-        .map(|k| range(held.iter().flat_map(|h| &h.loads[k])))
-        .collect();
-    let (rows, windows) = rows(&held, &ranges);
+    let (held, rows, windows) = read(tool, stretches)?;
     let found = (windows >= FEWEST)
         .then(|| fit(&rows, n, true))
         .flatten()
@@ -82,7 +138,11 @@ pub(super) fn by_tool(
     for k in 0..n {
         drives.push(drive(tool, k, &held, &rows, &found)?);
     }
-    Ok((drives, found.lack.residual, told.into_iter().collect()))
+    Ok(ByTool {
+        drives,
+        lack: found.lack,
+        told,
+    })
 }
 
 /// Says that the displacement is not that of springs.
@@ -328,12 +388,47 @@ fn drive(
     if let Some((gap, column)) = found.gap(k) {
         result.add_gap(found.value(column), gap.zero);
     }
+    result.points = partial_twists(rows, found, k);
     Ok(result)
 }
 
 /// Returns the standard deviations below zero that any of `drives` values reaches with the probability [`IMPOSSIBLE`].
 fn beyond_chance(drives: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - IMPOSSIBLE / drives.max(1) as f64)
+}
+
+/// Torque and twist of a drive by window, of growing and of falling torque: what the spring and the hysteresis of the drive
+/// explain, with the whole residual over its arm (component plus residual, Larsen & McCleary 1972). Of each window the axis
+/// with the largest arm counts.
+fn partial_twists(rows: &[Row], found: &Fit, k: usize) -> [Vec<[f64; 2]>; 2] {
+    let values = &found.estimate.values;
+    let n = rows.first().map_or(0, |row| row.arms.len());
+    let gap = found.gap(k);
+    let mut best: BTreeMap<usize, &Row> = BTreeMap::new();
+    for row in rows {
+        let own = best.entry(row.window).or_insert(row);
+        if row.arms[k].abs() > own.arms[k].abs() {
+            *own = row;
+        }
+    }
+    let most = best
+        .values()
+        .fold(0.0, |m: f64, row| m.max(row.arms[k].abs()));
+    let mut points = [Vec::new(), Vec::new()];
+    for row in best.values() {
+        let (arm, direction) = (row.arms[k], row.directions[k]);
+        if direction == 0.0 || arm.abs() < SHOWN_ARM * most {
+            continue;
+        }
+        let load = row.x[k] / arm;
+        let step = gap.map_or(0.0, |(gap, column)| {
+            let spring = row.loads[k] - found.friction(k) * direction;
+            values[column] * (spring - gap.zero).signum()
+        });
+        let twist = values[k] * load - values[n + k] * direction + step + found.left(row) / arm;
+        points[usize::from(direction < 0.0)].push([load, twist]);
+    }
+    points
 }
 
 /// Says that the displacement follows the force with the wrong sign.

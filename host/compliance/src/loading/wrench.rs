@@ -38,8 +38,9 @@ pub(crate) fn wrench(signals: &Signals) -> Result<[Vec<f64>; 6], ComplianceError
             None if c >= 3 && !moment => vec![0.0; signals.len()],
             None => {
                 return Err(ComplianceError::Recording(format!(
-                    "{} has no column `{name}`: the force is recorded as fx fy fz (N), its moment as mx my mz (N·m; all three or none).",
-                    signals.label
+                    "{} has no column `{name}`: the force is recorded as fx fy fz (N), its moment as mx my mz (N·m; all three or none). {}",
+                    signals.label,
+                    signals.other_columns()
                 )));
             }
         };

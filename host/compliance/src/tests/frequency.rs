@@ -200,3 +200,84 @@ fn measurements_that_contradict_each_other_are_not_averaged() {
     assert_eq!(found.drives[0].source, crate::Source::Both);
     assert!(!found.warnings.iter().any(|w| w.contains("contradict")));
 }
+
+/// A chirp from 1 to `end` Hz of a position loop on two masses, by steps of 0.1 ms: an integration of its own. The
+/// antiresonance is √(900/0.12)/2π = 13.8 Hz.
+fn two_masses(end: f64, size: f64, seed: u64) -> rig_data::prepare::InMemory {
+    use core::f64::consts::{FRAC_PI_2, PI, TAU};
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::rand_core::SeedableRng;
+    let mut dice = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+    let mut normal = move |std: f64| {
+        let value: f64 = StandardNormal.sample(&mut dice);
+        std * value
+    };
+    let (stiffness, damping, link, motor) = (900.0, 0.4, 0.12, 0.05);
+    let (step, length) = (1e-4, 30.0);
+    let loop_speed = TAU * 6.0;
+    let (kp, kd) = (
+        loop_speed * loop_speed * (link + motor),
+        1.6 * loop_speed * (link + motor),
+    );
+    let weight = 0.3 * 9.81;
+    let (mut qm, mut ql, mut vm, mut vl) = (-FRAC_PI_2, -FRAC_PI_2, 0.0_f64, 0.0_f64);
+    let (mut phase, mut torque) = (0.0_f64, 0.0);
+    let mut block = rig_data::Block {
+        joints: vec![rig_data::JointColumns::default()],
+        first_line: 2,
+        ..rig_data::Block::default()
+    };
+    let joint = &mut block.joints[0];
+    for k in 0..((length + 2.0) / step) as usize {
+        let t = k as f64 * step;
+        let share = ((t - 1.0) / length).clamp(0.0, 1.0);
+        if t > 1.0 && t < length + 1.0 {
+            phase += TAU * end.powf(share) * step;
+        }
+        let ease = (PI * (10.0 * share).min(10.0 * (1.0 - share)).min(0.5)).sin();
+        let reference = -FRAC_PI_2 + size * ease * phase.sin();
+        if k % 10 == 0 {
+            torque = kp * (reference - qm) - kd * vm + weight * reference.cos();
+            block.t.push(t);
+            joint.q.push(qm + normal(1e-5));
+            joint.tau.push(torque + normal(0.05));
+            joint.reference.get_or_insert_default().push(reference);
+        }
+        let spring = stiffness * (qm - ql) + damping * (vm - vl);
+        vm += step * (torque - spring - 0.1 * (vm / 1e-3).tanh() - 0.15 * vm) / motor;
+        vl += step * (spring - weight * ql.cos() - 0.02 * (vl / 1e-3).tanh() - 0.05 * vl) / link;
+        qm += step * vm;
+        ql += step * vl;
+    }
+    rig_data::prepare::InMemory {
+        label: "chirp".into(),
+        blocks: vec![block],
+    }
+}
+
+/// Bands near the resonance are coherent by noise alone; they do not show an antiresonance below them.
+#[test]
+fn a_band_that_ends_below_the_antiresonance_is_refused() {
+    let robot = rig_model::robot::Robot::from_toml(
+        rig_model::robot::ONE_LINK_TEMPLATE,
+        "one-link.toml".as_ref(),
+    )
+    .unwrap();
+    let identified = |end: f64, size: f64, seed: u64| {
+        let run = two_masses(end, size, seed);
+        crate::identify_compliance(&robot, &[], &[&run], &crate::ComplianceOptions::default())
+    };
+    for seed in 0..4 {
+        for end in [8.0, 10.0] {
+            let said = match identified(end, 0.02, seed) {
+                Err(error) => error.to_string(),
+                Ok(found) => panic!("{end} Hz, {seed}: {:?}", found.drives),
+            };
+            assert!(said.contains("shows no antiresonance"), "{said}");
+        }
+    }
+    let found = identified(45.0, 0.02, 1).unwrap().drives[0]
+        .stiffness
+        .unwrap();
+    assert!((found.value / 900.0 - 1.0).abs() < 0.01, "{found:?}");
+}

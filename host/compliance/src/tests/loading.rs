@@ -546,3 +546,105 @@ fn readings_of_a_wrist_sensor_give_the_same_stiffness() {
         assert!((a.value / b.value - 1.0).abs() < 1e-6, "{a:?} {b:?}");
     }
 }
+
+/// The sentence of recordings whose displacement does not follow the force.
+fn complaint(robot: &Robot, runs: &[InMemory], options: &ComplianceOptions) -> String {
+    let list: Vec<&dyn Recording> = runs.iter().map(|run| run as &dyn Recording).collect();
+    match identify_compliance(robot, &list, &[], options) {
+        Err(error) => error.to_string(),
+        Ok(found) => found.warnings.join(" "),
+    }
+}
+
+/// Replaces the force of each recording by `change(force, pose)`.
+fn with_force(
+    runs: &[InMemory],
+    change: impl Fn(nalgebra::Vector3<f64>, &[f64]) -> nalgebra::Vector3<f64>,
+) -> Vec<InMemory> {
+    let other = |run: &InMemory| {
+        let mut block = run.blocks[0].clone();
+        let q: Vec<f64> = block.joints.iter().map(|j| j.q[0]).collect();
+        for i in 0..block.t.len() {
+            let value = |c: usize| {
+                let name = ["fx", "fy", "fz"][c];
+                block.extra.iter().position(|(n, _)| n == name).unwrap()
+            };
+            let at = [value(0), value(1), value(2)];
+            let force = change(at.map(|k| block.extra[k].1[i]).into(), &q);
+            for (k, f) in at.into_iter().zip(force.iter()) {
+                block.extra[k].1[i] = *f;
+            }
+        }
+        recording(block)
+    };
+    runs.iter().map(other).collect()
+}
+
+/// Before another recording is asked for, the axes are read in other ways.
+#[test]
+fn forces_in_other_axes_are_told_from_a_loading_that_shows_nothing() {
+    let mut robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
+    let offset = [0.05, 0.02, 0.15];
+    let runs = loaded(&displacements(&robot, offset), 3);
+    let options = ComplianceOptions {
+        tool: offset,
+        ..ComplianceOptions::default()
+    };
+    let said = complaint(&robot, &runs, &options);
+    assert!(!said.contains("as it is read"), "{said}");
+    // Two axes exchanged, one of them after all signs.
+    for (order, sign, words) in [
+        ([1, 0, 2], 1.0, "fx and fy exchanged they"),
+        (
+            [2, 1, 0],
+            -1.0,
+            "fx and fz exchanged and the opposite sign they",
+        ),
+        ([1, 2, 0], 1.0, "taken as"),
+    ] {
+        let turned = with_force(&runs, |f, _| {
+            sign * nalgebra::Vector3::new(f[order[0]], f[order[1]], f[order[2]])
+        });
+        let said = complaint(&robot, &turned, &options);
+        assert!(
+            said.contains(words) && !said.contains("A force along"),
+            "{said}"
+        );
+    }
+    // A sensor on the flange that the description lacks, with a bias.
+    let mount = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), 0.7);
+    let flange = |q: &[f64]| {
+        let mut pose = nalgebra::Isometry3::identity();
+        for (joint, q) in robot.joints.iter().zip(q) {
+            pose *= joint.pose(*q);
+        }
+        pose.rotation * mount
+    };
+    let sensed = with_force(&runs, |f, q| {
+        flange(q).inverse() * f + nalgebra::Vector3::new(3.0, -4.0, 20.0)
+    });
+    let said = complaint(&robot, &sensed, &options);
+    assert!(
+        said.contains("axes of the flange, turned by 40 degrees")
+            && said.contains("[wrist_sensor]"),
+        "{said}"
+    );
+    // Degrees, small enough to lie within the limits.
+    let mut degrees = runs.clone();
+    for run in &mut degrees {
+        for joint in &mut run.blocks[0].joints {
+            joint.q.iter_mut().for_each(|q| *q = q.to_degrees());
+        }
+    }
+    let said = complaint(&robot, &degrees, &options);
+    assert!(said.contains("taken as degrees"), "{said}");
+    // A described sensor, but forces in the axes of the base.
+    robot.wrist_sensor = Some(WristSensor {
+        position: [0.0, 0.0, 0.04],
+        rotation: [0.0, 0.0, 0.7],
+        reads: Some(Reads::Load),
+        ..WristSensor::default()
+    });
+    let said = complaint(&robot, &runs, &options);
+    assert!(said.contains("--wrench base"), "{said}");
+}

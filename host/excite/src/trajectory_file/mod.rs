@@ -10,5 +10,5 @@ mod text;
 mod write;
 
 pub use content::{COASTING, DesignRecord, JointTrajectory, TrajectoryFile};
-pub use reference::load_reference;
+pub use reference::{load_reference, reference_at};
 pub use samples::SampledReference;

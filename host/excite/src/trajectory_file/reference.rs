@@ -5,11 +5,71 @@ use std::path::Path;
 use super::content::TrajectoryFile;
 use super::samples::SampledReference;
 use crate::ExciteError;
-use rig_data::{EffortNeed, Source};
+use crate::interpolation::Samples;
+use rig_data::{EffortNeed, JointColumns, Source};
 use rig_model::robot::Robot;
 
+/// Share of a joint's motion that every second sample may miss of the others. At 10 % a sine has 7.4 samples a period: the
+/// interpolation of all samples is within 0.2 % of its position and 2 % of its velocity.
+const MISSED: f64 = 0.1;
+/// Distance from the interpolation that counts as noise, rad or m: ten steps of the encoder that `rig control` assumes.
+const NOISE: f64 = 1e-4;
+/// Relative difference of two rates that are the same.
+const SAME_RATE: f64 = 1e-6;
+
+/// Reads a trajectory as [`load_reference`] does, and interpolates samples of another rate to `rate` (Hz). Returns the
+/// rate of the file too, if it was interpolated.
+///
+/// # Errors
+/// As [`load_reference`]; [`ExciteError::Coarse`] if the samples do not show the motion between them.
+pub fn reference_at(
+    path: &Path,
+    robot: &Robot,
+    rate: f64,
+) -> Result<(SampledReference, Option<f64>), ExciteError> {
+    let read = load_reference(path, robot, rate)?;
+    let own = 1.0 / read.period;
+    if (own / rate - 1.0).abs() <= SAME_RATE {
+        return Ok((read, None));
+    }
+    let mut even = SampledReference {
+        period: 1.0 / rate,
+        position: Vec::new(),
+        velocity: Vec::new(),
+        acceleration: Vec::new(),
+    };
+    for (j, (position, joint)) in read.position.iter().zip(&robot.joints).enumerate() {
+        let rates = (read.velocity.get(j).zip(read.acceleration.get(j)))
+            .map(|(v, a)| [v.as_slice(), a.as_slice()]);
+        let samples = Samples {
+            period: read.period,
+            position,
+            rates,
+        };
+        let missed = samples.missed(NOISE);
+        if missed > MISSED {
+            return Err(ExciteError::Coarse {
+                path: path.into(),
+                joint: joint.name.clone(),
+                rate: own,
+                missed,
+                most: MISSED,
+            });
+        }
+        // Rounding errors must not take the last instant away.
+        let last = ((position.len().saturating_sub(1)) as f64 * rate / own + 1e-6).floor();
+        let instants = 0..=last.max(0.0) as usize;
+        let all: Vec<_> = (instants.map(|k| samples.at(k as f64 * own / rate))).collect();
+        even.position.push(all.iter().map(|r| r.position).collect());
+        even.velocity.push(all.iter().map(|r| r.velocity).collect());
+        (even.acceleration).push(all.iter().map(|r| r.acceleration).collect());
+    }
+    Ok((even, Some(own)))
+}
+
 /// Reads a trajectory as samples: a `.toml` trajectory sampled at `rate` (Hz), or the `ref` columns of a sampled one
-/// (its `q` columns if there are none) at its own rate.
+/// (its `q` columns if there are none) at its own rate. Velocities and accelerations are those of the file where its `q` is
+/// the reference, as `rig excite` writes it; otherwise there are none.
 ///
 /// # Errors
 /// [`ExciteError`] with the place of the error.
@@ -38,13 +98,24 @@ pub fn load_reference(
         path: path.into(),
         row,
     };
-    for (k, block) in source.read_all()?.0.iter().enumerate() {
+    let mut designed = true;
+    let blocks = source.read_all()?.0;
+    for (k, block) in blocks.iter().enumerate() {
         if source.sampling().irregular || k > 0 {
             return Err(uneven(block.first_line));
         }
         for (to, from) in sampled.position.iter_mut().zip(&block.joints) {
             to.extend(from.reference.as_ref().unwrap_or(&from.q));
+            designed &= from.reference.as_ref() == Some(&from.q);
+            designed &= from.qd.is_some() && from.qdd.is_some();
         }
+    }
+    if let (true, Some(block)) = (designed, blocks.first()) {
+        let each = |pick: fn(&JointColumns) -> &Option<Vec<f64>>| -> Vec<Vec<f64>> {
+            (block.joints.iter().map(pick).flatten().cloned()).collect()
+        };
+        sampled.velocity = each(|joint| &joint.qd);
+        sampled.acceleration = each(|joint| &joint.qdd);
     }
     // One sample has no period.
     if sampled.period <= 0.0 {

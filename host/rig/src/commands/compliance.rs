@@ -69,8 +69,10 @@ pub(crate) struct Args {
     /// the ranges]
     #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true)]
     pose: Vec<String>,
-    /// The two joints of the map, separated by a comma [default: the second and the third, else the first two]
-    #[arg(long, value_delimiter = ',', value_name = "JOINT,JOINT")]
+    /// The two joints of the map of the compliance, separated by a comma [default: the second and the third, else the first
+    /// two]. With an equals sign: the channel of the recordings that is a column, such as fx=ft/wrench/force/x; repeat for
+    /// several (`rig inspect` lists channels)
+    #[arg(long, value_name = "JOINT,JOINT|COLUMN=CHANNEL")]
     map: Vec<String>,
     #[command(flatten)]
     columns: UnitArg,
@@ -121,13 +123,16 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_twice(&args.frequency, "give every recording once")?;
     let robot = args.robot.load(ui)?;
     let options = args.options(&robot)?;
-    let mapping = args.columns.mapping()?;
+    let (columns, _) = args.maps();
+    let mapping = args.columns.mapping_with(&columns)?;
     let read = |paths, need| Inputs::read_mapped(&robot, paths, need, &mapping);
     let load = read(&args.load, EffortNeed::Optional)?;
     let response = read(&args.frequency, EffortNeed::Required)?;
     for warning in load.warnings().chain(response.warnings()) {
         ui.remark(&warning);
     }
+    load.refuse_scales(&robot)?;
+    response.refuse_scales(&robot)?;
     let mut found = identify_compliance(
         &robot,
         &recordings(&load.listened()),
@@ -156,6 +161,16 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 }
 
 impl Args {
+    /// Divides `--map` into columns of the recordings and joints of the map: a column has an equals sign.
+    fn maps(&self) -> (Vec<String>, Vec<String>) {
+        let (columns, joints): (Vec<String>, Vec<String>) =
+            (self.map.iter().cloned()).partition(|entry| entry.contains('='));
+        let joints = (joints.iter())
+            .flat_map(|entry| entry.split(','))
+            .map(|name| name.trim().to_owned());
+        (columns, joints.collect())
+    }
+
     /// Options for the library.
     fn options(&self, robot: &Robot) -> Result<ComplianceOptions, CommandError> {
         let index = |option: &str, name: &str| {
@@ -181,14 +196,16 @@ impl Args {
                 )));
             }
         };
-        let map = match self.map.as_slice() {
+        let (_, joints) = self.maps();
+        let map = match joints.as_slice() {
             [] if robot.joints.len() > 2 => Some([1, 2]),
             [] if robot.joints.len() == 2 => Some([0, 1]),
             [] => None,
             [a, b] => Some([index("--map", a)?, index("--map", b)?]),
             other => {
                 return Err(CommandError::Sentence(format!(
-                    "--map has {} names; give the two joints of the map, separated by a comma.",
+                    "--map {} has {} names; give the two joints of the map, separated by a comma, or a column of the recordings with its channel, such as --map fx=force_x.",
+                    other.join(","),
                     other.len()
                 )));
             }

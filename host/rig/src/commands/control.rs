@@ -11,13 +11,13 @@ use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
 use rig_control::{
-    Bench, ContactOptions, ContactTask, Evaluation, LawKind, LawModel, Settings, Surface, Trace,
-    default_reference, references, resolution, save, tool_point,
+    Bench, ContactOptions, ContactTask, ControlError, Evaluation, Failed, LawKind, LawModel, Run,
+    Settings, Surface, Trace, default_reference, references, resolution, save, tool_point,
 };
-use rig_excite::load_reference;
+use rig_excite::{SampledReference, reference_at};
 use rig_model::robot::Robot;
 use rig_model::simulate::{Model, controllers};
-use rig_output::{can_take, folder, format_significant, write_whole};
+use rig_output::{can_take, folder, format_significant, format_trimmed, write_whole};
 use rig_shared::trajectory::Reference;
 
 /// Simulates control laws on a robot and measures them: tracking error, force, robustness to wrong parameters.
@@ -45,18 +45,18 @@ pub(crate) struct Args {
     /// Trajectory by `rig excite` (.toml or .csv), or a recording whose reference is repeated
     #[arg(long)]
     trajectory: Option<PathBuf>,
-    /// Length of the default motion, s
-    #[arg(long, default_value_t = 10.0, conflicts_with = "trajectory")]
-    duration: f64,
+    /// Length of the default motion, s [default: 10]
+    #[arg(long, conflicts_with = "trajectory")]
+    duration: Option<f64>,
     /// Multiply all parameters of the laws' models by this factor
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
     /// Repeat with parameters that are wrong at random by up to this share, per cent
     #[arg(long, value_name = "PERCENT")]
     wrong: Option<f64>,
-    /// Number of such repetitions of each law
-    #[arg(long, default_value_t = 20)]
-    draws: usize,
+    /// Number of such repetitions of each law [default: 20]
+    #[arg(long)]
+    draws: Option<usize>,
     /// Undamped natural frequency of the position loops, Hz
     #[arg(long, default_value_t = Settings::default().bandwidth)]
     bandwidth: f64,
@@ -94,30 +94,26 @@ pub(crate) struct Args {
 /// The surface and the task on it.
 #[derive(Debug, ClapArgs)]
 struct ContactArgs {
-    /// Stiffness of the surface, N/m
-    #[arg(long, default_value_t = Surface::default().stiffness)]
-    stiffness: f64,
-    /// Damping of the surface, N·s/m
-    #[arg(long, default_value_t = Surface::default().damping)]
-    surface_damping: f64,
-    /// Coefficient of friction between tool and surface
-    #[arg(long, default_value_t = Surface::default().friction)]
-    surface_friction: f64,
-    /// Distance of the tool from the surface at the start, m
-    #[arg(long, default_value_t = Surface::default().gap)]
-    gap: f64,
+    #[arg(long, help = format!("Stiffness of the surface, N/m [default: {}]", Surface::default().stiffness))]
+    stiffness: Option<f64>,
+    #[arg(long, help = format!("Damping of the surface, N·s/m [default: {}]", Surface::default().damping))]
+    surface_damping: Option<f64>,
+    #[arg(long, help = format!("Coefficient of friction between tool and surface [default: {}]", Surface::default().friction))]
+    surface_friction: Option<f64>,
+    #[arg(long, help = format!("Distance of the tool from the surface at the start, m [default: {}]", Surface::default().gap))]
+    gap: Option<f64>,
     /// Wanted force, N [default: 20, or a quarter of what the torque limits allow]
     #[arg(long, value_name = "N")]
     press: Option<f64>,
-    /// Length of the slide along the surface, m
-    #[arg(long, default_value_t = 0.05)]
-    slide: f64,
+    /// Length of the slide along the surface, m [default: 0.05]
+    #[arg(long)]
+    slide: Option<f64>,
     /// Stiffness of the impedance, N/m [default: that of a fifth of the bandwidth]
     #[arg(long, allow_negative_numbers = true)]
     impedance: Option<f64>,
-    /// Standard deviation of the noise of the measured force, N
-    #[arg(long, default_value_t = 0.0)]
-    noise_force: f64,
+    /// Standard deviation of the noise of the measured force, N [default: 0]
+    #[arg(long)]
+    noise_force: Option<f64>,
     /// Tool point in the frame of the last joint, m
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
     tool: Option<Vec<f64>>,
@@ -171,6 +167,12 @@ const MOTIONS: [&str; 5] = [
     "impedance.csv",
 ];
 
+/// Length of the default motion, s.
+const DURATION: f64 = 10.0;
+/// Number of motions with wrong parameters.
+const DRAWS: usize = 20;
+/// Length of the slide, m.
+const SLIDE: f64 = 0.05;
 /// Largest share of wrong parameters, per cent: beyond it some inertia could vanish.
 const MOST_WRONG: f64 = 90.0;
 
@@ -178,6 +180,59 @@ impl Args {
     /// Returns the file to print if the result is wanted as JSON.
     pub(crate) fn json_file(&self) -> Option<PathBuf> {
         self.json.then(|| self.out.join("control.json"))
+    }
+
+    /// Returns the laws, each once.
+    fn laws(&self) -> Vec<LawKind> {
+        let mut laws: Vec<LawKind> = Vec::new();
+        for kind in self.law.iter().flat_map(|law| law.kinds()) {
+            if !laws.contains(kind) {
+                laws.push(*kind);
+            }
+        }
+        laws
+    }
+
+    /// Refuses options that none of the laws uses.
+    fn refuse_unused(&self, laws: &[LawKind]) -> Result<(), CommandError> {
+        let contact = &self.contact;
+        let of_contact = [
+            ("--stiffness", contact.stiffness.is_some()),
+            ("--surface-damping", contact.surface_damping.is_some()),
+            ("--surface-friction", contact.surface_friction.is_some()),
+            ("--gap", contact.gap.is_some()),
+            ("--press", contact.press.is_some()),
+            ("--slide", contact.slide.is_some()),
+            ("--noise-force", contact.noise_force.is_some()),
+            ("--pose", contact.pose.is_some()),
+            ("--normal", contact.normal.is_some()),
+        ];
+        let of_tracking = [
+            ("--trajectory", self.trajectory.is_some()),
+            ("--duration", self.duration.is_some()),
+        ];
+        let given = |list: &[(&'static str, bool)]| {
+            let mut list = list.iter();
+            list.find(|(_, given)| *given).map(|(option, _)| *option)
+        };
+        if let (Some(draws), None) = (self.draws, self.wrong) {
+            return Err(CommandError::Sentence(format!(
+                "--draws {draws} belongs to --wrong; leave it out, or give --wrong."
+            )));
+        }
+        let presses = laws.iter().any(|law| law.is_contact());
+        let tracks = laws.iter().any(|law| !law.is_contact());
+        let (option, of) = match (given(&of_contact), given(&of_tracking)) {
+            (Some(option), _) if !presses => (option, "hybrid, impedance or contact"),
+            (_, Some(option)) if !tracks => (option, "pid, computed-torque, adaptive or all"),
+            _ if contact.impedance.is_some() && !laws.contains(&LawKind::Impedance) => {
+                ("--impedance", "impedance or contact")
+            }
+            _ => return Ok(()),
+        };
+        Err(CommandError::Sentence(format!(
+            "{option} belongs to --law {of}; leave it out, or give such a law."
+        )))
     }
 }
 
@@ -188,6 +243,8 @@ impl Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &["control.json", "report.html"])?;
     refuse_folder(&args.out, &MOTIONS, args.force)?;
+    let laws = args.laws();
+    args.refuse_unused(&laws)?;
     let settings = settings(args)?;
     let robot = args.robot.load(ui)?;
     let mut notes = Vec::new();
@@ -195,12 +252,6 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let truth = Model::from_robot(&robot)?;
     // Refuses a joint without inertia.
     controllers(&robot, &truth, &robot.middle_position())?;
-    let mut laws: Vec<LawKind> = Vec::new();
-    for kind in args.law.iter().flat_map(|law| law.kinds()) {
-        if !laws.contains(kind) {
-            laws.push(*kind);
-        }
-    }
     for name in motion_names(&laws, models.len()) {
         refuse_file(&args.out.join(name), args.force)?;
     }
@@ -212,6 +263,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         task: None,
         tracking: Vec::new(),
         contact: Vec::new(),
+        failed: Vec::new(),
         notes,
     };
     evaluation.notes.extend(truth.effects.unsimulated());
@@ -229,6 +281,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     if !pressing.is_empty() {
         whole.press(&pressing, settings, &mut evaluation, &mut motions, ui)?;
     }
+    refuse_all_failed(&evaluation)?;
     for note in &evaluation.notes {
         ui.remark(note);
     }
@@ -241,7 +294,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     let report = args.out.join("report.html");
     ui.say(&format!("report: {}", report.display()));
-    Ok(())
+    refuse_failed(&evaluation, &args.out)
 }
 
 /// Returns the name of the recording of a law with model `k` of `models`.
@@ -341,34 +394,43 @@ impl Whole<'_> {
             reference,
             tool,
             settings,
-            wrong: self.args.wrong.map(|share| (0.01 * share, self.args.draws)),
+            wrong: self
+                .args
+                .wrong
+                .map(|share| (0.01 * share, self.args.draws.unwrap_or(DRAWS))),
         }
+    }
+
+    /// Returns the motion at `rate` (Hz), and notes how it was interpolated.
+    fn motion(&self, rate: f64, notes: &mut Vec<String>) -> Result<SampledReference, CommandError> {
+        let Some(path) = &self.args.trajectory else {
+            return Ok(default_reference(
+                self.robot,
+                rate,
+                self.args.duration.unwrap_or(DURATION),
+            ));
+        };
+        let (sampled, from) = reference_at(path, self.robot, rate)?;
+        notes.extend(from.map(|from| {
+            format!(
+                "{}: the reference is sampled at {} Hz; quintics through its samples give position, velocity and acceleration at the {} Hz of the control loop (--rate).",
+                path.display(),
+                format_trimmed(from, 6),
+                format_trimmed(rate, 6)
+            )
+        }));
+        Ok(sampled)
     }
 
     fn track(
         &self,
         laws: &[LawKind],
-        mut settings: Settings,
+        settings: Settings,
         evaluation: &mut Evaluation,
         motions: &mut Vec<Motion>,
         ui: &Ui,
     ) -> Result<(), CommandError> {
-        let sampled = match &self.args.trajectory {
-            Some(path) => load_reference(path, self.robot, settings.rate)?,
-            None => default_reference(self.robot, settings.rate, self.args.duration),
-        };
-        let rate = 1.0 / sampled.period;
-        if (rate / settings.rate - 1.0).abs() > 1e-6 {
-            let given = self.args.rate.map_or(String::new(), |given| {
-                format!(" --rate {given} was not used.")
-            });
-            evaluation.notes.push(format!(
-                "The laws run at {rate:.6} Hz, the rate of the sampled trajectory; a .toml trajectory runs at any rate.{given}"
-            ));
-            settings.rate = rate;
-            settings.check()?;
-            evaluation.settings = settings;
-        }
+        let sampled = self.motion(settings.rate, &mut evaluation.notes)?;
         let reference = references(&sampled)?;
         let tool = match three("tool", self.args.contact.tool.as_deref())? {
             Some(tool) => tool,
@@ -377,8 +439,11 @@ impl Whole<'_> {
         let bench = self.bench(&reference, tool, settings);
         let mut progress = ui.progress("simulating", (laws.len() * self.models.len()) as u64);
         self.each(laws, |law, model, name, motion| {
-            let mut run = bench.track(law, model, name)?;
+            let run = bench.track(law, model, name);
             progress.advance(1);
+            let Some(mut run) = finished(run, law, name, &mut evaluation.failed)? else {
+                return Ok(());
+            };
             run.measures.motion.clone_from(&motion);
             add_notes(&mut evaluation.notes, run.notes);
             evaluation.tracking.push(run.measures);
@@ -396,18 +461,19 @@ impl Whole<'_> {
         ui: &Ui,
     ) -> Result<(), CommandError> {
         let given = &self.args.contact;
+        let usual = Surface::default();
         let options = ContactOptions {
             surface: Surface {
-                stiffness: given.stiffness,
-                damping: given.surface_damping,
-                friction: given.surface_friction,
-                gap: given.gap,
+                stiffness: given.stiffness.unwrap_or(usual.stiffness),
+                damping: given.surface_damping.unwrap_or(usual.damping),
+                friction: given.surface_friction.unwrap_or(usual.friction),
+                gap: given.gap.unwrap_or(usual.gap),
             },
             tool: three("tool", given.tool.as_deref())?,
             pose: given.pose.clone(),
             normal: three("normal", given.normal.as_deref())?,
             force: given.press,
-            slide: given.slide,
+            slide: given.slide.unwrap_or(SLIDE),
             stiffness: given.impedance,
         };
         // One task for all models: that of the first.
@@ -420,8 +486,11 @@ impl Whole<'_> {
         let bench = self.bench(&reference, task.tool, settings);
         let mut progress = ui.progress("simulating", (laws.len() * self.models.len()) as u64);
         self.each(laws, |law, model, name, motion| {
-            let mut run = bench.press(law, model, name, &task)?;
+            let run = bench.press(law, model, name, &task);
             progress.advance(1);
+            let Some(mut run) = finished(run, law, name, &mut evaluation.failed)? else {
+                return Ok(());
+            };
             run.measures.motion.clone_from(&motion);
             add_notes(&mut evaluation.notes, run.notes);
             evaluation.contact.push(run.measures);
@@ -430,6 +499,55 @@ impl Whole<'_> {
         })?;
         evaluation.task = Some(task);
         Ok(())
+    }
+}
+
+/// Returns the motion of a law. A law that is unstable or gives no torque is noted, so that the others still run.
+///
+/// # Errors
+/// All other errors, which concern all laws.
+fn finished<M>(
+    run: Result<Run<M>, ControlError>,
+    law: LawKind,
+    model: &str,
+    failed: &mut Vec<Failed>,
+) -> Result<Option<Run<M>>, CommandError> {
+    match run {
+        Ok(run) => Ok(Some(run)),
+        Err(error @ (ControlError::Unstable { .. } | ControlError::Law { .. })) => {
+            failed.push(Failed {
+                law,
+                model: model.to_owned(),
+                reason: error.to_string(),
+            });
+            Ok(None)
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Refuses a run in which no law finished its motion, with the reason of the first.
+fn refuse_all_failed(evaluation: &Evaluation) -> Result<(), CommandError> {
+    match evaluation.failed.first() {
+        Some(first) if evaluation.tracking.is_empty() && evaluation.contact.is_empty() => {
+            Err(CommandError::Sentence(first.reason.clone()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Fails if a law did not finish its motion; the others are reported.
+fn refuse_failed(evaluation: &Evaluation, out: &Path) -> Result<(), CommandError> {
+    let names: Vec<String> = (evaluation.failed.iter())
+        .map(|own| format!("{} with {}", own.law.name(), own.model))
+        .collect();
+    match names.is_empty() {
+        true => Ok(()),
+        false => Err(CommandError::Sentence(format!(
+            "No motion of {}: the warning above says why. The other laws are in {}.",
+            names.join(", "),
+            out.display()
+        ))),
     }
 }
 
@@ -450,14 +568,14 @@ fn settings(args: &Args) -> Result<Settings, CommandError> {
         delay: !args.no_delay,
         resolution: args.resolution,
         friction_gain: args.friction_gain,
-        force_noise: args.contact.noise_force,
+        force_noise: args.contact.noise_force.unwrap_or(0.0),
         seed: args.seed,
         ..Settings::default()
     };
     settings.check()?;
     for (name, value, most) in [
         ("scale", args.scale, 100.0),
-        ("duration", args.duration, 3600.0),
+        ("duration", args.duration.unwrap_or(DURATION), 3600.0),
     ] {
         if !(value > 0.0 && value <= most) {
             return Err(CommandError::Sentence(format!(
@@ -472,10 +590,9 @@ fn settings(args: &Args) -> Result<Settings, CommandError> {
             "--wrong {wrong} is not possible: it must be above 0 and at most {MOST_WRONG} per cent."
         )));
     }
-    if !(1..=10_000).contains(&args.draws) {
+    if let Some(draws) = args.draws.filter(|draws| !(1..=10_000).contains(draws)) {
         return Err(CommandError::Sentence(format!(
-            "--draws {} is not possible: it must be between 1 and 10000.",
-            args.draws
+            "--draws {draws} is not possible: it must be between 1 and 10000."
         )));
     }
     Ok(settings)

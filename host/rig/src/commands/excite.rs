@@ -298,6 +298,14 @@ impl Args {
     fn staged_options(&self) -> Result<StagedOptions, CommandError> {
         let band = match self.band.as_deref() {
             None => None,
+            // A frequency of half the rate has two rows a period.
+            Some(&[_, high]) if high >= 0.5 * self.rate => {
+                return Err(CommandError::Sentence(format!(
+                    "--band up to {high} Hz needs more than {} rows a second, and --rate is {}; give a lower frequency or a higher --rate.",
+                    2.0 * high,
+                    self.rate
+                )));
+            }
             Some(&[low, high]) => Some([low, high]),
             Some(other) => {
                 return Err(CommandError::Sentence(format!(

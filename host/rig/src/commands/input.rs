@@ -196,6 +196,17 @@ fn sentence(source: &Source, wrong: &[Implausible]) -> String {
     format!("{}: {text}.", source.path().display())
 }
 
+/// Returns true if the scale of a position or of an effort is wrong, whether or not the rows are a motion.
+fn is_scale(problem: &Implausible) -> bool {
+    matches!(
+        problem,
+        Implausible::Degrees { .. }
+            | Implausible::Position { .. }
+            | Implausible::EffortTooLarge { .. }
+            | Implausible::EffortTooSmall { .. }
+    )
+}
+
 impl Inputs {
     /// Opens recordings and checks their columns.
     ///
@@ -248,13 +259,31 @@ impl Inputs {
     /// # Errors
     /// Names the error in a file and its line. One sentence lists all units that look wrong.
     pub(crate) fn refuse_units(&self, robot: &Robot, least: usize) -> Result<(), CommandError> {
+        self.refuse_implausible(robot, least, |problem| !problem.is_doubt())
+    }
+
+    /// Refuses positions and efforts whose scale is wrong by the limits, also of recordings that are no motion: joints
+    /// that are held, or that move little and slowly.
+    ///
+    /// # Errors
+    /// As [`Self::refuse_units`].
+    pub(crate) fn refuse_scales(&self, robot: &Robot) -> Result<(), CommandError> {
+        self.refuse_implausible(robot, 0, is_scale)
+    }
+
+    fn refuse_implausible(
+        &self,
+        robot: &Robot,
+        least: usize,
+        is_wrong: impl Fn(&Implausible) -> bool,
+    ) -> Result<(), CommandError> {
         for source in &self.sources {
             let block = first_part(source)?.rows();
             if block.len() < least {
                 continue;
             }
             let wrong: Vec<Implausible> = (plausibility(&block, robot).into_iter())
-                .filter(|problem| !problem.is_doubt())
+                .filter(&is_wrong)
                 .collect();
             if !wrong.is_empty() {
                 return Err(CommandError::Implausible(sentence(source, &wrong)));

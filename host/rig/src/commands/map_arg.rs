@@ -7,7 +7,7 @@ use rig_data::Mapping;
 
 use super::error::CommandError;
 
-/// Units and columns of the recordings from a file: for a command whose `--map` is something else.
+/// Units and columns of the recordings from a file: for a command whose `--map` has two meanings.
 #[derive(Clone, Debug, Default, ClapArgs)]
 pub(crate) struct UnitArg {
     /// Unit of a column (q1=deg, t=ms), or of that column of all joints (q=deg); repeat for several
@@ -45,16 +45,24 @@ impl UnitArg {
         }
         Ok(mapping)
     }
+
+    /// Returns the mapping with columns, each as COLUMN=CHANNEL.
+    ///
+    /// # Errors
+    /// As [`Self::mapping`].
+    pub(crate) fn mapping_with(&self, columns: &[String]) -> Result<Mapping, CommandError> {
+        let mut mapping = self.mapping()?;
+        for entry in columns {
+            let added = mapping.add_column(entry);
+            added.map_err(|why| CommandError::Sentence(format!("--map {entry}: {why}.")))?;
+        }
+        Ok(mapping)
+    }
 }
 
 impl MapArg {
     /// Does the same as [`UnitArg::mapping`], with the columns of the options.
     pub(crate) fn mapping(&self) -> Result<Mapping, CommandError> {
-        let mut mapping = self.units.mapping()?;
-        for entry in &self.map {
-            let added = mapping.add_column(entry);
-            added.map_err(|why| CommandError::Sentence(format!("--map {entry}: {why}.")))?;
-        }
-        Ok(mapping)
+        self.units.mapping_with(&self.map)
     }
 }

@@ -40,7 +40,7 @@ mod urdf;
 mod validate;
 mod work;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use diagnose::write_diagnosis;
 pub use error::CommandError;
@@ -48,7 +48,7 @@ pub use identify::{Compare, Impossible, write_identification};
 pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
 pub use overwrite::{refuse_file, refuse_folder};
 use ui::Ui;
-use work::Work;
+use work::{Work, with_negative_numbers};
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
 ///
@@ -79,6 +79,12 @@ enum Command {
 }
 
 impl Cli {
+    /// Reads the arguments of the program. A wrong one, or `--help`, ends it.
+    pub fn from_arguments() -> Self {
+        let matches = with_negative_numbers(Self::command()).get_matches();
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
+
     /// Runs the command; returns the exit status.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The commands that make files: each is also a step of `rig run`.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use super::error::CommandError;
 use super::ui::Ui;
@@ -38,6 +38,34 @@ pub(crate) enum Work {
 pub(crate) struct Words {
     #[command(subcommand)]
     pub(crate) work: Work,
+}
+
+impl Words {
+    /// Reads the words, the name of the program first.
+    ///
+    /// # Errors
+    /// clap's message about a wrong word.
+    pub(crate) fn read<T: Into<std::ffi::OsString> + Clone>(
+        words: impl IntoIterator<Item = T>,
+    ) -> Result<Self, clap::Error> {
+        let matches = with_negative_numbers(Self::command()).try_get_matches_from(words)?;
+        Self::from_arg_matches(&matches)
+    }
+}
+
+/// Lets every option of a command and of its subcommands take a negative number. The check of the value then says what is
+/// possible, instead of clap that `-2` is no option.
+pub(crate) fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let names: Vec<String> = (command.get_subcommands())
+        .map(|own| own.get_name().to_owned())
+        .collect();
+    let command = command.mut_args(|own| match own.get_action().takes_values() {
+        true if !own.is_positional() => own.allow_negative_numbers(true),
+        _ => own,
+    });
+    names.into_iter().fold(command, |command, name| {
+        command.mut_subcommand(name, with_negative_numbers)
+    })
 }
 
 impl Work {

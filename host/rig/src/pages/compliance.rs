@@ -3,8 +3,8 @@
 use super::context::Context;
 use super::parts;
 use rig_compliance::{
-    Band, Compliance, ComplianceMap, DriveLoading, FrequencyResponse, ToolCompliance, Value,
-    response_pose,
+    Band, Compliance, ComplianceMap, Deflection, DriveLoading, FrequencyResponse, ToolCompliance,
+    Value, response_pose,
 };
 use rig_output::{format_significant, format_unit, format_value};
 use rig_report::{
@@ -60,6 +60,16 @@ fn value(value: &Value) -> String {
     }
 }
 
+/// Returns true if a force moves the tool point at a pose by more than rounding.
+fn yields(pose: &ToolCompliance) -> bool {
+    let arms: f64 = (3..6).map(|r| pose.compliance[r][r]).sum();
+    let most = pose
+        .principal
+        .first()
+        .map_or(0.0, |own| own.compliance.value);
+    most > 1e-18 * arms
+}
+
 fn summary(found: &Compliance, context: &Context) -> Vec<Fact> {
     let mut facts = Vec::new();
     for drive in found.drives.iter().filter(|d| d.source.is_measured()) {
@@ -72,7 +82,9 @@ fn summary(found: &Compliance, context: &Context) -> Vec<Fact> {
             );
         }
     }
-    if let Some(most) = found.poses.first().and_then(|p| p.principal.first()) {
+    // Without an arm no force moves the tool point; a warning says so.
+    let moved = found.poses.first().filter(|pose| yields(pose));
+    if let Some(most) = moved.and_then(|p| p.principal.first()) {
         facts.push(
             Fact::new("Largest displacement per force", value(&most.compliance))
                 .unit("m/N")
@@ -189,8 +201,11 @@ fn curve(drive: &DriveLoading) -> Option<Plot> {
         Axis::new("torque of the drive", "N·m"),
         Axis::new("twist", "rad"),
     )
-    .note("Each dot is the mean of one window. The line has the slope of the estimated stiffness, without friction.");
-    let names = [("growing", Role::Measured), ("falling", Role::Before)];
+    .note(match drive.by {
+        Deflection::Tool => "Each dot is one window: the deflection of the tool point over the arm of this joint, less what the other joints explain. The line has the slope of the estimated stiffness, without friction.",
+        _ => "Each dot is the mean of one window. The line has the slope of the estimated stiffness, without friction.",
+    });
+    let names = [("growing", Role::Measured), ("falling", Role::After)];
     for ((name, role), points) in names.iter().zip(&drive.points) {
         plot = plot.with(Series::points(
             *name,
@@ -575,7 +590,7 @@ fn principal(found: &Compliance, pose: &ToolCompliance) -> Table {
                     },
                 ];
                 cells.extend(own.shares.iter().map(|s| match yields {
-                    true => format!("{:.1}", 100.0 * s),
+                    true => fixed(100.0 * s, 1),
                     false => "–".to_owned(),
                 }));
                 cells
