@@ -11,7 +11,7 @@ use super::ui::{Progress, Ui};
 use rig_data::prepare::{PrepareError, Recording};
 use rig_data::{
     Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Mapping, Source, StrangeReference,
-    Warning, plausibility, strange_rates, strange_references,
+    Warning, implausible_positions, plausibility, strange_rates, strange_references,
 };
 use rig_diagnose::faults::faults_at_start;
 use rig_model::robot::{Description, Joint, JointKind, Robot};
@@ -231,8 +231,8 @@ impl Inputs {
         })
     }
 
-    /// Refuses columns whose units look wrong. Recordings of fewer than `least` rows are not checked: rows of single
-    /// poses are no motion.
+    /// Refuses columns whose units look wrong. Of recordings of fewer than `least` rows only the range of the positions is
+    /// checked: rows of single poses are no motion.
     ///
     /// # Errors
     /// Names the error in a file and its line. One sentence lists all units that look wrong.
@@ -242,10 +242,11 @@ impl Inputs {
                 continue;
             };
             let block = block?;
-            if block.len() < least {
-                continue;
-            }
-            let wrong: Vec<Implausible> = (plausibility(&block, robot).into_iter())
+            let check = match block.len() < least {
+                true => implausible_positions,
+                false => plausibility,
+            };
+            let wrong: Vec<Implausible> = (check(&block, robot).into_iter())
                 .filter(|problem| !problem.is_doubt())
                 .collect();
             if !wrong.is_empty() {
