@@ -432,6 +432,23 @@ fn repeated_how(percent: f64, made_up: bool) -> String {
     }
 }
 
+/// Returns the positions in `block` that are far outside of what the joints reach. Rows of single poses are judged by this
+/// alone, because they follow no motion.
+pub fn implausible_positions(block: &Block, robot: &Robot) -> Vec<Implausible> {
+    let joints = block.joints.iter().zip(&robot.joints);
+    (1..)
+        .zip(joints)
+        .filter(|(_, (columns, _))| !columns.q.is_empty())
+        .filter_map(|(k, (columns, joint))| {
+            let unit = match joint.kind {
+                JointKind::Revolute => "rad",
+                JointKind::Prismatic => "m",
+            };
+            range_fault(k, &columns.q, joint, unit)
+        })
+        .collect()
+}
+
 /// Finds positions and efforts that keep each value for several rows; joints with the same rate are grouped.
 fn repeated(block: &Block) -> Vec<Implausible> {
     let together = |of: fn(&JointColumns) -> &[f64]| {
@@ -556,6 +573,21 @@ fn position_fault(
             unit,
         });
     }
+    if let Some(wrong) = range_fault(k, q, joint, unit) {
+        return Some(wrong);
+    }
+    let limits = joint.limits.as_ref()?;
+    let speed = highest_speed(t, q)?;
+    (speed > 10.0 * limits.velocity).then_some(Implausible::Velocity {
+        joint: k,
+        speed,
+        limit: limits.velocity,
+        unit,
+    })
+}
+
+/// Returns the fault of positions that are far outside of what the joint reaches.
+fn range_fault(k: usize, q: &[f64], joint: &Joint, unit: &'static str) -> Option<Implausible> {
     let limits = joint.limits.as_ref()?;
     let [lower, upper] = limits.position;
     let (lowest, highest) = range(q);
@@ -584,13 +616,7 @@ fn position_fault(
             }
         });
     }
-    let speed = highest_speed(t, q)?;
-    (speed > 10.0 * limits.velocity).then_some(Implausible::Velocity {
-        joint: k,
-        speed,
-        limit: limits.velocity,
-        unit,
-    })
+    None
 }
 
 /// Returns the number of rows per second.

@@ -22,7 +22,7 @@ const CURRENT: &str = "current";
 const VOLTAGE: &str = "voltage";
 
 /// Names, the first of which is printed; factor to SI; quantity.
-const UNITS: [(&[&str], f64, &str); 29] = [
+const UNITS: [(&[&str], f64, &str); 34] = [
     (&["rad"], 1.0, ANGLE),
     (&["mrad"], 1e-3, ANGLE),
     (&["deg", "degree", "degrees", "°"], PI / 180.0, ANGLE),
@@ -52,6 +52,20 @@ const UNITS: [(&[&str], f64, &str); 29] = [
     (&["cNm", "Ncm", "N·cm"], 1e-2, EFFORT),
     (&["kNm", "kN·m"], 1e3, EFFORT),
     (&["kgcm", "kgfcm", "kgf·cm", "kg·cm"], 0.098_066_5, EFFORT),
+    // A kilogram-force is 9.80665 N, a pound-force 4.4482216152605 N and a foot 0.3048 m by definition.
+    (&["kgfm", "kgf·m", "kgf*m"], 9.806_65, EFFORT),
+    (
+        &["lbfft", "lbf·ft", "lbf*ft", "ft·lbf", "ft-lb", "lb-ft"],
+        1.355_817_948_331_400_4,
+        EFFORT,
+    ),
+    (
+        &["lbfin", "lbf·in", "lbf*in", "in·lbf", "in-lb", "lb-in"],
+        0.112_984_829_027_616_7,
+        EFFORT,
+    ),
+    (&["kgf"], 9.806_65, EFFORT),
+    (&["lbf"], 4.448_221_615_260_5, EFFORT),
     (&["N"], 1.0, EFFORT),
     (&["mN"], 1e-3, EFFORT),
     (&["kN"], 1e3, EFFORT),
@@ -127,7 +141,7 @@ impl Unit {
             LENGTH => Some(true),
             ANGLE => Some(false),
             SPEED => Some(self.name.starts_with('m')),
-            EFFORT => Some(self.name.ends_with('N')),
+            EFFORT => Some(self.name.ends_with(['N', 'f'])),
             _ => None,
         }
     }
@@ -174,10 +188,10 @@ mod tests {
             assert!(Unit::stated(text).is_none(), "{text}");
         }
         let linear = |name| Unit::named(name).unwrap().is_linear();
-        for name in ["m", "mm", "m/s", "mm/s", "N", "mN", "kN"] {
+        for name in ["m", "mm", "m/s", "mm/s", "N", "mN", "kN", "kgf", "lbf"] {
             assert_eq!(linear(name), Some(true), "{name}");
         }
-        for name in ["rad", "deg/s", "rpm", "Nm", "kgcm"] {
+        for name in ["rad", "deg/s", "rpm", "Nm", "kgcm", "kgfm", "lbfft"] {
             assert_eq!(linear(name), Some(false), "{name}");
         }
         assert!(Unit::named("MN").is_none());

@@ -2,10 +2,11 @@
 
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::Recording;
-use rig_model::robot::WristSensor;
+use rig_model::robot::{Robot, WristSensor};
 use rig_output::{format_short, format_significant};
 
 use crate::error::LoadError;
+use crate::pace::{Pace, pace};
 use crate::rows::{Ends, FEWEST_ROWS, LEAST_ROWS, each_readings};
 
 /// Consecutive rows at an extreme value that a cut reading shows at least.
@@ -15,14 +16,79 @@ const BEYOND: f64 = 1.1;
 /// Width of the neighbourhood of an extreme value, as a share of the channel's range.
 const NEIGHBOURHOOD: f64 = 0.02;
 
+/// Most rows of a channel that are looked at as spikes.
+const SPIKES: usize = 8;
+/// Multiple of the range of all other rows beyond which a reading is a spike: a load that is hit, or a jump of the bias,
+/// stays below ten times the range of a motion.
+const SPIKE: f64 = 10.0;
+
+/// The highest values of a channel with the lines of their rows, the highest first.
+#[derive(Clone, Debug, Default)]
+struct Highest(Vec<(f64, u64)>);
+
+impl Highest {
+    fn push(&mut self, value: f64, line: u64) {
+        let list = &mut self.0;
+        if list.len() <= SPIKES || list.last().is_some_and(|(least, _)| value > *least) {
+            let place = list.partition_point(|(own, _)| *own >= value);
+            list.insert(place, (value, line));
+            list.truncate(SPIKES + 1);
+        }
+    }
+
+    /// Returns the highest value that is no candidate for a spike.
+    fn rest(&self) -> Option<f64> {
+        self.0.get(SPIKES).map(|(value, _)| *value)
+    }
+}
+
+/// Returns the rows, and the range of all others, if single rows of a channel are far outside of it.
+fn spikes(highest: &[Highest; 2]) -> Option<(Vec<(f64, u64)>, [f64; 2])> {
+    let [high, low] = [highest[0].rest()?, -highest[1].rest()?];
+    let reach = SPIKE * (high - low);
+    let above = highest[0].0.iter().copied();
+    let below = highest[1].0.iter().map(|(value, line)| (-value, *line));
+    let far = |(value, _): &(f64, u64)| *value > high + reach || *value < low - reach;
+    let found: Vec<(f64, u64)> = above.chain(below).filter(far).collect();
+    (!found.is_empty()).then_some((found, [low, high]))
+}
+
+/// Says which row of a channel is a spike.
+fn spike_words(label: &str, c: usize, rows: &[(f64, u64)], range: [f64; 2]) -> String {
+    let column = WRENCH_COLUMNS[c];
+    let unit = if c < 3 { "N" } else { "N·m" };
+    let (value, line) = rows
+        .iter()
+        .copied()
+        .fold((0.0, 0), |worst: (f64, u64), own| {
+            if own.0.abs() > worst.0.abs() {
+                own
+            } else {
+                worst
+            }
+        });
+    let more = match rows.len() {
+        1 => String::new(),
+        n => format!(" (and {} rows more)", n - 1),
+    };
+    format!(
+        "{label}, line {line}: {column} is {} {unit}{more}, and in all other rows it lies within {} and {} {unit}: such a reading is a fault of the sensor or of its line. Remove the row.",
+        format_significant(value, 4),
+        format_significant(range[0], 4),
+        format_significant(range[1], 4)
+    )
+}
+
 /// What a channel reads over a recording.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Channel {
     low: f64,
     high: f64,
     /// Smallest difference of two rows that is not zero.
     step: f64,
     last: f64,
+    /// Highest values, and highest negative ones.
+    highest: [Highest; 2],
 }
 
 /// Rows at and near an end of a channel.
@@ -66,12 +132,18 @@ impl End {
 pub(crate) struct Judged {
     /// Number of rows.
     pub rows: u64,
+    /// How the rows follow each other.
+    pub pace: Pace,
+    /// True if poses at rest are taken of it, and not every row.
+    pub poses: bool,
     /// Time from the first to the last row, s.
     pub length: f64,
     /// Readings beyond which rows are left out.
     pub ends: Ends,
     /// Channels that were cut, with the value.
     pub cut: Vec<(&'static str, f64)>,
+    /// Says which row of a channel is a spike.
+    pub spike: Option<String>,
 }
 
 /// Finds the ends of the channels: the described range of the sensor, and values at which readings were cut.
@@ -80,6 +152,7 @@ pub(crate) struct Judged {
 /// [`LoadError::Dead`], [`LoadError::NoColumn`].
 pub(crate) fn judge(
     recording: &dyn Recording,
+    robot: &Robot,
     sensor: &WristSensor,
     poses: bool,
 ) -> Result<Judged, LoadError> {
@@ -90,7 +163,9 @@ pub(crate) fn judge(
             least: LEAST_ROWS,
         });
     }
-    let poses = poses || rows < FEWEST_ROWS as u64;
+    let pace = pace(recording, robot)?;
+    // A short recording of a motion is searched for rests as well: the readings of a motion need its acceleration.
+    let poses = poses || pace == Pace::Listed || rows < FEWEST_ROWS as u64;
     for (channel, column) in channels.iter().zip(WRENCH_COLUMNS) {
         if channel.low == channel.high {
             return Err(LoadError::Dead {
@@ -112,7 +187,7 @@ pub(crate) fn judge(
         Ok(())
     })?;
     let mut ends = [[f64::NEG_INFINITY, f64::INFINITY]; 6];
-    let mut cut = Vec::new();
+    let (mut cut, mut spike) = (Vec::new(), None);
     for (c, end) in ends.iter_mut().enumerate() {
         let range = if c < 3 {
             sensor.force_range
@@ -121,6 +196,13 @@ pub(crate) fn judge(
         };
         if let Some(range) = range {
             *end = [-range, range];
+        }
+        if let Some((rows, others)) = spikes(&channels[c].highest).filter(|_| !poses) {
+            spike.get_or_insert_with(|| spike_words(&recording.label(), c, &rows, others));
+            let [low, high] = others;
+            let beside = f64::EPSILON * (low.abs() + high.abs());
+            *end = [end[0].max(low - beside), end[1].min(high + beside)];
+            continue;
         }
         let seen = [channels[c].low, channels[c].high];
         for side in 0..2 {
@@ -144,9 +226,12 @@ pub(crate) fn judge(
     }
     Ok(Judged {
         rows,
+        pace,
+        poses,
         length,
         ends,
         cut,
+        spike,
     })
 }
 
@@ -168,12 +253,13 @@ fn beyond(recording: &dyn Recording, c: usize, value: f64, range: f64) -> LoadEr
 
 /// Returns the number of rows, the length in s and the range of each channel.
 fn ranges(recording: &dyn Recording) -> Result<(u64, f64, [Channel; 6]), LoadError> {
-    let mut channels = [Channel {
+    let mut channels: [Channel; 6] = std::array::from_fn(|_| Channel {
         low: f64::INFINITY,
         high: f64::NEG_INFINITY,
         step: f64::INFINITY,
         last: f64::NAN,
-    }; 6];
+        highest: Default::default(),
+    });
     let (mut rows, mut times) = (0u64, [f64::INFINITY, f64::NEG_INFINITY]);
     each_readings(recording, &mut |block, readings| {
         rows += block.len() as u64;
@@ -181,7 +267,9 @@ fn ranges(recording: &dyn Recording) -> Result<(u64, f64, [Channel; 6]), LoadErr
             times = [times[0].min(*t), times[1].max(*t)];
         }
         for (channel, list) in channels.iter_mut().zip(readings) {
-            for value in list {
+            for (value, line) in list.iter().zip(block.first_line..) {
+                channel.highest[0].push(*value, line);
+                channel.highest[1].push(-value, line);
                 channel.low = channel.low.min(*value);
                 channel.high = channel.high.max(*value);
                 let step = (value - channel.last).abs();

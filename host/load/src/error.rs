@@ -33,7 +33,7 @@ pub enum LoadError {
     },
     /// A channel of the sensor always reads the same.
     #[error(
-        "{column} of {label} is {value} in every row: that channel is dead or was not recorded; check the sensor's cable and the recorder."
+        "{column} of {label} is {value} in every row: that channel is dead or was not recorded; check the sensor's cable and the recorder. A simulated sensor that carries nothing reads the same everywhere: simulate its noise (--noise-force, --noise-moment)."
     )]
     Dead {
         /// Name of the recording.
@@ -52,6 +52,14 @@ pub enum LoadError {
         rows: usize,
         /// Least number.
         least: usize,
+    },
+    /// A recording without poses at rest that is too short for a motion, or was called one of poses.
+    #[error("{label} moves all the time, so its rows are no poses at rest: {remedy}.")]
+    Moves {
+        /// Name of the recording.
+        label: String,
+        /// What to do.
+        remedy: String,
     },
     /// No joint moves.
     #[error(

@@ -9,7 +9,9 @@ use rig_output::format_significant;
 use crate::error::LoadError;
 use crate::estimate::Estimate;
 use crate::mounting::Channels;
+use crate::statistics::noise_floor;
 use crate::system::{Fit, Nuisance, Sensed};
+use crate::units::{Unit, by_lever};
 
 /// Angle below which the axes of the sensor are those described, rad: rounding.
 const LEAST_TURN: f64 = 1e-6;
@@ -92,6 +94,8 @@ pub(crate) struct Told<'a> {
     pub alternatives: Vec<[Nuisance; 2]>,
     /// What the readings were shifted by, s.
     pub delay: f64,
+    /// True if the fit leaves about the noise. Otherwise properties that it found may stand for something else.
+    pub explains: bool,
 }
 
 impl Told<'_> {
@@ -149,6 +153,7 @@ impl Told<'_> {
         let biases = self.biases();
         for bias in &biases {
             warnings.extend(jump_words(bias));
+            warnings.extend(drift_words(bias, self.fit.noise));
         }
         SensorFindings {
             reads,
@@ -162,7 +167,7 @@ impl Told<'_> {
             position,
             residual: self.fit.noise,
             share: self.sensed.share(self.fit),
-            noise: self.noise(),
+            noise: noise_floor(self.sensed.recordings),
             biases,
             warming: self.sensed.warming(self.fit),
             traces: self.traces(),
@@ -179,15 +184,27 @@ impl Told<'_> {
 
     fn turned(&self, angle: f64, axis: &Vector3<f64>, [roll, pitch, yaw]: [f64; 3]) -> String {
         format!(
-            "The axes of the sensor are turned by {} degrees about [{:.2}, {:.2}, {:.2}] against the description; the load was identified with the estimated axes. If the sensor is turned, write rotation = [{:.4}, {:.4}, {:.4}] into [wrist_sensor]. A cable that pulls can look alike.",
+            "The axes of the sensor are turned by {} degrees about [{:.2}, {:.2}, {:.2}] against the description; the load was identified with the estimated axes.{}",
             format_significant(angle.to_degrees(), 3),
             axis.x,
             axis.y,
             axis.z,
-            roll,
-            pitch,
-            yaw
+            self.advice(&format!(
+                "If the sensor is turned, write rotation = [{roll:.4}, {pitch:.4}, {yaw:.4}] into [wrist_sensor]. A cable that pulls can look alike."
+            ))
         )
+    }
+
+    /// Returns what to change, behind a space; nothing if more is left than noise, because the property may then stand for
+    /// another cause.
+    fn advice(&self, remedy: &str) -> String {
+        match self.explains {
+            true => format!(" {remedy}"),
+            false => {
+                " More than noise is left, so this may stand for another cause: find that first."
+                    .to_owned()
+            }
+        }
     }
 
     /// Returns the direction of gravity if it is not the described one.
@@ -199,11 +216,12 @@ impl Told<'_> {
         }
         let gravity = turn * self.sensed.gravity;
         warnings.push(format!(
-            "The base leans by {} degrees against the description; the load was identified with the estimated gravity. Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into the description.",
+            "The base leans by {} degrees against the description; the load was identified with the estimated gravity.{}",
             format_significant(turn.angle().to_degrees(), 3),
-            gravity.x,
-            gravity.y,
-            gravity.z
+            self.advice(&format!(
+                "Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into the description.",
+                gravity.x, gravity.y, gravity.z
+            ))
         ));
         Some(gravity.into())
     }
@@ -216,8 +234,9 @@ impl Told<'_> {
         }
         let sense = if delay > 0.0 { "late" } else { "early" };
         warnings.push(format!(
-            "The readings are {} ms {sense} against the positions; the load was identified with this delay. Record both by one clock.",
-            format_significant(1e3 * delay.abs(), 3)
+            "The readings are {} ms {sense} against the positions; the load was identified with this delay.{}",
+            format_significant(1e3 * delay.abs(), 3),
+            self.advice("Record both by one clock.")
         ));
         Some(delay)
     }
@@ -227,11 +246,12 @@ impl Told<'_> {
         let origin = self.origin()?;
         let error = origin - Vector3::from(self.sensor.position);
         warnings.push(format!(
-            "The sensor's origin lies {} mm from the described one; the load was identified with the estimated origin. Measure it, or write position = [{:.4}, {:.4}, {:.4}] into [wrist_sensor].",
+            "The sensor's origin lies {} mm from the described one; the load was identified with the estimated origin.{}",
             format_significant(1e3 * error.norm(), 3),
-            origin.x,
-            origin.y,
-            origin.z
+            self.advice(&format!(
+                "Measure it, or write position = [{:.4}, {:.4}, {:.4}] into [wrist_sensor].",
+                origin.x, origin.y, origin.z
+            ))
         ));
         Some(origin.into())
     }
@@ -280,27 +300,13 @@ impl Told<'_> {
             .collect()
     }
 
-    /// Returns the noise in the band of the fit: that of the recordings, by their rows.
-    fn noise(&self) -> Option<[f64; 2]> {
-        let (mut sums, mut rows) = ([0.0; 2], 0.0);
-        for recorded in self.sensed.recordings {
-            let own = recorded.passed.noise?;
-            let count = recorded.rows() as f64;
-            for (sum, noise) in sums.iter_mut().zip(own) {
-                *sum += count * noise * noise;
-            }
-            rows += count;
-        }
-        (rows > 0.0).then(|| sums.map(|sum| (sum / rows).sqrt()))
-    }
-
     /// Says if more is left than noise: half of the residual's power is not explained by the noise above the band. Refuses
     /// readings of which a rigid load leaves more than half of the power.
     ///
     /// # Errors
     /// [`LoadError::Fault`] with the residual, unless the user goes on.
     pub(crate) fn not_rigid(&self, even_if_wrong: bool) -> Result<Option<String>, LoadError> {
-        let Some(noise) = self.noise() else {
+        let Some(noise) = noise_floor(self.sensed.recordings) else {
             return Ok(None);
         };
         let over =
@@ -310,14 +316,19 @@ impl Told<'_> {
         }
         let share = self.sensed.share(self.fit);
         let text = format!(
-            "A rigid load leaves {} N and {} N·m RMS ({} and {} % of what the sensor reads beside the bias); noise as that above the band would leave {} N and {} N·m. Something else acts on the sensor (cables that pull, contact, elasticity, gain and crosstalk, another robot), or its noise is slow.",
+            "A rigid load leaves {} N and {} N·m RMS ({} and {} % of what the sensor reads beside the bias); noise as that above the band would leave {} N and {} N·m. Something else acts on the sensor (cables that pull, contact, elasticity, gain and crosstalk, another robot), or its noise is slow. {}",
             format_significant(self.fit.noise[0], 3),
             format_significant(self.fit.noise[1], 3),
             format_significant(100.0 * share[0], 2),
             format_significant(100.0 * share[1], 2),
             format_significant(noise[0], 3),
-            format_significant(noise[1], 3)
+            format_significant(noise[1], 3),
+            match self.explains {
+                true => "",
+                false => NO_CAUSE,
+            }
         );
+        let text = text.trim_end().to_owned();
         let lost = |kind: usize| share[kind].powi(2) > 0.5 && over(kind) > 2.0;
         match (lost(0) || lost(1)) && !even_if_wrong {
             true => Err(LoadError::Fault(text)),
@@ -340,18 +351,42 @@ impl Told<'_> {
         let in_flange = self.robot.last_link.inverse() * sensor;
         let described = in_flange.translation.vector;
         let origin = self.origin().unwrap_or(described);
-        let lever = (moment / mass - origin).norm();
+        let lever = |mass: f64, moment: Vector3<f64>| (moment / mass - origin).norm();
+        // Moments in a small unit have so much noise that the centre of mass counts as not shown.
+        let raw = &self.fit.values;
+        let fitted = lever(raw[0], Vector3::new(raw[1], raw[2], raw[3]));
+        let lever = lever(mass, moment).max(fitted);
         if lever <= FARTHEST {
             return Ok(Vec::new());
         }
         let text = format!(
-            "The centre of mass would be {} m from the sensor: the moments look like another unit (N·mm are 1000 times N·m). They must be in N·m, the forces in N.",
-            format_significant(lever, 3)
+            "The centre of mass would be {} m from the sensor: {}.",
+            format_significant(lever, 3),
+            unit_by_lever(lever)
         );
         match even_if_wrong {
             true => Ok(vec![text]),
             false => Err(LoadError::Fault(text)),
         }
+    }
+}
+
+/// Names the units in which the centre of mass is near the sensor, and the options that convert them.
+fn unit_by_lever(lever: f64) -> String {
+    let units = by_lever(lever);
+    let list = |of: fn(&Unit) -> &'static str| -> String {
+        let all: Vec<&str> = units.iter().map(|unit| of(unit)).collect();
+        all.join(", or ")
+    };
+    match units.is_empty() {
+        true => {
+            "the moments look like another unit. They must be in N·m, the forces in N".to_owned()
+        }
+        false => format!(
+            "{}. Give {}, or moments in N·m and forces in N",
+            list(|unit| unit.words),
+            list(|unit| unit.option)
+        ),
     }
 }
 
@@ -364,14 +399,43 @@ fn words(nuisance: Nuisance) -> &'static str {
         Nuisance::Origin => "another position of the sensor",
         Nuisance::Drift => "a drift of the bias",
         Nuisance::Warming => "a bias that follows the temperature",
+        Nuisance::Scale => "another scale of the moments",
     }
 }
 
-fn capital(words: &str) -> String {
+/// Returns words that begin with a capital letter.
+pub(crate) fn capital(words: &str) -> String {
     let mut rest = words.chars();
     rest.next().map_or_else(String::new, |first| {
         first.to_uppercase().chain(rest).collect()
     })
+}
+
+/// Names what a rigid load was compared with in vain.
+const NO_CAUSE: &str = "Exchanged or reversed channels, another unit, a turned or displaced sensor, a delay and a base that leans were tried: none of them explains it.";
+
+/// Says that a bias drifts, with the change of each channel that is above its noise.
+fn drift_words(bias: &Bias, noise: [f64; 2]) -> Option<String> {
+    let drift = bias.drift?;
+    let large = |c: &usize| drift[*c].abs() > noise[*c / 3];
+    let change: Vec<String> = ((0..6).filter(large))
+        .map(|c| {
+            let unit = if c < 3 { "N" } else { "N·m" };
+            format!(
+                "{} {} {unit}",
+                WRENCH_COLUMNS[c],
+                format_significant(drift[c], 2)
+            )
+        })
+        .collect();
+    let which = match change.is_empty() {
+        true => "by less than the noise of a reading".to_owned(),
+        false => change.join(", "),
+    };
+    Some(format!(
+        "{}: the bias of the sensor drifts from the begin to the end of the recording ({which}); the load was identified beside it. Let the sensor warm up before the recording.",
+        bias.recording
+    ))
 }
 
 /// Says that a bias jumps.

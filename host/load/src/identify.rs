@@ -13,6 +13,7 @@ use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, sizes_of};
 use crate::findings::SensorFindings;
 use crate::intake::Sensing;
+use crate::limits::too_heavy;
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
 use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers};
@@ -97,6 +98,11 @@ pub fn identify_load(
     if let Some(tool) = &options.tool {
         found = without_tool(found, tool)?;
     }
+    if options.by != By::Torque {
+        let mass = found.values[0];
+        let centre = [1, 2, 3].map(|k| found.values[k] / mass);
+        warnings.extend(too_heavy(robot, &chain, with, mass, centre)?);
+    }
     let not_shown = missing(robot, &chain, &to_joint, &found, options.by);
     described(
         robot,
@@ -138,9 +144,13 @@ fn described(
     let numbers = numbers(found);
     let body = body(found).ok_or_else(|| LoadError::NoMass {
         why: format!(
-            "it is {} ± {} kg; record a livelier motion, or more poses",
+            "it is {} ± {} kg; {}",
             format_significant(found.values[0], 3),
-            format_significant(found.std()[0], 2)
+            format_significant(found.std()[0], 2),
+            match found.values[0] < -CERTAIN * found.std()[0] {
+                true => "a negative mass is that of recordings with and without the load that were exchanged (--data, --without), or of torques with the opposite sign",
+                false => "record a livelier motion, or more poses",
+            }
         ),
     })?;
     let all_shown = found.shown().iter().all(|s| *s);
@@ -181,7 +191,9 @@ fn without_tool(mut found: Estimate, tool: &Load) -> Result<Estimate, LoadError>
     if mass < CERTAIN * std {
         return Err(LoadError::NoMass {
             why: format!(
-                "beside --tool it is {} ± {} kg",
+                "the sensor or the torques show {} kg, and --tool has {} kg, so that {} ± {} kg are left for it; check that the load is mounted, and that the file describes the tool",
+                format_significant(mass + tool.mass, 4),
+                format_significant(tool.mass, 4),
                 format_significant(mass, 3),
                 format_significant(std, 2)
             ),
@@ -266,6 +278,7 @@ fn by_torque(driven: &Driven, mass: Option<f64>) -> Result<(Estimate, TorqueFind
             residual: equations.noise,
             with_unloaded: !driven.without.is_empty(),
             prepared: equations.plan,
+            traces: equations.traces,
         },
     ))
 }

@@ -10,7 +10,9 @@ use rig_shared::multibody::{Chain, INERTIAL_PARAMETERS};
 
 use crate::channels::{Judged, judge};
 use crate::error::LoadError;
-use crate::rows::{FEWEST_ROWS, Passed, each_pose, each_row};
+use crate::pace::Pace;
+use crate::poses::each_pose;
+use crate::rows::{Passed, each_row};
 use crate::statistics::{Collector, Recorded};
 use crate::torqueless::Torqueless;
 use crate::wrench_row::WrenchRow;
@@ -37,19 +39,20 @@ pub(crate) struct Sensing<'a> {
 /// # Errors
 /// [`LoadError`] of the first one that cannot be used.
 pub(crate) fn judged(sensing: &Sensing, sensor: &WristSensor) -> Result<Vec<Judged>, LoadError> {
-    let judge = |(recording, _): &(&dyn Recording, bool)| judge(*recording, sensor, sensing.poses);
-    sensing.recordings.iter().map(judge).collect()
-}
-
-/// Returns true if each row of a recording is a pose at rest.
-fn is_poses(sensing: &Sensing, judged: &Judged) -> bool {
-    sensing.poses || judged.rows < FEWEST_ROWS as u64
+    let judge = |(recording, _): &(&dyn Recording, bool)| {
+        judge(*recording, sensing.robot, sensor, sensing.poses)
+    };
+    let judged: Vec<Judged> = (sensing.recordings.iter().map(judge)).collect::<Result<_, _>>()?;
+    match judged.iter().find_map(|own| own.spike.clone()) {
+        Some(text) if !sensing.even_if_wrong => Err(LoadError::Fault(text)),
+        _ => Ok(judged),
+    }
 }
 
 /// Returns the recordings of a motion.
 pub(crate) fn moving<'a>(sensing: &Sensing<'a>, judged: &[Judged]) -> Vec<Torqueless<'a>> {
     (sensing.recordings.iter().zip(judged))
-        .filter(|(_, judged)| !is_poses(sensing, judged))
+        .filter(|(_, judged)| !judged.poses)
         .map(|((recording, _), _)| Torqueless(*recording))
         .collect()
 }
@@ -117,7 +120,7 @@ impl<'a> Intake<'a> {
         let mut recordings = Vec::new();
         for ((recording, loaded), judged) in sensing.recordings.iter().zip(&self.judged) {
             let label = recording.label();
-            let poses = is_poses(sensing, judged);
+            let poses = judged.poses;
             let next = if poses { None } else { prepared.next() };
             let rows = match (&self.plan, &next) {
                 (Some(plan), Some((survey, _))) => survey.rows / plan.decimation as u64,
@@ -131,24 +134,39 @@ impl<'a> Intake<'a> {
                     each_row(sensing.chain, &pose, *usable, plan, read, &mut take)?
                 }
                 _ => {
+                    let read = (&judged.ends, judged.pace);
+                    let saturated = each_pose(sensing.chain, &pose, *recording, read, &mut take)?;
                     if !sensing.poses {
-                        warnings.push(format!(
-                            "{label} has {} rows: each was taken as a pose at rest.",
-                            judged.rows
-                        ));
+                        warnings.push(taken_as_poses(&label, judged, collector.rows()));
                     }
-                    let ends = &judged.ends;
                     Passed {
-                        saturated: each_pose(sensing.chain, &pose, *recording, ends, &mut take)?,
+                        saturated,
                         noise: None,
                     }
                 }
             };
             let recorded = collector.finish(label, *loaded, poses, passed);
+            warnings.extend(judged.spike.clone());
             saturation(&recorded, judged, sensing.even_if_wrong, warnings)?;
             recordings.push(recorded);
         }
         Ok(recordings)
+    }
+}
+
+/// Says that a recording was taken as poses at rest.
+fn taken_as_poses(label: &str, judged: &Judged, poses: u64) -> String {
+    let rows = judged.rows;
+    match judged.pace {
+        Pace::Listed if poses == rows => {
+            format!("{label} has {rows} rows: each was taken as a pose at rest.")
+        }
+        Pace::Listed => {
+            format!("{label} has {rows} rows: they were taken as {poses} poses at rest.")
+        }
+        Pace::Continuous => format!(
+            "{label} has {rows} rows, too few for a motion: the {poses} poses at which the robot stands were taken."
+        ),
     }
 }
 

@@ -43,29 +43,35 @@
 //! ```
 
 mod body;
+mod candidates;
+mod causes;
 mod channels;
 mod controllers;
-mod convention;
 mod error;
 mod estimate;
 mod findings;
 mod identify;
 mod intake;
 mod jump;
+mod limits;
 mod missing;
 mod mounting;
 mod noise_floor;
 mod options;
+mod pace;
+mod poses;
 mod result;
 mod rows;
 mod selection;
 mod sensor;
+mod settle;
 mod statistics;
 mod system;
 #[cfg(test)]
 mod tests;
 mod torque;
 mod torqueless;
+mod units;
 mod urdf_link;
 mod wrench_row;
 
@@ -76,4 +82,5 @@ pub use identify::identify_load;
 pub use options::{By, LoadOptions};
 pub use result::{Agreement, LoadIdentification, LoadParameter, NotShown, TorqueFindings, Value};
 pub use rows::FEWEST_ROWS;
+pub use torque::TorqueTrace;
 pub use urdf_link::urdf_link;

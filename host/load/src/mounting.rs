@@ -11,6 +11,8 @@ pub(crate) struct Mounting {
     pub moment: Matrix3<f64>,
     /// Turns the described gravity to the true one, in the base frame.
     pub gravity: Rotation3<f64>,
+    /// Moments as read over moments in N·m, against the same of the forces; 1 in SI units.
+    pub scale: f64,
 }
 
 impl Mounting {
@@ -20,6 +22,7 @@ impl Mounting {
             force: rotation * sign,
             moment: rotation * sign,
             gravity: Rotation3::identity(),
+            scale: 1.0,
         }
     }
 
@@ -40,7 +43,21 @@ impl Mounting {
             force: turn * self.force,
             moment: turn * self.moment,
             gravity: Rotation3::from_scaled_axis(*gravity) * self.gravity,
+            scale: self.scale,
         }
+    }
+
+    /// Returns the mounting of a sensor whose moments read `factor` times as much.
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        Self {
+            scale: self.scale * factor,
+            ..self.clone()
+        }
+    }
+
+    /// Returns the factor of the readings of a channel's kind.
+    pub(crate) fn factor(&self, channel: usize) -> f64 {
+        if channel < 3 { 1.0 } else { self.scale }
     }
 
     /// Returns the mounting for which the load has the opposite parameters.
@@ -48,7 +65,7 @@ impl Mounting {
         Self {
             force: -self.force,
             moment: -self.moment,
-            gravity: self.gravity,
+            ..self.clone()
         }
     }
 
@@ -57,7 +74,7 @@ impl Mounting {
         Self {
             force: self.force * channels.force,
             moment: self.moment * channels.moment,
-            gravity: self.gravity,
+            ..self.clone()
         }
     }
 }

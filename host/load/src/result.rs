@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::estimate::{Estimate, Parameters};
 use crate::findings::SensorFindings;
 use crate::options::By;
+use crate::torque::TorqueTrace;
 
 /// A value with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -47,6 +48,9 @@ pub struct TorqueFindings {
     pub with_unloaded: bool,
     /// Preparation of the recordings.
     pub prepared: PreprocessingPlan,
+    /// Torques over time, of the recordings with the load.
+    #[serde(skip)]
+    pub traces: Vec<TorqueTrace>,
 }
 
 /// Comparison of the load by sensor and by torque.

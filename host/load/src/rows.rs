@@ -17,14 +17,8 @@ const TEMPERATURE: &str = "temp";
 
 /// Least number of poses or rows: with two the mass and a part of the centre are known.
 pub(crate) const LEAST_ROWS: usize = 2;
-/// Rows below which a recording is taken as a list of poses at rest: no derivative can be formed of fewer.
+/// Fewest rows of a motion: no derivative can be formed of fewer.
 pub const FEWEST_ROWS: usize = 256;
-/// Largest movement of a joint within a pose, rad or m: above the noise of encoders, below the distance of poses.
-const AT_REST: f64 = 5e-3;
-/// Poses nearer than this multiple of [`AT_REST`] follow each other in a motion.
-const NEAR: f64 = 3.0;
-/// Shorter than this share of the longest pose, rows belong to the way between two.
-const SHORT: f64 = 0.05;
 
 /// Readings beyond which a channel counts as saturated, lowest and highest, by column.
 pub(crate) type Ends = [[f64; 2]; 6];
@@ -101,74 +95,11 @@ pub(crate) fn each_row(
     Ok(passed)
 }
 
-/// Streams the poses of a recording: consecutive rows at one position are one pose, with their mean readings, because the
-/// errors of one pose are not independent. Rows between poses are left out. Returns the number of rows beyond `ends`.
-///
-/// # Errors
-/// As [`each_row`]; [`LoadError::Fault`] if the recording moves most of the time.
-pub(crate) fn each_pose(
-    chain: &Chain<f64>,
-    sensor: &Isometry3<f64>,
-    recording: &dyn Recording,
-    ends: &Ends,
-    take: &mut dyn FnMut(&WrenchRow),
-) -> Result<u64, LoadError> {
-    let mut poses: Vec<Pose> = Vec::new();
-    let mut left_out = 0;
-    each_readings(recording, &mut |block, readings| {
-        for k in 0..block.len() {
-            let now: [f64; 6] = std::array::from_fn(|c| readings[c][k]);
-            if beyond(&now, ends) {
-                left_out += 1;
-                continue;
-            }
-            let q: Vec<f64> = block.joints.iter().map(|joint| joint.q[k]).collect();
-            let others = [
-                block.t[k],
-                temperature(&block.extra).map_or(0.0, |list| list[k]),
-            ];
-            match poses.last_mut().filter(|pose| pose.is_at(&q)) {
-                Some(pose) => pose.add(&q, &now, others),
-                None => poses.push(Pose::new(q, now, others)),
-            }
-        }
-        Ok(())
-    })?;
-    let longest = poses.iter().map(|pose| pose.rows).max().unwrap_or(0);
-    poses.retain(|pose| pose.rows as f64 >= SHORT * longest as f64);
-    let near = poses
-        .windows(2)
-        .filter(|two| two[0].is_near(&two[1]))
-        .count();
-    if poses.len() > 2 && 2 * near > poses.len() {
-        return Err(LoadError::Fault(format!(
-            "{} moves all the time, so its rows are no poses at rest: leave out --poses, or record at least {FEWEST_ROWS} rows of the motion.",
-            recording.label()
-        )));
-    }
-    let still = vec![0.0; chain.joint_count()];
-    for pose in &poses {
-        let count = pose.rows as f64;
-        let q: Vec<f64> = pose.q.iter().map(|sum| sum / count).collect();
-        let mut regressor = [0.0; ENTRIES];
-        wrench_regressor(chain, &q, &still, &still, &mut regressor)
-            .map_err(|e| LoadError::Model(e.to_string()))?;
-        about(&sensor.translation.vector, &mut regressor);
-        let axes = base_axes(chain, &q).map_err(|e| LoadError::Model(e.to_string()))?;
-        take(&WrenchRow {
-            time: pose.others[0] / count,
-            temperature: pose.others[1] / count,
-            regressor,
-            rate: [0.0; ENTRIES],
-            weights: axes.map(|axis| weight(&axis, &sensor.translation.vector)),
-            readings: pose.readings.map(|sum| sum / count),
-        });
-    }
-    Ok(left_out)
-}
-
 /// Returns the axes of the base in the axes of the last joint.
-fn base_axes(chain: &Chain<f64>, q: &[f64]) -> Result<[Vector3<f64>; 3], MultibodyError> {
+pub(crate) fn base_axes(
+    chain: &Chain<f64>,
+    q: &[f64],
+) -> Result<[Vector3<f64>; 3], MultibodyError> {
     let own = Frame {
         position: [0.0; 3],
         rotation: Matrix3::identity().into(),
@@ -177,51 +108,6 @@ fn base_axes(chain: &Chain<f64>, q: &[f64]) -> Result<[Vector3<f64>; 3], Multibo
     let link = q.len().saturating_sub(1);
     let pose = frame_pose(chain, q, link, &own, &mut unused)?;
     Ok(pose.rotation.map(Vector3::from))
-}
-
-/// Sums over the rows of one pose.
-struct Pose {
-    first: Vec<f64>,
-    rows: u64,
-    q: Vec<f64>,
-    readings: [f64; 6],
-    /// Time and temperature.
-    others: [f64; 2],
-}
-
-impl Pose {
-    fn new(q: Vec<f64>, readings: [f64; 6], others: [f64; 2]) -> Self {
-        Self {
-            first: q.clone(),
-            rows: 1,
-            q,
-            readings,
-            others,
-        }
-    }
-
-    fn distance(&self, q: &[f64]) -> f64 {
-        (self.first.iter().zip(q)).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
-    }
-
-    fn is_at(&self, q: &[f64]) -> bool {
-        self.distance(q) < AT_REST
-    }
-
-    fn is_near(&self, other: &Self) -> bool {
-        self.distance(&other.first) < NEAR * AT_REST
-    }
-
-    fn add(&mut self, q: &[f64], readings: &[f64; 6], others: [f64; 2]) {
-        self.rows += 1;
-        let sums = self
-            .q
-            .iter_mut()
-            .chain(&mut self.readings)
-            .chain(&mut self.others);
-        let values = q.iter().chain(readings).chain(&others);
-        sums.zip(values).for_each(|(sum, value)| *sum += value);
-    }
 }
 
 /// Calls `take` with each block of a recording and its readings.
@@ -262,7 +148,7 @@ fn readings(extra: &[(String, Vec<f64>)]) -> Result<[&[f64]; 6], &'static str> {
 }
 
 /// Returns the column of the sensor's temperature.
-fn temperature(columns: &[(String, Vec<f64>)]) -> Option<&[f64]> {
+pub(crate) fn temperature(columns: &[(String, Vec<f64>)]) -> Option<&[f64]> {
     extra(columns, TEMPERATURE)
 }
 
@@ -273,7 +159,7 @@ fn extra<'a>(columns: &'a [(String, Vec<f64>)], name: &str) -> Option<&'a [f64]>
 }
 
 /// Returns true if a reading lies outside of the range that its channel measures.
-fn beyond(readings: &[f64; 6], ends: &Ends) -> bool {
+pub(crate) fn beyond(readings: &[f64; 6], ends: &Ends) -> bool {
     (readings.iter().zip(ends)).any(|(value, [low, high])| value <= low || value >= high)
 }
 

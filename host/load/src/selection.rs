@@ -8,10 +8,10 @@ use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 use rig_identify::{LeaveOut, Refit, TriangularFactor};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use crate::convention::{DECISIVE, settled};
 use crate::estimate::solved;
 use crate::jump::jump;
 use crate::mounting::Mounting;
+use crate::settle::{DECISIVE, settled};
 use crate::system::{Fit, Nuisance, Sensed};
 
 /// Probability by chance below which a further unknown is taken in.
@@ -58,7 +58,7 @@ fn least(nuisance: Nuisance) -> f64 {
         Nuisance::Rotation | Nuisance::Lean => 1e-3,
         Nuisance::Delay => 1e-4,
         Nuisance::Origin => 5e-4,
-        Nuisance::Drift | Nuisance::Warming => 0.0,
+        Nuisance::Drift | Nuisance::Warming | Nuisance::Scale => 0.0,
     }
 }
 
@@ -170,7 +170,7 @@ pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected 
 fn without_needless(sensed: &Sensed, fit: Fit, start: &Mounting, newest: Option<Nuisance>) -> Fit {
     let mut fit = fit;
     for nuisance in fit.unknowns.nuisances.clone() {
-        if Some(nuisance) == newest {
+        if Some(nuisance) == newest || nuisance == Nuisance::Scale {
             continue;
         }
         let mut mounting = fit.mounting.clone();
@@ -193,7 +193,9 @@ fn without_needless(sensed: &Sensed, fit: Fit, start: &Mounting, newest: Option<
 fn can_show(sensed: &Sensed, nuisance: Nuisance) -> bool {
     match nuisance {
         Nuisance::Warming => sensed.recordings.iter().any(|r| r.warms),
-        Nuisance::Delay | Nuisance::Origin => sensed.recordings.iter().any(|r| !r.poses),
+        Nuisance::Delay | Nuisance::Origin | Nuisance::Scale => {
+            sensed.recordings.iter().any(|r| !r.poses)
+        }
         Nuisance::Lean => sensed.gravity != Vector3::zeros(),
         Nuisance::Rotation | Nuisance::Drift => true,
     }

@@ -1,20 +1,21 @@
 //! The load from the wrist sensor, stage by stage.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Rotation3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::{PreprocessingPlan, Recording, surveyed};
 use rig_model::robot::{Reads, WristSensor};
 use rig_output::format_significant;
 
-use crate::convention::{Compared, compare, other_unit, settled};
+use crate::causes::{Cause, Compared, Tried, compare, explains};
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
-use crate::findings::{SensorFindings, Told};
+use crate::findings::{SensorFindings, Told, capital};
 use crate::intake::{Intake, Sensing, judged, moving};
 use crate::mounting::{Channels, Mounting};
 use crate::rows::LEAST_ROWS;
-use crate::selection::{Selected, selected};
+use crate::settle::settled;
 use crate::system::{Fit, Nuisance, Sensed, Unknowns};
+use crate::units::{Unit, named};
 
 /// Most times that the readings are shifted by the delay found.
 const MOST_SHIFTS: usize = 8;
@@ -50,15 +51,16 @@ pub(crate) fn by_sensor(
             to_joint: sensing.to_joint,
             gravity: robot.gravity.into(),
         };
-        let fitted = fitted(&sensed, sensing, &sensor, &mut said)?;
+        let compared = compared(&sensed, sensing, &sensor)?;
         // The equations have a delay to first order only, so the readings are shifted by it and read again.
-        if let Some(further) = sensed.delay(&fitted.fit)
+        if let Some(further) = compared.delay
             && shifts < MOST_SHIFTS
         {
             delay += further;
             shifts += 1;
             continue;
         }
+        let fitted = believed(&sensed, compared, sensing, &mut said)?;
         warnings.extend(said);
         return finished(
             &sensed,
@@ -79,13 +81,12 @@ struct Fitted {
     alternatives: Vec<[Nuisance; 2]>,
 }
 
-/// Fits the equations with the channels that are believed and the properties that the readings show.
-fn fitted(
+/// Fits the equations as described, and by every cause for which they may not fit.
+fn compared(
     sensed: &Sensed,
     sensing: &Sensing,
     sensor: &WristSensor,
-    warnings: &mut Vec<String>,
-) -> Result<Fitted, LoadError> {
+) -> Result<Compared, LoadError> {
     let unknowns = Unknowns {
         tool: sensed.recordings.iter().any(|r| !r.loaded),
         ..Unknowns::default()
@@ -99,17 +100,60 @@ fn fitted(
     }
     let sign = sensor.reads.unwrap_or(Reads::Load).sign();
     let mounting = Mounting::of(&described(sensing, sensor), sign);
-    let compared = compare(sensed, &mounting, &unknowns, sensor.reads.is_some());
-    let Believed {
-        fit,
-        start,
+    Ok(compare(
+        sensed,
+        &mounting,
+        &unknowns,
+        sensor.reads.is_some(),
+    ))
+}
+
+/// Decides which explanation of the readings is believed.
+///
+/// # Errors
+/// [`LoadError::Fault`] with the causes that are no property of a sound sensor, unless the user goes on.
+fn believed(
+    sensed: &Sensed,
+    compared: Compared,
+    sensing: &Sensing,
+    warnings: &mut Vec<String>,
+) -> Result<Fitted, LoadError> {
+    let fitted = |tried: Tried, channels: Channels| Fitted {
+        fit: tried.selected.fit,
         channels,
-    } = believed(sensed, &mounting, &unknowns, compared, sensing, warnings)?;
-    let Selected { fit, alternatives } = selected(sensed, fit, &start);
-    Ok(Fitted {
-        fit,
-        channels,
-        alternatives,
+        alternatives: tried.selected.alternatives,
+    };
+    let as_recorded = Channels::as_recorded();
+    let described = compared.described;
+    let is_turned = matches!(&compared.causes[..], [only] if only.cause == Cause::Turned);
+    let mut causes = compared.causes;
+    if causes.is_empty() {
+        return Ok(fitted(described, as_recorded));
+    }
+    if is_turned {
+        return Ok(fitted(causes.remove(0), as_recorded));
+    }
+    let text = fault_of(sensed, &described.selected.fit, &causes);
+    if !sensing.even_if_wrong {
+        return Err(LoadError::Fault(text));
+    }
+    let first = causes.remove(0);
+    Ok(match first.cause.clone() {
+        Cause::Channels(channels) => {
+            warnings.push(format!(
+                "{text} The load was identified with them put right."
+            ));
+            fitted(first, channels)
+        }
+        Cause::Turned => {
+            warnings.push(text);
+            fitted(first, as_recorded)
+        }
+        // Units are not converted behind the user's back.
+        Cause::Described | Cause::Scale | Cause::ScaleAndTurned => {
+            warnings.push(text);
+            fitted(described, as_recorded)
+        }
     })
 }
 
@@ -128,16 +172,8 @@ fn finished(
     prepared: Option<PreprocessingPlan>,
     warnings: &mut Vec<String>,
 ) -> Result<(Estimate, SensorFindings), LoadError> {
-    if let Some(words) = other_unit(sensed, &fitted.fit) {
-        let text = format!(
-            "A rigid load does not fit forces and moments: {words}. Forces must be in N and moments in N·m."
-        );
-        if !sensing.even_if_wrong {
-            return Err(LoadError::Fault(text));
-        }
-        warnings.push(text);
-    }
     let fit = weighing(sensed, fitted.fit, sensing, sensor, warnings)?;
+    let explains = explains(sensed, &fit);
     let segments = sensed.factors(&fit);
     let spread = match sensed.recordings.iter().all(|r| r.poses) {
         true => Spread::Residuals(fit.freedom().max(1.0) as usize),
@@ -153,6 +189,7 @@ fn finished(
         channels: fitted.channels,
         alternatives: fitted.alternatives,
         delay,
+        explains,
     };
     let pose = sensing.robot.last_link * sensor.pose();
     warnings.extend(findings.implausible(&found, &pose, sensing.even_if_wrong)?);
@@ -166,59 +203,6 @@ fn sensed_mass(fit: &Fit) -> f64 {
     fit.values.first().copied().unwrap_or(0.0)
 }
 
-/// Channels that are believed.
-struct Believed {
-    /// Fit with them.
-    fit: Fit,
-    /// The mounting as described, with channels put right.
-    start: Mounting,
-    /// Exchange of channels that was put right.
-    channels: Channels,
-}
-
-/// Decides which channels are believed, and if the sensor stands turned by quarters.
-fn believed(
-    sensed: &Sensed,
-    mounting: &Mounting,
-    unknowns: &Unknowns,
-    compared: Compared,
-    sensing: &Sensing,
-    warnings: &mut Vec<String>,
-) -> Result<Believed, LoadError> {
-    let as_recorded = Channels::as_recorded();
-    let Some((channels, fit)) = compared.better else {
-        return Ok(Believed {
-            fit: sensed.fit(mounting, unknowns),
-            start: mounting.clone(),
-            channels: as_recorded,
-        });
-    };
-    // Which of the two opposite wrenches is read need not be stated: the sign of the mass tells.
-    let sensor = sensing.robot.wrist_sensor.as_ref();
-    let reads = sensor.and_then(|sensor| sensor.reads);
-    let may_be_opposite = reads.is_none() || is_opposite(&channels);
-    let is_turned = channels.is_rotation() || may_be_opposite && channels.is_opposite_rotation();
-    if is_turned {
-        return Ok(Believed {
-            fit,
-            start: mounting.clone(),
-            channels: as_recorded,
-        });
-    }
-    let text = fault_of(&channels, &compared.stated, &fit);
-    if !sensing.even_if_wrong {
-        return Err(LoadError::Fault(text));
-    }
-    warnings.push(format!(
-        "{text} The load was identified with them put right."
-    ));
-    Ok(Believed {
-        fit,
-        start: mounting.after(&channels),
-        channels,
-    })
-}
-
 /// Returns the fit with a positive mass, and checks the stated sense of the readings by it.
 fn weighing(
     sensed: &Sensed,
@@ -228,6 +212,12 @@ fn weighing(
     warnings: &mut Vec<String>,
 ) -> Result<Fit, LoadError> {
     weighs(sensed, &fit)?;
+    if let Some(text) = exchanged_recordings(sensed, &fit) {
+        if !sensing.even_if_wrong {
+            return Err(LoadError::Fault(text));
+        }
+        warnings.push(text);
+    }
     if sensed_mass(&fit) >= 0.0 {
         return Ok(fit);
     }
@@ -260,36 +250,128 @@ fn weighs(sensed: &Sensed, fit: &Fit) -> Result<(), LoadError> {
     }
     Err(LoadError::NoMass {
         why: format!(
-            "it is {} ± {} kg; record poses in which gravity has other directions in the sensor, or a heavier load",
+            "it is {} ± {} kg (one standard deviation); {}",
             format_significant(mass, 3),
-            format_significant(std, 2)
+            format_significant(std, 2),
+            match fit.unknowns.tool {
+                true =>
+                    "the recordings with and without the load read the same weight, so check that the load is mounted in the first and not in the second",
+                false =>
+                    "check that a load is mounted beyond the sensor, and record poses in which gravity has other directions in the sensor, or a heavier load",
+            }
         ),
     })
 }
 
-/// Returns true if all six channels are reversed and nothing else.
-fn is_opposite(channels: &Channels) -> bool {
-    channels.force == -Matrix3::identity() && channels.moment == -Matrix3::identity()
+/// Says that the sensor carries less with the load than without it. The mass of both is that of one body, whatever sign the
+/// readings have.
+fn exchanged_recordings(sensed: &Sensed, fit: &Fit) -> Option<String> {
+    let tool = fit.unknowns.tool.then(|| sensed.tool_mass(fit))?;
+    let load = sensed_mass(fit);
+    (load * tool < 0.0 && tool.abs() > load.abs()).then(|| {
+        format!(
+            "The sensor carries {} kg with the load and {} kg without it: --data and --without look exchanged. Exchange them.",
+            format_significant((tool + load).abs(), 4),
+            format_significant(tool.abs(), 4)
+        )
+    })
 }
 
-/// Says which channels are wrong, and how much better the readings fit without the fault.
-fn fault_of(channels: &Channels, stated: &Fit, better: &Fit) -> String {
+/// Says why the readings do not fit, and how much better they do without it.
+fn fault_of(sensed: &Sensed, described: &Fit, causes: &[Tried]) -> String {
     let rms = |fit: &Fit| {
+        let [force, moment] = fit.noise;
         format!(
             "{} N and {} N·m RMS",
-            format_significant(fit.noise[0], 3),
-            format_significant(fit.noise[1], 3)
+            format_significant(force, 3),
+            format_significant(moment, 3)
         )
     };
-    let or = match channels.is_opposite_rotation() {
-        true => " (or the sensor is turned and `reads` has the other value)",
-        false => "",
+    let words: Vec<[String; 2]> = causes.iter().map(|own| words_of(sensed, own)).collect();
+    let [what, remedies] = [0, 1].map(|k| {
+        let all: Vec<&str> = words.iter().map(|own| own[k].as_str()).collect();
+        all.join(", or ")
+    });
+    let begin = match causes.first().map(|own| &own.cause) {
+        Some(Cause::Channels(_)) => "The sensor's channels look wrong",
+        _ => "A rigid load does not fit forces and moments as recorded",
     };
+    let best = causes.first().map_or(described, |own| &own.selected.fit);
+    let figures = match sensed
+        .origin(described)
+        .filter(|_| explains(sensed, described))
+    {
+        Some(error) => format!(
+            "Otherwise the readings fit only if the sensor's origin lies {} m from the described one",
+            format_significant(error.norm(), 3)
+        ),
+        None => format!(
+            "As recorded a rigid load leaves {}, put right {}",
+            rms(described),
+            rms(best)
+        ),
+    };
+    format!("{begin}: {what}. {figures}. {}.", capital(&remedies))
+}
+
+/// Says what is wrong, and what mends it.
+fn words_of(sensed: &Sensed, tried: &Tried) -> [String; 2] {
+    let fit = &tried.selected.fit;
+    match &tried.cause {
+        Cause::Described => [String::new(), String::new()],
+        Cause::Channels(channels) => {
+            let or = match channels.is_opposite_rotation() {
+                true => " (or the sensor is turned and `reads` has the other value)",
+                false => "",
+            };
+            [
+                format!("{}{or}", channels.words()),
+                format!(
+                    "correct the columns {}, or the wiring",
+                    WRENCH_COLUMNS.join(" ")
+                ),
+            ]
+        }
+        Cause::Turned => [
+            turned_words(tried),
+            "correct the rotation of the sensor".to_owned(),
+        ],
+        Cause::Scale => unit_words(sensed, fit),
+        Cause::ScaleAndTurned => {
+            let [what, remedy] = unit_words(sensed, fit);
+            [format!("{what}, and {}", turned_words(tried)), remedy]
+        }
+    }
+}
+
+fn turned_words(tried: &Tried) -> String {
+    let turn = tried.start.force.transpose() * tried.selected.fit.mounting.force;
+    let sense = turn.determinant().signum();
+    let angle = Rotation3::from_matrix_unchecked(turn * sense).angle();
     format!(
-        "The sensor's channels look wrong: {}{or}. As recorded a rigid load leaves {}, put right {}. Correct the columns {}, or the wiring.",
-        channels.words(),
-        rms(stated),
-        rms(better),
-        WRENCH_COLUMNS.join(" ")
+        "the sensor is turned by {} degrees against the description",
+        format_significant(angle.to_degrees(), 3)
     )
+}
+
+/// Names the unit of the moments against that of the forces, and the option that converts it.
+fn unit_words(sensed: &Sensed, fit: &Fit) -> [String; 2] {
+    let units = named(sensed, fit);
+    if units.is_empty() {
+        return [
+            format!(
+                "the moments are {} times those that the forces and the motion give, and no unit that is known has this factor",
+                format_significant(fit.mounting.scale, 3)
+            ),
+            "give forces in N and moments in N·m".to_owned(),
+        ];
+    }
+    let list = |of: fn(&Unit) -> &'static str| -> String {
+        let all: Vec<&str> = units.iter().map(|unit| of(unit)).collect();
+        all.join(", or ")
+    };
+    [
+        list(|unit| unit.words),
+        format!("give {}", list(|unit| unit.option)),
+    ]
 }

@@ -27,14 +27,15 @@ pub(crate) mod column {
     pub(crate) const TEMPERATURE: usize = 12;
     /// The first of the three readings of the channel's kind.
     pub(crate) const READINGS: usize = 13;
-    /// The three forces as read, for a moment; zero for a force.
+    /// For a moment: regressor of the forces along the next axis and the one after it, mass and first moments of each;
+    /// zero for a force.
     pub(crate) const FORCES: usize = 16;
     /// Regressor of the weight for a unit of gravity along each axis of the base: three times four parameters.
-    pub(crate) const WEIGHTS: usize = 19;
+    pub(crate) const WEIGHTS: usize = 24;
     /// Derivative of the regressor by time.
-    pub(crate) const RATE: usize = 31;
+    pub(crate) const RATE: usize = 36;
     /// Number of columns.
-    pub(crate) const COUNT: usize = 41;
+    pub(crate) const COUNT: usize = 46;
 }
 
 /// A segment of a recording.
@@ -99,6 +100,26 @@ impl Recorded {
     }
 }
 
+/// Returns the next axis and the one after it.
+pub(crate) fn others(axis: usize) -> [usize; 2] {
+    [(axis + 1) % 3, (axis + 2) % 3]
+}
+
+/// Returns the noise of forces (N) and moments (N·m) in the band of the fit: that of the recordings, by their rows; `None`
+/// if one of them does not tell it.
+pub(crate) fn noise_floor(recordings: &[Recorded]) -> Option<[f64; 2]> {
+    let (mut sums, mut rows) = ([0.0; 2], 0.0);
+    for recorded in recordings {
+        let own = recorded.passed.noise?;
+        let count = recorded.rows() as f64;
+        for (sum, noise) in sums.iter_mut().zip(own) {
+            *sum += count * noise * noise;
+        }
+        rows += count;
+    }
+    (rows > 0.0).then(|| sums.map(|sum| (sum / rows).sqrt()))
+}
+
 /// Collects rows into segments.
 pub(crate) struct Collector {
     factors: Vec<[TriangularFactor; 6]>,
@@ -127,6 +148,11 @@ impl Collector {
         }
     }
 
+    /// Returns the number of rows so far.
+    pub(crate) fn rows(&self) -> u64 {
+        self.seen
+    }
+
     /// Adds a row.
     pub(crate) fn push(&mut self, row: &WrenchRow) {
         let place = (u128::from(self.seen) * SEGMENTS as u128 / u128::from(self.expected)) as usize;
@@ -150,7 +176,13 @@ impl Collector {
             x[column::TEMPERATURE] = warmer;
             x[column::READINGS..column::FORCES].copy_from_slice(&row.readings[first..first + 3]);
             if first > 0 {
-                x[column::FORCES..column::WEIGHTS].copy_from_slice(&row.readings[..3]);
+                for (to, axis) in x[column::FORCES..column::WEIGHTS]
+                    .chunks_exact_mut(WEIGHED)
+                    .zip(others(channel % 3))
+                {
+                    let own = axis * INERTIAL_PARAMETERS;
+                    to.copy_from_slice(&row.regressor[own..own + WEIGHED]);
+                }
             }
             for (weight, entries) in x[column::WEIGHTS..column::RATE]
                 .chunks_exact_mut(WEIGHED)

@@ -3,7 +3,8 @@
 //! s·R·y = (W + ε × g)·φ − T·Ẇ·φ + b + d·t + δ × (s·R·y) − p × f: y are the readings, R the rotation from the sensor to the
 //! last joint, s the sign convention, W the regressor of the wrench, φ the load, b the bias of a recording. Further
 //! unknowns are a drift d of the bias, a small rotation δ of the sensor, a small rotation ε of gravity, a delay T of the
-//! sensor against the encoders, and an error p of the sensor's position.
+//! sensor against the encoders, and an error p of the sensor's position, beside the force f of the load. A scale of the
+//! moments multiplies what the load adds to them.
 
 use std::ops::Range;
 
@@ -15,7 +16,7 @@ use rig_shared::multibody::INERTIAL_PARAMETERS;
 
 use crate::estimate::{Parameters, solved};
 use crate::mounting::Mounting;
-use crate::statistics::{Recorded, Segment, column};
+use crate::statistics::{Recorded, Segment, column, others};
 use crate::wrench_row::{WEIGHED, WrenchRow};
 
 /// Ratio of the readings' size to the smallest noise that is told apart from rounding.
@@ -47,10 +48,12 @@ pub(crate) enum Nuisance {
     Drift,
     /// A drift of the bias with temperature, one for all recordings.
     Warming,
+    /// A small relative change of the scale of the moments. None of [`Self::ALL`]: a scale is a fault to be named.
+    Scale,
 }
 
 impl Nuisance {
-    /// All of them.
+    /// Those that are estimated where the data show them.
     pub(crate) const ALL: [Self; 6] = [
         Self::Rotation,
         Self::Lean,
@@ -63,7 +66,7 @@ impl Nuisance {
     /// Returns the number of its unknowns.
     fn count(self, recordings: usize) -> usize {
         match self {
-            Self::Delay => 1,
+            Self::Delay | Self::Scale => 1,
             Self::Lean => 2,
             Self::Rotation | Self::Origin => 3,
             Self::Warming => 6,
@@ -246,6 +249,8 @@ impl Sensed<'_> {
         let mut own = triangle.columns(0, INERTIAL_PARAMETERS).into_owned();
         let change = fit.mounting.gravity * self.gravity - self.gravity;
         add_weight(&triangle, &change, &mut own);
+        let factor = fit.mounting.factor(channel);
+        own *= factor;
         let mut rows = DMatrix::zeros(height, layout.count());
         let loaded = self.recordings[recording].loaded;
         let parts = [(loaded, 0), (unknowns.tool, layout.tool())];
@@ -273,20 +278,24 @@ impl Sensed<'_> {
                     .copy_from(&triangle.column(column::TEMPERATURE)),
                 Nuisance::Delay => {
                     let rate = triangle.columns(column::RATE, INERTIAL_PARAMETERS);
-                    to.copy_from(&-(rate * body));
+                    to.copy_from(&-(rate * (body * factor)));
                 }
                 Nuisance::Lean => {
                     let gravity = fit.mounting.gravity * self.gravity;
                     for (k, about) in self.level_axes(fit).iter().enumerate() {
                         let mut lean = DMatrix::zeros(height, INERTIAL_PARAMETERS);
                         add_weight(&triangle, &about.cross(&gravity), &mut lean);
-                        to.column_mut(k).copy_from(&(lean * body));
+                        to.column_mut(k).copy_from(&(lean * (body * factor)));
                     }
                 }
                 Nuisance::Rotation => turn(&wrench, axis, &mut to),
+                Nuisance::Scale if channel >= 3 => to.copy_from(&(&own * body)),
+                Nuisance::Scale => {}
                 Nuisance::Origin if channel >= 3 => {
-                    let force = triangle.fixed_columns::<3>(column::FORCES);
-                    turn(&(force * fit.mounting.force.transpose()), axis, &mut to);
+                    let [next, last] = others(axis);
+                    let [along_next, along_last] = forces(&triangle, axis, &body, &change);
+                    to.column_mut(next).copy_from(&(along_last * -factor));
+                    to.column_mut(last).copy_from(&(along_next * factor));
                 }
                 Nuisance::Origin => {}
             }
@@ -341,6 +350,37 @@ impl Sensed<'_> {
             }
         }
         fit
+    }
+
+    /// Returns the squared residuals of the forces (`kind` 0) or the moments (1) if they are fitted alone.
+    pub(crate) fn squares_alone(
+        &self,
+        mounting: &Mounting,
+        unknowns: &Unknowns,
+        kind: usize,
+    ) -> f64 {
+        let count = self.layout(unknowns).count();
+        let fit = Fit {
+            mounting: mounting.clone(),
+            unknowns: unknowns.clone(),
+            values: vec![0.0; count],
+            noise: [1.0; 2],
+            squares: [0.0; 2],
+            equations: 0,
+        };
+        let mut whole = TriangularFactor::new(count);
+        self.each_segment(unknowns, &mut |recording, _, segment, bias| {
+            for channel in 3 * kind..3 * kind + 3 {
+                let (rows, right) = self.rows([recording, channel, bias], segment, &fit);
+                for (row, y) in rows.row_iter().zip(right) {
+                    let x: Vec<f64> = row.iter().copied().collect();
+                    whole.push(&x, y, 1.0);
+                }
+            }
+        });
+        let (r, z) = whole.system();
+        let values = solved(&r, &z).as_slice().to_vec();
+        self.squares(&Fit { values, ..fit })[kind]
     }
 
     /// Returns true if the fit leaves nothing but rounding: likelihoods of other units cannot be compared then.
@@ -445,6 +485,19 @@ impl Sensed<'_> {
         ]
     }
 
+    /// Returns the mass of what is mounted without the load, kg; 0 if there is no recording of it.
+    pub(crate) fn tool_mass(&self, fit: &Fit) -> f64 {
+        match fit.unknowns.tool {
+            true => fit.values[self.layout(&fit.unknowns).tool()],
+            false => 0.0,
+        }
+    }
+
+    /// Returns the relative change of the scale of the moments.
+    pub(crate) fn scale(&self, fit: &Fit) -> f64 {
+        self.values(fit, Nuisance::Scale).map_or(0.0, |v| v[0])
+    }
+
     /// Returns the two axes of the base frame about which gravity is turned.
     pub(crate) fn level_axes(&self, fit: &Fit) -> [Vector3<f64>; 2] {
         level_axes(&(fit.mounting.gravity * self.gravity))
@@ -514,11 +567,11 @@ impl Sensed<'_> {
             let along = |entries: &[f64]| -> f64 {
                 entries.iter().zip(load.iter()).map(|(w, p)| w * p).sum()
             };
-            let mut sum = fit.values[bias + channel] + along(&row.regressor[own.clone()]);
-            sum -= delay * along(&row.rate[own]);
+            let mut load = along(&row.regressor[own.clone()]) - delay * along(&row.rate[own]);
             for (entries, change) in row.weights.iter().zip(change.iter()) {
-                sum += change * along(&entries[channel * WEIGHED..(channel + 1) * WEIGHED]);
+                load += change * along(&entries[channel * WEIGHED..(channel + 1) * WEIGHED]);
             }
+            let mut sum = fit.values[bias + channel] + fit.mounting.factor(channel) * load;
             if let Some(drift) = of(Nuisance::Drift) {
                 sum += (row.time / recorded.length - 0.5) * drift[6 * recording + channel];
             }
@@ -528,7 +581,9 @@ impl Sensed<'_> {
             sum
         });
         if let Some(origin) = self.origin(fit) {
-            let lever = origin.cross(&Vector3::new(wrench[0], wrench[1], wrench[2]));
+            let bias = &fit.values[bias..bias + 3];
+            let force = Vector3::from_fn(|axis, _| wrench[axis] - bias[axis]);
+            let lever = origin.cross(&force) * fit.mounting.scale;
             for axis in 0..3 {
                 wrench[3 + axis] -= lever[axis];
             }
@@ -571,6 +626,27 @@ fn add_weight(triangle: &DMatrixView<'_, f64>, gravity: &Vector3<f64>, to: &mut 
         let mut weighed = to.columns_mut(0, WEIGHED);
         weighed += own * *along;
     }
+}
+
+/// Returns the forces of a body along the two other axes, by the rows of a moment. Those that were read have noise, which
+/// would be taken for noise of the moments. `change` is added to gravity (base frame, m/s²).
+fn forces(
+    triangle: &DMatrixView<'_, f64>,
+    axis: usize,
+    body: &Parameters,
+    change: &Vector3<f64>,
+) -> [DVector<f64>; 2] {
+    let weighed = body.fixed_rows::<WEIGHED>(0);
+    let at = [column::FORCES, column::FORCES + WEIGHED];
+    let mut forces = at.map(|at| triangle.columns(at, WEIGHED) * weighed);
+    let [next, last] = others(axis);
+    for (k, along) in change.iter().enumerate() {
+        // The moment of a weight is −h × g, so the columns of h hold gravity along the two other axes.
+        let gravity = |column: usize| triangle.column(column::WEIGHTS + k * WEIGHED + 1 + column);
+        forces[0] -= gravity(last) * (body[0] * *along);
+        forces[1] += gravity(next) * (body[0] * *along);
+    }
+    forces
 }
 
 /// Returns two unit vectors at right angles to gravity.

@@ -48,6 +48,36 @@ pub(crate) struct Equations {
     pub noise: Vec<Option<f64>>,
     /// Preparation.
     pub plan: PreprocessingPlan,
+    /// Torques over time, and what the fit gives for them, of the recordings with the load.
+    pub traces: Vec<TorqueTrace>,
+}
+
+/// Torque of a joint over time, thinned for a figure, and what the fit gives for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueTrace {
+    /// Name of the recording.
+    pub recording: String,
+    /// Index of the joint.
+    pub joint: usize,
+    /// s
+    pub time: Vec<f64>,
+    /// N·m or N, in the band of the fit.
+    pub read: Vec<f64>,
+    /// The same by the fit.
+    pub predicted: Vec<f64>,
+}
+
+/// Rows of a joint of a recording that are kept for a figure.
+const SAMPLED: u64 = 300;
+
+/// A row that is kept for a figure.
+struct Sample {
+    joint: usize,
+    time: f64,
+    row: Vec<f64>,
+    read: f64,
+    /// Torque that is known without the fit.
+    known: f64,
 }
 
 /// Places of the unknowns beside the load.
@@ -125,18 +155,23 @@ pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
     };
     let effects = Effects::of(robot).map_err(|e| LoadError::Model(e.to_string()))?;
     let mut parts: Vec<Vec<TriangularFactor>> = Vec::new();
+    let mut samples: Vec<(String, Vec<Sample>)> = Vec::new();
     for (recording, (source, survey)) in usable.iter().zip(&surveys).enumerate() {
         let loaded = recording < driven.with.len();
         let expected = survey.rows / treatment.decimation as u64;
         // Without the torque of the described effects.
         let freed = Compensated::new(*source, &effects, &chain, &treatment, true)?;
-        parts.extend(assembly.segments(&freed, &plan, loaded, expected)?);
+        let (segments, kept) = assembly.segments(&freed, &plan, loaded, expected)?;
+        parts.extend(segments);
+        if loaded {
+            samples.push((driven.with[recording].label(), kept));
+        }
     }
     let noise = noise_of(&parts);
     if noise.iter().all(Option::is_none) {
         return Err(LoadError::AtRest);
     }
-    let segments = (parts.iter())
+    let segments: Vec<TriangularFactor> = (parts.iter())
         .map(|joints| {
             let mut whole = TriangularFactor::new(joints[0].columns());
             merge_weighted(&mut whole, joints, &noise);
@@ -144,10 +179,49 @@ pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
         })
         .collect();
     Ok(Equations {
+        traces: traces(&segments, &samples, &noise),
         segments,
         noise,
         plan: treatment,
     })
+}
+
+/// Returns the torques of the joints that are used over time, with those of the fit of all equations.
+fn traces(
+    segments: &[TriangularFactor],
+    samples: &[(String, Vec<Sample>)],
+    noise: &[Option<f64>],
+) -> Vec<TorqueTrace> {
+    let Some(first) = segments.first() else {
+        return Vec::new();
+    };
+    let mut whole = TriangularFactor::new(first.columns());
+    segments.iter().for_each(|own| whole.merge(own, 1.0));
+    let (r, z) = whole.system();
+    let x = solved(&r, &z);
+    let used = (0..noise.len()).filter(|joint| noise[*joint].is_some());
+    let used: Vec<usize> = used.collect();
+    let of = |recording: &str, samples: &[Sample], joint: usize| {
+        let own: Vec<&Sample> = samples.iter().filter(|own| own.joint == joint).collect();
+        let along = |own: &Sample| {
+            own.row
+                .iter()
+                .zip(x.iter())
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+        };
+        TorqueTrace {
+            recording: recording.to_owned(),
+            joint,
+            time: own.iter().map(|own| own.time).collect(),
+            read: own.iter().map(|own| own.read).collect(),
+            predicted: own.iter().map(|own| own.known + along(own)).collect(),
+        }
+    };
+    let all = samples.iter();
+    all.flat_map(|(label, own)| used.iter().map(move |joint| of(label, own, *joint)))
+        .filter(|trace| !trace.time.is_empty())
+        .collect()
 }
 
 /// What the rows of a recording are made of.
@@ -167,36 +241,48 @@ impl Assembly<'_> {
         INERTIAL_PARAMETERS + self.unknowns.robot + self.unknowns.changed.len()
     }
 
-    /// Returns one factor a segment and joint; segments without rows are left out.
+    /// Returns one factor a segment and joint, and rows for a figure; segments without rows are left out.
     fn segments(
         &self,
         recording: &dyn Recording,
         plan: &Plan,
         loaded: bool,
         expected: u64,
-    ) -> Result<Vec<Vec<TriangularFactor>>, LoadError> {
+    ) -> Result<(Vec<Vec<TriangularFactor>>, Vec<Sample>), LoadError> {
         let joints = self.driven.robot.joints.len();
         let empty = || vec![TriangularFactor::new(self.count()); joints];
         let mut segments: Vec<Vec<TriangularFactor>> = (0..SEGMENTS).map(|_| empty()).collect();
         let mut seen = 0u64;
         let mut row = vec![0.0; self.count()];
+        let mut samples = Vec::new();
         each_rows(recording, plan, ModelKind::Differential, &mut |rows| {
             for k in 0..rows.t.len() {
                 let place = u128::from(seen) * SEGMENTS as u128 / u128::from(expected.max(1));
                 let segment = &mut segments[(place as usize).min(SEGMENTS - 1)];
+                let is_sampled = loaded && seen.is_multiple_of(expected.div_ceil(SAMPLED).max(1));
                 seen += 1;
-                for (factor, equation) in segment.iter_mut().zip(&rows.equations) {
+                let equations = segment.iter_mut().zip(&rows.equations);
+                for (joint, (factor, equation)) in equations.enumerate() {
                     if equation.keep[k] {
                         let x = &equation.x[k * self.width..(k + 1) * self.width];
                         let known = self.compose(x, loaded, &mut row);
                         factor.push(&row, equation.y[k] - known, 1.0);
+                        if is_sampled {
+                            samples.push(Sample {
+                                joint,
+                                time: rows.t[k],
+                                row: row.clone(),
+                                read: equation.y[k],
+                                known,
+                            });
+                        }
                     }
                 }
             }
             Ok(())
         })?;
         segments.retain(|own| own.iter().any(|factor| factor.rows() > 0));
-        Ok(segments)
+        Ok((segments, samples))
     }
 
     /// Composes a row from that of the model; returns the torque that is known.

@@ -3,6 +3,7 @@
 use super::made::{Moving, Points, Sensor, interpolated, parameters, poses, recorded, tool};
 use crate::{LoadError, LoadIdentification, LoadOptions, identify_load};
 use rand::{RngExt, SeedableRng};
+use rig_data::prepare::InMemory;
 use rig_model::robot::{IRP6_TEMPLATE, Reads, Robot, TX40, WristSensor};
 
 fn irp6() -> Robot {
@@ -310,6 +311,131 @@ fn rows_of_one_pose_are_one_reading_and_a_motion_is_no_list_of_poses() {
         .unwrap_err()
         .to_string();
     assert!(text.contains("moves all the time"), "{text}");
+}
+
+/// Whether rows are poses follows from their times and positions: a motion is none however few rows it has, and poses are
+/// read out of a recording in which the robot stops.
+#[test]
+fn rest_and_motion_are_told_by_the_rows_and_not_by_their_number() {
+    let moving = Moving::new(tx40(), 0.7, 6);
+    let points = tool();
+    let sensor = Sensor::default();
+    let identify = |recording: &InMemory, poses: bool| {
+        let options = LoadOptions {
+            poses,
+            ..LoadOptions::default()
+        };
+        identify_load(&moving.robot, &[recording], &[], &options)
+    };
+    for [seconds, rate] in [[5.0, 50.0], [0.39, 100.0], [2.0, 100.0]] {
+        let short = recorded(&moving, &points, &sensor, [seconds, rate], 3, NO_FLAW);
+        let text = identify(&short, false).unwrap_err().to_string();
+        assert!(
+            text.contains("moves all the time") && text.contains("at least 256"),
+            "{text}"
+        );
+    }
+    let long = recorded(&moving, &points, &sensor, [5.2, 50.0], 3, NO_FLAW);
+    assert!(errors(&identify(&long, false).unwrap(), &points)[0] < 0.02);
+    let long = recorded(&moving, &points, &sensor, [30.0, 100.0], 3, NO_FLAW);
+    let text = identify(&long, true).unwrap_err().to_string();
+    assert!(text.contains("leave out --poses"), "{text}");
+    // Six stops of 0.6 s at 50 Hz, with 0.2 s of straight way between them.
+    let stops: Vec<Vec<f64>> = (0..6)
+        .map(|k| moving.position(4.7 * f64::from(k)))
+        .collect();
+    let mut list = Vec::new();
+    for (k, stop) in stops.iter().enumerate() {
+        list.extend(vec![stop.clone(); 30]);
+        if let Some(next) = stops.get(k + 1) {
+            let way = (1..10).map(|n| {
+                let share = f64::from(n) / 10.0;
+                let joints = stop.iter().zip(next);
+                joints
+                    .map(|(a, b)| a + share * (b - a))
+                    .collect::<Vec<f64>>()
+            });
+            list.extend(way);
+        }
+    }
+    let mut stopping = poses(&moving, &points, &sensor, &list, 4);
+    let times = stopping.blocks[0].t.iter_mut().enumerate();
+    times.for_each(|(k, t)| *t = 0.02 * k as f64);
+    let found = identify(&stopping, false).unwrap();
+    assert_eq!(found.sensor.as_ref().unwrap().rows, 6);
+    assert!(errors(&found, &points)[0] < 0.02);
+    // One row a pose, written without a clock: no joint makes such steps.
+    let mut listed = poses(&moving, &points, &sensor, &stops, 4);
+    let times = listed.blocks[0].t.iter_mut().enumerate();
+    times.for_each(|(k, t)| *t = 1e-3 * k as f64);
+    let found = identify(&listed, false).unwrap();
+    assert_eq!(found.sensor.as_ref().unwrap().rows, 6);
+}
+
+#[test]
+fn a_spike_is_named_by_its_row_and_exchanged_recordings_by_their_weights() {
+    let moving = Moving::new(irp6(), 0.8, 3);
+    let [heavy, light] = [
+        tool(),
+        vec![(0.4, [0.0, 0.01, 0.05]), (0.2, [0.03, 0.0, 0.02])],
+    ];
+    let sensor = Sensor::default();
+    let spike = |t: f64, mut read: [f64; 6]| {
+        if (t - 12.34).abs() < 1e-6 {
+            read[2] = 5e4;
+        }
+        read
+    };
+    let motion = recorded(&moving, &heavy, &sensor, [20.0, 100.0], 2, &spike);
+    let identify = |with: &InMemory, without: &[&dyn rig_data::prepare::Recording]| {
+        identify_load(&moving.robot, &[with], without, &LoadOptions::default())
+    };
+    let text = identify(&motion, &[]).unwrap_err().to_string();
+    // The header line and 1234 rows stand before it.
+    assert!(
+        text.contains("line 1236: fz is 50000 N") || text.contains("line 1236: fz is 5.000e4 N"),
+        "{text}"
+    );
+    let with = recorded(&moving, &heavy, &sensor, [20.0, 100.0], 4, NO_FLAW);
+    let without = recorded(&moving, &light, &sensor, [20.0, 100.0], 5, NO_FLAW);
+    assert!(identify(&with, &[&without]).is_ok());
+    let text = identify(&without, &[&with]).unwrap_err().to_string();
+    assert!(text.contains("look exchanged"), "{text}");
+    // Small units in all six channels: no joint carries such a load.
+    let milli = |_: f64, read: [f64; 6]| read.map(|v| 1e3 * v);
+    let motion = recorded(&moving, &heavy, &sensor, [20.0, 100.0], 6, &milli);
+    let found = identify(&motion, &[]).unwrap();
+    assert!(
+        found
+            .warnings
+            .iter()
+            .any(|w| w.contains("described limit") && w.contains("mN")),
+        "{:?}",
+        found.warnings
+    );
+}
+
+/// Moments in N·mm at rest: their noise is larger than the size of a load in N·m, but not than the centre of mass that they
+/// would give.
+#[test]
+fn poses_with_moments_in_another_unit_are_refused() {
+    let points = tool();
+    for seed in 0..6 {
+        let moving = Moving::new(tx40(), 0.8, seed);
+        let list: Vec<Vec<f64>> = (0..8)
+            .map(|k| moving.position(3.1 * f64::from(k)))
+            .collect();
+        let mut still = poses(&moving, &points, &Sensor::default(), &list, seed);
+        for (_, column) in &mut still.blocks[0].extra[3..] {
+            column.iter_mut().for_each(|value| *value *= 1e3);
+        }
+        let refused = identify_load(&moving.robot, &[&still], &[], &LoadOptions::default());
+        let text = refused.unwrap_err().to_string();
+        assert!(
+            text.contains("N·mm") && text.contains("--unit mx=Nmm"),
+            "{text}"
+        );
+    }
 }
 
 #[test]

@@ -11,7 +11,7 @@ use super::ui::{Progress, Ui};
 use rig_data::prepare::{LongestPart, PrepareError, Recording};
 use rig_data::{
     Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Mapping, Source, StrangeReference,
-    Warning, plausibility, strange_rates, strange_references,
+    Warning, implausible_positions, plausibility, strange_rates, strange_references,
 };
 use rig_diagnose::faults::faults_at_start;
 use rig_model::robot::{Description, Joint, JointKind, Robot};
@@ -253,13 +253,20 @@ impl Inputs {
         })
     }
 
-    /// Refuses columns whose units look wrong. Recordings of fewer than `least` rows are not checked: rows of single
-    /// poses are no motion.
+    /// Refuses columns whose units look wrong. Of recordings of fewer than `least` rows only the range of the positions is
+    /// checked: rows of single poses are no motion.
     ///
     /// # Errors
     /// Names the error in a file and its line. One sentence lists all units that look wrong.
     pub(crate) fn refuse_units(&self, robot: &Robot, least: usize) -> Result<(), CommandError> {
-        self.refuse_implausible(robot, least, |problem| !problem.is_doubt())
+        self.refuse_implausible(|block| match block.len() < least {
+            true => implausible_positions(block, robot),
+            false => {
+                let mut found = plausibility(block, robot);
+                found.retain(|problem| !problem.is_doubt());
+                found
+            }
+        })
     }
 
     /// Refuses positions and efforts whose scale is wrong by the limits, also of recordings that are no motion: joints
@@ -268,23 +275,19 @@ impl Inputs {
     /// # Errors
     /// As [`Self::refuse_units`].
     pub(crate) fn refuse_scales(&self, robot: &Robot) -> Result<(), CommandError> {
-        self.refuse_implausible(robot, 0, is_scale)
+        self.refuse_implausible(|block| {
+            let mut found = plausibility(block, robot);
+            found.retain(is_scale);
+            found
+        })
     }
 
     fn refuse_implausible(
         &self,
-        robot: &Robot,
-        least: usize,
-        is_wrong: impl Fn(&Implausible) -> bool,
+        judge: impl Fn(&Block) -> Vec<Implausible>,
     ) -> Result<(), CommandError> {
         for source in &self.sources {
-            let block = first_part(source)?.rows();
-            if block.len() < least {
-                continue;
-            }
-            let wrong: Vec<Implausible> = (plausibility(&block, robot).into_iter())
-                .filter(&is_wrong)
-                .collect();
+            let wrong = judge(&first_part(source)?.rows());
             if !wrong.is_empty() {
                 return Err(CommandError::Implausible(sentence(source, &wrong)));
             }

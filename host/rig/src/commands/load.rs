@@ -49,7 +49,8 @@ pub(crate) struct Args {
     /// What the load is measured by
     #[arg(long, value_enum, default_value_t = Measured::Sensor)]
     by: Measured,
-    /// Every row of the recordings is a pose at rest (assumed for fewer than 256 rows)
+    /// The recordings are poses at rest; rows on the way between two are left out (assumed for rows far apart in time, and
+    /// for fewer than 256)
     #[arg(long)]
     poses: bool,
     /// A known load (load.toml) that is mounted as well, and is subtracted
@@ -171,10 +172,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&warning);
     }
     match args.by {
-        Measured::Sensor if args.poses => {}
         Measured::Sensor => {
-            with.refuse_units(&robot, FEWEST_ROWS)?;
-            without.refuse_units(&robot, FEWEST_ROWS)?;
+            let least = if args.poses { usize::MAX } else { FEWEST_ROWS };
+            with.refuse_units(&robot, least)?;
+            without.refuse_units(&robot, least)?;
         }
         Measured::Torque | Measured::Both => refuse_faults(
             &robot,
@@ -336,9 +337,12 @@ fn lines(
             "inertia about the centre of mass Ixx {xx}, Ixy {xy}, Ixz {xz}, Iyy {yy}, Iyz {yz}, Izz {zz} kg·m²"
         ));
     }
+    lines.push(
+        "(± is one standard deviation here, and half the 95 % interval in the report)".to_owned(),
+    );
     if let Some(sensor) = &found.sensor {
         lines.push(format!(
-            "left of the readings: {} N and {} N·m RMS",
+            "unexplained: {} N and {} N·m RMS",
             format_significant(sensor.residual[0], 3),
             format_significant(sensor.residual[1], 3)
         ));

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::{parts, treatment};
-use rig_load::{ControllerNumbers, LoadIdentification, SensorFindings, Trace, Value};
+use rig_load::{ControllerNumbers, LoadIdentification, SensorFindings, TorqueTrace, Trace, Value};
 use rig_output::{format_significant, format_unit, format_value};
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
 
@@ -48,7 +48,9 @@ fn summary(found: &LoadIdentification, context: &Context) -> Vec<Fact> {
     let fact = |label: &str, value: &Value, unit: &str, shown: bool| {
         let fact = Fact::new(label, half(value)).unit(unit);
         match shown {
-            true => fact.note("± half the 95 % interval"),
+            true => {
+                fact.note("± half the 95 % interval; the program prints ± one standard deviation")
+            }
             false => fact
                 .note("± half the 95 % interval; not shown by these data")
                 .tone(Tone::Notice),
@@ -179,7 +181,8 @@ fn readings(sensor: &SensorFindings) -> Section {
     );
     for trace in &sensor.traces {
         for (kind, unit, first) in [("Force", "N", 0), ("Moment", "N·m", 3)] {
-            section = section.with(Block::Plot(curves(trace, kind, unit, first)));
+            let still = sensor.prepared.is_none();
+            section = section.with(Block::Plot(curves(trace, kind, unit, first, still)));
         }
     }
     section.with(Block::Text(format!(
@@ -197,14 +200,18 @@ fn readings(sensor: &SensorFindings) -> Section {
     )))
 }
 
-fn curves(trace: &Trace, kind: &str, unit: &str, first: usize) -> Plot {
+/// Draws one kind of readings with the fit; poses (`still`) are not joined by lines, because nothing was recorded between.
+fn curves(trace: &Trace, kind: &str, unit: &str, first: usize, still: bool) -> Plot {
     const ROLES: [Role; 3] = [Role::Measured, Role::Model, Role::After];
     let mut plot = Plot::new(
         format!("{kind}: {}", trace.recording),
         Axis::new("time", "s"),
         Axis::new(kind.to_lowercase(), unit),
     )
-    .note("Dots: readings. Lines: identified load with bias.");
+    .note(match still {
+        true => "Dots: readings of each pose. Dashes: identified load with bias.",
+        false => "Dots: readings. Lines: identified load with bias.",
+    });
     for k in 0..3 {
         let channel = CHANNELS[first + k];
         let role = ROLES[k];
@@ -215,14 +222,31 @@ fn curves(trace: &Trace, kind: &str, unit: &str, first: usize) -> Plot {
                 trace.time.clone(),
                 trace.read[first + k].clone(),
             ))
-            .with(Series::line(
+            .with(fit(
                 format!("{channel}, fit"),
                 role,
-                trace.time.clone(),
-                trace.predicted[first + k].clone(),
+                trace,
+                first + k,
+                still,
             ));
     }
     plot
+}
+
+/// The fit of a channel: a line, or one dash a pose.
+fn fit(name: String, role: Role, trace: &Trace, channel: usize, still: bool) -> Series {
+    let (time, values) = (&trace.time, &trace.predicted[channel]);
+    if !still {
+        return Series::line(name, role, time.clone(), values.clone());
+    }
+    let steps = time.windows(2).map(|two| (two[1] - two[0]).abs());
+    let step = steps
+        .filter(|step| *step > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    let half = if step.is_finite() { 0.3 * step } else { 0.3 };
+    let x = time.iter().flat_map(|t| [t - half, t + half, t + half]);
+    let y = values.iter().flat_map(|v| [*v, *v, f64::NAN]);
+    Series::line(name, role, x.collect(), y.collect())
 }
 
 /// Bias of the sensor by recording.
@@ -289,19 +313,44 @@ fn torques(found: &LoadIdentification) -> Option<Section> {
             "The description gave the torque of the robot without the load. Its own uncertainty is not in the standard deviations."
         }
     };
-    Some(
-        Section::new("torques", "Joint torques", source).with(Block::Table(Table {
-            caption: "Residual of the torques with the load".into(),
-            columns: vec![Column::text("Joint"), Column::number("RMS", "N·m or N")],
-            rows: rows
-                .map(|(name, rms)| {
-                    let rms = rms.map_or("not used".to_owned(), |rms| format_significant(rms, 3));
-                    vec![name.clone(), rms]
-                })
-                .collect(),
-            note: String::new(),
-        })),
+    let mut section = Section::new("torques", "Joint torques", source).with(Block::Table(Table {
+        caption: "Residual of the torques with the load".into(),
+        columns: vec![Column::text("Joint"), Column::number("RMS", "N·m or N")],
+        rows: rows
+            .map(|(name, rms)| {
+                let rms = rms.map_or("not used".to_owned(), |rms| format_significant(rms, 3));
+                vec![name.clone(), rms]
+            })
+            .collect(),
+        note: String::new(),
+    }));
+    for trace in &torque.traces {
+        section = section.with(Block::Plot(torque_curves(trace, &torque.joints)));
+    }
+    Some(section)
+}
+
+/// The torque of a joint over time beside the fit.
+fn torque_curves(trace: &TorqueTrace, joints: &[String]) -> Plot {
+    let joint = joints.get(trace.joint).map_or("", String::as_str);
+    Plot::new(
+        format!("Torque of {joint}: {}", trace.recording),
+        Axis::new("time", "s"),
+        Axis::new("torque", "N·m or N"),
     )
+    .note("Dots: torque as recorded, in the band of the fit. Line: robot with the identified load.")
+    .with(Series::points(
+        "recorded",
+        Role::Measured,
+        trace.time.clone(),
+        trace.read.clone(),
+    ))
+    .with(Series::line(
+        "fit",
+        Role::Model,
+        trace.time.clone(),
+        trace.predicted.clone(),
+    ))
 }
 
 fn agreement(found: &LoadIdentification) -> Option<Section> {
@@ -379,7 +428,7 @@ fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumber
         }
     };
     Section::new("controllers", "Settings for robot controllers", lead).with(Block::Code(format!(
-        "Universal Robots  {}\nKUKA              {}\nFranka            {}",
+        "Universal Robots: {}\nKUKA: {}\nFranka: {}",
         numbers.universal_robots, numbers.kuka, numbers.franka
     )))
 }

@@ -1,0 +1,336 @@
+//! Why readings do not fit a rigid load as described: every cause that is known is fitted, and all are compared with what
+//! the noise would leave.
+//!
+//! A cause is believed if it leaves about the noise, leaves decisively less than the description does, and no cause with
+//! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit has one, a turned sensor three.
+
+use crate::candidates::{exchanged, scaled, turned};
+use crate::mounting::{Channels, Mounting};
+use crate::selection::{Selected, selected};
+use crate::settle::{DECISIVE, settled};
+use crate::statistics::{Recorded, noise_floor};
+use crate::system::{Fit, Nuisance, Sensed, Unknowns};
+use crate::units::named;
+
+/// Residual-to-noise RMS ratio up to which a fit leaves about the noise: noise that is slower than white raises the
+/// residual in the band. The estimators of wrong causes leave 4 to 100 times the noise.
+const ABOUT: f64 = 2.0;
+/// Residual as a share of what the readings change by, up to which a fit counts as exact: sensors resolve no less.
+const EXACT: f64 = 1e-3;
+/// The same for recordings that tell no noise, as poses: a wrong cause leaves half of the readings or more.
+const EXPLAINED: f64 = 0.22;
+/// Ratio to the least residual of the forces beyond which a cause is not looked at further. Delays, leaning bases and jumps
+/// change what all causes leave.
+const HOPELESS: f64 = 10.0;
+/// Share of the segments in which a cause must leave less than the description.
+const NEARLY_ALL: f64 = 0.9;
+
+/// Distance of the sensor's origin from the described one that is no error of a measurement, m: a wrist sensor with its
+/// flanges is shorter.
+const FARTHEST: f64 = 0.3;
+/// Factor beside a scale that must be told from it.
+const BESIDE: f64 = 1.1;
+
+/// Why readings are not those of a load as described.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Cause {
+    /// They are, with properties of sensor and base that are small.
+    Described,
+    /// Channels are exchanged or reversed.
+    Channels(Channels),
+    /// The moments have another unit than the forces.
+    Scale,
+    /// The sensor is turned by any angle.
+    Turned,
+    /// Both.
+    ScaleAndTurned,
+}
+
+/// A cause that was fitted.
+pub(crate) struct Tried {
+    pub cause: Cause,
+    /// The mounting as described, with channels put right.
+    pub start: Mounting,
+    /// Fit with everything that the readings show then.
+    pub selected: Selected,
+    /// Misfit with a penalty for each unknown; smaller is better.
+    score: f64,
+}
+
+/// What was compared.
+pub(crate) struct Compared {
+    /// The readings as described.
+    pub described: Tried,
+    /// Causes that explain the readings, those with the fewest unknowns first. Empty if the description explains them, or
+    /// nothing does.
+    pub causes: Vec<Tried>,
+    /// Delay by the fit that is nearest to the readings so far, s.
+    pub delay: Option<f64>,
+}
+
+/// Fits every cause and compares them.
+pub(crate) fn compare(
+    sensed: &Sensed,
+    mounting: &Mounting,
+    unknowns: &Unknowns,
+    sign_stated: bool,
+) -> Compared {
+    let plain = sensed.fit(mounting, unknowns);
+    let trial = Trial {
+        sensed,
+        mounting,
+        plain: &plain,
+    };
+    let described = trial.taken_in(Cause::Described, mounting, plain.clone());
+    let fit = &described.selected.fit;
+    // A wrong position of the sensor and another scale of the moments are alike.
+    let is_certain =
+        noise_floor(sensed.recordings).is_some() && !fit.unknowns.has(Nuisance::Origin);
+    if sensed.is_exact(fit) || is_certain && explains(sensed, fit) {
+        let delay = sensed.delay(fit);
+        return Compared {
+            described,
+            causes: Vec::new(),
+            delay,
+        };
+    }
+    let mut all = trial.causes(unknowns, sign_stated);
+    all.retain(|own| own.score.is_finite());
+    let nearest = all.iter().min_by(|a, b| a.score.total_cmp(&b.score));
+    let nearest = nearest.filter(|own| own.score < described.score - DECISIVE);
+    let delay = sensed.delay(&nearest.unwrap_or(&described).selected.fit);
+    all.retain(|own| explains(sensed, &own.selected.fit));
+    if noise_floor(sensed.recordings).is_some() && explains(sensed, &described.selected.fit) {
+        return displaced_or_scaled(sensed, described, all, delay);
+    }
+    let is_described = explains(sensed, &described.selected.fit);
+    let least = (all.iter().map(|own| own.score)).fold(f64::INFINITY, f64::min);
+    all.retain(|own| own.score <= least + DECISIVE);
+    if is_described && described.score <= least + DECISIVE {
+        all.clear();
+    }
+    all.retain(|own| {
+        own.score < described.score - DECISIVE
+            && trial.leaves_less(&own.selected.fit, &described.selected.fit)
+    });
+    Compared {
+        causes: without_special_cases(sensed, all),
+        described,
+        delay,
+    }
+}
+
+/// Decides between another position of the sensor, by which the description leaves the noise, and another scale of the
+/// moments. The scale is believed if it is that of a unit, and the readings tell it from others near by: another position
+/// would be so by chance only. It is believed too if the position would lie further from the described one than a caliper
+/// or drawing is wrong.
+fn displaced_or_scaled(
+    sensed: &Sensed,
+    mut described: Tried,
+    all: Vec<Tried>,
+    delay: Option<f64>,
+) -> Compared {
+    let as_good = |own: &Tried| own.score <= described.score + DECISIVE;
+    // An exchange or a sign that needs neither has no unknown at all.
+    let is_plain = |own: &Tried| {
+        let fit = &own.selected.fit.unknowns;
+        matches!(own.cause, Cause::Channels(_))
+            && !fit.has(Nuisance::Origin)
+            && !fit.has(Nuisance::Rotation)
+    };
+    let mut all: Vec<Tried> = all.into_iter().filter(as_good).collect();
+    if let Some(at) = all.iter().position(is_plain) {
+        return Compared {
+            causes: vec![all.remove(at)],
+            described,
+            delay,
+        };
+    }
+    let scale = all.into_iter().find(|own| own.cause == Cause::Scale);
+    let error = sensed.origin(&described.selected.fit);
+    let is_far = error.is_some_and(|error| error.norm() > FARTHEST);
+    let causes = match scale {
+        Some(own) if is_far || is_unit(sensed, &own) => vec![own],
+        Some(_) => {
+            let pair = [Nuisance::Origin, Nuisance::Scale];
+            described.selected.alternatives.push(pair);
+            Vec::new()
+        }
+        None => Vec::new(),
+    };
+    Compared {
+        described,
+        causes,
+        delay,
+    }
+}
+
+/// Returns true if the scale of the moments is that of a unit, and scales 10 % beside it leave decisively more.
+fn is_unit(sensed: &Sensed, tried: &Tried) -> bool {
+    let fit = &tried.selected.fit;
+    let fixed = fit.unknowns.without(Nuisance::Scale);
+    let is_worse = |factor: f64| {
+        settled(sensed, &fit.mounting.scaled(factor), &fixed).misfit() > fit.misfit() + DECISIVE
+    };
+    [1.0 / BESIDE, BESIDE].into_iter().all(is_worse) && !named(sensed, fit).is_empty()
+}
+
+/// Drops causes of which a special case explains as much, and sorts them by their unknowns. An exchange of channels with a
+/// turned sensor is no special case of a turned sensor.
+fn without_special_cases(sensed: &Sensed, mut all: Vec<Tried>) -> Vec<Tried> {
+    let has = |all: &[Tried], cause: &Cause| all.iter().any(|own| own.cause == *cause);
+    let is_opposite =
+        |own: &Tried| matches!(&own.cause, Cause::Channels(c) if c.is_opposite_rotation());
+    let is_scaled = has(&all, &Cause::Scale);
+    // Of a turned sensor, another position and another scale of the moments are alike as well.
+    let is_scale_certain =
+        (all.iter()).any(|own| own.cause == Cause::ScaleAndTurned && is_unit(sensed, own));
+    if let Some(at) = all.iter().position(|own| own.cause == Cause::Turned)
+        && has(&all, &Cause::ScaleAndTurned)
+        && all[at].selected.fit.unknowns.has(Nuisance::Origin)
+    {
+        let is_far = sensed
+            .origin(&all[at].selected.fit)
+            .is_some_and(|error| error.norm() > FARTHEST);
+        match is_far || is_scale_certain {
+            true => drop(all.remove(at)),
+            false => {
+                let pair = [Nuisance::Origin, Nuisance::Scale];
+                all[at].selected.alternatives.push(pair);
+            }
+        }
+    }
+    let is_turned = has(&all, &Cause::Turned);
+    let is_mirrored = all.iter().any(is_opposite);
+    all.retain(|own| match own.cause {
+        Cause::ScaleAndTurned => !is_turned && !is_scaled,
+        Cause::Turned => !is_mirrored,
+        Cause::Channels(_) => !is_turned || !own.selected.fit.unknowns.has(Nuisance::Rotation),
+        _ => true,
+    });
+    let order = |own: &Tried| match own.cause {
+        Cause::Described => 0,
+        Cause::Channels(_) => 1,
+        Cause::Scale => 2,
+        Cause::Turned => 3,
+        Cause::ScaleAndTurned => 4,
+    };
+    all.sort_by(|a, b| order(a).cmp(&order(b)).then(a.score.total_cmp(&b.score)));
+    let mut is_first = true;
+    // Of exchanges that explain as much, the one nearest to the file is meant.
+    all.retain(|own| !matches!(own.cause, Cause::Channels(_)) || std::mem::take(&mut is_first));
+    all
+}
+
+/// Returns true if a fit leaves about the noise.
+pub(crate) fn explains(sensed: &Sensed, fit: &Fit) -> bool {
+    let share = sensed.share(fit);
+    let residual = fit.noise;
+    match noise_floor(sensed.recordings) {
+        Some(noise) => (0..2).all(|k| residual[k] <= ABOUT * noise[k] || share[k] <= EXACT),
+        None => share.iter().all(|share| *share <= EXPLAINED),
+    }
+}
+
+/// What causes are tried on.
+struct Trial<'a> {
+    sensed: &'a Sensed<'a>,
+    mounting: &'a Mounting,
+    /// Fit as described, with nothing beside load and bias.
+    plain: &'a Fit,
+}
+
+impl Trial<'_> {
+    /// Takes in what the readings show beside a cause. `start` is the mounting without rotations.
+    fn taken_in(&self, cause: Cause, start: &Mounting, fit: Fit) -> Tried {
+        let selected = selected(self.sensed, fit, start);
+        Tried {
+            cause,
+            start: start.clone(),
+            score: self.score(&selected.fit),
+            selected,
+        }
+    }
+
+    /// Tries all causes beside the description that leave decisively less than it does with nothing else.
+    fn causes(&self, unknowns: &Unknowns, sign_stated: bool) -> Vec<Tried> {
+        let mut all = self.plain_causes(unknowns, sign_stated);
+        all.retain(|(_, _, fit)| fit.misfit() < self.plain.misfit() - DECISIVE);
+        // Neither another position of the sensor nor another unit of the moments changes what the forces leave.
+        let forces = |fit: &Fit| fit.noise[0];
+        let least = all.iter().map(|(_, _, fit)| forces(fit));
+        let least = least.fold(forces(self.plain), f64::min);
+        all.retain(|(_, _, fit)| forces(fit) <= HOPELESS * least);
+        all.into_iter()
+            .map(|(cause, start, fit)| self.taken_in(cause, &start, fit))
+            .collect()
+    }
+
+    /// Fits all causes beside the description with load and bias alone.
+    fn plain_causes(&self, unknowns: &Unknowns, sign_stated: bool) -> Vec<(Cause, Mounting, Fit)> {
+        let (sensed, mounting) = (self.sensed, self.mounting);
+        let recordings: Vec<Recorded> = sensed.recordings.iter().map(Recorded::in_one).collect();
+        let whole = Sensed {
+            recordings: &recordings,
+            to_joint: sensed.to_joint,
+            gravity: sensed.gravity,
+        };
+        let mut all = Vec::new();
+        for channels in exchanged(&whole, mounting, unknowns, sign_stated) {
+            let start = mounting.after(&channels);
+            let fit = sensed.fit(&start, unknowns);
+            all.push((Cause::Channels(channels), start, fit));
+        }
+        let can_scale = sensed.recordings.iter().any(|r| !r.poses);
+        let scaling = unknowns.with(Nuisance::Scale);
+        if can_scale {
+            let start = scaled(&whole, mounting, unknowns);
+            let fit = settled(sensed, &start, &scaling);
+            all.push((Cause::Scale, start, fit));
+        }
+        for start in turned(&whole, mounting) {
+            let turning = unknowns.with(Nuisance::Rotation);
+            let fit = settled(sensed, &start, &turning);
+            all.push((Cause::Turned, mounting.clone(), fit));
+            if can_scale {
+                let start = scaled(&whole, &start, unknowns);
+                let fit = settled(sensed, &start, &scaling.with(Nuisance::Rotation));
+                all.push((Cause::ScaleAndTurned, mounting.scaled(start.scale), fit));
+            }
+        }
+        all
+    }
+
+    /// Returns −2·ln of the likelihood with the noise by degrees of freedom, each unknown counted as the information
+    /// criterion of Schwarz (1978) does; infinite without a degree of freedom.
+    fn score(&self, fit: &Fit) -> f64 {
+        let is_still = self.sensed.recordings.iter().all(|r| r.poses);
+        let bodies = 1 + usize::from(fit.unknowns.tool);
+        // At rest the six inertias of a body are no unknowns.
+        let hidden = if is_still { 6 * bodies } else { 0 };
+        let unknowns = fit.values.len().saturating_sub(hidden) as f64;
+        let equations = fit.equations as f64;
+        let freedom = equations - unknowns;
+        if freedom < 1.0 {
+            return f64::INFINITY;
+        }
+        let unbiased = equations * (equations / freedom).ln();
+        // Jumps leave out segments, so fits of unlike many equations are compared.
+        let all = 6.0 * self.sensed.used_rows(&Unknowns::default()) as f64;
+        (fit.misfit() + unbiased + unknowns * equations.ln()) * all / equations
+    }
+
+    /// Returns true if a fit leaves less than another in nearly all segments of a motion.
+    fn leaves_less(&self, fit: &Fit, other: &Fit) -> bool {
+        if self.sensed.recordings.iter().any(|r| r.poses) {
+            return true;
+        }
+        let (own, others) = [fit, other]
+            .map(|own| self.sensed.squares_by_segment(own))
+            .into();
+        let over = |s: &[f64; 2]| s[0] / fit.noise[0].powi(2) + s[1] / fit.noise[1].powi(2);
+        let pairs = own.iter().zip(&others);
+        let less = pairs.filter(|(a, b)| over(a) < over(b)).count();
+        less as f64 >= NEARLY_ALL * own.len() as f64
+    }
+}

@@ -1,0 +1,97 @@
+//! How the rows of a recording follow each other: one after the other in time, or pose by pose.
+
+use rig_data::prepare::Recording;
+use rig_model::robot::Robot;
+
+use crate::error::LoadError;
+use crate::rows::{FEWEST_ROWS, each_readings};
+
+/// Largest movement of a joint within a pose, rad or m: above the noise of encoders, below the distance of poses.
+pub(crate) const AT_REST: f64 = 5e-3;
+/// Time between rows beyond which they are no recording of a motion, s. Joints of arms reach a few rad/s and turn within a
+/// second; a motion that is sampled more seldom has no acceleration that could be computed.
+const LONGEST_STEP: f64 = 0.15;
+/// Multiple of the described speed of a joint beyond which it does not move from one row to the next: the rows of two poses
+/// stand beside each other.
+const TOO_FAST: f64 = 1.5;
+/// Speed of a joint without a described one, rad/s or m/s: above that of arms.
+const FASTEST: f64 = 10.0;
+
+/// How the rows of a recording follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// Rows stand for poses: they are far apart in time, or the robot cannot come from one to the next.
+    Listed,
+    /// Rows follow each other in time, whether the robot moves or stands.
+    Continuous,
+}
+
+/// Decides from the time steps and speeds of the rows how they follow each other.
+///
+/// # Errors
+/// As [`each_readings`].
+pub(crate) fn pace(recording: &dyn Recording, robot: &Robot) -> Result<Pace, LoadError> {
+    let speeds: Vec<f64> = (robot.joints.iter())
+        .map(|joint| match &joint.limits {
+            Some(limits) if limits.velocity > 0.0 => limits.velocity,
+            _ => FASTEST,
+        })
+        .collect();
+    let mut steps = Steps::default();
+    each_readings(recording, &mut |block, _| {
+        for k in 0..block.len() {
+            let q: Vec<f64> = block.joints.iter().map(|joint| joint.q[k]).collect();
+            steps.push(block.t[k], q, &speeds);
+        }
+        Ok(())
+    })?;
+    Ok(steps.pace())
+}
+
+/// Sums over the steps from row to row.
+#[derive(Default)]
+struct Steps {
+    rows: usize,
+    /// Time and positions of the last row.
+    last: Option<(f64, Vec<f64>)>,
+    /// Change of the positions in the last step.
+    change: Vec<f64>,
+    /// Steps that are longer than [`LONGEST_STEP`].
+    long: usize,
+    /// Steps in which a joint moves further than [`AT_REST`], and those of them that no joint can make.
+    moves: usize,
+    leaps: usize,
+    /// Squares of the changes, and of the changes of the changes.
+    squares: [f64; 2],
+}
+
+impl Steps {
+    fn push(&mut self, t: f64, q: Vec<f64>, speeds: &[f64]) {
+        self.rows += 1;
+        if let Some((before, from)) = self.last.take() {
+            let step = t - before;
+            let change: Vec<f64> = q.iter().zip(&from).map(|(a, b)| a - b).collect();
+            self.long += usize::from(step > LONGEST_STEP);
+            self.moves += usize::from(change.iter().any(|by| by.abs() > AT_REST));
+            let is_leap = (change.iter().zip(speeds))
+                .any(|(by, speed)| by.abs() > AT_REST + TOO_FAST * speed * step);
+            self.leaps += usize::from(is_leap);
+            self.squares[0] += change.iter().map(|by| by * by).sum::<f64>();
+            self.squares[1] += (change.iter().zip(&self.change))
+                .map(|(now, last)| (now - last).powi(2))
+                .sum::<f64>();
+            self.change = change;
+        }
+        self.last = Some((t, q));
+    }
+
+    fn pace(&self) -> Pace {
+        let is_seldom = 2 * self.long + 1 > self.rows;
+        // Where many rows are far apart in time, those of a slow motion lie on a smooth path.
+        let is_smooth = self.rows >= FEWEST_ROWS && self.squares[1] < self.squares[0];
+        match is_seldom && !is_smooth || self.leaps > 0 && 2 * self.leaps >= self.moves {
+            true => Pace::Listed,
+            false => Pace::Continuous,
+        }
+    }
+}

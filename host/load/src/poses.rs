@@ -1,0 +1,151 @@
+//! The poses at rest of a recording.
+
+use nalgebra::Isometry3;
+use rig_data::prepare::Recording;
+use rig_shared::multibody::{Chain, wrench_regressor};
+
+use crate::error::LoadError;
+use crate::pace::{AT_REST, Pace};
+use crate::rows::{Ends, FEWEST_ROWS, base_axes, beyond, each_readings, temperature};
+use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
+
+/// Shortest time at one position that is a rest in rows that follow each other in time, s: a joint that passes through
+/// [`AT_REST`] meanwhile has 25 mrad/s, and what it does to the readings is below one per cent of the weight.
+const SHORTEST_REST: f64 = 0.2;
+/// Poses nearer than this multiple of [`AT_REST`] follow each other in a motion.
+const NEAR: f64 = 3.0;
+/// Shorter than this share of the longest pose, rows belong to the way between two.
+const SHORT: f64 = 0.05;
+
+/// Streams the poses of a recording: consecutive rows at one position are one pose, with their mean readings, because the
+/// errors of one pose are not independent. Rows between poses are left out; of rows that follow each other in time those are
+/// poses in which the robot rests. Returns the number of rows beyond `ends`.
+///
+/// # Errors
+/// As [`each_row`]; [`LoadError::Moves`] if the recording never rests.
+pub(crate) fn each_pose(
+    chain: &Chain<f64>,
+    sensor: &Isometry3<f64>,
+    recording: &dyn Recording,
+    (ends, pace): (&Ends, Pace),
+    take: &mut dyn FnMut(&WrenchRow),
+) -> Result<u64, LoadError> {
+    let mut poses: Vec<Pose> = Vec::new();
+    let (mut left_out, mut rows) = (0, 0u64);
+    each_readings(recording, &mut |block, readings| {
+        for k in 0..block.len() {
+            let now: [f64; 6] = std::array::from_fn(|c| readings[c][k]);
+            rows += 1;
+            if beyond(&now, ends) {
+                left_out += 1;
+                continue;
+            }
+            let q: Vec<f64> = block.joints.iter().map(|joint| joint.q[k]).collect();
+            let others = [
+                block.t[k],
+                temperature(&block.extra).map_or(0.0, |list| list[k]),
+            ];
+            match poses.last_mut().filter(|pose| pose.is_at(&q)) {
+                Some(pose) => pose.add(&q, &now, others),
+                None => poses.push(Pose::new(q, now, others)),
+            }
+        }
+        Ok(())
+    })?;
+    if pace == Pace::Continuous {
+        poses.retain(|pose| pose.until - pose.since >= SHORTEST_REST);
+    }
+    let longest = poses.iter().map(|pose| pose.rows).max().unwrap_or(0);
+    poses.retain(|pose| pose.rows as f64 >= SHORT * longest as f64);
+    let near = poses
+        .windows(2)
+        .filter(|two| two[0].is_near(&two[1]))
+        .count();
+    if pace == Pace::Continuous && poses.is_empty() || poses.len() > 2 && 2 * near > poses.len() {
+        return Err(never_rests(&recording.label(), rows));
+    }
+    let still = vec![0.0; chain.joint_count()];
+    for pose in &poses {
+        let count = pose.rows as f64;
+        let q: Vec<f64> = pose.q.iter().map(|sum| sum / count).collect();
+        let mut regressor = [0.0; ENTRIES];
+        wrench_regressor(chain, &q, &still, &still, &mut regressor)
+            .map_err(|e| LoadError::Model(e.to_string()))?;
+        about(&sensor.translation.vector, &mut regressor);
+        let axes = base_axes(chain, &q).map_err(|e| LoadError::Model(e.to_string()))?;
+        take(&WrenchRow {
+            time: pose.others[0] / count,
+            temperature: pose.others[1] / count,
+            regressor,
+            rate: [0.0; ENTRIES],
+            weights: axes.map(|axis| weight(&axis, &sensor.translation.vector)),
+            readings: pose.readings.map(|sum| sum / count),
+        });
+    }
+    Ok(left_out)
+}
+
+/// Says that the rows of a recording are no poses.
+fn never_rests(label: &str, rows: u64) -> LoadError {
+    let remedy = match rows >= FEWEST_ROWS as u64 {
+        true => "leave out --poses".to_owned(),
+        false => format!(
+            "it has {rows} rows; record at least {FEWEST_ROWS} of the motion, or let the robot stand at each pose"
+        ),
+    };
+    LoadError::Moves {
+        label: label.to_owned(),
+        remedy,
+    }
+}
+
+/// Sums over the rows of one pose.
+struct Pose {
+    first: Vec<f64>,
+    /// Time of its first and last row, s.
+    since: f64,
+    until: f64,
+    rows: u64,
+    q: Vec<f64>,
+    readings: [f64; 6],
+    /// Time and temperature.
+    others: [f64; 2],
+}
+
+impl Pose {
+    fn new(q: Vec<f64>, readings: [f64; 6], others: [f64; 2]) -> Self {
+        Self {
+            first: q.clone(),
+            since: others[0],
+            until: others[0],
+            rows: 1,
+            q,
+            readings,
+            others,
+        }
+    }
+
+    fn distance(&self, q: &[f64]) -> f64 {
+        (self.first.iter().zip(q)).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+    }
+
+    fn is_at(&self, q: &[f64]) -> bool {
+        self.distance(q) < AT_REST
+    }
+
+    fn is_near(&self, other: &Self) -> bool {
+        self.distance(&other.first) < NEAR * AT_REST
+    }
+
+    fn add(&mut self, q: &[f64], readings: &[f64; 6], others: [f64; 2]) {
+        self.rows += 1;
+        self.until = others[0];
+        let sums = self
+            .q
+            .iter_mut()
+            .chain(&mut self.readings)
+            .chain(&mut self.others);
+        let values = q.iter().chain(readings).chain(&others);
+        sums.zip(values).for_each(|(sum, value)| *sum += value);
+    }
+}
