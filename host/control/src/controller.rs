@@ -60,6 +60,8 @@ pub(crate) struct Controller<'a> {
     task: Option<&'a ContactTask>,
     inner: Inner,
     effects: Compensated,
+    /// Sentence on a bandwidth below the wanted one.
+    slower: Option<String>,
     known: Vec<f64>,
     load: Vec<f64>,
     pub kind: LawKind,
@@ -125,8 +127,7 @@ fn slowed(
         )
     });
     let note = format!(
-        "Warning: {} runs at {} Hz instead of {} Hz (--bandwidth): at {} ticks a second, with the torque {late}, a faster loop has less than a gain margin of {MARGIN}.{} --rate {} keeps the bandwidth.",
-        kind.name(),
+        "the loop runs at {} Hz instead of {} Hz (--bandwidth): at {} ticks a second, with the torque {late}, a faster loop has less than a gain margin of {MARGIN}.{} With --rate {} it keeps the bandwidth.",
         format_significant(bandwidth, 3),
         format_significant(settings.bandwidth, 3),
         format_significant(settings.rate, 4),
@@ -190,8 +191,6 @@ impl<'a> Controller<'a> {
             },
             _ => Inner::ComputedTorque,
         };
-        let mut effects = Compensated::of(model, settings.friction(), settings.period());
-        effects.notes.extend(slower);
         Ok(Self {
             model,
             settings: *settings,
@@ -199,7 +198,8 @@ impl<'a> Controller<'a> {
             gains,
             task,
             inner,
-            effects,
+            effects: Compensated::of(model, settings.friction(), settings.period()),
+            slower,
             known: vec![0.0; n],
             load: vec![0.0; n],
             kind,
@@ -211,7 +211,12 @@ impl<'a> Controller<'a> {
         self.settings.bandwidth
     }
 
-    /// Returns sentences on what the law leaves out of its model, and on a lower bandwidth.
+    /// Returns a sentence if this bandwidth is lower than the wanted one.
+    pub(crate) fn slower(&self) -> Option<&str> {
+        self.slower.as_deref()
+    }
+
+    /// Returns sentences on what the law leaves out of its model.
     pub(crate) fn notes(&self) -> &[String] {
         &self.effects.notes
     }

@@ -46,6 +46,14 @@ pub struct Run<M> {
     pub notes: Vec<String>,
 }
 
+/// A motion with what its law says.
+struct Moved {
+    trace: Trace,
+    notes: Vec<String>,
+    bandwidth: f64,
+    slower: Option<String>,
+}
+
 impl Bench<'_> {
     /// Runs a law with a model.
     fn run(
@@ -53,12 +61,17 @@ impl Bench<'_> {
         law: LawKind,
         model: &LawModel,
         task: Option<&ContactTask>,
-    ) -> Result<(Trace, Vec<String>, f64), ControlError> {
+    ) -> Result<Moved, ControlError> {
         PositionLimits::of(self.robot).check(self.reference, self.settings.period())?;
         let mut controller = Controller::design(law, model, self.reference, task, &self.settings)?;
         let truth = (self.robot, self.truth);
         let trace = closed_loop(truth, &mut controller, self.reference, task, &self.settings)?;
-        Ok((trace, controller.notes().to_vec(), controller.bandwidth()))
+        Ok(Moved {
+            trace,
+            notes: controller.notes().to_vec(),
+            bandwidth: controller.bandwidth(),
+            slower: controller.slower().map(str::to_owned),
+        })
     }
 
     /// Runs and measures a law that tracks a motion. `name` is that of the model.
@@ -71,7 +84,12 @@ impl Bench<'_> {
         model: &LawModel,
         name: &str,
     ) -> Result<Run<Tracking>, ControlError> {
-        let (trace, notes, bandwidth) = self.run(law, model, None)?;
+        let Moved {
+            trace,
+            notes,
+            bandwidth,
+            slower,
+        } = self.run(law, model, None)?;
         let [tool_rms, tool_largest] =
             measures::tool(&self.truth.chain, self.tool, &trace, self.reference)?;
         let measure = |trace: &Trace| {
@@ -84,7 +102,8 @@ impl Bench<'_> {
             LawKind::Adaptive => Some(self.adaptation(model, &trace)?),
             _ => None,
         };
-        let mut warnings = warnings::of_motion(self.robot, &trace, false);
+        let mut warnings: Vec<String> = slower.into_iter().collect();
+        warnings.extend(warnings::of_motion(self.robot, &trace, false));
         warnings.extend(adaptation.as_ref().and_then(warnings::of_adaptation));
         let measures = Tracking {
             law,
@@ -120,7 +139,7 @@ impl Bench<'_> {
         task: &ContactTask,
     ) -> Result<Run<Contact>, ControlError> {
         task_path::check(self.robot, task)?;
-        let (trace, notes, _) = self.run(law, model, Some(task))?;
+        let Moved { trace, notes, .. } = self.run(law, model, Some(task))?;
         let found = measures::force(law, task, &trace)?;
         let measure = |trace: &Trace| measures::force(law, task, trace).map(|own| own.overshoot);
         let mut warnings = warnings::of_motion(self.robot, &trace, true);
@@ -191,7 +210,7 @@ impl Bench<'_> {
                     } {
                         let value = self
                             .run(law, model, task)
-                            .and_then(|(trace, ..)| measure(&trace));
+                            .and_then(|moved| measure(&moved.trace));
                         if let (Ok(value), Ok(mut list)) = (value, found.lock()) {
                             list[k] = value;
                         }

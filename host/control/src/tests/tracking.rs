@@ -313,12 +313,12 @@ fn gains_for_the_own_inertia_fall_until_the_late_loop_has_its_margin() {
             let run = bench(&robot, &truth, &reference, settings)
                 .track(law, &model, "bare")
                 .unwrap();
-            let notes = run.notes.join(" ");
+            let told = run.measures.warnings.join(" ");
             (
                 run.measures.bandwidth,
                 run.measures.tool_rms,
                 run.trace,
-                notes,
+                told,
             )
         };
         let (slow, rms, trace, notes) = track(400.0);

@@ -112,7 +112,7 @@ pub fn load_reference(
     }
     if let (true, Some(block)) = (designed, blocks.first()) {
         let each = |pick: fn(&JointColumns) -> &Option<Vec<f64>>| -> Vec<Vec<f64>> {
-            (block.joints.iter().map(pick).flatten().cloned()).collect()
+            (block.joints.iter().flat_map(pick).cloned()).collect()
         };
         sampled.velocity = each(|joint| &joint.qd);
         sampled.acceleration = each(|joint| &joint.qdd);
