@@ -438,6 +438,29 @@ fn poses_with_moments_in_another_unit_are_refused() {
     }
 }
 
+/// Rows of single poses follow no motion, so only the range of their positions tells degrees.
+#[test]
+fn poses_in_degrees_are_named() {
+    let moving = Moving::new(tx40(), 0.9, 3);
+    let list: Vec<Vec<f64>> = (0..6)
+        .map(|k| moving.position(4.7 * f64::from(k)))
+        .collect();
+    let mut still = poses(&moving, &tool(), &Sensor::default(), &list, 3);
+    let of = |made: &InMemory| {
+        let found = rig_data::implausible_positions(&made.blocks[0], &moving.robot);
+        found.iter().map(|own| own.to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&still), [""; 0]);
+    for joint in &mut still.blocks[0].joints {
+        joint.q.iter_mut().for_each(|q| *q = q.to_degrees());
+    }
+    let found = of(&still);
+    assert!(
+        found.iter().any(|text| text.contains("looks like degrees")),
+        "{found:?}"
+    );
+}
+
 #[test]
 fn a_turned_sensor_is_found_whatever_the_angle() {
     let points = tool();
