@@ -146,7 +146,10 @@ fn displaced_or_scaled(
             delay,
         };
     }
-    let scale = all.into_iter().find(|own| own.cause == Cause::Scale);
+    // A turned sensor that is found from the described rotation is a property beside the description.
+    let of = |cause: &Cause| all.iter().position(|own| own.cause == *cause);
+    let place = of(&Cause::Scale).or_else(|| of(&Cause::ScaleAndTurned));
+    let scale = place.map(|at| all.remove(at));
     let error = sensed.origin(&described.selected.fit);
     let is_far = error.is_some_and(|error| error.norm() > FARTHEST);
     let causes = match scale {
