@@ -174,7 +174,8 @@ fn wrong_options_are_refused_in_a_sentence() {
     assert!(contact(&["--stiffness", "0"]).contains("surface stiffness 0"));
     assert!(contact(&["--pose", "0"]).contains("one for each of the 2 joints"));
     assert!(contact(&["--pose", "nan", "0"]).contains("--pose contains NaN"));
-    assert!(contact(&["--impedance", "nan"]).contains("impedance NaN"));
+    let impedance = ["--law", "impedance", "--impedance", "nan"];
+    assert!(refuse(&mut control("edda.toml", &impedance, &out)).contains("impedance NaN"));
     assert!(contact(&["--slide", "1"]).contains("--slide"));
     // A model of another robot.
     let mut command = control("edda.toml", &[], &out);

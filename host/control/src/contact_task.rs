@@ -362,14 +362,7 @@ impl ContactTask {
         let stiffest = IMPACT * force / (surface.stiffness * inertia[0]).sqrt();
         // Without damping it is infinite.
         let damped = IMPACT * force / surface.damping;
-        let target = 0.2 * settings.bandwidth;
-        let omega = core::f64::consts::TAU * target;
-        let targets: Vec<_> = (inertia.iter())
-            .map(|mass| {
-                let stiffness = options.stiffness.unwrap_or(mass * omega * omega);
-                Target::design(stiffness, target, 1.0)
-            })
-            .collect();
+        let targets = targets(&inertia, options.stiffness, settings);
         let approach = stiffest.min(damped).min(APPROACH);
         let speed = planned_speed(approach, force, &surface, settings);
         let way = surface.gap + depth(force, &targets, &surface);
@@ -432,6 +425,17 @@ impl ContactTask {
         }
         out
     }
+}
+
+/// Returns the behaviour of the impedance along each direction: critically damped at a fifth of the position loops'
+/// bandwidth, with the given stiffness or that of this frequency.
+fn targets(inertia: &[f64], stiffness: Option<f64>, settings: &Settings) -> Vec<Target<f64>> {
+    let bandwidth = 0.2 * settings.bandwidth;
+    let omega = core::f64::consts::TAU * bandwidth;
+    let own = |mass: &f64| stiffness.unwrap_or(mass * omega * omega);
+    (inertia.iter())
+        .map(|mass| Target::design(own(mass), bandwidth, 1.0))
+        .collect()
 }
 
 /// Returns how far behind the surface the reference of the impedance goes to press with `force`, m.

@@ -166,15 +166,7 @@ pub(crate) fn judge(
     let pace = pace(recording, robot)?;
     // A short recording of a motion is searched for rests as well: the readings of a motion need its acceleration.
     let poses = poses || pace == Pace::Listed || rows < FEWEST_ROWS as u64;
-    for (channel, column) in channels.iter().zip(WRENCH_COLUMNS) {
-        if channel.low == channel.high {
-            return Err(LoadError::Dead {
-                label: recording.label(),
-                column,
-                value: channel.low,
-            });
-        }
-    }
+    refuse_dead(recording, &channels)?;
     let mut found = [[End::default(); 2]; 6];
     each_readings(recording, &mut |block, readings| {
         for k in 0..block.len() {
@@ -233,6 +225,19 @@ pub(crate) fn judge(
         cut,
         spike,
     })
+}
+
+/// Refuses a channel that has one value throughout.
+fn refuse_dead(recording: &dyn Recording, channels: &[Channel; 6]) -> Result<(), LoadError> {
+    let mut all = channels.iter().zip(WRENCH_COLUMNS);
+    match all.find(|(channel, _)| channel.low == channel.high) {
+        Some((channel, column)) => Err(LoadError::Dead {
+            label: recording.label(),
+            column,
+            value: channel.low,
+        }),
+        None => Ok(()),
+    }
 }
 
 /// Says that a reading is outside of what the sensor measures.
