@@ -73,6 +73,11 @@ impl<T: Real> Config<T> {
         }
     }
 
+    /// Returns e^{−ω/rate}: θ of an edge in every sample.
+    pub fn decay(&self) -> T {
+        self.decay
+    }
+
     /// Returns the group delay of the acceleration at low frequency, s. That of position and velocity is zero.
     pub fn acceleration_delay(&self) -> T {
         T::from_f64(3.0) / self.pole

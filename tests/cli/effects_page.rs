@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use rig_output::capital;
 use rig_shared::effects::{Confusion, Kind, Need};
 
 use crate::documented::made_page;
@@ -64,13 +65,6 @@ fn need(need: Need) -> String {
 /// Makes words of the library safe for Markdown, in a table too.
 fn escaped(text: &str) -> String {
     (text.replace('*', "\\*").replace('_', "\\_")).replace('|', "\\|")
-}
-
-/// Returns a text with a capital at its beginning.
-fn capital(text: &str) -> String {
-    let mut rest = text.chars();
-    rest.next()
-        .map_or_else(String::new, |c| c.to_uppercase().chain(rest).collect())
 }
 
 /// Returns the titles of the sections, in the order of the registry, with the laws of each.
@@ -138,16 +132,13 @@ fn section(name: &str, kinds: &[Kind], page: &mut String) {
         "**Looks like:** {}.\n",
         escaped(&signatures.join("; "))
     );
-    let mut needs: Vec<String> = (kinds.iter())
-        .flat_map(|k| k.about().needs.iter().map(|n| need(*n)))
-        .collect();
-    let mut seen = Vec::new();
-    needs.retain(|n| {
-        !seen.contains(n) && {
-            seen.push(n.clone());
-            true
+    let mut needs: Vec<String> = Vec::new();
+    for own in kinds.iter().flat_map(|k| k.about().needs) {
+        let words = need(*own);
+        if !needs.contains(&words) {
+            needs.push(words);
         }
-    });
+    }
     let _ = writeln!(page, "**A recording needs:** {}.\n", needs.join("; "));
     let rivals = confusions(name, kinds);
     if rivals.is_empty() {

@@ -33,36 +33,31 @@ pub(crate) struct Drift {
 /// Sums of a joint over stretches of the time since the start of each recording.
 #[derive(Clone, Debug)]
 pub(crate) struct Stretches {
+    /// Places of its friction among the base parameters.
+    friction: Vec<usize>,
     width: f64,
     /// Σ f² and Σ f·r.
     sums: Vec<[f64; 2]>,
 }
 
 impl Stretches {
-    pub(crate) fn new() -> Self {
+    /// Begins for joint `joint`, from 0.
+    pub(crate) fn new(base: &Base, joint: usize) -> Self {
+        let own = [column::VISCOUS, column::COULOMB].map(|c| joint * COLUMNS + c);
         Self {
+            friction: (0..base.len())
+                .filter(|&k| own.contains(&base.columns[k]))
+                .collect(),
             width: WIDTH,
             sums: Vec::new(),
         }
     }
 
-    /// Takes a row of joint `j` at `time` since the start of its recording, with the torque of `values`, the base
-    /// parameters.
-    pub(crate) fn push(
-        &mut self,
-        base: &Base,
-        j: usize,
-        (equation, k): (&Equation, usize),
-        values: &[f64],
-        time: f64,
-    ) {
+    /// Takes row `k` at `time` since the start of its recording, with the torque of `values`, the base parameters.
+    pub(crate) fn push(&mut self, (equation, k): (&Equation, usize), values: &[f64], time: f64) {
         let row = &equation.x[k * values.len()..(k + 1) * values.len()];
-        let (mut friction, mut all) = (0.0, 0.0);
-        for ((x, value), of) in row.iter().zip(values).zip(&base.columns) {
-            all += x * value;
-            let own = [column::VISCOUS, column::COULOMB].map(|c| j * COLUMNS + c);
-            friction += f64::from(u8::from(own.contains(of))) * x * value;
-        }
+        let all: f64 = row.iter().zip(values).map(|(x, value)| x * value).sum();
+        let friction: f64 = self.friction.iter().map(|&c| row[c] * values[c]).sum();
         while time >= self.width * MOST as f64 {
             self.sums = (self.sums.chunks(2))
                 .map(|pair| [0, 1].map(|c| pair.iter().map(|sum| sum[c]).sum()))

@@ -149,7 +149,7 @@ fn rows(
     let p = base.len();
     let mut factors = vec![TriangularFactor::new(p); joints];
     let mut motion = vec![Motion::default(); joints];
-    let mut stretches = vec![Stretches::new(); joints];
+    let mut stretches: Vec<Stretches> = (0..joints).map(|j| Stretches::new(base, j)).collect();
     let mut start = (0, f64::NAN);
     let differential = ModelKind::Differential;
     each_row(
@@ -169,7 +169,7 @@ fn rows(
                     if equation.keep[k] {
                         factor.push(&equation.x[k * p..(k + 1) * p], equation.y[k], 1.0);
                         let time = rows.t[k] - start.1;
-                        stretches[j].push(base, j, (equation, k), values, time);
+                        stretches[j].push((equation, k), values, time);
                     }
                     motion[j].rows += 1.0;
                     motion[j].speed += rows.qd[j][k].powi(2);

@@ -10,8 +10,8 @@ use rig_model::effects::Effects;
 use rig_model::robot::Robot;
 
 /// Streams the rows of recordings over the base parameters, with the treatment of an identification and without the
-/// torque of the described effects. `take` gets the place of the recording, too. `model` tells which equations; those of the integral model have the windows of
-/// `found`, which must then be of that model.
+/// torque of the described effects. `take` gets the place of the recording, too. `model` tells which equations; those of
+/// the integral model have the windows of `found`, which must then be of that model.
 ///
 /// # Errors
 /// Recordings that cannot be read; a robot without a model.

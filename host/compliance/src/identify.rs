@@ -1,7 +1,8 @@
 //! The whole: stiffness of the drives from all sources, and the compliance of the tool point.
 
 use rig_data::prepare::Recording;
-use rig_model::robot::{JointKind, Robot};
+use rig_data::{Block, Implausible, JointColumns, implausible_positions};
+use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit};
 use serde::Serialize;
 
@@ -191,26 +192,30 @@ fn at_poses(
     Ok((computed, map))
 }
 
-/// Refuses a pose in degrees, by the rule for recordings: more than five times the farthest limit, and in degrees near it.
+/// Refuses a pose in degrees, by the rule for recordings.
 fn refuse_pose_in_degrees(robot: &Robot, pose: &[f64]) -> Result<(), ComplianceError> {
-    let in_degrees = robot.joints.iter().zip(pose).find(|(joint, q)| {
-        let Some(limits) = joint.limits.as_ref() else {
-            return false;
-        };
-        let reach = limits.position[0].abs().max(limits.position[1].abs());
-        joint.kind == JointKind::Revolute
-            && q.abs() > 5.0 * reach
-            && q.to_radians().abs() <= 1.2 * reach
+    let row = |q: &f64| JointColumns {
+        q: vec![*q],
+        ..JointColumns::default()
+    };
+    let block = Block {
+        joints: pose.iter().map(row).collect(),
+        ..Block::default()
+    };
+    let found = implausible_positions(&block, robot).into_iter();
+    let in_degrees = found.filter_map(|wrong| match wrong {
+        Implausible::Degrees { joint, .. } => Some(joint - 1),
+        _ => None,
     });
-    match in_degrees {
+    match in_degrees.min() {
         None => Ok(()),
-        Some((joint, q)) => Err(ComplianceError::Option(format!(
+        Some(joint) => Err(ComplianceError::Option(format!(
             "The pose {} has joint \"{}\" at {} rad, far beyond its limits, which looks like degrees; give positions in rad ({}° is {} rad).",
             listed_pose(pose),
-            joint.name,
-            format_significant(*q, 4),
-            format_significant(*q, 4),
-            format_significant(q.to_radians(), 4)
+            robot.joints[joint].name,
+            format_significant(pose[joint], 4),
+            format_significant(pose[joint], 4),
+            format_significant(pose[joint].to_radians(), 4)
         ))),
     }
 }

@@ -12,6 +12,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::sensing::OBSERVER_SHARE;
 use super::settings::{LawKind, Settings};
+use rig_shared::encoder::Config;
 
 /// Gain margin of the loop: the factor of all gains up to which it is stable. By judgement: the law's own model is known, so
 /// the margin covers what the linear loop leaves out, and a model whose inertia is a fifth too large. Friction helps in
@@ -52,8 +53,8 @@ fn tick(state: SVector<f64, 7>, [kp, kd, ki]: [f64; 3], settings: &Settings) -> 
         mut bend,
         mut sum,
     ]: [f64; 7] = state.into();
-    // The observer of rig_shared::encoder with an edge in every sample: v̂/v has −3 dB at OBSERVER_SHARE of the rate.
-    let theta = (-core::f64::consts::TAU * OBSERVER_SHARE / 1.6434).exp();
+    // The observer of rig_shared::encoder with an edge in every sample.
+    let theta = Config::new(OBSERVER_SHARE * settings.rate, settings.rate).decay();
     let left = 1.0 - theta;
     seen += rate + 0.5 * bend;
     rate += bend;

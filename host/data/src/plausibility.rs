@@ -439,13 +439,7 @@ pub fn implausible_positions(block: &Block, robot: &Robot) -> Vec<Implausible> {
     (1..)
         .zip(joints)
         .filter(|(_, (columns, _))| !columns.q.is_empty())
-        .filter_map(|(k, (columns, joint))| {
-            let unit = match joint.kind {
-                JointKind::Revolute => "rad",
-                JointKind::Prismatic => "m",
-            };
-            range_fault(k, &columns.q, joint, unit)
-        })
+        .filter_map(|(k, (columns, joint))| range_fault(k, &columns.q, joint, joint.kind.units().0))
         .collect()
 }
 

@@ -6,7 +6,7 @@ use rig_model::robot::{Robot, WristSensor};
 use rig_output::{format_short, format_significant};
 
 use crate::error::LoadError;
-use crate::pace::{Pace, pace};
+use crate::pace::{Pace, Steps};
 use crate::rows::{Ends, FEWEST_ROWS, LEAST_ROWS, each_readings};
 
 /// Consecutive rows at an extreme value that a cut reading shows at least.
@@ -156,14 +156,18 @@ pub(crate) fn judge(
     sensor: &WristSensor,
     poses: bool,
 ) -> Result<Judged, LoadError> {
-    let (rows, length, channels) = ranges(recording)?;
+    let Seen {
+        rows,
+        length,
+        channels,
+        pace,
+    } = seen(recording, robot)?;
     if rows < LEAST_ROWS as u64 {
         return Err(LoadError::TooFew {
             rows: rows as usize,
             least: LEAST_ROWS,
         });
     }
-    let pace = pace(recording, robot)?;
     // A short recording of a motion is searched for rests as well: the readings of a motion need its acceleration.
     let poses = poses || pace == Pace::Listed || rows < FEWEST_ROWS as u64;
     refuse_dead(recording, &channels)?;
@@ -196,22 +200,22 @@ pub(crate) fn judge(
             *end = [end[0].max(low - beside), end[1].min(high + beside)];
             continue;
         }
-        let seen = [channels[c].low, channels[c].high];
+        let reach = [channels[c].low, channels[c].high];
         for side in 0..2 {
-            let reached = |range: f64| seen[side].abs() >= range;
-            if let Some(range) = range.filter(|range| seen[side].abs() > BEYOND * range) {
-                return Err(beyond(recording, c, seen[side], range));
+            let reached = |range: f64| reach[side].abs() >= range;
+            if let Some(range) = range.filter(|range| reach[side].abs() > BEYOND * range) {
+                return Err(beyond(recording, c, reach[side], range));
             }
             // Rows of one pose repeat a reading, and a reading well inside of the range is none of its ends.
             let is_cut = !poses && found[c][side].is_cut() && range.is_none_or(reached);
             if is_cut || range.is_some_and(reached) {
-                cut.push((WRENCH_COLUMNS[c], seen[side]));
+                cut.push((WRENCH_COLUMNS[c], reach[side]));
             }
             if is_cut {
                 end[side] = if side == 0 {
-                    end[0].max(seen[0])
+                    end[0].max(reach[0])
                 } else {
-                    end[1].min(seen[1])
+                    end[1].min(reach[1])
                 };
             }
         }
@@ -256,8 +260,17 @@ fn beyond(recording: &dyn Recording, c: usize, value: f64, range: f64) -> LoadEr
     ))
 }
 
-/// Returns the number of rows, the length in s and the range of each channel.
-fn ranges(recording: &dyn Recording) -> Result<(u64, f64, [Channel; 6]), LoadError> {
+/// What one pass over a recording tells.
+struct Seen {
+    rows: u64,
+    /// Time from the first to the last row, s.
+    length: f64,
+    channels: [Channel; 6],
+    pace: Pace,
+}
+
+/// Returns rows, length, pace and the range of each channel.
+fn seen(recording: &dyn Recording, robot: &Robot) -> Result<Seen, LoadError> {
     let mut channels: [Channel; 6] = std::array::from_fn(|_| Channel {
         low: f64::INFINITY,
         high: f64::NEG_INFINITY,
@@ -266,10 +279,12 @@ fn ranges(recording: &dyn Recording) -> Result<(u64, f64, [Channel; 6]), LoadErr
         highest: Default::default(),
     });
     let (mut rows, mut times) = (0u64, [f64::INFINITY, f64::NEG_INFINITY]);
+    let mut steps = Steps::of(robot);
     each_readings(recording, &mut |block, readings| {
         rows += block.len() as u64;
-        for t in &block.t {
+        for (k, t) in block.t.iter().enumerate() {
             times = [times[0].min(*t), times[1].max(*t)];
+            steps.push(*t, block.joints.iter().map(|joint| joint.q[k]).collect());
         }
         for (channel, list) in channels.iter_mut().zip(readings) {
             for (value, line) in list.iter().zip(block.first_line..) {
@@ -286,5 +301,10 @@ fn ranges(recording: &dyn Recording) -> Result<(u64, f64, [Channel; 6]), LoadErr
         }
         Ok(())
     })?;
-    Ok((rows, times[1] - times[0], channels))
+    Ok(Seen {
+        rows,
+        length: times[1] - times[0],
+        channels,
+        pace: steps.pace(),
+    })
 }

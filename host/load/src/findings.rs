@@ -4,14 +4,14 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Vector3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::PreprocessingPlan;
 use rig_model::robot::{Reads, Robot, WristSensor};
-use rig_output::format_significant;
+use rig_output::{capital, format_significant};
 
 use crate::error::LoadError;
 use crate::estimate::Estimate;
 use crate::mounting::Channels;
 use crate::statistics::noise_floor;
 use crate::system::{Fit, Nuisance, Sensed};
-use crate::units::{Unit, by_lever};
+use crate::units::{alternatives, by_lever};
 
 /// Angle below which the axes of the sensor are those described, rad: rounding.
 const LEAST_TURN: f64 = 1e-6;
@@ -374,19 +374,14 @@ impl Told<'_> {
 /// Names the units in which the centre of mass is near the sensor, and the options that convert them.
 fn unit_by_lever(lever: f64) -> String {
     let units = by_lever(lever);
-    let list = |of: fn(&Unit) -> &'static str| -> String {
-        let all: Vec<&str> = units.iter().map(|unit| of(unit)).collect();
-        all.join(", or ")
-    };
     match units.is_empty() {
         true => {
             "the moments look like another unit. They must be in N·m, the forces in N".to_owned()
         }
-        false => format!(
-            "{}. Give {}, or moments in N·m and forces in N",
-            list(|unit| unit.words),
-            list(|unit| unit.option)
-        ),
+        false => {
+            let [words, options] = alternatives(&units);
+            format!("{words}. Give {options}, or moments in N·m and forces in N")
+        }
     }
 }
 
@@ -401,14 +396,6 @@ fn words(nuisance: Nuisance) -> &'static str {
         Nuisance::Warming => "a bias that follows the temperature",
         Nuisance::Scale => "another scale of the moments",
     }
-}
-
-/// Returns words that begin with a capital letter.
-pub(crate) fn capital(words: &str) -> String {
-    let mut rest = words.chars();
-    rest.next().map_or_else(String::new, |first| {
-        first.to_uppercase().chain(rest).collect()
-    })
 }
 
 /// Names what a rigid load was compared with in vain.

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 use rig_data::prepare::{PrepareError, Recording};
-use rig_model::robot::{JointKind, Robot};
-use rig_output::format_significant;
+use rig_model::robot::Robot;
+use rig_output::{format_significant, format_unit};
 use rig_shared::multibody::{Chain, point_position};
 
 use crate::error::LoadError;
@@ -53,10 +53,7 @@ pub(crate) fn too_heavy(
         });
     let worst = over.max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)));
     Ok(worst.map(|(joint, torque, limit)| {
-        let unit = match joint.kind {
-            JointKind::Revolute => "N·m",
-            JointKind::Prismatic => "N",
-        };
+        let unit = format_unit(joint.kind.units().1);
         format!(
             "The weight of {} kg asks {} {unit} of joint {}, whose described limit is {} {unit}. If the readings are in mN and mN·m, give --unit fx=mN --unit fy=mN --unit fz=mN --unit mx=mNm --unit my=mNm --unit mz=mNm; otherwise check their unit, or the limit in the description.",
             format_significant(mass, 4),

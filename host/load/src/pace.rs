@@ -1,10 +1,8 @@
 //! How the rows of a recording follow each other: one after the other in time, or pose by pose.
 
-use rig_data::prepare::Recording;
-use rig_model::robot::Robot;
+use rig_model::robot::{Joint, Robot};
 
-use crate::error::LoadError;
-use crate::rows::{FEWEST_ROWS, each_readings};
+use crate::rows::FEWEST_ROWS;
 
 /// Largest movement of a joint within a pose, rad or m: above the noise of encoders, below the distance of poses.
 pub(crate) const AT_REST: f64 = 5e-3;
@@ -26,31 +24,10 @@ pub(crate) enum Pace {
     Continuous,
 }
 
-/// Decides from the time steps and speeds of the rows how they follow each other.
-///
-/// # Errors
-/// As [`each_readings`].
-pub(crate) fn pace(recording: &dyn Recording, robot: &Robot) -> Result<Pace, LoadError> {
-    let speeds: Vec<f64> = (robot.joints.iter())
-        .map(|joint| match &joint.limits {
-            Some(limits) if limits.velocity > 0.0 => limits.velocity,
-            _ => FASTEST,
-        })
-        .collect();
-    let mut steps = Steps::default();
-    each_readings(recording, &mut |block, _| {
-        for k in 0..block.len() {
-            let q: Vec<f64> = block.joints.iter().map(|joint| joint.q[k]).collect();
-            steps.push(block.t[k], q, &speeds);
-        }
-        Ok(())
-    })?;
-    Ok(steps.pace())
-}
-
 /// Sums over the steps from row to row.
-#[derive(Default)]
-struct Steps {
+pub(crate) struct Steps {
+    /// Highest speed of each joint, rad/s or m/s.
+    speeds: Vec<f64>,
     rows: usize,
     /// Time and positions of the last row.
     last: Option<(f64, Vec<f64>)>,
@@ -66,14 +43,33 @@ struct Steps {
 }
 
 impl Steps {
-    fn push(&mut self, t: f64, q: Vec<f64>, speeds: &[f64]) {
+    /// Begins for a robot.
+    pub(crate) fn of(robot: &Robot) -> Self {
+        let speed = |joint: &Joint| match &joint.limits {
+            Some(limits) if limits.velocity > 0.0 => limits.velocity,
+            _ => FASTEST,
+        };
+        Self {
+            speeds: robot.joints.iter().map(speed).collect(),
+            rows: 0,
+            last: None,
+            change: Vec::new(),
+            long: 0,
+            moves: 0,
+            leaps: 0,
+            squares: [0.0; 2],
+        }
+    }
+
+    /// Takes a row.
+    pub(crate) fn push(&mut self, t: f64, q: Vec<f64>) {
         self.rows += 1;
         if let Some((before, from)) = self.last.take() {
             let step = t - before;
             let change: Vec<f64> = q.iter().zip(&from).map(|(a, b)| a - b).collect();
             self.long += usize::from(step > LONGEST_STEP);
             self.moves += usize::from(change.iter().any(|by| by.abs() > AT_REST));
-            let is_leap = (change.iter().zip(speeds))
+            let is_leap = (change.iter().zip(&self.speeds))
                 .any(|(by, speed)| by.abs() > AT_REST + TOO_FAST * speed * step);
             self.leaps += usize::from(is_leap);
             self.squares[0] += change.iter().map(|by| by * by).sum::<f64>();
@@ -85,7 +81,8 @@ impl Steps {
         self.last = Some((t, q));
     }
 
-    fn pace(&self) -> Pace {
+    /// Decides from the time steps and speeds of the rows how they follow each other.
+    pub(crate) fn pace(&self) -> Pace {
         let is_seldom = 2 * self.long + 1 > self.rows;
         // Where many rows are far apart in time, those of a slow motion lie on a smooth path.
         let is_smooth = self.rows >= FEWEST_ROWS && self.squares[1] < self.squares[0];

@@ -22,7 +22,7 @@ const SHORT: f64 = 0.05;
 /// poses in which the robot rests. Returns the number of rows beyond `ends`.
 ///
 /// # Errors
-/// As [`each_row`]; [`LoadError::Moves`] if the recording never rests.
+/// As [`each_readings`]; [`LoadError::Moves`] if the recording never rests.
 pub(crate) fn each_pose(
     chain: &Chain<f64>,
     sensor: &Isometry3<f64>,

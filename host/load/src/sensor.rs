@@ -4,18 +4,18 @@ use nalgebra::{Matrix3, Rotation3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::{PreprocessingPlan, Recording, surveyed};
 use rig_model::robot::{Reads, WristSensor};
-use rig_output::format_significant;
+use rig_output::{capital, format_significant};
 
 use crate::causes::{Cause, Compared, Tried, compare, explains};
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
-use crate::findings::{SensorFindings, Told, capital};
+use crate::findings::{SensorFindings, Told};
 use crate::intake::{Intake, Sensing, judged, moving};
 use crate::mounting::{Channels, Mounting};
 use crate::rows::LEAST_ROWS;
 use crate::settle::settled;
 use crate::system::{Fit, Nuisance, Sensed, Unknowns};
-use crate::units::{Unit, named};
+use crate::units::{alternatives, named};
 
 /// Most times that the readings are shifted by the delay found.
 const MOST_SHIFTS: usize = 8;
@@ -366,12 +366,6 @@ fn unit_words(sensed: &Sensed, fit: &Fit) -> [String; 2] {
             "give forces in N and moments in N·m".to_owned(),
         ];
     }
-    let list = |of: fn(&Unit) -> &'static str| -> String {
-        let all: Vec<&str> = units.iter().map(|unit| of(unit)).collect();
-        all.join(", or ")
-    };
-    [
-        list(|unit| unit.words),
-        format!("give {}", list(|unit| unit.option)),
-    ]
+    let [words, options] = alternatives(&units);
+    [words, format!("give {options}")]
 }

@@ -15,7 +15,7 @@ mod toml_text;
 pub use files::{WriteError, can_take, data_dir, folder, persist, temporary, write_whole};
 pub use finding::{Finding, one_a_kind, worst_first};
 pub use format::{
-    fixed, format_interval, format_p_value, format_short, format_significant, format_time,
+    capital, fixed, format_interval, format_p_value, format_short, format_significant, format_time,
     format_trimmed, format_unit, format_value, listed, power_of_ten,
 };
 pub use spelling::edit_distance;

@@ -63,7 +63,7 @@ pub(crate) struct Args {
     #[arg(long, value_delimiter = ',', requires = "stiffness")]
     stiffness_std: Vec<f64>,
     /// Tool point in the flange frame, m [default: the origin of that frame]
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     tool: Option<Vec<f64>>,
     /// Joint positions, base first, separated by commas, rad or m; give it again for more poses [default: the middle of
     /// the ranges]

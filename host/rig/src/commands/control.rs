@@ -109,19 +109,19 @@ struct ContactArgs {
     #[arg(long)]
     slide: Option<f64>,
     /// Stiffness of the impedance, N/m [default: that of a fifth of the bandwidth]
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     impedance: Option<f64>,
     /// Standard deviation of the noise of the measured force, N [default: 0]
     #[arg(long)]
     noise_force: Option<f64>,
     /// Tool point in the frame of the last joint, m
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     tool: Option<Vec<f64>>,
     /// Start pose, rad or m of each joint
-    #[arg(long, num_args = 1.., allow_negative_numbers = true)]
+    #[arg(long, num_args = 1..)]
     pose: Option<Vec<f64>>,
     /// Direction into the surface, in the base frame
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     normal: Option<Vec<f64>>,
 }
 

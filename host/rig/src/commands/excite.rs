@@ -126,7 +126,7 @@ pub(crate) struct Args {
     pub(crate) load: bool,
     /// Instead of a periodic motion: rest at this number of poses, 3 to 16, which identify mass and centre of mass of
     /// the load by the [wrist_sensor]
-    #[arg(long, requires = "load", allow_negative_numbers = true)]
+    #[arg(long, requires = "load")]
     pub(crate) poses: Option<usize>,
     /// Standard deviations of the forces and of the moments of the [wrist_sensor], separated by a comma, N and N*m
     /// [default: in proportion to its ranges, else 1,0.05] (--load)
@@ -157,14 +157,14 @@ pub(crate) struct Args {
     pub(crate) joint: Option<String>,
     /// Share of each position range that is kept free for the tracking error of the controller, half of it at each end
     /// [default: 0.1 for fourier; else the motion uses 80 % of the distance from its start to the nearer limit]
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     pub(crate) margin: Option<f64>,
     /// Share of the velocity limits that is used; of the acceleration limits its square is used [default: 0.9 for
     /// fourier; else 0.8 of both]. Begin with a small share if the motion is new to the robot
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     pub(crate) speed_share: Option<f64>,
     /// Amplitude to either side of the start, rad or m [default: from the limits] (all but fourier)
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     pub(crate) amplitude: Option<f64>,
     /// Speed of reversals, or slowest and fastest speed of a sweep separated by a comma, rad/s or m/s [default: 0.8 %
     /// of the limit; 0.4 to 80 %]

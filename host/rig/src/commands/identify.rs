@@ -174,30 +174,30 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "auto")]
     compare: Compare,
     /// Weight of each --data, in the order of the recordings; 1 if not given
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     weight: Vec<f64>,
     /// Relative uncertainty of the description's inertial values (0.1 = 10 %). It is used by iv, output-error, ridge
     /// and consistent, and for the links in the written files if there are several joints [default: ridge: the value
     /// that makes the data most likely; else 2]
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     prior_uncertainty: Option<f64>,
     /// Fit the description only: do not look for springs, torque ripple or a tilted base
     #[arg(long)]
     as_described: bool,
     /// Cut-off of the zero-phase low-pass on the position, Hz, or "auto": chosen from the data
-    #[arg(long, default_value = "auto", value_parser = auto::<f64>, allow_negative_numbers = true)]
+    #[arg(long, default_value = "auto", value_parser = auto::<f64>)]
     cutoff: Choice<f64>,
     /// Keep every n-th row after the parallel low-pass, or "auto"
     #[arg(long, default_value = "auto", value_parser = auto::<usize>)]
     decimation: Choice<usize>,
     /// Leave out rows slower than this, rad/s or m/s, where the sign of friction is uncertain; 0 keeps all, or "auto"
-    #[arg(long, default_value = "auto", value_parser = speed, allow_negative_numbers = true)]
+    #[arg(long, default_value = "auto", value_parser = speed)]
     min_speed: Choice<f64>,
     /// Length of the windows of the integral model, s [default: chosen from the motion]
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     window: Option<f64>,
     /// Torque lead: time by which a recorded torque acts later, s (half a sample for a command held until the next one)
-    #[arg(long, default_value_t = 0.0, value_parser = lead, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_parser = lead)]
     torque_lead: f64,
     /// Use the recorded qd<k> (and qdd<k>) instead of deriving them from the filtered position
     #[arg(long)]

@@ -54,7 +54,7 @@ pub(crate) struct Args {
     trajectory: Option<PathBuf>,
     /// Position of the link at the start, rad; an incremental encoder cannot measure it. Without it the emulated link
     /// is at -1.5708
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     home: Option<f32>,
     /// Compensate friction and effects with the values of the description
     #[arg(long, requires = "robot")]

@@ -57,10 +57,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "without")]
     tool: Option<PathBuf>,
     /// Origin of the sensor in the flange frame, m
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     sensor_position: Option<Vec<f64>>,
     /// Roll, pitch and yaw of the sensor's axes in the flange frame, rad
-    #[arg(long, num_args = 3, value_names = ["R", "P", "Y"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["R", "P", "Y"])]
     sensor_rotation: Option<Vec<f64>>,
     /// The wrench that the sensor reads: that of the load on the robot (weight, downwards), or that of the robot on it
     #[arg(long, value_enum)]

@@ -40,7 +40,9 @@ mod urdf;
 mod validate;
 mod work;
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
+
+use clap::{CommandFactory, Parser, Subcommand};
 
 pub use diagnose::write_diagnosis;
 pub use error::CommandError;
@@ -48,7 +50,7 @@ pub use identify::{Compare, Impossible, write_identification};
 pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
 pub use overwrite::{refuse_file, refuse_folder};
 use ui::Ui;
-use work::{Work, with_negative_numbers};
+use work::{Work, read_words};
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
 ///
@@ -79,10 +81,14 @@ enum Command {
 }
 
 impl Cli {
-    /// Reads the arguments of the program. A wrong one, or `--help`, ends it.
-    pub fn from_arguments() -> Self {
-        let matches = with_negative_numbers(Self::command()).get_matches();
-        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    /// Reads a command line, the name of the program first.
+    ///
+    /// # Errors
+    /// clap's message about a wrong word, or the text of `--help`; [`clap::Error::exit`] prints it and ends the program.
+    pub fn read<T: Into<OsString> + Clone>(
+        words: impl IntoIterator<Item = T>,
+    ) -> Result<Self, clap::Error> {
+        read_words(words)
     }
 
     /// Runs the command; returns the exit status.

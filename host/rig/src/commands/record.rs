@@ -55,7 +55,7 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 1.0)]
     seconds: f64,
     /// Position of the link at the start, rad; an incremental encoder cannot measure it
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     home: Option<f32>,
     /// Compensate friction and effects with the values of the description
     #[arg(long, requires = "robot")]

@@ -39,16 +39,16 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(crate) out: PathBuf,
     /// Sample rate for a .toml trajectory, Hz; a .csv has its own rate
-    #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1000.0)]
     pub(crate) rate: f64,
     /// Standard deviation of the noise on positions, rad or m
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     pub(crate) noise_position: f64,
     /// Standard deviation of the noise on velocities, rad/s or m/s
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     pub(crate) noise_velocity: f64,
     /// Standard deviation of the noise on torques, N·m or N
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     pub(crate) noise_torque: f64,
     /// Round the positions to the described encoders (encoder_counts_per_rev), after the noise
     #[arg(long)]
@@ -57,17 +57,16 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(crate) load: Option<PathBuf>,
     /// Standard deviation of the noise on the wrist sensor's forces, N
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     pub(crate) noise_force: f64,
     /// Standard deviation of the noise on the wrist sensor's moments, N·m
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     pub(crate) noise_moment: f64,
     /// Constant part of the wrist sensor's readings, N and N·m [default: 0]
     #[arg(
         long,
         num_args = 6,
-        value_names = ["FX", "FY", "FZ", "MX", "MY", "MZ"],
-        allow_negative_numbers = true
+        value_names = ["FX", "FY", "FZ", "MX", "MY", "MZ"]
     )]
     pub(crate) sensor_bias: Option<Vec<f64>>,
     /// Seed of the noise

@@ -1,5 +1,7 @@
 //! The commands that make files: each is also a step of `rig run`.
 
+use std::ffi::OsString;
+
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use super::error::CommandError;
@@ -45,17 +47,27 @@ impl Words {
     ///
     /// # Errors
     /// clap's message about a wrong word.
-    pub(crate) fn read<T: Into<std::ffi::OsString> + Clone>(
+    pub(crate) fn read<T: Into<OsString> + Clone>(
         words: impl IntoIterator<Item = T>,
     ) -> Result<Self, clap::Error> {
-        let matches = with_negative_numbers(Self::command()).try_get_matches_from(words)?;
-        Self::from_arg_matches(&matches)
+        read_words(words)
     }
+}
+
+/// Reads words as a command line, the name of the program first.
+///
+/// # Errors
+/// clap's message about a wrong word.
+pub(crate) fn read_words<C: CommandFactory + FromArgMatches, T: Into<OsString> + Clone>(
+    words: impl IntoIterator<Item = T>,
+) -> Result<C, clap::Error> {
+    let matches = with_negative_numbers(C::command()).try_get_matches_from(words)?;
+    C::from_arg_matches(&matches)
 }
 
 /// Lets every option of a command and of its subcommands take a negative number. The check of the value then says what is
 /// possible, instead of clap that `-2` is no option.
-pub(crate) fn with_negative_numbers(command: clap::Command) -> clap::Command {
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let names: Vec<String> = (command.get_subcommands())
         .map(|own| own.get_name().to_owned())
         .collect();

@@ -9,6 +9,7 @@ use rig_data::prepare::{PreprocessingPlan, Recording, Survey};
 use rig_excite::REPLAY_STEP;
 use rig_model::robot::{Controller, Robot};
 use rig_model::simulate::{Inputs, Model, Motion, SimulateError, closed_loop, controllers};
+use rig_output::capital;
 
 /// Initial and largest number of simulation steps per sample.
 const SUBSTEPS: [u32; 2] = [4, 64];
@@ -83,7 +84,7 @@ impl<'a> Simulation<'a> {
         };
         let (controllers, uncontrolled) = match controllers(robot, model, &first) {
             Ok(found) => found,
-            Err(e) => return Ok(Err(sentence(&e.to_string()))),
+            Err(e) => return Ok(Err(capital(&e.to_string()))),
         };
         let most = subject.options.most_samples;
         let gathered = match gather(robot, &controllers, subject.recording, most)? {
@@ -131,7 +132,7 @@ impl<'a> Simulation<'a> {
         };
         let last = substeps.unwrap_or(most).max(1);
         let mut substeps = substeps.unwrap_or(begin).max(1);
-        let failed = |e: SimulateError| sentence(&e.to_string());
+        let failed = |e: SimulateError| capital(&e.to_string());
         // The work doubles from run to run, so the first ones are a small share of it.
         let mut coarse = self
             .run(substeps, &mut |p| progress(0.3 * p))
@@ -221,13 +222,4 @@ impl<'a> Simulation<'a> {
 /// Returns the controller's torque per position error, N·m/rad or N/m.
 fn stiffness(c: &Controller) -> f64 {
     c.torque_gain * c.velocity_gain * c.position_gain
-}
-
-/// Turns a message of another crate into a sentence.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    letters
-        .next()
-        .map(|c| c.to_uppercase().chain(letters).collect())
-        .unwrap_or_default()
 }

@@ -63,17 +63,17 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "weighted")]
     estimator: Fit,
     /// Share of a joint's torque RMS above which a difference of the parameters matters
-    #[arg(long, default_value_t = 0.05, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.05)]
     tolerance: f64,
     /// Cut-off of the zero-phase low-pass on the position, Hz [default: from each set]
     #[arg(long)]
     cutoff: Option<f64>,
     /// Leave out rows slower than this, rad/s or m/s, where the sign of friction is uncertain; 0 keeps all, or "auto"
-    #[arg(long, default_value = "auto", value_parser = speed, allow_negative_numbers = true)]
+    #[arg(long, default_value = "auto", value_parser = speed)]
     min_speed: Choice<f64>,
     /// Torque lead of all sets: time by which a recorded torque acts later, s (half a sample for a command held until the
     /// next one)
-    #[arg(long, default_value_t = 0.0, value_parser = lead, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_parser = lead)]
     torque_lead: f64,
     /// Seed of the random states from which the base parameters are computed; with --simulated of motions and noise
     #[arg(long, default_value_t = 1)]

@@ -3,7 +3,7 @@
 use super::words;
 use crate::pages::parts;
 use rig_diagnose::outcome::{Diagnosis, NotTestable, Residual, Tried};
-use rig_output::{format_p_value, format_significant};
+use rig_output::{capital, format_p_value, format_significant};
 use rig_report::{self, Block, Column, Section, Table};
 
 /// Number of rows above which a table is folded.
@@ -39,7 +39,7 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
     )
     .with(parts::info(format!(
         "{}. {}",
-        words::capital(&next.kind.to_string()),
+        capital(&next.kind.to_string()),
         next.text
     )));
     if !items.is_empty() {

@@ -4,7 +4,7 @@ use rig_shared::effects::{About, Kind};
 
 use crate::pages::parts;
 use rig_diagnose::outcome::{Diagnosis, Residual, Step, Verdict};
-use rig_output::format_significant;
+use rig_output::{capital, format_significant};
 use rig_report::{NoteKind, Tone};
 
 /// A verdict in a few words.
@@ -66,14 +66,6 @@ pub(super) fn about(effect: &str, law: Option<&str>) -> Option<&'static About> {
 /// An effect for a heading: its title, or its name without underscores.
 pub(super) fn title(effect: &str, law: Option<&str>) -> String {
     capital(&about(effect, law).map_or_else(|| name(effect), |about| about.title.into()))
-}
-
-/// A text with its first letter in upper case.
-pub(super) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
 }
 
 /// An effect's name without underscores.
