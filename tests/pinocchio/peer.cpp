@@ -5,6 +5,8 @@
 #include <pinocchio/algorithm/rnea.hpp>
 #include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/aba.hpp>
+#include <pinocchio/algorithm/aba-derivatives.hpp>
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/regressor.hpp>
 
 #include <algorithm>
@@ -28,6 +30,8 @@ constexpr int RECORDING = 10000;
 struct Check {
     VectorXd q, v, a, tau, forward;
     MatrixXd inertia, regressor;
+    // Of torques by position and velocity; of accelerations by position, velocity and torque (lower triangle).
+    MatrixXd derivatives[5];
 };
 
 struct Arm {
@@ -89,6 +93,10 @@ Arm read(const std::string &path) {
         for (int i = 0; i < arm.n; i++)
             for (int j = 0; j <= i; j++) check.inertia(i, j) = number();
         check.forward = vector(arm.n);
+        for (int part = 0; part < 4; part++) check.derivatives[part] = matrix(arm.n, arm.n);
+        check.derivatives[4] = MatrixXd::Zero(arm.n, arm.n);
+        for (int i = 0; i < arm.n; i++)
+            for (int j = 0; j <= i; j++) check.derivatives[4](i, j) = number();
         check.regressor = matrix(arm.n, 10 * arm.n);
         arm.checks.push_back(check);
     }
@@ -103,7 +111,7 @@ double difference(const MatrixXd &ours, const MatrixXd &theirs) {
 
 void check(Arm &arm) {
     pin::Data data(arm.model);
-    double tau = 0, inertia = 0, forward = 0, regressor = 0;
+    double tau = 0, inertia = 0, forward = 0, regressor = 0, inverse_derivatives = 0, forward_derivatives = 0;
     for (const Check &c : arm.checks) {
         tau = std::max(tau, difference(c.tau, pin::rnea(arm.model, data, c.q, c.v, c.a)));
         // It fills the upper triangle, the other side the lower.
@@ -111,6 +119,14 @@ void check(Arm &arm) {
         m.triangularView<Eigen::Lower>() = pin::crba(arm.model, data, c.q).transpose();
         inertia = std::max(inertia, difference(c.inertia, m));
         forward = std::max(forward, difference(c.forward, pin::aba(arm.model, data, c.q, c.v, c.tau)));
+        pin::computeRNEADerivatives(arm.model, data, c.q, c.v, c.a);
+        inverse_derivatives = std::max({inverse_derivatives, difference(c.derivatives[0], data.dtau_dq),
+                                        difference(c.derivatives[1], data.dtau_dv)});
+        pin::computeABADerivatives(arm.model, data, c.q, c.v, c.tau);
+        MatrixXd inverse = MatrixXd::Zero(arm.n, arm.n);
+        inverse.triangularView<Eigen::Lower>() = data.Minv.transpose();
+        forward_derivatives = std::max({forward_derivatives, difference(c.derivatives[2], data.ddq_dq),
+                                        difference(c.derivatives[3], data.ddq_dv), difference(c.derivatives[4], inverse)});
         // Its order of a link's parameters: m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz.
         const MatrixXd y = pin::computeJointTorqueRegressor(arm.model, data, c.q, c.v, c.a);
         MatrixXd sorted = y;
@@ -120,10 +136,12 @@ void check(Arm &arm) {
         regressor = std::max(regressor, difference(c.regressor, sorted));
     }
     std::printf("%s: largest relative differences over %zu motions: inverse dynamics %.1e, inertia matrix %.1e, "
-                "forward dynamics %.1e, regressor %.1e\n",
-                arm.name.c_str(), arm.checks.size(), tau, inertia, forward, regressor);
+                "forward dynamics %.1e, regressor %.1e, derivatives of inverse dynamics %.1e, of forward dynamics %.1e\n",
+                arm.name.c_str(), arm.checks.size(), tau, inertia, forward, regressor, inverse_derivatives,
+                forward_derivatives);
     // Forward dynamics carries the rounding times the condition of the inertia matrix.
-    if (!(tau < 1e-11 && inertia < 1e-11 && forward < 1e-8 && regressor < 1e-11))
+    if (!(tau < 1e-11 && inertia < 1e-11 && forward < 1e-8 && regressor < 1e-11 && inverse_derivatives < 1e-11
+          && forward_derivatives < 1e-8))
         fail(arm.name + ": the two programs do not agree");
 }
 
@@ -175,6 +193,18 @@ void times(Arm &arm) {
     });
     time(arm, "forward_dynamics", SAMPLES, [&] {
         for (int k = 0; k < SAMPLES; k++) sink += pin::aba(arm.model, data, m.q[k], m.v[k], m.a[k])[0];
+    });
+    time(arm, "inverse_dynamics_derivatives", SAMPLES, [&] {
+        for (int k = 0; k < SAMPLES; k++) {
+            pin::computeRNEADerivatives(arm.model, data, m.q[k], m.v[k], m.a[k]);
+            sink += data.dtau_dq(0, 0);
+        }
+    });
+    time(arm, "forward_dynamics_derivatives", SAMPLES, [&] {
+        for (int k = 0; k < SAMPLES; k++) {
+            pin::computeABADerivatives(arm.model, data, m.q[k], m.v[k], m.a[k]);
+            sink += data.ddq_dq(0, 0);
+        }
     });
     time(arm, "regressor", SAMPLES, [&] {
         for (int k = 0; k < SAMPLES; k++)

@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use rig_model::batch::{BLOCK, BatchError, ChainBatch, ModelBatch, lower};
+use rig_model::batch::{BLOCK, BatchError, ChainBatch, Derivatives, ModelBatch, lower};
 use rig_shared::multibody::{COLUMNS, column};
 
 /// Samples of a call; the other side walks through as many. Results stay in the cache on both sides.
@@ -64,6 +64,25 @@ fn times() {
                 .unwrap();
         });
         print("forward_dynamics", forward);
+        let [mut position, mut velocity] = [(); 2].map(|()| vec![0.0; n * n * SAMPLES]);
+        let mut input = vec![0.0; lower(n, 0) * SAMPLES];
+        let mut derivatives = Derivatives {
+            position: &mut position,
+            velocity: &mut velocity,
+            input: &mut input,
+        };
+        let inverse = nanoseconds(SAMPLES, || {
+            model
+                .inverse_dynamics_derivatives(black_box(&q), &qd, &qdd, &mut derivatives)
+                .unwrap();
+        });
+        print("inverse_dynamics_derivatives", inverse);
+        let forward = nanoseconds(SAMPLES, || {
+            model
+                .forward_dynamics_derivatives(black_box(&q), &qd, &qdd, &mut derivatives)
+                .unwrap();
+        });
+        print("forward_dynamics_derivatives", forward);
         let mut block = chain.block(BLOCK);
         let regressor = nanoseconds(SAMPLES, || {
             chain
@@ -121,6 +140,23 @@ fn write(folder: &Path) {
         model
             .forward_dynamics(&q, &qd, &torques, &mut forward)
             .unwrap();
+        let derivatives = |forward: bool| -> [Vec<f64>; 3] {
+            let [mut position, mut velocity] = [(); 2].map(|()| vec![0.0; n * n * CHECKED]);
+            let mut input = vec![0.0; lower(n, 0) * CHECKED];
+            let mut out = Derivatives {
+                position: &mut position,
+                velocity: &mut velocity,
+                input: &mut input,
+            };
+            let done = if forward {
+                model.forward_dynamics_derivatives(&q, &qd, &torques, &mut out)
+            } else {
+                model.inverse_dynamics_derivatives(&q, &qd, &qdd, &mut out)
+            };
+            done.unwrap();
+            [position, velocity, input]
+        };
+        let derivatives = [derivatives(false), derivatives(true)];
         let mut matrix = chain.block(CHECKED);
         chain
             .differential_regressor(&q, &qd, &qdd, &mut matrix)
@@ -130,6 +166,11 @@ fn write(folder: &Path) {
                 line(&mut text, signal.iter().map(|c| &c[k]));
             }
             for result in [&tau, &inertia, &forward] {
+                line(&mut text, result.iter().skip(k).step_by(CHECKED));
+            }
+            // The inertia matrix among them is checked already.
+            let [[position, velocity, _], forward] = &derivatives;
+            for result in [position, velocity].into_iter().chain(forward) {
                 line(&mut text, result.iter().skip(k).step_by(CHECKED));
             }
             for joint in 0..n {

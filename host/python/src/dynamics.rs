@@ -5,7 +5,7 @@
 
 use numpy::ndarray::{ArrayView2, Axis, Slice};
 use rig_data::prepare::{each_of, threads};
-use rig_model::batch::{BatchError, ChainBatch, ModelBatch, RegressorBlock, lower};
+use rig_model::batch::{BatchError, ChainBatch, Derivatives, ModelBatch, RegressorBlock, lower};
 use rig_shared::multibody::COLUMNS;
 
 /// Samples that are transposed at once: three signals of seven joints take 43 KiB.
@@ -139,13 +139,55 @@ impl<F: FnMut(&[Vec<Vec<f64>>], &mut [f64]) -> Result<(), BatchError>> Kernel fo
         let n = self.size;
         let (columns, rows) = self.triangle.evaluated(signals)?;
         for (k, matrix) in out.chunks_exact_mut(n * n).enumerate() {
-            for i in 0..n {
-                for j in 0..=i {
-                    let value = columns[lower(i, j) * rows + k];
-                    matrix[i * n + j] = value;
-                    matrix[j * n + i] = value;
-                }
+            fill_symmetric(columns, rows, k, n, matrix);
+        }
+        Ok(())
+    }
+}
+
+/// Writes sample `k` of the columns of a lower triangle as a full matrix.
+fn fill_symmetric(columns: &[f64], rows: usize, k: usize, n: usize, matrix: &mut [f64]) {
+    for i in 0..n {
+        for j in 0..=i {
+            let value = columns[lower(i, j) * rows + k];
+            matrix[i * n + j] = value;
+            matrix[j * n + i] = value;
+        }
+    }
+}
+
+/// Derivatives by position, velocity and input: three n×n matrices a sample.
+struct Matrices<F> {
+    function: F,
+    size: usize,
+    columns: [Vec<f64>; 3],
+}
+
+impl<F: FnMut(&[Vec<Vec<f64>>], &mut Derivatives<'_>) -> Result<(), BatchError>> Kernel
+    for Matrices<F>
+{
+    fn compute(&mut self, signals: &[Vec<Vec<f64>>], out: &mut [f64]) -> Result<(), BatchError> {
+        let n = self.size;
+        let rows = samples(signals);
+        let [position, velocity, input] = &mut self.columns;
+        position.resize(n * n * rows, 0.0);
+        velocity.resize(n * n * rows, 0.0);
+        input.resize(lower(n, 0) * rows, 0.0);
+        let mut derivatives = Derivatives {
+            position,
+            velocity,
+            input,
+        };
+        (self.function)(signals, &mut derivatives)?;
+        for (k, sample) in out.chunks_exact_mut(3 * n * n).enumerate() {
+            let (full, symmetric) = sample.split_at_mut(2 * n * n);
+            let columns = position
+                .chunks_exact(rows)
+                .chain(velocity.chunks_exact(rows));
+            for (entry, column) in full.iter_mut().zip(columns) {
+                *entry = column[k];
             }
+            fill_symmetric(input, rows, k, n, symmetric);
         }
         Ok(())
     }
@@ -212,6 +254,43 @@ pub(crate) fn forward(
         by_columns(n, |s: &[Vec<Vec<f64>>], out: &mut [f64]| {
             model.forward_dynamics(&s[0], &s[1], &s[2], out)
         })
+    })
+}
+
+/// Derivatives of the torques of a motion by position, velocity and acceleration, 3·n·n numbers a sample:
+/// `[q, qd, qdd]`.
+pub(crate) fn inverse_derivatives(
+    model: &ModelBatch,
+    signals: [ArrayView2<'_, f64>; 3],
+    wanted: usize,
+) -> Result<Vec<f64>, BatchError> {
+    matrices(model, signals, wanted, |s, out| {
+        model.inverse_dynamics_derivatives(&s[0], &s[1], &s[2], out)
+    })
+}
+
+/// Derivatives of the accelerations by position, velocity and torque, 3·n·n numbers a sample: `[q, qd, tau]`.
+pub(crate) fn forward_derivatives(
+    model: &ModelBatch,
+    signals: [ArrayView2<'_, f64>; 3],
+    wanted: usize,
+) -> Result<Vec<f64>, BatchError> {
+    matrices(model, signals, wanted, |s, out| {
+        model.forward_dynamics_derivatives(&s[0], &s[1], &s[2], out)
+    })
+}
+
+fn matrices(
+    model: &ModelBatch,
+    signals: [ArrayView2<'_, f64>; 3],
+    wanted: usize,
+    function: impl Fn(&[Vec<Vec<f64>>], &mut Derivatives<'_>) -> Result<(), BatchError> + Sync,
+) -> Result<Vec<f64>, BatchError> {
+    let n = model.joint_count();
+    over_rows(&signals, 3 * n * n, wanted, || Matrices {
+        function: &function,
+        size: n,
+        columns: Default::default(),
     })
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PySlice, PyType};
 use rig::commands::{CommandError, refuse_file};
 use rig_identify::{chain_of, column_name, unit};
 use rig_model::batch::{BatchError, ChainBatch, ModelBatch};
@@ -93,6 +93,14 @@ impl Robot {
         same_shape(&all.each_ref())?;
         Ok(all)
     }
+}
+
+/// Returns the three matrices of each sample as views of one array.
+fn three_matrices(all: Bound<'_, PyAny>) -> PyResult<[Bound<'_, PyAny>; 3]> {
+    let py = all.py();
+    let whole = PySlice::full(py);
+    let view = |k: usize| all.get_item((py.Ellipsis(), k, &whole, &whole));
+    Ok([view(0)?, view(1)?, view(2)?])
 }
 
 /// Makes the exception of a batch.
@@ -271,6 +279,48 @@ impl Robot {
             .detach(|| dynamics::forward(&self.model, signals, threads))
             .map_err(failed)?;
         array(py, out, &q, &[q.joints()])
+    }
+
+    /// Return the derivatives of the torques of a motion by q, qd and qdd: three arrays of shape (n, joints, joints).
+    ///
+    /// Entry (i, j) is that of torque i by joint j. The third array is the mass matrix. Viscous friction takes part;
+    /// Coulomb friction counts as constant.
+    #[pyo3(signature = (q, qd, qdd, *, threads = 0))]
+    fn inverse_dynamics_derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        qdd: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<[Bound<'py, PyAny>; 3]> {
+        let [q, qd, qdd] = self.signals([("q", q), ("qd", qd), ("qdd", qdd)])?;
+        let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
+        let out = py
+            .detach(|| dynamics::inverse_derivatives(&self.model, signals, threads))
+            .map_err(failed)?;
+        three_matrices(array(py, out, &q, &[3, q.joints(), q.joints()])?)
+    }
+
+    /// Return the derivatives of the accelerations by q, qd and tau: three arrays of shape (n, joints, joints).
+    ///
+    /// Entry (i, j) is that of acceleration i by joint j. The third array is the inverse of the mass matrix. Viscous
+    /// friction takes part; Coulomb friction counts as constant. Raises ``Error`` as :meth:`forward_dynamics`.
+    #[pyo3(signature = (q, qd, tau, *, threads = 0))]
+    fn forward_dynamics_derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        tau: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<[Bound<'py, PyAny>; 3]> {
+        let [q, qd, tau] = self.signals([("q", q), ("qd", qd), ("tau", tau)])?;
+        let signals = [q.rows()?, qd.rows()?, tau.rows()?];
+        let out = py
+            .detach(|| dynamics::forward_derivatives(&self.model, signals, threads))
+            .map_err(failed)?;
+        three_matrices(array(py, out, &q, &[3, q.joints(), q.joints()])?)
     }
 
     /// Return the mass matrices with drive inertias on the diagonal, shape (n, joints, joints), kg*m^2, kg*m or kg.

@@ -15,6 +15,11 @@ from arms import ONE_LINK, TWO_LINK, TwoLink, random_urdf, states
 ARMS = [(6, 1, ()), (7, 2, ()), (5, 3, (1, 3))]
 
 
+def symmetric(upper):
+    """Return the symmetric matrix of an upper triangle, whatever lies below."""
+    return np.triu(upper) + np.triu(upper, 1).T
+
+
 @pytest.mark.parametrize("joints, seed, prismatic", ARMS)
 def test_pinocchio_gives_the_same_torques_accelerations_and_matrices(joints, seed, prismatic):
     text = random_urdf(joints, seed, prismatic)
@@ -28,13 +33,35 @@ def test_pinocchio_gives_the_same_torques_accelerations_and_matrices(joints, see
     for k in range(len(q)):
         expected = pinocchio.rnea(model, data, q[k], qd[k], qdd[k])
         np.testing.assert_allclose(tau[k], expected, rtol=1e-9, atol=1e-9)
-        crba = pinocchio.crba(model, data, q[k])
-        full = np.triu(crba) + np.triu(crba, 1).T
+        full = symmetric(pinocchio.crba(model, data, q[k]))
         np.testing.assert_allclose(mass[k], full, rtol=1e-9, atol=1e-9)
         held = pinocchio.computeGeneralizedGravity(model, data, q[k])
         np.testing.assert_allclose(gravity[k], held, rtol=1e-9, atol=1e-9)
         aba = pinocchio.aba(model, data, q[k], qd[k], expected)
         np.testing.assert_allclose(acceleration[k], aba, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("joints, seed, prismatic", ARMS)
+def test_pinocchio_gives_the_same_derivatives(joints, seed, prismatic):
+    text = random_urdf(joints, seed, prismatic)
+    robot = rig.Robot.from_urdf(text)
+    model = pinocchio.buildModelFromXML(text)
+    data = model.createData()
+    q, qd, qdd = states(joints, 100, seed)
+    tau = robot.inverse_dynamics(q, qd, qdd)
+    torque = robot.inverse_dynamics_derivatives(q, qd, qdd)
+    acceleration = robot.forward_dynamics_derivatives(q, qd, tau)
+    assert all(part.shape == (100, joints, joints) for part in (*torque, *acceleration))
+    one = robot.inverse_dynamics_derivatives(q[7], qd[7], qdd[7])
+    for k in range(len(q)):
+        by_q, by_qd, mass = pinocchio.computeRNEADerivatives(model, data, q[k], qd[k], qdd[k])
+        for own, other in zip(torque, (by_q, by_qd, symmetric(mass))):
+            np.testing.assert_allclose(own[k], other, rtol=1e-8, atol=1e-8)
+        by_q, by_qd, inverse = pinocchio.computeABADerivatives(model, data, q[k], qd[k], tau[k])
+        for own, other in zip(acceleration, (by_q, by_qd, symmetric(inverse))):
+            np.testing.assert_allclose(own[k], other, rtol=1e-7, atol=1e-7 * np.abs(other).max())
+    for whole, single in zip(torque, one):
+        np.testing.assert_array_equal(whole[7], single)
 
 
 def test_closed_form_equations_give_the_same_torques():

@@ -248,7 +248,7 @@ impl ChainBatch {
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             load(qd, &range, &mut b);
-            in_place(&range, count, out, |out, stride, at| {
+            in_place(&range, count, [&mut *out], |[out], stride, at| {
                 let (frames, gravity) = (&self.frames, self.gravity);
                 dispatch::energy_regressor(frames, gravity, &a, &b, out, stride, at);
             });

@@ -22,6 +22,6 @@ mod threads;
 
 pub use chain::{ChainBatch, RegressorBlock};
 pub use error::BatchError;
-pub use model::ModelBatch;
+pub use model::{Derivatives, ModelBatch};
 pub use rig_shared::multibody::block::lower;
 pub use threads::{BLOCK, each_by, over_threads};

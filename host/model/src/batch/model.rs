@@ -1,10 +1,35 @@
 //! Torques, accelerations and inertia matrices of many samples.
 
-use rig_shared::multibody::block::{Body, CompositeBlock, Frame, JointBlock, lower};
+use rig_shared::multibody::block::{
+    Body, CompositeBlock, DerivativeBlock, Frame, JointBlock, NotPositive, lower,
+};
 use rig_shared::multibody::{COLUMNS, Chain, MultibodyError, column};
+
+use std::ops::Range;
 
 use super::signals::{in_place, lanes, load, output, samples, store, stretches};
 use super::{BatchError, dispatch};
+
+/// Derivatives of a result with n entries: the outputs of a batch.
+#[derive(Debug)]
+pub struct Derivatives<'a> {
+    /// By position: n² columns; column i·n + j is that of entry i by q_j.
+    pub position: &'a mut [f64],
+    /// By velocity, likewise.
+    pub velocity: &'a mut [f64],
+    /// By acceleration or torque: the n(n + 1)/2 columns of the lower triangle of a symmetric matrix. Column
+    /// [`lower(i, j)`](lower) is the entry (i, j) with j ≤ i.
+    pub input: &'a mut [f64],
+}
+
+impl Derivatives<'_> {
+    /// Checks the lengths for `n` joints.
+    fn check(&self, n: usize, samples: usize) -> Result<(), BatchError> {
+        output(n * n, samples, self.position)?;
+        output(n * n, samples, self.velocity)?;
+        output(lower(n, 0), samples, self.input)
+    }
+}
 
 /// A chain with its parameters, prepared for batches.
 #[derive(Clone, Debug)]
@@ -140,7 +165,7 @@ impl ModelBatch {
             load(q, &range, &mut a);
             let (frames, bodies) = (&self.frames, &self.bodies);
             let (work, composite) = (&mut work, &mut composite);
-            in_place(&range, count, out, |out, stride, at| {
+            in_place(&range, count, [&mut *out], |[out], stride, at| {
                 dispatch::inertia_matrix(frames, bodies, &a, work, composite, out, stride, at);
             });
         }
@@ -183,13 +208,103 @@ impl ModelBatch {
                 &mut matrix,
                 &mut d,
             )
-            .map_err(|e| BatchError::NotPositiveDefinite {
-                // The padding of a short stretch repeats its last sample, so it cannot fail first.
-                sample: range.start + e.lane,
-                joint: e.joint,
-            })?;
+            .map_err(|e| not_positive(&range, e))?;
             store(d.iter().map(|lane| &lane.0), &range, count, qdd);
         }
         Ok(())
+    }
+
+    /// Computes the derivatives of the torques of a motion by position, velocity and acceleration (the inertia matrix),
+    /// with drives and viscous friction. Coulomb friction counts as constant.
+    ///
+    /// # Errors
+    /// [`BatchError`] if a length is wrong.
+    pub fn inverse_dynamics_derivatives<S: AsRef<[f64]>>(
+        &self,
+        q: &[S],
+        qd: &[S],
+        qdd: &[S],
+        out: &mut Derivatives<'_>,
+    ) -> Result<(), BatchError> {
+        let n = self.joint_count();
+        let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
+        out.check(n, count)?;
+        let [mut a, mut b, mut c] = [(); 3].map(|()| lanes(n));
+        let mut work = vec![DerivativeBlock::ZERO; n];
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            load(qd, &range, &mut b);
+            load(qdd, &range, &mut c);
+            let (frames, bodies) = (&self.frames, &self.bodies);
+            let outs = [&mut *out.position, &mut *out.velocity, &mut *out.input];
+            in_place(&range, count, outs, |outs, stride, at| {
+                dispatch::inverse_dynamics_derivatives(
+                    frames,
+                    self.gravity,
+                    bodies,
+                    [&a, &b, &c],
+                    &mut work,
+                    outs,
+                    stride,
+                    at,
+                );
+            });
+        }
+        Ok(())
+    }
+
+    /// Computes the derivatives of the accelerations under the torques `tau` by position, velocity and torque (the inverse
+    /// of the inertia matrix), with drives and viscous friction. Coulomb friction counts as constant.
+    ///
+    /// # Errors
+    /// As [`Self::forward_dynamics`].
+    pub fn forward_dynamics_derivatives<S: AsRef<[f64]>>(
+        &self,
+        q: &[S],
+        qd: &[S],
+        tau: &[S],
+        out: &mut Derivatives<'_>,
+    ) -> Result<(), BatchError> {
+        let n = self.joint_count();
+        let count = samples(n, &[("q", q), ("qd", qd), ("tau", tau)])?;
+        out.check(n, count)?;
+        let [mut a, mut b, mut c] = [(); 3].map(|()| lanes(n));
+        let mut joints = vec![JointBlock::ZERO; n];
+        let mut composite = CompositeBlock::ZERO;
+        let mut work = vec![DerivativeBlock::ZERO; n];
+        let mut buffer = lanes(2 * n * n + 2 * lower(n, 0) + n);
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            load(qd, &range, &mut b);
+            load(tau, &range, &mut c);
+            let (frames, bodies) = (&self.frames, &self.bodies);
+            let outs = [&mut *out.position, &mut *out.velocity, &mut *out.input];
+            in_place(&range, count, outs, |outs, stride, at| {
+                dispatch::forward_dynamics_derivatives(
+                    frames,
+                    self.gravity,
+                    bodies,
+                    [&a, &b, &c],
+                    &mut joints,
+                    &mut composite,
+                    &mut work,
+                    &mut buffer,
+                    outs,
+                    stride,
+                    at,
+                )
+            })
+            .map_err(|e| not_positive(&range, e))?;
+        }
+        Ok(())
+    }
+}
+
+/// Names the sample of an inertia matrix that is not positive definite. The padding of a short stretch repeats its last
+/// sample, so it cannot fail first.
+fn not_positive(range: &Range<usize>, found: NotPositive) -> BatchError {
+    BatchError::NotPositiveDefinite {
+        sample: range.start + found.lane,
+        joint: found.joint,
     }
 }

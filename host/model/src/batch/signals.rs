@@ -82,20 +82,25 @@ pub(super) fn store<'a>(
     }
 }
 
-/// Lets `compute(columns, stride, at)` write [`LANES`] entries of every column of `samples` samples, at `range`. A
-/// shorter range is written to temporary columns and copied.
-pub(super) fn in_place(
+/// Lets `compute(columns, stride, at)` write [`LANES`] entries of every column of `samples` samples of each output, at
+/// `range`. A shorter range is written to temporary columns and copied.
+pub(super) fn in_place<const N: usize, R>(
     range: &Range<usize>,
     samples: usize,
-    out: &mut [f64],
-    compute: impl FnOnce(&mut [f64], usize, usize),
-) {
+    outs: [&mut [f64]; N],
+    compute: impl FnOnce([&mut [f64]; N], usize, usize) -> R,
+) -> R {
     if range.len() == LANES {
-        return compute(out, samples, range.start);
+        return compute(outs, samples, range.start);
     }
-    let mut short = vec![0.0; out.len() / samples * LANES];
-    compute(&mut short, LANES, 0);
-    store(short.as_chunks().0.iter(), range, samples, out);
+    let mut short = outs
+        .each_ref()
+        .map(|out| vec![0.0; out.len() / samples * LANES]);
+    let done = compute(short.each_mut().map(Vec::as_mut_slice), LANES, 0);
+    for (out, short) in outs.into_iter().zip(&short) {
+        store(short.as_chunks().0.iter(), range, samples, out);
+    }
+    done
 }
 
 /// Returns one lane a joint, all zero.

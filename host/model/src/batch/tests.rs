@@ -3,15 +3,19 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use rig_shared::dual::Dual;
 use rig_shared::multibody::block::Lane;
 use rig_shared::multibody::{
-    COLUMNS, Chain, JointGeometry, JointKind, differential_regressor, energy_regressor,
-    forward_dynamics, gravity_vector, inertia_matrix, inverse_dynamics,
+    COLUMNS, Chain, JointGeometry, JointKind, articulated_forward_dynamics, differential_regressor,
+    energy_regressor, forward_dynamics, gravity_vector, inertia_matrix, inverse_dynamics,
 };
 
-use super::{BLOCK, BatchError, ChainBatch, ModelBatch, RegressorBlock, lower, over_threads};
+use super::{
+    BLOCK, BatchError, ChainBatch, Derivatives, ModelBatch, RegressorBlock, lower, over_threads,
+};
 
 struct Made {
+    joints: Vec<JointGeometry>,
     chain: Chain<f64>,
     parameters: Vec<[f64; COLUMNS]>,
     /// q, qd, qdd: columns.
@@ -78,6 +82,7 @@ fn made(n: usize, samples: usize, seed: u64) -> Made {
     let signals = [signal(3.0), signal(3.0), signal(10.0)];
     Made {
         chain: Chain::new(&joints, gravity).unwrap(),
+        joints,
         parameters,
         signals,
     }
@@ -143,9 +148,7 @@ fn every_function_agrees_with_that_of_one_sample() {
                 compare("acceleration", &found, count, k, &row, 1e-9);
                 let mut square = vec![0.0; n * n];
                 inertia_matrix(chain, p, &a, &mut square).unwrap();
-                let triangle: Vec<f64> = (0..n)
-                    .flat_map(|i| square[i * n..=i * n + i].to_vec())
-                    .collect();
+                let triangle = triangle(&square, n);
                 compare("inertia", &inertia, count, k, &triangle, 1e-13);
                 assert_eq!(triangle[lower(n - 1, n / 2)], square[(n - 1) * n + n / 2]);
                 let mut line = vec![0.0; width];
@@ -157,6 +160,85 @@ fn every_function_agrees_with_that_of_one_sample() {
                     .map(|entry| stored.column(entry / width, entry % width)[k])
                     .collect();
                 compare("regressor", &row, 1, 0, &wide, 1e-13);
+            }
+        }
+    }
+}
+
+/// Dynamics of one sample: chain, parameters, three signals, result.
+type Dynamics = fn(
+    &Chain<Dual<f64, 1>>,
+    &[[Dual<f64, 1>; COLUMNS]],
+    &[Dual<f64, 1>],
+    &[Dual<f64, 1>],
+    &[Dual<f64, 1>],
+    &mut [Dual<f64, 1>],
+) -> Result<(), rig_shared::multibody::MultibodyError>;
+
+/// Returns the matrix of derivatives by signal `by` of `dynamics`, row by row, by dual numbers.
+fn derivatives(dynamics: Dynamics, made: &Made, signals: &[Vec<f64>; 3], by: usize) -> Vec<f64> {
+    let n = made.joints.len();
+    let chain = Chain::new(&made.joints, made.chain.gravity()).unwrap();
+    let parameters: Vec<_> = (made.parameters.iter())
+        .map(|row| row.map(Dual::constant))
+        .collect();
+    let mut matrix = vec![0.0; n * n];
+    for j in 0..n {
+        let mut input = signals.each_ref().map(|signal| -> Vec<Dual<f64, 1>> {
+            signal.iter().map(|x| Dual::constant(*x)).collect()
+        });
+        input[by][j].derivative = [1.0];
+        let mut out = vec![Dual::constant(0.0); n];
+        let [a, b, c] = &input;
+        dynamics(&chain, &parameters, a, b, c, &mut out).unwrap();
+        for (i, value) in out.iter().enumerate() {
+            matrix[i * n + j] = value.derivative[0];
+        }
+    }
+    matrix
+}
+
+fn triangle(square: &[f64], n: usize) -> Vec<f64> {
+    (0..n)
+        .flat_map(|i| square[i * n..=i * n + i].to_vec())
+        .collect()
+}
+
+/// The forward dynamics of the dual numbers are those of articulated bodies: another algorithm than the batch's.
+#[test]
+fn derivatives_are_those_of_dual_numbers() {
+    for n in LENGTHS {
+        for (seed, count) in [(10, BLOCK + 5), (11, 3), (12, 32)] {
+            let made = made(n, count, seed);
+            let [q, qd, input] = &made.signals;
+            let model = ModelBatch::new(&made.chain, &made.parameters).unwrap();
+            let [mut p, mut v] = [(); 2].map(|()| vec![f64::NAN; n * n * count]);
+            let mut u = vec![f64::NAN; lower(n, 0) * count];
+            for (dynamics, tolerance) in [
+                (inverse_dynamics as Dynamics, 1e-12),
+                (articulated_forward_dynamics, 1e-8),
+            ] {
+                let mut out = Derivatives {
+                    position: &mut p,
+                    velocity: &mut v,
+                    input: &mut u,
+                };
+                if tolerance < 1e-10 {
+                    model
+                        .inverse_dynamics_derivatives(q, qd, input, &mut out)
+                        .unwrap();
+                } else {
+                    model
+                        .forward_dynamics_derivatives(q, qd, input, &mut out)
+                        .unwrap();
+                }
+                for k in (0..count).step_by(7).chain([count - 1]) {
+                    let signals = [at(q, k), at(qd, k), at(input, k)];
+                    let of = |by| derivatives(dynamics, &made, &signals, by);
+                    compare("by position", &p, count, k, &of(0), tolerance);
+                    compare("by velocity", &v, count, k, &of(1), tolerance);
+                    compare("by input", &u, count, k, &triangle(&of(2), n), tolerance);
+                }
             }
         }
     }
@@ -358,7 +440,9 @@ fn flat(lanes: &[Lane]) -> Vec<f64> {
 fn every_version_gives_the_same_results_but_for_rounding() {
     use super::dispatch::*;
     use super::signals::{lanes, load};
-    use rig_shared::multibody::block::{AxisBlock, Body, CompositeBlock, Frame, JointBlock, LANES};
+    use rig_shared::multibody::block::{
+        AxisBlock, Body, CompositeBlock, DerivativeBlock, Frame, JointBlock, LANES,
+    };
     for n in LENGTHS {
         let made = made(n, LANES, 7);
         let frames: Vec<Frame> = Frame::of(&made.chain).collect();
@@ -392,6 +476,52 @@ fn every_version_gives_the_same_results_but_for_rounding() {
         )
         .unwrap();
         alike("acceleration", &flat(&a), &flat(&b), 1e-9);
+        let mut turns = vec![DerivativeBlock::ZERO; n];
+        let mut buffer = lanes(2 * n * n + 2 * lower(n, 0) + n);
+        let out = || [n * n, n * n, lower(n, 0)].map(|columns| vec![f64::NAN; columns * LANES]);
+        let [mut a, mut b] = [out(), out()];
+        let [ma, mb] = [&mut a, &mut b].map(|out| out.each_mut().map(Vec::as_mut_slice));
+        let motion = [&q[..], &qd, &qdd];
+        inverse_dynamics_derivatives(&frames, g, &bodies, motion, &mut turns, ma, LANES, 0);
+        inverse_dynamics_derivatives_portable(
+            &frames, g, &bodies, motion, &mut turns, mb, LANES, 0,
+        );
+        for (a, b) in a.iter().zip(&b) {
+            alike("derivatives of torques", a, b, 1e-13);
+        }
+        let [ma, mb] = [&mut a, &mut b].map(|out| out.each_mut().map(Vec::as_mut_slice));
+        let loaded = [&q[..], &qd, &tau];
+        forward_dynamics_derivatives(
+            &frames,
+            g,
+            &bodies,
+            loaded,
+            &mut work,
+            &mut room,
+            &mut turns,
+            &mut buffer,
+            ma,
+            LANES,
+            0,
+        )
+        .unwrap();
+        forward_dynamics_derivatives_portable(
+            &frames,
+            g,
+            &bodies,
+            loaded,
+            &mut work,
+            &mut room,
+            &mut turns,
+            &mut buffer,
+            mb,
+            LANES,
+            0,
+        )
+        .unwrap();
+        for (a, b) in a.iter().zip(&b) {
+            alike("derivatives of accelerations", a, b, 1e-8);
+        }
         let width = n * COLUMNS;
         let mut axes = vec![AxisBlock::ZERO; n];
         let [mut a, mut b] = [(); 2].map(|()| vec![0.0; n * width * LANES]);

@@ -131,6 +131,24 @@ class Robot:
         Raises ``Error`` with the first sample (from 0) whose mass matrix is not positive definite.
         """
 
+    def inverse_dynamics_derivatives(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int = 0
+    ) -> tuple[_Floats, _Floats, _Floats]:
+        """Return the derivatives of the torques of a motion by q, qd and qdd: three arrays of shape (n, joints, joints).
+
+        Entry (i, j) is that of torque i by joint j. The third array is the mass matrix. Viscous friction takes part;
+        Coulomb friction counts as constant.
+        """
+
+    def forward_dynamics_derivatives(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, *, threads: int = 0
+    ) -> tuple[_Floats, _Floats, _Floats]:
+        """Return the derivatives of the accelerations by q, qd and tau: three arrays of shape (n, joints, joints).
+
+        Entry (i, j) is that of acceleration i by joint j. The third array is the inverse of the mass matrix. Viscous
+        friction takes part; Coulomb friction counts as constant. Raises ``Error`` as :meth:`forward_dynamics`.
+        """
+
     def mass_matrix(self, q: ArrayLike, *, threads: int = 0) -> _Floats:
         """Return the mass matrices with drive inertias on the diagonal, shape (n, joints, joints), kg*m^2, kg*m or kg."""
 

@@ -91,7 +91,7 @@ pub fn forward_dynamics<F: MulAdd>(
 
 /// x −= a·b
 #[inline(always)]
-fn subtract<F: MulAdd>(x: &mut Lane, a: &Lane, b: &Lane) {
+pub(super) fn subtract<F: MulAdd>(x: &mut Lane, a: &Lane, b: &Lane) {
     for k in 0..LANES {
         x[k] = F::mul_add(-a[k], b[k], x[k]);
     }

@@ -14,7 +14,9 @@
 
 mod body;
 mod columns;
+mod derivatives;
 mod forward;
+mod forward_derivatives;
 mod frame;
 mod inertia;
 mod inverse;
@@ -23,7 +25,9 @@ mod regressor;
 
 pub use body::Body;
 pub use columns::Section;
+pub use derivatives::{DerivativeBlock, inverse_dynamics_derivatives};
 pub use forward::{NotPositive, forward_dynamics};
+pub use forward_derivatives::forward_dynamics_derivatives;
 pub use frame::Frame;
 pub use inertia::{CompositeBlock, inertia_matrix, lower};
 pub use inverse::{JointBlock, inverse_dynamics};
