@@ -99,7 +99,7 @@ fn compared(
         parameters: &parameters,
         joint: joint_test.as_ref(),
         without: &without,
-        drifting: &drifting(sets, robot),
+        drifting: &drifting(sets, robot, options.tolerance),
         torque: &torque,
         causes: causes.as_ref(),
         tolerance: options.tolerance,

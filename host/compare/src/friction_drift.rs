@@ -26,6 +26,10 @@ pub(crate) struct Drift {
     pub joint: usize,
     /// Change of the scale of its friction from the first stretch to the last.
     pub change: f64,
+    /// Standard deviation of the change.
+    pub std: f64,
+    /// RMS torque of the change over that of the joint's torque.
+    pub share: f64,
     /// Probability of a line this steep without a change.
     pub p: f64,
 }
@@ -38,6 +42,8 @@ pub(crate) struct Stretches {
     width: f64,
     /// Σ f² and Σ f·r.
     sums: Vec<[f64; 2]>,
+    /// Σ y² of the torque y.
+    torque: f64,
 }
 
 impl Stretches {
@@ -50,6 +56,7 @@ impl Stretches {
                 .collect(),
             width: WIDTH,
             sums: Vec::new(),
+            torque: 0.0,
         }
     }
 
@@ -68,6 +75,7 @@ impl Stretches {
         if self.sums.len() <= place {
             self.sums.resize(place + 1, [0.0; 2]);
         }
+        self.torque += equation.y[k].powi(2);
         let sum = &mut self.sums[place];
         *sum = [
             sum[0] + friction * friction,
@@ -92,12 +100,15 @@ impl Stretches {
         let slope = sum(&|p| (p[0] - time) * (p[1] - scale)) / along;
         let left = sum(&|p| (p[1] - scale - slope * (p[0] - time)).powi(2));
         let freedom = (points.len() - 2) as f64;
-        let t = slope / (left / freedom / along).sqrt();
+        let deviation = (left / freedom / along).sqrt();
+        let t = slope / deviation;
         let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
         let span = points[points.len() - 1][0] - points[0][0];
         t.is_finite().then(|| Drift {
             joint,
             change: slope * span,
+            std: deviation * span,
+            share: (slope * span).abs() * (all / self.torque).sqrt(),
             p: 2.0 * student.sf(t.abs()),
         })
     }

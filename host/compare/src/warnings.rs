@@ -2,7 +2,7 @@
 
 use rig_identify::Warning;
 use rig_model::robot::Robot;
-use rig_output::worst_first;
+use rig_output::{format_significant, format_value, worst_first};
 
 use crate::identified_set::IdentifiedSet;
 use crate::significance::{FAMILY_LEVEL, holm};
@@ -62,8 +62,9 @@ fn line(own: &[SetWarning]) -> String {
     format!("Set {}: {}{rest}", first.set, first.warning)
 }
 
-/// Returns a sentence for each set and joint whose friction changes.
-pub(crate) fn drifting(sets: &[IdentifiedSet], robot: &Robot) -> Vec<String> {
+/// Returns a sentence for each set and joint whose friction changes. `tolerance` is the share of the torque from which on
+/// the change matters.
+pub(crate) fn drifting(sets: &[IdentifiedSet], robot: &Robot, tolerance: f64) -> Vec<String> {
     let all = || {
         (sets.iter()).flat_map(|set| {
             set.drifts
@@ -75,11 +76,17 @@ pub(crate) fn drifting(sets: &[IdentifiedSet], robot: &Robot) -> Vec<String> {
     (all().zip(holm(&p)))
         .filter(|(_, p)| *p < FAMILY_LEVEL)
         .map(|((set, drift), _)| {
+            let consequence = if drift.share > tolerance {
+                "The joint warms up, or the torque constant or the friction changes otherwise. Its values then depend on when they were recorded. Move the joint until its friction stays, or compare later parts of the recordings; \"rig diagnose\" tells what changes."
+            } else {
+                "It hardly matters for the torque, but may explain small differences between the sets."
+            };
             format!(
-                "The friction of {} {} by about {:.0} % during the recordings of {set}: the joint warms up, or the torque constant or the friction changes otherwise. Its values then depend on when they were recorded. Move the joint until its friction stays, or compare later parts of the recordings; \"rig diagnose\" tells what changes.",
+                "The friction of {} {} by ({}) % during the recordings of {set}, which is {} % of the torque. {consequence}",
                 robot.joints[drift.joint].name,
                 if drift.change < 0.0 { "falls" } else { "rises" },
-                100.0 * drift.change.abs(),
+                format_value(100.0 * drift.change.abs(), 100.0 * drift.std),
+                format_significant(100.0 * drift.share, 2),
             )
         })
         .collect()

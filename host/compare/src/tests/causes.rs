@@ -135,7 +135,9 @@ fn friction_that_warms_up_within_a_recording_is_told() {
     let (mut told, mut alarms) = (0, 0);
     for draw in 0..DRAWS {
         let found = said(draw, &cold);
-        let of_third = |reason: &String| reason.contains("falls") && reason.contains("of set 2:");
+        let of_third = |reason: &String| {
+            reason.contains("falls") && reason.contains("of set 2,") && reason.contains("warms up")
+        };
         told += u32::from(found.iter().any(of_third));
         alarms += found.iter().filter(|reason| !of_third(reason)).count();
         alarms += said(draw, &Truth::default()).len();

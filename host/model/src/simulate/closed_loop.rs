@@ -25,7 +25,7 @@ pub struct Inputs<'a> {
     /// Steps within one sample.
     pub substeps: u32,
     /// True if the controllers run once a sample and hold their torque. Otherwise they run at every step, with a
-    /// reference interpolated between samples, like a drive whose loop is faster than its recorder.
+    /// reference interpolated smoothly between samples, like a drive whose loop is faster than its recorder.
     pub held: bool,
 }
 
@@ -33,14 +33,32 @@ impl Inputs<'_> {
     /// Returns reference and feed-forward of joint `i` at `beyond` samples after sample `k`; the last values hold.
     fn asked(&self, i: usize, k: usize, beyond: f64) -> [f64; 2] {
         [self.reference, self.feed_forward].map(|series| {
-            let values = series.get(i).and_then(|list| list.get(k..));
-            match values {
-                Some([now, next, ..]) => now + beyond * (next - now),
-                Some([now]) => *now,
-                _ => 0.0,
-            }
+            let values = series.get(i).map_or(&[][..], Vec::as_slice);
+            between(values, k, beyond)
         })
     }
+}
+
+/// Interpolates at `beyond` samples after sample `k` by the cubic of Catmull and Rom (1974), which is exact for a parabola:
+/// straight lines between the samples would have another mean than the reference, and so another torque at the samples
+/// than between them. Beyond the ends the series goes on with its last second difference.
+fn between(values: &[f64], k: usize, beyond: f64) -> f64 {
+    let (now, next) = match values.get(k..) {
+        Some([now, next, ..]) => (*now, *next),
+        Some([now]) => return *now,
+        _ => return 0.0,
+    };
+    let before = k.checked_sub(1).map(|k| values[k]);
+    let after = values.get(k + 2).copied();
+    let (before, after) = match (before, after) {
+        (Some(before), Some(after)) => (before, after),
+        (Some(before), None) => (before, before + 3.0 * (next - now)),
+        (None, Some(after)) => (after - 3.0 * (next - now), after),
+        (None, None) => (2.0 * now - next, 2.0 * next - now),
+    };
+    let bend = 2.0 * before - 5.0 * now + 4.0 * next - after;
+    let twist = 3.0 * (now - next) + after - before;
+    now + 0.5 * beyond * (next - before + beyond * (bend + beyond * twist))
 }
 
 /// A simulated motion: per joint one value a sample.
@@ -176,4 +194,27 @@ pub fn closed_loop_watched(
         model.effects.read_effort(i, torque, inputs.period);
     }
     Ok(motion)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::between;
+
+    #[test]
+    fn a_parabola_is_interpolated_exactly_to_its_ends() {
+        let of = |t: f64| 0.3 - 1.2 * t + 0.7 * t * t;
+        let values: Vec<f64> = (0..6).map(|k| of(f64::from(k))).collect();
+        for k in 0..5 {
+            for beyond in [0.0, 0.25, 0.8] {
+                let found = between(&values, k, beyond);
+                assert!(
+                    (found - of(k as f64 + beyond)).abs() < 1e-12,
+                    "{k} {beyond}"
+                );
+            }
+        }
+        assert_eq!(between(&values, 5, 0.5), values[5]);
+        assert_eq!(between(&values[..2], 0, 0.5), 0.5 * (values[0] + values[1]));
+        assert_eq!(between(&[], 0, 0.5), 0.0);
+    }
 }
