@@ -1,6 +1,6 @@
 //! The whole identification of a load: sensor, torques, or both.
 
-use nalgebra::{Isometry3, SMatrix, SymmetricEigen};
+use nalgebra::SymmetricEigen;
 use rig_data::prepare::Recording;
 use rig_identify::{chain_of, least_eigenvalue};
 use rig_model::robot::{Joint, Load, Robot};
@@ -8,6 +8,7 @@ use rig_output::{format_significant, listed};
 use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::axes::parameters_from;
 use crate::body::body;
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, sizes_of};
@@ -43,7 +44,7 @@ pub fn identify_load(
     without: &[&dyn Recording],
     options: &LoadOptions,
 ) -> Result<LoadIdentification, LoadError> {
-    let to_joint = transform(&robot.last_link);
+    let to_joint = parameters_from(&robot.last_link);
     let chain = chain_of(robot)?;
     let mut warnings = Vec::new();
     let sensed = match options.by {
@@ -57,7 +58,6 @@ pub fn identify_load(
                     robot,
                     chain: &chain,
                     recordings: &all,
-                    to_joint: &to_joint,
                     prepare: &options.prepare,
                     poses: options.poses,
                     even_if_wrong: options.even_if_wrong,
@@ -241,18 +241,6 @@ fn by_description(robot: &Robot) -> Result<String, LoadError> {
     Ok(format!(
         "The description gave the torque of the robot without the load; {doubt}. A recording without the load (--without) avoids this."
     ))
-}
-
-/// Returns the matrix that turns the ten parameters in the flange frame to those in the frame of the last joint.
-fn transform(flange: &Isometry3<f64>) -> SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS> {
-    let mut matrix = Square::zeros();
-    for k in 0..INERTIAL_PARAMETERS {
-        let mut unit = [0.0; INERTIAL_PARAMETERS];
-        unit[k] = 1.0;
-        let column = Load::of(unit).seen_from(flange).parameters();
-        matrix.column_mut(k).copy_from_slice(&column);
-    }
-    matrix
 }
 
 /// Identifies the load from joint torques. `mass` is a first guess for the plausible sizes.

@@ -42,10 +42,12 @@
 //! # }
 //! ```
 
+mod axes;
 mod body;
 mod candidates;
 mod causes;
 mod channels;
+mod clipping;
 mod controllers;
 mod error;
 mod estimate;

@@ -262,7 +262,7 @@ fn biases(sensor: &SensorFindings) -> Section {
         if let Some(drift) = &bias.drift {
             rows.push(row("change from begin to end".into(), drift));
         }
-        if let Some((time, after)) = &bias.jump {
+        for (time, after) in &bias.jumps {
             rows.push(row(format!("after a jump near {time:.1} s"), after));
         }
     }
