@@ -42,6 +42,7 @@ mod right_angle;
 mod serial_robot;
 mod templates;
 mod text;
+mod toml_message;
 mod unit_check;
 mod unlikely;
 mod urdf;
