@@ -68,6 +68,7 @@ pub use serial_robot::Robot;
 pub use templates::{
     DOUBLE_PENDULUM, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, TX40, XL330, template,
 };
+pub use text::joint_place;
 pub use urdf::{
     Audit, AuditCheck, AuditFinding, ChainChoice, Original, Urdf, audit, is_placeholder,
 };

@@ -86,6 +86,14 @@ fn missing_ratio(robot: &Robot, text: &str, path: &Path) -> Result<(), RobotErro
     Ok(())
 }
 
+/// Returns the place of a value of a joint's table in the text of a TOML description, or of the deepest table on the way to
+/// it that is there. `keys` leads from the table of the joint to the value.
+pub fn joint_place(text: &str, joint: usize, keys: &[&'static str]) -> Place {
+    let mut key_path = vec![Step::Key("joint"), Step::At(joint)];
+    key_path.extend(keys.iter().map(|key| Step::Key(key)));
+    Place::of(text, offset(text, &key_path))
+}
+
 /// Returns the byte offset of the deepest value that `key_path` reaches.
 fn offset(text: &str, key_path: &[Step]) -> usize {
     walk(text, key_path).0
