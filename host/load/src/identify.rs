@@ -4,7 +4,7 @@ use nalgebra::SymmetricEigen;
 use rig_data::prepare::Recording;
 use rig_identify::{chain_of, least_eigenvalue};
 use rig_model::robot::{Joint, Load, Robot};
-use rig_output::{format_significant, listed};
+use rig_output::{format_significant, format_unit, listed};
 use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -15,11 +15,12 @@ use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, s
 use crate::findings::SensorFindings;
 use crate::intake::Sensing;
 use crate::limits::too_heavy;
+use crate::load_friction;
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
 use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers};
 use crate::sensor::by_sensor;
-use crate::torque::{Driven, equations};
+use crate::torque::{Driven, Equations, equations};
 
 /// Probability by chance below which sensor and torques contradict each other.
 const CONTRADICTS: f64 = 1e-3;
@@ -77,6 +78,7 @@ pub fn identify_load(
                 prepare: &options.prepare,
             },
             sensed.as_ref().map(|(found, _)| found.values[0]),
+            &mut warnings,
         )?),
     };
     let (sensed, sensor) = sensed.unzip();
@@ -243,8 +245,38 @@ fn by_description(robot: &Robot) -> Result<String, LoadError> {
     ))
 }
 
-/// Identifies the load from joint torques. `mass` is a first guess for the plausible sizes.
-fn by_torque(driven: &Driven, mass: Option<f64>) -> Result<(Estimate, TorqueFindings), LoadError> {
+/// Says of which joints a rigid load and friction leave more than noise: half of the residual's power is not explained by
+/// the noise of the torque above the band.
+fn unexplained(driven: &Driven, equations: &Equations) -> Option<String> {
+    let all = (driven.robot.joints.iter()).zip(equations.noise.iter().zip(&equations.floor));
+    let list: Vec<String> = all
+        .filter_map(|(joint, (residual, floor))| {
+            let (residual, floor) = ((*residual)?, (*floor)?);
+            let unit = format_unit(joint.kind.units().1);
+            (residual.powi(2) > 2.0 * floor.powi(2)).then(|| {
+                format!(
+                    "{} {unit} RMS of {}, where noise would leave {} {unit}",
+                    format_significant(residual, 3),
+                    joint.name,
+                    format_significant(floor, 3)
+                )
+            })
+        })
+        .collect();
+    (!list.is_empty()).then(|| {
+        format!(
+            "The load and friction as modelled leave more of the torques than noise as that above the band: {}. The values can be wrong by more than their standard deviations. Likely causes: friction that changes with speed, position, temperature or load, contact, cables, noise of the positions, or noise of the torques that is slow.",
+            listed(&list)
+        )
+    })
+}
+
+/// Identifies the load from joint torques; adds sentences to `warnings`. `mass` is a first guess for the plausible sizes.
+fn by_torque(
+    driven: &Driven,
+    mass: Option<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<(Estimate, TorqueFindings), LoadError> {
     let equations = equations(driven)?;
     let mut mass = mass.unwrap_or(1.0);
     let mut found = estimate(&equations.segments, mass, Spread::Segments);
@@ -258,12 +290,17 @@ fn by_torque(driven: &Driven, mass: Option<f64>) -> Result<(Estimate, TorqueFind
             why: "the joint torques show none of its parameters; record a livelier motion, or a heavier load".to_owned(),
         });
     }
-    let names = driven.robot.joints.iter().map(|j| j.name.clone());
+    let joints = &driven.robot.joints;
+    let (friction, constant) = (&equations.friction, equations.constant_friction);
+    warnings.extend(load_friction::words(friction, joints, constant));
+    warnings.extend(unexplained(driven, &equations));
     Ok((
         found,
         TorqueFindings {
-            joints: names.collect(),
+            joints: joints.iter().map(|j| j.name.clone()).collect(),
             residual: equations.noise,
+            noise: equations.floor,
+            load_friction: equations.friction,
             with_unloaded: !driven.without.is_empty(),
             prepared: equations.plan,
             traces: equations.traces,
