@@ -3,7 +3,8 @@
 //! The torque that is carried follows from the fit itself, so the column of such friction is made of the fit before, and
 //! the fit is repeated.
 //!
-//! Leaves out: friction on the link's side of the gear, and a term with the square of the load.
+//! Leaves out: friction on the link's side of the gear, a term with the square of the load, and that a gear of coupled
+//! drives carries the torque of several joints.
 
 use nalgebra::DVector;
 use rig_identify::{LeaveOut, Refit, TriangularFactor};
@@ -23,7 +24,8 @@ const GROWS: f64 = 1e-3;
 pub struct LoadFriction {
     /// Index of the joint, from 0.
     pub joint: usize,
-    /// Friction per torque that is carried, 1.
+    /// Friction per torque that the joint carries, 1. With coupled drives or a screw it is not that of a gear, which carries
+    /// another torque.
     pub coefficient: f64,
     /// Its standard deviation.
     pub std: f64,
@@ -34,12 +36,20 @@ pub struct LoadFriction {
 /// Says of which joints friction grows with the load; `None` if of none. `mass` is that of the fit without such friction,
 /// kg.
 pub(crate) fn words(found: &[LoadFriction], joints: &[Joint], mass: f64) -> Option<String> {
+    let drives = joints.iter().filter_map(|joint| joint.drive.as_ref());
+    // The coefficient of the joint's torque is then not that of a gear.
+    let is_coupled = drives
+        .into_iter()
+        .any(|d| !d.couples.is_empty() || d.screw.is_some());
     let of = |own: &LoadFriction| {
         let joint = &joints[own.joint];
         format!(
-            "{} (coefficient {}, {} {} RMS with the load)",
+            "{} ({}{} {} RMS with the load)",
             joint.name,
-            format_value(own.coefficient, own.std),
+            match is_coupled {
+                true => String::new(),
+                false => format!("coefficient {}, ", format_value(own.coefficient, own.std)),
+            },
             format_significant(own.size, 3),
             format_unit(joint.kind.units().1)
         )
