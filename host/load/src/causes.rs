@@ -2,7 +2,8 @@
 //! the noise would leave.
 //!
 //! A cause is believed if it leaves about the noise, leaves decisively less than the description does, and no cause with
-//! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit has one, a turned sensor three.
+//! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit or gain has one, a turned
+//! sensor three.
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 

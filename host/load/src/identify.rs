@@ -34,7 +34,8 @@ const COMPARED: f64 = 0.5;
 /// data show them. By torque the ten columns of the last link
 /// explain what the recordings with the load show beyond those without it (Khalil, Gautier & Lemoine 2007).
 ///
-/// Leaves out: elasticity between flange and load, gain and crosstalk of the sensor, cables that pull. At rest an error of
+/// Leaves out: elasticity between flange and load, gains of several channels and crosstalk of the
+/// sensor, cables that pull. At rest an error of
 /// the sensor's position is an error of the centre of mass, and neither is seen.
 ///
 /// # Errors
