@@ -206,22 +206,7 @@ pub(crate) fn judge(
     // A short recording of a motion is searched for rests as well: the readings of a motion need its acceleration.
     let poses = poses || pace == Pace::Listed || rows < FEWEST_ROWS as u64;
     refuse_dead(recording, &channels)?;
-    let mut found = [[End::default(); 2]; 6];
-    each_readings(recording, &mut |block, readings| {
-        for k in 0..block.len() {
-            for ((end, channel), list) in found.iter_mut().zip(&channels).zip(readings) {
-                let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
-                let width = channel.width();
-                for (end, distance) in
-                    (end.iter_mut()).zip([list[k] - channel.low, channel.high - list[k]])
-                {
-                    end.push(distance, near, channel.step);
-                    end.pile.push(distance, width);
-                }
-            }
-        }
-        Ok(())
-    })?;
+    let found = counted(recording, &channels)?;
     let mut ends = [[f64::NEG_INFINITY, f64::INFINITY]; 6];
     let (mut cut, mut suspects, mut spike) = (Vec::new(), Vec::new(), None);
     for (c, end) in ends.iter_mut().enumerate() {
@@ -277,6 +262,27 @@ pub(crate) fn judge(
         suspects,
         spike,
     })
+}
+
+/// Counts the rows at and near the ends of each channel.
+fn counted(recording: &dyn Recording, channels: &[Channel; 6]) -> Result<[[End; 2]; 6], LoadError> {
+    let mut found = [[End::default(); 2]; 6];
+    each_readings(recording, &mut |block, readings| {
+        for k in 0..block.len() {
+            for ((end, channel), list) in found.iter_mut().zip(channels).zip(readings) {
+                let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
+                let width = channel.width();
+                for (end, distance) in
+                    (end.iter_mut()).zip([list[k] - channel.low, channel.high - list[k]])
+                {
+                    end.push(distance, near, channel.step);
+                    end.pile.push(distance, width);
+                }
+            }
+        }
+        Ok(())
+    })?;
+    Ok(found)
 }
 
 /// Refuses a channel that has one value throughout.
