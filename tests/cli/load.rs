@@ -245,3 +245,101 @@ fn wrong_recordings_and_options_of_a_load_are_refused() {
     assert!(load(&still, &["--sensor-rotation", "0", "0", "90"]).contains("at most 7 rad"));
     assert!(!at("out").exists());
 }
+
+/// A copy counts the noise of a recording twice, whatever its name.
+#[test]
+fn a_copy_of_a_recording_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let header = "t,q1,tau1,fx,fy,fz,mx,my,mz\n";
+    let row = |k: u32| format!("{k},0.{k},0,1,2,{k},0,0,0.{k}\n");
+    let rows: String = (0..9).map(row).collect();
+    for name in ["own.csv", "copy.csv"] {
+        fs::write(at(name), header.to_owned() + &rows).unwrap();
+    }
+    let refused = |command: &str, options: &[(&str, &str)]| {
+        let mut rig = rig();
+        rig.args([command, "--robot"]).arg(robot("one-link.toml"));
+        for (option, name) in options {
+            rig.arg(option).arg(at(name));
+        }
+        refuse(rig.arg("--out").arg(at("out")))
+    };
+    let says = |said: &str| said.contains("copy.csv holds samples of") && said.contains("own.csv");
+    for (command, option) in [
+        ("load", "--data"),
+        ("compliance", "--load"),
+        ("identify", "--data"),
+    ] {
+        let said = refused(command, &[(option, "own.csv"), (option, "copy.csv")]);
+        assert!(says(&said), "{said}");
+    }
+    let said = refused("load", &[("--data", "own.csv"), ("--without", "copy.csv")]);
+    assert!(said.contains("has the same bytes"), "{said}");
+    assert!(!at("out").exists());
+}
+
+/// Friction of a gear that grows with the load is no part of the mass, and is told with its joint.
+#[test]
+fn friction_that_grows_with_the_load_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let effect =
+        "\n[[effect]]\nkind = \"load_friction\"\njoint = \"lower_arm\"\ncoefficient = 0.1\n";
+    let text = fs::read_to_string(robot("irp6.toml")).unwrap();
+    fs::write(at("rubs.toml"), text + effect).unwrap();
+    fs::write(at("part.toml"), LOAD).unwrap();
+    succeed(&mut excite(
+        &robot("irp6.toml"),
+        &["--load", "--starts", "1", "--period", "12"],
+        &at("motion.toml"),
+    ));
+    for (name, seed, load) in [("with.csv", "1", true), ("without.csv", "2", false)] {
+        let mut command = rig();
+        command.args(["simulate", "--robot"]).arg(at("rubs.toml"));
+        command.arg("--trajectory").arg(at("motion.toml"));
+        command.args(["--rate", "100", "--noise-torque", "0.5", "--seed", seed]);
+        if load {
+            command.arg("--load").arg(at("part.toml"));
+        }
+        succeed(command.arg("--out").arg(at(name)));
+    }
+    let mut command = rig();
+    command
+        .args(["load", "--by", "torque", "--robot"])
+        .arg(robot("irp6.toml"));
+    command.arg("--data").arg(at("with.csv"));
+    command.arg("--without").arg(at("without.csv"));
+    let said = succeed(command.arg("--out").arg(at("out")));
+    println!("{said}");
+    let text = fs::read_to_string(at("out/load.json")).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let rubbing = found["torque"]["load_friction"].as_array().unwrap();
+    assert!(rubbing.iter().any(|own| own["joint"] == 1), "{found}");
+    let mass = found["mass"]["value"].as_f64().unwrap();
+    assert!((mass - 1.0).abs() < 0.03, "{mass}");
+}
+
+/// A limit of a motor that leaves no motion is named by file, line and joint.
+#[test]
+fn a_limit_of_a_motor_of_the_wrist_is_refused_by_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wrist.toml");
+    let text = fs::read_to_string(robot("irp6.toml")).unwrap();
+    for (limit, line) in [
+        ("position = [1e4, 2e4]", "position ="),
+        ("torque = 1e-9", "torque = 1e-9"),
+    ] {
+        let text = text.clone() + "\n[joint.drive.limits]\n" + limit + "\n";
+        let number = text.lines().count();
+        assert!(text.lines().last().unwrap().starts_with(line));
+        fs::write(&path, &text).unwrap();
+        let out = folder.path().join("motion.toml");
+        let said = refuse(&mut excite(&path, &["--load"], &out));
+        let place = format!("wrist.toml:{number}:");
+        assert!(
+            said.contains(&place) && said.contains("wrist_turn"),
+            "{said}"
+        );
+    }
+}

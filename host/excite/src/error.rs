@@ -229,6 +229,38 @@ pub enum ExciteError {
     },
 }
 
+impl ExciteError {
+    /// Returns the joint of which a described value leaves no motion, and the keys that lead from its table to the value;
+    /// `None` if it is no value of one joint.
+    pub fn described_value(&self) -> Option<(&str, &'static [&'static str])> {
+        match self {
+            Self::MotorAngle { joint, .. } => Some((joint, &["drive", "limits", "position"])),
+            Self::Weak { joint, of, .. } => Some((
+                joint,
+                match of {
+                    LimitedTorque::Motor => &["drive", "limits", "torque"],
+                    LimitedTorque::Joint(_) => &["limits", "torque"],
+                },
+            )),
+            Self::Infeasible { joint, limit } => Some((
+                joint,
+                match *limit {
+                    "position" => &["limits", "position"],
+                    "velocity" => &["limits", "velocity"],
+                    "acceleration" => &["limits", "acceleration"],
+                    "torque" => &["limits", "torque"],
+                    "crank" => &["drive", "screw"],
+                    "motor angle" => &["drive", "limits", "position"],
+                    "motor speed" => &["drive", "limits", "velocity"],
+                    "motor torque" => &["drive", "limits", "torque"],
+                    _ => return None,
+                },
+            )),
+            _ => None,
+        }
+    }
+}
+
 /// Whose torque limit cannot move the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitedTorque {

@@ -51,7 +51,7 @@ pub(crate) fn turned(sensed: &Sensed, mounting: &Mounting) -> Vec<Mounting> {
         .to_vec()
 }
 
-/// Returns the covariance of the acceleration of the last joint against gravity (rows) with the forces as read (columns).
+/// Returns the covariance of the acceleration of the sensor against gravity (rows) with the forces as read (columns).
 fn weights_by_forces(sensed: &Sensed) -> Matrix3<f64> {
     let mut sum = Matrix3::zeros();
     for recorded in sensed.recordings.iter().filter(|r| r.loaded) {
@@ -77,6 +77,78 @@ fn weights_by_forces(sensed: &Sensed) -> Matrix3<f64> {
     sum
 }
 
+/// Returns the right-handed orders of the channels of a kind that fit best if the kind is fitted alone, with the squares that
+/// they leave, the best first. An order and its opposite leave the same, with the opposite load.
+fn orders(
+    sensed: &Sensed,
+    mounting: &Mounting,
+    unknowns: &Unknowns,
+    kind: usize,
+) -> Vec<(f64, Matrix3<f64>)> {
+    let right_handed = signed_permutations().into_iter();
+    let mut found: Vec<(f64, Matrix3<f64>)> = right_handed
+        .filter(|matrix| matrix.determinant() > 0.0)
+        .map(|matrix| {
+            let own = mounting.after(&Channels {
+                force: matrix,
+                moment: matrix,
+            });
+            (sensed.squares_alone(&own, unknowns, kind), matrix)
+        })
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.truncate(KEPT);
+    found
+}
+
+/// Returns exchanges of channels beside another scale of the moments, with the scale that fits each best as a start.
+/// Forces and moments are put in order one by one, because a scale does not change what either leaves alone. With
+/// `sign_stated` the mass must be positive.
+pub(crate) fn exchanged_and_scaled(
+    sensed: &Sensed,
+    mounting: &Mounting,
+    unknowns: &Unknowns,
+    sign_stated: bool,
+) -> Vec<(Channels, Mounting)> {
+    let [forces, moments] = [0, 1].map(|kind| orders(sensed, mounting, unknowns, kind));
+    let mut pairs: Vec<(f64, Channels)> = Vec::new();
+    for (of_forces, force) in &forces {
+        for (of_moments, moment) in &moments {
+            let score = of_forces.ln() + of_moments.ln();
+            pairs.extend([1.0, -1.0].map(|sign| {
+                let channels = Channels {
+                    force: *force,
+                    moment: *moment * sign,
+                };
+                (score, channels)
+            }));
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let signed = |(_, channels): (f64, Channels)| {
+        let start = scaled(sensed, &mounting.after(&channels), unknowns);
+        let mass = sensed.fit(&start, unknowns).values.first().copied();
+        let opposite = Channels {
+            force: -channels.force,
+            moment: -channels.moment,
+        };
+        let is_opposite = match sign_stated {
+            true => mass.is_some_and(|mass| mass < 0.0),
+            false => opposite.changes() < channels.changes(),
+        };
+        match is_opposite {
+            true => (opposite, start.opposite()),
+            false => (channels, start),
+        }
+    };
+    let kept = pairs.into_iter().take(2 * CHANNELS).map(signed);
+    // A turned sensor in another unit is a cause of its own.
+    let is_other = |(own, _): &(Channels, Mounting)| {
+        !own.is_rotation() && (sign_stated || !own.is_opposite_rotation())
+    };
+    kept.filter(is_other).collect()
+}
+
 /// Returns the exchanges of channels that fit best, the best first; `sensed` has one segment a recording. Rotations of
 /// both kinds alike are left out. With `sign_stated` the mass must be positive.
 pub(crate) fn exchanged(
@@ -85,25 +157,11 @@ pub(crate) fn exchanged(
     unknowns: &Unknowns,
     sign_stated: bool,
 ) -> Vec<Channels> {
-    let orders = |kind: usize| -> Vec<Matrix3<f64>> {
-        let of = |matrix: &Matrix3<f64>| Channels {
-            force: *matrix,
-            moment: *matrix,
-        };
-        // An order and its opposite leave the same, with the opposite load: the fits below tell them apart.
-        let right_handed = signed_permutations().into_iter();
-        let mut found: Vec<(f64, Matrix3<f64>)> = right_handed
-            .filter(|matrix| matrix.determinant() > 0.0)
-            .map(|matrix| {
-                let own = mounting.after(&of(&matrix));
-                (sensed.squares_alone(&own, unknowns, kind), matrix)
-            })
-            .collect();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let kept = found.into_iter().take(KEPT);
-        kept.flat_map(|(_, matrix)| [matrix, -matrix]).collect()
+    let both = |kind: usize| -> Vec<Matrix3<f64>> {
+        let own = orders(sensed, mounting, unknowns, kind).into_iter();
+        own.flat_map(|(_, matrix)| [matrix, -matrix]).collect()
     };
-    let (forces, moments) = (orders(0), orders(1));
+    let (forces, moments) = (both(0), both(1));
     let mut found: Vec<(f64, Channels)> = Vec::new();
     for force in &forces {
         for moment in &moments {

@@ -2,9 +2,12 @@
 //! the noise would leave.
 //!
 //! A cause is believed if it leaves about the noise, leaves decisively less than the description does, and no cause with
-//! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit has one, a turned sensor three.
+//! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit or gain has one, a turned
+//! sensor three.
 
-use crate::candidates::{exchanged, scaled, turned};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::candidates::{exchanged, exchanged_and_scaled, scaled, turned};
 use crate::mounting::{Channels, Mounting};
 use crate::selection::{Selected, selected};
 use crate::settle::{DECISIVE, settled};
@@ -31,6 +34,9 @@ const FARTHEST: f64 = 0.3;
 /// Factor beside a scale that must be told from it.
 const BESIDE: f64 = 1.1;
 
+/// Probability by chance below which a gain of a channel of poses is looked at.
+const BY_CHANCE: f64 = 1e-3;
+
 /// Why readings are not those of a load as described.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Cause {
@@ -44,6 +50,12 @@ pub(crate) enum Cause {
     Turned,
     /// Both.
     ScaleAndTurned,
+    /// Channels are exchanged or reversed, and the moments have another unit.
+    ScaleAndChannels(Channels),
+    /// A channel reads its noise, and nothing of the load.
+    Dead(usize),
+    /// A channel reads the load with another gain.
+    Gain(usize),
 }
 
 /// A cause that was fitted.
@@ -95,7 +107,7 @@ pub(crate) fn compare(
         };
     }
     let mut all = trial.causes(unknowns, sign_stated);
-    all.retain(|own| own.score.is_finite());
+    all.retain(|own| own.score.is_finite() && trial.is_no_chance(own));
     let nearest = all.iter().min_by(|a, b| a.score.total_cmp(&b.score));
     let nearest = nearest.filter(|own| own.score < described.score - DECISIVE);
     let delay = sensed.delay(&nearest.unwrap_or(&described).selected.fit);
@@ -146,6 +158,21 @@ fn displaced_or_scaled(
             delay,
         };
     }
+    // A channel alone has one unknown, a position three.
+    let is_channel = |own: &Tried| {
+        matches!(own.cause, Cause::Dead(_) | Cause::Gain(_))
+            && own.score < described.score - DECISIVE
+    };
+    if all.iter().any(is_channel) {
+        all.retain(is_channel);
+        all.sort_by(|a, b| a.score.total_cmp(&b.score));
+        let only = without_special_cases(sensed, all);
+        return Compared {
+            causes: only,
+            described,
+            delay,
+        };
+    }
     // A turned sensor that is found from the described rotation is a property beside the description.
     let of = |cause: &Cause| all.iter().position(|own| own.cause == *cause);
     let place = of(&Cause::Scale).or_else(|| of(&Cause::ScaleAndTurned));
@@ -154,9 +181,8 @@ fn displaced_or_scaled(
     let is_far = error.is_some_and(|error| error.norm() > FARTHEST);
     let causes = match scale {
         Some(own) if is_far || is_unit(sensed, &own) => vec![own],
-        Some(_) => {
-            let pair = [Nuisance::Origin, Nuisance::Scale];
-            described.selected.alternatives.push(pair);
+        Some(own) => {
+            described.selected.add_scale(sensed, &own.selected.fit);
             Vec::new()
         }
         None => Vec::new(),
@@ -198,16 +224,25 @@ fn without_special_cases(sensed: &Sensed, mut all: Vec<Tried>) -> Vec<Tried> {
         match is_far || is_scale_certain {
             true => drop(all.remove(at)),
             false => {
-                let pair = [Nuisance::Origin, Nuisance::Scale];
-                all[at].selected.alternatives.push(pair);
+                let scaled = (all.iter()).find(|own| own.cause == Cause::ScaleAndTurned);
+                let scaled = scaled.map(|own| own.selected.fit.clone());
+                if let Some(fit) = scaled {
+                    all[at].selected.add_scale(sensed, &fit);
+                }
             }
         }
     }
     let is_turned = has(&all, &Cause::Turned);
     let is_mirrored = all.iter().any(is_opposite);
+    let is_exchanged = (all.iter()).any(|own| matches!(own.cause, Cause::Channels(_)));
+    let is_special =
+        (all.iter()).any(|own| matches!(own.cause, Cause::Channels(_) | Cause::Dead(_)));
     all.retain(|own| match own.cause {
         Cause::ScaleAndTurned => !is_turned && !is_scaled,
+        Cause::ScaleAndChannels(_) => !is_turned && !is_scaled && !is_exchanged,
         Cause::Turned => !is_mirrored,
+        // Nothing and the opposite are gains, too.
+        Cause::Gain(_) => !is_special,
         Cause::Channels(_) => !is_turned || !own.selected.fit.unknowns.has(Nuisance::Rotation),
         _ => true,
     });
@@ -217,11 +252,18 @@ fn without_special_cases(sensed: &Sensed, mut all: Vec<Tried>) -> Vec<Tried> {
         Cause::Scale => 2,
         Cause::Turned => 3,
         Cause::ScaleAndTurned => 4,
+        Cause::ScaleAndChannels(_) => 5,
+        Cause::Dead(_) => 6,
+        Cause::Gain(_) => 7,
     };
     all.sort_by(|a, b| order(a).cmp(&order(b)).then(a.score.total_cmp(&b.score)));
-    let mut is_first = true;
     // Of exchanges that explain as much, the one nearest to the file is meant.
-    all.retain(|own| !matches!(own.cause, Cause::Channels(_)) || std::mem::take(&mut is_first));
+    let (mut is_first, mut is_first_scaled) = (true, true);
+    all.retain(|own| match own.cause {
+        Cause::Channels(_) => std::mem::take(&mut is_first),
+        Cause::ScaleAndChannels(_) => std::mem::take(&mut is_first_scaled),
+        _ => true,
+    });
     all
 }
 
@@ -275,7 +317,7 @@ impl Trial<'_> {
         let recordings: Vec<Recorded> = sensed.recordings.iter().map(Recorded::in_one).collect();
         let whole = Sensed {
             recordings: &recordings,
-            to_joint: sensed.to_joint,
+            to_axes: sensed.to_axes,
             gravity: sensed.gravity,
         };
         let mut all = Vec::new();
@@ -290,6 +332,23 @@ impl Trial<'_> {
             let start = scaled(&whole, mounting, unknowns);
             let fit = settled(sensed, &start, &scaling);
             all.push((Cause::Scale, start, fit));
+        }
+        let pairs = match can_scale {
+            true => exchanged_and_scaled(&whole, mounting, unknowns, sign_stated),
+            false => Vec::new(),
+        };
+        for (channels, start) in pairs {
+            let fit = settled(sensed, &start, &scaling);
+            let start = mounting.after(&channels).scaled(start.scale);
+            all.push((Cause::ScaleAndChannels(channels), start, fit));
+        }
+        for channel in 0..6 {
+            let dead = mounting.with_gain(channel, 0.0);
+            let fit = sensed.fit(&dead, unknowns);
+            all.push((Cause::Dead(channel), dead.clone(), fit));
+            // The other channels give the load, and the load the gain.
+            let fit = settled(sensed, &dead, &unknowns.with(Nuisance::Gain(channel)));
+            all.push((Cause::Gain(channel), dead, fit));
         }
         for start in turned(&whole, mounting) {
             let turning = unknowns.with(Nuisance::Rotation);
@@ -321,6 +380,27 @@ impl Trial<'_> {
         // Jumps leave out segments, so fits of unlike many equations are compared.
         let all = 6.0 * self.sensed.used_rows(&Unknowns::default()) as f64;
         (fit.misfit() + unbiased + unknowns * equations.ln()) * all / equations
+    }
+
+    /// Returns true unless a gain of a channel of poses leaves less by chance (F test for the channels of its kind, all six
+    /// channels together). Few poses leave few degrees of freedom, and an exact fit none.
+    fn is_no_chance(&self, tried: &Tried) -> bool {
+        let (Cause::Dead(channel) | Cause::Gain(channel)) = tried.cause else {
+            return true;
+        };
+        if self.sensed.recordings.iter().any(|r| !r.poses) {
+            return true;
+        }
+        let fit = &tried.selected.fit;
+        let kind = channel / 3;
+        let bodies = 1.0 + f64::from(u8::from(fit.unknowns.tool));
+        // The forces show the mass, the moments the three first moments.
+        let own = [1.0, 3.0][kind] * bodies + 3.0 * self.sensed.recordings.len() as f64;
+        let freedom = 0.5 * fit.equations as f64 - own - 1.0;
+        let [before, after] = [self.plain, fit].map(|fit| fit.squares[kind]);
+        let ratio = (before - after) * freedom / after.max(f64::MIN_POSITIVE);
+        let chance = FisherSnedecor::new(1.0, freedom).map(|f| f.sf(ratio.max(0.0)));
+        chance.is_ok_and(|p| 6.0 * p < BY_CHANCE)
     }
 
     /// Returns true if a fit leaves less than another in nearly all segments of a motion.

@@ -5,6 +5,7 @@ use rig_data::prepare::Recording;
 use rig_model::robot::{Robot, WristSensor};
 use rig_output::{format_short, format_significant};
 
+use crate::clipping::{Pile, Suspect};
 use crate::error::LoadError;
 use crate::pace::{Pace, Steps};
 use crate::rows::{Ends, FEWEST_ROWS, LEAST_ROWS, each_readings};
@@ -86,9 +87,39 @@ struct Channel {
     high: f64,
     /// Smallest difference of two rows that is not zero.
     step: f64,
-    last: f64,
+    last: [f64; 2],
+    /// Sum of the sizes of second differences, and their number.
+    roughness: [f64; 2],
     /// Highest values, and highest negative ones.
     highest: [Highest; 2],
+}
+
+impl Channel {
+    /// Takes in the steps to the next value.
+    fn follow(&mut self, value: f64) {
+        let [before, last] = self.last;
+        let step = (value - last).abs();
+        if step > 0.0 {
+            self.step = self.step.min(step);
+        }
+        let bend = (value - 2.0 * last + before).abs();
+        if bend.is_finite() {
+            self.roughness[0] += bend;
+            self.roughness[1] += 1.0;
+        }
+        self.last = [last, value];
+    }
+
+    /// Returns the standard deviation of white noise whose second differences have this mean size.
+    fn noise(&self) -> f64 {
+        let mean = self.roughness[0] / self.roughness[1].max(1.0);
+        mean / (6.0 * std::f64::consts::FRAC_2_PI).sqrt()
+    }
+
+    /// Returns the width of the neighbourhood of an extreme value in which readings that were cut lie.
+    fn width(&self) -> f64 {
+        Pile::width(self.high - self.low, NEIGHBOURHOOD, self.noise())
+    }
 }
 
 /// Rows at and near an end of a channel.
@@ -99,6 +130,8 @@ struct End {
     run: usize,
     /// Distance of the row before the run.
     before: f64,
+    /// Rows by which a smaller limit is suspected.
+    pile: Pile,
     /// Runs of [`RUN`] rows or more, and those of them that are entered or left by more than a step of the sensor.
     runs: [usize; 2],
 }
@@ -142,6 +175,8 @@ pub(crate) struct Judged {
     pub ends: Ends,
     /// Channels that were cut, with the value.
     pub cut: Vec<(&'static str, f64)>,
+    /// Sides of channels whose readings may be cut within the described range.
+    pub suspects: Vec<Suspect>,
     /// Says which row of a channel is a spike.
     pub spike: Option<String>,
 }
@@ -171,19 +206,9 @@ pub(crate) fn judge(
     // A short recording of a motion is searched for rests as well: the readings of a motion need its acceleration.
     let poses = poses || pace == Pace::Listed || rows < FEWEST_ROWS as u64;
     refuse_dead(recording, &channels)?;
-    let mut found = [[End::default(); 2]; 6];
-    each_readings(recording, &mut |block, readings| {
-        for k in 0..block.len() {
-            for ((end, channel), list) in found.iter_mut().zip(&channels).zip(readings) {
-                let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
-                end[0].push(list[k] - channel.low, near, channel.step);
-                end[1].push(channel.high - list[k], near, channel.step);
-            }
-        }
-        Ok(())
-    })?;
+    let found = counted(recording, &channels)?;
     let mut ends = [[f64::NEG_INFINITY, f64::INFINITY]; 6];
-    let (mut cut, mut spike) = (Vec::new(), None);
+    let (mut cut, mut suspects, mut spike) = (Vec::new(), Vec::new(), None);
     for (c, end) in ends.iter_mut().enumerate() {
         let range = if c < 3 {
             sensor.force_range
@@ -210,6 +235,13 @@ pub(crate) fn judge(
             let is_cut = !poses && found[c][side].is_cut() && range.is_none_or(reached);
             if is_cut || range.is_some_and(reached) {
                 cut.push((WRENCH_COLUMNS[c], reach[side]));
+            } else if found[c][side].pile.is_heaped() {
+                let inwards = if side == 0 { 1.0 } else { -1.0 };
+                suspects.push(Suspect {
+                    channel: c,
+                    side,
+                    from: reach[side] + inwards * channels[c].width(),
+                });
             }
             if is_cut {
                 end[side] = if side == 0 {
@@ -227,8 +259,30 @@ pub(crate) fn judge(
         length,
         ends,
         cut,
+        suspects,
         spike,
     })
+}
+
+/// Counts the rows at and near the ends of each channel.
+fn counted(recording: &dyn Recording, channels: &[Channel; 6]) -> Result<[[End; 2]; 6], LoadError> {
+    let mut found = [[End::default(); 2]; 6];
+    each_readings(recording, &mut |block, readings| {
+        for k in 0..block.len() {
+            for ((end, channel), list) in found.iter_mut().zip(channels).zip(readings) {
+                let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
+                let width = channel.width();
+                for (end, distance) in
+                    (end.iter_mut()).zip([list[k] - channel.low, channel.high - list[k]])
+                {
+                    end.push(distance, near, channel.step);
+                    end.pile.push(distance, width);
+                }
+            }
+        }
+        Ok(())
+    })?;
+    Ok(found)
 }
 
 /// Refuses a channel that has one value throughout.
@@ -275,7 +329,8 @@ fn seen(recording: &dyn Recording, robot: &Robot) -> Result<Seen, LoadError> {
         low: f64::INFINITY,
         high: f64::NEG_INFINITY,
         step: f64::INFINITY,
-        last: f64::NAN,
+        last: [f64::NAN; 2],
+        roughness: [0.0; 2],
         highest: Default::default(),
     });
     let (mut rows, mut times) = (0u64, [f64::INFINITY, f64::NEG_INFINITY]);
@@ -292,11 +347,7 @@ fn seen(recording: &dyn Recording, robot: &Robot) -> Result<Seen, LoadError> {
                 channel.highest[1].push(-value, line);
                 channel.low = channel.low.min(*value);
                 channel.high = channel.high.max(*value);
-                let step = (value - channel.last).abs();
-                if step > 0.0 {
-                    channel.step = channel.step.min(step);
-                }
-                channel.last = *value;
+                channel.follow(*value);
             }
         }
         Ok(())

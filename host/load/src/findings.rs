@@ -4,12 +4,12 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Vector3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::PreprocessingPlan;
 use rig_model::robot::{Reads, Robot, WristSensor};
-use rig_output::{capital, format_significant};
+use rig_output::{capital, format_significant, format_value, listed};
 
 use crate::error::LoadError;
 use crate::estimate::Estimate;
 use crate::mounting::Channels;
-use crate::statistics::noise_floor;
+use crate::statistics::{Recorded, noise_floor};
 use crate::system::{Fit, Nuisance, Sensed};
 use crate::units::{alternatives, by_lever};
 
@@ -27,8 +27,8 @@ pub struct Bias {
     pub bias: [f64; 6],
     /// Change from the begin to the end of the recording, if the data show one.
     pub drift: Option<[f64; 6]>,
-    /// Time of a jump, s after the begin, and the bias after it.
-    pub jump: Option<(f64, [f64; 6])>,
+    /// Time of each jump, s after the begin, and the bias after it, in the order of time.
+    pub jumps: Vec<(f64, [f64; 6])>,
 }
 
 /// Readings of a recording over time, thinned for a figure, and what the fit gives for them.
@@ -92,6 +92,8 @@ pub(crate) struct Told<'a> {
     pub channels: Channels,
     /// Pairs of a property that was found, and another that explains the readings as well.
     pub alternatives: Vec<[Nuisance; 2]>,
+    /// Scale of the moments that is one of these, and its standard deviation.
+    pub scale: Option<[f64; 2]>,
     /// What the readings were shifted by, s.
     pub delay: f64,
     /// True if the fit leaves about the noise. Otherwise properties that it found may stand for something else.
@@ -106,6 +108,7 @@ impl Told<'_> {
             .rotations(self.fit)
             .map(Rotation3::from_scaled_axis);
         let force = turn * self.fit.mounting.force * self.channels.force.transpose();
+        let force = self.described * force;
         match force.determinant() > 0.0 {
             true => (force, Reads::Robot),
             false => (-force, Reads::Load),
@@ -135,8 +138,15 @@ impl Told<'_> {
         let delay = self.delay(warnings);
         let position = self.position(warnings);
         for [found, other] in &self.alternatives {
+            let factor = self.scale.filter(|_| *other == Nuisance::Scale);
+            let factor = factor.map_or_else(String::new, |[scale, std]| {
+                format!(
+                    " ({} times, ± one standard deviation)",
+                    format_value(scale, std)
+                )
+            });
             warnings.push(format!(
-                "{} explains the readings as well as {}: poses in more directions, or a livelier motion, tell them apart.",
+                "{}{factor} explains the readings as well as {}: poses in more directions, or a livelier motion, tell them apart.",
                 capital(words(*other)),
                 words(*found)
             ));
@@ -260,7 +270,7 @@ impl Told<'_> {
     fn origin(&self) -> Option<Vector3<f64>> {
         let error = self.sensed.origin(self.fit)?;
         let flange = self.robot.last_link.rotation.inverse();
-        Some(Vector3::from(self.sensor.position) + flange * error)
+        Some(Vector3::from(self.sensor.position) + flange * (self.described * error))
     }
 
     fn traces(&self) -> Vec<Trace> {
@@ -282,22 +292,33 @@ impl Told<'_> {
     }
 
     fn biases(&self) -> Vec<Bias> {
-        let jumps = &self.fit.unknowns.jumps;
         let recordings = self.sensed.recordings.iter().enumerate();
         recordings
             .map(|(r, recorded)| Bias {
                 recording: recorded.label.clone(),
                 bias: self.sensed.bias(self.fit, r),
                 drift: self.sensed.drift(self.fit, r),
-                jump: jumps.iter().position(|jump| jump.recording == r).map(|at| {
-                    let share = jumps[at].segment as f64 / recorded.segments.len() as f64;
-                    (
-                        share * recorded.length,
-                        self.sensed.bias_after(self.fit, at),
-                    )
-                }),
+                jumps: self.jumps(r, recorded),
             })
             .collect()
+    }
+
+    /// Returns time and bias after each jump of a recording, in the order of time.
+    fn jumps(&self, recording: usize, recorded: &Recorded) -> Vec<(f64, [f64; 6])> {
+        let all = self.fit.unknowns.jumps.iter().enumerate();
+        let mut own: Vec<(usize, usize)> = all
+            .filter(|(_, jump)| jump.recording == recording)
+            .map(|(at, jump)| (jump.segment, at))
+            .collect();
+        own.sort_unstable();
+        let told = |(segment, at): (usize, usize)| {
+            let share = segment as f64 / recorded.segments.len() as f64;
+            (
+                share * recorded.length,
+                self.sensed.bias_after(self.fit, at),
+            )
+        };
+        own.into_iter().map(told).collect()
     }
 
     /// Says if more is left than noise: half of the residual's power is not explained by the noise above the band. Refuses
@@ -328,12 +349,30 @@ impl Told<'_> {
                 false => NO_CAUSE,
             }
         );
-        let text = text.trim_end().to_owned();
+        let text = format!("{} {}", text.trim_end(), self.hit())
+            .trim_end()
+            .to_owned();
         let lost = |kind: usize| share[kind].powi(2) > 0.5 && over(kind) > 2.0;
         match (lost(0) || lost(1)) && !even_if_wrong {
             true => Err(LoadError::Fault(text)),
             false => Ok(Some(text)),
         }
+    }
+
+    /// Says where most of the residual lies; empty if it lies in no single segment.
+    fn hit(&self) -> String {
+        let worst = self.sensed.worst_segment(self.fit);
+        let Some((recording, number, share)) = worst.filter(|own| own.2 > MOST) else {
+            return String::new();
+        };
+        let recorded = &self.sensed.recordings[recording];
+        let count = recorded.segments.len() as f64;
+        let [from, to] = [number, number + 1].map(|k| k as f64 / count * recorded.length);
+        format!(
+            "{:.0} % of the residual's power lies between {from:.1} and {to:.1} s after the begin of {}: look for a contact or a hit there.",
+            100.0 * share,
+            recorded.label
+        )
     }
 
     /// Returns warnings about values that no load has.
@@ -385,6 +424,9 @@ fn unit_by_lever(lever: f64) -> String {
     }
 }
 
+/// Share of the residual's power in one of twenty segments from which something happened in it.
+const MOST: f64 = 0.5;
+
 /// Names a property in a sentence.
 fn words(nuisance: Nuisance) -> &'static str {
     match nuisance {
@@ -395,11 +437,12 @@ fn words(nuisance: Nuisance) -> &'static str {
         Nuisance::Drift => "a drift of the bias",
         Nuisance::Warming => "a bias that follows the temperature",
         Nuisance::Scale => "another scale of the moments",
+        Nuisance::Gain(_) => "another gain of one channel",
     }
 }
 
 /// Names what a rigid load was compared with in vain.
-const NO_CAUSE: &str = "Exchanged or reversed channels, another unit, a turned or displaced sensor, a delay and a base that leans were tried: none of them explains it.";
+const NO_CAUSE: &str = "Exchanged or reversed channels, a dead channel or one with another gain, readings that are cut, another unit, a turned or displaced sensor, a delay and a base that leans were tried: none of them explains it.";
 
 /// Says that a bias drifts, with the change of each channel that is above its noise.
 fn drift_words(bias: &Bias, noise: [f64; 2]) -> Option<String> {
@@ -425,18 +468,34 @@ fn drift_words(bias: &Bias, noise: [f64; 2]) -> Option<String> {
     ))
 }
 
-/// Says that a bias jumps.
+/// Says that a bias jumps, and by how much.
 fn jump_words(bias: &Bias) -> Option<String> {
-    let (time, after) = bias.jump?;
-    let change: Vec<String> = (WRENCH_COLUMNS.iter().zip(after).zip(bias.bias))
-        .map(|((name, after), before)| {
-            let unit = if name.starts_with('f') { "N" } else { "N·m" };
-            format!("{name} {} {unit}", format_significant(after - before, 2))
+    let befores = [bias.bias]
+        .into_iter()
+        .chain(bias.jumps.iter().map(|own| own.1));
+    let each: Vec<String> = (bias.jumps.iter().zip(befores))
+        .map(|((time, after), before)| {
+            let change: Vec<String> = (WRENCH_COLUMNS.iter().zip(after).zip(before))
+                .map(|((name, after), before)| {
+                    let unit = if name.starts_with('f') { "N" } else { "N·m" };
+                    format!("{name} {} {unit}", format_significant(after - before, 2))
+                })
+                .collect();
+            format!("near {time:.1} s ({})", change.join(", "))
         })
         .collect();
+    let left_out = match each.len() {
+        0 => return None,
+        1 => {
+            "It was estimated before and after, and a tenth of the recording around it was left out."
+        }
+        _ => {
+            "It was estimated between them, and a tenth of the recording around each was left out."
+        }
+    };
     Some(format!(
-        "{}: the bias of the sensor jumps near {time:.1} s ({}). It was estimated before and after, and a tenth of the recording around it was left out.",
+        "{}: the bias of the sensor jumps {}. {left_out}",
         bias.recording,
-        change.join(", ")
+        listed(&each)
     ))
 }

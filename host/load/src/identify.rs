@@ -1,24 +1,26 @@
 //! The whole identification of a load: sensor, torques, or both.
 
-use nalgebra::{Isometry3, SMatrix, SymmetricEigen};
+use nalgebra::SymmetricEigen;
 use rig_data::prepare::Recording;
 use rig_identify::{chain_of, least_eigenvalue};
 use rig_model::robot::{Joint, Load, Robot};
-use rig_output::{format_significant, listed};
+use rig_output::{format_significant, format_unit, listed};
 use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::axes::parameters_from;
 use crate::body::body;
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, sizes_of};
 use crate::findings::SensorFindings;
 use crate::intake::Sensing;
 use crate::limits::too_heavy;
+use crate::load_friction;
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
 use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers};
 use crate::sensor::by_sensor;
-use crate::torque::{Driven, equations};
+use crate::torque::{Driven, Equations, equations};
 
 /// Probability by chance below which sensor and torques contradict each other.
 const CONTRADICTS: f64 = 1e-3;
@@ -32,7 +34,8 @@ const COMPARED: f64 = 0.5;
 /// data show them. By torque the ten columns of the last link
 /// explain what the recordings with the load show beyond those without it (Khalil, Gautier & Lemoine 2007).
 ///
-/// Leaves out: elasticity between flange and load, gain and crosstalk of the sensor, cables that pull. At rest an error of
+/// Leaves out: elasticity between flange and load, gains of several channels and crosstalk of the
+/// sensor, cables that pull. At rest an error of
 /// the sensor's position is an error of the centre of mass, and neither is seen.
 ///
 /// # Errors
@@ -43,7 +46,7 @@ pub fn identify_load(
     without: &[&dyn Recording],
     options: &LoadOptions,
 ) -> Result<LoadIdentification, LoadError> {
-    let to_joint = transform(&robot.last_link);
+    let to_joint = parameters_from(&robot.last_link);
     let chain = chain_of(robot)?;
     let mut warnings = Vec::new();
     let sensed = match options.by {
@@ -57,7 +60,6 @@ pub fn identify_load(
                     robot,
                     chain: &chain,
                     recordings: &all,
-                    to_joint: &to_joint,
                     prepare: &options.prepare,
                     poses: options.poses,
                     even_if_wrong: options.even_if_wrong,
@@ -77,6 +79,7 @@ pub fn identify_load(
                 prepare: &options.prepare,
             },
             sensed.as_ref().map(|(found, _)| found.values[0]),
+            &mut warnings,
         )?),
     };
     let (sensed, sensor) = sensed.unzip();
@@ -243,20 +246,38 @@ fn by_description(robot: &Robot) -> Result<String, LoadError> {
     ))
 }
 
-/// Returns the matrix that turns the ten parameters in the flange frame to those in the frame of the last joint.
-fn transform(flange: &Isometry3<f64>) -> SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS> {
-    let mut matrix = Square::zeros();
-    for k in 0..INERTIAL_PARAMETERS {
-        let mut unit = [0.0; INERTIAL_PARAMETERS];
-        unit[k] = 1.0;
-        let column = Load::of(unit).seen_from(flange).parameters();
-        matrix.column_mut(k).copy_from_slice(&column);
-    }
-    matrix
+/// Says of which joints a rigid load and friction leave more than noise: half of the residual's power is not explained by
+/// the noise of the torque above the band.
+fn unexplained(driven: &Driven, equations: &Equations) -> Option<String> {
+    let all = (driven.robot.joints.iter()).zip(equations.noise.iter().zip(&equations.floor));
+    let list: Vec<String> = all
+        .filter_map(|(joint, (residual, floor))| {
+            let (residual, floor) = ((*residual)?, (*floor)?);
+            let unit = format_unit(joint.kind.units().1);
+            (residual.powi(2) > 2.0 * floor.powi(2)).then(|| {
+                format!(
+                    "{} {unit} RMS of {}, where noise would leave {} {unit}",
+                    format_significant(residual, 3),
+                    joint.name,
+                    format_significant(floor, 3)
+                )
+            })
+        })
+        .collect();
+    (!list.is_empty()).then(|| {
+        format!(
+            "The load and friction as modelled leave more of the torques than noise as that above the band: {}. The values can be wrong by more than their standard deviations. Likely causes: friction that changes with speed, position, temperature or load, contact, cables, noise of the positions, or noise of the torques that is slow.",
+            listed(&list)
+        )
+    })
 }
 
-/// Identifies the load from joint torques. `mass` is a first guess for the plausible sizes.
-fn by_torque(driven: &Driven, mass: Option<f64>) -> Result<(Estimate, TorqueFindings), LoadError> {
+/// Identifies the load from joint torques; adds sentences to `warnings`. `mass` is a first guess for the plausible sizes.
+fn by_torque(
+    driven: &Driven,
+    mass: Option<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<(Estimate, TorqueFindings), LoadError> {
     let equations = equations(driven)?;
     let mut mass = mass.unwrap_or(1.0);
     let mut found = estimate(&equations.segments, mass, Spread::Segments);
@@ -270,12 +291,17 @@ fn by_torque(driven: &Driven, mass: Option<f64>) -> Result<(Estimate, TorqueFind
             why: "the joint torques show none of its parameters; record a livelier motion, or a heavier load".to_owned(),
         });
     }
-    let names = driven.robot.joints.iter().map(|j| j.name.clone());
+    let joints = &driven.robot.joints;
+    let (friction, constant) = (&equations.friction, equations.constant_friction);
+    warnings.extend(load_friction::words(friction, joints, constant));
+    warnings.extend(unexplained(driven, &equations));
     Ok((
         found,
         TorqueFindings {
-            joints: names.collect(),
+            joints: joints.iter().map(|j| j.name.clone()).collect(),
             residual: equations.noise,
+            noise: equations.floor,
+            load_friction: equations.friction,
             with_unloaded: !driven.without.is_empty(),
             prepared: equations.plan,
             traces: equations.traces,

@@ -1,14 +1,15 @@
 //! The recordings of the wrist sensor: judged and surveyed once, and read as often as the equations need them.
 
-use nalgebra::SMatrix;
 use rig_data::prepare::{
     MaybeResampled, PrepareOptions, PreprocessingPlan, Recording, Survey, as_recordings,
 };
 use rig_model::robot::{Robot, WristSensor};
 use rig_output::{format_significant, listed};
-use rig_shared::multibody::{Chain, INERTIAL_PARAMETERS};
+use rig_shared::multibody::Chain;
 
+use crate::axes::SensorAxes;
 use crate::channels::{Judged, judge};
+use crate::clipping::Suspect;
 use crate::error::LoadError;
 use crate::pace::Pace;
 use crate::poses::each_pose;
@@ -18,7 +19,7 @@ use crate::torqueless::Torqueless;
 use crate::wrench_row::WrenchRow;
 
 /// Share of the rows that may be left out because of saturation.
-const MOST_SATURATED: f64 = 0.5;
+pub(crate) const MOST_SATURATED: f64 = 0.5;
 
 /// Recordings of the wrist sensor.
 pub(crate) struct Sensing<'a> {
@@ -26,7 +27,6 @@ pub(crate) struct Sensing<'a> {
     pub chain: &'a Chain<f64>,
     /// Recordings with the load, then those without it.
     pub recordings: &'a [(&'a dyn Recording, bool)],
-    pub to_joint: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
     pub prepare: &'a PrepareOptions,
     /// True if every row of every recording is a pose at rest.
     pub poses: bool,
@@ -105,21 +105,35 @@ impl<'a> Intake<'a> {
         self.surveys.iter().filter_map(|s| s.note.clone())
     }
 
-    /// Reads the recordings, the readings `delay` seconds later than the positions.
+    /// Returns the sides of channels whose readings may be cut within the described range, by recording of a motion.
+    pub(crate) fn suspects(&self) -> Vec<(usize, Suspect)> {
+        let all = self.judged.iter().enumerate();
+        let moving = all.filter(|(_, judged)| !judged.poses);
+        moving
+            .flat_map(|(r, judged)| judged.suspects.iter().map(move |own| (r, *own)))
+            .collect()
+    }
+
+    /// Reads the recordings, the readings `delay` seconds later than the positions. Rows of the channels `cut` are left out.
     ///
     /// # Errors
     /// [`LoadError`].
     pub(crate) fn read(
         &self,
         delay: f64,
+        cut: &[(usize, Suspect)],
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Recorded>, LoadError> {
         let sensing = self.sensing;
-        let pose = sensing.robot.last_link * self.sensor.pose();
+        let axes = SensorAxes::of(&(sensing.robot.last_link * self.sensor.pose()));
         let mut prepared = self.surveys.iter().zip(&self.usable);
         let mut recordings = Vec::new();
-        for ((recording, loaded), judged) in sensing.recordings.iter().zip(&self.judged) {
+        let all = sensing.recordings.iter().zip(&self.judged).enumerate();
+        for (r, ((recording, loaded), judged)) in all {
             let label = recording.label();
+            let mut ends = judged.ends;
+            let own = cut.iter().filter(|(recording, _)| *recording == r);
+            own.for_each(|(_, suspect)| suspect.narrow(&mut ends));
             let poses = judged.poses;
             let next = if poses { None } else { prepared.next() };
             let rows = match (&self.plan, &next) {
@@ -130,12 +144,12 @@ impl<'a> Intake<'a> {
             let mut take = |row: &WrenchRow| collector.push(row);
             let passed = match (&self.plan, next) {
                 (Some(plan), Some((_, usable))) => {
-                    let read = (&judged.ends, delay);
-                    each_row(sensing.chain, &pose, *usable, plan, read, &mut take)?
+                    let read = (&ends, delay);
+                    each_row(sensing.chain, &axes, *usable, plan, read, &mut take)?
                 }
                 _ => {
-                    let read = (&judged.ends, judged.pace);
-                    let saturated = each_pose(sensing.chain, &pose, *recording, read, &mut take)?;
+                    let read = (&ends, judged.pace);
+                    let saturated = each_pose(sensing.chain, &axes, *recording, read, &mut take)?;
                     if !sensing.poses {
                         warnings.push(taken_as_poses(&label, judged, collector.rows()));
                     }
@@ -186,8 +200,7 @@ fn saturation(
             format!("{column} at {} {unit}", format_significant(*value, 4))
         })
         .collect();
-    let saturated = recorded.passed.saturated;
-    let left_out = saturated as f64 / (saturated + recorded.rows()).max(1) as f64;
+    let left_out = recorded.left_out();
     let text = format!(
         "{}: the sensor was saturated ({}); {:.1} % of the rows were left out.",
         recorded.label,

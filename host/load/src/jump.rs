@@ -1,6 +1,6 @@
 //! Jumps of the sensor's bias.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::system::{Fit, Jump, Sensed};
 
@@ -9,41 +9,60 @@ const JUMPS: f64 = 1e-4;
 /// Least number of segments on either side of a jump.
 const LEAST_SIDE: usize = 3;
 
-/// Finds the clearest jump of the bias. The means of the residuals over the segments on both sides of it differ by more
-/// than they differ among themselves (t test, corrected for all places and channels).
-pub(crate) fn jump(sensed: &Sensed, fit: &Fit) -> Option<Jump> {
-    let mut clearest: Option<(f64, Jump)> = None;
-    for (recording, means) in sensed.mean_residuals(fit).iter().enumerate() {
-        let count = means.len();
-        let is_known = fit
-            .unknowns
-            .jumps
-            .iter()
-            .any(|jump| jump.recording == recording);
-        if count < 2 * LEAST_SIDE + 2 || is_known || sensed.recordings[recording].poses {
+/// Finds the clearest jump of the bias between two jumps that are known, or the clearest pair: of two opposite jumps neither
+/// is seen alone. The means of the residuals over the segments beside them differ by more than they differ among themselves
+/// (F test, corrected for all places and channels). Empty if there is none.
+pub(crate) fn jumps(sensed: &Sensed, fit: &Fit) -> Vec<Jump> {
+    let (mut least, mut clearest) = (JUMPS, Vec::new());
+    for (recording, means) in sensed.mean_residuals(fit) {
+        if sensed.recordings[recording].poses {
             continue;
         }
-        let places = (count - 2 * LEAST_SIDE + 1) as f64;
-        for segment in LEAST_SIDE..=count - LEAST_SIDE {
-            for channel in 0..6 {
-                let list: Vec<f64> = means.iter().map(|own| own[channel]).collect();
-                let p = 6.0 * places * chance_of(&list[..segment], &list[segment..]);
-                if p < JUMPS && clearest.as_ref().is_none_or(|(least, _)| p < *least) {
-                    clearest = Some((p, Jump { recording, segment }));
+        let places = places(means.len());
+        for channel in 0..6 {
+            let list: Vec<f64> = means.iter().map(|(_, own)| own[channel]).collect();
+            for own in &places {
+                let as_many = places.iter().filter(|other| other.len() == own.len());
+                let p = 6.0 * as_many.count() as f64 * chance_of(&list, own);
+                if p < least {
+                    least = p;
+                    let jump = |place: &usize| Jump {
+                        recording,
+                        segment: means[*place].0,
+                    };
+                    clearest = own.iter().map(jump).collect();
                 }
             }
         }
     }
-    clearest.map(|(_, jump)| jump)
+    clearest
 }
 
-/// Returns the probability that two groups with one mean differ by chance as much (two-sided t test, pooled variance).
-fn chance_of(before: &[f64], after: &[f64]) -> f64 {
-    let mean = rig_numerics::statistics::mean;
+/// Returns the places of one jump and of two in a stretch of segments.
+fn places(count: usize) -> Vec<Vec<usize>> {
+    let one = |from: usize| from + LEAST_SIDE..(count + 1).saturating_sub(LEAST_SIDE);
+    // The segments beside a jump are left out.
+    let is_long = |jumps: usize| count >= (jumps + 1) * LEAST_SIDE + 2 * jumps;
+    let mut all = Vec::new();
+    if is_long(1) {
+        all.extend(one(0).map(|place| vec![place]));
+    }
+    if is_long(2) {
+        all.extend(one(0).flat_map(|first| one(first).map(move |second| vec![first, second])));
+    }
+    all
+}
+
+/// Returns the probability that groups of values with one mean differ by chance as much (one-way analysis of variance). A
+/// group begins at each place.
+fn chance_of(list: &[f64], places: &[usize]) -> f64 {
     let squares = rig_numerics::statistics::squares_about_mean;
-    let freedom = (before.len() + after.len() - 2) as f64;
-    let variance = (squares(before) + squares(after)) / freedom;
-    let spread = variance * (1.0 / before.len() as f64 + 1.0 / after.len() as f64);
-    let t = (mean(before) - mean(after)).abs() / spread.sqrt().max(f64::MIN_POSITIVE);
-    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |d| 2.0 * d.sf(t))
+    let ends = places.iter().copied().chain([list.len()]);
+    let begins = [0].into_iter().chain(places.iter().copied());
+    let within: f64 = begins.zip(ends).map(|(a, b)| squares(&list[a..b])).sum();
+    let further = places.len() as f64;
+    let freedom = list.len() as f64 - further - 1.0;
+    let between = (squares(list) - within).max(0.0);
+    let ratio = between / further / (within / freedom).max(f64::MIN_POSITIVE);
+    FisherSnedecor::new(further, freedom).map_or(1.0, |d| d.sf(ratio))
 }

@@ -42,10 +42,12 @@
 //! # }
 //! ```
 
+mod axes;
 mod body;
 mod candidates;
 mod causes;
 mod channels;
+mod clipping;
 mod controllers;
 mod error;
 mod estimate;
@@ -54,6 +56,7 @@ mod identify;
 mod intake;
 mod jump;
 mod limits;
+mod load_friction;
 mod missing;
 mod mounting;
 mod noise_floor;
@@ -70,6 +73,7 @@ mod system;
 #[cfg(test)]
 mod tests;
 mod torque;
+mod torque_noise;
 mod torqueless;
 mod units;
 mod urdf_link;
@@ -79,6 +83,7 @@ pub use controllers::{ControllerNumbers, controller_numbers};
 pub use error::LoadError;
 pub use findings::{Bias, SensorFindings, Trace};
 pub use identify::identify_load;
+pub use load_friction::LoadFriction;
 pub use options::{By, LoadOptions};
 pub use result::{Agreement, LoadIdentification, LoadParameter, NotShown, TorqueFindings, Value};
 pub use rows::FEWEST_ROWS;

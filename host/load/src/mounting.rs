@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-/// From the readings to the wrench of the robot on the load, in the axes of the last joint; and where gravity points.
+/// From the readings to the wrench of the robot on the load, in the described axes of the sensor; and where gravity points.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Mounting {
     /// Applied to the force.
@@ -13,16 +13,19 @@ pub(crate) struct Mounting {
     pub gravity: Rotation3<f64>,
     /// Moments as read over moments in N·m, against the same of the forces; 1 in SI units.
     pub scale: f64,
+    /// Reading over what a channel should read, by channel; 0 for one that reads its noise only.
+    pub gains: [f64; 6],
 }
 
 impl Mounting {
-    /// Builds the mounting of a sensor with right channels. `sign` is 1 if it reads the wrench of the robot on the load.
-    pub(crate) fn of(rotation: &Matrix3<f64>, sign: f64) -> Self {
+    /// Builds the mounting of a sensor as described. `sign` is 1 if it reads the wrench of the robot on the load.
+    pub(crate) fn of(sign: f64) -> Self {
         Self {
-            force: rotation * sign,
-            moment: rotation * sign,
+            force: Matrix3::identity() * sign,
+            moment: Matrix3::identity() * sign,
             gravity: Rotation3::identity(),
             scale: 1.0,
+            gains: [1.0; 6],
         }
     }
 
@@ -35,7 +38,7 @@ impl Mounting {
         }
     }
 
-    /// Returns the mounting with the sensor turned by a rotation vector in the axes of the joint, and gravity by one in the
+    /// Returns the mounting with the sensor turned by a rotation vector in its described axes, and gravity by one in the
     /// base frame.
     pub(crate) fn turned(&self, sensor: &Vector3<f64>, gravity: &Vector3<f64>) -> Self {
         let turn = Rotation3::from_scaled_axis(*sensor).into_inner();
@@ -43,7 +46,7 @@ impl Mounting {
             force: turn * self.force,
             moment: turn * self.moment,
             gravity: Rotation3::from_scaled_axis(*gravity) * self.gravity,
-            scale: self.scale,
+            ..self.clone()
         }
     }
 
@@ -55,9 +58,26 @@ impl Mounting {
         }
     }
 
+    /// Returns the mounting with another gain of a channel.
+    pub(crate) fn with_gain(&self, channel: usize, gain: f64) -> Self {
+        let mut other = self.clone();
+        other.gains[channel] = gain;
+        other
+    }
+
+    /// Returns true if a channel is not read as the others are.
+    pub(crate) fn has_gain(&self) -> bool {
+        self.gains != [1.0; 6]
+    }
+
     /// Returns the factor of the readings of a channel's kind.
-    pub(crate) fn factor(&self, channel: usize) -> f64 {
+    pub(crate) fn of_kind(&self, channel: usize) -> f64 {
         if channel < 3 { 1.0 } else { self.scale }
+    }
+
+    /// Returns the factor of the readings of a channel.
+    pub(crate) fn factor(&self, channel: usize) -> f64 {
+        self.of_kind(channel) * self.gains[channel]
     }
 
     /// Returns the mounting for which the load has the opposite parameters.

@@ -102,7 +102,7 @@ fn drawn(number: f64, sequence: u64) -> f64 {
 }
 
 /// Returns the shares of white noise that the zero-phase low-pass leaves, and that the rest of the signal has.
-fn shares(low_pass: &LowPass, plan: &PreprocessingPlan) -> [f64; 2] {
+pub(crate) fn shares(low_pass: &LowPass, plan: &PreprocessingPlan) -> [f64; 2] {
     let reach = (10.0 * plan.sample_rate / plan.cutoff).ceil();
     let reach = (reach as usize).clamp(32, 1 << 16);
     let mut impulse = vec![0.0; 2 * reach + 1];

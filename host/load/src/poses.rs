@@ -1,9 +1,9 @@
 //! The poses at rest of a recording.
 
-use nalgebra::Isometry3;
 use rig_data::prepare::Recording;
 use rig_shared::multibody::{Chain, wrench_regressor};
 
+use crate::axes::SensorAxes;
 use crate::error::LoadError;
 use crate::pace::{AT_REST, Pace};
 use crate::rows::{Ends, FEWEST_ROWS, base_axes, beyond, each_readings, temperature};
@@ -25,7 +25,7 @@ const SHORT: f64 = 0.05;
 /// As [`each_readings`]; [`LoadError::Moves`] if the recording never rests.
 pub(crate) fn each_pose(
     chain: &Chain<f64>,
-    sensor: &Isometry3<f64>,
+    sensor: &SensorAxes,
     recording: &dyn Recording,
     (ends, pace): (&Ends, Pace),
     take: &mut dyn FnMut(&WrenchRow),
@@ -71,14 +71,15 @@ pub(crate) fn each_pose(
         let mut regressor = [0.0; ENTRIES];
         wrench_regressor(chain, &q, &still, &still, &mut regressor)
             .map_err(|e| LoadError::Model(e.to_string()))?;
-        about(&sensor.translation.vector, &mut regressor);
+        sensor.turn(&mut regressor);
+        about(&sensor.origin, &mut regressor);
         let axes = base_axes(chain, &q).map_err(|e| LoadError::Model(e.to_string()))?;
         take(&WrenchRow {
             time: pose.others[0] / count,
             temperature: pose.others[1] / count,
             regressor,
             rate: [0.0; ENTRIES],
-            weights: axes.map(|axis| weight(&axis, &sensor.translation.vector)),
+            weights: axes.map(|axis| weight(&sensor.seen(&axis), &sensor.origin)),
             readings: pose.readings.map(|sum| sum / count),
         });
     }

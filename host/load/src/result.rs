@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::estimate::{Estimate, Parameters};
 use crate::findings::SensorFindings;
+use crate::load_friction::LoadFriction;
 use crate::options::By;
 use crate::torque::TorqueTrace;
 
@@ -44,6 +45,11 @@ pub struct TorqueFindings {
     pub joints: Vec<String>,
     /// Per joint, RMS of the torque residual with the load, N·m or N; `None` if none of its torques was used.
     pub residual: Vec<Option<f64>>,
+    /// Per joint, RMS that the noise of its torque leaves in the band of the fit, N·m or N, inferred from the torque above
+    /// the band; `None` if the band leaves nothing above it.
+    pub noise: Vec<Option<f64>>,
+    /// Friction that grows with the torque that a joint carries, where the data show it.
+    pub load_friction: Vec<LoadFriction>,
     /// True if recordings without the load gave the parameters of the robot; false if its description did.
     pub with_unloaded: bool,
     /// Preparation of the recordings.

@@ -1,13 +1,11 @@
 //! Rows of a recording: regressor of the wrench and readings of the sensor, in one band.
 
-use nalgebra::Isometry3;
 use nalgebra::{Matrix3, Vector3};
 use rig_data::prepare::{LowPass, Motion, PrepareError, PreprocessingPlan, Recording, each_motion};
 use rig_data::{Block, WRENCH_COLUMNS, WRENCH_MESSAGE};
-use rig_shared::multibody::{
-    Chain, INERTIAL_PARAMETERS, MultibodyError, Pose as Frame, frame_pose, wrench_regressor,
-};
+use rig_shared::multibody::{Chain, MultibodyError, Pose as Frame, frame_pose, wrench_regressor};
 
+use crate::axes::SensorAxes;
 use crate::error::LoadError;
 use crate::noise_floor::NoiseFloor;
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
@@ -41,7 +39,7 @@ pub(crate) struct Passed {
 /// [`LoadError`]: a recording that cannot be read or has no sensor.
 pub(crate) fn each_row(
     chain: &Chain<f64>,
-    sensor: &Isometry3<f64>,
+    axes: &SensorAxes,
     recording: &dyn Recording,
     plan: &PreprocessingPlan,
     (ends, delay): (&Ends, f64),
@@ -70,7 +68,7 @@ pub(crate) fn each_row(
         };
         let piece = Piece {
             chain,
-            sensor,
+            axes,
             plan,
             low_pass: &low_pass,
             motion,
@@ -166,7 +164,7 @@ pub(crate) fn beyond(readings: &[f64; 6], ends: &Ends) -> bool {
 /// A piece of a recording of motion.
 struct Piece<'a> {
     chain: &'a Chain<f64>,
-    sensor: &'a Isometry3<f64>,
+    axes: &'a SensorAxes,
     plan: &'a PreprocessingPlan,
     low_pass: &'a LowPass,
     motion: &'a Motion,
@@ -235,7 +233,7 @@ impl Piece<'_> {
             let span = (after - before) as f64 / self.plan.sample_rate;
             let mut rate: [f64; ENTRIES] =
                 std::array::from_fn(|c| (filtered[c][after] - filtered[c][before]) / span);
-            let origin = &self.sensor.translation.vector;
+            let origin = &self.axes.origin;
             about(origin, &mut regressor);
             about(origin, &mut rate);
             take(&WrenchRow {
@@ -256,23 +254,24 @@ impl Piece<'_> {
         Ok(left_out)
     }
 
-    /// Returns the entries of the regressor over the rows `low .. high`, and the axes of the base in the axes of the last
-    /// joint, one column each.
+    /// Returns the entries of the regressor over the rows `low .. high`, and the axes of the base in the described axes
+    /// of the sensor, one column each.
     fn regressors(&self, low: usize, high: usize) -> Result<[Vec<Vec<f64>>; 2], MultibodyError> {
         let joints = &self.motion.joints;
         let empty = |count: usize| vec![Vec::with_capacity(high - low); count];
         let [mut columns, mut axes] = [empty(ENTRIES), empty(9)];
         let [mut q, mut qd, mut qdd] = [(); 3].map(|()| vec![0.0; joints.len()]);
-        let mut entries = [0.0; 6 * INERTIAL_PARAMETERS];
+        let mut entries = [0.0; ENTRIES];
         for k in low..high {
             for (j, joint) in joints.iter().enumerate() {
                 (q[j], qd[j], qdd[j]) = (joint.q[k], joint.qd[k], joint.qdd[k]);
             }
             wrench_regressor(self.chain, &q, &qd, &qdd, &mut entries)?;
+            self.axes.turn(&mut entries);
             for (column, entry) in columns.iter_mut().zip(entries) {
                 column.push(entry);
             }
-            let now = base_axes(self.chain, &q)?;
+            let now = base_axes(self.chain, &q)?.map(|axis| self.axes.seen(&axis));
             let entries = now.iter().flat_map(|axis| axis.iter());
             for (column, entry) in axes.iter_mut().zip(entries) {
                 column.push(*entry);

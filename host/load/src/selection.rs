@@ -4,12 +4,14 @@
 //! A turned sensor, a base that leans, a delay and a wrong position of the sensor bend the readings in similar ways, so
 //! none of them is tested before the others have been compared with it.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 use rig_identify::{LeaveOut, Refit, TriangularFactor};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::estimate::solved;
-use crate::jump::jump;
+use crate::jump::jumps;
 use crate::mounting::Mounting;
 use crate::settle::{DECISIVE, settled};
 use crate::system::{Fit, Nuisance, Sensed};
@@ -58,7 +60,7 @@ fn least(nuisance: Nuisance) -> f64 {
         Nuisance::Rotation | Nuisance::Lean => 1e-3,
         Nuisance::Delay => 1e-4,
         Nuisance::Origin => 5e-4,
-        Nuisance::Drift | Nuisance::Warming | Nuisance::Scale => 0.0,
+        Nuisance::Drift | Nuisance::Warming | Nuisance::Scale | Nuisance::Gain(_) => 0.0,
     }
 }
 
@@ -84,20 +86,47 @@ fn shows(sensed: &Sensed, fit: &Fit, without: &Fit, nuisance: Nuisance) -> bool 
     if freedom < 1.0 {
         return false;
     }
-    let left_out = LeaveOut::of(&segments);
-    let of = |factor: &TriangularFactor| {
-        let (r, z) = factor.system();
-        solved(&r, &z).as_slice()[place.clone()].to_vec()
-    };
-    let spread = Refit {
-        whole: of(&left_out.whole),
-        without: left_out.without.iter().map(of).collect(),
-    };
-    let Some(squares) = squares_over(&values, spread.covariance()) else {
+    let Some(squares) = squares_over(&values, spread(&segments, &place).covariance()) else {
         return false;
     };
     let ratio = squares * freedom / (count * (freedom + count - 1.0));
     FisherSnedecor::new(count, freedom).is_ok_and(|d| d.sf(ratio) < TAKEN_IN)
+}
+
+/// Returns the standard deviation of a nuisance with one unknown: for a motion by refits with one segment left out, for
+/// poses by the residuals. Not a number if the fit has no such unknown.
+pub(crate) fn deviation(sensed: &Sensed, fit: &Fit, nuisance: Nuisance) -> f64 {
+    let Some(place) = sensed.place(&fit.unknowns, nuisance) else {
+        return f64::NAN;
+    };
+    let segments = sensed.factors(fit);
+    if sensed.recordings.iter().any(|r| r.poses) {
+        return by_residuals(&segments, place.start);
+    }
+    spread(&segments, &place).covariance()[(0, 0)].sqrt()
+}
+
+/// Returns the standard deviation of an unknown in equations whose noise is one: the length of what is left of its column
+/// beside the others, inverted.
+fn by_residuals(segments: &[TriangularFactor], place: usize) -> f64 {
+    let (r, _) = LeaveOut::of(segments).whole.system();
+    let others = r.clone().remove_column(place);
+    let own = r.column(place).into_owned();
+    let along = &others * solved(&others, &own);
+    1.0 / (own - along).norm()
+}
+
+/// Refits the unknowns at a place, with all segments and with one left out.
+fn spread(segments: &[TriangularFactor], place: &Range<usize>) -> Refit {
+    let left_out = LeaveOut::of(segments);
+    let of = |factor: &TriangularFactor| {
+        let (r, z) = factor.system();
+        solved(&r, &z).as_slice()[place.clone()].to_vec()
+    };
+    Refit {
+        whole: of(&left_out.whole),
+        without: left_out.without.iter().map(of).collect(),
+    }
 }
 
 /// Returns vᵀ·C⁻¹·v; `None` if C is singular.
@@ -126,6 +155,17 @@ pub(crate) struct Selected {
     pub fit: Fit,
     /// Pairs of a property that was taken in, and another that explains the readings as well.
     pub alternatives: Vec<[Nuisance; 2]>,
+    /// Scale of the moments that explains the readings as well as their position does, and its standard deviation.
+    pub scale: Option<[f64; 2]>,
+}
+
+impl Selected {
+    /// Adds the scale of the moments of another fit as an alternative to the position of the sensor.
+    pub(crate) fn add_scale(&mut self, sensed: &Sensed, fit: &Fit) {
+        self.alternatives.push([Nuisance::Origin, Nuisance::Scale]);
+        let scale = fit.mounting.scale;
+        self.scale = Some([scale, scale * deviation(sensed, fit, Nuisance::Scale)]);
+    }
 }
 
 /// Takes in the properties and jumps that the data show. `start` is the mounting as described.
@@ -136,7 +176,9 @@ pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected 
     loop {
         let mut larger: Vec<(Option<Nuisance>, Fit)> = Vec::new();
         for nuisance in Nuisance::ALL {
-            if taken.contains(&nuisance) || !can_show(sensed, nuisance) {
+            // A sensor is turned by what all of its channels read.
+            let is_apart = nuisance == Nuisance::Rotation && is_apart(&fit);
+            if taken.contains(&nuisance) || is_apart || !can_show(sensed, nuisance) {
                 continue;
             }
             let own = settled(sensed, &fit.mounting, &fit.unknowns.with(nuisance));
@@ -144,9 +186,10 @@ pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected 
                 larger.push((Some(nuisance), own));
             }
         }
-        if let Some(found) = jump(sensed, &fit) {
+        let found = jumps(sensed, &fit);
+        if !found.is_empty() {
             let mut unknowns = fit.unknowns.clone();
-            unknowns.jumps.push(found);
+            unknowns.jumps.extend(found);
             let own = settled(sensed, &fit.mounting, &unknowns);
             if is_better(&own, &fit) {
                 larger.push((None, own));
@@ -155,7 +198,11 @@ pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected 
         larger.sort_by(|a, b| score(&a.1).total_cmp(&score(&b.1)));
         let mut larger = larger.into_iter();
         let Some((nuisance, best)) = larger.next() else {
-            return Selected { fit, alternatives };
+            return Selected {
+                fit,
+                alternatives,
+                scale: None,
+            };
         };
         if let Some(nuisance) = nuisance {
             taken.push(nuisance);
@@ -170,7 +217,8 @@ pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected 
 fn without_needless(sensed: &Sensed, fit: Fit, start: &Mounting, newest: Option<Nuisance>) -> Fit {
     let mut fit = fit;
     for nuisance in fit.unknowns.nuisances.clone() {
-        if Some(nuisance) == newest || nuisance == Nuisance::Scale {
+        let is_fault = matches!(nuisance, Nuisance::Scale | Nuisance::Gain(_));
+        if Some(nuisance) == newest || is_fault {
             continue;
         }
         let mut mounting = fit.mounting.clone();
@@ -189,11 +237,17 @@ fn without_needless(sensed: &Sensed, fit: Fit, start: &Mounting, newest: Option<
     fit
 }
 
+/// Returns true if a channel has a gain of its own.
+fn is_apart(fit: &Fit) -> bool {
+    let is_gain = |own: &Nuisance| matches!(own, Nuisance::Gain(_));
+    fit.mounting.has_gain() || fit.unknowns.nuisances.iter().any(is_gain)
+}
+
 /// Returns true if such recordings can show a nuisance at all.
 fn can_show(sensed: &Sensed, nuisance: Nuisance) -> bool {
     match nuisance {
         Nuisance::Warming => sensed.recordings.iter().any(|r| r.warms),
-        Nuisance::Delay | Nuisance::Origin | Nuisance::Scale => {
+        Nuisance::Delay | Nuisance::Origin | Nuisance::Scale | Nuisance::Gain(_) => {
             sensed.recordings.iter().any(|r| !r.poses)
         }
         Nuisance::Lean => sensed.gravity != Vector3::zeros(),

@@ -4,15 +4,18 @@ use nalgebra::{Matrix3, Rotation3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::{PreprocessingPlan, Recording, surveyed};
 use rig_model::robot::{Reads, WristSensor};
-use rig_output::{capital, format_significant};
+use rig_output::{capital, format_significant, format_value};
 
+use crate::axes::parameters_from;
 use crate::causes::{Cause, Compared, Tried, compare, explains};
+use crate::clipping::{self, Suspect};
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
 use crate::findings::{SensorFindings, Told};
-use crate::intake::{Intake, Sensing, judged, moving};
+use crate::intake::{Intake, MOST_SATURATED, Sensing, judged, moving};
 use crate::mounting::{Channels, Mounting};
 use crate::rows::LEAST_ROWS;
+use crate::selection::deviation;
 use crate::settle::settled;
 use crate::system::{Fit, Nuisance, Sensed, Unknowns};
 use crate::units::{alternatives, named};
@@ -42,16 +45,26 @@ pub(crate) fn by_sensor(
     let (surveys, usable) = surveyed(&moving, robot.joints.len())?;
     let intake = Intake::of(sensing, &sensor, judged, surveys, &usable)?;
     warnings.extend(intake.notes());
+    let pose = robot.last_link * sensor.pose();
+    let to_axes = parameters_from(&(pose.rotation.inverse() * robot.last_link));
     let (mut delay, mut shifts) = (0.0, 0);
+    let (mut cut, mut is_searched) = (Vec::new(), false);
     loop {
         let mut said = Vec::new();
-        let recordings = intake.read(delay, &mut said)?;
+        let recordings = intake.read(delay, &places(&cut), &mut said)?;
         let sensed = Sensed {
             recordings: &recordings,
-            to_joint: sensing.to_joint,
+            to_axes: &to_axes,
             gravity: robot.gravity.into(),
         };
-        let compared = compared(&sensed, sensing, &sensor)?;
+        let compared = compared(&sensed, &sensor)?;
+        if !is_searched && compared.causes.is_empty() {
+            is_searched = true;
+            cut = clipped(&intake, &sensed, &compared, (&sensor, delay))?;
+            if !cut.is_empty() {
+                continue;
+            }
+        }
         // The equations have a delay to first order only, so the readings are shifted by it and read again.
         if let Some(further) = compared.delay
             && shifts < MOST_SHIFTS
@@ -62,6 +75,9 @@ pub(crate) fn by_sensor(
         }
         let fitted = believed(&sensed, compared, sensing, &mut said)?;
         warnings.extend(said);
+        for own in &cut {
+            warnings.push(own.told(&sensed, &sensor, sensing.even_if_wrong)?);
+        }
         return finished(
             &sensed,
             fitted,
@@ -73,20 +89,102 @@ pub(crate) fn by_sensor(
     }
 }
 
+/// Readings of a recording that are cut within the described range of the sensor.
+struct Cut {
+    recording: usize,
+    suspect: Suspect,
+    /// Mean of these readings.
+    level: f64,
+}
+
+impl Cut {
+    /// Says where the readings are cut.
+    ///
+    /// # Errors
+    /// [`LoadError::Fault`] if most rows are lost, unless the user goes on.
+    fn told(
+        &self,
+        sensed: &Sensed,
+        sensor: &WristSensor,
+        even_if_wrong: bool,
+    ) -> Result<String, LoadError> {
+        let range = match self.suspect.channel {
+            0..3 => sensor.force_range,
+            _ => sensor.moment_range,
+        };
+        let recorded = &sensed.recordings[self.recording];
+        let text = clipping::words(recorded, self.suspect.channel, self.level, range);
+        match recorded.left_out() > MOST_SATURATED && !even_if_wrong {
+            true => Err(LoadError::Fault(text)),
+            false => Ok(text),
+        }
+    }
+}
+
+/// Returns the channels that are cut, and in which recording.
+fn places(cut: &[Cut]) -> Vec<(usize, Suspect)> {
+    cut.iter().map(|own| (own.recording, own.suspect)).collect()
+}
+
+/// Finds readings that are cut within the described range, if the description leaves more than noise. All suspected rows are
+/// left out, and the load by the others tells which of them were cut. Without these, about the noise must be left.
+///
+/// # Errors
+/// [`LoadError`].
+fn clipped(
+    intake: &Intake,
+    sensed: &Sensed,
+    compared: &Compared,
+    (sensor, delay): (&WristSensor, f64),
+) -> Result<Vec<Cut>, LoadError> {
+    let fit = &compared.described.selected.fit;
+    let suspects = intake.suspects();
+    if suspects.is_empty() || explains(sensed, fit) {
+        return Ok(Vec::new());
+    }
+    let recordings = intake.read(delay, &suspects, &mut Vec::new())?;
+    let without = Sensed {
+        recordings: &recordings,
+        to_axes: sensed.to_axes,
+        gravity: sensed.gravity,
+    };
+    let known = self::compared(&without, sensor)?;
+    let fit = &known.described.selected.fit;
+    let cut = |(recording, suspect): (usize, Suspect)| {
+        let all = (recording, &sensed.recordings[recording]);
+        let level = clipping::cut_at(&suspect, all, &without, fit)?;
+        Some(Cut {
+            recording,
+            suspect,
+            level,
+        })
+    };
+    let found: Vec<Cut> = suspects.into_iter().filter_map(cut).collect();
+    // Something else than a limit may act at extreme readings, too.
+    let recordings = intake.read(delay, &places(&found), &mut Vec::new())?;
+    let without = Sensed {
+        recordings: &recordings,
+        ..without
+    };
+    let fit = self::compared(&without, sensor)?.described.selected.fit;
+    Ok(match explains(&without, &fit) {
+        true => found,
+        false => Vec::new(),
+    })
+}
+
 /// A fit, and what it was decided on.
 struct Fitted {
     fit: Fit,
     /// Exchange of channels that was put right.
     channels: Channels,
     alternatives: Vec<[Nuisance; 2]>,
+    /// Scale of the moments that is an alternative, and its standard deviation.
+    scale: Option<[f64; 2]>,
 }
 
 /// Fits the equations as described, and by every cause for which they may not fit.
-fn compared(
-    sensed: &Sensed,
-    sensing: &Sensing,
-    sensor: &WristSensor,
-) -> Result<Compared, LoadError> {
+fn compared(sensed: &Sensed, sensor: &WristSensor) -> Result<Compared, LoadError> {
     let unknowns = Unknowns {
         tool: sensed.recordings.iter().any(|r| !r.loaded),
         ..Unknowns::default()
@@ -99,7 +197,7 @@ fn compared(
         });
     }
     let sign = sensor.reads.unwrap_or(Reads::Load).sign();
-    let mounting = Mounting::of(&described(sensing, sensor), sign);
+    let mounting = Mounting::of(sign);
     Ok(compare(
         sensed,
         &mounting,
@@ -122,6 +220,7 @@ fn believed(
         fit: tried.selected.fit,
         channels,
         alternatives: tried.selected.alternatives,
+        scale: tried.selected.scale,
     };
     let as_recorded = Channels::as_recorded();
     let described = compared.described;
@@ -149,12 +248,39 @@ fn believed(
             warnings.push(text);
             fitted(first, as_recorded)
         }
+        Cause::Dead(channel) => {
+            warnings.push(left_out(&text, channel));
+            fitted(first, as_recorded)
+        }
+        Cause::Gain(channel) => {
+            warnings.push(left_out(&text, channel));
+            Fitted {
+                fit: without_channel(sensed, &first.selected.fit, channel),
+                channels: as_recorded,
+                alternatives: first.selected.alternatives,
+                scale: None,
+            }
+        }
         // Units are not converted behind the user's back.
-        Cause::Described | Cause::Scale | Cause::ScaleAndTurned => {
+        Cause::Described | Cause::Scale | Cause::ScaleAndTurned | Cause::ScaleAndChannels(_) => {
             warnings.push(text);
             fitted(described, as_recorded)
         }
     })
+}
+
+/// Says that a channel was left out.
+fn left_out(text: &str, channel: usize) -> String {
+    format!(
+        "{text} The load was identified without {}.",
+        WRENCH_COLUMNS[channel]
+    )
+}
+
+/// Returns a fit in which a channel tells nothing of the load.
+fn without_channel(sensed: &Sensed, fit: &Fit, channel: usize) -> Fit {
+    let unknowns = fit.unknowns.without(Nuisance::Gain(channel));
+    settled(sensed, &fit.mounting.with_gain(channel, 0.0), &unknowns)
 }
 
 /// Returns the described axes of the sensor in the frame of the last joint.
@@ -188,6 +314,7 @@ fn finished(
         sensor,
         channels: fitted.channels,
         alternatives: fitted.alternatives,
+        scale: fitted.scale,
         delay,
         explains,
     };
@@ -293,7 +420,9 @@ fn fault_of(sensed: &Sensed, described: &Fit, causes: &[Tried]) -> String {
         all.join(", or ")
     });
     let begin = match causes.first().map(|own| &own.cause) {
-        Some(Cause::Channels(_)) => "The sensor's channels look wrong",
+        Some(Cause::Channels(_) | Cause::ScaleAndChannels(_) | Cause::Dead(_) | Cause::Gain(_)) => {
+            "The sensor's channels look wrong"
+        }
         _ => "A rigid load does not fit forces and moments as recorded",
     };
     let best = causes.first().map_or(described, |own| &own.selected.fit);
@@ -324,24 +453,34 @@ fn words_of(sensed: &Sensed, tried: &Tried) -> [String; 2] {
                 true => " (or the sensor is turned and `reads` has the other value)",
                 false => "",
             };
-            [
-                format!("{}{or}", channels.words()),
-                format!(
-                    "correct the columns {}, or the wiring",
-                    WRENCH_COLUMNS.join(" ")
-                ),
-            ]
+            [format!("{}{or}", channels.words()), columns_remedy()]
         }
         Cause::Turned => [
             turned_words(tried),
             "correct the rotation of the sensor".to_owned(),
         ],
         Cause::Scale => unit_words(sensed, fit),
+        Cause::Dead(channel) | Cause::Gain(channel) => gain_words(sensed, fit, *channel),
+        Cause::ScaleAndChannels(channels) => {
+            let [what, remedy] = unit_words(sensed, fit);
+            [
+                format!("{}, and {what}", channels.words()),
+                format!("{}, and {remedy}", columns_remedy()),
+            ]
+        }
         Cause::ScaleAndTurned => {
             let [what, remedy] = unit_words(sensed, fit);
             [format!("{what}, and {}", turned_words(tried)), remedy]
         }
     }
+}
+
+/// Says how exchanged channels are mended.
+fn columns_remedy() -> String {
+    format!(
+        "correct the columns {}, or the wiring",
+        WRENCH_COLUMNS.join(" ")
+    )
 }
 
 fn turned_words(tried: &Tried) -> String {
@@ -354,14 +493,36 @@ fn turned_words(tried: &Tried) -> String {
     )
 }
 
+/// Says what a channel reads against the five others, and what to check.
+fn gain_words(sensed: &Sensed, fit: &Fit, channel: usize) -> [String; 2] {
+    let name = WRENCH_COLUMNS[channel];
+    let gain = match sensed.gain(fit) {
+        None => format!(
+            "{name} shows nothing of the load that the five others carry: it is dead, or reads its noise only"
+        ),
+        Some(_) => {
+            let std = deviation(sensed, fit, Nuisance::Gain(channel));
+            format!(
+                "{name} reads {} times what the load by the five others gives",
+                format_value(fit.mounting.gains[channel], std)
+            )
+        }
+    };
+    [
+        gain,
+        format!("check the cable, the amplifier and the calibration of {name}"),
+    ]
+}
+
 /// Names the unit of the moments against that of the forces, and the option that converts it.
 fn unit_words(sensed: &Sensed, fit: &Fit) -> [String; 2] {
     let units = named(sensed, fit);
+    let scale = fit.mounting.scale;
     if units.is_empty() {
         return [
             format!(
-                "the moments are {} times those that the forces and the motion give, and no unit that is known has this factor",
-                format_significant(fit.mounting.scale, 3)
+                "the moments are {} times those that the forces and the motion give (± one standard deviation), and no unit that is known has this factor",
+                format_value(scale, scale * deviation(sensed, fit, Nuisance::Scale))
             ),
             "give forces in N and moments in N·m".to_owned(),
         ];

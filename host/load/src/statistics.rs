@@ -76,6 +76,12 @@ impl Recorded {
         self.segments.iter().map(|s| s.rows).sum()
     }
 
+    /// Returns the share of its rows that were left out beside saturated readings.
+    pub(crate) fn left_out(&self) -> f64 {
+        let saturated = self.passed.saturated;
+        saturated as f64 / (saturated + self.rows()).max(1) as f64
+    }
+
     /// Returns the recording with all segments in one, for comparisons that need no segments.
     pub(crate) fn in_one(&self) -> Self {
         let merged = |channel: usize| {

@@ -1,10 +1,10 @@
 //! The equations of the wrist sensor for one mounting: which unknowns there are, and their least squares.
 //!
-//! s·R·y = (W + ε × g)·φ − T·Ẇ·φ + b + d·t + δ × (s·R·y) − p × f: y are the readings, R the rotation from the sensor to the
-//! last joint, s the sign convention, W the regressor of the wrench, φ the load, b the bias of a recording. Further
+//! s·R·y = (W + ε × g)·φ − T·Ẇ·φ + b + d·t + δ × (s·R·y) − p × f: y are the readings, R the rotation of the sensor
+//! against the description, s the sign convention, W the regressor of the wrench, φ the load, b the bias of a recording. Further
 //! unknowns are a drift d of the bias, a small rotation δ of the sensor, a small rotation ε of gravity, a delay T of the
 //! sensor against the encoders, and an error p of the sensor's position, beside the force f of the load. A scale of the
-//! moments multiplies what the load adds to them.
+//! moments multiplies what the load adds to them, the gain of a channel what it adds to that channel.
 
 use std::ops::Range;
 
@@ -33,6 +33,13 @@ pub(crate) struct Jump {
     pub segment: usize,
 }
 
+impl Jump {
+    /// Returns true if a segment of its recording is left out because of it.
+    fn is_beside(&self, segment: usize) -> bool {
+        segment + 1 == self.segment || segment == self.segment
+    }
+}
+
 /// A property of sensor, recorder or base that is an unknown beside the load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Nuisance {
@@ -50,6 +57,8 @@ pub(crate) enum Nuisance {
     Warming,
     /// A small relative change of the scale of the moments. None of [`Self::ALL`]: a scale is a fault to be named.
     Scale,
+    /// A change of the gain of one channel. None of [`Self::ALL`], as a scale.
+    Gain(usize),
 }
 
 impl Nuisance {
@@ -66,7 +75,7 @@ impl Nuisance {
     /// Returns the number of its unknowns.
     fn count(self, recordings: usize) -> usize {
         match self {
-            Self::Delay | Self::Scale => 1,
+            Self::Delay | Self::Scale | Self::Gain(_) => 1,
             Self::Lean => 2,
             Self::Rotation | Self::Origin => 3,
             Self::Warming => 6,
@@ -92,6 +101,13 @@ impl Unknowns {
         self.nuisances.contains(&nuisance)
     }
 
+    /// Returns the index of the last of the jumps of a recording that have happened.
+    fn last_jump(&self, recording: usize, has_happened: impl Fn(&Jump) -> bool) -> Option<usize> {
+        let all = self.jumps.iter().enumerate();
+        let own = all.filter(|(_, jump)| jump.recording == recording && has_happened(jump));
+        own.max_by_key(|(_, jump)| jump.segment).map(|(at, _)| at)
+    }
+
     /// Returns them with another one.
     pub(crate) fn with(&self, nuisance: Nuisance) -> Self {
         let mut more = self.clone();
@@ -108,6 +124,9 @@ impl Unknowns {
         fewer
     }
 }
+
+/// Number of a segment, and the mean residual of each channel in it.
+pub(crate) type SegmentMean = (usize, [f64; 6]);
 
 /// Places of the unknowns.
 struct Layout<'a> {
@@ -150,12 +169,12 @@ impl Layout<'_> {
     }
 }
 
-/// Recordings, and how the parameters in the flange frame enter the wrench in the frame of the last joint.
+/// Recordings, and how the parameters in the flange frame enter the wrench in the described axes of the sensor.
 pub(crate) struct Sensed<'a> {
     /// The recordings.
     pub recordings: &'a [Recorded],
-    /// From the ten parameters in the flange frame to those in the frame of the last joint.
-    pub to_joint: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
+    /// From the ten parameters in the flange frame to those in the described axes of the sensor.
+    pub to_axes: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
     /// Gravity as described, in the base frame, m/s².
     pub gravity: Vector3<f64>,
 }
@@ -218,14 +237,13 @@ impl Sensed<'_> {
     ) {
         let layout = self.layout(unknowns);
         for (r, recorded) in self.recordings.iter().enumerate() {
-            let jump = unknowns.jumps.iter().position(|jump| jump.recording == r);
             for (g, segment) in recorded.segments.iter().enumerate() {
-                let bias = match jump.map(|at| (at, unknowns.jumps[at].segment)) {
-                    Some((_, before)) if g + 1 == before || g == before => continue,
-                    Some((at, first)) if g > first => layout.after_jump(at),
-                    _ => layout.bias(r),
-                };
-                take(r, g, segment, bias);
+                let own = unknowns.jumps.iter().filter(|jump| jump.recording == r);
+                if !own.clone().any(|jump| jump.is_beside(g)) {
+                    let last = unknowns.last_jump(r, |jump| jump.segment < g);
+                    let bias = last.map_or(layout.bias(r), |at| layout.after_jump(at));
+                    take(r, g, segment, bias);
+                }
             }
         }
     }
@@ -250,17 +268,18 @@ impl Sensed<'_> {
         let change = fit.mounting.gravity * self.gravity - self.gravity;
         add_weight(&triangle, &change, &mut own);
         let factor = fit.mounting.factor(channel);
+        let of_kind = &own * fit.mounting.of_kind(channel);
         own *= factor;
         let mut rows = DMatrix::zeros(height, layout.count());
         let loaded = self.recordings[recording].loaded;
         let parts = [(loaded, 0), (unknowns.tool, layout.tool())];
-        // What moves here, in the frame of the last joint.
+        // What moves here, in the described axes of the sensor.
         let mut body = Parameters::zeros();
         for (_, at) in parts.iter().filter(|(is_here, _)| *is_here) {
             rows.columns_mut(*at, INERTIAL_PARAMETERS)
-                .copy_from(&(&own * self.to_joint));
+                .copy_from(&(&own * self.to_axes));
             let values = &fit.values[*at..at + INERTIAL_PARAMETERS];
-            body += self.to_joint * Parameters::from_column_slice(values);
+            body += self.to_axes * Parameters::from_column_slice(values);
         }
         rows.column_mut(bias + channel)
             .copy_from(&triangle.column(column::ONE));
@@ -291,6 +310,8 @@ impl Sensed<'_> {
                 Nuisance::Rotation => turn(&wrench, axis, &mut to),
                 Nuisance::Scale if channel >= 3 => to.copy_from(&(&own * body)),
                 Nuisance::Scale => {}
+                Nuisance::Gain(own) if *own == channel => to.copy_from(&(&of_kind * body)),
+                Nuisance::Gain(_) => {}
                 Nuisance::Origin if channel >= 3 => {
                     let [next, last] = others(axis);
                     let [along_next, along_last] = forces(&triangle, axis, &body, &change);
@@ -441,23 +462,47 @@ impl Sensed<'_> {
         all
     }
 
+    /// Returns recording and number of the segment with the largest residual, and its share of the power of all residuals, in
+    /// units of the noise of the fit.
+    pub(crate) fn worst_segment(&self, fit: &Fit) -> Option<(usize, usize, f64)> {
+        let mut places = Vec::new();
+        self.each_segment(&fit.unknowns, &mut |recording, number, _, _| {
+            places.push((recording, number));
+        });
+        let over = |s: [f64; 2]| (0..2).map(|k| s[k] / fit.noise[k].powi(2)).sum::<f64>();
+        let powers = self.squares_by_segment(fit).into_iter().map(over);
+        let all: Vec<((usize, usize), f64)> = places.into_iter().zip(powers).collect();
+        let sum: f64 = all.iter().map(|(_, power)| power).sum();
+        let worst = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        worst.map(|((recording, number), power)| (recording, number, power / sum))
+    }
+
     /// Returns the residual of the triangle's rows of a channel.
     fn residual(&self, place: [usize; 3], segment: &Segment, fit: &Fit) -> DVector<f64> {
         let (rows, right) = self.rows(place, segment, fit);
         DVector::from_vec(right) - rows * DVector::from_column_slice(&fit.values)
     }
 
-    /// Returns, per recording and segment, the mean residual of each channel in the axes of the last joint.
-    pub(crate) fn mean_residuals(&self, fit: &Fit) -> Vec<Vec<[f64; 6]>> {
-        let mut means: Vec<Vec<[f64; 6]>> = vec![Vec::new(); self.recordings.len()];
-        self.each_segment(&fit.unknowns, &mut |recording, _, segment, bias| {
-            means[recording].push(std::array::from_fn(|channel| {
+    /// Returns, per recording and stretch between two jumps, the number of each segment and the mean residual of each
+    /// channel in it, in the described axes of the sensor.
+    pub(crate) fn mean_residuals(&self, fit: &Fit) -> Vec<(usize, Vec<SegmentMean>)> {
+        let mut stretches: Vec<(usize, Vec<SegmentMean>)> = Vec::new();
+        let mut last = None;
+        self.each_segment(&fit.unknowns, &mut |recording, number, segment, bias| {
+            if last != Some(bias) {
+                stretches.push((recording, Vec::new()));
+                last = Some(bias);
+            }
+            let mean = std::array::from_fn(|channel| {
                 let residual = self.residual([recording, channel, bias], segment, fit);
                 let ones = segment.channels[channel].column(column::ONE);
                 ones.rows(0, residual.len()).dot(&residual) / segment.rows as f64
-            }));
+            });
+            if let Some((_, means)) = stretches.last_mut() {
+                means.push((number, mean));
+            }
         });
-        means
+        stretches
     }
 
     /// Returns the places of a nuisance among the unknowns.
@@ -471,7 +516,7 @@ impl Sensed<'_> {
         fit.values.get(place)
     }
 
-    /// Returns the rotations among the unknowns, rad: of the sensor in the axes of the last joint, of gravity in the base
+    /// Returns the rotations among the unknowns, rad: of the sensor in the described axes of the sensor, of gravity in the base
     /// frame.
     pub(crate) fn rotations(&self, fit: &Fit) -> [Vector3<f64>; 2] {
         let sensor = self.values(fit, Nuisance::Rotation);
@@ -498,6 +543,15 @@ impl Sensed<'_> {
         self.values(fit, Nuisance::Scale).map_or(0.0, |v| v[0])
     }
 
+    /// Returns the change of the gain of the channel whose gain is unknown.
+    pub(crate) fn gain(&self, fit: &Fit) -> Option<(usize, f64)> {
+        let gain = |own: &Nuisance| match own {
+            Nuisance::Gain(channel) => Some((*channel, self.values(fit, *own)?[0])),
+            _ => None,
+        };
+        fit.unknowns.nuisances.iter().find_map(gain)
+    }
+
     /// Returns the two axes of the base frame about which gravity is turned.
     pub(crate) fn level_axes(&self, fit: &Fit) -> [Vector3<f64>; 2] {
         level_axes(&(fit.mounting.gravity * self.gravity))
@@ -508,7 +562,7 @@ impl Sensed<'_> {
         self.values(fit, Nuisance::Delay).map(|values| values[0])
     }
 
-    /// Returns the error of the sensor's position in the axes of the last joint, m.
+    /// Returns the error of the sensor's position in the described axes of the sensor, m.
     pub(crate) fn origin(&self, fit: &Fit) -> Option<Vector3<f64>> {
         self.values(fit, Nuisance::Origin)
             .map(Vector3::from_column_slice)
@@ -539,13 +593,8 @@ impl Sensed<'_> {
     /// Returns what the sensor would read at a row of a recording by the fit.
     pub(crate) fn predicted(&self, fit: &Fit, recording: usize, row: &WrenchRow) -> [f64; 6] {
         let (layout, recorded) = (self.layout(&fit.unknowns), &self.recordings[recording]);
-        let jump = fit
-            .unknowns
-            .jumps
-            .iter()
-            .position(|jump| jump.recording == recording);
-        let after = jump.filter(|at| {
-            let share = fit.unknowns.jumps[*at].segment as f64 / recorded.segments.len() as f64;
+        let after = fit.unknowns.last_jump(recording, |jump| {
+            let share = jump.segment as f64 / recorded.segments.len() as f64;
             row.time > share * recorded.length
         });
         let bias = after.map_or(layout.bias(recording), |at| layout.after_jump(at));
@@ -558,11 +607,11 @@ impl Sensed<'_> {
         if fit.unknowns.tool {
             load += part(layout.tool());
         }
-        let load = self.to_joint * load;
+        let load = self.to_axes * load;
         let change = fit.mounting.gravity * self.gravity - self.gravity;
         let delay = self.delay(fit).unwrap_or(0.0);
         let of = |nuisance| self.values(fit, nuisance);
-        let mut wrench: [f64; 6] = std::array::from_fn(|channel| {
+        let loads: [f64; 6] = std::array::from_fn(|channel| {
             let own = channel * INERTIAL_PARAMETERS..(channel + 1) * INERTIAL_PARAMETERS;
             let along = |entries: &[f64]| -> f64 {
                 entries.iter().zip(load.iter()).map(|(w, p)| w * p).sum()
@@ -571,7 +620,11 @@ impl Sensed<'_> {
             for (entries, change) in row.weights.iter().zip(change.iter()) {
                 load += change * along(&entries[channel * WEIGHED..(channel + 1) * WEIGHED]);
             }
-            let mut sum = fit.values[bias + channel] + fit.mounting.factor(channel) * load;
+            load
+        });
+        let mut wrench: [f64; 6] = std::array::from_fn(|channel| {
+            let mut sum =
+                fit.values[bias + channel] + fit.mounting.factor(channel) * loads[channel];
             if let Some(drift) = of(Nuisance::Drift) {
                 sum += (row.time / recorded.length - 0.5) * drift[6 * recording + channel];
             }
@@ -581,22 +634,20 @@ impl Sensed<'_> {
             sum
         });
         if let Some(origin) = self.origin(fit) {
-            let bias = &fit.values[bias..bias + 3];
-            let force = Vector3::from_fn(|axis, _| wrench[axis] - bias[axis]);
-            let lever = origin.cross(&force) * fit.mounting.scale;
+            let lever = origin.cross(&Vector3::new(loads[0], loads[1], loads[2]));
             for axis in 0..3 {
-                wrench[3 + axis] -= lever[axis];
+                wrench[3 + axis] -= fit.mounting.factor(3 + axis) * lever[axis];
             }
         }
         self.as_read(fit, &wrench)
     }
 
-    /// Turns six unknowns from the axes of the joint to readings.
+    /// Turns six unknowns to readings.
     fn read(&self, fit: &Fit, at: usize) -> [f64; 6] {
         self.as_read(fit, &fit.values[at..at + 6])
     }
 
-    /// Turns a wrench of the robot on the load, in the axes of the last joint, to readings.
+    /// Turns a wrench of the robot on the load, in the described axes of the sensor, to readings.
     fn as_read(&self, fit: &Fit, wrench: &[f64]) -> [f64; 6] {
         let of = |first: usize| {
             let own = Vector3::from_column_slice(&wrench[first..first + 3]);

@@ -7,7 +7,7 @@
 //!
 //! Leaves out: the uncertainty of the description, if it gives the torque of the unloaded robot.
 
-use nalgebra::SMatrix;
+use nalgebra::{DVector, SMatrix};
 use rig_data::Compensated;
 use rig_data::prepare::{PrepareOptions, PreprocessingPlan, Recording, as_recordings, surveyed};
 use rig_identify::{
@@ -21,10 +21,15 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use crate::error::LoadError;
 use crate::estimate::solved;
+use crate::load_friction::{Carried, LoadFriction, growing};
 use crate::statistics::SEGMENTS;
+use crate::torque_noise::torque_noise;
 
 /// Rounds in which the noise of each joint is estimated from its residuals.
 const ROUNDS: usize = 3;
+/// Fits in which the torque that a joint carries and its friction are determined in turn. Each leaves an error of about the
+/// coefficient times the error before.
+const FRICTION_ROUNDS: usize = 3;
 
 /// Recordings of joint torques.
 pub(crate) struct Driven<'a> {
@@ -46,6 +51,12 @@ pub(crate) struct Equations {
     pub segments: Vec<TriangularFactor>,
     /// Per joint, RMS of the residual, N·m or N; `None` if none of its torques was used, as at rest.
     pub noise: Vec<Option<f64>>,
+    /// Per joint, RMS that the noise of its torque leaves, N·m or N; `None` if the band leaves nothing above it.
+    pub floor: Vec<Option<f64>>,
+    /// Friction that grows with the load, where the data show it.
+    pub friction: Vec<LoadFriction>,
+    /// Mass of the load by a fit without such friction, kg.
+    pub constant_friction: f64,
     /// Preparation.
     pub plan: PreprocessingPlan,
     /// Torques over time, and what the fit gives for them, of the recordings with the load.
@@ -154,36 +165,141 @@ pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
         width: columns.len(),
     };
     let effects = Effects::of(robot).map_err(|e| LoadError::Model(e.to_string()))?;
-    let mut parts: Vec<Vec<TriangularFactor>> = Vec::new();
-    let mut samples: Vec<(String, Vec<Sample>)> = Vec::new();
-    for (recording, (source, survey)) in usable.iter().zip(&surveys).enumerate() {
-        let loaded = recording < driven.with.len();
-        let expected = survey.rows / treatment.decimation as u64;
-        // Without the torque of the described effects.
-        let freed = Compensated::new(*source, &effects, &chain, &treatment, true)?;
-        let (segments, kept) = assembly.segments(&freed, &plan, loaded, expected)?;
-        parts.extend(segments);
-        if loaded {
-            samples.push((driven.with[recording].label(), kept));
-        }
-    }
-    let noise = noise_of(&parts);
-    if noise.iter().all(Option::is_none) {
+    // Without the torque of the described effects.
+    let freed = (usable.iter())
+        .map(|source| Compensated::new(*source, &effects, &chain, &treatment, true))
+        .collect::<Result<Vec<_>, _>>()?;
+    let rows = surveys.iter().map(|s| s.rows / treatment.decimation as u64);
+    let readings = Readings {
+        assembly: &assembly,
+        plan: &plan,
+        recordings: freed.iter().zip(rows).collect(),
+    };
+    let constant = readings.collected(None)?;
+    if constant.noise.iter().all(Option::is_none) {
         return Err(LoadError::AtRest);
     }
-    let segments: Vec<TriangularFactor> = (parts.iter())
-        .map(|joints| {
-            let mut whole = TriangularFactor::new(joints[0].columns());
-            merge_weighted(&mut whole, joints, &noise);
-            whole
-        })
-        .collect();
+    let constant_friction = constant.solution[0];
+    let (collected, friction) = readings.beside_load_friction(constant)?;
+    let segments = collected.segments();
     Ok(Equations {
-        traces: traces(&segments, &samples, &noise),
+        traces: traces(&segments, &collected.samples, &collected.noise),
         segments,
-        noise,
+        noise: collected.noise,
+        floor: torque_noise(&usable, &treatment, joints)?,
+        friction,
+        constant_friction,
         plan: treatment,
     })
+}
+
+/// The rows of all recordings, reduced to one factor a segment and joint.
+struct Collected {
+    parts: Vec<Vec<TriangularFactor>>,
+    /// Rows for a figure, by recording with the load.
+    samples: Vec<(String, Vec<Sample>)>,
+    /// Per joint whose friction may grow with the load, RMS of its column with the load.
+    sizes: Vec<f64>,
+    /// Per joint, RMS of the residual, N·m or N.
+    noise: Vec<Option<f64>>,
+    /// Values of all unknowns.
+    solution: DVector<f64>,
+}
+
+impl Collected {
+    /// Returns one factor a segment, in units of the noise.
+    fn segments(&self) -> Vec<TriangularFactor> {
+        let weighted = |joints: &Vec<TriangularFactor>| {
+            let mut whole = TriangularFactor::new(joints[0].columns());
+            merge_weighted(&mut whole, joints, &self.noise);
+            whole
+        };
+        self.parts.iter().map(weighted).collect()
+    }
+}
+
+/// Recordings that are ready to be read, with the number of rows that is expected of each.
+struct Readings<'a> {
+    assembly: &'a Assembly<'a>,
+    plan: &'a Plan<'a>,
+    recordings: Vec<(&'a Compensated<'a>, u64)>,
+}
+
+impl Readings<'_> {
+    /// Collects the rows of all recordings. With `carried`, each of its joints has a column of friction that grows with
+    /// the load.
+    fn collected(&self, carried: Option<&Carried>) -> Result<Collected, LoadError> {
+        let with = self.assembly.driven.with;
+        let mut parts: Vec<Vec<TriangularFactor>> = Vec::new();
+        let mut samples = Vec::new();
+        let mut squares = vec![(0.0, 0u64); carried.map_or(0, |own| own.joints.len())];
+        for (k, (recording, expected)) in self.recordings.iter().enumerate() {
+            let own = Kept {
+                loaded: k < with.len(),
+                expected: *expected,
+                carried,
+            };
+            let (segments, kept) =
+                (self.assembly).segments(*recording, self.plan, &own, &mut squares)?;
+            parts.extend(segments);
+            if own.loaded {
+                samples.push((with[k].label(), kept));
+            }
+        }
+        let noise = noise_of(&parts);
+        let mut collected = Collected {
+            parts,
+            samples,
+            sizes: (squares.iter())
+                .map(|(sum, rows)| (sum / (*rows).max(1) as f64).sqrt())
+                .collect(),
+            noise,
+            solution: DVector::zeros(self.assembly.count() + squares.len()),
+        };
+        let segments = collected.segments();
+        if let Some(first) = segments.first() {
+            let mut whole = TriangularFactor::new(first.columns());
+            segments.iter().for_each(|own| whole.merge(own, 1.0));
+            let (r, z) = whole.system();
+            collected.solution = solved(&r, &z);
+        }
+        Ok(collected)
+    }
+
+    /// Gives friction that grows with the load to the joints whose torques show it. Returns `constant`, the fit without it,
+    /// if none does.
+    fn beside_load_friction(
+        &self,
+        constant: Collected,
+    ) -> Result<(Collected, Vec<LoadFriction>), LoadError> {
+        let used = |joint: &usize| constant.noise[*joint].is_some();
+        let mut joints: Vec<usize> = (0..constant.noise.len()).filter(used).collect();
+        while !joints.is_empty() {
+            let mut solution = constant.solution.clone();
+            let mut collected = None;
+            for _ in 0..FRICTION_ROUNDS {
+                let carried = self.assembly.carried(&joints, &solution);
+                let next = self.collected(Some(&carried))?;
+                solution = next.solution.clone();
+                collected = Some(next);
+            }
+            let Some(collected) = collected else { break };
+            let found = growing(&collected.segments(), &joints, &collected.sizes);
+            if found.len() == joints.len() {
+                return Ok((collected, found));
+            }
+            joints = found.iter().map(|own| own.joint).collect();
+        }
+        Ok((constant, Vec::new()))
+    }
+}
+
+/// How a recording is read.
+struct Kept<'a> {
+    loaded: bool,
+    /// Rows.
+    expected: u64,
+    carried: Option<&'a Carried<'a>>,
 }
 
 /// Returns the torques of the joints that are used over time, with those of the fit of all equations.
@@ -241,19 +357,40 @@ impl Assembly<'_> {
         INERTIAL_PARAMETERS + self.unknowns.robot + self.unknowns.changed.len()
     }
 
-    /// Returns one factor a segment and joint, and rows for a figure; segments without rows are left out.
+    /// Returns the torque that the joints carry by a solution.
+    fn carried(&self, joints: &[usize], solution: &DVector<f64>) -> Carried<'_> {
+        let (load, others) = solution.as_slice().split_at(INERTIAL_PARAMETERS);
+        Carried {
+            joints: joints.to_vec(),
+            robot: self.robot,
+            count: self.driven.robot.joints.len(),
+            load: load.to_vec(),
+            values: match self.known.is_empty() {
+                true => others[..self.unknowns.robot].to_vec(),
+                false => self.known.to_vec(),
+            },
+        }
+    }
+
+    /// Returns one factor a segment and joint, and rows for a figure; segments without rows are left out. Adds to
+    /// `squares`, with the number of rows, the squared columns of friction that grows with the load.
     fn segments(
         &self,
         recording: &dyn Recording,
         plan: &Plan,
-        loaded: bool,
-        expected: u64,
+        own: &Kept,
+        squares: &mut [(f64, u64)],
     ) -> Result<(Vec<Vec<TriangularFactor>>, Vec<Sample>), LoadError> {
+        let Kept {
+            loaded, expected, ..
+        } = *own;
         let joints = self.driven.robot.joints.len();
-        let empty = || vec![TriangularFactor::new(self.count()); joints];
+        let rubbing = own.carried.map_or(&[][..], |carried| &carried.joints);
+        let count = self.count() + rubbing.len();
+        let empty = || vec![TriangularFactor::new(count); joints];
         let mut segments: Vec<Vec<TriangularFactor>> = (0..SEGMENTS).map(|_| empty()).collect();
         let mut seen = 0u64;
-        let mut row = vec![0.0; self.count()];
+        let mut row = vec![0.0; count];
         let mut samples = Vec::new();
         each_rows(recording, plan, ModelKind::Differential, &mut |rows| {
             for k in 0..rows.t.len() {
@@ -266,6 +403,17 @@ impl Assembly<'_> {
                     if equation.keep[k] {
                         let x = &equation.x[k * self.width..(k + 1) * self.width];
                         let known = self.compose(x, loaded, &mut row);
+                        if let Some(carried) = own.carried
+                            && let Some(place) = rubbing.iter().position(|own| *own == joint)
+                        {
+                            let robot = &x[..self.robot.len()];
+                            let friction = carried.friction(joint, &row, robot);
+                            row[self.count() + place] = friction;
+                            if loaded {
+                                squares[place].0 += friction * friction;
+                                squares[place].1 += 1;
+                            }
+                        }
                         factor.push(&row, equation.y[k] - known, 1.0);
                         if is_sampled {
                             samples.push(Sample {

@@ -18,7 +18,8 @@ pub(crate) struct WrenchRow {
     pub time: f64,
     /// Temperature of the sensor, °C; 0 if it was not recorded.
     pub temperature: f64,
-    /// Regressor of the wrench of the robot on the load, about the sensor's origin, in the axes of the last joint.
+    /// Regressor of the wrench of the robot on the load, about the sensor's origin, in the described axes of
+    /// the sensor.
     pub regressor: [f64; ENTRIES],
     /// Its derivative by time, 1/s; zero at rest.
     pub rate: [f64; ENTRIES],
@@ -39,7 +40,7 @@ pub(crate) fn about(point: &Vector3<f64>, regressor: &mut [f64; ENTRIES]) {
     }
 }
 
-/// Returns the regressor of a weight about a point, for gravity along `direction`, all in the axes of the last joint.
+/// Returns the regressor of a weight about a point, for gravity along `direction`, all in the same axes.
 pub(crate) fn weight(direction: &Vector3<f64>, point: &Vector3<f64>) -> [f64; WEIGHT_ENTRIES] {
     let mut entries = [0.0; WEIGHT_ENTRIES];
     // The robot bears the weight: f = −m·g, n = −(m·c) × g.

@@ -23,7 +23,10 @@ enum Kind {
     Turned,
     TurnedAndDisplaced,
     UnitAndTurned,
+    UnitAndExchange,
     Cable,
+    Dead,
+    Gain,
 }
 
 /// A random case, and the words that the right answer has.
@@ -94,7 +97,10 @@ fn case(kind: Kind, seed: u64, still: bool) -> Case {
     if kind == Kind::TurnedAndDisplaced {
         own.position = std::array::from_fn(|k| own.position[k] + draw(random, -0.05, 0.05));
     }
-    if matches!(kind, Kind::Unit | Kind::UnitAndTurned) {
+    if matches!(
+        kind,
+        Kind::Unit | Kind::UnitAndTurned | Kind::UnitAndExchange
+    ) {
         let (both, words) = UNITS[(seed % 6) as usize];
         factors = both;
         right.push(format!("look like {words}"));
@@ -102,9 +108,9 @@ fn case(kind: Kind, seed: u64, still: bool) -> Case {
     if kind == Kind::Scale {
         factors[1] = [0.3, 0.5, 2.0, 5.0, 12.0][(seed % 5) as usize];
         // In many motions another origin of the sensor is alike: both must be said then.
-        right.push("no unit that is known|Another scale of the moments explains".to_owned());
+        right.push("no unit that is known|Another scale of the moments (".to_owned());
     }
-    if kind == Kind::Exchange {
+    if matches!(kind, Kind::Exchange | Kind::UnitAndExchange) {
         let first = 3 * (seed as usize % 2);
         let [a, b] = [[0, 1], [0, 2], [1, 2]][seed as usize % 3].map(|c| c + first);
         columns.swap(a, b);
@@ -117,12 +123,29 @@ fn case(kind: Kind, seed: u64, still: bool) -> Case {
         let name = rig_data::WRENCH_COLUMNS[channel];
         right.push(format!("{name} has the opposite sign"));
     }
+    let channel = seed as usize % 6;
+    let name = rig_data::WRENCH_COLUMNS[channel];
+    if kind == Kind::Dead {
+        right.push(format!("{name} shows nothing of the load"));
+    }
+    if kind == Kind::Gain {
+        columns[channel].1 = [0.5, 2.0, 0.8][(seed / 6 + seed) as usize % 3];
+        right.push(format!("{name} reads"));
+    }
+    let noise = Sensor {
+        bias: [0.0; 6],
+        ..sensor.clone()
+    };
     let moving = Moving::new(is, draw(random, 0.4, 0.8), seed);
     let flaw = |t: f64, read: Readings| -> Readings {
         let mut read: Readings = std::array::from_fn(|c| {
             let (from, sign) = columns[c];
             sign * factors[c / 3] * read[from]
         });
+        if kind == Kind::Dead {
+            let mut random = Pcg64::seed_from_u64((1e3 * t) as u64);
+            read[channel] = noise.read([0.0; 6], &mut random)[channel];
+        }
         if kind == Kind::Cable {
             let q = moving.position(t);
             read[0] += 12.0 * q[5].sin();
@@ -183,6 +206,9 @@ fn judge(case: &Case) -> (Said, String) {
         "look like",
         "no unit that is known",
         "turned by",
+        "shows nothing",
+        "are cut at",
+        "times what",
     ];
     // A property of a fit that leaves more than noise is told with this doubt.
     let text = match text.contains("may stand for another cause") {
@@ -193,7 +219,10 @@ fn judge(case: &Case) -> (Said, String) {
     let said = |words: &String| words.split('|').any(|words| text.contains(words));
     let is_right = !case.right.is_empty() && case.right.iter().all(said);
     let others = names.iter().filter(|name| {
-        text.contains(**name) && !case.right.iter().any(|words| words.contains(*name))
+        let is_meant = |words: &String| {
+            words.contains(*name) || **name == "times what" && words.ends_with(" reads")
+        };
+        text.contains(**name) && !case.right.iter().any(is_meant)
     });
     let is_load = found.as_ref().is_ok_and(|found| is_of(found, &case.points));
     let doubts = text.contains("Something else acts") || text.contains("leaves");
@@ -246,6 +275,8 @@ fn causes_of_a_motion_that_does_not_fit_are_named_and_none_is_invented() {
         Kind::Sign,
         Kind::Turned,
         Kind::TurnedAndDisplaced,
+        Kind::Dead,
+        Kind::Gain,
     ] {
         let [right, wrong, _] = counted(kind, false, cases);
         assert!(wrong as u64 <= cases / 10, "{kind:?}: {wrong} wrong");
@@ -254,10 +285,12 @@ fn causes_of_a_motion_that_does_not_fit_are_named_and_none_is_invented() {
 }
 
 #[test]
-fn a_unit_is_named_beside_a_turned_sensor() {
+fn a_unit_is_named_beside_a_turned_sensor_and_beside_exchanged_channels() {
     let cases = cases();
-    let [right, wrong, _] = counted(Kind::UnitAndTurned, false, cases);
-    assert!(wrong as u64 <= cases / 10 && right as u64 >= 9 * cases / 10);
+    for kind in [Kind::UnitAndTurned, Kind::UnitAndExchange] {
+        let [right, wrong, _] = counted(kind, false, cases);
+        assert!(wrong as u64 <= cases / 10 && right as u64 >= 9 * cases / 10);
+    }
 }
 
 #[test]
@@ -271,9 +304,62 @@ fn no_cause_is_invented_for_a_cable_that_pulls() {
 #[test]
 fn causes_of_poses_that_do_not_fit_are_named_and_none_is_invented() {
     let cases = cases();
-    for kind in [Kind::Sound, Kind::Exchange, Kind::Sign, Kind::Turned] {
+    for kind in [
+        Kind::Sound,
+        Kind::Exchange,
+        Kind::Sign,
+        Kind::Turned,
+        Kind::Dead,
+        Kind::Gain,
+    ] {
         let [right, wrong, _] = counted(kind, true, cases);
         assert!(wrong as u64 <= cases / 10, "{kind:?}: {wrong} wrong");
         assert!(right as u64 >= 9 * cases / 10, "{kind:?}: {right} right");
     }
+}
+
+/// The five other channels give the load, whatever the sixth reads.
+#[test]
+fn a_channel_that_is_dead_or_has_another_gain_is_left_out() {
+    for (kind, seed, still) in [
+        (Kind::Dead, 2, false),
+        (Kind::Dead, 0, true),
+        (Kind::Gain, 1, false),
+        (Kind::Gain, 8, true),
+    ] {
+        let case = case(kind, seed, still);
+        let options = LoadOptions {
+            even_if_wrong: true,
+            ..LoadOptions::default()
+        };
+        let found = identify_load(&case.described, &[&case.recording], &[], &options).unwrap();
+        let text = found.warnings.join(" ");
+        assert!(text.contains("The load was identified without"), "{text}");
+        assert!(is_of(&found, &case.points), "{kind:?} {seed}: {text}");
+    }
+}
+
+/// The factor is given with its standard deviation, and is that of the recording within four of them.
+#[test]
+fn a_scale_of_the_moments_is_given_with_its_standard_deviation() {
+    let case = case(Kind::Scale, 2, false);
+    let found = identify_load(
+        &case.described,
+        &[&case.recording],
+        &[],
+        &LoadOptions::default(),
+    );
+    let text = match found {
+        Ok(found) => found.warnings.join(" "),
+        Err(error) => error.to_string(),
+    };
+    let words = text.split("moments are ").nth(1);
+    let words = words
+        .or_else(|| text.split("scale of the moments (").nth(1))
+        .unwrap();
+    let words = words.split(" times").next().unwrap();
+    let (value, std) = words.split_once(" ± ").unwrap();
+    let std: f64 = std.parse().unwrap();
+    let off = (value.parse::<f64>().unwrap() - 2.0) / std;
+    assert!(off.abs() < 4.0 && std > 0.0 && std < 0.1, "{text}");
 }

@@ -32,6 +32,11 @@ fn arm() -> Robot {
 
 /// Adds torques by virtual work, with Coulomb and viscous friction and noise.
 fn driven(moving: &Moving, points: &Points, rubs: f64, seed: u64) -> InMemory {
+    rubbing(moving, points, rubs, &[0.0; 6], seed)
+}
+
+/// The same, with friction of each joint that grows with the torque that it carries.
+fn rubbing(moving: &Moving, points: &Points, rubs: f64, grows: &[f64; 6], seed: u64) -> InMemory {
     let sensor = Sensor::default();
     let mut recording = recorded(moving, points, &sensor, [30.0, 100.0], seed, &|_, r| r);
     let mut random = rand_pcg::Pcg64::seed_from_u64(seed + 100);
@@ -42,7 +47,8 @@ fn driven(moving: &Moving, points: &Points, rubs: f64, seed: u64) -> InMemory {
         let [before, after] = [-1e-3, 1e-3].map(|by| moving.position(t + by));
         for (j, torque) in torques.iter().enumerate() {
             let velocity = (after[j] - before[j]) / 2e-3;
-            let friction = rubs * velocity.signum() + 0.3 * velocity + 0.1;
+            let dry = rubs + grows[j] * torque.abs();
+            let friction = dry * velocity.signum() + 0.3 * velocity + 0.1;
             let noise: f64 = StandardNormal.sample(&mut random);
             block.joints[j].tau.push(torque + friction + 0.02 * noise);
         }
@@ -73,6 +79,7 @@ fn load_is_what_the_torques_with_it_show_beyond_those_without_it() {
         "{:?}",
         found.mass
     );
+    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
     // With the sensor the torques do not contradict, and the result is at least as exact.
     let options = LoadOptions {
         by: By::Both,
@@ -165,4 +172,68 @@ fn a_torque_scale_that_is_wrong_contradicts_the_sensor() {
         "{:?}",
         found.warnings
     );
+}
+
+/// Friction that grows with the load is not that of a larger mass: it is estimated where it is, and nowhere else.
+#[test]
+fn friction_that_grows_with_the_load_is_named_by_its_joint() {
+    let moving = Moving::new(arm(), 0.7, 21);
+    let part = tool();
+    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
+    let truth = parameters(&part);
+    let options = LoadOptions {
+        by: By::Torque,
+        ..LoadOptions::default()
+    };
+    for grows in [[0.0; 6], [0.1; 6], [0.0, 0.0, 0.12, 0.0, 0.0, 0.0]] {
+        let without = rubbing(&moving, &hand(), 0.8, &grows, 1);
+        let with = rubbing(&moving, &both, 0.8, &grows, 2);
+        let found = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+        let torque = found.torque.as_ref().unwrap();
+        let said = found.warnings.join(" ");
+        assert_eq!(said.contains("Friction grows"), grows[2] > 0.0, "{said}");
+        for own in &torque.load_friction {
+            let off = (own.coefficient - grows[own.joint]) / own.std;
+            assert!(off.abs() < 4.0 && grows[own.joint] > 0.0, "{own:?}");
+        }
+        let named = torque.load_friction.iter().any(|own| own.joint == 2);
+        assert_eq!(named, grows[2] > 0.0);
+        let off = (found.mass.value - truth[0]) / found.mass.std;
+        assert!(off.abs() < 4.0, "{:?}, truth {}", found.mass, truth[0]);
+    }
+}
+
+/// What neither load nor friction explains is told with its joint, because the mass may be wrong by more than its standard
+/// deviation then.
+#[test]
+fn a_residual_of_the_torques_above_their_noise_is_told_with_its_joint() {
+    let moving = Moving::new(arm(), 0.7, 21);
+    let part = tool();
+    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
+    let without = driven(&moving, &hand(), 0.8, 1);
+    let mut with = driven(&moving, &both, 0.8, 2);
+    // A hose pulls at the third joint.
+    let block = &mut with.blocks[0];
+    for (k, t) in block.t.iter().enumerate() {
+        block.joints[2].tau[k] += 0.3 * (3.0 * moving.position(*t)[2]).sin();
+    }
+    let options = LoadOptions {
+        by: By::Torque,
+        ..LoadOptions::default()
+    };
+    let found = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+    let name = &moving.robot.joints[2].name;
+    let said = found.warnings.join(" ");
+    assert!(
+        said.contains(&format!("RMS of {name}, where noise")),
+        "{said}"
+    );
+    let others = moving
+        .robot
+        .joints
+        .iter()
+        .filter(|joint| joint.name != *name);
+    for joint in others {
+        assert!(!said.contains(&format!("RMS of {},", joint.name)), "{said}");
+    }
 }

@@ -10,6 +10,7 @@ use super::error::{Place, RobotError};
 use super::fault::{MAX_NUMBER, is_safe_magnitude};
 use super::joint::Inertial;
 use super::serial_robot::Robot;
+use super::toml_message::of_wrong_length;
 use super::urdf::SpatialInertia;
 use rig_output::{comment_toml, toml_document};
 
@@ -38,6 +39,19 @@ fn is_true(value: &bool) -> bool {
     *value
 }
 
+/// Returns the byte at which the line of a key begins; 0 if there is none.
+fn place_of(text: &str, key: &str) -> usize {
+    let mut begin = 0;
+    for line in text.split_inclusive('\n') {
+        let rest = line.trim_start().strip_prefix(key);
+        if rest.is_some_and(|rest| rest.trim_start().starts_with('=')) {
+            return begin + line.len() - line.trim_start().len();
+        }
+        begin += line.len();
+    }
+    0
+}
+
 /// Comments of the written file, by key.
 const COMMENTS: &str = "
 mass = 'kg'
@@ -59,20 +73,24 @@ impl Load {
         let load: Self = toml::from_str(&text).map_err(|error| RobotError::Toml {
             path: path.into(),
             place: Place::of(&text, error.span().map_or(0, |s| s.start)),
-            message: format!(
-                "{}; a load has `mass`, `first_moment` and `inertia` (`rig load` writes such a file)",
-                error.message().lines().collect::<Vec<_>>().join(", ")
-            ),
+            message: match error.message().starts_with("invalid length") {
+                true => of_wrong_length(&error, &text),
+                false => format!(
+                    "{}; a load has `mass`, `first_moment` and `inertia` (`rig load` writes such a file)",
+                    error.message().lines().collect::<Vec<_>>().join(", ")
+                ),
+            },
         })?;
         let wrong = |key: &str, found: f64, advice: &str| RobotError::Value {
             path: path.into(),
-            place: Place::of(&text, text.find(key).unwrap_or(0)),
+            place: Place::of(&text, place_of(&text, key)),
             what: format!("`{key}` of the load"),
             found: found.to_string(),
             advice: advice.to_owned(),
         };
         if !(load.mass >= 0.0) {
-            return Err(wrong("mass", load.mass, "it must be 0 or greater, in kg"));
+            let advice = "it must be 0 or greater, in kg";
+            return Err(wrong("mass", load.mass, advice));
         }
         for (key, values) in [
             ("mass", &[load.mass][..]),
@@ -82,6 +100,17 @@ impl Load {
             if let Some(found) = values.iter().find(|v| !is_safe_magnitude(**v)) {
                 let advice = format!("it must be a number of at most {MAX_NUMBER:e}");
                 return Err(wrong(key, *found, &advice));
+            }
+        }
+        if load.mass == 0.0 {
+            for (key, values) in [
+                ("first_moment", &load.first_moment[..]),
+                ("inertia", &load.inertia),
+            ] {
+                if let Some(found) = values.iter().find(|v| **v != 0.0) {
+                    let advice = "a body of mass 0 has none: give its mass, or 0 here as well";
+                    return Err(wrong(key, *found, advice));
+                }
             }
         }
         Ok(load)
@@ -188,7 +217,19 @@ mod tests {
             ),
             (
                 "mass = 1.0\nfirst_moment = [0, 0]\ninertia = [0, 0, 0, 0, 0, 0]",
-                "3 numbers",
+                ":2:16: `first_moment`: invalid length 2, expected a list of 3 numbers",
+            ),
+            (
+                "mass = 0\nfirst_moment = [0, 0.1, 0]\ninertia = [0, 0, 0, 0, 0, 0]",
+                ":2:1: `first_moment` of the load is 0.1",
+            ),
+            (
+                "# of mass 0\nmass = 0\nfirst_moment = [0, 0, 0]\ninertia = [1, 0, 0, 0, 0, 0]",
+                ":4:1: `inertia` of the load is 1",
+            ),
+            (
+                "# kg: mass\nmass = -1.0\nfirst_moment = [0, 0, 0]\ninertia = [0, 0, 0, 0, 0, 0]",
+                ":2:1:",
             ),
             ("mass = 1.0", "first_moment"),
         ] {

@@ -42,6 +42,7 @@ mod right_angle;
 mod serial_robot;
 mod templates;
 mod text;
+mod toml_message;
 mod unit_check;
 mod unlikely;
 mod urdf;
@@ -67,6 +68,7 @@ pub use serial_robot::Robot;
 pub use templates::{
     DOUBLE_PENDULUM, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, TX40, XL330, template,
 };
+pub use text::joint_place;
 pub use urdf::{
     Audit, AuditCheck, AuditFinding, ChainChoice, Original, Urdf, audit, is_placeholder,
 };

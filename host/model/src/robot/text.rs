@@ -12,6 +12,7 @@ use super::drive::Drive;
 use super::error::{Place, RobotError};
 use super::fault::{Fault, Step};
 use super::serial_robot::Robot;
+use super::toml_message::sentence;
 
 /// Returns the robot and the remarks on the text, one sentence each.
 pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), RobotError> {
@@ -31,7 +32,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), Robo
     let mut robot: Robot = toml::from_str(text).map_err(|e| RobotError::Toml {
         path: path.into(),
         place: Place::of(text, e.span().map_or(0, |s| s.start)),
-        message: sentence(&e),
+        message: sentence(&e, text),
     })?;
     missing_ratio(&robot, text, path)?;
     check(&robot).map_err(refused)?;
@@ -85,30 +86,12 @@ fn missing_ratio(robot: &Robot, text: &str, path: &Path) -> Result<(), RobotErro
     Ok(())
 }
 
-/// Returns the message of the TOML reader on one line, with a correction if one is known.
-fn sentence(error: &toml::de::Error) -> String {
-    let message = error
-        .message()
-        .lines()
-        .map(str::trim)
-        .collect::<Vec<_>>()
-        .join(", ");
-    // The reader takes a bare word for the beginning of `true` or `false`.
-    if message.starts_with("invalid boolean") || message.contains("must be quoted") {
-        return "what stands here is no TOML value; write a number like 20 or 2e-5, text in quotation marks, true or false".into();
-    }
-    let advice = if message.starts_with("missing field") {
-        "; add this key to the table that begins here (`rig init one-link` writes an example)"
-    } else if message.starts_with("unknown field") {
-        "; correct or remove this key"
-    } else if message.starts_with("invalid length") {
-        "; give exactly that many numbers in brackets"
-    } else if message.starts_with("invalid type") || message.starts_with("unknown variant") {
-        "; give a value of that kind"
-    } else {
-        " (this is not valid TOML; `rig init one-link` writes an example)"
-    };
-    message.replace("expected f64", "expected a number") + advice
+/// Returns the place of a value of a joint's table in the text of a TOML description, or of the deepest table on the way to
+/// it that is there. `keys` leads from the table of the joint to the value.
+pub fn joint_place(text: &str, joint: usize, keys: &[&'static str]) -> Place {
+    let mut key_path = vec![Step::Key("joint"), Step::At(joint)];
+    key_path.extend(keys.iter().map(|key| Step::Key(key)));
+    Place::of(text, offset(text, &key_path))
 }
 
 /// Returns the byte offset of the deepest value that `key_path` reaches.

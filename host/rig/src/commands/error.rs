@@ -8,7 +8,7 @@ use rig_data::DataError;
 use rig_identify::IdentifyError;
 use rig_link::LinkError;
 use rig_load::LoadError;
-use rig_model::robot::RobotError;
+use rig_model::robot::{Place, RobotError};
 use rig_model::simulate::SimulateError;
 use rig_output::WriteError;
 use rig_plant::emulated::NameplateError;
@@ -79,6 +79,16 @@ pub enum CommandError {
     /// Trajectory design.
     #[error(transparent)]
     Excite(#[from] rig_excite::ExciteError),
+    /// A value of the description that leaves no motion.
+    #[error("{}:{place}: {error}", path.display())]
+    Described {
+        /// The description.
+        path: PathBuf,
+        /// Where the value stands.
+        place: Place,
+        /// Why it leaves none.
+        error: rig_excite::ExciteError,
+    },
     /// The demonstration.
     #[error(transparent)]
     Demo(#[from] crate::demo::DemoError),

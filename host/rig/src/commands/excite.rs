@@ -1,6 +1,6 @@
 //! `rig excite`: designs a motion within the robot's limits that makes its parameters identifiable.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
@@ -13,7 +13,7 @@ use rig_excite::{
     Criterion, Design, Effort, Options, Parameters, PoseOptions, Poses, Scaling, StagedKind,
     StagedOptions, design_measured, poses, staged,
 };
-use rig_model::robot::Robot;
+use rig_model::robot::{Robot, joint_place};
 
 /// Optimality criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -351,14 +351,40 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ));
     }
     args.refuse_other_noise(&robot)?;
+    design(args, &robot, ui).map_err(|error| located(error, &args.robot, &robot))
+}
+
+/// Names the line of a TOML description at which the value stands that leaves no motion.
+fn located(error: CommandError, path: &Path, robot: &Robot) -> CommandError {
+    let CommandError::Excite(error) = error else {
+        return error;
+    };
+    let place = || {
+        let (joint, keys) = error.described_value()?;
+        let is_toml = path.extension().is_some_and(|end| end == "toml");
+        let text = is_toml.then(|| std::fs::read_to_string(path).ok())??;
+        Some(joint_place(&text, robot.joint_index(joint)?, keys))
+    };
+    match place() {
+        Some(place) => CommandError::Described {
+            path: path.into(),
+            place,
+            error,
+        },
+        None => CommandError::Excite(error),
+    }
+}
+
+/// Designs the motion or the poses, and writes them.
+fn design(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     if let Some(count) = args.poses {
-        return at_rest(args, count, &robot, ui);
+        return at_rest(args, count, robot, ui);
     }
     let Some(kind) = args.kind.staged() else {
-        return optimal(args, &robot, ui);
+        return optimal(args, robot, ui);
     };
-    let (file, notes) = staged(&robot, kind, &args.staged_options()?)?;
-    file.save(&args.out, &robot, args.rate)?;
+    let (file, notes) = staged(robot, kind, &args.staged_options()?)?;
+    file.save(&args.out, robot, args.rate)?;
     for note in notes {
         ui.remark(&note);
     }

@@ -7,6 +7,7 @@ use clap::Args as ClapArgs;
 
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
+use super::same_file::{is_copy, is_same};
 use super::ui::{Progress, Ui};
 use rig_data::prepare::{LongestPart, PrepareError, Recording};
 use rig_data::{
@@ -606,11 +607,6 @@ pub(crate) fn refuse_faults(
     }
 }
 
-/// Resolves a path, so that two names of one file compare equal. A missing file keeps its path.
-pub(crate) fn real(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
-}
-
 /// Refuses a recording that is given both as training data and as hold-out.
 ///
 /// # Errors
@@ -618,7 +614,7 @@ pub(crate) fn real(path: &Path) -> PathBuf {
 pub fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
     match holdout
         .iter()
-        .find(|held| data.iter().any(|path| real(path) == real(held)))
+        .find(|held| data.iter().any(|path| is_same(path, held)))
     {
         Some(path) => Err(CommandError::Sentence(format!(
             "{} is given both as training data and as --holdout; give a hold-out that is not used in the fit.",
@@ -634,7 +630,7 @@ pub(crate) fn refuse_as_rest(
     log: &Path,
     moved: &[PathBuf],
 ) -> Result<(), CommandError> {
-    if moved.iter().any(|path| real(path) == real(log)) {
+    if moved.iter().any(|path| is_same(path, log)) {
         return Err(CommandError::Sentence(format!(
             "{} is given both as {option} and as a recording of motion; {option} takes a recording made with {with}.",
             log.display()
@@ -643,13 +639,23 @@ pub(crate) fn refuse_as_rest(
     Ok(())
 }
 
-/// Refuses a training recording that is given twice: it would make every interval too narrow.
+/// Refuses a recording that is given twice, by one name or as a copy: it would make every interval too narrow.
+///
+/// # Errors
+/// A sentence that names the recording, and its copy.
 pub fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError> {
     for (k, path) in data.iter().enumerate() {
-        if data[..k].iter().any(|before| real(before) == real(path)) {
+        if data[..k].iter().any(|before| is_same(before, path)) {
             return Err(CommandError::Sentence(format!(
                 "{} is given twice, which would count its noise twice; {instead}.",
                 path.display()
+            )));
+        }
+        if let Some(before) = data[..k].iter().find(|before| is_copy(before, path)) {
+            return Err(CommandError::Sentence(format!(
+                "{} holds samples of {}: both files have the same bytes, which would count their noise twice; {instead}.",
+                path.display(),
+                before.display()
             )));
         }
     }

@@ -6,9 +6,10 @@ use clap::{Args as ClapArgs, ValueEnum};
 use serde::Serialize;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, Use, real, recordings, refuse_faults, refuse_twice};
+use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
+use super::same_file::{is_copy, is_same};
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -138,6 +139,7 @@ fn check(args: &Args) -> Result<(), CommandError> {
     can_take(&args.out, &FILES)?;
     refuse_folder(&args.out, &[], args.force)?;
     refuse_twice(&args.data, "give every recording once")?;
+    refuse_twice(&args.without, "give every recording once")?;
     refuse_both(&args.data, &args.without)?;
     if args.poses && args.by != Measured::Sensor {
         return Err(CommandError::Sentence(
@@ -232,18 +234,25 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Refuses a recording that is given both with and without the load.
+/// Refuses a recording that is given both with and without the load, by one name or as a copy.
 fn refuse_both(with: &[PathBuf], without: &[PathBuf]) -> Result<(), CommandError> {
-    match without
-        .iter()
-        .find(|path| with.iter().any(|own| real(own) == real(path)))
-    {
-        Some(path) => Err(CommandError::Sentence(format!(
-            "{} is given both as --data and as --without; give a recording with the load, and another one without it.",
-            path.display()
-        ))),
-        None => Ok(()),
+    let wants = "give a recording with the load, and another one without it";
+    for path in without {
+        if with.iter().any(|own| is_same(own, path)) {
+            return Err(CommandError::Sentence(format!(
+                "{} is given both as --data and as --without; {wants}.",
+                path.display()
+            )));
+        }
+        if let Some(own) = with.iter().find(|own| is_copy(own, path)) {
+            return Err(CommandError::Sentence(format!(
+                "{} (--without) has the same bytes as {} (--data); {wants}.",
+                path.display(),
+                own.display()
+            )));
+        }
     }
+    Ok(())
 }
 
 /// Puts the sensor of the options into the description.

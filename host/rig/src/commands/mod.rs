@@ -33,6 +33,7 @@ mod overwrite;
 mod pictures;
 mod record;
 mod run;
+mod same_file;
 mod simulate;
 mod table;
 mod ui;

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
-use super::input::{described, real};
+use super::input::described;
 use super::overwrite::refuse_file;
+use super::same_file::is_same;
 use super::ui::Ui;
 use rig_diagnose::voltage::replay_voltage;
 use rig_excite::{Carried, Noise, load_reference, replay_carrying};
@@ -83,7 +84,7 @@ pub(crate) struct Args {
 /// A file cannot be read or written, or the model cannot be simulated.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = described(&args.robot, &args.chain, ui)?.robot;
-    if real(&args.out) == real(&args.trajectory) {
+    if is_same(&args.out, &args.trajectory) {
         return Err(CommandError::Sentence(format!(
             "--out {} is the trajectory itself; give another file.",
             args.out.display()

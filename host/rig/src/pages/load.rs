@@ -262,7 +262,7 @@ fn biases(sensor: &SensorFindings) -> Section {
         if let Some(drift) = &bias.drift {
             rows.push(row("change from begin to end".into(), drift));
         }
-        if let Some((time, after)) = &bias.jump {
+        for (time, after) in &bias.jumps {
             rows.push(row(format!("after a jump near {time:.1} s"), after));
         }
     }
@@ -306,7 +306,16 @@ fn setting(sensor: &SensorFindings) -> String {
 
 fn torques(found: &LoadIdentification) -> Option<Section> {
     let torque = found.torque.as_ref()?;
-    let rows = torque.joints.iter().zip(&torque.residual);
+    let rms = |value: &Option<f64>, none: &str| {
+        value.map_or(none.to_owned(), |rms| format_significant(rms, 3))
+    };
+    let friction = |joint: usize| {
+        let own = torque.load_friction.iter().find(|own| own.joint == joint);
+        own.map_or("not shown".to_owned(), |own| {
+            format_value(own.coefficient, own.std)
+        })
+    };
+    let rows = torque.joints.iter().enumerate();
     let source = match torque.with_unloaded {
         true => "The recordings without the load gave the parameters of the robot.",
         false => {
@@ -314,15 +323,24 @@ fn torques(found: &LoadIdentification) -> Option<Section> {
         }
     };
     let mut section = Section::new("torques", "Joint torques", source).with(Block::Table(Table {
-        caption: "Residual of the torques with the load".into(),
-        columns: vec![Column::text("Joint"), Column::number("RMS", "N·m or N")],
+        caption: "Residual of the torques, and friction that grows with the load".into(),
+        columns: vec![
+            Column::text("Joint"),
+            Column::number("RMS", "N·m or N"),
+            Column::number("Noise alone would leave", "N·m or N"),
+            Column::number("Friction per torque carried", ""),
+        ],
         rows: rows
-            .map(|(name, rms)| {
-                let rms = rms.map_or("not used".to_owned(), |rms| format_significant(rms, 3));
-                vec![name.clone(), rms]
+            .map(|(k, name)| {
+                vec![
+                    name.clone(),
+                    rms(&torque.residual[k], "not used"),
+                    rms(&torque.noise[k], "not known"),
+                    friction(k),
+                ]
             })
             .collect(),
-        note: String::new(),
+        note: "Noise: that of the torque above the band of the fit, as if it were white. Friction per torque carried: ± one standard deviation; \"not shown\" where the data show no such friction.".into(),
     }));
     for trace in &torque.traces {
         section = section.with(Block::Plot(torque_curves(trace, &torque.joints)));
