@@ -268,7 +268,7 @@ fn a_copy_of_a_recording_is_refused() {
     let says = |said: &str| said.contains("copy.csv holds samples of") && said.contains("own.csv");
     for (command, option) in [
         ("load", "--data"),
-        ("compliance", "--load"),
+        ("compliance", "--static"),
         ("identify", "--data"),
     ] {
         let said = refused(command, &[(option, "own.csv"), (option, "copy.csv")]);
