@@ -87,7 +87,7 @@ pub enum CommandError {
         /// Where the value stands.
         place: Place,
         /// Why it leaves none.
-        error: rig_excite::ExciteError,
+        error: Box<rig_excite::ExciteError>,
     },
     /// The demonstration.
     #[error(transparent)]

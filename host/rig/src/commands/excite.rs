@@ -369,7 +369,7 @@ fn located(error: CommandError, path: &Path, robot: &Robot) -> CommandError {
         Some(place) => CommandError::Described {
             path: path.into(),
             place,
-            error,
+            error: Box::new(error),
         },
         None => CommandError::Excite(error),
     }
