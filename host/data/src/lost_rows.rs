@@ -58,6 +58,8 @@ pub(super) struct LostRows {
     pub rows: f64,
     /// Number of rows that are judged.
     pub judged: usize,
+    /// True if most places follow a row that repeats all positions: the last values were written while none arrived.
+    pub held: bool,
 }
 
 /// Places at which rows are lost, and rows that repeat the row before.
@@ -99,6 +101,7 @@ pub(super) fn advances(block: &Block) -> Advances {
             places: found.len(),
             rows: found.iter().map(|(_, rows)| rows).sum(),
             judged,
+            held: 2 * found.iter().filter(|(k, _)| stands(block, *k)).count() > found.len(),
         })
     };
     let (mut lost, mut repeated) = (told(&lost), told(&repeated));
@@ -113,6 +116,12 @@ pub(super) fn advances(block: &Block) -> Advances {
         repeated,
         made_up: 2 * made_up > places(&repeated),
     }
+}
+
+/// Returns true if every position of a row is that of the row before.
+fn stands(block: &Block, row: usize) -> bool {
+    let same = |q: &[f64]| row > 0 && q.get(row - 1) == q.get(row);
+    block.joints.iter().all(|joint| same(&joint.q))
 }
 
 /// Returns true if the next row repeats every position and effort.
@@ -297,6 +306,24 @@ mod tests {
                 only && (0.8..1.2).contains(&part),
                 "{rate} {count}: {lost:?}"
             );
+        }
+    }
+
+    /// The last values are written over 30 rows, five times.
+    #[test]
+    fn values_that_were_held_are_told_from_lost_rows() {
+        for (rate, count) in &KINDS[..2] {
+            for seed in 0..5 {
+                let held = |row: usize| match row % 1700 {
+                    within @ 1100..1130 => row - (within - 1099),
+                    _ => row,
+                };
+                let lost = advances(&recorded(*rate, *count, (0..9000).map(held), seed)).lost;
+                assert!(lost.is_some_and(|lost| lost.held), "{rate} {count}");
+                let kept = (0..9000).filter(|row| row % 1700 < 1100 || row % 1700 >= 1130);
+                let lost = advances(&recorded(*rate, *count, kept, seed)).lost;
+                assert!(lost.is_some_and(|lost| !lost.held), "{rate} {count}");
+            }
         }
     }
 
