@@ -152,8 +152,8 @@ pub enum Implausible {
     },
     /// Rows that are missing while t goes on evenly.
     #[error(
-        "t counts on over missing rows: at {places} (first at t = {} s) the positions advance in one row by what {advance} take{each}, so that velocity and acceleration are wrong there; record the time of each row, or give the parts between these places one by one",
-        format_time(*at)
+        "t counts on over missing rows: at {places} (first at t = {} s) the positions advance in one row by what {advance} take{each}, so that velocity and acceleration are wrong there; {}",
+        format_time(*at), lost_how(*held)
     )]
     LostRows {
         /// Time of the row before the first place, s.
@@ -164,6 +164,8 @@ pub enum Implausible {
         advance: String,
         /// Number of missing rows in words; empty if there is one place.
         each: String,
+        /// True if the positions stand still before most places.
+        held: bool,
     },
     /// Rows that repeat the row before while the joints move.
     #[error(
@@ -392,7 +394,11 @@ fn miscounted(block: &Block) -> Option<Implausible> {
         made_up,
     } = advances(block);
     if let Some(LostRows {
-        row, places, rows, ..
+        row,
+        places,
+        rows,
+        held,
+        ..
     }) = lost
     {
         let whole = rows.round().max(1.0);
@@ -411,6 +417,7 @@ fn miscounted(block: &Block) -> Option<Implausible> {
                 true => String::new(),
                 false => format!(" ({whole} rows in all)"),
             },
+            held,
         });
     }
     repeated.map(|found| Implausible::RepeatedRows {
@@ -418,6 +425,16 @@ fn miscounted(block: &Block) -> Option<Implausible> {
         percent: 100.0 * found.places as f64 / found.judged.max(1) as f64,
         made_up,
     })
+}
+
+/// Says what to do about rows that are missing while the time was counted on.
+fn lost_how(held: bool) -> &'static str {
+    match held {
+        true => {
+            "the positions stand still before, as where the last values are written while none arrive: take out the rows that repeat the row before"
+        }
+        false => "record the time of each row, or give the parts between these places one by one",
+    }
 }
 
 /// Says why rows repeat the row before, what follows, and what would be right.
