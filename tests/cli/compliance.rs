@@ -76,6 +76,42 @@ fn a_stiffness_is_identified_by_a_chirp_and_read_again() {
     assert_eq!(before, fs::read(at("found/compliance.json")).unwrap());
 }
 
+/// Friction stops the motor of a chirp near the antiresonance; a multisine keeps it moving, and its periods are averaged.
+#[test]
+fn a_stiffness_is_identified_by_whole_periods_of_a_multisine() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [elastic, rigid] = elastic(folder.path());
+    let mut excite = rig();
+    excite.args(["excite", "--kind", "multisine", "--band", "2,50"]);
+    excite.args(["--start", "-1.5708", "--robot"]).arg(&rigid);
+    let said = refuse(excite.arg("--out").arg(at("multisine.toml")));
+    assert!(said.contains("give a .csv"), "{said}");
+    let mut excite = rig();
+    excite.args(["excite", "--kind", "multisine", "--band", "2,50"]);
+    excite.args(["--start", "-1.5708", "--robot"]).arg(&rigid);
+    let said = succeed(excite.arg("--out").arg(at("multisine.csv")));
+    assert!(said.contains("5 periods of 8 s"), "{said}");
+    let mut simulate = rig();
+    simulate.args(["simulate", "--noise-torque", "0.05"]);
+    simulate.args(["--noise-position", "1e-5", "--robot"]);
+    simulate.arg(&elastic).arg("--trajectory");
+    simulate.arg(at("multisine.csv"));
+    succeed(simulate.arg("--out").arg(at("run.csv")));
+    let mut command = compliance(&rigid, &at("found"));
+    command.args(["--tool", "0.5", "0", "0", "--pose", "-1.5708"]);
+    succeed(command.arg("--frequency").arg(at("run.csv")));
+    let found = json(&at("found"));
+    let periodic = &found["frequency"]["periodic"];
+    assert_eq!(periodic["periods"], 4);
+    assert!(periodic["odd"].as_f64() > periodic["noise"].as_f64());
+    let stiffness = found["drives"][0]["stiffness"]["value"].as_f64().unwrap();
+    assert!((stiffness / 1200.0 - 1.0).abs() < 0.01, "{stiffness}");
+    assert_eq!(found["warnings"].as_array().unwrap().len(), 0, "{found}");
+    let page = fs::read_to_string(at("found/report.html")).unwrap();
+    assert!(page.contains("the mean over 4 periods") && page.contains("odd distortion"));
+}
+
 #[test]
 fn matrices_and_map_come_from_a_given_stiffness() {
     let folder = tempfile::tempdir().unwrap();

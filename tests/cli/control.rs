@@ -278,3 +278,49 @@ fn an_unstable_law_is_told_and_the_others_are_reported() {
             .contains("with free.toml")
     );
 }
+
+/// A described wrist sensor reads the force: its range bounds the task. Motors that leave their limits are told.
+#[test]
+fn the_described_sensor_and_the_limits_of_motors_are_heeded() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let text = fs::read_to_string(robot("irp6.toml")).unwrap();
+    let sensor = "\n[wrist_sensor]\nrotation = [0.4, -0.9, 2.1]\nforce_range = 18.0\n";
+    fs::write(at("sensor.toml"), format!("{text}{sensor}")).unwrap();
+    let run = |name: &str, options: &[&str], out: &str| {
+        let mut command = rig();
+        command.args(["control", "--robot"]).arg(at(name));
+        command.args(options).arg("--out").arg(at(out));
+        command
+    };
+    let press = ["--law", "hybrid", "--press"];
+    succeed(&mut run(
+        "sensor.toml",
+        &[&press[..], &["20"]].concat(),
+        "a",
+    ));
+    let found = result(&at("a"));
+    let notes = found["notes"].to_string();
+    assert!(
+        notes.contains("read by the described [wrist_sensor]"),
+        "{notes}"
+    );
+    let error = found["contact"][0]["steady_error"].as_f64().unwrap();
+    assert!(error.abs() < 0.05, "{error}");
+    let said = refuse(&mut run(
+        "sensor.toml",
+        &[&press[..], &["30"]].concat(),
+        "b",
+    ));
+    assert!(said.contains("its range is 18.0 N"), "{said}");
+    // Behind the last joint stands its drive.
+    let motor = "\n[joint.drive.limits]\nvelocity = 150.0\n";
+    fs::write(at("motor.toml"), format!("{}{motor}", text.trim_end())).unwrap();
+    let options = ["--law", "computed-torque", "--duration", "5"];
+    succeed(&mut run("motor.toml", &options, "c"));
+    let warnings = result(&at("c"))["tracking"][0]["warnings"].to_string();
+    assert!(
+        warnings.contains("the speed of the motor of joint"),
+        "{warnings}"
+    );
+}

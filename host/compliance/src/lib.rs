@@ -39,7 +39,7 @@ mod value;
 
 pub use effects_text::elasticity_text;
 pub use error::ComplianceError;
-pub use frequency::{Band, FrequencyResponse, response_pose};
+pub use frequency::{Band, FrequencyResponse, Periodic, response_pose};
 pub use identify::{Compliance, ComplianceOptions, WrenchFrame, identify_compliance};
 pub use loading::{Deflection, DriveLoading, LoadingFindings};
 pub use map::{ComplianceMap, GRID, SingularPose, compliance_map};

@@ -1,17 +1,14 @@
 //! The closed loop of a law and the true robot, tick by tick.
 
-use rand::SeedableRng;
-use rand_pcg::Pcg64;
-
 use super::contact_task::ContactTask;
 use super::controller::Controller;
 use super::error::ControlError;
+use super::force_sensing::ForceSensor;
 use super::law_model::LawModel;
 use super::mobility::free_inertia;
 use super::plant::{Contact, Plant};
 use super::sensing::Encoders;
 use super::settings::Settings;
-use rig_excite::drawn;
 use rig_model::robot::{JointKind, Robot};
 use rig_model::simulate::Model;
 use rig_shared::control::arm::Inputs;
@@ -39,6 +36,8 @@ pub struct Trace {
     pub saturated: Vec<usize>,
     /// True force of the tool on the surface along the normal, N; empty without a surface.
     pub force: Vec<f64>,
+    /// Number of ticks in which the wrist sensor had a force and a moment beyond its range.
+    pub beyond_range: [usize; 2],
     /// True position of the tool along each direction of the task, m; empty without a surface.
     pub tool: [Vec<f64>; 3],
     /// Adapted parameters at some instants: time, values.
@@ -60,7 +59,7 @@ pub(crate) fn closed_loop(
     let contact = task.map(|task| contact(robot, task)).transpose()?;
     let mut plant = Plant::new(model, contact, &start)?;
     let mut encoders = Encoders::new(robot, settings.rate, settings.resolution);
-    let mut random = Pcg64::seed_from_u64(settings.seed);
+    let mut sensor = ForceSensor::of(robot, settings);
     let mut trace = empty(n, samples, settings.period());
     let (mut torque, mut next) = (vec![0.0; n], vec![0.0; n]);
     let mut wanted = vec![Reference::default(); n];
@@ -68,6 +67,13 @@ pub(crate) fn closed_loop(
         let t = k as f64 * settings.period();
         encoders.read(&plant.q, &plant.v);
         let force = plant.force()?;
+        let read = match task {
+            Some(_) => {
+                let positions = [plant.link_q.as_slice(), &encoders.q];
+                sensor.read(&model.chain, positions, plant.tool, force)?
+            }
+            None => [0.0; 3],
+        };
         for (own, series) in wanted.iter_mut().zip(reference) {
             *own = series[k];
         }
@@ -76,7 +82,7 @@ pub(crate) fn closed_loop(
             velocity: &encoders.qd,
             reference: &wanted,
             task: task.map_or_else(Default::default, |task| task.reference(controller.kind, t)),
-            force: force.map(|f| f + drawn(&mut random, settings.force_noise)),
+            force: read,
             feedforward: &[],
         };
         let limited = controller
@@ -109,6 +115,7 @@ pub(crate) fn closed_loop(
         torque.copy_from_slice(&next);
         stable(robot, &plant, controller, t)?;
     }
+    trace.beyond_range = sensor.beyond;
     Ok(trace)
 }
 

@@ -8,8 +8,10 @@ use super::closed_loop::{Trace, closed_loop};
 use super::contact_task::ContactTask;
 use super::controller::{Controller, limits, regressor};
 use super::error::ControlError;
+use super::force_sensing;
 use super::law_model::LawModel;
 use super::measures::{self, PLOTTED};
+use super::motor_limits;
 use super::position_limits::PositionLimits;
 use super::result::{Adaptation, Adapted, Contact, Robustness, Tracking};
 use super::settings::{LawKind, Settings};
@@ -104,6 +106,7 @@ impl Bench<'_> {
         };
         let mut warnings: Vec<String> = slower.into_iter().collect();
         warnings.extend(warnings::of_motion(self.robot, &trace, false));
+        warnings.extend(motor_limits::exceeded(self.robot, &trace)?);
         warnings.extend(adaptation.as_ref().and_then(warnings::of_adaptation));
         let measures = Tracking {
             law,
@@ -139,11 +142,22 @@ impl Bench<'_> {
         task: &ContactTask,
     ) -> Result<Run<Contact>, ControlError> {
         task_path::check(self.robot, task)?;
-        let Moved { trace, notes, .. } = self.run(law, model, Some(task))?;
+        let sensor = force_sensing::check(self.robot, &self.truth.chain, task)?;
+        let Moved {
+            trace, mut notes, ..
+        } = self.run(law, model, Some(task))?;
+        notes.extend(sensor);
         let found = measures::force(law, task, &trace)?;
         let measure = |trace: &Trace| measures::force(law, task, trace).map(|own| own.overshoot);
         let mut warnings = warnings::of_motion(self.robot, &trace, true);
+        warnings.extend(motor_limits::exceeded(self.robot, &trace)?);
         warnings.extend(warnings::of_force(law, &found, task, &self.settings));
+        let touching = trace.force.iter().filter(|force| **force > 0.0).count();
+        warnings.extend(force_sensing::beyond_range(
+            self.robot,
+            trace.beyond_range,
+            touching,
+        ));
         let ticks = measures::ticks(trace.force.len());
         let pick = |list: &[f64]| -> Vec<f64> {
             ticks.clone().filter_map(|k| list.get(k)).copied().collect()

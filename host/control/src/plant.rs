@@ -22,13 +22,14 @@ pub(crate) struct Contact<'a> {
 }
 
 impl Contact<'_> {
-    /// Computes the force on the tool (base frame, N) at positions and velocities of the links, and its torques on them.
+    /// Computes position (m) of the tool and force (N) on it in the base frame at positions and velocities of the links, and
+    /// its torques on them.
     fn act(
         &self,
         model: &Model,
         [q, v]: [&[f64]; 2],
         external: &mut [f64],
-    ) -> Result<[f64; 3], ControlError> {
+    ) -> Result<[[f64; 3]; 2], ControlError> {
         let mut jacobian = vec![[0.0; 6]; q.len()];
         let position = tool_pose(&model.chain, q, self.task.tool, &mut jacobian)?;
         let velocity: [f64; 3] = core::array::from_fn(|k| {
@@ -48,7 +49,7 @@ impl Contact<'_> {
         for (own, column) in external.iter_mut().zip(&jacobian) {
             *own = (0..3).map(|k| column[k] * force[k]).sum::<f64>();
         }
-        Ok(force)
+        Ok([position, force])
     }
 }
 
@@ -65,6 +66,8 @@ pub(crate) struct Plant<'a> {
     pub link_q: Vec<f64>,
     /// Velocities of the links.
     pub link_v: Vec<f64>,
+    /// Position of the tool in the base frame at the last [`force`](Self::force), m.
+    pub tool: [f64; 3],
     middle: Vec<f64>,
     external: Vec<f64>,
 }
@@ -86,6 +89,7 @@ impl<'a> Plant<'a> {
             v: still.clone(),
             link_q: q.to_vec(),
             link_v: still.clone(),
+            tool: [0.0; 3],
             middle: q.to_vec(),
             external: if contact.is_some() { still } else { Vec::new() },
             contact,
@@ -106,7 +110,10 @@ impl<'a> Plant<'a> {
     pub(crate) fn force(&mut self) -> Result<[f64; 3], ControlError> {
         match &self.contact {
             Some(contact) => {
-                contact.act(self.model, [&self.link_q, &self.link_v], &mut self.external)
+                let links = [self.link_q.as_slice(), &self.link_v];
+                let [tool, force] = contact.act(self.model, links, &mut self.external)?;
+                self.tool = tool;
+                Ok(force)
             }
             None => Ok([0.0; 3]),
         }

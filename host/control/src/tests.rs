@@ -3,6 +3,7 @@
 
 mod contact;
 mod passive;
+mod sensor;
 mod tracking;
 
 use rig_model::robot::Robot;

@@ -2,12 +2,10 @@
 
 use rig_shared::transmission::Transmission;
 
-use crate::{ExciteError, JointTrajectory};
+use crate::ExciteError;
+use crate::instants::Instants;
 use rig_model::robot::{Joint, Robot};
 use rig_model::simulate::{Model, SimulateError};
-
-/// Number of instants at which motions of single joints and poses are checked.
-const SAMPLES: usize = 20_000;
 
 /// Limits of a motor; infinite if there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,19 +72,19 @@ impl Used {
     }
 }
 
-/// Returns the most used motor limit at the samples of a motion; `None` if it exceeds none. The torque counts if all
+/// Returns the most used motor limit at instants of a motion; `None` if it exceeds none. The torque counts if all
 /// links are described (`with_torque`).
 pub(super) fn exceeded(
     robot: &Robot,
     model: &Model,
-    joints: &[JointTrajectory],
+    instants: &Instants<'_>,
     with_torque: bool,
 ) -> Result<Option<Used>, ExciteError> {
     let limits = MotorBounds::all(robot, 1.0);
     if limits.is_empty() {
         return Ok(None);
     }
-    let n = joints.len();
+    let n = robot.joints.len();
     let wrong = |e| ExciteError::from(SimulateError::from(e));
     let transmission: Transmission<f64> = robot.transmission().map_err(wrong)?;
     let [
@@ -98,20 +96,13 @@ pub(super) fn exceeded(
         mut tau,
         mut motor,
     ] = [(); 7].map(|()| vec![0.0; n]);
-    let durations = joints.iter().map(|joint| joint.trajectory.duration());
-    let duration = durations.fold(0.0, f64::max);
     let mut most = Used {
         share: 0.0,
         joint: 0,
         limit: "motor angle",
     };
-    for k in 0..=SAMPLES {
-        let time = duration * k as f64 / SAMPLES as f64;
-        for (j, joint) in joints.iter().enumerate() {
-            let at = joint.trajectory.at(time);
-            q[j] = joint.start + at.position;
-            (qd[j], qdd[j]) = (at.velocity, at.acceleration);
-        }
+    for k in 0..instants.count() {
+        instants.fill(k, &mut q, &mut qd, &mut qdd);
         transmission.motor_position(&q, &mut psi).map_err(wrong)?;
         transmission
             .motor_velocity(&q, &qd, &mut psid)

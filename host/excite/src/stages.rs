@@ -10,6 +10,7 @@ use rig_shared::trajectory::{
 use crate::bounds::{Bounds, Room, bounds_of, prior};
 use crate::drives::{Combined, Drives, into_cranks};
 use crate::feasible::refuse_unreachable;
+use crate::instants::{Instants, MOTOR_STEPS, TORQUE_STEPS};
 use crate::motor_limits::exceeded;
 use crate::quintic_move::{micros, move_time};
 use crate::torque_share::torque_share;
@@ -27,10 +28,10 @@ const SPEED_SPAN: f64 = 200.0;
 /// passes have the same ends, so a longer time makes the slow ones longer.
 const FASTEST_PASS: f64 = 0.15;
 /// Default share of each limit that these motions use; for positions, of the distance from the start to the limit.
-const SHARE: f64 = 0.8;
+pub(super) const SHARE: f64 = 0.8;
 /// Factor by which velocity and acceleration are lowered until the torque fits, and number of attempts.
-const SLOWER: f64 = 0.85;
-const ATTEMPTS: usize = 30;
+pub(super) const SLOWER: f64 = 0.85;
+pub(super) const ATTEMPTS: usize = 30;
 /// Purpose of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StagedKind {
@@ -89,6 +90,29 @@ impl StagedOptions {
         }
     }
 
+    /// Rejects a band that is none.
+    pub(super) fn check_band(&self) -> Result<(), ExciteError> {
+        let positive = |v: f64| v > 0.0 && v.is_finite();
+        match self.band {
+            Some([low, high]) if !(positive(low) && low < high && positive(high)) => {
+                Err(ExciteError::Option {
+                    name: "band",
+                    value: format!("{low},{high}"),
+                    right: "it must be two frequencies above 0 Hz, the lower one first".to_owned(),
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Band of a frequency response: from a frequency at which the range bounds the amplitude to one at which acceleration
+    /// clearly does.
+    pub(super) fn default_band(distance: f64, velocity: f64, acceleration: f64) -> [f64; 2] {
+        let low = 0.25 * velocity / (TAU * distance);
+        let high = 4.0 * acceleration / (TAU * velocity);
+        [low, high.max(8.0 * low)]
+    }
+
     /// Rejects invalid numbers and options that the kind does not use.
     fn check(&self, kind: StagedKind, unit: &str) -> Result<(), ExciteError> {
         let option = |name, value: String, right: &str| {
@@ -131,16 +155,7 @@ impl StagedOptions {
                 );
             }
         }
-        if let Some([low, high]) = self
-            .band
-            .filter(|[low, high]| !(positive(*low) && low < high && positive(*high)))
-        {
-            return option(
-                "band",
-                format!("{low},{high}"),
-                "it must be two frequencies above 0 Hz, the lower one first",
-            );
-        }
+        self.check_band()?;
         if let Some(count) = self.count.filter(|n| !(2..=SPEEDS).contains(n)) {
             return option(
                 "number of speeds",
@@ -196,11 +211,8 @@ impl Allowance<'_> {
     }
 
     fn chirp(&self) -> Result<Trajectory<f64>, String> {
-        // From a frequency at which the range bounds the amplitude to one at which acceleration clearly does.
         let [start_hz, end_hz] = self.asked.band.unwrap_or_else(|| {
-            let start_hz = 0.25 * self.velocity / (TAU * self.distance);
-            let end_hz = 4.0 * self.acceleration / (TAU * self.velocity);
-            [start_hz, end_hz.max(8.0 * start_hz)]
+            StagedOptions::default_band(self.distance, self.velocity, self.acceleration)
         });
         // About five periods in the slowest octave, so that the sweep is slow compared with its own frequency.
         let octaves = (end_hz / start_hz).log2();
@@ -390,47 +402,13 @@ pub fn staged(
     kind: StagedKind,
     options: &StagedOptions,
 ) -> Result<(TrajectoryFile, Vec<String>), ExciteError> {
-    let moving = moving_joint(robot, options.joint.as_deref())?;
-    let unit = match robot.joints.get(moving).map(|j| j.kind) {
-        Some(JointKind::Prismatic) => "m",
-        _ => "rad",
-    };
-    options.check(kind, unit)?;
-    let room = Room::new(
-        options.margin.unwrap_or(0.0),
-        options.speed_share.unwrap_or(1.0),
-    )?;
-    let (bounds, mut notes) = bounds_of(robot, room, options.start.as_deref())?;
-    let combined = Combined::of(robot);
-    if !robot.workspace.is_empty() {
-        notes.push(
-            "The regions in [[workspace]] were not checked: only a motion of kind fourier is designed within them."
-                .into(),
-        );
-    }
-    let mut model = Model::from_robot(robot)?;
-    let with_torque = prior(robot, &model).is_ok();
-    let drives = Drives::of(robot, model.motors.take(), &bounds, 1.0)?;
-    refuse_unreachable(robot, &bounds, &combined, drives.as_ref(), with_torque)?;
-    let start = start_of(options.start.as_deref(), &bounds, &combined)?;
-    let no_room = |why: String| ExciteError::NoRoom {
-        kind: kind.name(),
-        joint: robot.joints[moving].name.clone(),
-        why,
-    };
-    let b = bounds[moving];
-    refuse_fast(options, &b)?;
-    let distance = distance_of(options, &b, &combined, &start, moving).map_err(no_room)?;
-    let within = Within {
-        robot,
-        moving,
-        bounds: &bounds,
-        start: &start,
-    };
-    let trajectory = within.fastest(kind, options, distance, &mut notes)?;
-    let file = file_of(robot, moving, &start, &trajectory);
+    let mut ready = Prepared::new(robot, kind.name(), options, |unit| {
+        options.check(kind, unit)
+    })?;
+    let trajectory = ready.fastest(kind, options)?;
+    let file = file_of(robot, ready.moving, &ready.start, &trajectory);
     if file.duration() > LONG {
-        notes.push(format!(
+        ready.notes.push(format!(
             "The motion lasts {:.0} s, as long as slow motion over this range takes; --amplitude{} it.",
             file.duration(),
             match kind {
@@ -440,39 +418,129 @@ pub fn staged(
             }
         ));
     }
-    Ok((file, notes))
+    Ok((file, ready.notes))
 }
 
 /// One joint of a robot at rest, and the limits available to its motion.
-struct Within<'a> {
-    robot: &'a Robot,
-    moving: usize,
-    bounds: &'a [Bounds],
-    start: &'a [f64],
+pub(super) struct Prepared<'a> {
+    pub(super) robot: &'a Robot,
+    /// Name of the kind of motion.
+    kind: &'static str,
+    /// Index of the joint.
+    pub(super) moving: usize,
+    pub(super) bounds: Vec<Bounds>,
+    pub(super) start: Vec<f64>,
+    /// Available distance on either side of the start.
+    pub(super) distance: f64,
+    /// Remarks on limits that were not checked.
+    pub(super) notes: Vec<String>,
+    model: Model,
+    /// True if the torque of a motion is known beforehand.
+    with_torque: bool,
 }
 
-impl Within<'_> {
-    /// Finds the fastest motion of a kind whose reference keeps all limits; adds a note if the torque is unknown.
-    fn fastest(
-        &self,
-        kind: StagedKind,
+impl<'a> Prepared<'a> {
+    /// `check` rejects options; it gets the unit of the joint's position.
+    pub(super) fn new(
+        robot: &'a Robot,
+        kind: &'static str,
         options: &StagedOptions,
-        distance: f64,
-        notes: &mut Vec<String>,
-    ) -> Result<Trajectory<f64>, ExciteError> {
-        let b = self.bounds[self.moving];
-        let model = Model::from_robot(self.robot)?;
-        let limited = self.bounds.iter().any(|b| b.torque.is_some());
-        let known = prior(self.robot, &model);
+        check: impl Fn(&str) -> Result<(), ExciteError>,
+    ) -> Result<Self, ExciteError> {
+        let moving = moving_joint(robot, options.joint.as_deref())?;
+        check(match robot.joints.get(moving).map(|j| j.kind) {
+            Some(JointKind::Prismatic) => "m",
+            _ => "rad",
+        })?;
+        let room = Room::new(
+            options.margin.unwrap_or(0.0),
+            options.speed_share.unwrap_or(1.0),
+        )?;
+        let (bounds, mut notes) = bounds_of(robot, room, options.start.as_deref())?;
+        let combined = Combined::of(robot);
+        if !robot.workspace.is_empty() {
+            notes.push(
+                "The regions in [[workspace]] were not checked: only a motion of kind fourier is designed within them."
+                    .into(),
+            );
+        }
+        let mut model = Model::from_robot(robot)?;
+        let known = prior(robot, &model);
+        let with_torque = known.is_ok();
+        let limited = bounds.iter().any(|b| b.torque.is_some());
         if let (Err(joint), true) = (&known, limited) {
             notes.push(format!(
                 "The torque limit was not checked: joint \"{joint}\" has no [joint.inertial], so that its torque is not known beforehand."
             ));
         }
-        // Without an acceleration limit the velocity limit is reached within a tenth of the distance.
-        let acceleration = b
-            .acceleration
-            .unwrap_or(5.0 * b.velocity * b.velocity / distance);
+        let drives = Drives::of(robot, model.motors.take(), &bounds, 1.0)?;
+        refuse_unreachable(robot, &bounds, &combined, drives.as_ref(), with_torque)?;
+        let start = start_of(options.start.as_deref(), &bounds, &combined)?;
+        let mut ready = Self {
+            robot,
+            kind,
+            moving,
+            bounds,
+            start,
+            distance: 0.0,
+            notes,
+            model: Model::from_robot(robot)?,
+            with_torque,
+        };
+        refuse_fast(options, &ready.bounds[moving])?;
+        ready.distance = distance_of(
+            options,
+            &ready.bounds[moving],
+            &combined,
+            &ready.start,
+            moving,
+        )
+        .map_err(|why| ready.no_room(why))?;
+        Ok(ready)
+    }
+
+    /// Returns the error of a motion that does not fit.
+    pub(super) fn no_room(&self, why: String) -> ExciteError {
+        ExciteError::NoRoom {
+            kind: self.kind,
+            joint: self.robot.joints[self.moving].name.clone(),
+            why,
+        }
+    }
+
+    /// Acceleration limit. Without one the velocity limit is reached within a tenth of the distance.
+    pub(super) fn acceleration(&self) -> f64 {
+        let b = self.bounds[self.moving];
+        (b.acceleration).unwrap_or(5.0 * b.velocity * b.velocity / self.distance)
+    }
+
+    /// Returns why a motion exceeds a limit of torque or of a motor.
+    pub(super) fn overloaded(
+        &self,
+        for_torque: &Instants<'_>,
+        for_motors: &Instants<'_>,
+    ) -> Result<Option<String>, ExciteError> {
+        if self.with_torque && self.bounds.iter().any(|b| b.torque.is_some()) {
+            let share = torque_share(&self.model, &self.bounds, for_torque)?;
+            if share.is_nan() || share > 1.0 {
+                return Ok(Some(format!(
+                    "even slowly it needs {:.0} % of a torque limit; start it where gravity is weaker",
+                    100.0 * share
+                )));
+            }
+        }
+        let used = exceeded(self.robot, &self.model, for_motors, self.with_torque)?;
+        Ok(used.map(|used| used.why(self.robot)))
+    }
+
+    /// Finds the fastest motion of a kind whose reference keeps all limits.
+    fn fastest(
+        &self,
+        kind: StagedKind,
+        options: &StagedOptions,
+    ) -> Result<Trajectory<f64>, ExciteError> {
+        let b = self.bounds[self.moving];
+        let (distance, acceleration) = (self.distance, self.acceleration());
         // A margin need not be kept to the last bit of single precision, but a limit must be.
         let rounding = match options.margin {
             Some(margin) if margin > 0.0 => 1e-6 * (b.high - b.low),
@@ -507,28 +575,18 @@ impl Within<'_> {
                 why = error.to_string();
                 continue;
             }
-            let joints = joints_of(self.robot, self.moving, self.start, &trajectory);
-            if known.is_ok() && limited {
-                let share = torque_share(&model, self.bounds, &joints)?;
-                if share.is_nan() || share > 1.0 {
-                    why = format!(
-                        "even slowly it needs {:.0} % of a torque limit; start it where gravity is weaker",
-                        100.0 * share
-                    );
-                    continue;
-                }
-            }
-            if let Some(used) = exceeded(self.robot, &model, &joints, known.is_ok())? {
-                why = used.why(self.robot);
+            let joints = joints_of(self.robot, self.moving, &self.start, &trajectory);
+            let overloaded = self.overloaded(
+                &Instants::of_joints(&joints, TORQUE_STEPS),
+                &Instants::of_joints(&joints, MOTOR_STEPS),
+            )?;
+            if let Some(reason) = overloaded {
+                why = reason;
                 continue;
             }
             return Ok(trajectory);
         }
-        Err(ExciteError::NoRoom {
-            kind: kind.name(),
-            joint: self.robot.joints[self.moving].name.clone(),
-            why,
-        })
+        Err(self.no_room(why))
     }
 }
 

@@ -3,19 +3,16 @@
 use rig_shared::multibody::{column, inverse_dynamics};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
+use crate::ExciteError;
 use crate::bounds::Bounds;
-use crate::{ExciteError, JointTrajectory};
+use crate::instants::Instants;
 use rig_model::simulate::{Model, SimulateError};
 
-/// Number of instants at which the torque is checked; the motions use a share of the limits, which leaves a margin
-/// between them.
-const TORQUE_SAMPLES: usize = 50_000;
-
-/// Returns the largest used share of a torque limit at the samples of a motion, with full Coulomb friction.
+/// Returns the largest used share of a torque limit at instants of a motion, with full Coulomb friction.
 pub(super) fn torque_share(
     model: &Model,
     bounds: &[Bounds],
-    joints: &[JointTrajectory],
+    instants: &Instants<'_>,
 ) -> Result<f64, ExciteError> {
     let n = bounds.len();
     let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -28,15 +25,8 @@ pub(super) fn torque_share(
     // Coulomb friction of the motors also counts in full.
     let width = n * MOTOR_COLUMNS;
     let mut motors = vec![0.0; n * width];
-    let durations = joints.iter().map(|joint| joint.trajectory.duration());
-    let duration = durations.fold(0.0, f64::max);
-    for k in 0..=TORQUE_SAMPLES {
-        let time = duration * k as f64 / TORQUE_SAMPLES as f64;
-        for (j, joint) in joints.iter().enumerate() {
-            let at = joint.trajectory.at(time);
-            q[j] = joint.start + at.position;
-            (qd[j], qdd[j]) = (at.velocity, at.acceleration);
-        }
+    for k in 0..instants.count() {
+        instants.fill(k, &mut q, &mut qd, &mut qdd);
         inverse_dynamics(&model.chain, &rows, &q, &qd, &qdd, &mut tau)?;
         let mut coulomb: Vec<f64> = model
             .parameters

@@ -222,6 +222,13 @@
     }
     function marks(u, g, k, b, X, Y) {
       var ink = variable("marker"), paper = variable("card"), rows = [], taken = [];
+      // A label leaves neither the plot nor crosses the line of another marker, if the left of its own line is free of both.
+      function leftwards(p, w) {
+        function crossed(from, to) {
+          return data.markers.some(function (m) { var q = m.vertical && X(m.at); return m.vertical && q !== p && q > from && q < to; });
+        }
+        return p + w > b.left + b.width || crossed(p, p + w) && p - w > b.left && !crossed(p - w, p);
+      }
       g.save(); g.font = FONT.replace("12px", 12 * k + "px"); g.lineJoin = "round";
       data.markers.forEach(function (m) {
         var p = m.vertical ? X(m.at) : Y(m.at), w = g.measureText(m.label).width, x, y;
@@ -229,7 +236,7 @@
         g.strokeStyle = ink; g.lineWidth = 1.1 * k; g.setLineDash([2 * k, 3 * k]); g.beginPath();
         if (m.vertical) {
           g.moveTo(p, b.top); g.lineTo(p, b.top + b.height);
-          x = p + 6 * k; if (x + w > b.left + b.width) x = p - 6 * k - w;
+          x = p + 6 * k; if (leftwards(p, w + 10 * k)) x = p - 6 * k - w;
           var row = 0;
           while ((rows[row] || (rows[row] = [])).some(function (q) { return x < q[1] && q[0] < x + w; })) row++;
           rows[row].push([x, x + w]); y = b.top + (13 + 16 * row) * k;

@@ -539,6 +539,20 @@ impl<'a> Canvas<'a> {
         path
     }
 
+    /// Returns true if the label of a vertical marker belongs to the left of its line: to the right it leaves the plot, or
+    /// crosses the line of another marker, which it does not to the left.
+    fn label_leftwards(&self, at: f64, width: f64) -> bool {
+        let plot = self.scene.plot;
+        let others = || {
+            let vertical = (plot.markers.iter())
+                .filter(|m| m.direction == Direction::Vertical && marker_drawable(plot, m));
+            vertical.map(|m| self.x(m.at)).filter(|x| *x != at)
+        };
+        let crossed = |a: f64, b: f64| others().any(|x| a < x && x < b);
+        let (right, left) = (at + 10.0 + width, at - 10.0 - width);
+        right > self.right || (crossed(at, right) && left > self.left && !crossed(left, at))
+    }
+
     fn markers(&self, out: &mut String) {
         let plot = self.scene.plot;
         let ink = self.palette.named("marker", "#3d4650");
@@ -551,7 +565,7 @@ impl<'a> Canvas<'a> {
             let (path, x, y, anchor) = match marker.direction {
                 Direction::Vertical => {
                     let at = self.x(marker.at);
-                    let leftwards = at + 6.0 + width > self.right;
+                    let leftwards = self.label_leftwards(at, width);
                     let (a, b) = if leftwards {
                         (at - 6.0 - width, at - 6.0)
                     } else {

@@ -381,3 +381,24 @@ fn the_page_asks_nothing_of_any_network() {
         "the plotting library's licence goes with it"
     );
 }
+
+/// A label between two markers stands where it crosses neither line.
+#[test]
+fn the_label_of_a_marker_does_not_cross_the_line_of_another() {
+    let (x, y) = wave(200);
+    let axis = || Axis::new("x", "m");
+    let plot = |second: f64| {
+        let lines = Plot::new("markers", axis(), axis())
+            .with(Series::line("wave", Role::Model, x.clone(), y.clone()))
+            .mark(Marker::vertical(1.0, "antiresonance"))
+            .mark(Marker::vertical(second, "resonance"));
+        let picture = svg(&lines).unwrap();
+        let parsed = roxmltree::Document::parse(&picture).unwrap();
+        let anchors = parsed.descendants().filter(|n| n.has_tag_name("text"));
+        let labels = anchors.filter(|n| n.text().is_some_and(|t| t.contains("resonance")));
+        let sides = labels.map(|n| n.attribute("text-anchor").unwrap().to_owned());
+        sides.collect::<Vec<_>>()
+    };
+    assert_eq!(plot(1.8), ["start", "start"]);
+    assert_eq!(plot(1.1), ["end", "start"]);
+}

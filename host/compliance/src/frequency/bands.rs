@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::spectra::{Bin, Spectra};
+use super::bin::Bin;
+use super::spectra::Spectra;
 use super::two_mass::C;
 
 /// Averages of a band at least.

@@ -45,7 +45,7 @@ pub(super) fn has_reference(stretch: &Signals, k: usize) -> bool {
     stretch.joints[k].reference.is_some()
 }
 
-/// Returns the columns of joint `k`.
+/// Returns the columns of joint `k`. Those of a `periodic` reference keep the line through their ends.
 ///
 /// # Errors
 /// [`ComplianceError::Recording`]: no torque, a joint or a reference that does not move.
@@ -54,6 +54,7 @@ pub(super) fn columns_of(
     k: usize,
     name: &str,
     by_reference: bool,
+    periodic: bool,
 ) -> Result<Columns, ComplianceError> {
     let joint = &stretch.joints[k];
     let n = stretch.len() - 1;
@@ -78,7 +79,11 @@ pub(super) fn columns_of(
         (Some(reference), true) => &reference[..n],
         _ => &joint.tau[..n],
     };
-    let instrument = without_line(instrument);
+    let level = |values: &[f64]| match periodic {
+        true => without_mean(values),
+        false => without_line(values),
+    };
+    let instrument = level(instrument);
     let still = rms(&instrument) < STILL * rms(&without_line(&joint.q[..n]));
     if by_reference && still {
         return Err(ComplianceError::Recording(format!(
@@ -89,7 +94,7 @@ pub(super) fn columns_of(
     }
     Ok(Columns {
         instrument,
-        torque: without_line(&joint.tau[..n]),
+        torque: level(&joint.tau[..n]),
         sign: velocity.iter().map(|v| (v / scale).tanh()).collect(),
         link_sign: vec![0.0; n],
         position: joint.q[..n].iter().map(|q| q - joint.q[0]).collect(),
@@ -117,6 +122,11 @@ fn noise(velocity: &[f64]) -> f64 {
         .collect();
     // Median of the magnitude over 0.6745 is the standard deviation; the second difference of white noise has √6 of it.
     median_of_finite(second).unwrap_or(0.0) / (0.6745 * 6f64.sqrt())
+}
+
+fn without_mean(values: &[f64]) -> Vec<f64> {
+    let middle = mean(values);
+    values.iter().map(|v| v - middle).collect()
 }
 
 /// Subtracts the line through the two ends: what holds the joint at rest.

@@ -12,7 +12,7 @@ use rig_numerics::optimise::levenberg_marquardt::{LeastSquares, Settings};
 use rig_numerics::statistics::sum_of_squares;
 
 use super::bands::BandBins;
-use super::spectra::Bin;
+use super::bin::Bin;
 use super::two_mass::{C, TwoMass};
 use crate::value::Value;
 

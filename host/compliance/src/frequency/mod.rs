@@ -1,9 +1,11 @@
 //! Stiffness of a joint from its frequency response.
 
 mod bands;
+mod bin;
 mod columns;
 mod fit;
 mod link_motion;
+mod periodic;
 mod response;
 mod spectra;
 mod two_mass;
@@ -11,6 +13,7 @@ mod two_mass;
 pub use bands::Band;
 #[cfg(test)]
 pub(crate) use bands::bands;
+pub use periodic::Periodic;
 pub(crate) use response::respond;
 pub use response::{FrequencyResponse, response_pose};
 #[cfg(test)]

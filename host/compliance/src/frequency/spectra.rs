@@ -1,14 +1,16 @@
 //! Spectra of torque, velocity and instrument of one joint.
 //!
 //! A recording that begins and ends at rest is transformed as a whole, without a window: its transform has no leakage,
-//! whatever the motion is. Other recordings are cut into Hann windows that overlap by half (Welch 1967).
+//! whatever the motion is. Of a periodic reference, the mean over its whole periods is transformed. Other recordings are cut into Hann windows that overlap by half (Welch 1967).
 
 use std::f64::consts::TAU;
 
 use realfft::RealFftPlanner;
 use rig_numerics::statistics::mean;
 
+use super::bin::Bin;
 use super::columns::{Columns, columns_of, has_reference, rests};
+use super::periodic::{Harmonics, Periodic, Periods, harmonics, periods_of, shown};
 use super::two_mass::{C, TwoMass};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
@@ -17,23 +19,6 @@ use crate::signals::Signals;
 const WINDOW: f64 = 8.0;
 /// Fewest rows of a recording.
 const FEWEST: usize = 512;
-
-/// Transforms at one frequency.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Bin {
-    /// rad/s.
-    pub omega: f64,
-    /// Instrument: reference, or the torque itself.
-    pub instrument: C,
-    /// Torque.
-    pub torque: C,
-    /// Velocity of the motor, joint side.
-    pub velocity: C,
-    /// Sign of the velocity.
-    pub sign: C,
-    /// Friction of the link over its size, by a model.
-    pub link_sign: C,
-}
 
 /// All transforms of the recordings of one joint.
 #[derive(Clone, Debug, Default)]
@@ -57,6 +42,10 @@ pub(crate) struct Spectra {
     /// Time, torque, velocity of the longest stretch, for the figure.
     pub shown: [Vec<f64>; 3],
     columns: Vec<Columns>,
+    /// Whole periods of the reference, one entry a stretch; empty if it has none.
+    periods: Vec<Periods>,
+    /// Harmonics in them.
+    harmonics: Vec<Harmonics>,
 }
 
 impl Spectra {
@@ -69,8 +58,47 @@ impl Spectra {
         self.transform();
     }
 
+    /// Returns what whole periods of the reference show, by a model; `None` if there are none.
+    pub(crate) fn periodic(&self, model: &TwoMass) -> Option<Periodic> {
+        shown(&self.harmonics, &self.periods, self.rate, model)
+    }
+
+    /// Transforms whole periods; false if they hold too few harmonics.
+    fn transform_periods(&mut self) -> bool {
+        let mut planner = RealFftPlanner::new();
+        let dt = 1.0 / self.rate;
+        let each = self
+            .columns
+            .iter()
+            .zip(&self.periods)
+            .map(|(own, periods)| {
+                let transformed: Vec<Vec<Bin>> = (0..periods.count)
+                    .map(|k| {
+                        let mut bins = Vec::new();
+                        let rows = [periods.first + k * periods.length, periods.length];
+                        segment(&mut planner, own, rows, dt, true, &mut bins);
+                        bins
+                    })
+                    .collect();
+                harmonics(&transformed)
+            });
+        let Some(found) = each.collect::<Option<Vec<Harmonics>>>() else {
+            return false;
+        };
+        self.bins = found
+            .iter()
+            .flat_map(|own| own.held.iter().copied())
+            .collect();
+        self.bins.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+        self.harmonics = found;
+        true
+    }
+
     /// Transforms all columns.
     fn transform(&mut self) {
+        if !self.periods.is_empty() && self.transform_periods() {
+            return;
+        }
         let mut planner = RealFftPlanner::new();
         let dt = 1.0 / self.rate;
         self.bins.clear();
@@ -123,7 +151,6 @@ pub(crate) fn spectra(
             k + 1
         )));
     }
-    let mut columns = Vec::new();
     for stretch in &usable {
         if (stretch.rate() / all.rate - 1.0).abs() > 1e-3 {
             return Err(ComplianceError::Recording(format!(
@@ -134,15 +161,24 @@ pub(crate) fn spectra(
                 all.rate
             )));
         }
-        columns.push(columns_of(stretch, k, name, all.by_reference)?);
     }
+    all.periods = periods_in(&usable, k)
+        .filter(|_| all.by_reference)
+        .unwrap_or_default();
+    all.columns = columns_in(&usable, k, name, &all)?;
+    if !all.periods.is_empty() && !all.transform_periods() {
+        all.periods.clear();
+        all.columns = columns_in(&usable, k, name, &all)?;
+    }
+    let columns = &all.columns;
     let dt = 1.0 / all.rate;
     all.whole = columns.iter().all(|c| rests(&c.velocity));
     all.rows = columns.iter().map(|c| c.torque.len()).sum();
     all.seconds = all.rows as f64 * dt;
     let joints = first.joints.len();
     all.pose = (0..joints).map(|j| mean(&first.joints[j].q)).collect();
-    if !all.whole {
+    // A mean over periods is one average, and so is a whole recording.
+    if !all.whole && all.periods.is_empty() {
         all.weight = 0.5;
     }
     if let Some((longest, stretch)) =
@@ -154,9 +190,30 @@ pub(crate) fn spectra(
             longest.velocity.clone(),
         ];
     }
-    all.columns = columns;
     all.transform();
     Ok(all)
+}
+
+/// Returns the whole periods of the references; `None` if one of them is not periodic.
+fn periods_in(stretches: &[&Signals], k: usize) -> Option<Vec<Periods>> {
+    let each = stretches.iter().map(|stretch| {
+        let reference = stretch.joints[k].reference.as_ref()?;
+        periods_of(&reference[..stretch.len() - 1])
+    });
+    each.collect()
+}
+
+/// Returns the columns of all stretches.
+fn columns_in(
+    stretches: &[&Signals],
+    k: usize,
+    name: &str,
+    all: &Spectra,
+) -> Result<Vec<Columns>, ComplianceError> {
+    let periodic = !all.periods.is_empty();
+    let each = stretches.iter();
+    each.map(|stretch| columns_of(stretch, k, name, all.by_reference, periodic))
+        .collect()
 }
 
 /// Transforms rows `start` to `start + length`. Densities: the squared magnitude of a bin is power per Hz, one-sided

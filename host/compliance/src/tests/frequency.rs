@@ -281,3 +281,45 @@ fn a_band_that_ends_below_the_antiresonance_is_refused() {
         .unwrap();
     assert!((found.value / 900.0 - 1.0).abs() < 0.01, "{found:?}");
 }
+
+/// A gap makes the spring look softer, the more the larger it is. That is told with a bound which holds, and not taken for a
+/// wrong scale of the torque; without a gap, and with a wrong scale, it is not.
+#[test]
+fn a_spring_that_looks_softer_by_backlash_is_told() {
+    let stiffness = 1500.0;
+    let run = |rig: &Rig, scale: f64| {
+        let own = |seed| {
+            let mut block = rig.run(30.0, chirp(30.0, [1.0, 60.0], 1.2, 0.0), |_| 0.0, seed);
+            block.joints[0].tau.iter_mut().for_each(|tau| *tau *= scale);
+            block
+        };
+        identify(rig, own, &[1], None).map(|found| {
+            let stiffness = found.frequency.unwrap().stiffness.value;
+            (stiffness, found.warnings.join(" "))
+        })
+    };
+    let sound = Rig::new(stiffness, 0.8);
+    for (scale, gap) in [(1.0, 0.002), (1.0, 0.004)] {
+        let (value, warnings) = run(&sound.clone().with_gap(gap), scale).unwrap();
+        let off = 1.0 - value / stiffness;
+        println!(
+            "gap of {gap} rad: {:.1} % too soft; {warnings}",
+            100.0 * off
+        );
+        assert!(warnings.contains("Backlash"), "{gap}: {off} {warnings}");
+        assert!(
+            !warnings.contains("ratio or the description is wrong"),
+            "{warnings}"
+        );
+        let told = warnings.split("too small by ").nth(1).unwrap();
+        let bound: f64 = told.split(' ').next().unwrap().parse().unwrap();
+        assert!(bound > 0.0 && bound < 100.0 * off, "{gap}: {bound}, {off}");
+    }
+    let (_, warnings) = run(&sound, 1.0).unwrap();
+    assert!(!warnings.contains("Backlash"), "{warnings}");
+    let (_, warnings) = run(&sound, 0.7).unwrap();
+    assert!(
+        !warnings.contains("Backlash") && warnings.contains("scale"),
+        "{warnings}"
+    );
+}

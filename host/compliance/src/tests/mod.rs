@@ -4,5 +4,6 @@
 
 mod frequency;
 mod loading;
+mod periodic;
 mod rig;
 mod statics;

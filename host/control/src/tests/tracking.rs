@@ -363,3 +363,46 @@ fn the_shipped_robots_keep_their_bandwidth() {
         }
     }
 }
+
+/// A motor that cannot do what the law asks is named with its value; one that can is not.
+#[test]
+fn motors_that_leave_their_limits_are_told() {
+    let mut robot = robot("irp6.toml");
+    let limits = |torque: f64, velocity: f64| {
+        Some(rig_model::robot::MotorLimits {
+            torque: Some(torque),
+            velocity: Some(velocity),
+            ..Default::default()
+        })
+    };
+    let mut warned = |torque, velocity| {
+        robot.joints[0].drive.as_mut().unwrap().limits = limits(torque, velocity);
+        let settings = Settings::default();
+        let truth = Model::from_robot(&robot).unwrap();
+        let reference = references(&default_reference(&robot, settings.rate, 2.0)).unwrap();
+        let bench = Bench {
+            robot: &robot,
+            truth: &truth,
+            reference: &reference,
+            tool: [0.0; 3],
+            settings,
+            wrong: None,
+        };
+        let model = LawModel::of(&robot).unwrap();
+        let run = bench.track(LawKind::ComputedTorque, &model, "own").unwrap();
+        let fastest = (run.trace.velocity[0].iter()).fold(0.0, |m: f64, v| m.max(v.abs()));
+        let strongest = (run.trace.torque[0].iter()).fold(0.0, |m: f64, t| m.max(t.abs()));
+        (run.measures.warnings.join(" "), fastest, strongest)
+    };
+    // The column's motor turns 158 times per turn of the joint, the other way round.
+    let (none, fastest, strongest) = warned(1e3, 1e5);
+    assert!(!none.contains("motors"), "{none}");
+    let (both, ..) = warned(0.9 * strongest / 158.0, 0.9 * fastest * 158.0);
+    assert!(
+        both.contains("the torque of the motor of joint \"column\""),
+        "{both}"
+    );
+    assert!(both.contains("the speed of the motor"), "{both}");
+    let (kept, ..) = warned(1.1 * strongest / 158.0, 1.1 * fastest * 158.0);
+    assert!(!kept.contains("motors"), "{kept}");
+}

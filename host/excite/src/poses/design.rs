@@ -11,6 +11,7 @@ use super::route::Moves;
 use super::space::{Pose, Space};
 use crate::bounds::{Room, bounds_of};
 use crate::error::wrong;
+use crate::instants::{Instants, MOTOR_STEPS, TORQUE_STEPS};
 use crate::motor_limits::exceeded;
 use crate::quintic_move::micros;
 use crate::torque_share::torque_share;
@@ -243,13 +244,22 @@ fn motion(
             continue;
         }
         if space.knows_torque {
-            let share = torque_share(&space.model, &space.bounds, &joints)?;
+            let share = torque_share(
+                &space.model,
+                &space.bounds,
+                &Instants::of_joints(&joints, TORQUE_STEPS),
+            )?;
             if share.is_nan() || share > 1.0 {
                 fault = (0, "torque");
                 continue;
             }
         }
-        if let Some(used) = exceeded(space.robot, &space.model, &joints, space.has_bodies)? {
+        if let Some(used) = exceeded(
+            space.robot,
+            &space.model,
+            &Instants::of_joints(&joints, MOTOR_STEPS),
+            space.has_bodies,
+        )? {
             fault = (used.joint, used.limit);
             continue;
         }

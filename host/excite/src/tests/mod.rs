@@ -6,6 +6,7 @@ mod files;
 mod load_motion;
 mod load_poses;
 mod motors;
+mod multisine;
 mod room;
 mod runs;
 mod six_joints;

@@ -62,6 +62,36 @@ impl SampledReference {
             share.powi(2) * (3.0 - 2.0 * share) * size * sines.sum::<f64>()
         })
     }
+
+    /// Writes a `.csv`: columns t, and per joint q, qd, qdd and the same positions again as ref, so that it can be read as a
+    /// recording. Velocities and accelerations must be there. The file is written completely or not at all.
+    ///
+    /// # Errors
+    /// [`ExciteError`]: an error of the operating system.
+    pub fn save(&self, path: &Path, robot: &Robot) -> Result<(), ExciteError> {
+        let joints = self.position.len();
+        let mut columns = vec![Column::new("t", "s")];
+        for k in 1..=joints {
+            let unit = match robot.joints.get(k - 1).map(|j| j.kind) {
+                Some(JointKind::Prismatic) => "m",
+                _ => "rad",
+            };
+            for (name, over) in [("q", ""), ("qd", "/s"), ("qdd", "/s^2"), ("ref", "")] {
+                columns.push(Column::new(&format!("{name}{k}"), &format!("{unit}{over}")));
+            }
+        }
+        let rate = (1.0 / self.period * 1e9).round() / 1e9;
+        let mut writer = RecordingWriter::create(path, &columns, &BTreeMap::new())?;
+        for row in 0..self.position.first().map_or(0, Vec::len) {
+            let mut values = vec![row as f64 / rate];
+            for j in 0..joints {
+                let q = self.position[j][row];
+                values.extend([q, self.velocity[j][row], self.acceleration[j][row], q]);
+            }
+            writer.push_row(&values)?;
+        }
+        Ok(writer.finish()?)
+    }
 }
 
 impl TrajectoryFile {
@@ -105,34 +135,5 @@ impl TrajectoryFile {
             velocity: each(|r| r.velocity, false),
             acceleration: each(|r| r.acceleration, false),
         })
-    }
-
-    pub(super) fn save_samples(
-        &self,
-        path: &Path,
-        robot: &Robot,
-        rate: f64,
-    ) -> Result<(), ExciteError> {
-        let samples = self.sampled(rate)?;
-        let mut columns = vec![Column::new("t", "s")];
-        for k in 1..=self.joints.len() {
-            let unit = match robot.joints.get(k - 1).map(|j| j.kind) {
-                Some(JointKind::Prismatic) => "m",
-                _ => "rad",
-            };
-            for (name, over) in [("q", ""), ("qd", "/s"), ("qdd", "/s^2"), ("ref", "")] {
-                columns.push(Column::new(&format!("{name}{k}"), &format!("{unit}{over}")));
-            }
-        }
-        let mut writer = RecordingWriter::create(path, &columns, &BTreeMap::new())?;
-        for row in 0..samples.position.first().map_or(0, Vec::len) {
-            let mut values = vec![row as f64 / rate];
-            for j in 0..self.joints.len() {
-                let q = samples.position[j][row];
-                values.extend([q, samples.velocity[j][row], samples.acceleration[j][row], q]);
-            }
-            writer.push_row(&values)?;
-        }
-        Ok(writer.finish()?)
     }
 }

@@ -53,7 +53,7 @@ impl TrajectoryFile {
             .map(str::to_ascii_lowercase);
         match extension.as_deref() {
             Some("toml") => Ok(write_whole(path, self.to_toml(robot).as_bytes())?),
-            Some("csv") => self.save_samples(path, robot, rate),
+            Some("csv") => self.sampled(rate)?.save(path, robot),
             _ => Err(ExciteError::UnknownFormat { path: path.into() }),
         }
     }

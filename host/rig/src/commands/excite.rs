@@ -10,10 +10,11 @@ use super::input::described;
 use super::overwrite::refuse_file;
 use super::ui::Ui;
 use rig_excite::{
-    Criterion, Design, Effort, Options, Parameters, PoseOptions, Poses, Scaling, StagedKind,
-    StagedOptions, design_measured, poses, staged,
+    Criterion, Design, Effort, MultisineOptions, Options, Parameters, PoseOptions, Poses, Scaling,
+    StagedKind, StagedOptions, design_measured, multisine, poses, staged,
 };
 use rig_model::robot::{Robot, joint_place};
+use rig_output::format_significant;
 
 /// Optimality criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -51,6 +52,8 @@ pub(crate) enum KindArg {
     Fourier,
     /// Swept sine, for resonances and frequency response
     Chirp,
+    /// Periodic sum of many sines, for frequency response with its noise and distortion; samples only (.csv)
+    Multisine,
     /// Steps with rests, for gravity and holding torque
     Staircase,
     /// Slow triangles, for breakaway, presliding and backlash
@@ -61,12 +64,18 @@ pub(crate) enum KindArg {
 
 impl KindArg {
     /// The motions of one joint.
-    const STAGED: [Self; 4] = [Self::Chirp, Self::Staircase, Self::Reversals, Self::Sweep];
+    const STAGED: [Self; 5] = [
+        Self::Chirp,
+        Self::Multisine,
+        Self::Staircase,
+        Self::Reversals,
+        Self::Sweep,
+    ];
 
-    /// Returns the kind of a motion of one joint; none for the optimal motion of all joints.
+    /// Returns the kind of a motion of one joint that a trajectory file describes.
     fn staged(self) -> Option<StagedKind> {
         match self {
-            Self::Fourier => None,
+            Self::Fourier | Self::Multisine => None,
             Self::Chirp => Some(StagedKind::Chirp),
             Self::Staircase => Some(StagedKind::Staircase),
             Self::Reversals => Some(StagedKind::Reversals),
@@ -140,13 +149,16 @@ pub(crate) struct Args {
     /// Harmonics per joint, 1 to 8 [default: 5] (fourier)
     #[arg(long)]
     pub(crate) harmonics: Option<usize>,
-    /// Period of the slowest harmonic, s [default: from the limits, 1 s at least] (fourier)
+    /// Period of the slowest harmonic, s [default: from the limits, 1 s at least; for multisine 16 periods of the lowest
+    /// frequency] (fourier, multisine)
     #[arg(long)]
     pub(crate) period: Option<f64>,
-    /// Time from rest to full amplitude, and from there back to rest, s [default: one period] (fourier)
+    /// Time from rest to full amplitude, and from there back to rest, s [default: one period; for multisine two periods of
+    /// the lowest frequency] (fourier, multisine)
     #[arg(long)]
     pub(crate) ramp: Option<f64>,
-    /// Whole periods at full amplitude [default: 5] (fourier)
+    /// Whole periods at full amplitude [default: 5; for multisine 4, after one in which the joint settles] (fourier,
+    /// multisine)
     #[arg(long)]
     pub(crate) periods: Option<u16>,
     /// Joint positions at the start, separated by commas, rad or m [default: free for fourier, else mid-range]
@@ -173,7 +185,7 @@ pub(crate) struct Args {
     /// Number of speeds, 2 to 16 [default: 12] (sweep)
     #[arg(long)]
     pub(crate) speeds: Option<usize>,
-    /// First and last frequency separated by a comma, Hz [default: from the limits] (chirp)
+    /// First and last frequency separated by a comma, Hz [default: from the limits] (chirp, multisine)
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) band: Option<Vec<f64>>,
     /// Triangles, two reversals each, at each of three amplitudes [default: 2] (reversals)
@@ -182,7 +194,7 @@ pub(crate) struct Args {
     /// Random starts of the optimiser: more starts find better motions but take longer [default: 24] (fourier)
     #[arg(long)]
     pub(crate) starts: Option<u32>,
-    /// Seed of the random starts [default: 1] (fourier)
+    /// Seed of the random starts, or of the phases [default: 1] (fourier, multisine)
     #[arg(long)]
     pub(crate) seed: Option<u64>,
     /// Sample rate of a .csv, Hz
@@ -199,66 +211,59 @@ pub(crate) struct Args {
 impl Args {
     /// Refuses options that this kind of motion does not use.
     fn refuse_unused(&self) -> Result<(), CommandError> {
-        let of_fourier = [
-            ("--criterion", self.criterion.is_some()),
-            ("--parameters", self.parameters.is_some()),
-            ("--scaling", self.scaling.is_some()),
-            ("--torque-noise", self.torque_noise.is_some()),
-            ("--harmonics", self.harmonics.is_some()),
-            ("--period", self.period.is_some()),
-            ("--ramp", self.ramp.is_some()),
-            ("--periods", self.periods.is_some()),
-            ("--starts", self.starts.is_some()),
-            ("--seed", self.seed.is_some()),
-            ("--load", self.load),
+        use KindArg::{Chirp, Fourier, Multisine, Reversals, Sweep};
+        let periodic = &[Fourier, Multisine][..];
+        let options = [
+            ("--criterion", self.criterion.is_some(), &[Fourier][..]),
+            ("--parameters", self.parameters.is_some(), &[Fourier]),
+            ("--scaling", self.scaling.is_some(), &[Fourier]),
+            ("--torque-noise", self.torque_noise.is_some(), &[Fourier]),
+            ("--harmonics", self.harmonics.is_some(), &[Fourier]),
+            ("--period", self.period.is_some(), periodic),
+            ("--ramp", self.ramp.is_some(), periodic),
+            ("--periods", self.periods.is_some(), periodic),
+            ("--starts", self.starts.is_some(), &[Fourier]),
+            ("--seed", self.seed.is_some(), periodic),
+            ("--load", self.load, &[Fourier]),
+            ("--joint", self.joint.is_some(), &KindArg::STAGED),
+            ("--amplitude", self.amplitude.is_some(), &KindArg::STAGED),
+            ("--speed", self.speed.is_some(), &[Reversals, Sweep]),
+            ("--speeds", self.speeds.is_some(), &[Sweep]),
+            ("--band", self.band.is_some(), &[Chirp, Multisine]),
+            ("--cycles", self.cycles.is_some(), &[Reversals]),
         ];
         // All before --seed, which also draws poses.
-        if let (Some(count), Some((option, _))) =
-            (self.poses, of_fourier[..9].iter().find(|(_, given)| *given))
+        if let (Some(count), Some((option, ..))) =
+            (self.poses, options[..9].iter().find(|(_, given, _)| *given))
         {
             return Err(CommandError::Sentence(format!(
                 "{option} belongs to a periodic motion, but --poses {count} asks for poses at rest; leave one of them out."
             )));
         }
-        let unused = of_fourier.iter().find(|(_, given)| *given);
-        let staged = [
-            (
-                "--amplitude",
-                self.amplitude.is_some(),
-                &KindArg::STAGED[..],
+        let Some((option, _, kinds)) =
+            (options.iter()).find(|(_, given, kinds)| *given && !kinds.contains(&self.kind))
+        else {
+            return Ok(());
+        };
+        let name = |kind: &KindArg| {
+            (kind.to_possible_value()).map_or(String::new(), |value| value.get_name().to_owned())
+        };
+        let names: Vec<String> = kinds.iter().map(name).collect();
+        Err(CommandError::Sentence(match (*option, &self.joint) {
+            ("--joint", Some(joint)) => format!(
+                "--joint {joint} names the one joint that moves, but --kind fourier moves all of them; give --kind {}, or leave --joint out.",
+                names.join(", ")
             ),
-            (
-                "--speed",
-                self.speed.is_some(),
-                &[KindArg::Reversals, KindArg::Sweep],
+            _ if kinds.contains(&Fourier) => format!(
+                "{option} belongs to --kind {}; the size of a {} follows from the limits and its own options, so leave the option out or give that kind.",
+                names.join(", "),
+                name(&self.kind)
             ),
-            ("--speeds", self.speeds.is_some(), &[KindArg::Sweep]),
-            ("--band", self.band.is_some(), &[KindArg::Chirp]),
-            ("--cycles", self.cycles.is_some(), &[KindArg::Reversals]),
-        ];
-        if let Some((option, _, kinds)) =
-            (staged.iter()).find(|(_, given, kinds)| *given && !kinds.contains(&self.kind))
-        {
-            let names: Vec<String> = kinds
-                .iter()
-                .filter_map(|kind| kind.to_possible_value())
-                .map(|value| value.get_name().to_owned())
-                .collect();
-            return Err(CommandError::Sentence(format!(
+            _ => format!(
                 "{option} belongs to --kind {}; leave it out, or give that kind.",
                 names.join(", ")
-            )));
-        }
-        match (self.kind.staged(), &self.joint, unused) {
-            (None, Some(joint), _) => Err(CommandError::Sentence(format!(
-                "--joint {joint} names the one joint that moves, but --kind fourier moves all of them; give --kind chirp, staircase, reversals or sweep, or leave --joint out."
-            ))),
-            (Some(kind), _, Some((option, _))) => Err(CommandError::Sentence(format!(
-                "{option} belongs to --kind fourier; the size of a {} follows from the limits and its own options, so leave the option out or give --kind fourier.",
-                kind.name()
-            ))),
-            _ => Ok(()),
-        }
+            ),
+        }))
     }
 
     /// Refuses options on noise that the rows of this robot do not have.
@@ -380,6 +385,9 @@ fn design(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     if let Some(count) = args.poses {
         return at_rest(args, count, robot, ui);
     }
+    if args.kind == KindArg::Multisine {
+        return many_sines(args, robot, ui);
+    }
     let Some(kind) = args.kind.staged() else {
         return optimal(args, robot, ui);
     };
@@ -393,6 +401,54 @@ fn design(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         args.out.display(),
         kind.name(),
         file.duration()
+    ));
+    ui.say(NOT_LOOKED_AT);
+    Ok(())
+}
+
+/// Designs a multisine.
+fn many_sines(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
+    let extension = args.out.extension().and_then(|e| e.to_str());
+    if !extension.is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+        return Err(CommandError::Sentence(format!(
+            "--out {} is no .csv, and a multisine has more sines than a .toml trajectory can hold; give a .csv, which holds its samples.",
+            args.out.display()
+        )));
+    }
+    let found = multisine(
+        robot,
+        &MultisineOptions {
+            staged: args.staged_options()?,
+            period: args.period,
+            periods: args.periods,
+            ramp: args.ramp,
+            seed: args.seed.unwrap_or(1),
+            rate: args.rate,
+        },
+    )?;
+    found.reference.save(&args.out, robot)?;
+    for note in &found.notes {
+        ui.remark(note);
+    }
+    let [position, velocity, acceleration] = found.shares.map(|share| 100.0 * share);
+    ui.say(&format!(
+        "{} odd harmonics from {} to {} Hz; crest factor {:.2} of the position, {:.2} of the velocity, {:.2} of the acceleration.",
+        found.harmonics,
+        format_significant(found.band[0], 4),
+        format_significant(found.band[1], 4),
+        found.crest[0],
+        found.crest[1],
+        found.crest[2]
+    ));
+    ui.say(&format!(
+        "It uses {position:.0} % of the distance to the position limit, {velocity:.0} % of the velocity limit and {acceleration:.0} % of the acceleration limit."
+    ));
+    ui.answer(&format!(
+        "{}: the motion, {} periods of {} s with rise and fall, {:.1} s.",
+        args.out.display(),
+        found.periods,
+        found.period,
+        found.duration()
     ));
     ui.say(NOT_LOOKED_AT);
     Ok(())

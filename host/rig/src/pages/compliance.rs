@@ -3,8 +3,8 @@
 use super::context::Context;
 use super::parts;
 use rig_compliance::{
-    Band, Compliance, ComplianceMap, Deflection, DriveLoading, FrequencyResponse, ToolCompliance,
-    Value, response_pose,
+    Band, Compliance, ComplianceMap, Deflection, DriveLoading, FrequencyResponse, Periodic,
+    ToolCompliance, Value, response_pose,
 };
 use rig_output::{format_significant, format_unit, format_value};
 use rig_report::{
@@ -233,9 +233,14 @@ fn curve(drive: &DriveLoading) -> Option<Plot> {
 
 /// The frequency response of one joint.
 fn frequency(found: &FrequencyResponse) -> Section {
-    let how = match found.whole {
-        true => "transformed as a whole, from rest to rest",
-        false => "in Hann windows that overlap by half",
+    let how = match (&found.periodic, found.whole) {
+        (Some(periodic), _) => format!(
+            "the mean over {} periods of {} s",
+            periodic.periods,
+            format_significant(periodic.period, 4)
+        ),
+        (None, true) => "transformed as a whole, from rest to rest".into(),
+        (None, false) => "in Hann windows that overlap by half".into(),
     };
     let instrument = match found.by_reference {
         true => "The reference is the instrument, so that noise in the feedback gives no bias.",
@@ -252,8 +257,12 @@ fn frequency(found: &FrequencyResponse) -> Section {
     let used: Vec<usize> = (0..found.bands.len())
         .filter(|k| found.bands[*k].used)
         .collect();
-    Section::new("frequency", "Frequency response", lead)
-        .with(Block::Table(two_masses(found)))
+    let mut section =
+        Section::new("frequency", "Frequency response", lead).with(Block::Table(two_masses(found)));
+    if let Some(periodic) = &found.periodic {
+        section = section.with(Block::Text(distortion(periodic)));
+    }
+    section
         .with(Block::Plot(magnitude(found, &used)))
         .with(Block::Plot(phase(found, &used)))
         .with(Block::Plot(coherence(found)))
@@ -266,6 +275,23 @@ fn frequency(found: &FrequencyResponse) -> Section {
             summary: "Torque and velocity over time".into(),
             blocks: vec![Block::Plot(signals(found))],
         })
+}
+
+/// Says how large noise and distortion are.
+fn distortion(periodic: &Periodic) -> String {
+    let percent = |share: f64| format!("{} %", format_significant(100.0 * share, 2));
+    let order = |name: &str, share: Option<f64>| {
+        share.map_or(String::new(), |share| {
+            format!(", {name} {}", percent(share))
+        })
+    };
+    format!(
+        "The reference holds {} harmonics. In the mean over the periods, per harmonic and over the velocity at the harmonics of the reference (RMS): noise {}{}{}. The periods differ by noise alone. Distortion by something nonlinear shows at harmonics that the reference leaves out: friction and backlash at odd ones, what depends on the direction at even ones. It does not fall with more periods.",
+        parts::count(periodic.harmonics as u64),
+        percent(periodic.noise),
+        order("odd distortion", periodic.odd),
+        order("even distortion", periodic.even)
+    )
 }
 
 fn two_masses(found: &FrequencyResponse) -> Table {
