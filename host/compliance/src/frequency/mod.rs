@@ -5,6 +5,7 @@ mod columns;
 mod fit;
 mod link_motion;
 mod response;
+mod search;
 mod spectra;
 mod two_mass;
 

@@ -6,10 +6,10 @@
 use std::f64::consts::TAU;
 
 use realfft::RealFftPlanner;
-use rig_numerics::statistics::mean;
+use rig_numerics::statistics::{mean, rms};
 
 use super::columns::{Columns, columns_of, has_reference, rests};
-use super::two_mass::{C, TwoMass};
+use super::two_mass::{C, Gravity, TwoMass};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 
@@ -29,10 +29,14 @@ pub(crate) struct Bin {
     pub torque: C,
     /// Velocity of the motor, joint side.
     pub velocity: C,
-    /// Sign of the velocity.
+    /// Friction of the motor over its size.
     pub sign: C,
     /// Friction of the link over its size, by a model.
     pub link_sign: C,
+    /// Torque that a gap takes away, over c and the gap, by a model.
+    pub gap: C,
+    /// Torque of gravity on the link less its linear part, by a model.
+    pub gravity: C,
 }
 
 /// All transforms of the recordings of one joint.
@@ -60,13 +64,18 @@ pub(crate) struct Spectra {
 }
 
 impl Spectra {
-    /// Predicts the friction of the link by a model, and transforms it.
-    pub(crate) fn predict_link(&mut self, model: &TwoMass) {
+    /// Predicts friction, backlash and gravity by a model, and transforms them.
+    pub(crate) fn predict(&mut self, model: &TwoMass, gravity: &Gravity) {
         let rate = self.rate;
         for own in &mut self.columns {
-            own.predict_link(model, rate);
+            own.predict(model, gravity, rate);
         }
         self.transform();
+    }
+
+    /// Returns the RMS torque.
+    pub(super) fn torque(&self) -> f64 {
+        rms(&self.shown[1])
     }
 
     /// Transforms all columns.
@@ -190,12 +199,14 @@ fn segment(
         let _ = plan.process(&mut input, &mut output);
         output.iter().map(|v| v * scale).collect()
     };
-    let [instrument, torque, moved, sign, link_sign] = [
+    let [instrument, torque, moved, sign, link_sign, gap, gravity] = [
         &columns.instrument,
         &columns.torque,
         &columns.moved,
         &columns.sign,
         &columns.link_sign,
+        &columns.gap,
+        &columns.gravity,
     ]
     .map(|list| transform(list));
     // Above 0.4 of the rate the difference has little signal.
@@ -210,6 +221,8 @@ fn segment(
             velocity: moved[k] * derivative,
             sign: sign[k],
             link_sign: link_sign[k],
+            gap: gap[k],
+            gravity: gravity[k],
         });
     }
 }

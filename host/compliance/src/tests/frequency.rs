@@ -281,3 +281,30 @@ fn a_band_that_ends_below_the_antiresonance_is_refused() {
         .unwrap();
     assert!((found.value / 900.0 - 1.0).abs() < 0.01, "{found:?}");
 }
+
+/// A gap softens the response, so that a linear fit is 15 to 60 % too soft here. The contact of the emulated rig is
+/// integrated with steps of its own.
+#[test]
+fn a_gap_is_found_beside_the_stiffness_or_makes_it_a_lower_bound() {
+    let stiffness = 1500.0;
+    for gap in [3e-4, 1e-3, 5e-3] {
+        let rig = Rig::new(stiffness, 0.8).with_plain_friction().with_gap(gap);
+        let run = |seed| rig.run(30.0, chirp(30.0, [1.0, 60.0], 1.2, 0.0), |_| 0.0, seed);
+        let found = identify(&rig, run, &[1], None).unwrap();
+        let response = found.frequency.unwrap();
+        let off = 100.0 * (response.stiffness.value / stiffness - 1.0);
+        println!(
+            "gap of {gap}: stiffness {off:.1} % off, gap {:?}, lower bound: {}, {:?}",
+            response.backlash, response.is_lower_bound, response.warnings
+        );
+        let told = found.warnings.iter().any(|w| w.contains("backlash"));
+        assert!(told, "{:?}", found.warnings);
+        match response.backlash {
+            Some(own) => {
+                assert!(off.abs() < 5.0, "{off}");
+                assert!((own.value / gap - 1.0).abs() < 0.25, "{own:?}");
+            }
+            None => assert!(off < 0.0, "{off}"),
+        }
+    }
+}
