@@ -13,10 +13,14 @@ pub(crate) struct Bin {
     pub torque: C,
     /// Velocity of the motor, joint side.
     pub velocity: C,
-    /// Sign of the velocity.
+    /// Friction of the motor over its size.
     pub sign: C,
     /// Friction of the link over its size, by a model.
     pub link_sign: C,
+    /// Torque that a gap takes away, over c and the gap, by a model.
+    pub gap: C,
+    /// Torque of gravity on the link less its linear part, by a model.
+    pub gravity: C,
 }
 
 impl Bin {
@@ -34,6 +38,8 @@ impl Bin {
             velocity: f(self.velocity, other.velocity),
             sign: f(self.sign, other.sign),
             link_sign: f(self.link_sign, other.link_sign),
+            gap: f(self.gap, other.gap),
+            gravity: f(self.gravity, other.gravity),
         }
     }
 }

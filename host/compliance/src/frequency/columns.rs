@@ -2,8 +2,8 @@
 
 use rig_numerics::statistics::{mean, median_of_finite, rms};
 
-use super::link_motion::link_friction;
-use super::two_mass::TwoMass;
+use super::link_motion::{MotorMotion, predict};
+use super::two_mass::{Gravity, TwoMass};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 
@@ -25,18 +25,34 @@ pub(super) struct Columns {
     pub(super) torque: Vec<f64>,
     /// Position at the next row minus that at this one.
     pub(super) moved: Vec<f64>,
-    /// Sign of the motor's velocity.
+    /// Coulomb friction of the motor over its size: the sign of its velocity until a model predicts what it does at rest.
     pub(super) sign: Vec<f64>,
     /// Coulomb friction of the link over its size; zero until a model predicts the motion of the link.
     pub(super) link_sign: Vec<f64>,
+    /// Torque that a gap takes away, over c and the gap; zero until a model with a gap predicts it.
+    pub(super) gap: Vec<f64>,
+    /// Torque of gravity on the link less its linear part; zero until a model predicts the motion of the link.
+    pub(super) gravity: Vec<f64>,
+    /// Sign of the motor's velocity by the measured velocity alone; near 0 where noise decides it.
+    moving: Vec<f64>,
     pub(super) velocity: Vec<f64>,
     position: Vec<f64>,
 }
 
 impl Columns {
-    /// Predicts the friction of the link by a model of two masses.
-    pub(super) fn predict_link(&mut self, model: &TwoMass, rate: f64) {
-        self.link_sign = link_friction(model, &self.position, &self.velocity, 1.0 / rate);
+    /// Predicts friction, backlash and gravity by a model of two masses.
+    pub(super) fn predict(&mut self, model: &TwoMass, gravity: &Gravity, rate: f64) {
+        let motion = MotorMotion {
+            position: &self.position,
+            first: -mean(&self.position),
+            velocity: &self.velocity,
+            torque: &self.torque,
+            moving: &self.moving,
+            dt: 1.0 / rate,
+        };
+        let found = predict(model, &motion, gravity);
+        (self.sign, self.link_sign) = (found.motor_friction, found.link_friction);
+        (self.gap, self.gravity) = (found.gap, found.gravity);
     }
 }
 
@@ -92,11 +108,15 @@ pub(super) fn columns_of(
             k + 1
         )));
     }
+    let moving: Vec<f64> = velocity.iter().map(|v| (v / scale).tanh()).collect();
     Ok(Columns {
         instrument,
         torque: level(&joint.tau[..n]),
-        sign: velocity.iter().map(|v| (v / scale).tanh()).collect(),
+        sign: moving.clone(),
         link_sign: vec![0.0; n],
+        gap: vec![0.0; n],
+        gravity: vec![0.0; n],
+        moving,
         position: joint.q[..n].iter().map(|q| q - joint.q[0]).collect(),
         velocity,
         moved,

@@ -13,15 +13,19 @@ use rig_numerics::statistics::sum_of_squares;
 
 use super::bands::BandBins;
 use super::bin::Bin;
-use super::two_mass::{C, TwoMass};
+use super::two_mass::{C, Gravity, TwoMass};
 use crate::value::Value;
 
-/// Parameters: ln c, ln Jl, ln Jm, ln d, fm, fc, delay in rows, then fc and viscous friction of the link.
-const COUNT: usize = 9;
+/// Parameters: ln c, ln Jl, ln Jm, ln d, fm, fc, delay in rows, then fc and viscous friction of the link, and the gap.
+const COUNT: usize = 10;
 /// Index of ln Jl.
 const LINK: usize = 1;
+/// Index of ln Jm.
+const MOTOR: usize = 2;
 /// Index of the first parameter of the link's friction.
 const LINK_FRICTION: usize = 7;
+/// Index of the gap.
+const GAP: usize = 9;
 /// Frequencies of the antiresonance that are tried at first.
 const TRIED: usize = 80;
 /// Damping ratios that are tried at first.
@@ -43,12 +47,14 @@ const SETTINGS: Settings = Settings {
 #[derive(Clone, Debug)]
 pub(crate) struct Fitted {
     pub model: TwoMass,
-    /// Covariance of the parameters: ln c, ln Jl, ln Jm, ln d, fm, fc, delay (rows), fc and viscous friction of the link.
+    /// Covariance of the parameters: ln c, ln Jl, ln Jm, ln d, fm, fc, delay (rows), fc and viscous friction of the link, gap.
     pub covariance: DMatrix<f64>,
     /// Sum of squares per degree of freedom: 1 for a model that explains all but noise.
     pub misfit: f64,
     /// The same for the best rigid joint, with the weights of the two masses.
     pub rigid_misfit: f64,
+    /// -2·ln(likelihood), but for a constant: the logarithm of the noise that the model leaves, over the averages of all bands.
+    pub deviance: f64,
 }
 
 impl Fitted {
@@ -68,10 +74,12 @@ impl Fitted {
 /// What the fit takes as known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Known {
-    /// Derivative of the gravity torque by the position, N·m/rad.
-    pub gravity: f64,
+    /// Torque of gravity on the link.
+    pub gravity: Gravity,
     /// Inertia of the link, if it is not to be estimated, kg·m².
     pub link_inertia: Option<f64>,
+    /// Inertia of the motor, if it is not to be estimated, kg·m².
+    pub motor_inertia: Option<f64>,
     /// Rows per second.
     pub rate: f64,
 }
@@ -91,7 +99,7 @@ pub(crate) fn fit(
     let mut theta = vec![
         start.stiffness.ln(),
         known.link_inertia.unwrap_or(start.link_inertia).ln(),
-        start.motor_inertia.ln(),
+        known.motor_inertia.unwrap_or(start.motor_inertia).ln(),
         start.damping.ln(),
         start.viscous,
         start.coulomb.max(0.0),
@@ -101,10 +109,13 @@ pub(crate) fn fit(
         },
         start.link_coulomb,
         start.link_viscous,
+        start.gap,
     ];
     let free: Vec<usize> = (0..COUNT)
         .filter(|p| *p != LINK || known.link_inertia.is_none())
+        .filter(|p| *p != MOTOR || known.motor_inertia.is_none())
         .filter(|p| *p < LINK_FRICTION || first.is_some())
+        .filter(|p| *p != GAP || start.gap > 0.0)
         .collect();
     let wide = |at: f64| [at - 12.0, at + 12.0];
     let mut bounds: Vec<[f64; 2]> = theta[..4].iter().map(|at| wide(*at)).collect();
@@ -112,7 +123,7 @@ pub(crate) fn fit(
     // Dry friction brakes.
     bounds.push([0.0, f64::MAX]);
     bounds.push([-20.0, 20.0]);
-    bounds.extend([[0.0, f64::MAX]; 2]);
+    bounds.extend([[0.0, f64::MAX]; 3]);
     let mut noise: Vec<f64> = used.iter().map(|b| b.noise).collect();
     for round in 0..ROUNDS {
         if round > 0 {
@@ -139,11 +150,13 @@ pub(crate) fn fit(
             covariance[(*p, *r)] = inverse[(a, b)] * scale;
         }
     }
+    let model = model(&theta, known);
     Some(Fitted {
-        model: model(&theta, known),
+        model,
         covariance,
         misfit,
-        rigid_misfit: rigid(&used, &noise, &model(&theta, known), known)?,
+        rigid_misfit: rigid(&used, &noise, &model, known)?,
+        deviance: deviance(&used, &model),
     })
 }
 
@@ -156,7 +169,7 @@ fn rigid(bands: &[&BandBins<'_>], noise: &[f64], start: &TwoMass, known: &Known)
         viscous: theta[1],
         coulomb: theta[2],
         delay: theta[3] / known.rate,
-        gravity: known.gravity,
+        gravity: known.gravity.slope,
         ..TwoMass::default()
     };
     let first = [
@@ -212,14 +225,20 @@ fn model(theta: &[f64], known: &Known) -> TwoMass {
         delay: theta[6] / known.rate,
         link_coulomb: theta[7],
         link_viscous: theta[8],
-        gravity: known.gravity,
+        gap: theta[GAP],
+        gravity: known.gravity.slope,
     }
 }
 
 /// Torque less the Coulomb friction of a model.
 fn driven(bin: &Bin, model: &TwoMass) -> C {
-    let of_link = model.through_spring(bin.omega) * bin.link_sign * model.link_coulomb;
-    bin.torque - bin.sign * model.coulomb - of_link
+    let through = model.through_spring(bin.omega);
+    let of_link = through * (bin.link_sign * model.link_coulomb + bin.gravity);
+    let of_gap = match model.gap > 0.0 {
+        true => (C::new(1.0, 0.0) - through) * bin.gap * (model.stiffness * model.gap),
+        false => C::new(0.0, 0.0),
+    };
+    bin.torque - bin.sign * model.coulomb - of_link - of_gap
 }
 
 /// Velocity that a model does not explain.
@@ -241,6 +260,13 @@ pub(crate) fn frictionless(band: &BandBins<'_>, model: &TwoMass) -> C {
 fn left(band: &BandBins<'_>, model: &TwoMass) -> f64 {
     let squares = (band.bins.iter()).map(|bin| error(bin, model).norm_sqr());
     squares.sum::<f64>() / band.bins.len() as f64
+}
+
+/// Returns -2·ln(likelihood) of a model, but for a constant: each band has an unknown noise.
+fn deviance(bands: &[&BandBins<'_>], model: &TwoMass) -> f64 {
+    (bands.iter())
+        .map(|band| 2.0 * band.band.averages * left(band, model).ln())
+        .sum()
 }
 
 /// Residuals of all bands over their standard deviations, real parts and imaginary parts.

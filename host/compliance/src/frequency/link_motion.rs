@@ -1,49 +1,123 @@
-//! The motion of a link behind the measured motion of its motor.
+//! The motion of a link behind the measured motion of its motor, and the friction and backlash that it shows.
 
-use super::two_mass::TwoMass;
+use rig_numerics::statistics::mean;
+
+use super::two_mass::{Gravity, TwoMass};
 
 /// Phase of the link's own swing per step, rad.
 const PHASE: f64 = 0.05;
 /// Friction below this share of the largest spring torque counts as none: only the sign of the velocity is returned.
 const NONE: f64 = 1e-6;
 
-/// Returns the Coulomb friction torque on the link over its size, -1 to 1, at each row. `position` (from the first row, at
-/// rest) and `velocity` are those of the motor.
+/// Measured motion of the motor, at each row.
+pub(super) struct MotorMotion<'a> {
+    /// Position from the first row, rad.
+    pub(super) position: &'a [f64],
+    /// Position of the first row from the mean pose, rad.
+    pub(super) first: f64,
+    pub(super) velocity: &'a [f64],
+    /// Torque of the motor.
+    pub(super) torque: &'a [f64],
+    /// Sign of the velocity by the measured velocity alone: near 0 where noise decides it.
+    pub(super) moving: &'a [f64],
+    /// Time between rows, s.
+    pub(super) dt: f64,
+}
+
+/// Nonlinear torques by a model, at each row.
+#[derive(Debug, Default)]
+pub(super) struct Nonlinear {
+    /// Coulomb friction of the motor over its size, -1 to 1.
+    pub(super) motor_friction: Vec<f64>,
+    /// Coulomb friction of the link over its size, -1 to 1.
+    pub(super) link_friction: Vec<f64>,
+    /// Torque of the spring less that of a spring without a gap, over c and the gap, -½ to ½.
+    pub(super) gap: Vec<f64>,
+    /// Torque of gravity on the link less its linear part, N·m.
+    pub(super) gravity: Vec<f64>,
+}
+
+/// Returns the nonlinear torques on motor and link at each row. At the first row the link rests.
 ///
-/// Time stepping after Moreau (1988): friction stops the link if it can, else it brakes with its full size.
-pub(super) fn link_friction(
-    model: &TwoMass,
-    position: &[f64],
-    velocity: &[f64],
-    dt: f64,
-) -> Vec<f64> {
+/// Time stepping after Moreau (1988): friction stops the link if it can, else it brakes with its full size. The contact of
+/// a gap pushes and never pulls (Nordin & Gutman 2002).
+pub(super) fn predict(model: &TwoMass, motor: &MotorMotion<'_>, gravity: &Gravity) -> Nonlinear {
     let inertia = model.link_inertia;
+    let (position, velocity, dt) = (motor.position, motor.velocity, motor.dt);
     let steps = (dt * model.antiresonance() / PHASE)
         .ceil()
         .clamp(1.0, 200.0);
     let h = dt / steps;
-    // The spring's torque at rest is part of the origin: twist and gravity are counted from there.
+    // At rest the spring carries the weight: the twist is counted from there.
+    let preload = gravity.torque(motor.first);
+    let rest = preload / model.stiffness + 0.5 * model.gap * preload.signum();
     let (mut q, mut v) = (0.0, 0.0);
     let most = position.iter().fold(0.0, |m: f64, p| m.max(p.abs())) * model.stiffness;
     let size = model.link_coulomb.max(NONE * most);
-    let mut friction = Vec::with_capacity(position.len());
+    let mut found = Nonlinear::default();
+    let mut spring = Vec::with_capacity(position.len());
     for row in 0..position.len() {
         let mut impulse = 0.0;
         let next = (row + 1).min(position.len() - 1);
+        let (twist, rate) = (position[row] - q, velocity[row] - v);
+        let linear = model.stiffness * twist + model.damping * rate;
+        let torque = spring_torque(model, rest + twist, rate) - preload;
+        spring.push(torque);
+        (found.gravity).push(gravity.torque(motor.first + q) - preload - model.gravity * q);
+        found.gap.push(match model.gap > 0.0 {
+            true => (torque - linear) / (model.stiffness * model.gap),
+            false => 0.0,
+        });
         for step in 0..steps as usize {
             let share = (step as f64 + 0.5) / steps;
-            let motor = position[row] + share * (position[next] - position[row]);
+            let motor_position = position[row] + share * (position[next] - position[row]);
             let speed = velocity[row] + share * (velocity[next] - velocity[row]);
-            let torque = model.stiffness * (motor - q) + model.damping * (speed - v)
+            q += 0.5 * h * v;
+            let torque = spring_torque(model, rest + motor_position - q, speed - v)
                 - model.link_viscous * v
-                - model.gravity * q;
+                - gravity.torque(motor.first + q);
             let free = v + h * torque / inertia;
             let stopping = (free * inertia).clamp(-h * size, h * size);
             v = free - stopping / inertia;
-            q += h * v;
+            q += 0.5 * h * v;
             impulse += stopping;
         }
-        friction.push(impulse / (dt * size));
+        found.link_friction.push(impulse / (dt * size));
     }
-    friction
+    found.motor_friction = motor_friction(model, motor, &spring);
+    found
+}
+
+/// Returns the torque of the spring at a twist from the middle of its gap.
+fn spring_torque(model: &TwoMass, twist: f64, rate: f64) -> f64 {
+    let bend = twist - twist.clamp(-0.5 * model.gap, 0.5 * model.gap);
+    let torque = model.stiffness * bend + model.damping * rate;
+    match model.gap > 0.0 && (bend == 0.0 || torque * bend < 0.0) {
+        true => 0.0,
+        false => torque,
+    }
+}
+
+/// Returns the friction of the motor over its size. While the motor sticks, its friction balances all other torques.
+fn motor_friction(model: &TwoMass, motor: &MotorMotion<'_>, spring: &[f64]) -> Vec<f64> {
+    let n = spring.len();
+    // Friction has no mean over a motion to and fro.
+    let offset = mean(motor.torque) - mean(spring);
+    (0..n)
+        .map(|row| {
+            let moving = motor.moving[row];
+            let (before, next) = (row.saturating_sub(1), (row + 1).min(n - 1));
+            let acceleration = (motor.velocity[next] - motor.velocity[before])
+                / ((next - before).max(1) as f64 * motor.dt);
+            let balance = motor.torque[row]
+                - offset
+                - spring[row]
+                - model.motor_inertia * acceleration
+                - model.viscous * motor.velocity[row];
+            match model.coulomb > 0.0 {
+                true => moving + (1.0 - moving.abs()) * (balance / model.coulomb).clamp(-1.0, 1.0),
+                false => moving,
+            }
+        })
+        .collect()
 }

@@ -7,6 +7,7 @@ mod fit;
 mod link_motion;
 mod periodic;
 mod response;
+mod search;
 mod spectra;
 mod two_mass;
 

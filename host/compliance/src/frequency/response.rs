@@ -1,6 +1,6 @@
 //! The frequency response of one joint and the stiffness that it shows.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use rig_model::robot::{JointKind, Robot};
 use rig_output::format_significant;
@@ -9,10 +9,11 @@ use rig_shared::transmission::DriveKind;
 use serde::Serialize;
 
 use super::bands::{Band, BandBins, bands};
-use super::fit::{Fitted, Known, fit, frictionless};
+use super::fit::{Fitted, Known, frictionless};
 use super::periodic::Periodic;
+use super::search::{Gap, fit_all};
 use super::spectra::{Spectra, spectra};
-use super::two_mass::C;
+use super::two_mass::{C, Gravity};
 use crate::drives::{Drives, listed_pose, loaded};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
@@ -42,8 +43,6 @@ const UNUSABLE: f64 = 0.1;
 const SOFTER: f64 = 0.01;
 /// Multiple of the noise that the model leaves which is told.
 const MISFIT: f64 = 4.0;
-/// Predictions of the link's friction; a third changes the stiffness by less than a tenth of its standard deviation.
-const PREDICTIONS: usize = 3;
 /// Largest number of points in the figure of the signals.
 const SHOWN: usize = 4000;
 
@@ -96,6 +95,10 @@ pub struct FrequencyResponse {
     pub link_coulomb: Value,
     /// Delay of the position after the torque, s.
     pub delay: Value,
+    /// Backlash, rad (m), if it follows from the response.
+    pub backlash: Option<f64>,
+    /// True if backlash makes the stiffness a lower bound.
+    pub is_lower_bound: bool,
     /// Sum of squares per degree of freedom.
     pub misfit: f64,
     /// Inertia of the links at the pose by the description.
@@ -117,7 +120,7 @@ struct Described {
     unit: &'static str,
     link: Option<f64>,
     motor: Option<f64>,
-    gravity: f64,
+    gravity: Gravity,
 }
 
 /// Computes the frequency response of joint `k` and fits the two-mass model.
@@ -151,6 +154,7 @@ pub(crate) fn respond(
     let mut known = Known {
         gravity: described.gravity,
         link_inertia: None,
+        motor_inertia: None,
         rate: spectra.rate,
     };
     let unclear = || {
@@ -160,13 +164,14 @@ pub(crate) fn respond(
             format_significant(range[1], 3)
         ))
     };
-    let mut found = fit_all(&mut spectra, &known).ok_or_else(unclear)?;
+    let inertias = described.link.zip(described.motor).map(<[f64; 2]>::from);
+    let (mut found, mut gap) = fit_all(&mut spectra, &known, inertias).ok_or_else(unclear)?;
     if let (Some(link), true) = (
         described.link,
         found.variance([1.0, 0.0, 0.0]).sqrt() > UNCERTAIN,
     ) {
         known.link_inertia = Some(link);
-        found = fit_all(&mut spectra, &known).ok_or_else(unclear)?;
+        (found, gap) = fit_all(&mut spectra, &known, inertias).ok_or_else(unclear)?;
         warnings.push(format!(
             "The response alone shows neither inertia of joint \"{name}\" well: the inertia of the links is that of the description, {} {unit} at this pose. Its error is not in the standard deviation. A band beyond the resonance would show it.",
             format_significant(link, 4),
@@ -174,19 +179,12 @@ pub(crate) fn respond(
         ));
     }
     within(&found, &bands(&spectra), name, &described)?;
-    Ok(result(
-        robot, stretches, k, spectra, &found, &described, known, warnings,
-    ))
-}
-
-/// Fits the model, then again with the friction of the link that it predicts.
-fn fit_all(spectra: &mut Spectra, known: &Known) -> Option<Fitted> {
-    let mut found = fit(&bands(spectra), known, None)?;
-    for _ in 0..PREDICTIONS {
-        spectra.predict_link(&found.model);
-        found = fit(&bands(spectra), known, Some(&found.model))?;
+    if gap == Gap::Found {
+        known.link_inertia = described.link;
     }
-    Some(found)
+    Ok(result(
+        robot, stretches, k, spectra, &found, gap, &described, known, warnings,
+    ))
 }
 
 /// Checks that the joint is the one that moves, and that its torque is not cut.
@@ -325,7 +323,6 @@ fn described(robot: &Robot, pose: &[f64], k: usize) -> Result<Described, Complia
         gravity_vector(&chain, &rows, &q, &mut torque).map_err(|e| wrong(&e))?;
         Ok(torque[k])
     };
-    let step = 1e-4;
     let complete = robot.joints[k..].iter().all(|j| j.inertial.is_some());
     let link = inertia[k * n + k];
     Ok(Described {
@@ -335,7 +332,17 @@ fn described(robot: &Robot, pose: &[f64], k: usize) -> Result<Described, Complia
         },
         link: (complete && link > 0.0).then_some(link),
         motor: (motor > 0.0).then_some(motor),
-        gravity: (gravity(step)? - gravity(-step)?) / (2.0 * step),
+        gravity: match robot.joints[k].kind {
+            JointKind::Revolute => Gravity {
+                held: gravity(0.0)?,
+                slope: 0.5 * (gravity(FRAC_PI_2)? - gravity(-FRAC_PI_2)?),
+                curvature: 0.5 * (gravity(PI)? - gravity(0.0)?),
+            },
+            JointKind::Prismatic => Gravity {
+                held: gravity(0.0)?,
+                ..Gravity::default()
+            },
+        },
     })
 }
 
@@ -377,9 +384,32 @@ impl Masses {
     }
 }
 
+/// Says what the response shows of a gap.
+fn told_gap(name: &str, unit: &str, found: &Fitted, twist: f64, gap: Gap) -> Option<String> {
+    match gap {
+        Gap::None => None,
+        Gap::Found => Some(format!(
+            "The response of joint \"{name}\" shows backlash of about {} {unit}, which is taken into account; simulated gaps were found to 25 %. Both inertias are those of the description; their errors are not in the standard deviations. Static loading (--static) shows stiffness and backlash apart.",
+            format_significant(found.model.gap, 2)
+        )),
+        Gap::Bound => Some(format!(
+            "The response of joint \"{name}\" shows backlash that is large against the twist: {} {unit} by the RMS torque and the stiffness found. The stiffness found is only a lower bound, and may be a third of the true one. Measure it by static loading (--static), or with much more torque.",
+            format_significant(twist, 2)
+        )),
+    }
+}
+
 /// Says what contradicts the description or the model.
-fn doubts(name: &str, found: &Fitted, masses: &Masses, described: &Described) -> Vec<String> {
-    if let Some(softer) = softer(name, found, masses, described) {
+fn doubts(
+    name: &str,
+    found: &Fitted,
+    gap: Gap,
+    masses: &Masses,
+    described: &Described,
+) -> Vec<String> {
+    if gap == Gap::None
+        && let Some(softer) = softer(name, found, masses, described)
+    {
         return vec![softer];
     }
     let mut doubts = Vec::new();
@@ -388,7 +418,10 @@ fn doubts(name: &str, found: &Fitted, masses: &Masses, described: &Described) ->
         (motor, masses.motor, described.motor),
         ("links at this pose", masses.link, described.link),
     ] {
-        let Some(other) = other else { continue };
+        // A gap that is not fitted divides the inertias otherwise.
+        let Some(other) = other.filter(|_| gap != Gap::Bound) else {
+            continue;
+        };
         let off = (own.value - other).abs();
         if off > DIFFERS * other && off > 3.0 * own.std && own.std > 0.0 {
             doubts.push(format!(
@@ -441,6 +474,7 @@ fn result(
     k: usize,
     spectra: Spectra,
     found: &Fitted,
+    gap: Gap,
     described: &Described,
     known: Known,
     mut warnings: Vec<String>,
@@ -448,7 +482,10 @@ fn result(
     let name = robot.joints[k].name.clone();
     let model = &found.model;
     let masses = Masses::of(found, described);
-    warnings.extend(doubts(&name, found, &masses, described));
+    let unit = robot.joints[k].kind.units().0;
+    let twist = spectra.torque() / model.stiffness;
+    warnings.extend(told_gap(&name, unit, found, twist, gap));
+    warnings.extend(doubts(&name, found, gap, &masses, described));
     let spread = |p: usize| found.covariance[(p, p)].max(0.0).sqrt();
     let bins = bands(&spectra);
     let polar = |response: C| [response.norm(), response.arg()];
@@ -484,6 +521,8 @@ fn result(
         coulomb: Value::new(model.coulomb, spread(5)),
         link_coulomb: Value::new(model.link_coulomb, spread(7)),
         delay: Value::new(model.delay, spread(6) / spectra.rate),
+        backlash: (gap == Gap::Found).then_some(model.gap),
+        is_lower_bound: gap == Gap::Bound,
         misfit: found.misfit,
         described_link_inertia: described.link,
         described_motor_inertia: described.motor,

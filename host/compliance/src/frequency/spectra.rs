@@ -6,12 +6,12 @@
 use std::f64::consts::TAU;
 
 use realfft::RealFftPlanner;
-use rig_numerics::statistics::mean;
+use rig_numerics::statistics::{mean, rms};
 
 use super::bin::Bin;
 use super::columns::{Columns, columns_of, has_reference, rests};
 use super::periodic::{Harmonics, Periodic, Periods, harmonics, periods_of, shown};
-use super::two_mass::{C, TwoMass};
+use super::two_mass::{C, Gravity, TwoMass};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 
@@ -49,11 +49,11 @@ pub(crate) struct Spectra {
 }
 
 impl Spectra {
-    /// Predicts the friction of the link by a model, and transforms it.
-    pub(crate) fn predict_link(&mut self, model: &TwoMass) {
+    /// Predicts friction, backlash and gravity by a model, and transforms them.
+    pub(crate) fn predict(&mut self, model: &TwoMass, gravity: &Gravity) {
         let rate = self.rate;
         for own in &mut self.columns {
-            own.predict_link(model, rate);
+            own.predict(model, gravity, rate);
         }
         self.transform();
     }
@@ -92,6 +92,11 @@ impl Spectra {
         self.bins.sort_by(|a, b| a.omega.total_cmp(&b.omega));
         self.harmonics = found;
         true
+    }
+
+    /// Returns the RMS torque.
+    pub(super) fn torque(&self) -> f64 {
+        rms(&self.shown[1])
     }
 
     /// Transforms all columns.
@@ -247,12 +252,14 @@ fn segment(
         let _ = plan.process(&mut input, &mut output);
         output.iter().map(|v| v * scale).collect()
     };
-    let [instrument, torque, moved, sign, link_sign] = [
+    let [instrument, torque, moved, sign, link_sign, gap, gravity] = [
         &columns.instrument,
         &columns.torque,
         &columns.moved,
         &columns.sign,
         &columns.link_sign,
+        &columns.gap,
+        &columns.gravity,
     ]
     .map(|list| transform(list));
     // Above 0.4 of the rate the difference has little signal.
@@ -267,6 +274,8 @@ fn segment(
             velocity: moved[k] * derivative,
             sign: sign[k],
             link_sign: link_sign[k],
+            gap: gap[k],
+            gravity: gravity[k],
         });
     }
 }

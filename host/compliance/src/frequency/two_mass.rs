@@ -5,7 +5,8 @@
 //! with kg, the derivative of the gravity torque by the position (Spong 1987; Pham & Gautier 1991 for the identification).
 //! Antiresonance ωa² = (c + kg)/Jl, where the link swings against a motor at rest; resonance ωr² ≈ c·(1/Jl + 1/Jm).
 //!
-//! Coulomb friction of motor and link are further inputs: that of the link acts on the motor through the spring.
+//! Coulomb friction of motor and link are further inputs: that of the link acts on the motor through the spring. So is the
+//! torque that a gap in series with the spring takes away: it acts on both masses.
 //!
 //! Leaves out: friction that depends on speed, position or
 //! load otherwise; modes beyond the first; motion of the other joints, which count as held.
@@ -14,6 +15,26 @@ use nalgebra::Complex;
 
 /// Complex number.
 pub(crate) type C = Complex<f64>;
+
+/// Torque of gravity on a link, by the description.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Gravity {
+    /// Torque that holds the link at the mean pose, N·m.
+    pub held: f64,
+    /// First derivative there, N·m/rad.
+    pub slope: f64,
+    /// Second derivative there, N·m/rad².
+    pub curvature: f64,
+}
+
+impl Gravity {
+    /// Returns the torque that holds the link at a position from the mean pose. Exact for a joint that turns; that of a
+    /// joint that slides does not depend on its position.
+    pub(super) fn torque(&self, position: f64) -> f64 {
+        let (sin, cos) = position.sin_cos();
+        self.held + self.slope * sin + self.curvature * (1.0 - cos)
+    }
+}
 
 /// Parameters of the model.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,6 +55,8 @@ pub(crate) struct TwoMass {
     pub coulomb: f64,
     /// Coulomb friction of the link, N·m.
     pub link_coulomb: f64,
+    /// Whole gap of the backlash, rad.
+    pub gap: f64,
     /// Delay of the velocity after the torque, s.
     pub delay: f64,
     /// kg, N·m/rad.
