@@ -126,3 +126,44 @@ fn gears_of_an_arm_with_coupled_drives_are_simulated() {
     );
     assert!(!at("none.csv").exists());
 }
+
+/// What a recording of 200 Hz without noise tells is the description, as one of any other rate: the motion between its samples
+/// obeys the same equations.
+#[test]
+fn a_slow_recording_tells_the_same_inertia_as_its_description() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut design = rig();
+    design.args(["excite", "--starts", "1", "--seed", "1", "--robot"]);
+    design
+        .arg(robot("edda.toml"))
+        .arg("--out")
+        .arg(at("motion.toml"));
+    succeed(&mut design);
+    succeed(&mut simulate(
+        &robot("edda.toml"),
+        &at("motion.toml"),
+        &at("run.csv"),
+    ));
+    let mut identify = rig();
+    identify.args(["identify", "--estimator", "weighted", "--robot"]);
+    identify
+        .arg(robot("edda.toml"))
+        .arg("--data")
+        .arg(at("run.csv"));
+    succeed(identify.arg("--out").arg(at("found")));
+    let text = fs::read_to_string(at("found/identification.json")).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let value = |start: &str| -> f64 {
+        let list = found["base_parameters"].as_array().unwrap();
+        let own = list
+            .iter()
+            .find(|own| own["expression"].as_str().unwrap().starts_with(start));
+        own.unwrap()["value"].as_f64().unwrap()
+    };
+    // Izz1 + Ia1 + a² m2 of the description.
+    let truth = 1.0276 + 0.25 + 0.2025 * 6.0;
+    let inertia = value("Izz1 + Ia1");
+    assert!((inertia / truth - 1.0).abs() < 2e-5, "{inertia}");
+    assert!((value("fv1") / 0.4 - 1.0).abs() < 1e-3, "{}", value("fv1"));
+}

@@ -294,12 +294,12 @@ fn within(
     let [low, high] = coherent_range(bands);
     let bound = described.link.map_or(String::new(), |link| {
         format!(
-            " With the described inertia of the links a stiffness of less than {} would show.",
+            " With the described inertia of the links and no backlash a stiffness of less than {} would show.",
             format_significant(link * (TAU * high).powi(2), 2)
         )
     });
     Err(ComplianceError::Recording(format!(
-        "The response of joint \"{name}\" shows no antiresonance between {} and {} Hz, where torque and velocity are coherent; a chirp over a wider band may show it.{bound}",
+        "The response of joint \"{name}\" shows no antiresonance between {} and {} Hz, where torque and velocity are coherent; a chirp over a wider band may show it, or one with more amplitude if friction or backlash hides it.{bound}",
         format_significant(low, 3),
         format_significant(high, 3)
     )))
