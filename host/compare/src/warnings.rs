@@ -79,7 +79,7 @@ pub(crate) fn drifting(sets: &[IdentifiedSet], robot: &Robot, tolerance: f64) ->
             let consequence = if drift.share > tolerance {
                 "The joint warms up, or the torque constant or the friction changes otherwise. Its values then depend on when they were recorded. Move the joint until its friction stays, or compare later parts of the recordings; \"rig diagnose\" tells what changes."
             } else {
-                "It hardly matters for the torque, but may explain small differences between the sets."
+                "Perhaps the joint warms up. It hardly matters for the torque, but may explain small differences between the sets."
             };
             format!(
                 "The friction of {} {} by ({}) % during the recordings of {set}, which is {} % of the torque. {consequence}",
