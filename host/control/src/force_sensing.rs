@@ -10,7 +10,7 @@ use super::settings::Settings;
 use rig_excite::drawn;
 use rig_model::robot::Robot;
 use rig_output::format_significant;
-use rig_shared::multibody::{Chain, Pose, frame_pose};
+use rig_shared::multibody::{Chain, MAX_JOINTS, Pose, frame_pose};
 
 /// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -39,9 +39,10 @@ impl Mounted {
 
     /// Returns origin and axes (columns) in the base frame.
     fn placed(&self, chain: &Chain<f64>, q: &[f64]) -> Result<Pose<f64>, ControlError> {
-        let mut jacobian = vec![[0.0; 6]; q.len()];
+        let mut jacobian = [[0.0; 6]; MAX_JOINTS];
+        let jacobian = &mut jacobian[..q.len().min(MAX_JOINTS)];
         let last = q.len().saturating_sub(1);
-        frame_pose(chain, q, last, &self.pose, &mut jacobian).map_err(|e| at_start(e.into()))
+        frame_pose(chain, q, last, &self.pose, jacobian).map_err(|e| at_start(e.into()))
     }
 
     /// Returns force and moment about the origin in the sensor's axes, of a force at a point of the base frame.

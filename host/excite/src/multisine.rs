@@ -22,6 +22,7 @@ use crate::instants::Instants;
 use crate::stages::{ATTEMPTS, Prepared, SHARE, SLOWER, StagedOptions};
 use crate::{ExciteError, SampledReference};
 use rig_model::robot::Robot;
+use rig_numerics::statistics::rms;
 
 /// Draws of the phases.
 const DRAWS: usize = 64;
@@ -247,8 +248,7 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 fn crest(values: &[f64]) -> f64 {
-    let square = values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
-    largest(values) / square.sqrt()
+    largest(values) / rms(values)
 }
 
 /// Designs a multisine of one joint, with the others at rest, within 80 % of the limits or as the options require.

@@ -267,16 +267,19 @@ pub(crate) fn judge(
 /// Counts the rows at and near the ends of each channel.
 fn counted(recording: &dyn Recording, channels: &[Channel; 6]) -> Result<[[End; 2]; 6], LoadError> {
     let mut found = [[End::default(); 2]; 6];
+    let widths = channels.each_ref().map(|channel| {
+        let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
+        (channel, near, channel.width())
+    });
     each_readings(recording, &mut |block, readings| {
         for k in 0..block.len() {
-            for ((end, channel), list) in found.iter_mut().zip(channels).zip(readings) {
-                let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
-                let width = channel.width();
+            let all = found.iter_mut().zip(&widths).zip(readings);
+            for ((end, (channel, near, width)), list) in all {
                 for (end, distance) in
                     (end.iter_mut()).zip([list[k] - channel.low, channel.high - list[k]])
                 {
-                    end.push(distance, near, channel.step);
-                    end.pile.push(distance, width);
+                    end.push(distance, *near, channel.step);
+                    end.pile.push(distance, *width);
                 }
             }
         }

@@ -7,7 +7,7 @@
 use rig_data::prepare::{LowPass, PreprocessingPlan};
 
 /// Least power above the band of noise of power 1 from which the noise in the band is inferred.
-const LEAST_ABOVE: f64 = 0.05;
+pub(crate) const LEAST_ABOVE: f64 = 0.05;
 /// Drawn sequences of noise, whose powers are averaged. Each of a recording of 30 s at 100 Hz with a band of 5 Hz has 300
 /// independent values within the band, so that six of them give its power to 3 %.
 const SEQUENCES: u64 = 6;
@@ -82,7 +82,7 @@ impl<'a> NoiseFloor<'a> {
     }
 }
 
-fn squares_of_difference(all: &[f64], smooth: &[f64]) -> f64 {
+pub(crate) fn squares_of_difference(all: &[f64], smooth: &[f64]) -> f64 {
     let rest = all.iter().zip(smooth);
     rest.map(|(y, smooth)| (y - smooth).powi(2)).sum()
 }

@@ -3,10 +3,7 @@
 use rig_data::prepare::{PreprocessingPlan, Recording, each_motion};
 
 use crate::error::LoadError;
-use crate::noise_floor::shares;
-
-/// Least share of white noise above the band from which the noise in the band is inferred.
-const LEAST_ABOVE: f64 = 0.05;
+use crate::noise_floor::{LEAST_ABOVE, shares, squares_of_difference};
 
 /// Returns for each joint the RMS noise that its torques of all recordings have in the band of the fit, N·m or N; `None` if
 /// the band leaves nothing above it.
@@ -29,10 +26,7 @@ pub(crate) fn torque_noise(
             rows += high - low;
             for (sum, joint) in sums.iter_mut().zip(&motion.joints) {
                 let raw = &joint.tau[low..high];
-                let smooth = low_pass.zero_phase(raw);
-                *sum += (raw.iter().zip(&smooth))
-                    .map(|(raw, smooth)| (raw - smooth).powi(2))
-                    .sum::<f64>();
+                *sum += squares_of_difference(raw, &low_pass.zero_phase(raw));
             }
             Ok(())
         })?;

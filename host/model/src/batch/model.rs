@@ -1,7 +1,8 @@
 //! Torques, accelerations and inertia matrices of many samples.
 
 use rig_shared::multibody::block::{
-    Body, CompositeBlock, DerivativeBlock, Frame, JointBlock, NotPositive, lower,
+    Body, CompositeBlock, DerivativeBlock, Frame, JointBlock, NotPositive, derivative_buffers,
+    lower,
 };
 use rig_shared::multibody::{COLUMNS, Chain, MultibodyError, column};
 
@@ -272,7 +273,7 @@ impl ModelBatch {
         let mut joints = vec![JointBlock::ZERO; n];
         let mut composite = CompositeBlock::ZERO;
         let mut work = vec![DerivativeBlock::ZERO; n];
-        let mut buffer = lanes(2 * n * n + 2 * lower(n, 0) + n);
+        let mut buffer = lanes(derivative_buffers(n));
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             load(qd, &range, &mut b);

@@ -442,6 +442,7 @@ fn every_version_gives_the_same_results_but_for_rounding() {
     use super::signals::{lanes, load};
     use rig_shared::multibody::block::{
         AxisBlock, Body, CompositeBlock, DerivativeBlock, Frame, JointBlock, LANES,
+        derivative_buffers,
     };
     for n in LENGTHS {
         let made = made(n, LANES, 7);
@@ -477,7 +478,7 @@ fn every_version_gives_the_same_results_but_for_rounding() {
         .unwrap();
         alike("acceleration", &flat(&a), &flat(&b), 1e-9);
         let mut turns = vec![DerivativeBlock::ZERO; n];
-        let mut buffer = lanes(2 * n * n + 2 * lower(n, 0) + n);
+        let mut buffer = lanes(derivative_buffers(n));
         let out = || [n * n, n * n, lower(n, 0)].map(|columns| vec![f64::NAN; columns * LANES]);
         let [mut a, mut b] = [out(), out()];
         let [ma, mb] = [&mut a, &mut b].map(|out| out.each_mut().map(Vec::as_mut_slice));

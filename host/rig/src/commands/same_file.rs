@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const CHUNK: usize = 1 << 16;
 
 /// Resolves a path, so that two names of one file compare equal. A missing file keeps its path.
-pub(crate) fn real(path: &Path) -> PathBuf {
+fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 

@@ -13,11 +13,16 @@ use super::inverse::JointBlock;
 use super::lane::{LANES, Lane};
 use crate::lanes::MulAdd;
 
+/// Returns the number of buffers that the derivatives of the forward dynamics of `n` joints need.
+#[must_use]
+pub const fn derivative_buffers(n: usize) -> usize {
+    n + 2 * lower(n, 0) + 2 * n * n
+}
+
 /// Computes the derivatives of the accelerations under the torques `tau` by position, velocity and torque.
 ///
-/// `frames`, `bodies`, `joints`, `work` and the signals have one entry per joint, `torque` has
-/// 2·n² + n(n + 1) + n buffers.
-/// Column i·n + j of `by_position` and `by_velocity` is ∂q̈_i/∂q_j and ∂q̈_i/∂q̇_j; `by_torque` has the lower triangle of the
+/// `frames`, `bodies`, `joints`, `work` and the signals q, q̇, τ have one entry per joint, `buffer` has
+/// [`derivative_buffers`]. Column i·n + j of `by_position` and `by_velocity` is ∂q̈_i/∂q_j and ∂q̈_i/∂q̇_j; `by_torque` has the lower triangle of the
 /// inverse of the inertia matrix. Errors as [`forward_dynamics`].
 #[inline(always)]
 pub fn forward_dynamics_derivatives<F: MulAdd>(
@@ -37,8 +42,8 @@ pub fn forward_dynamics_derivatives<F: MulAdd>(
     let (qdd, rest) = buffer.split_at_mut(n);
     let (factor, rest) = rest.split_at_mut(lower(n, 0));
     let (inertia, rest) = rest.split_at_mut(lower(n, 0));
-    let (rows, more) = rest.split_at_mut(n * n);
-    let more = &mut more[..n * n];
+    let (by_q, by_qd) = rest.split_at_mut(n * n);
+    let by_qd = &mut by_qd[..n * n];
     forward_dynamics::<F>(
         frames, gravity, bodies, q, qd, tau, joints, composite, factor, qdd,
     )?;
@@ -48,16 +53,16 @@ pub fn forward_dynamics_derivatives<F: MulAdd>(
         bodies,
         [q, qd, qdd],
         work,
-        rows,
-        more,
+        by_q,
+        by_qd,
         inertia,
     );
     invert::<F>(n, factor, inertia);
     for (c, entry) in inertia.iter().enumerate() {
         *by_torque.lane(c) = entry.0;
     }
-    multiply_negative::<F>(n, inertia, rows, by_position);
-    multiply_negative::<F>(n, inertia, more, by_velocity);
+    multiply_negative::<F>(n, inertia, by_q, by_position);
+    multiply_negative::<F>(n, inertia, by_qd, by_velocity);
     Ok(())
 }
 

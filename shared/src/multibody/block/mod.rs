@@ -27,7 +27,7 @@ pub use body::Body;
 pub use columns::Section;
 pub use derivatives::{DerivativeBlock, inverse_dynamics_derivatives};
 pub use forward::{NotPositive, forward_dynamics};
-pub use forward_derivatives::forward_dynamics_derivatives;
+pub use forward_derivatives::{derivative_buffers, forward_dynamics_derivatives};
 pub use frame::Frame;
 pub use inertia::{CompositeBlock, inertia_matrix, lower};
 pub use inverse::{JointBlock, inverse_dynamics};
