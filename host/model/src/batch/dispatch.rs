@@ -1,7 +1,7 @@
 //! The kernels, compiled for the vector instructions of the machine and selected at run time.
 //!
 //! Users build for the oldest processor of their kind. A kernel compiled for AVX2 and FMA runs about twice as fast
-//! where both exist, and one for AVX-512 1.4 times as fast again. FMA adds unrounded products ([`MulAdd`]), so these
+//! where both exist, and one for AVX-512 is faster again. FMA adds unrounded products ([`MulAdd`]), so these
 //! versions differ from the portable one by rounding (tested). Results are identical on one kind of machine, but not between
 //! kinds. Other processors use the portable version; on 64-bit Arm it already uses vectors.
 
