@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use clap::CommandFactory;
+use clap::{CommandFactory, Parser};
 use rig::commands::Cli;
 
 fn root() -> PathBuf {
@@ -112,7 +112,7 @@ fn commands_of_the_pages_are_understood() {
         for (language, block) in blocks(&page) {
             for call in calls(&block).iter().filter(|_| language == "sh") {
                 count += 1;
-                if let Err(error) = Cli::read(call) {
+                if let Err(error) = Cli::try_parse_from(call) {
                     wrong.push(format!("{}: {call:?}: {error}", page.display()));
                 }
             }

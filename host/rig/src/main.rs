@@ -2,13 +2,11 @@
 
 use std::process::ExitCode;
 
+use clap::Parser;
 use rig::commands::Cli;
 
 fn main() -> ExitCode {
-    match Cli::read(std::env::args_os())
-        .unwrap_or_else(|error| error.exit())
-        .run()
-    {
+    match Cli::parse().run() {
         Ok(status) => ExitCode::from(status),
         Err(error) => {
             eprintln!("rig: {error}");

@@ -41,9 +41,7 @@ mod urdf;
 mod validate;
 mod work;
 
-use std::ffi::OsString;
-
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 
 pub use diagnose::write_diagnosis;
 pub use error::CommandError;
@@ -51,13 +49,12 @@ pub use identify::{Compare, Impossible, write_identification};
 pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
 pub use overwrite::{refuse_file, refuse_folder};
 use ui::Ui;
-use work::{Work, read_words};
+use work::{Work, with_negative_numbers};
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
 ///
 /// Without a command it runs the demonstration (`rig demo`), which needs no hardware.
-#[derive(Debug, Parser)]
-#[command(name = "rig", version)]
+#[derive(Debug, Args)]
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -81,17 +78,20 @@ enum Command {
     Man(man::Args),
 }
 
-impl Cli {
-    /// Reads a command line, the name of the program first.
-    ///
-    /// # Errors
-    /// clap's message about a wrong word, or the text of `--help`; [`clap::Error::exit`] prints it and ends the program.
-    pub fn read<T: Into<OsString> + Clone>(
-        words: impl IntoIterator<Item = T>,
-    ) -> Result<Self, clap::Error> {
-        read_words(words)
+impl CommandFactory for Cli {
+    fn command() -> clap::Command {
+        let program = clap::Command::new("rig").version(env!("CARGO_PKG_VERSION"));
+        with_negative_numbers(Self::augment_args(program))
     }
 
+    fn command_for_update() -> clap::Command {
+        Self::command()
+    }
+}
+
+impl Parser for Cli {}
+
+impl Cli {
     /// Runs the command; returns the exit status.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args as ClapArgs;
+use clap::{Args as ClapArgs, Parser};
 
 use self::project::{Step, steps};
 use self::state::{Done, State, inputs, snapshot, written};
@@ -133,7 +133,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
 /// Parses the options of a step as the command line does.
 fn parsed(step: Step) -> Result<Ready, CommandError> {
     let words = std::iter::once("rig").chain(step.words.iter().map(String::as_str));
-    match Words::read(words) {
+    match Words::try_parse_from(words) {
         Ok(Words { work }) => Ok(Ready { step, work }),
         Err(error) => {
             let text = error.to_string();
@@ -245,7 +245,7 @@ impl Run<'_> {
         let there = snapshot(&step.out);
         let status = if owns || self.args.force {
             let words = std::iter::once("rig").chain(step.words.iter().map(String::as_str));
-            let forced = Words::read(words.chain(["--force"]));
+            let forced = Words::try_parse_from(words.chain(["--force"]));
             let forced = forced.map_err(|error| CommandError::Sentence(error.to_string()))?;
             forced.work.run(&ui)?
         } else {

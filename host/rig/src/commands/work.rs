@@ -1,8 +1,6 @@
 //! The commands that make files: each is also a step of `rig run`.
 
-use std::ffi::OsString;
-
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use super::error::CommandError;
 use super::ui::Ui;
@@ -35,39 +33,27 @@ pub(crate) enum Work {
 }
 
 /// The words of such a command, as in `rig excite --robot arm.toml --out motion.toml`.
-#[derive(Debug, Parser)]
-#[command(name = "rig")]
+#[derive(Debug, Args)]
 pub(crate) struct Words {
     #[command(subcommand)]
     pub(crate) work: Work,
 }
 
-impl Words {
-    /// Reads the words, the name of the program first.
-    ///
-    /// # Errors
-    /// clap's message about a wrong word.
-    pub(crate) fn read<T: Into<OsString> + Clone>(
-        words: impl IntoIterator<Item = T>,
-    ) -> Result<Self, clap::Error> {
-        read_words(words)
+impl CommandFactory for Words {
+    fn command() -> clap::Command {
+        with_negative_numbers(Self::augment_args(clap::Command::new("rig")))
+    }
+
+    fn command_for_update() -> clap::Command {
+        Self::command()
     }
 }
 
-/// Reads words as a command line, the name of the program first.
-///
-/// # Errors
-/// clap's message about a wrong word.
-pub(crate) fn read_words<C: CommandFactory + FromArgMatches, T: Into<OsString> + Clone>(
-    words: impl IntoIterator<Item = T>,
-) -> Result<C, clap::Error> {
-    let matches = with_negative_numbers(C::command()).try_get_matches_from(words)?;
-    C::from_arg_matches(&matches)
-}
+impl Parser for Words {}
 
 /// Lets every option of a command and of its subcommands take a negative number. The check of the value then says what is
 /// possible, instead of clap that `-2` is no option.
-fn with_negative_numbers(command: clap::Command) -> clap::Command {
+pub(crate) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let names: Vec<String> = (command.get_subcommands())
         .map(|own| own.get_name().to_owned())
         .collect();

@@ -347,6 +347,8 @@ fn word(value: &Value) -> Result<String, String> {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
 
     /// `rig run` gives every step an output and may have to replace it.
@@ -384,7 +386,7 @@ mod tests {
         );
         for step in found {
             let all = std::iter::once("rig").chain(step.words.iter().map(String::as_str));
-            assert!(Words::read(all).is_ok(), "{}", step.name);
+            assert!(Words::try_parse_from(all).is_ok(), "{}", step.name);
         }
     }
 }
