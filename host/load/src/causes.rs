@@ -58,6 +58,16 @@ pub(crate) enum Cause {
     Gain(usize),
 }
 
+impl Cause {
+    /// Returns true if another cause is of the same kind, with another scale of the moments beside it.
+    fn is_scaled_by(&self, other: &Self) -> bool {
+        matches!(
+            (self, other),
+            (Self::Channels(_), Self::ScaleAndChannels(_)) | (Self::Turned, Self::ScaleAndTurned)
+        )
+    }
+}
+
 /// A cause that was fitted.
 pub(crate) struct Tried {
     pub cause: Cause,
@@ -158,10 +168,12 @@ fn displaced_or_scaled(
             delay,
         };
     }
-    // A channel alone has one unknown, a position three.
+    // A channel alone has one unknown, a position three. It stands for no other unit, as long as it needs no position that
+    // is none.
     let is_channel = |own: &Tried| {
         matches!(own.cause, Cause::Dead(_) | Cause::Gain(_))
             && own.score < described.score - DECISIVE
+            && !is_far(sensed, own)
     };
     if all.iter().any(is_channel) {
         all.retain(is_channel);
@@ -177,10 +189,8 @@ fn displaced_or_scaled(
     let of = |cause: &Cause| all.iter().position(|own| own.cause == *cause);
     let place = of(&Cause::Scale).or_else(|| of(&Cause::ScaleAndTurned));
     let scale = place.map(|at| all.remove(at));
-    let error = sensed.origin(&described.selected.fit);
-    let is_far = error.is_some_and(|error| error.norm() > FARTHEST);
     let causes = match scale {
-        Some(own) if is_far || is_unit(sensed, &own) => vec![own],
+        Some(own) if is_far(sensed, &described) || is_unit(sensed, &own) => vec![own],
         Some(own) => {
             described.selected.add_scale(sensed, &own.selected.fit);
             Vec::new()
@@ -204,6 +214,39 @@ fn is_unit(sensed: &Sensed, tried: &Tried) -> bool {
     [1.0 / BESIDE, BESIDE].into_iter().all(is_worse) && !named(sensed, fit).is_empty()
 }
 
+/// Decides, for each cause that needs another position of the sensor, between it and one of its kind with another scale of
+/// the moments, as [`displaced_or_scaled`] does for the description.
+fn decide_scales(sensed: &Sensed, all: &mut Vec<Tried>) {
+    let mut at = 0;
+    while at < all.len() {
+        let own = &all[at];
+        let scaled: Vec<&Tried> = (all.iter())
+            .filter(|other| own.cause.is_scaled_by(&other.cause))
+            .filter(|_| own.selected.fit.unknowns.has(Nuisance::Origin))
+            .collect();
+        let Some(best) = scaled
+            .iter()
+            .min_by(|a, b| a.score.total_cmp(&b.score))
+            .map(|best| best.selected.fit.clone())
+        else {
+            at += 1;
+            continue;
+        };
+        if is_far(sensed, own) || scaled.iter().any(|other| is_unit(sensed, other)) {
+            all.remove(at);
+        } else {
+            all[at].selected.add_scale(sensed, &best);
+            at += 1;
+        }
+    }
+}
+
+/// Returns true if a cause needs the sensor further from its described position than a caliper or drawing is wrong.
+fn is_far(sensed: &Sensed, tried: &Tried) -> bool {
+    let error = sensed.origin(&tried.selected.fit);
+    error.is_some_and(|error| error.norm() > FARTHEST)
+}
+
 /// Drops causes of which a special case explains as much, and sorts them by their unknowns. An exchange of channels with a
 /// turned sensor is no special case of a turned sensor.
 fn without_special_cases(sensed: &Sensed, mut all: Vec<Tried>) -> Vec<Tried> {
@@ -211,27 +254,7 @@ fn without_special_cases(sensed: &Sensed, mut all: Vec<Tried>) -> Vec<Tried> {
     let is_opposite =
         |own: &Tried| matches!(&own.cause, Cause::Channels(c) if c.is_opposite_rotation());
     let is_scaled = has(&all, &Cause::Scale);
-    // Of a turned sensor, another position and another scale of the moments are alike as well.
-    let is_scale_certain =
-        (all.iter()).any(|own| own.cause == Cause::ScaleAndTurned && is_unit(sensed, own));
-    if let Some(at) = all.iter().position(|own| own.cause == Cause::Turned)
-        && has(&all, &Cause::ScaleAndTurned)
-        && all[at].selected.fit.unknowns.has(Nuisance::Origin)
-    {
-        let is_far = sensed
-            .origin(&all[at].selected.fit)
-            .is_some_and(|error| error.norm() > FARTHEST);
-        match is_far || is_scale_certain {
-            true => drop(all.remove(at)),
-            false => {
-                let scaled = (all.iter()).find(|own| own.cause == Cause::ScaleAndTurned);
-                let scaled = scaled.map(|own| own.selected.fit.clone());
-                if let Some(fit) = scaled {
-                    all[at].selected.add_scale(sensed, &fit);
-                }
-            }
-        }
-    }
+    decide_scales(sensed, &mut all);
     let is_turned = has(&all, &Cause::Turned);
     let is_mirrored = all.iter().any(is_opposite);
     let is_exchanged = (all.iter()).any(|own| matches!(own.cause, Cause::Channels(_)));

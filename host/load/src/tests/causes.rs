@@ -293,6 +293,20 @@ fn a_unit_is_named_beside_a_turned_sensor_and_beside_exchanged_channels() {
     }
 }
 
+/// A position of the sensor that is none (111 m for N·mm) makes another unit look like a gain of 1, or like no cause at all
+/// beside exchanged channels.
+#[test]
+fn a_unit_is_no_position_of_the_sensor() {
+    for (kind, seed) in [
+        (Kind::Unit, 6),
+        (Kind::UnitAndExchange, 9),
+        (Kind::UnitAndExchange, 21),
+    ] {
+        let (said, text) = judge(&case(kind, seed, false));
+        assert_eq!(said, Said::Right, "{kind:?} {seed}: {text}");
+    }
+}
+
 #[test]
 fn no_cause_is_invented_for_a_cable_that_pulls() {
     let cases = cases();
