@@ -62,7 +62,8 @@ pub fn diagnose(
     // drive off, or because some but not all recordings have the external loads removed.
     let unloaded = training.iter().filter(|r| r.unburdened()).count();
     stated.loads_separable = unloaded > 0 && unloaded < training.len();
-    let constants_searched = !options.sensor_zeros.is_empty() || stated.loads_separable;
+    stated.zeros_given = !options.sensor_zeros.is_empty();
+    let constants_searched = stated.zeros_given || stated.loads_separable;
     stated.no_offsets = options.no_offsets && !constants_searched;
     let given = [training, holdout].concat();
     let mut uneven = Uneven::default();

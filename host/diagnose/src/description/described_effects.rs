@@ -68,6 +68,8 @@ pub(crate) struct DescribedEffects {
     pub(crate) no_offsets: bool,
     /// True if the recordings tell which part of a described constant torque is external.
     pub(crate) loads_separable: bool,
+    /// True if the readings of the sensors with the drive off are given.
+    pub(crate) zeros_given: bool,
     /// The ignored torque limits.
     pub(crate) lifted: Vec<LiftedLimit>,
     effects: Vec<(RobotEffect, Placed, Way)>,
@@ -99,6 +101,7 @@ impl DescribedEffects {
             robot: plain,
             no_offsets: false,
             loads_separable: false,
+            zeros_given: false,
             lifted: Vec::new(),
             effects,
         }

@@ -2,8 +2,10 @@
 //!
 //! Base parameters can absorb a wrong gravity direction, zero angle or constant torque. If the description states such
 //! a value, it is held. The data then show the difference as a named effect (a tilted base, an offset) instead of a
-//! wrong parameter. If it states nothing, the parameter is free and the effect not testable. On several joints,
-//! parameters that the motion determines less well than the description are held, too.
+//! wrong parameter. If it states nothing, the parameter is free and the effect not testable. A constant torque is held at
+//! zero alone: another value was identified, with a model that may have lacked the effects (a cogging torque shifts it),
+//! so it is refitted like friction. It is held if readings with the drive off tell the constant of the sensor from it. On
+//! several joints, parameters that the motion determines less well than the description are held, too.
 
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
@@ -72,8 +74,8 @@ impl ParameterPrior {
             if offset.is_some() && stated.no_offsets {
                 unstated.push(k);
                 free.push(vec![(k, 1.0)]);
-            } else if offset.is_some_and(|f| f.offset != 0.0 && stated.loads_separable) {
-                // Some of it, or all, may be external.
+            } else if offset.is_some_and(|f| f.offset != 0.0 && !stated.zeros_given) {
+                // Some of it, or all, may be external, or may stand for what a model without the effects lacks.
                 free.push(vec![(k, 1.0)]);
             } else if offset.is_some() {
                 held.push(k);

@@ -103,6 +103,28 @@ fn a_constant_that_a_description_cannot_state_is_fitted_beside_its_friction() {
     }
 }
 
+/// An identification without the cogging in its model takes a part of it for a constant torque. Held, that constant made the
+/// diagnosis name friction that differs with the direction, with an interval that left zero far outside.
+#[test]
+fn a_constant_of_an_identification_without_the_effect_is_a_wrong_value_and_no_effect() {
+    let hidden = Effect::Cogging {
+        amplitude: 0.2,
+        order: 12.0,
+        phase: 0.5,
+    };
+    for (seed, described) in [(105, 0.06), (106, -0.1), (107, 0.3)] {
+        let made = Scenario::short([hidden], seed).make().unwrap();
+        let mut robot = made.robot.clone();
+        robot.joints[0].friction.as_mut().unwrap().offset = described;
+        let (diagnosis, model) = made.diagnosed(&robot, &Options::default());
+        assert_eq!(names(&diagnosis), ["cogging"], "{:?}", diagnosis.words);
+        let left = model.joints[0].friction.as_ref().unwrap().offset;
+        assert!(left.abs() < 0.01, "{left} of {described}");
+        let said = diagnosis.words.iter().any(|w| w.contains("off1"));
+        assert!(said, "{:?}", diagnosis.words);
+    }
+}
+
 /// Returns the verdict on the same rig without the constant.
 fn stated_without_a_constant() -> Verdict {
     let made = Scenario::short([], 101).make().unwrap();
