@@ -82,6 +82,8 @@ pub(crate) struct Known {
     pub motor_inertia: Option<f64>,
     /// Rows per second.
     pub rate: f64,
+    /// Time for which the recorded torque is held, s; 0 if it is that of the instant.
+    pub hold: f64,
 }
 
 /// Fits the model to the used bands, from a first model if there is one; only then the friction of the link is estimated.
@@ -170,6 +172,7 @@ fn rigid(bands: &[&BandBins<'_>], noise: &[f64], start: &TwoMass, known: &Known)
         coulomb: theta[2],
         delay: theta[3] / known.rate,
         gravity: known.gravity.slope,
+        hold: known.hold,
         ..TwoMass::default()
     };
     let first = [
@@ -227,31 +230,32 @@ fn model(theta: &[f64], known: &Known) -> TwoMass {
         link_viscous: theta[8],
         gap: theta[GAP],
         gravity: known.gravity.slope,
+        hold: known.hold,
     }
 }
 
-/// Torque less the Coulomb friction of a model.
-fn driven(bin: &Bin, model: &TwoMass) -> C {
+/// Velocity that a model gives for friction, gravity and a gap: they act at every instant.
+fn resisted(bin: &Bin, model: &TwoMass) -> C {
     let through = model.through_spring(bin.omega);
     let of_link = through * (bin.link_sign * model.link_coulomb + bin.gravity);
     let of_gap = match model.gap > 0.0 {
         true => (C::new(1.0, 0.0) - through) * bin.gap * (model.stiffness * model.gap),
         false => C::new(0.0, 0.0),
     };
-    bin.torque - bin.sign * model.coulomb - of_link - of_gap
+    -model.response(bin.omega) * (bin.sign * model.coulomb + of_link + of_gap)
 }
 
 /// Velocity that a model does not explain.
 fn error(bin: &Bin, model: &TwoMass) -> C {
-    bin.velocity - model.response(bin.omega) * driven(bin, model)
+    bin.velocity - model.recorded(bin.omega) * bin.torque - resisted(bin, model)
 }
 
 /// Returns the response of a band without the Coulomb friction of a model.
 pub(crate) fn frictionless(band: &BandBins<'_>, model: &TwoMass) -> C {
     let (mut velocity, mut torque) = (C::new(0.0, 0.0), C::new(0.0, 0.0));
     for bin in band.bins {
-        velocity += bin.instrument.conj() * bin.velocity;
-        torque += bin.instrument.conj() * driven(bin, model);
+        velocity += bin.instrument.conj() * (bin.velocity - resisted(bin, model));
+        torque += bin.instrument.conj() * bin.torque;
     }
     velocity / torque
 }

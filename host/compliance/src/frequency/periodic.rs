@@ -148,7 +148,7 @@ pub(super) fn shown(
     let first = periods.first()?;
     let held: Vec<&Bin> = all.iter().flat_map(|own| &own.held).collect();
     let power = held.iter().map(|bin| bin.velocity.norm_sqr()).sum::<f64>() / held.len() as f64;
-    let left = |bin: &Bin| -> C { bin.velocity - model.response(bin.omega) * bin.torque };
+    let left = |bin: &Bin| -> C { bin.velocity - model.recorded(bin.omega) * bin.torque };
     let rms = |squares: Vec<f64>| {
         let count = squares.len() as f64;
         (count > 0.0).then(|| (squares.iter().sum::<f64>() / count / power).sqrt())

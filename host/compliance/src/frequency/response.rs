@@ -95,6 +95,8 @@ pub struct FrequencyResponse {
     pub link_coulomb: Value,
     /// Delay of the position after the torque, s.
     pub delay: Value,
+    /// True if the torque counts as held from row to row, which explains the recording better than one of each instant.
+    pub held: bool,
     /// Backlash, rad (m), if it follows from the response.
     pub backlash: Option<f64>,
     /// True if backlash makes the stiffness a lower bound.
@@ -156,6 +158,7 @@ pub(crate) fn respond(
         link_inertia: None,
         motor_inertia: None,
         rate: spectra.rate,
+        hold: 0.0,
     };
     let unclear = || {
         ComplianceError::Recording(format!(
@@ -507,7 +510,7 @@ fn result(
         periodic: spectra.periodic(model),
         by_reference: spectra.by_reference,
         model: (bands.iter())
-            .map(|band| polar(model.response(TAU * band.frequency)))
+            .map(|band| polar(model.recorded(TAU * band.frequency)))
             .collect(),
         frictionless,
         bands,
@@ -521,6 +524,7 @@ fn result(
         coulomb: Value::new(model.coulomb, spread(5)),
         link_coulomb: Value::new(model.link_coulomb, spread(7)),
         delay: Value::new(model.delay, spread(6) / spectra.rate),
+        held: model.hold > 0.0,
         backlash: (gap == Gap::Found).then_some(model.gap),
         is_lower_bound: gap == Gap::Bound,
         misfit: found.misfit,

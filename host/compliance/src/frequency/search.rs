@@ -4,6 +4,9 @@
 //! zone, Gelb & Vander Velde 1968): a linear fit gives a smaller stiffness, a heavier motor and a lighter link. Here the
 //! torque that the gap takes away is predicted in time and is a further input, as friction is.
 //!
+//! A controller that holds the torque from row to row makes the joint seem stiffer, by 8 % with 7 rows a period of the
+//! antiresonance; both are fitted, and the more likely one counts.
+//!
 //! Leaves out: gaps beyond the twist, where impacts decide the motion of the link; the response then bounds the stiffness.
 
 use super::bands::bands;
@@ -40,11 +43,8 @@ pub(super) fn fit_all(
     known: &Known,
     inertias: Option<[f64; 2]>,
 ) -> Option<(Fitted, Gap)> {
-    let mut plain = fit(&bands(spectra), known, None)?;
-    for _ in 0..PREDICTIONS {
-        spectra.predict(&plain.model, &known.gravity);
-        plain = fit(&bands(spectra), known, Some(&plain.model))?;
-    }
+    let (known, plain) = fit_plain(spectra, known)?;
+    let known = &known;
     let (before, without) = (spectra.clone(), plain.deviance);
     let evident =
         fit_with_gap(spectra, known, &plain).filter(|found| without - found.deviance > EVIDENT);
@@ -68,6 +68,29 @@ pub(super) fn fit_all(
             Some((plain, Gap::Bound))
         }
     }
+}
+
+/// Returns the most likely fit without a gap, of a torque that acts as recorded at each instant, or that is held from row to
+/// row; leaves the spectra as it predicts them.
+fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
+    let mut first = fit(&bands(spectra), known, None)?;
+    let mut best: Option<(Known, Fitted, Spectra)> = None;
+    for hold in [0.0, 1.0 / known.rate] {
+        let known = Known { hold, ..*known };
+        let mut own = spectra.clone();
+        let mut found = first.clone();
+        for _ in 0..PREDICTIONS {
+            own.predict(&found.model, &known.gravity);
+            found = fit(&bands(&own), &known, Some(&found.model))?;
+        }
+        first.clone_from(&found);
+        if (best.as_ref()).is_none_or(|(_, best, _)| found.deviance < best.deviance) {
+            best = Some((known, found, own));
+        }
+    }
+    let (known, found, own) = best?;
+    *spectra = own;
+    Some((known, found))
 }
 
 /// Returns the most likely fit with a gap, and leaves the spectra as it predicts them.

@@ -8,8 +8,11 @@
 //! Coulomb friction of motor and link are further inputs: that of the link acts on the motor through the spring. So is the
 //! torque that a gap in series with the spring takes away: it acts on both masses.
 //!
-//! Leaves out: friction that depends on speed, position or
-//! load otherwise; modes beyond the first; motion of the other joints, which count as held.
+//! A controller may hold the torque from one row to the next. What the rows show of the motion is then the response at the
+//! frequency and at all its aliases, each by the hold (Åström & Wittenmark 1997, ch. 2 and 7).
+//!
+//! Leaves out: friction that depends on speed, position or load otherwise; modes beyond the first; motion of the other
+//! joints, which count as held; a torque that is held for longer than a row.
 
 use nalgebra::Complex;
 
@@ -61,9 +64,36 @@ pub(crate) struct TwoMass {
     pub delay: f64,
     /// kg, N·m/rad.
     pub gravity: f64,
+    /// Time for which the recorded torque is held, s; 0 if it is that of the instant.
+    pub hold: f64,
 }
 
+/// Aliases on either side that count, up to a frequency as a share of the rate of the rows. Those beyond change the response of
+/// an inertia by less than a thousandth.
+const ALIASES: [(f64, i32); 3] = [(0.1, 1), (0.2, 2), (f64::INFINITY, 4)];
+
 impl TwoMass {
+    /// Returns velocity per recorded torque at an angular frequency, rad/s: that of the torque which acts, or of one that is
+    /// held from row to row.
+    pub(crate) fn recorded(&self, omega: f64) -> C {
+        let period = self.hold;
+        if period == 0.0 || omega == 0.0 {
+            return self.response(omega);
+        }
+        let rate = std::f64::consts::TAU / period;
+        let last = (ALIASES.iter())
+            .find(|(share, _)| omega.abs() < share * rate)
+            .map_or(0, |(_, last)| *last);
+        // The position is sampled; its velocity is that of the position at this frequency.
+        let of_alias = |k: i32| {
+            let s = C::new(0.0, omega + f64::from(k) * rate);
+            self.response(s.im) / (s * s)
+        };
+        let sum: C = (-last..=last).map(of_alias).sum();
+        let s = C::new(0.0, omega);
+        sum * s * (C::new(1.0, 0.0) - (-s * period).exp()) / period
+    }
+
     /// Returns velocity per torque at an angular frequency, rad/s.
     pub(crate) fn response(&self, omega: f64) -> C {
         let s = C::new(0.0, omega);

@@ -201,9 +201,20 @@ fn measurements_that_contradict_each_other_are_not_averaged() {
     assert!(!found.warnings.iter().any(|w| w.contains("contradict")));
 }
 
-/// A chirp from 1 to `end` Hz of a position loop on two masses, by steps of 0.1 ms: an integration of its own. The
-/// antiresonance is √(900/0.12)/2π = 13.8 Hz.
+/// A chirp as [`sampled`] gives it, at 1 kHz, of a torque that is held from row to row.
 fn two_masses(end: f64, size: f64, seed: u64) -> rig_data::prepare::InMemory {
+    sampled([end, size], seed, 10, true)
+}
+
+/// A chirp from 1 to `end` Hz of a position loop on two masses, by steps of 0.1 ms: an integration of its own. The
+/// antiresonance is √(900/0.12)/2π = 13.8 Hz. A row is recorded in every `every`-th step; the torque is `held` from row to
+/// row, or changes with every step.
+fn sampled(
+    [end, size]: [f64; 2],
+    seed: u64,
+    every: usize,
+    held: bool,
+) -> rig_data::prepare::InMemory {
     use core::f64::consts::{FRAC_PI_2, PI, TAU};
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::rand_core::SeedableRng;
@@ -236,8 +247,10 @@ fn two_masses(end: f64, size: f64, seed: u64) -> rig_data::prepare::InMemory {
         }
         let ease = (PI * (10.0 * share).min(10.0 * (1.0 - share)).min(0.5)).sin();
         let reference = -FRAC_PI_2 + size * ease * phase.sin();
-        if k % 10 == 0 {
+        if k % every == 0 || !held {
             torque = kp * (reference - qm) - kd * vm + weight * reference.cos();
+        }
+        if k % every == 0 {
             block.t.push(t);
             joint.q.push(qm + normal(1e-5));
             joint.tau.push(torque + normal(0.05));
@@ -252,6 +265,38 @@ fn two_masses(end: f64, size: f64, seed: u64) -> rig_data::prepare::InMemory {
     rig_data::prepare::InMemory {
         label: "chirp".into(),
         blocks: vec![block],
+    }
+}
+
+/// A controller of 125 or 250 Hz holds its torque for a ninth or an eighteenth of a period of the antiresonance. Taken for the
+/// torque of the instant, it made the joint seem stiffer.
+#[test]
+fn a_torque_that_is_held_from_row_to_row_is_told_from_one_of_each_instant() {
+    let robot = rig_model::robot::Robot::from_toml(
+        rig_model::robot::ONE_LINK_TEMPLATE,
+        "one-link.toml".as_ref(),
+    )
+    .unwrap();
+    for (every, held) in [(80, true), (40, true), (40, false), (10, true)] {
+        let run = sampled([45.0, 0.02], 1, every, held);
+        let found =
+            crate::identify_compliance(&robot, &[], &[&run], &crate::ComplianceOptions::default());
+        let response = found.unwrap().frequency.unwrap();
+        println!(
+            "{every} {held}: {:?} {:?}",
+            response.stiffness, response.motor_inertia
+        );
+        if every > 10 {
+            assert_eq!(response.held, held, "{every}");
+        }
+        for (own, truth) in [
+            (response.stiffness, 900.0),
+            (response.link_inertia, 0.12),
+            (response.motor_inertia, 0.05),
+        ] {
+            let off = own.value / truth - 1.0;
+            assert!(off.abs() < 0.01, "{every} {held}: {own:?}, {truth}");
+        }
     }
 }
 

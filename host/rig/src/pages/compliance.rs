@@ -357,7 +357,13 @@ fn two_masses(found: &FrequencyResponse) -> Table {
         rows: rows
             .map(|(name, own, other, unit)| vec![name.into(), own, other, unit.into()])
             .into(),
-        note: "Stiffness by the description: its inertia of the links at this pose, times the square of the antiresonance, less the stiffness of gravity. For a prismatic joint read m for rad, N for N·m and kg for kg·m².".into(),
+        note: format!(
+            "The recorded torque counts as {}. Stiffness by the description: its inertia of the links at this pose, times the square of the antiresonance, less the stiffness of gravity. For a prismatic joint read m for rad, N for N·m and kg for kg·m².",
+            match found.held {
+                true => "held by the controller from row to row",
+                false => "that of the instant of its row",
+            }
+        ),
     }
 }
 
