@@ -14,8 +14,9 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 /// Share of the largest parameter of its kind that counts as the size of a smaller one.
 const LEAST_SIZE: f64 = 0.05;
-/// RMS torque of a parameter error of one size, as a share of the motion's RMS torque, from which the motion excites the
-/// direction of that error. A choice: a hundredth; less drowns in the friction that is not compensated.
+/// RMS torque of a parameter error of one size, as a share of the motion's RMS torque or of the dry friction, whichever is
+/// larger, from which the motion excites the direction of that error. A choice: a hundredth; less drowns in the friction
+/// that is not compensated.
 pub const EXCITED: f64 = 0.01;
 /// K_D·ω over the mean gain of the adaptation as an integral of s. 4 would be critically damped with a constant gain; 8
 /// leaves room for its peaks, which are a few times the mean.
@@ -240,7 +241,13 @@ impl Excitation {
                 .zip(&parameters.size)
                 .map(|((_, upper), size)| (upper - BOUND * size) / size),
         );
-        let mean_square = (sizes.transpose() * &information * &sizes)[(0, 0)];
+        // At rest the motion makes no torque, or rounding errors alone; dry friction that is not compensated acts all the same.
+        let coulomb = |c: usize| c < COLUMNS * torque_scale.len() && c % COLUMNS == column::COULOMB;
+        let dry = (columns.iter().enumerate())
+            .filter(|(_, c)| coulomb(**c))
+            .map(|(k, c)| sizes[k] * parameters.size[k] / torque_scale[c / COLUMNS]);
+        let moved = (sizes.transpose() * &information * &sizes)[(0, 0)];
+        let mean_square = moved.max(dry.map(|torque| torque * torque).sum());
         let eigen = SymmetricEigen::new(information.clone());
         let mut projection = DMatrix::zeros(columns.len(), columns.len());
         let mut directions = 0;

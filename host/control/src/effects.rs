@@ -4,7 +4,6 @@ use super::law_model::LawModel;
 use rig_model::robot::title_of;
 use rig_shared::compensation::{Compensation, EFFECTS, Effects, Inputs, Role, State};
 use rig_shared::effects::Kind;
-use rig_shared::multibody::column;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::trajectory::Reference;
 
@@ -13,6 +12,8 @@ struct Joint {
     index: usize,
     gear_ratio: f64,
     friction: [f64; 2],
+    /// Share of the effects that the model has.
+    share: f64,
     compensation: Compensation<f64>,
     state: State<f64>,
     count: usize,
@@ -66,12 +67,12 @@ impl Compensated {
             for (place, effect) in effects.iter_mut().zip(list) {
                 *place = Some(*effect);
             }
-            let own = &model.parameters[index];
             match Compensation::new(&effects) {
                 Ok(compensation) => joints.push(Joint {
                     index,
                     gear_ratio: model.robot.joints[index].gear_ratio(),
-                    friction: [own[column::COULOMB], own[column::VISCOUS]],
+                    friction: model.friction[index],
+                    share: model.effects[index],
                     compensation,
                     state: State::default(),
                     count: list.len(),
@@ -131,7 +132,7 @@ impl Compensated {
                     .torque(&self.settings, &mut joint.state, &inputs);
                 torque = given.feedforward;
             }
-            out[j] = torque;
+            out[j] = joint.share * torque;
         }
     }
 

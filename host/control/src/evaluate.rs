@@ -203,15 +203,11 @@ impl Bench<'_> {
             return Ok(None);
         };
         let models = (0..draws).map(|k| {
-            let mut own = LawModel::of(&model.robot)?;
-            own.parameters.clone_from(&model.parameters);
-            if let (Some(own), Some(given)) = (&mut own.motors, &model.motors) {
-                own.parameters.clone_from(&given.parameters);
-            }
+            let mut own = model.clone();
             own.disturb(share, self.settings.seed + k as u64);
-            Ok(own)
+            own
         });
-        let models = models.collect::<Result<Vec<_>, ControlError>>()?;
+        let models: Vec<LawModel> = models.collect();
         let next = AtomicUsize::new(0);
         let found = Mutex::new(vec![f64::NAN; draws]);
         let workers = std::thread::available_parallelism().map_or(1, |count| count.get());

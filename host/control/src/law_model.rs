@@ -10,6 +10,7 @@ use rig_shared::control::arm::{ArmModel, ArmMotors};
 use rig_shared::multibody::{COLUMNS, Chain, column};
 
 /// The model that a law uses.
+#[derive(Clone)]
 pub struct LawModel {
     /// Geometry and gravity.
     pub chain: Chain<f64>,
@@ -19,6 +20,10 @@ pub struct LawModel {
     pub motors: Option<Motors>,
     /// The description, for its effects.
     pub robot: Robot,
+    /// Share of each joint's effects that the model has; 1 as described.
+    pub effects: Vec<f64>,
+    /// Described Coulomb and viscous friction of each joint, which its effects stand beside.
+    pub friction: Vec<[f64; 2]>,
 }
 
 fn kind_name(kind: JointKind) -> &'static str {
@@ -42,8 +47,12 @@ impl LawModel {
         } = Model::from_robot(robot)?;
         Ok(Self {
             chain,
+            friction: (parameters.iter())
+                .map(|row| [row[column::COULOMB], row[column::VISCOUS]])
+                .collect(),
             parameters,
             motors,
+            effects: vec![1.0; robot.joints.len()],
             robot: robot.clone(),
         })
     }
@@ -97,7 +106,7 @@ impl LawModel {
     }
 
     /// Multiplies every link's ten inertial parameters by one factor, and each parameter of its drive and friction by
-    /// one of its own. Bodies remain possible bodies.
+    /// one of its own. Bodies remain possible bodies. One factor serves the torque of all effects of a joint.
     fn multiply(&mut self, mut factor: impl FnMut() -> f64) {
         for row in &mut self.parameters {
             let body = factor();
@@ -111,6 +120,9 @@ impl LawModel {
         }
         for value in (self.motors.iter_mut()).flat_map(|m| m.parameters.as_flattened_mut()) {
             *value *= factor();
+        }
+        for share in &mut self.effects {
+            *share *= factor();
         }
     }
 

@@ -52,8 +52,8 @@ pub(crate) fn of_adaptation(learnt: &Adaptation) -> Option<String> {
     })
 }
 
-/// Returns a sentence for each phase in which the force peaks: at the contact, and for the hybrid law during the slide,
-/// with the rate at which its loop is fastest.
+/// Returns a sentence for each phase in which the force peaks: at the contact, and during the slide, for the hybrid law with
+/// the rate at which its loop is fastest.
 pub(crate) fn of_force(
     law: LawKind,
     found: &ForceMeasures,
@@ -86,8 +86,15 @@ fn in_slide(
     settings: &Settings,
 ) -> Option<String> {
     let during = found.slide_peak? / task.force - 1.0;
-    if law != LawKind::Hybrid || during <= OVERSHOOT {
+    if during <= OVERSHOOT {
         return None;
+    }
+    if law != LawKind::Hybrid {
+        return Some(format!(
+            "the force peaks at {:.1} N of {:.1} N during the slide: the impedance does not control the force, and errors of the model and of the path press on the surface. Give a better model, a smaller --impedance, or a softer surface.",
+            (1.0 + during) * task.force,
+            task.force
+        ));
     }
     let remedy = match fastest_rate(settings) {
         Some(rate) => format!("Give --rate {rate:.0}, or a softer surface."),

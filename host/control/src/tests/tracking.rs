@@ -172,6 +172,63 @@ fn adaptive_law_learns_what_the_motion_excites_and_tracks_better_for_it() {
     );
 }
 
+/// The model × 0.7 is that of a description in which friction and effects are 0.7 times as large.
+#[test]
+fn a_scaled_model_has_scaled_effects() {
+    let with_effects = |share: f64| {
+        let mut robot = robot("edda.toml");
+        for joint in &mut robot.joints {
+            let friction = joint.friction.as_mut().unwrap();
+            friction.coulomb *= share;
+            friction.viscous *= share;
+        }
+        let effects = format!(
+            "[[effect]]\nkind = \"stribeck\"\njoint = \"shoulder\"\nbreakaway = {}\nvelocity = 0.2\n\n[[effect]]\nkind = \"cogging\"\njoint = \"elbow\"\ncosine = {}\nsine = {}\norder = 12.0\n",
+            3.0 * share,
+            2.0 * share,
+            -1.0 * share
+        );
+        let text = format!("{}\n{effects}", robot.to_toml().unwrap());
+        Robot::from_toml(&text, "edda.toml".as_ref()).unwrap()
+    };
+    let robot = with_effects(1.0);
+    let truth = Model::from_robot(&robot).unwrap();
+    let settings = Settings::default();
+    let reference = references(&default_reference(&robot, settings.rate, 4.0)).unwrap();
+    let bench = bench(&robot, &truth, &reference, settings);
+    let mut scaled = LawModel::of(&robot).unwrap();
+    scaled.scale(0.7);
+    let mut by_hand = LawModel::of(&with_effects(0.7)).unwrap();
+    by_hand.parameters.clone_from(&scaled.parameters);
+    let torque = |model: &LawModel| {
+        let run = bench.track(LawKind::ComputedTorque, model, "0.7").unwrap();
+        run.trace.torque
+    };
+    let mut exact = scaled.clone();
+    exact.effects.fill(1.0);
+    let [own, expected, other] = [&scaled, &by_hand, &exact].map(torque);
+    let farthest = |list: &[Vec<f64>]| {
+        let pairs = own.iter().flatten().zip(list.iter().flatten());
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let [same, different] = [farthest(&expected), farthest(&other)];
+    assert!(same < 1e-6 && different > 0.3, "{same} {different}");
+}
+
+/// At rest only the constant torques of the two joints make a torque: no gravity acts in EDDA's plane.
+#[test]
+fn a_robot_at_rest_excites_its_constant_torques_alone() {
+    let robot = robot("edda.toml");
+    let truth = Model::from_robot(&robot).unwrap();
+    let model = LawModel::of(&robot).unwrap();
+    let reference = held(&[0.3, 0.4], 0.0, 2000);
+    let run = bench(&robot, &truth, &reference, Settings::default())
+        .track(LawKind::Adaptive, &model, "own")
+        .unwrap();
+    let learnt = run.measures.adaptation.unwrap();
+    assert!(learnt.excited <= 2, "{} directions", learnt.excited);
+}
+
 #[test]
 fn an_unstable_loop_is_told_with_joint_and_time() {
     let mut robot = robot("edda.toml");

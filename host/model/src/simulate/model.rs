@@ -20,6 +20,7 @@ pub struct Model {
 }
 
 /// Coupled drives and their parameters beyond the joints' own.
+#[derive(Clone)]
 pub struct Motors {
     /// Motor positions as functions of the joint positions.
     pub transmission: Transmission<f64>,
