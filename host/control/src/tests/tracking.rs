@@ -186,7 +186,7 @@ fn a_scaled_model_has_scaled_effects() {
             "[[effect]]\nkind = \"stribeck\"\njoint = \"shoulder\"\nbreakaway = {}\nvelocity = 0.2\n\n[[effect]]\nkind = \"cogging\"\njoint = \"elbow\"\ncosine = {}\nsine = {}\norder = 12.0\n",
             3.0 * share,
             2.0 * share,
-            -1.0 * share
+            -share
         );
         let text = format!("{}\n{effects}", robot.to_toml().unwrap());
         Robot::from_toml(&text, "edda.toml".as_ref()).unwrap()
