@@ -82,7 +82,7 @@ pub(crate) struct Known {
     pub motor_inertia: Option<f64>,
     /// Rows per second.
     pub rate: f64,
-    /// Time for which the recorded torque is held, s; 0 if it is that of the instant.
+    /// Time for which the recorded torque is held, s; 0 if it is that of the instant, from which a search begins.
     pub hold: f64,
 }
 

@@ -71,24 +71,20 @@ pub(super) fn fit_all(
 }
 
 /// Returns the most likely fit without a gap, of a torque that acts as recorded at each instant, or that is held from row to
-/// row; leaves the spectra as it predicts them.
+/// row; leaves the spectra as it predicts them. One of the two is enough.
 fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
-    let mut first = fit(&bands(spectra), known, None)?;
-    let mut best: Option<(Known, Fitted, Spectra)> = None;
-    for hold in [0.0, 1.0 / known.rate] {
+    let start = fit(&bands(spectra), known, None)?;
+    let with_hold = |hold: f64| {
         let known = Known { hold, ..*known };
-        let mut own = spectra.clone();
-        let mut found = first.clone();
+        let (mut own, mut found) = (spectra.clone(), start.clone());
         for _ in 0..PREDICTIONS {
             own.predict(&found.model, &known.gravity);
             found = fit(&bands(&own), &known, Some(&found.model))?;
         }
-        first.clone_from(&found);
-        if (best.as_ref()).is_none_or(|(_, best, _)| found.deviance < best.deviance) {
-            best = Some((known, found, own));
-        }
-    }
-    let (known, found, own) = best?;
+        Some((known, found, own))
+    };
+    let both = [0.0, 1.0 / known.rate].map(with_hold).into_iter().flatten();
+    let (known, found, own) = both.min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))?;
     *spectra = own;
     Some((known, found))
 }

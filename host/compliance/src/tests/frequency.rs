@@ -268,8 +268,7 @@ fn sampled(
     }
 }
 
-/// A controller of 125 or 250 Hz holds its torque for a ninth or an eighteenth of a period of the antiresonance. Taken for the
-/// torque of the instant, it made the joint seem stiffer.
+/// A controller of 125 or 250 Hz holds its torque for a ninth or an eighteenth of a period of the antiresonance.
 #[test]
 fn a_torque_that_is_held_from_row_to_row_is_told_from_one_of_each_instant() {
     let robot = rig_model::robot::Robot::from_toml(
