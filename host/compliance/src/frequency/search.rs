@@ -73,7 +73,7 @@ pub(super) fn fit_all(
 /// Returns the most likely fit without a gap, of a torque that acts as recorded at each instant, or that is held from row to
 /// row; leaves the spectra as it predicts them. One of the two is enough.
 fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
-    let start = fit(&bands(spectra), known, None)?;
+    let mut start = fit(&bands(spectra), known, None)?;
     let with_hold = |hold: f64| {
         let known = Known { hold, ..*known };
         let (mut own, mut found) = (spectra.clone(), start.clone());
@@ -81,6 +81,8 @@ fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
             own.predict(&found.model, &known.gravity);
             found = fit(&bands(&own), &known, Some(&found.model))?;
         }
+        // The next one begins where this one ends.
+        start.clone_from(&found);
         Some((known, found, own))
     };
     let both = [0.0, 1.0 / known.rate].map(with_hold).into_iter().flatten();
