@@ -5,7 +5,7 @@
 //! positions, velocities and accelerations become intervals. Inverse dynamics over intervals gives that of the torque,
 //! for any number of joints. A cell in which a velocity can change its sign counts Coulomb friction in both directions.
 
-use rig_shared::multibody::{COLUMNS, Chain, inverse_dynamics, point_position};
+use rig_shared::multibody::{COLUMNS, Chain, column, inverse_dynamics, point_position};
 use rig_shared::scalar::Real;
 use rig_shared::trajectory::Trajectory;
 use rig_shared::transmission::MOTOR_COLUMNS;
@@ -97,7 +97,7 @@ pub(super) fn reach(
     let whole = if schedule.periods > 0 { period } else { 0.0 };
     let down = ramp + period * f64::from(schedule.periods);
     let per_second = (CELLS * schedule.harmonics) as f64 / period;
-    let mut proof = Proof::new(frame, motions, chain);
+    let mut proof = Proof::new(frame, motions, chain)?;
     // One period represents all of them.
     for (from, length, ramp) in [
         (0.0, ramp, Some(ramp)),
@@ -134,25 +134,47 @@ struct Proof<'a> {
     chain: &'a Chain<Interval>,
     motions: &'a [JointMotion],
     trajectories: Vec<Trajectory<f64>>,
-    /// Prior parameters, if the description has them all.
+    /// Prior parameters without the parts that describe coupled motors, if the description has them all.
     rows: Option<Vec<[Interval; COLUMNS]>>,
+    /// Prior parameters of the motors; empty if all drives are simple.
+    parameters: Vec<[Interval; MOTOR_COLUMNS]>,
     /// Bounds so far.
     reached: Reached,
     /// Position, velocity and acceleration of each joint within the cell.
     state: Vec<[Interval; 3]>,
+    /// Torques of the joints within the cell without those that the motors take themselves.
+    links: Vec<Interval>,
+    /// Torques that the motors take themselves, at the motors.
     motors: Vec<Interval>,
+    /// Torques of the joints.
     tau: Vec<Interval>,
     jacobian: Vec<[f64; 3]>,
 }
 
 impl<'a> Proof<'a> {
     /// Creates the bounds of the start, at rest.
-    fn new(frame: &'a Frame, motions: &'a [JointMotion], chain: &'a Chain<Interval>) -> Self {
+    fn new(
+        frame: &'a Frame,
+        motions: &'a [JointMotion],
+        chain: &'a Chain<Interval>,
+    ) -> Result<Self, ExciteError> {
         let n = motions.len();
-        let rows: Option<Vec<[Interval; COLUMNS]>> = frame
+        let mut rows: Option<Vec<[Interval; COLUMNS]>> = frame
             .parameters
             .as_ref()
             .map(|rows| rows.iter().map(|row| row.map(Interval::from_f64)).collect());
+        let mut parameters = Vec::new();
+        if let Some(drives) = &frame.drives {
+            let own = drives.parameters.chunks_exact(MOTOR_COLUMNS);
+            parameters.extend(own.map(|p| [0, 1, 2].map(|c| Interval::from_f64(p[c]))));
+            let mut parts = vec![[Interval::default(); 2]; n];
+            let of_joints = drives.enclosing.joint_parts(&parameters, &mut parts);
+            of_joints.map_err(SimulateError::from)?;
+            for (row, [inertia, viscosity]) in rows.iter_mut().flatten().zip(parts) {
+                row[column::DRIVE_INERTIA] -= inertia;
+                row[column::VISCOUS] -= viscosity;
+            }
+        }
         let joints = motions
             .iter()
             .map(|m| Reach {
@@ -171,7 +193,7 @@ impl<'a> Proof<'a> {
             };
             limited
         ];
-        Self {
+        Ok(Self {
             frame,
             chain,
             motions,
@@ -180,6 +202,7 @@ impl<'a> Proof<'a> {
                 .map(|m| frame.schedule.trajectory(&m.coefficients))
                 .collect(),
             rows,
+            parameters,
             reached: Reached {
                 joints,
                 motors,
@@ -187,10 +210,11 @@ impl<'a> Proof<'a> {
                 heights: vec![f64::INFINITY; frame.planes.len()],
             },
             state: vec![[Interval::default(); 3]; n],
-            motors: vec![Interval::default(); n * n * MOTOR_COLUMNS],
+            links: vec![Interval::default(); n],
+            motors: vec![Interval::default(); n],
             tau: vec![Interval::default(); n],
             jacobian: vec![[0.0; 3]; n],
-        }
+        })
     }
 
     /// Extends the bounds by all cells of a segment.
@@ -297,17 +321,17 @@ impl<'a> Proof<'a> {
             return Ok(());
         };
         let [q, qd, qdd] = [0, 1, 2].map(|d| self.state.iter().map(|s| s[d]).collect::<Vec<_>>());
-        inverse_dynamics(self.chain, rows, &q, &qd, &qdd, &mut self.tau)?;
+        inverse_dynamics(self.chain, rows, &q, &qd, &qdd, &mut self.links)?;
+        self.tau.copy_from_slice(&self.links);
         if let Some(drives) = &self.frame.drives {
-            drives
-                .enclosing
-                .motor_columns(&q, &qd, &qdd, &mut self.motors)
+            let t = &drives.enclosing;
+            t.own_motor_torque(&self.parameters, &q, &qd, &qdd, &mut self.motors)
                 .map_err(SimulateError::from)?;
-            let width = q.len() * MOTOR_COLUMNS;
-            for (t, row) in self.tau.iter_mut().zip(self.motors.chunks_exact(width)) {
-                for (column, value) in row.iter().zip(&drives.parameters) {
-                    *t += *column * Interval::from_f64(*value);
-                }
+            let mut turned = vec![Interval::default(); q.len()];
+            t.joint_torque(&q, &self.motors, &mut turned)
+                .map_err(SimulateError::from)?;
+            for (total, of_motors) in self.tau.iter_mut().zip(&turned) {
+                *total += *of_motors;
             }
         }
         for (reach, t) in self.reached.joints.iter_mut().zip(&self.tau) {
@@ -335,8 +359,9 @@ impl<'a> Proof<'a> {
             reach.velocity = reach.velocity.max(speed.magnitude());
         }
         if self.rows.is_some() {
-            let torques = drives.enclosed_torques(&q, &self.tau)?;
-            for (reach, torque) in self.reached.motors.iter_mut().zip(&torques) {
+            let carried = drives.enclosed_torques(&q, &self.links)?;
+            let torques = carried.iter().zip(&self.motors).map(|(x, own)| *x + *own);
+            for (reach, torque) in self.reached.motors.iter_mut().zip(torques) {
                 reach.torque = reach.torque.map(|most| most.max(torque.magnitude()));
             }
         }

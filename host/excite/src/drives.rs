@@ -17,6 +17,14 @@ use rig_model::simulate::{Motors, SimulateError};
 const AT_ONCE: usize = 4;
 type D = Dual<L, AT_ONCE>;
 
+/// Largest number of passes in search of a bound of the motors' torques. In a cell of a proof the first one succeeds: the
+/// ratios hardly change there.
+const BOUNDING_PASSES: usize = 20;
+/// Share by which a pass widens its bound, so that the next one lies strictly within it.
+const INFLATION: f64 = 1e-3;
+/// More than the relative rounding error of a sum of products of positive numbers, one for each joint.
+const SUMS: f64 = 1e-14;
+
 /// Drives that move several joints or have a varying ratio, for every scalar type of a design.
 pub(super) struct Drives {
     pub plain: Transmission<f64>,
@@ -116,14 +124,57 @@ impl Drives {
     /// Returns an enclosure of the motors' torques x, Jᵀ·x = τ, for positions and joint torques within intervals; all
     /// numbers if the positions vary too much.
     ///
-    /// With C = J⁻ᵀ at the middle position and E = 1 − C·Jᵀ, x = C·τ + E·x, so that the largest |x| is at most that of
-    /// C·τ over 1 − ‖E‖ (Neumaier 1990, section 4.1). Elimination over intervals would need a pivot that is the same
-    /// at all positions.
+    /// With C = J⁻ᵀ at the middle position and E = 1 − C·Jᵀ, x = C·τ + E·x. A u > 0 with |C·τ| + |E|·u < u bounds |x|, motor
+    /// by motor and whatever their units: |E| then has a spectral radius below 1, and |x| ≤ (1 − |E|)⁻¹·|C·τ| ≤ u (Neumaier
+    /// 1990, sections 3.7 and 4.1). Elimination over intervals would need a pivot that is the same at all positions.
     pub(super) fn enclosed_torques(
         &self,
         q: &[Interval],
         tau: &[Interval],
     ) -> Result<Vec<Interval>, ExciteError> {
+        let n = q.len();
+        let inverse = self.middle_inverse(q)?;
+        let mut jacobian = vec![Interval::default(); n * n];
+        self.enclosing.jacobian(q, &mut jacobian).map_err(wrong)?;
+        let c = |i: usize, j: usize| Interval::from_f64(inverse[i * n + j]);
+        let mut rest = vec![0.0; n * n];
+        let mut first = vec![Interval::default(); n];
+        for i in 0..n {
+            for j in 0..n {
+                let mut entry = Interval::from_f64(f64::from(u8::from(i == j)));
+                for k in 0..n {
+                    // (Jᵀ)_kj = J_jk.
+                    entry -= c(i, k) * jacobian[j * n + k];
+                }
+                rest[i * n + j] = entry.magnitude();
+                first[i] += c(i, j) * tau[j];
+            }
+        }
+        // |C·τ| + |E|·u, and the second term alone.
+        let bounds = |u: &[f64]| -> [Vec<f64>; 2] {
+            let products = rest.chunks_exact(n).map(|row| row.iter().zip(u));
+            let spread = products.map(|row| row.map(|(e, u)| e * u).sum::<f64>() * (1.0 + SUMS));
+            let spread: Vec<f64> = spread.collect();
+            let whole = first.iter().zip(&spread);
+            [whole.map(|(x, s)| x.magnitude() + s).collect(), spread]
+        };
+        let mut bound: Vec<f64> = first.iter().map(|x| x.magnitude()).collect();
+        for _ in 0..BOUNDING_PASSES {
+            let largest = bound.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+            let wider = |u: &f64| u + INFLATION * (u + largest);
+            bound = bound.iter().map(wider).collect();
+            let [next, spread] = bounds(&bound);
+            if next.iter().zip(&bound).all(|(next, bound)| next < bound) {
+                let each = first.iter().zip(spread);
+                return Ok(each.map(|(x, spread)| x.widened(spread)).collect());
+            }
+            bound = next;
+        }
+        Ok(vec![Interval::hull(f64::NEG_INFINITY, f64::INFINITY); n])
+    }
+
+    /// Returns J⁻ᵀ in the middle of the positions, n × n.
+    fn middle_inverse(&self, q: &[Interval]) -> Result<Vec<f64>, ExciteError> {
         let n = q.len();
         let middle: Vec<f64> = q.iter().map(|x| 0.5 * (x.low + x.high)).collect();
         let mut inverse = vec![0.0; n * n];
@@ -137,46 +188,7 @@ impl Drives {
                 inverse[i * n + j] = column[i];
             }
         }
-        let mut jacobian = vec![Interval::default(); n * n];
-        self.enclosing.jacobian(q, &mut jacobian).map_err(wrong)?;
-        let c = |i: usize, j: usize| Interval::from_f64(inverse[i * n + j]);
-        let mut rest = vec![Interval::default(); n * n];
-        let mut norm = 0.0_f64;
-        for i in 0..n {
-            for j in 0..n {
-                let mut entry = Interval::from_f64(f64::from(u8::from(i == j)));
-                for k in 0..n {
-                    // (Jᵀ)_kj = J_jk.
-                    entry -= c(i, k) * jacobian[j * n + k];
-                }
-                rest[i * n + j] = entry;
-            }
-            let row = &rest[i * n..(i + 1) * n];
-            norm = norm.max(row.iter().map(|e| e.magnitude()).sum());
-        }
-        // NaN fails this comparison too.
-        if !(norm < 1.0) {
-            let all = Interval::hull(f64::NEG_INFINITY, f64::INFINITY);
-            return Ok(vec![all; n]);
-        }
-        let first: Vec<Interval> = (0..n)
-            .map(|i| {
-                let mut sum = Interval::default();
-                for (j, torque) in tau.iter().enumerate() {
-                    sum += c(i, j) * *torque;
-                }
-                sum
-            })
-            .collect();
-        let largest = first.iter().map(|x| x.magnitude()).fold(0.0, f64::max);
-        let bound = largest / (1.0 - norm);
-        Ok((0..n)
-            .map(|i| {
-                let row = &rest[i * n..(i + 1) * n];
-                let slack: f64 = row.iter().map(|e| e.magnitude()).sum();
-                first[i].widened(slack * bound)
-            })
-            .collect())
+        Ok(inverse)
     }
 }
 

@@ -90,6 +90,70 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
+    /// Computes the torques that inertia and friction of the motors take at the motors themselves, N·m, length n; zero
+    /// for a simple drive. `parameters` has one row per motor. [`Self::motor_columns`] times `parameters` is Jᵀ times
+    /// the result, less the [`Self::joint_parts`].
+    ///
+    /// # Errors
+    /// [`TransmissionError::WrongLength`].
+    pub fn own_motor_torque(
+        &self,
+        parameters: &[[T; MOTOR_COLUMNS]],
+        q: &[T],
+        qd: &[T],
+        qdd: &[T],
+        out: &mut [T],
+    ) -> Result<(), TransmissionError> {
+        let n = self.joint_count();
+        check("parameters", n, parameters.len())?;
+        check("q", n, q.len())?;
+        check("qd", n, qd.len())?;
+        check("qdd", n, qdd.len())?;
+        check("out", n, out.len())?;
+        let mut direction = [T::ZERO; MAX_JOINTS];
+        let direction = &mut direction[..n];
+        for (k, (torque, motor)) in out.iter_mut().zip(&self.motors).enumerate() {
+            motor.direction(q, direction);
+            let speed = dot(direction, qd);
+            let acceleration = dot(direction, qdd) + motor.convective(q, qd);
+            let own = &parameters[k];
+            let at_own_joint = own[motor_column::INERTIA] * acceleration
+                + own[motor_column::VISCOUS] * speed
+                + own[motor_column::COULOMB] * speed.sgn();
+            *torque = match motor.kind {
+                DriveKind::Simple => T::ZERO,
+                DriveKind::Coupled => at_own_joint / motor.ratios[k],
+                DriveKind::Varying => at_own_joint,
+            };
+        }
+        Ok(())
+    }
+
+    /// Writes for each joint the parts of `Ia` and `fv` that describe coupled motors, length n: Σ_k r_i²·Iam_k (i ≠ k) and
+    /// Σ_k r_i²·fvm_k. `parameters` has one row per motor.
+    ///
+    /// # Errors
+    /// [`TransmissionError::WrongLength`].
+    pub fn joint_parts(
+        &self,
+        parameters: &[[T; MOTOR_COLUMNS]],
+        out: &mut [[T; 2]],
+    ) -> Result<(), TransmissionError> {
+        let n = self.joint_count();
+        check("parameters", n, parameters.len())?;
+        check("out", n, out.len())?;
+        out.fill([T::ZERO; 2]);
+        for (k, (motor, own)) in self.motors.iter().zip(parameters).enumerate() {
+            // Empty unless the drive is coupled.
+            let direction = &motor.shares[..];
+            for (i, [inertia, viscosity]) in out.iter_mut().enumerate().take(direction.len()) {
+                *inertia += own[motor_column::INERTIA] * motor.own_inertia(k, i, direction);
+                *viscosity += own[motor_column::VISCOUS] * motor.own_viscosity(i, direction);
+            }
+        }
+        Ok(())
+    }
+
     /// Writes the row of the motors' kinetic energy, length 3n, without the part in `Ia`: ½·(s² − Σ r_i²·q̇_i²) of a
     /// coupled drive (i ≠ k), ½·Ψ̇² of a varying one. Friction columns are 0.
     ///

@@ -446,6 +446,31 @@ fn columns_give_the_torque_of_spinning_motors() {
         t.joint_torque(&q, &at_motor, &mut expected).unwrap();
         close(&tau, &expected, 1e-12);
 
+        // Split into what each motor takes itself and the parts that stand in the joints' parameters.
+        let (mut taken, mut parts) = (vec![f64::NAN; n], vec![[f64::NAN; 2]; n]);
+        t.own_motor_torque(&motors, &q, &qd, &qdd, &mut taken)
+            .unwrap();
+        t.joint_parts(&motors, &mut parts).unwrap();
+        for k in 0..n {
+            let simple = t.kind(k) == Some(DriveKind::Simple);
+            let turns = if simple {
+                t.own_turns(k).unwrap().powi(2)
+            } else {
+                0.0
+            };
+            let expected = if simple { 0.0 } else { at_motor[k] };
+            close(&[taken[k]], &[expected], 1e-12);
+            let simple_parts = [turns * own[k][0], turns * own[k][1]];
+            close(
+                &parts[k],
+                &[
+                    joints[k][10] - simple_parts[0],
+                    joints[k][11] - simple_parts[1],
+                ],
+                1e-12,
+            );
+        }
+
         // The same through the matrices.
         let (mut mass, mut damping) = (vec![0.0; n * n], vec![0.0; n * n]);
         for i in 0..n {

@@ -1,6 +1,7 @@
 //! Tests of the design, its files and its runs.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod coupled;
 mod design;
 mod files;
 mod load_motion;

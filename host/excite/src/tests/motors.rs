@@ -95,6 +95,7 @@ fn the_irp6_keeps_the_limits_of_its_motors() {
         let most = proved.torque.unwrap();
         println!("{name}: torque {torque} N·m, proved {most} N·m");
         assert!(torque <= most && most <= limits.torque.unwrap());
+        assert!(most <= 1.03 * torque, "{name}: {torque} {most}");
         // Without the limits the motion exceeds them.
         assert!(free[j].1 > limits.velocity.unwrap());
         assert!(j > 0 || free[j].2 > limits.torque.unwrap());
