@@ -5,10 +5,13 @@
 //! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit or gain has one, a turned
 //! sensor three.
 
+use rig_model::robot::{Reads, WristSensor};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::candidates::{exchanged, exchanged_and_scaled, scaled, turned};
+use crate::error::LoadError;
 use crate::mounting::{Channels, Mounting};
+use crate::rows::LEAST_ROWS;
 use crate::selection::{Selected, selected};
 use crate::settle::{DECISIVE, settled};
 use crate::statistics::{Recorded, noise_floor};
@@ -76,7 +79,7 @@ pub(crate) struct Tried {
     /// Fit with everything that the readings show then.
     pub selected: Selected,
     /// Misfit with a penalty for each unknown; smaller is better.
-    score: f64,
+    pub score: f64,
 }
 
 /// What was compared.
@@ -90,8 +93,34 @@ pub(crate) struct Compared {
     pub delay: Option<f64>,
 }
 
+/// Fits the equations as described, and by every cause for which they may not fit.
+///
+/// # Errors
+/// [`LoadError::TooFew`].
+pub(crate) fn compared(sensed: &Sensed, sensor: &WristSensor) -> Result<Compared, LoadError> {
+    let unknowns = Unknowns {
+        tool: sensed.recordings.iter().any(|r| !r.loaded),
+        ..Unknowns::default()
+    };
+    let rows = sensed.used_rows(&unknowns);
+    if (rows as usize) < LEAST_ROWS {
+        return Err(LoadError::TooFew {
+            rows: rows as usize,
+            least: LEAST_ROWS,
+        });
+    }
+    let sign = sensor.reads.unwrap_or(Reads::Load).sign();
+    let mounting = Mounting::of(sign);
+    Ok(compare(
+        sensed,
+        &mounting,
+        &unknowns,
+        sensor.reads.is_some(),
+    ))
+}
+
 /// Fits every cause and compares them.
-pub(crate) fn compare(
+fn compare(
     sensed: &Sensed,
     mounting: &Mounting,
     unknowns: &Unknowns,
@@ -105,9 +134,9 @@ pub(crate) fn compare(
     };
     let described = trial.taken_in(Cause::Described, mounting, plain.clone());
     let fit = &described.selected.fit;
-    // A wrong position of the sensor and another scale of the moments are alike.
-    let is_certain =
-        noise_floor(sensed.recordings).is_some() && !fit.unknowns.has(Nuisance::Origin);
+    // Jumps of the bias, and a wrong position of the sensor, are alike to other causes.
+    let is_plain = fit.unknowns.jumps.is_empty() && !fit.unknowns.has(Nuisance::Origin);
+    let is_certain = noise_floor(sensed.recordings).is_some() && is_plain;
     if sensed.is_exact(fit) || is_certain && explains(sensed, fit) {
         let delay = sensed.delay(fit);
         return Compared {
@@ -122,10 +151,11 @@ pub(crate) fn compare(
     let nearest = nearest.filter(|own| own.score < described.score - DECISIVE);
     let delay = sensed.delay(&nearest.unwrap_or(&described).selected.fit);
     all.retain(|own| explains(sensed, &own.selected.fit));
-    if noise_floor(sensed.recordings).is_some() && explains(sensed, &described.selected.fit) {
+    let is_described = explains(sensed, &described.selected.fit);
+    let has_jumps = !described.selected.fit.unknowns.jumps.is_empty();
+    if noise_floor(sensed.recordings).is_some() && is_described && !has_jumps {
         return displaced_or_scaled(sensed, described, all, delay);
     }
-    let is_described = explains(sensed, &described.selected.fit);
     let least = (all.iter().map(|own| own.score)).fold(f64::INFINITY, f64::min);
     all.retain(|own| own.score <= least + DECISIVE);
     if is_described && described.score <= least + DECISIVE {
@@ -426,17 +456,19 @@ impl Trial<'_> {
         chance.is_ok_and(|p| 6.0 * p < BY_CHANCE)
     }
 
-    /// Returns true if a fit leaves less than another in nearly all segments of a motion.
+    /// Returns true if a fit leaves less than another in nearly all segments of a motion that both use.
     fn leaves_less(&self, fit: &Fit, other: &Fit) -> bool {
         if self.sensed.recordings.iter().any(|r| r.poses) {
             return true;
         }
-        let (own, others) = [fit, other]
-            .map(|own| self.sensed.squares_by_segment(own))
-            .into();
+        let [own, others] = [fit, other].map(|own| self.sensed.squares_by_segment(own));
         let over = |s: &[f64; 2]| s[0] / fit.noise[0].powi(2) + s[1] / fit.noise[1].powi(2);
-        let pairs = own.iter().zip(&others);
-        let less = pairs.filter(|(a, b)| over(a) < over(b)).count();
-        less as f64 >= NEARLY_ALL * own.len() as f64
+        let pairs = own.iter().filter_map(|(at, a)| Some((a, others.get(at)?)));
+        let (mut less, mut count) = (0, 0);
+        for (a, b) in pairs {
+            count += 1;
+            less += usize::from(over(a) < over(b));
+        }
+        less as f64 >= NEARLY_ALL * f64::from(count)
     }
 }

@@ -12,7 +12,7 @@ use crate::channels::{Judged, judge};
 use crate::clipping::Suspect;
 use crate::error::LoadError;
 use crate::pace::Pace;
-use crate::poses::each_pose;
+use crate::poses::poses;
 use crate::rows::{Passed, each_row};
 use crate::statistics::{Collector, Recorded};
 use crate::torqueless::Torqueless;
@@ -136,27 +136,28 @@ impl<'a> Intake<'a> {
             own.for_each(|(_, suspect)| suspect.narrow(&mut ends));
             let poses = judged.poses;
             let next = if poses { None } else { prepared.next() };
-            let rows = match (&self.plan, &next) {
-                (Some(plan), Some((survey, _))) => survey.rows / plan.decimation as u64,
-                _ => judged.rows,
-            };
-            let mut collector = Collector::new(rows, judged.length);
-            let mut take = |row: &WrenchRow| collector.push(row);
-            let passed = match (&self.plan, next) {
-                (Some(plan), Some((_, usable))) => {
+            let (collector, passed) = match (&self.plan, next) {
+                (Some(plan), Some((survey, usable))) => {
+                    let rows = survey.rows / plan.decimation as u64;
+                    let mut collector = Collector::new(rows, judged.length);
+                    let mut take = |row: &WrenchRow| collector.push(row);
                     let read = (&ends, delay);
-                    each_row(sensing.chain, &axes, *usable, plan, read, &mut take)?
+                    let passed = each_row(sensing.chain, &axes, *usable, plan, read, &mut take)?;
+                    (collector, passed)
                 }
                 _ => {
                     let read = (&ends, judged.pace);
-                    let saturated = each_pose(sensing.chain, &axes, *recording, read, &mut take)?;
+                    let (rows, saturated) = self::poses(sensing.chain, &axes, *recording, read)?;
+                    let mut collector = Collector::new(rows.len() as u64, judged.length);
+                    rows.iter().for_each(|row| collector.push(row));
                     if !sensing.poses {
                         warnings.push(taken_as_poses(&label, judged, collector.rows()));
                     }
-                    Passed {
+                    let passed = Passed {
                         saturated,
                         noise: None,
-                    }
+                    };
+                    (collector, passed)
                 }
             };
             let recorded = collector.finish(label, *loaded, poses, passed);

@@ -17,19 +17,18 @@ const NEAR: f64 = 3.0;
 /// Shorter than this share of the longest pose, rows belong to the way between two.
 const SHORT: f64 = 0.05;
 
-/// Streams the poses of a recording: consecutive rows at one position are one pose, with their mean readings, because the
+/// Returns the poses of a recording: consecutive rows at one position are one pose, with their mean readings, because the
 /// errors of one pose are not independent. Rows between poses are left out; of rows that follow each other in time those are
-/// poses in which the robot rests. Returns the number of rows beyond `ends`.
+/// poses in which the robot rests. Beside them stands the number of rows beyond `ends`.
 ///
 /// # Errors
 /// As [`each_readings`]; [`LoadError::Moves`] if the recording never rests.
-pub(crate) fn each_pose(
+pub(crate) fn poses(
     chain: &Chain<f64>,
     sensor: &SensorAxes,
     recording: &dyn Recording,
     (ends, pace): (&Ends, Pace),
-    take: &mut dyn FnMut(&WrenchRow),
-) -> Result<u64, LoadError> {
+) -> Result<(Vec<WrenchRow>, u64), LoadError> {
     let mut poses: Vec<Pose> = Vec::new();
     let (mut left_out, mut rows) = (0, 0u64);
     each_readings(recording, &mut |block, readings| {
@@ -65,6 +64,7 @@ pub(crate) fn each_pose(
         return Err(never_rests(&recording.label(), rows));
     }
     let still = vec![0.0; chain.joint_count()];
+    let mut found = Vec::with_capacity(poses.len());
     for pose in &poses {
         let count = pose.rows as f64;
         let q: Vec<f64> = pose.q.iter().map(|sum| sum / count).collect();
@@ -74,7 +74,7 @@ pub(crate) fn each_pose(
         sensor.turn(&mut regressor);
         about(&sensor.origin, &mut regressor);
         let axes = base_axes(chain, &q).map_err(|e| LoadError::Model(e.to_string()))?;
-        take(&WrenchRow {
+        found.push(WrenchRow {
             time: pose.others[0] / count,
             temperature: pose.others[1] / count,
             regressor,
@@ -83,7 +83,7 @@ pub(crate) fn each_pose(
             readings: pose.readings.map(|sum| sum / count),
         });
     }
-    Ok(left_out)
+    Ok((found, left_out))
 }
 
 /// Says that the rows of a recording are no poses.

@@ -7,17 +7,16 @@ use rig_model::robot::{Reads, WristSensor};
 use rig_output::{capital, format_significant, format_value};
 
 use crate::axes::parameters_from;
-use crate::causes::{Cause, Compared, Tried, compare, explains};
-use crate::clipping::{self, Suspect};
+use crate::causes::{Cause, Compared, Tried, compared, explains};
 use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
+use crate::faulty_rows::FaultyRows;
 use crate::findings::{SensorFindings, Told};
-use crate::intake::{Intake, MOST_SATURATED, Sensing, judged, moving};
-use crate::mounting::{Channels, Mounting};
-use crate::rows::LEAST_ROWS;
+use crate::intake::{Intake, Sensing, judged, moving};
+use crate::mounting::Channels;
 use crate::selection::deviation;
 use crate::settle::settled;
-use crate::system::{Fit, Nuisance, Sensed, Unknowns};
+use crate::system::{Fit, Nuisance, Sensed};
 use crate::units::{alternatives, named};
 
 /// Most times that the readings are shifted by the delay found.
@@ -48,22 +47,18 @@ pub(crate) fn by_sensor(
     let pose = robot.last_link * sensor.pose();
     let to_axes = parameters_from(&(pose.rotation.inverse() * robot.last_link));
     let (mut delay, mut shifts) = (0.0, 0);
-    let (mut cut, mut is_searched) = (Vec::new(), false);
+    let mut faulty = FaultyRows::default();
     loop {
         let mut said = Vec::new();
-        let recordings = intake.read(delay, &places(&cut), &mut said)?;
+        let recordings = faulty.left_out(&intake, delay, &mut said)?;
         let sensed = Sensed {
             recordings: &recordings,
             to_axes: &to_axes,
             gravity: robot.gravity.into(),
         };
         let compared = compared(&sensed, &sensor)?;
-        if !is_searched && compared.causes.is_empty() {
-            is_searched = true;
-            cut = clipped(&intake, &sensed, &compared, (&sensor, delay))?;
-            if !cut.is_empty() {
-                continue;
-            }
+        if faulty.search(&intake, &sensed, &compared, (&sensor, delay))? {
+            continue;
         }
         // The equations have a delay to first order only, so the readings are shifted by it and read again.
         if let Some(further) = compared.delay
@@ -75,9 +70,7 @@ pub(crate) fn by_sensor(
         }
         let fitted = believed(&sensed, compared, sensing, &mut said)?;
         warnings.extend(said);
-        for own in &cut {
-            warnings.push(own.told(&sensed, &sensor, sensing.even_if_wrong)?);
-        }
+        warnings.extend(faulty.words(&sensed, &sensor, sensing.even_if_wrong)?);
         return finished(
             &sensed,
             fitted,
@@ -89,94 +82,6 @@ pub(crate) fn by_sensor(
     }
 }
 
-/// Readings of a recording that are cut within the described range of the sensor.
-struct Cut {
-    recording: usize,
-    suspect: Suspect,
-    /// Mean of these readings.
-    level: f64,
-}
-
-impl Cut {
-    /// Says where the readings are cut.
-    ///
-    /// # Errors
-    /// [`LoadError::Fault`] if most rows are lost, unless the user goes on.
-    fn told(
-        &self,
-        sensed: &Sensed,
-        sensor: &WristSensor,
-        even_if_wrong: bool,
-    ) -> Result<String, LoadError> {
-        let range = match self.suspect.channel {
-            0..3 => sensor.force_range,
-            _ => sensor.moment_range,
-        };
-        let recorded = &sensed.recordings[self.recording];
-        let text = clipping::words(recorded, self.suspect.channel, self.level, range);
-        match recorded.left_out() > MOST_SATURATED && !even_if_wrong {
-            true => Err(LoadError::Fault(text)),
-            false => Ok(text),
-        }
-    }
-}
-
-/// Returns the channels that are cut, and in which recording.
-fn places(cut: &[Cut]) -> Vec<(usize, Suspect)> {
-    cut.iter().map(|own| (own.recording, own.suspect)).collect()
-}
-
-/// Finds readings that are cut within the described range, if the description leaves more than noise. All suspected rows are
-/// left out, and the load by the others tells which of them were cut. Without these, about the noise must be left. Too few
-/// rows that are left tell nothing: noise alone lies near its extreme values in most segments.
-///
-/// # Errors
-/// [`LoadError`].
-fn clipped(
-    intake: &Intake,
-    sensed: &Sensed,
-    compared: &Compared,
-    (sensor, delay): (&WristSensor, f64),
-) -> Result<Vec<Cut>, LoadError> {
-    let fit = &compared.described.selected.fit;
-    let suspects = intake.suspects();
-    if suspects.is_empty() || explains(sensed, fit) {
-        return Ok(Vec::new());
-    }
-    let recordings = intake.read(delay, &suspects, &mut Vec::new())?;
-    let without = Sensed {
-        recordings: &recordings,
-        to_axes: sensed.to_axes,
-        gravity: sensed.gravity,
-    };
-    let known = match self::compared(&without, sensor) {
-        Err(LoadError::TooFew { .. }) => return Ok(Vec::new()),
-        other => other?,
-    };
-    let fit = &known.described.selected.fit;
-    let cut = |(recording, suspect): (usize, Suspect)| {
-        let all = (recording, &sensed.recordings[recording]);
-        let level = clipping::cut_at(&suspect, all, &without, fit)?;
-        Some(Cut {
-            recording,
-            suspect,
-            level,
-        })
-    };
-    let found: Vec<Cut> = suspects.into_iter().filter_map(cut).collect();
-    // Something else than a limit may act at extreme readings, too.
-    let recordings = intake.read(delay, &places(&found), &mut Vec::new())?;
-    let without = Sensed {
-        recordings: &recordings,
-        ..without
-    };
-    let fit = self::compared(&without, sensor)?.described.selected.fit;
-    Ok(match explains(&without, &fit) {
-        true => found,
-        false => Vec::new(),
-    })
-}
-
 /// A fit, and what it was decided on.
 struct Fitted {
     fit: Fit,
@@ -185,29 +90,6 @@ struct Fitted {
     alternatives: Vec<[Nuisance; 2]>,
     /// Scale of the moments that is an alternative, and its standard deviation.
     scale: Option<[f64; 2]>,
-}
-
-/// Fits the equations as described, and by every cause for which they may not fit.
-fn compared(sensed: &Sensed, sensor: &WristSensor) -> Result<Compared, LoadError> {
-    let unknowns = Unknowns {
-        tool: sensed.recordings.iter().any(|r| !r.loaded),
-        ..Unknowns::default()
-    };
-    let rows = sensed.used_rows(&unknowns);
-    if (rows as usize) < LEAST_ROWS {
-        return Err(LoadError::TooFew {
-            rows: rows as usize,
-            least: LEAST_ROWS,
-        });
-    }
-    let sign = sensor.reads.unwrap_or(Reads::Load).sign();
-    let mounting = Mounting::of(sign);
-    Ok(compare(
-        sensed,
-        &mounting,
-        &unknowns,
-        sensor.reads.is_some(),
-    ))
 }
 
 /// Decides which explanation of the readings is believed.

@@ -82,6 +82,27 @@ impl Recorded {
         saturated as f64 / (saturated + self.rows()).max(1) as f64
     }
 
+    /// Returns true if every row is among the sampled ones.
+    pub(crate) fn is_sampled(&self) -> bool {
+        self.sample.len() as u64 == self.rows()
+    }
+
+    /// Returns a recording of which every row is sampled without some of its poses.
+    pub(crate) fn without_poses(&self, poses: &[usize]) -> Self {
+        let rows = self.sample.iter().enumerate();
+        let kept: Vec<&WrenchRow> = rows
+            .filter(|(k, _)| !poses.contains(k))
+            .map(|(_, row)| row)
+            .collect();
+        let mut collector = Collector::new(kept.len() as u64, self.length);
+        kept.into_iter().for_each(|row| collector.push(row));
+        let passed = Passed {
+            saturated: self.passed.saturated + poses.len() as u64,
+            ..self.passed
+        };
+        collector.finish(self.label.clone(), self.loaded, self.poses, passed)
+    }
+
     /// Returns the recording with all segments in one, for comparisons that need no segments.
     pub(crate) fn in_one(&self) -> Self {
         let merged = |channel: usize| {

@@ -6,6 +6,7 @@
 //! sensor against the encoders, and an error p of the sensor's position, beside the force f of the load. A scale of the
 //! moments multiplies what the load adds to them, the gain of a channel what it adds to that channel.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::{
@@ -71,6 +72,14 @@ impl Nuisance {
         Self::Drift,
         Self::Warming,
     ];
+
+    /// Returns true if its unknowns multiply those of the load.
+    fn is_product(self) -> bool {
+        match self {
+            Self::Lean | Self::Delay | Self::Origin | Self::Scale | Self::Gain(_) => true,
+            Self::Rotation | Self::Drift | Self::Warming => false,
+        }
+    }
 
     /// Returns the number of its unknowns.
     fn count(self, recordings: usize) -> usize {
@@ -355,22 +364,42 @@ impl Sensed<'_> {
             squares: [0.0; 2],
             equations: 6 * rows,
         };
+        let factors = |fit: &Fit| [0, 1].map(|kind| self.factor(fit, kind));
+        let mut kinds = factors(&fit);
         for _ in 0..ROUNDS {
             let mut whole = TriangularFactor::new(count);
-            for factor in self.factors(&fit) {
-                whole.merge(&factor, 1.0);
+            for (kind, noise) in kinds.iter().zip(fit.noise) {
+                whole.merge(kind, 1.0 / noise);
             }
             let (r, z) = whole.system();
             fit.values = solved(&r, &z).as_slice().to_vec();
-            fit.squares = self.squares(&fit);
+            if unknowns.nuisances.iter().any(|own| own.is_product()) {
+                kinds = factors(&fit);
+            }
             // Each kind bears half of the unknowns.
             let freedom = (0.5 * fit.freedom()).max(1.0);
             for kind in 0..2 {
-                fit.squares[kind] = fit.squares[kind].max(least[kind].powi(2) * freedom);
+                let squares = kinds[kind].residual_squares(&fit.values);
+                fit.squares[kind] = squares.max(least[kind].powi(2) * freedom);
                 fit.noise[kind] = (fit.squares[kind] / freedom).sqrt();
             }
         }
         fit
+    }
+
+    /// Returns the equations of the forces (`kind` 0) or the moments (1) of all segments in one factor.
+    fn factor(&self, fit: &Fit, kind: usize) -> TriangularFactor {
+        let mut whole = TriangularFactor::new(fit.values.len());
+        self.each_segment(&fit.unknowns, &mut |recording, _, segment, bias| {
+            for channel in 3 * kind..3 * kind + 3 {
+                let (rows, right) = self.rows([recording, channel, bias], segment, fit);
+                for (row, y) in rows.row_iter().zip(right) {
+                    let x: Vec<f64> = row.iter().copied().collect();
+                    whole.push(&x, y, 1.0);
+                }
+            }
+        });
+        whole
     }
 
     /// Returns the squared residuals of the forces (`kind` 0) or the moments (1) if they are fitted alone.
@@ -380,28 +409,17 @@ impl Sensed<'_> {
         unknowns: &Unknowns,
         kind: usize,
     ) -> f64 {
-        let count = self.layout(unknowns).count();
         let fit = Fit {
             mounting: mounting.clone(),
             unknowns: unknowns.clone(),
-            values: vec![0.0; count],
+            values: vec![0.0; self.layout(unknowns).count()],
             noise: [1.0; 2],
             squares: [0.0; 2],
             equations: 0,
         };
-        let mut whole = TriangularFactor::new(count);
-        self.each_segment(unknowns, &mut |recording, _, segment, bias| {
-            for channel in 3 * kind..3 * kind + 3 {
-                let (rows, right) = self.rows([recording, channel, bias], segment, &fit);
-                for (row, y) in rows.row_iter().zip(right) {
-                    let x: Vec<f64> = row.iter().copied().collect();
-                    whole.push(&x, y, 1.0);
-                }
-            }
-        });
-        let (r, z) = whole.system();
-        let values = solved(&r, &z).as_slice().to_vec();
-        self.squares(&Fit { values, ..fit })[kind]
+        let factor = self.factor(&fit, kind);
+        let (r, z) = factor.system();
+        factor.residual_squares(solved(&r, &z).as_slice())
     }
 
     /// Returns true if the fit leaves nothing but rounding: likelihoods of other units cannot be compared then.
@@ -443,21 +461,21 @@ impl Sensed<'_> {
     /// Returns the squared residuals of forces and of moments.
     fn squares(&self, fit: &Fit) -> [f64; 2] {
         self.squares_by_segment(fit)
-            .iter()
+            .values()
             .fold([0.0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]])
     }
 
-    /// Returns the squared residuals of forces and of moments in each used segment.
-    pub(crate) fn squares_by_segment(&self, fit: &Fit) -> Vec<[f64; 2]> {
-        let mut all = Vec::new();
-        self.each_segment(&fit.unknowns, &mut |recording, _, segment, bias| {
+    /// Returns the squared residuals of forces and of moments in each used segment, by recording and number of the segment.
+    pub(crate) fn squares_by_segment(&self, fit: &Fit) -> BTreeMap<(usize, usize), [f64; 2]> {
+        let mut all = BTreeMap::new();
+        self.each_segment(&fit.unknowns, &mut |recording, number, segment, bias| {
             let mut sums = [0.0; 2];
             for channel in 0..6 {
                 sums[channel / 3] += self
                     .residual([recording, channel, bias], segment, fit)
                     .norm_squared();
             }
-            all.push(sums);
+            all.insert((recording, number), sums);
         });
         all
     }
@@ -465,13 +483,9 @@ impl Sensed<'_> {
     /// Returns recording and number of the segment with the largest residual, and its share of the power of all residuals, in
     /// units of the noise of the fit.
     pub(crate) fn worst_segment(&self, fit: &Fit) -> Option<(usize, usize, f64)> {
-        let mut places = Vec::new();
-        self.each_segment(&fit.unknowns, &mut |recording, number, _, _| {
-            places.push((recording, number));
-        });
         let over = |s: [f64; 2]| (0..2).map(|k| s[k] / fit.noise[k].powi(2)).sum::<f64>();
-        let powers = self.squares_by_segment(fit).into_iter().map(over);
-        let all: Vec<((usize, usize), f64)> = places.into_iter().zip(powers).collect();
+        let all = self.squares_by_segment(fit).into_iter();
+        let all: Vec<((usize, usize), f64)> = all.map(|(place, s)| (place, over(s))).collect();
         let sum: f64 = all.iter().map(|(_, power)| power).sum();
         let worst = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         worst.map(|((recording, number), power)| (recording, number, power / sum))

@@ -50,6 +50,8 @@ pub(super) struct Moving {
     /// Amplitude and frequency (rad, Hz) of two sines a joint, about the middle of its range.
     sines: Vec<[[f64; 3]; 2]>,
     middle: Vec<f64>,
+    /// Time of a movement and of the rest after it, s, if the robot goes from pose to pose.
+    pub stops: Option<[f64; 2]>,
 }
 
 /// Step of the differences, s.
@@ -80,11 +82,24 @@ impl Moving {
             chain,
             sines,
             middle,
+            stops: None,
         }
     }
 
     /// Returns the joint positions at a time.
     pub(super) fn position(&self, t: f64) -> Vec<f64> {
+        let Some([moves, rests]) = self.stops else {
+            return self.swung(t);
+        };
+        let number = (t / (moves + rests)).floor();
+        let s = ((t - number * (moves + rests)) / moves).min(1.0);
+        let share = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+        let [from, to] = [number, number + 1.0].map(|k| self.swung(2.9 * k));
+        let pairs = from.iter().zip(&to);
+        pairs.map(|(a, b)| a + share * (b - a)).collect()
+    }
+
+    fn swung(&self, t: f64) -> Vec<f64> {
         (self.sines.iter().zip(&self.middle))
             .map(|(sines, middle)| {
                 let sum: f64 = sines
