@@ -149,7 +149,7 @@ pub(crate) fn exchanged_and_scaled(
     kept.filter(is_other).collect()
 }
 
-/// Returns the exchanges of channels that fit best, the best first; `sensed` has one segment a recording. Rotations of
+/// Returns the exchanges of channels that fit best, the best first. Rotations of
 /// both kinds alike are left out. With `sign_stated` the mass must be positive.
 pub(crate) fn exchanged(
     sensed: &Sensed,
@@ -195,7 +195,7 @@ pub(crate) fn exchanged(
     kept.map(|(_, channels)| channels).collect()
 }
 
-/// Returns the mounting with the scale of the moments that fits best, as a start; `sensed` has one segment a recording.
+/// Returns the mounting with the scale of the moments that fits best, as a start.
 pub(crate) fn scaled(sensed: &Sensed, mounting: &Mounting, unknowns: &Unknowns) -> Mounting {
     let last = STARTS_PER_DECADE * DECADES;
     let starts = (-last..=last).map(|k| 10f64.powf(f64::from(k) / f64::from(STARTS_PER_DECADE)));

@@ -14,7 +14,7 @@ use crate::mounting::{Channels, Mounting};
 use crate::rows::LEAST_ROWS;
 use crate::selection::{Selected, selected};
 use crate::settle::{DECISIVE, settled};
-use crate::statistics::{Recorded, noise_floor};
+use crate::statistics::noise_floor;
 use crate::system::{Fit, Nuisance, Sensed, Unknowns};
 use crate::units::named;
 
@@ -367,14 +367,8 @@ impl Trial<'_> {
     /// Fits all causes beside the description with load and bias alone.
     fn plain_causes(&self, unknowns: &Unknowns, sign_stated: bool) -> Vec<(Cause, Mounting, Fit)> {
         let (sensed, mounting) = (self.sensed, self.mounting);
-        let recordings: Vec<Recorded> = sensed.recordings.iter().map(Recorded::in_one).collect();
-        let whole = Sensed {
-            recordings: &recordings,
-            to_axes: sensed.to_axes,
-            gravity: sensed.gravity,
-        };
         let mut all = Vec::new();
-        for channels in exchanged(&whole, mounting, unknowns, sign_stated) {
+        for channels in exchanged(sensed, mounting, unknowns, sign_stated) {
             let start = mounting.after(&channels);
             let fit = sensed.fit(&start, unknowns);
             all.push((Cause::Channels(channels), start, fit));
@@ -382,12 +376,12 @@ impl Trial<'_> {
         let can_scale = sensed.recordings.iter().any(|r| !r.poses);
         let scaling = unknowns.with(Nuisance::Scale);
         if can_scale {
-            let start = scaled(&whole, mounting, unknowns);
+            let start = scaled(sensed, mounting, unknowns);
             let fit = settled(sensed, &start, &scaling);
             all.push((Cause::Scale, start, fit));
         }
         let pairs = match can_scale {
-            true => exchanged_and_scaled(&whole, mounting, unknowns, sign_stated),
+            true => exchanged_and_scaled(sensed, mounting, unknowns, sign_stated),
             false => Vec::new(),
         };
         for (channels, start) in pairs {
@@ -403,12 +397,12 @@ impl Trial<'_> {
             let fit = settled(sensed, &dead, &unknowns.with(Nuisance::Gain(channel)));
             all.push((Cause::Gain(channel), dead, fit));
         }
-        for start in turned(&whole, mounting) {
+        for start in turned(sensed, mounting) {
             let turning = unknowns.with(Nuisance::Rotation);
             let fit = settled(sensed, &start, &turning);
             all.push((Cause::Turned, mounting.clone(), fit));
             if can_scale {
-                let start = scaled(&whole, &start, unknowns);
+                let start = scaled(sensed, &start, unknowns);
                 let fit = settled(sensed, &start, &scaling.with(Nuisance::Rotation));
                 all.push((Cause::ScaleAndTurned, mounting.scaled(start.scale), fit));
             }

@@ -47,6 +47,24 @@ pub(crate) struct Segment {
     pub rows: u64,
 }
 
+impl Segment {
+    /// Returns segments in one.
+    fn merged(segments: &[Self]) -> Self {
+        let merged = |channel: usize| {
+            let mut factor = TriangularFactor::new(column::COUNT - 1);
+            for row in segments.iter().flat_map(|s| s.channels[channel].row_iter()) {
+                let x: Vec<f64> = row.iter().copied().collect();
+                factor.push(&x[..column::COUNT - 1], x[column::COUNT - 1], 1.0);
+            }
+            DMatrix::from_vec(column::COUNT, column::COUNT, factor.triangle())
+        };
+        Self {
+            channels: std::array::from_fn(merged),
+            rows: segments.iter().map(|s| s.rows).sum(),
+        }
+    }
+}
+
 /// A recording of the sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct Recorded {
@@ -58,6 +76,8 @@ pub(crate) struct Recorded {
     pub poses: bool,
     /// Segments in the order of time.
     pub segments: Vec<Segment>,
+    /// All of them in one.
+    pub whole: Segment,
     /// Length, s.
     pub length: f64,
     /// True if the sensor's temperature was recorded and changes.
@@ -101,29 +121,6 @@ impl Recorded {
             ..self.passed
         };
         collector.finish(self.label.clone(), self.loaded, self.poses, passed)
-    }
-
-    /// Returns the recording with all segments in one, for comparisons that need no segments.
-    pub(crate) fn in_one(&self) -> Self {
-        let merged = |channel: usize| {
-            let mut factor = TriangularFactor::new(column::COUNT - 1);
-            for row in self
-                .segments
-                .iter()
-                .flat_map(|s| s.channels[channel].row_iter())
-            {
-                let x: Vec<f64> = row.iter().copied().collect();
-                factor.push(&x[..column::COUNT - 1], x[column::COUNT - 1], 1.0);
-            }
-            DMatrix::from_vec(column::COUNT, column::COUNT, factor.triangle())
-        };
-        Self {
-            segments: vec![Segment {
-                channels: std::array::from_fn(merged),
-                rows: self.rows(),
-            }],
-            ..self.clone()
-        }
     }
 }
 
@@ -232,20 +229,22 @@ impl Collector {
         passed: Passed,
     ) -> Recorded {
         let segments = self.factors.iter().zip(&self.counts);
+        let segments: Vec<Segment> = segments
+            .filter(|(_, rows)| **rows > 0)
+            .map(|(factors, rows)| Segment {
+                channels: std::array::from_fn(|c| {
+                    let width = column::COUNT;
+                    DMatrix::from_vec(width, width, factors[c].triangle())
+                }),
+                rows: *rows,
+            })
+            .collect();
         Recorded {
             label,
             loaded,
             poses,
-            segments: segments
-                .filter(|(_, rows)| **rows > 0)
-                .map(|(factors, rows)| Segment {
-                    channels: std::array::from_fn(|c| {
-                        let width = column::COUNT;
-                        DMatrix::from_vec(width, width, factors[c].triangle())
-                    }),
-                    rows: *rows,
-                })
-                .collect(),
+            whole: Segment::merged(&segments),
+            segments,
             length: self.length,
             warms: self.warms,
             passed,

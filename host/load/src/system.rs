@@ -257,6 +257,22 @@ impl Sensed<'_> {
         }
     }
 
+    /// Calls `take` with what [`Self::each_segment`] gives, a recording without jumps in one.
+    fn each_part(&self, unknowns: &Unknowns, take: &mut dyn FnMut(usize, &Segment, usize)) {
+        let layout = self.layout(unknowns);
+        let jumps = |recording: usize| unknowns.jumps.iter().any(|own| own.recording == recording);
+        for (r, recorded) in self.recordings.iter().enumerate() {
+            if !jumps(r) {
+                take(r, &recorded.whole, layout.bias(r));
+            }
+        }
+        self.each_segment(unknowns, &mut |r, _, segment, bias| {
+            if jumps(r) {
+                take(r, segment, bias);
+            }
+        });
+    }
+
     /// Returns the rows of a channel of a segment, one column an unknown, and their right-hand sides. Products of unknowns
     /// are linearised about the values of `fit`.
     fn rows(
@@ -390,7 +406,7 @@ impl Sensed<'_> {
     /// Returns the equations of the forces (`kind` 0) or the moments (1) of all segments in one factor.
     fn factor(&self, fit: &Fit, kind: usize) -> TriangularFactor {
         let mut whole = TriangularFactor::new(fit.values.len());
-        self.each_segment(&fit.unknowns, &mut |recording, _, segment, bias| {
+        self.each_part(&fit.unknowns, &mut |recording, segment, bias| {
             for channel in 3 * kind..3 * kind + 3 {
                 let (rows, right) = self.rows([recording, channel, bias], segment, fit);
                 for (row, y) in rows.row_iter().zip(right) {
