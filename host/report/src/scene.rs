@@ -250,7 +250,11 @@ fn drawn<'a>(
     let high_all: Vec<f64> = high_all.into_iter().map(|v| gap(v, plot.y.log)).collect();
 
     let count = x_all.len();
+    // A point that is none in both coordinates ends a piece of the curve.
+    let ends = |i: &usize| source.x[*i].is_nan() && source.y.get(*i).is_some_and(|y| y.is_nan());
+    let samples = (0..count).filter(|i| !ends(i)).count();
     let missing = (0..count)
+        .filter(|i| !ends(i))
         .filter(|i| {
             let hole = |c: &[f64]| c.get(*i).is_some_and(|v| v.is_nan());
             hole(&x_all)
@@ -264,7 +268,7 @@ fn drawn<'a>(
             _ => "not finite, or not positive on a logarithmic axis",
         };
         remarks.push(format!(
-            "{}: {missing} of {count} samples are {why} and left as gaps.",
+            "{}: {missing} of {samples} samples are {why} and left as gaps.",
             source.name
         ));
     }

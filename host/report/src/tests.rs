@@ -263,6 +263,28 @@ fn non_finite_values_are_gaps_that_are_counted() {
     assert!(scene.json().contains("null,null,null"));
 }
 
+/// Dashes that are apart on purpose miss nothing.
+#[test]
+fn pieces_of_a_curve_are_no_missing_samples() {
+    let nan = f64::NAN;
+    let plot = Plot::new("dashes", Axis::default(), Axis::default()).with(Series::line(
+        "fit",
+        Role::Model,
+        vec![0.0, 1.0, nan, 2.0, 3.0],
+        vec![1.0, 1.0, nan, 2.0, 2.0],
+    ));
+    let scene = scene::Scene::new(&plot).unwrap().unwrap();
+    assert!(scene.remarks.is_empty(), "{:?}", scene.remarks);
+    let picture = svg(&plot).unwrap();
+    let parsed = roxmltree::Document::parse(&picture).unwrap();
+    let paths = parsed.descendants().filter_map(|n| n.attribute("d"));
+    assert!(
+        paths
+            .map(|d| d.matches('M').count())
+            .any(|pieces| pieces == 2)
+    );
+}
+
 #[test]
 fn empty_figures_are_a_sentence() {
     for y in [vec![], vec![f64::NAN; 3]] {

@@ -244,7 +244,7 @@ fn fit(name: String, role: Role, trace: &Trace, channel: usize, still: bool) -> 
         .filter(|step| *step > 0.0)
         .fold(f64::INFINITY, f64::min);
     let half = if step.is_finite() { 0.3 * step } else { 0.3 };
-    let x = time.iter().flat_map(|t| [t - half, t + half, t + half]);
+    let x = time.iter().flat_map(|t| [t - half, t + half, f64::NAN]);
     let y = values.iter().flat_map(|v| [*v, *v, f64::NAN]);
     Series::line(name, role, x.collect(), y.collect())
 }
