@@ -167,3 +167,43 @@ fn a_slow_recording_tells_the_same_inertia_as_its_description() {
     assert!((inertia / truth - 1.0).abs() < 2e-5, "{inertia}");
     assert!((value("fv1") / 0.4 - 1.0).abs() < 1e-3, "{}", value("fv1"));
 }
+
+/// A sampled motion is interpolated to the rate that is asked for; without --rate the recording has that of the file.
+#[test]
+fn a_sampled_motion_is_simulated_at_the_rate_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let rig_file = robot("one-link.toml");
+    for name in ["motion.toml", "motion.csv"] {
+        let mut command = rig();
+        command.args(["excite", "--rate", "100", "--starts", "2", "--robot"]);
+        command.arg(&rig_file).arg("--out").arg(at(name));
+        succeed(&mut command);
+    }
+    let run = |motion: &str, options: &[&str], out: &str| {
+        let mut command = rig();
+        command.args(["simulate", "--robot"]).arg(&rig_file);
+        command.arg("--trajectory").arg(at(motion)).args(options);
+        command.arg("--out").arg(at(out));
+        command
+    };
+    succeed(&mut run("motion.toml", &["--rate", "500"], "direct.csv"));
+    succeed(&mut run("motion.csv", &["--rate", "500"], "resampled.csv"));
+    succeed(&mut run("motion.csv", &[], "own.csv"));
+    let period = |name: &str| column(&at(name), "t")[1] - column(&at(name), "t")[0];
+    assert!((period("resampled.csv") - 0.002).abs() < 1e-9);
+    assert!((period("own.csv") - 0.01).abs() < 1e-9);
+    for (name, most) in [("ref1", 1e-5), ("q1", 1e-4)] {
+        let [direct, resampled] =
+            ["direct.csv", "resampled.csv"].map(|file| column(&at(file), name));
+        assert!(direct.len().abs_diff(resampled.len()) < 6);
+        let apart = direct.iter().zip(&resampled).map(|(a, b)| (a - b).abs());
+        let worst = apart.fold(0.0, f64::max);
+        assert!(worst < most, "{name}: {worst:e}");
+    }
+    let said = refuse(&mut run("motion.csv", &["--rate", "0"], "none.csv"));
+    assert!(
+        said.contains("rate") && said.contains("between 1 and 1000000 Hz"),
+        "{said}"
+    );
+}

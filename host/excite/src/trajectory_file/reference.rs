@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::content::TrajectoryFile;
-use super::samples::SampledReference;
+use super::samples::{SampledReference, check_rate};
 use crate::ExciteError;
 use crate::interpolation::Samples;
 use rig_data::{EffortNeed, JointColumns, Source};
@@ -21,12 +21,13 @@ const SAME_RATE: f64 = 1e-6;
 /// rate of the file too, if it was interpolated.
 ///
 /// # Errors
-/// As [`load_reference`]; [`ExciteError::Coarse`] if the samples do not show the motion between them.
+/// As [`load_reference`]; [`ExciteError::Option`] for a rate that is not between 1 Hz and 1 MHz; [`ExciteError::Coarse`] if the samples do not show the motion between them.
 pub fn reference_at(
     path: &Path,
     robot: &Robot,
     rate: f64,
 ) -> Result<(SampledReference, Option<f64>), ExciteError> {
+    check_rate(rate)?;
     let read = load_reference(path, robot, rate)?;
     let own = 1.0 / read.period;
     if (own / rate - 1.0).abs() <= SAME_RATE {

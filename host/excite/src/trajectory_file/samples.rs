@@ -102,13 +102,7 @@ impl TrajectoryFile {
     /// [`ExciteError::Option`] for a rate that is not between 1 Hz and 1 MHz, and for a motion in which the drive is
     /// switched off, because only the rig determines how the joint coasts.
     pub fn sampled(&self, rate: f64) -> Result<SampledReference, ExciteError> {
-        if !(1.0..=1e6).contains(&rate) {
-            return Err(ExciteError::Option {
-                name: "rate",
-                value: format!("{rate} Hz"),
-                right: "it must be between 1 and 1000000 Hz".into(),
-            });
-        }
+        check_rate(rate)?;
         if let Some(off) = self.drive_off {
             return Err(ExciteError::Option {
                 name: "time of drive_off",
@@ -136,4 +130,16 @@ impl TrajectoryFile {
             acceleration: each(|r| r.acceleration, false),
         })
     }
+}
+
+/// Refuses a rate (Hz) that is not between 1 Hz and 1 MHz.
+pub(super) fn check_rate(rate: f64) -> Result<(), ExciteError> {
+    if !(1.0..=1e6).contains(&rate) {
+        return Err(ExciteError::Option {
+            name: "rate",
+            value: format!("{rate} Hz"),
+            right: "it must be between 1 and 1000000 Hz".into(),
+        });
+    }
+    Ok(())
 }

@@ -9,8 +9,12 @@ use super::overwrite::refuse_file;
 use super::same_file::is_same;
 use super::ui::Ui;
 use rig_diagnose::voltage::replay_voltage;
-use rig_excite::{Carried, Noise, load_reference, replay_carrying};
+use rig_excite::{Carried, Noise, SampledReference, load_reference, reference_at, replay_carrying};
 use rig_model::robot::{Load, Robot};
+use rig_output::format_trimmed;
+
+/// Sample rate of a trajectory by its parameters, Hz.
+const RATE: f64 = 1000.0;
 
 /// Simulates the robot following a trajectory, with its own friction, drives and controller.
 ///
@@ -39,9 +43,9 @@ pub(crate) struct Args {
     /// Recording to write (.csv or .mcap)
     #[arg(long)]
     pub(crate) out: PathBuf,
-    /// Sample rate for a .toml trajectory, Hz; a .csv has its own rate
-    #[arg(long, default_value_t = 1000.0)]
-    pub(crate) rate: f64,
+    /// Sample rate, Hz; samples of another rate are interpolated [default: 1000 for a .toml trajectory, else that of the file]
+    #[arg(long)]
+    pub(crate) rate: Option<f64>,
     /// Standard deviation of the noise on positions, rad or m
     #[arg(long, default_value_t = 0.0)]
     pub(crate) noise_position: f64,
@@ -111,7 +115,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         return under_voltage(args, ui, &robot);
     }
     let carried = carried(args, &robot, ui)?;
-    let reference = load_reference(&args.trajectory, &robot, args.rate)?;
+    let reference = args.reference(&robot, ui)?;
     let noise = Noise {
         position: args.noise_position,
         velocity: args.noise_velocity,
@@ -140,6 +144,24 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 }
 
 impl Args {
+    /// Returns the motion at the wanted rate.
+    fn reference(&self, robot: &Robot, ui: &Ui) -> Result<SampledReference, CommandError> {
+        let path = &self.trajectory;
+        let Some(rate) = self.rate else {
+            return Ok(load_reference(path, robot, RATE)?);
+        };
+        let (reference, from) = reference_at(path, robot, rate)?;
+        if let Some(from) = from {
+            ui.remark(&format!(
+                "{}: the motion is sampled at {} Hz; quintics through its samples give it at the {} Hz of --rate.",
+                path.display(),
+                format_trimmed(from, 6),
+                format_trimmed(rate, 6)
+            ));
+        }
+        Ok(reference)
+    }
+
     /// Returns the first given option of the wrist sensor.
     fn sensor_option(&self) -> Option<&'static str> {
         [
@@ -226,7 +248,16 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError
         velocity: args.noise_velocity,
         torque: 0.0,
     };
-    let done = replay_voltage(robot, &args.trajectory, args.rate, noise, args.seed)?;
+    let sampled = (args.trajectory.extension()).is_none_or(|end| !end.eq_ignore_ascii_case("toml"));
+    if let (true, Some(rate)) = (sampled, args.rate) {
+        return Err(CommandError::Sentence(format!(
+            "--rate {rate} has no effect on joint {}: under voltage the samples of {} are followed at their own instants; leave it out.",
+            robot.joints[0].name,
+            args.trajectory.display()
+        )));
+    }
+    let rate = args.rate.unwrap_or(RATE);
+    let done = replay_voltage(robot, &args.trajectory, rate, noise, args.seed)?;
     done.save(&args.out, robot)?;
     for note in &done.notes {
         ui.remark(note);
