@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use rig_model::robot::Load;
+
 use crate::run::{refuse, rig, succeed};
 
 /// An arm of `n` joints from `base`, named with `prefix`.
@@ -183,6 +185,42 @@ fn a_description_from_a_urdf_moves_as_the_urdf_does() {
     let [before, after] =
         ["gripper.urdf", "back.urdf"].map(|name| fs::read(folder.path().join(name)).unwrap());
     assert!(before == after);
+}
+
+/// A load has the same ten numbers by a URDF whose tip is turned and shifted, and by the TOML that `rig init --from` makes of it:
+/// those that were simulated, in the frame of the tip.
+#[test]
+fn a_load_has_the_same_flange_by_a_urdf_and_by_the_description_from_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let tip = "<link name='tool0'/>
+<joint name='mount' type='fixed'><parent link='link3'/><child link='tool0'/><origin xyz='0.03 -0.02 0.25' rpy='0.4 1.5707963 -2.1'/></joint>\n";
+    written(folder.path(), "arm.urdf", &(arm("", "base", 3) + tip));
+    let load = "mass = 1.5\nfirst_moment = [0.06, -0.03, 0.15]\ninertia = [0.03, 0.001, -0.006, 0.028, 0.002, 0.012]\n";
+    fs::write(folder.path().join("load.toml"), load).unwrap();
+    let run = |line: &str| succeed(rig().args(line.split(' ')).current_dir(folder.path()));
+    run("init --from arm.urdf --tip tool0 --out arm.toml");
+    run("excite --robot arm.urdf --tip tool0 --starts 1 --out m.toml");
+    let simulate = "simulate --robot arm.urdf --tip tool0 --trajectory m.toml --rate 100 --noise-torque 0.05 --out";
+    run(&format!("{simulate} bare.csv"));
+    run(&format!("{simulate} loaded.csv --load load.toml --seed 2"));
+    let identify = "load --by torque --data loaded.csv --without bare.csv --out";
+    run(&format!("{identify} by_urdf --robot arm.urdf --tip tool0"));
+    run(&format!("{identify} by_toml --robot arm.toml"));
+    let read = |name: &str| Load::read(&folder.path().join(name)).unwrap().parameters();
+    let [by_urdf, by_toml] = ["by_urdf/load.toml", "by_toml/load.toml"].map(read);
+    assert_eq!(by_urdf, by_toml);
+    // A URDF that is written from the TOML has a link at the flange.
+    run("urdf --robot arm.toml --out back.urdf");
+    run(&format!(
+        "{identify} by_back --robot back.urdf --tip flange"
+    ));
+    for (back, own) in read("by_back/load.toml").iter().zip(&by_toml) {
+        assert!((back - own).abs() < 1e-6, "{back} {own}");
+    }
+    for (found, simulated) in by_urdf.iter().zip(read("load.toml")) {
+        println!("{found} {simulated}");
+        assert!((found - simulated).abs() < 0.01, "{found} {simulated}");
+    }
 }
 
 #[test]

@@ -78,15 +78,14 @@ pub struct ToolPoint<'a> {
 }
 
 impl<'a> ToolPoint<'a> {
-    /// Creates the tool point: `offset` (m) in the flange frame, which is the frame of the last joint (TOML) or of the link
-    /// that the chain ends at (URDF).
+    /// Creates the tool point: `offset` (m) in the flange frame.
     ///
     /// # Errors
     /// [`ComplianceError::Model`].
     pub fn new(robot: &'a Robot, offset: [f64; 3]) -> Result<Self, ComplianceError> {
         let chain = Chain::new(&robot.geometry(), robot.gravity)
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
-        let flange = &robot.last_link;
+        let flange = &robot.flange_pose();
         let place = flange * nalgebra::Translation3::from(Vector3::from(offset));
         Ok(Self {
             robot,
@@ -115,7 +114,7 @@ impl<'a> ToolPoint<'a> {
             return Err(ComplianceError::Option(text));
         }
         // The sensor reads the robot's wrench on the load, or its opposite, which acts on the robot.
-        let pose = self.robot.last_link * sensor.pose();
+        let pose = self.robot.flange_pose() * sensor.pose();
         self.sensor = Some((frame(&pose), -reads.sign()));
         Ok(self)
     }
@@ -134,7 +133,8 @@ impl<'a> ToolPoint<'a> {
     /// Takes wrenches on the robot at the tool point, in the axes of the flange after a turn about its z axis, rad.
     pub(crate) fn in_flange_axes(mut self, angle: f64) -> Self {
         let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
-        let place = self.robot.last_link * nalgebra::Translation3::from(Vector3::from(self.offset));
+        let place =
+            self.robot.flange_pose() * nalgebra::Translation3::from(Vector3::from(self.offset));
         self.sensor = Some((frame(&(place * turn)), 1.0));
         self
     }

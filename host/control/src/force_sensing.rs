@@ -25,7 +25,7 @@ struct Mounted {
 impl Mounted {
     fn of(robot: &Robot) -> Option<Self> {
         let sensor = robot.wrist_sensor.as_ref()?;
-        let at = robot.last_link * sensor.pose();
+        let at = robot.flange_pose() * sensor.pose();
         let rotation = at.rotation.to_rotation_matrix();
         let range = [sensor.force_range, sensor.moment_range];
         Some(Self {

@@ -39,7 +39,7 @@ impl WristChain {
     /// # Errors
     /// [`ChainError::TooManyJoints`] if the robot has more than ten.
     pub(super) fn of(robot: &Robot, sensor: &WristSensor) -> Result<Self, ChainError> {
-        let at = (robot.last_link * sensor.pose()).translation;
+        let at = (robot.flange_pose() * sensor.pose()).translation;
         let joint = |kind, alpha, theta, d| JointGeometry {
             kind,
             alpha,

@@ -124,7 +124,12 @@ impl Told<'_> {
         let (rotation, reads) = self.rotation();
         let against = Rotation3::from_matrix_unchecked(self.described.transpose() * rotation);
         let angle = against.angle();
-        let flange = self.robot.last_link.rotation.to_rotation_matrix().inverse();
+        let flange = self
+            .robot
+            .flange_pose()
+            .rotation
+            .to_rotation_matrix()
+            .inverse();
         let own = flange * Rotation3::from_matrix_unchecked(rotation);
         let (roll, pitch, yaw) = own.euler_angles();
         let is_turned = angle > LEAST_TURN;
@@ -269,7 +274,7 @@ impl Told<'_> {
     /// Returns the estimated origin of the sensor in the flange frame, m.
     fn origin(&self) -> Option<Vector3<f64>> {
         let error = self.sensed.origin(self.fit)?;
-        let flange = self.robot.last_link.rotation.inverse();
+        let flange = self.robot.flange_pose().rotation.inverse();
         Some(Vector3::from(self.sensor.position) + flange * (self.described * error))
     }
 
@@ -387,7 +392,7 @@ impl Told<'_> {
     ) -> Result<Vec<String>, LoadError> {
         let mass = found.values[0];
         let moment = Vector3::new(found.values[1], found.values[2], found.values[3]);
-        let in_flange = self.robot.last_link.inverse() * sensor;
+        let in_flange = self.robot.flange_pose().inverse() * sensor;
         let described = in_flange.translation.vector;
         let origin = self.origin().unwrap_or(described);
         let lever = |mass: f64, moment: Vector3<f64>| (moment / mass - origin).norm();

@@ -46,7 +46,7 @@ pub fn identify_load(
     without: &[&dyn Recording],
     options: &LoadOptions,
 ) -> Result<LoadIdentification, LoadError> {
-    let to_joint = parameters_from(&robot.last_link);
+    let to_joint = parameters_from(&robot.flange_pose());
     let chain = chain_of(robot)?;
     let mut warnings = Vec::new();
     let sensed = match options.by {

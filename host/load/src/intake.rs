@@ -125,7 +125,7 @@ impl<'a> Intake<'a> {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Recorded>, LoadError> {
         let sensing = self.sensing;
-        let axes = SensorAxes::of(&(sensing.robot.last_link * self.sensor.pose()));
+        let axes = SensorAxes::of(&(sensing.robot.flange_pose() * self.sensor.pose()));
         let mut prepared = self.surveys.iter().zip(&self.usable);
         let mut recordings = Vec::new();
         let all = sensing.recordings.iter().zip(&self.judged).enumerate();

@@ -25,7 +25,7 @@ pub(crate) fn too_heavy(
     mass: f64,
     centre: [f64; 3],
 ) -> Result<Option<String>, LoadError> {
-    let point = robot.last_link * nalgebra::Point3::from(centre);
+    let point = robot.flange_pose() * nalgebra::Point3::from(centre);
     let gravity = Vector3::from(robot.gravity);
     let count = robot.joints.len();
     let mut highest = vec![0.0f64; count];

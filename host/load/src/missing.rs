@@ -82,7 +82,7 @@ fn further_pose(
         .collect();
     let mut random = rand_pcg::Pcg64::seed_from_u64(1);
     let still = vec![0.0; ranges.len()];
-    let sensor = robot.last_link * robot.wrist_sensor.clone().unwrap_or_default().pose();
+    let sensor = robot.flange_pose() * robot.wrist_sensor.clone().unwrap_or_default().pose();
     let prior = found.covariance + found.beyond;
     let mut best: Option<(f64, Vec<f64>)> = None;
     for _ in 0..CANDIDATES {

@@ -44,8 +44,8 @@ pub(crate) fn by_sensor(
     let (surveys, usable) = surveyed(&moving, robot.joints.len())?;
     let intake = Intake::of(sensing, &sensor, judged, surveys, &usable)?;
     warnings.extend(intake.notes());
-    let pose = robot.last_link * sensor.pose();
-    let to_axes = parameters_from(&(pose.rotation.inverse() * robot.last_link));
+    let pose = robot.flange_pose() * sensor.pose();
+    let to_axes = parameters_from(&(pose.rotation.inverse() * robot.flange_pose()));
     let (mut delay, mut shifts) = (0.0, 0);
     let mut faulty = FaultyRows::default();
     loop {
@@ -171,7 +171,7 @@ fn without_channel(sensed: &Sensed, fit: &Fit, channel: usize) -> Fit {
 
 /// Returns the described axes of the sensor in the frame of the last joint.
 fn described(sensing: &Sensing, sensor: &WristSensor) -> Matrix3<f64> {
-    let pose = sensing.robot.last_link * sensor.pose();
+    let pose = sensing.robot.flange_pose() * sensor.pose();
     pose.rotation.to_rotation_matrix().into_inner()
 }
 
@@ -204,7 +204,7 @@ fn finished(
         delay,
         explains,
     };
-    let pose = sensing.robot.last_link * sensor.pose();
+    let pose = sensing.robot.flange_pose() * sensor.pose();
     warnings.extend(findings.implausible(&found, &pose, sensing.even_if_wrong)?);
     warnings.extend(findings.not_rigid(sensing.even_if_wrong)?);
     let findings = findings.findings(prepared, warnings);

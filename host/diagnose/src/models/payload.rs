@@ -114,8 +114,8 @@ pub(crate) fn on_last_link(
     };
     let mut place = Vector3::zeros();
     for _ in 0..ROUNDS {
-        let columns =
-            kilogram(place, &context.robot.last_link).map(|body| column_of(context, rows, &body));
+        let columns = kilogram(place, &context.robot.flange_pose())
+            .map(|body| column_of(context, rows, &body));
         let weighted: Vec<Vec<f64>> = (columns.iter())
             .map(|c| frozen.projected(frozen.weighted(c)))
             .collect();

@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nalgebra::{Isometry3, Vector3};
 use rig_data::Block;
 use rig_shared::effects::Kind;
 use rig_shared::multibody::column;
@@ -16,7 +15,7 @@ use rig_data::Source;
 use rig_data::prepare::{InMemory, Recording};
 use rig_excite::{Noise, SampledReference, replay};
 use rig_identify::least_eigenvalue;
-use rig_model::robot::{JointFriction, Origin, Robot, template};
+use rig_model::robot::{Flange, JointFriction, Origin, Robot, template};
 use rig_output::data_dir;
 use rig_scenario::{Arm, ArmScenario, Fault};
 
@@ -187,10 +186,10 @@ fn a_payload_beside_friction_that_nothing_states_is_not_bent() {
     let recordings = ArmScenario::new(Arm::Six, fault, 1).make().unwrap();
     let mut robot = recordings.robot.clone();
     robot.origin = Origin::Urdf;
-    robot.last_link = Isometry3::new(
-        Vector3::new(0.02, -0.01, 0.05),
-        Vector3::new(0.4, 1.1, -0.7),
-    );
+    robot.flange = Flange {
+        position: [0.02, -0.01, 0.05],
+        rotation: [0.4, 1.1, -0.7],
+    };
     for joint in &mut robot.joints {
         joint.friction = Some(JointFriction::default());
     }
@@ -206,7 +205,7 @@ fn a_payload_beside_friction_that_nothing_states_is_not_bent() {
     told("payload on a URDF", &diagnosis);
     let payload = (diagnosis.steps.iter()).find(|step| step.effect == "payload");
     let parameters = &payload.unwrap().parameters;
-    let own = robot.last_link.inverse_transform_point(&place.into());
+    let own = robot.flange_pose().inverse_transform_point(&place.into());
     for (name, truth) in [("mass", mass), ("x", own.x), ("y", own.y), ("z", own.z)] {
         let value = &parameters[name];
         let off = (value.value - truth).abs();

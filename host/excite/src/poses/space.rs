@@ -55,7 +55,7 @@ impl<'a> Space<'a> {
         let limited = bounds.iter().any(|b| b.torque.is_some());
         Ok(Self {
             robot,
-            sensor: robot.last_link * sensor.pose(),
+            sensor: robot.flange_pose() * sensor.pose(),
             knows_torque: limited && prior(robot, &model).is_ok(),
             has_bodies: prior(robot, &model).is_ok(),
             model,

@@ -132,9 +132,9 @@ impl Moving {
     /// Returns the wrench of the robot on the points, in the axes of the sensor about its origin, while `q` moves.
     pub(super) fn wrench(&self, points: &Points, q: &dyn Fn(f64) -> Vec<f64>, t: f64) -> [f64; 6] {
         let robot = &self.robot;
-        let sensor = robot.last_link * robot.wrist_sensor.clone().unwrap_or_default().pose();
+        let sensor = robot.flange_pose() * robot.wrist_sensor.clone().unwrap_or_default().pose();
         let place = |t: f64, point: &[f64; 3]| {
-            let in_joint = robot.last_link * nalgebra::Point3::from(*point);
+            let in_joint = robot.flange_pose() * nalgebra::Point3::from(*point);
             let frame = Isometry3::translation(in_joint.x, in_joint.y, in_joint.z);
             self.pose(&q(t), &frame).0
         };
@@ -161,7 +161,7 @@ impl Moving {
         let mut torques = vec![0.0; n];
         let gravity = Vector3::from(self.chain.gravity());
         for (m, point) in points {
-            let in_joint = robot.last_link * nalgebra::Point3::from(*point);
+            let in_joint = robot.flange_pose() * nalgebra::Point3::from(*point);
             let at = |k: f64, slopes: &mut Vec<[f64; 3]>| {
                 let q = self.position(t + k * STEP);
                 let p = point_position(&self.chain, &q, n - 1, in_joint.coords.into(), slopes);

@@ -87,6 +87,7 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
         return Err(fault);
     }
     check_workspace(robot)?;
+    robot.flange.check()?;
     if let Some(sensor) = &robot.wrist_sensor {
         sensor.check()?;
     }

@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::angles::{angle_about, squared_poses, squared_theta};
 use super::drive::Drive;
+use super::flange::Flange;
 use super::frame::step;
 use super::joint::{Joint, JointKind};
 use super::right_angle::{ROUNDING, right_angle};
@@ -159,7 +160,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
     }
     let robot = Robot {
         origin: Origin::Urdf,
-        last_link: links.last().copied().unwrap_or_default() * chain.tip,
+        flange: Flange::of(&(links.last().copied().unwrap_or_default() * chain.tip)),
         ..Robot::new(&chain.name, joints)
     };
     Converted {

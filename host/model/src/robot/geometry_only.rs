@@ -1,5 +1,6 @@
 //! Robots with known geometry and nothing else.
 
+use super::flange::Flange;
 use super::frame::GRAVITY;
 use super::joint::{Joint, JointKind};
 use super::serial_robot::Robot;
@@ -32,12 +33,12 @@ impl Robot {
             name: name.to_owned(),
             gravity: [0.0, 0.0, -GRAVITY],
             joints,
+            flange: Flange::default(),
             wrist_sensor: None,
             workspace: Vec::new(),
             effects: Vec::new(),
             identified: None,
             origin: Origin::Own,
-            last_link: nalgebra::Isometry3::identity(),
         }
     }
 }

@@ -14,7 +14,7 @@ use super::toml_message::of_wrong_length;
 use super::urdf::SpatialInertia;
 use rig_output::{comment_toml, toml_document};
 
-/// A rigid body that the flange carries, in the flange frame: the frame of the last joint (TOML) or of the link that the chain ends at (URDF).
+/// A rigid body that the flange carries, in the flange frame ([`Flange`](super::Flange)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
@@ -179,7 +179,7 @@ impl Robot {
     pub fn with_load(&self, load: &Load) -> Self {
         let mut robot = self.clone();
         if let Some(last) = robot.joints.last_mut() {
-            let load = SpatialInertia::of(&load.inertial()).seen_from(&self.last_link);
+            let load = SpatialInertia::of(&load.inertial()).seen_from(&self.flange_pose());
             last.inertial = Some(match &last.inertial {
                 Some(own) => SpatialInertia::of(own).plus(&load).inertial(),
                 None => load.inertial(),
@@ -193,8 +193,7 @@ impl Robot {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::robot::IRP6_TEMPLATE;
-    use nalgebra::{Translation3, UnitQuaternion};
+    use crate::robot::{Flange, IRP6_TEMPLATE};
 
     fn bar() -> Load {
         Load::of([1.2, 0.1, -0.05, 0.3, 0.2, 0.01, -0.02, 0.25, 0.03, 0.1])
@@ -243,10 +242,10 @@ mod tests {
     #[test]
     fn load_is_a_part_of_the_last_link() {
         let mut robot = Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap();
-        robot.last_link = Isometry3::from_parts(
-            Translation3::new(0.1, 0.0, 0.2),
-            UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2),
-        );
+        robot.flange = Flange {
+            position: [0.1, 0.0, 0.2],
+            rotation: [0.0, 0.0, std::f64::consts::FRAC_PI_2],
+        };
         // A point of 2 kg at x = 0.3 of the flange: in the joint's frame at y = 0.3, beside the shift.
         let load = Load::of([2.0, 0.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.18, 0.0, 0.18]);
         let before = robot.joints.last().unwrap().inertial.clone().unwrap();

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::array::exact;
 use super::band::IdentifiedBand;
 use super::effects::RobotEffect;
+use super::flange::Flange;
 use super::joint::Joint;
 use super::workspace::Region;
 use super::worth::Origin;
@@ -22,6 +23,9 @@ pub struct Robot {
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
+    /// Pose of the flange frame in the frame of the last joint.
+    #[serde(default, skip_serializing_if = "Flange::is_last_joint")]
+    pub flange: Flange,
     /// Force and torque sensor at the wrist, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wrist_sensor: Option<WristSensor>,
@@ -37,10 +41,6 @@ pub struct Robot {
     /// Source of the values. It decides how far they are trusted ([`worth`](fn@super::worth)). Not stored in the file.
     #[serde(skip)]
     pub origin: Origin,
-    /// Frame of the URDF link that the chain ends at (its tip), in the frame of the last joint. Identity if no URDF was read. Not stored in the
-    /// file.
-    #[serde(skip)]
-    pub last_link: nalgebra::Isometry3<f64>,
 }
 
 impl Robot {

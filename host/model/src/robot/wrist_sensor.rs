@@ -11,7 +11,7 @@ use super::fault::{Fault, Step, written};
 /// as a metre is beyond.
 const FARTHEST: f64 = 1.0;
 
-/// The sensor at the wrist. The flange frame is that of the last joint (TOML) or of the last link (URDF).
+/// The sensor at the wrist; [`Flange`](super::Flange) has the flange frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WristSensor {

@@ -90,7 +90,7 @@ impl<'a> LoadWrench<'a> {
     /// Returns what a perfect sensor reads: fx fy fz, N, mx my mz, N·m, in its axes, moments about its origin.
     pub fn at(&self, links: &LinkMotion) -> [f64; 6] {
         let last = self.last_frame(links);
-        let flange = last.pose * self.robot.last_link;
+        let flange = last.pose * self.robot.flange_pose();
         let sensor = flange * self.sensor;
         let CentredBody {
             mass,
@@ -112,12 +112,12 @@ impl<'a> LoadWrench<'a> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion};
+    use nalgebra::SVector;
     use rand::{RngExt, SeedableRng};
     use rig_shared::multibody::{Chain, wrench_regressor};
 
     use super::*;
-    use crate::robot::{Controller, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, WristSensor};
+    use crate::robot::{Controller, Flange, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, WristSensor};
     use crate::simulate::{Inputs, Model, Since, closed_loop_watched};
 
     const G: f64 = 9.81;
@@ -201,10 +201,10 @@ mod tests {
                     joint.kind = JointKind::Prismatic;
                 }
             }
-            robot.last_link = Isometry3::from_parts(
-                Translation3::new(draw(0.2), draw(0.2), draw(0.2)),
-                UnitQuaternion::from_euler_angles(draw(3.0), draw(1.5), draw(3.0)),
-            );
+            robot.flange = Flange {
+                position: [(); 3].map(|()| draw(0.2)),
+                rotation: [draw(3.0), draw(1.5), draw(3.0)],
+            };
             robot.wrist_sensor = Some(WristSensor {
                 position: [(); 3].map(|()| draw(0.2)),
                 rotation: [(); 3].map(|()| draw(1.5)),
@@ -233,12 +233,12 @@ mod tests {
             let chain = Chain::<f64>::new(&robot.geometry(), robot.gravity).unwrap();
             let mut w = [0.0; 60];
             wrench_regressor(&chain, &links.q, &links.qd, &links.qdd, &mut w).unwrap();
-            let phi = load.seen_from(&robot.last_link).parameters();
+            let phi = load.seen_from(&robot.flange_pose()).parameters();
             let joint = SVector::<f64, 6>::from_fn(|row, _| {
                 (0..10).map(|c| w[row * 10 + c] * phi[c]).sum()
             });
             let sensor = robot.wrist_sensor.as_ref().unwrap();
-            let pose = robot.last_link * sensor.pose();
+            let pose = robot.flange_pose() * sensor.pose();
             let force: Vector3<f64> = joint.fixed_rows::<3>(0).into();
             let moment: Vector3<f64> = joint.fixed_rows::<3>(3).into();
             let back = pose.rotation.inverse();

@@ -35,8 +35,8 @@ const FILES: [&str; 4] = ["load.toml", "load.urdf", "load.json", "report.html"];
 /// By joint torques: record the same motion with the load (--data) and without it (--without). Without --without the
 /// description must be an identified one (`rig identify`).
 ///
-/// All results are in the flange frame: the frame of the last joint (TOML), or of the link that the chain ends at (URDF;
-/// --tip names it). Writes load.toml, load.urdf, load.json and report.html into the folder given with --out.
+/// All results are in the flange frame: the frame of the last joint or that of [flange] (TOML), or of the link that the
+/// chain ends at (URDF; --tip names it). Writes load.toml, load.urdf, load.json and report.html into the folder given with --out.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]

@@ -109,7 +109,7 @@ fn body(found: &LoadIdentification) -> Section {
     let mut section = Section::new(
         "load",
         "Inertial parameters of the load",
-        "The flange frame is the frame of the last joint (TOML) or of the last link (URDF).",
+        "The flange frame is the frame of the last joint or that of [flange] (TOML), or the frame of the last link (URDF).",
     )
     .with(Block::Table(Table {
         caption: "The ten inertial parameters, inertia about the origin of the flange frame".into(),

@@ -41,7 +41,9 @@ fn explained(robot: &Robot, by: Explanation) -> String {
 
 fn payload(robot: &Robot, load: Load) -> String {
     let last = robot.joints.last().map_or("", |joint| joint.name.as_str());
-    let place = robot.last_link.inverse_transform_point(&load.place.into());
+    let place = robot
+        .flange_pose()
+        .inverse_transform_point(&load.place.into());
     let [x, y, z] =
         [place.x, place.y, place.z].map(|p| format!("{:.2}", 0.0 + (100.0 * p).round() / 100.0));
     format!(

@@ -580,5 +580,5 @@ fn links_beyond_the_tip_are_listed() {
     );
     let chosen = read(&text, &choice(None, Some("tool"), &[])).unwrap();
     assert_eq!((chosen.tip(), chosen.beyond_tip().len()), ("tool", 0));
-    assert!((chosen.robot().last_link.translation.z - 0.107).abs() < 1e-12);
+    assert!((chosen.robot().flange_pose().translation.z - 0.107).abs() < 1e-12);
 }

@@ -13,7 +13,7 @@ use rig_shared::transmission::DriveKind;
 
 use super::spatial::SpatialInertia;
 use crate::robot::error::RobotError;
-use crate::robot::frame::{GRAVITY, step};
+use crate::robot::frame::{GRAVITY, roll_pitch_yaw, step};
 use crate::robot::joint::{Joint, JointKind};
 use crate::robot::serial_robot::Robot;
 
@@ -51,14 +51,11 @@ impl Robot {
         // Writing to a String cannot fail.
         let _ = writeln!(body, "  <link name=\"{base}\"/>");
         if let Some(rotation) = tilt {
-            remarks.push(format!("Gravity is not along -z of {base}: link world is level, and the joint {} holds how {base} stands in it.", self.fixed_name()));
+            let fixed = self.free_name("world_to_base");
+            remarks.push(format!("Gravity is not along -z of {base}: link world is level, and the joint {fixed} holds how {base} stands in it."));
             let world = name("world".into());
             let _ = writeln!(body, "  <link name=\"{world}\"/>");
-            let _ = writeln!(
-                body,
-                "  <joint name=\"{}\" type=\"fixed\">",
-                self.fixed_name()
-            );
+            let _ = writeln!(body, "  <joint name=\"{fixed}\" type=\"fixed\">");
             let _ = writeln!(
                 body,
                 "    <parent link=\"{world}\"/>\n    <child link=\"{base}\"/>"
@@ -86,6 +83,19 @@ impl Robot {
             );
             parent = link;
         }
+        if !self.flange.is_last_joint() {
+            let (link, joint) = (name("flange".into()), self.free_name("last_to_flange"));
+            let pose = self.flange_pose();
+            let _ = writeln!(
+                body,
+                "  <link name=\"{link}\"/>\n  <joint name=\"{joint}\" type=\"fixed\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{link}\"/>\n    <origin xyz=\"{}\" rpy=\"{}\"/>\n  </joint>",
+                three(&pose.translation.vector),
+                rpy(&pose.rotation.to_rotation_matrix())
+            );
+            remarks.push(format!(
+                "The flange frame is that of link {link}: end the chain there, with --tip {link}."
+            ));
+        }
         self.write_transmissions(&mut body);
         self.left_out(&parameters, &[], &mut remarks);
         let mut text = String::from("<?xml version=\"1.0\"?>\n");
@@ -98,9 +108,9 @@ impl Robot {
         Ok(Urdf { text, remarks })
     }
 
-    /// Returns a name for the joint between world and base that no joint of the robot has.
-    fn fixed_name(&self) -> String {
-        let mut name = "world_to_base".to_owned();
+    /// Returns a name for a fixed joint that no joint of the robot has.
+    fn free_name(&self, wish: &str) -> String {
+        let mut name = wish.to_owned();
         while self.joint_index(&name).is_some() {
             name.push('_');
         }
@@ -270,16 +280,7 @@ fn write_joint(
 
 /// Returns fixed-axis roll, pitch and yaw of a rotation Rz(yaw)·Ry(pitch)·Rx(roll).
 pub(super) fn rpy(rotation: &Rotation3<f64>) -> String {
-    let r = rotation.matrix();
-    let level = r.m32.hypot(r.m33);
-    let pitch = (-r.m31).atan2(level);
-    // Pitch of ±90°: roll and yaw turn about the same axis, and roll is set to zero.
-    let (roll, yaw) = if level < 1e-12 {
-        (0.0, (-r.m12).atan2(r.m22))
-    } else {
-        (r.m32.atan2(r.m33), r.m21.atan2(r.m11))
-    };
-    three(&Vector3::new(roll, pitch, yaw))
+    three(&Vector3::from(roll_pitch_yaw(rotation)))
 }
 
 fn three(v: &Vector3<f64>) -> String {
