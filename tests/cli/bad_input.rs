@@ -371,6 +371,35 @@ fn files_of_other_programs_are_named() {
     }
 }
 
+/// A file of this program that is no recording is named as what it is.
+#[test]
+fn a_description_or_a_trajectory_in_place_of_a_recording_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["irp6.toml", "one-link.toml", "tx40.toml"] {
+        names(
+            &sentence(&robot(name)),
+            &[
+                name,
+                "a robot description",
+                "a recording of the robot is wanted",
+                "--robot",
+            ],
+        );
+    }
+    let motion = folder.path().join("motion.toml");
+    let mut excite = rig();
+    excite.args(["excite", "--kind", "sweep", "--robot"]);
+    succeed(excite.arg(robot("one-link.toml")).arg("--out").arg(&motion));
+    names(
+        &sentence(&motion),
+        &[
+            "motion.toml",
+            "a trajectory",
+            "a recording of the robot is wanted",
+        ],
+    );
+}
+
 /// A number that no measurement has is named by line and column, in few digits.
 #[test]
 fn impossible_numbers_are_named_by_line_and_column() {

@@ -78,6 +78,16 @@ pub enum ForeignFormat {
     /// JSON outside MCAP.
     #[error("JSON text; write one line per sample as CSV, with a header line such as `t,q1,tau1`")]
     Json,
+    /// A robot description in TOML.
+    #[error(
+        "a robot description (TOML), but a recording of the robot is wanted here: a .csv or .mcap file; the description goes to --robot"
+    )]
+    Description,
+    /// Parameters of a motion in TOML.
+    #[error(
+        "a trajectory (TOML), but a recording of the robot is wanted here: a .csv or .mcap file; `rig record` and `rig simulate` make one of a trajectory"
+    )]
+    Trajectory,
     /// XML or HTML.
     #[error(
         "XML or HTML text; give the recording itself (the robot's description goes to --robot)"
@@ -147,9 +157,27 @@ impl ForeignFormat {
             .map(|(_, format)| *format)
             .or_else(|| is_matlab_4(head).then_some(Self::Matlab4))
             .or_else(|| begins_json().then_some(Self::Json))
+            .or_else(|| own_toml(head))
             .or_else(|| wide(0).then_some(Self::Wide(BIG)))
             .or_else(|| wide(1).then_some(Self::Wide(LITTLE)))
     }
+}
+
+/// Returns which TOML file of this program begins with these bytes.
+fn own_toml(head: &[u8]) -> Option<ForeignFormat> {
+    let text = String::from_utf8_lossy(head);
+    let lines = || text.lines().map(str::trim);
+    let has_key = |key: &str| {
+        let mut rests = lines().filter_map(|line| line.strip_prefix(key));
+        rests.any(|rest| rest.trim_start().starts_with('='))
+    };
+    lines().any(|line| line.starts_with("[[joint]]")).then(|| {
+        match (has_key("gravity"), has_key("robot")) {
+            (true, _) => Some(ForeignFormat::Description),
+            (false, true) => Some(ForeignFormat::Trajectory),
+            (false, false) => None,
+        }
+    })?
 }
 
 /// Returns true for the header of a matrix in a MATLAB file of version 4 ("MAT-File Format", MathWorks R2019b, appendix): five

@@ -244,7 +244,7 @@ impl JointStates {
             let advice = if self.has_first {
                 "several publishers fill the topic in turn: record the topic of one publisher that has all joints of the robot"
             } else {
-                "where such a joint never moves, make it type=\"fixed\" in the URDF; where another publisher sends it, record a topic that has all joints"
+                "where such a joint never moves, make it type=\"fixed\" if a URDF describes the robot; where another publisher sends it, record a topic that has all joints"
             };
             return Err(Refusal::Message(format!(
                 "has no joint {} of the robot, only {all}; {advice}",

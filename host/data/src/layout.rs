@@ -12,7 +12,7 @@ use super::motors::MotorSide;
 use super::place::Place;
 use super::time_names::is_time;
 use super::unit::Unit;
-use rig_model::robot::{JointKind, Robot};
+use rig_model::robot::{JointKind, Origin, Robot};
 use rig_output::listed;
 
 /// Returns the columns of a file for `robot`.
@@ -304,12 +304,12 @@ fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<boo
     };
     let name = &robot.joints[first - 1].name;
     // Some joints are recorded and others not, for example those of a gripper.
-    let unmoved = if joint.len() < joints {
-        format!(
+    let unmoved = match (joint.len() < joints, robot.origin) {
+        (true, Origin::Urdf) => format!(
             "where joint `{name}` never moves, make it type=\"fixed\" in the URDF, or record its constant position; "
-        )
-    } else {
-        String::new()
+        ),
+        (true, _) => format!("where joint `{name}` never moves, record its constant position; "),
+        (false, _) => String::new(),
     };
     Err(if motor.len() == joints {
         format!(

@@ -651,11 +651,13 @@ fn lost_sign(column: &'static str, joint: usize, lost: Unsigned) -> Implausible 
     }
 }
 
-/// Returns a remark, after a comma, that a position beyond its limits by this factor may be a motor position.
+/// Returns a remark, after a comma, that a position beyond its limits by this factor may be a motor position; empty for a
+/// screw, which has no gear ratio.
 fn motor_angle(joint: &Joint, beyond: f64) -> String {
-    let Some(ratio) = joint.drive.as_ref().map(|drive| drive.gear_ratio.abs()) else {
+    let ratio = joint.drive.as_ref().map_or(0.0, |d| d.gear_ratio.abs());
+    if ratio == 0.0 {
         return String::new();
-    };
+    }
     let number = |x: f64| format_trimmed(x, 4);
     if ratio > 1.0 && beyond / ratio <= 1.2 {
         let ratio = number(ratio);

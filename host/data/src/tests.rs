@@ -8,7 +8,9 @@ use rand::{RngExt, SeedableRng};
 
 use super::made_for_tests::robot;
 use super::*;
-use rig_model::robot::{EMPS, JointKind, JointLimits, ONE_LINK_TEMPLATE, Robot};
+use rig_model::robot::{
+    EMPS, IRP6_TEMPLATE, JointKind, JointLimits, ONE_LINK_TEMPLATE, Origin, Robot,
+};
 
 fn rig() -> Robot {
     Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
@@ -108,9 +110,48 @@ fn a_joint_without_columns_beside_others_may_be_one_that_never_moves() {
     let message = read(&path, &robot).unwrap_err().to_string();
     assert!(
         message.contains("no column `q2` (position of joint `finger`")
-            && message
-                .contains("where joint `finger` never moves, make it type=\"fixed\" in the URDF"),
+            && message.contains("where joint `finger` never moves, record its constant position")
+            && !message.contains("URDF"),
         "{message}"
+    );
+    robot.origin = Origin::Urdf;
+    let message = read(&path, &robot).unwrap_err().to_string();
+    assert!(
+        message.contains("where joint `finger` never moves, make it type=\"fixed\" in the URDF"),
+        "{message}"
+    );
+}
+
+/// A ball screw has no gear ratio: positions of its joint in degrees are named as such, without one.
+#[test]
+fn positions_in_degrees_at_a_ball_screw_are_no_gear_ratio() {
+    let folder = Folder::new();
+    let robot = Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap();
+    let rows: String = (0..500)
+        .map(|k| {
+            let t = 0.01 * f64::from(k);
+            let s = (3.0 * t).sin();
+            let q = [0.1 * s, -90.0 + 20.0 * s, 5.0 * s, 0.1 * s, 0.1 * s].map(|q| q.to_string());
+            format!("{t},{},1,{s},{s},{s},{s}\n", q.join(","))
+        })
+        .collect();
+    let path = folder.file(&format!(
+        "t,q1,q2,q3,q4,q5,tau1,tau2,tau3,tau4,tau5\n{rows}"
+    ));
+    let (blocks, _) = Source::open_with(&path, &robot, EffortNeed::Required)
+        .unwrap()
+        .read_all()
+        .unwrap();
+    let said: Vec<String> = (blocks.iter())
+        .flat_map(|block| implausible_positions(block, &robot))
+        .map(|fault| fault.to_string())
+        .collect();
+    let of_screw = said.iter().find(|text| text.starts_with("q2 ")).unwrap();
+    assert!(
+        of_screw.contains("degrees")
+            && !of_screw.contains("gear ratio")
+            && !of_screw.contains("inf"),
+        "{of_screw}"
     );
 }
 
