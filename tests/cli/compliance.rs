@@ -120,7 +120,7 @@ fn matrices_and_map_come_from_a_given_stiffness() {
     command.args(["--stiffness", "2e4,2.5e4,1.2e4,4e3,3e3,1.5e3"]);
     command.args(["--stiffness-std", "400,500,240,80,60,30"]);
     command.args(["--pose", "0.3,-0.5,1.2,0.4,0.8,-0.6"]);
-    command.args(["--pose", "-1.2,0.4,0.9,-0.7,-1.1,2.0"]);
+    command.args(["--pose", "-1.2", "0.4", "0.9", "-0.7", "-1.1", "2.0"]);
     let said = succeed(&mut command);
     assert_eq!(said.matches("largest displacement").count(), 2, "{said}");
     let found = json(&at("found"));
@@ -142,6 +142,15 @@ fn wrong_options_are_refused() {
         (&[][..], "stiffness of no joint"),
         (&["--stiffness", "1,2"], "5 joints"),
         (&["--stiffness", "1,2,3,4,0"], "greater than 0"),
+        (&["--stiffness", "-1,2,3,4,5"], "--stiffness -1 of joint"),
+        (
+            &["--stiffness", "1,2,3,4,5", "--stiffness-std", "-3,4"],
+            "--stiffness-std -3 of joint \"column\" is not possible: a standard deviation is 0 or greater",
+        ),
+        (
+            &["--stiffness", "4e4,1.5,1.2,5e3,3e3", "--pose", "-1", "2"],
+            "5 joints",
+        ),
         (
             &["--stiffness", "4e4,1.5,1.2,5e3,3e3", "--pose", "1,2"],
             "5 joints",

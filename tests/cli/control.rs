@@ -173,7 +173,17 @@ fn wrong_options_are_refused_in_a_sentence() {
     assert!(contact(&["--press", "10000"]).contains("torque limits"));
     assert!(contact(&["--stiffness", "0"]).contains("surface stiffness 0"));
     assert!(contact(&["--pose", "0"]).contains("one for each of the 2 joints"));
-    assert!(contact(&["--pose", "nan", "0"]).contains("--pose contains NaN"));
+    for pose in [&["nan", "0"][..], &["nan,0"]] {
+        let options = [&["--pose"], pose].concat();
+        assert!(contact(&options).contains("--pose contains NaN"));
+    }
+    for pose in [&["-9", "-8", "1"][..], &["-9,-8,1"], &["-9,-8", "1"]] {
+        let options = [&["--pose"], pose].concat();
+        assert!(
+            contact(&options).contains("--pose has 3 numbers"),
+            "{pose:?}"
+        );
+    }
     let impedance = ["--law", "impedance", "--impedance", "nan"];
     assert!(refuse(&mut control("edda.toml", &impedance, &out)).contains("impedance NaN"));
     assert!(contact(&["--slide", "1"]).contains("--slide"));

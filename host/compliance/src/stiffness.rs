@@ -115,6 +115,15 @@ pub fn given_stiffness(
             "{option} has {count} numbers, but the robot has {n} joints; give one for each joint, base first ({hint})."
         ))
     };
+    // A wrong value says more than a wrong number of them.
+    for (std, entry) in stds.iter().zip(list.iter()) {
+        if !(*std >= 0.0 && std.is_finite()) {
+            return Err(ComplianceError::Option(format!(
+                "--stiffness-std {std} of joint \"{}\" is not possible: a standard deviation is 0 or greater.",
+                entry.joint
+            )));
+        }
+    }
     if values.len() != n {
         return Err(wrong("--stiffness", values.len(), "inf for a rigid one"));
     }
@@ -126,12 +135,6 @@ pub fn given_stiffness(
         if !(value > 0.0) {
             return Err(ComplianceError::Option(format!(
                 "--stiffness {value} of joint \"{}\" is not possible: a stiffness is greater than 0 (inf for a rigid drive).",
-                entry.joint
-            )));
-        }
-        if !(std >= 0.0 && std.is_finite()) {
-            return Err(ComplianceError::Option(format!(
-                "--stiffness-std {std} of joint \"{}\" is not possible: a standard deviation is 0 or greater.",
                 entry.joint
             )));
         }

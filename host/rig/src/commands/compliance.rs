@@ -8,6 +8,7 @@ use super::error::CommandError;
 use super::input::{Inputs, RobotArg, recordings, refuse_twice};
 use super::map_arg::UnitArg;
 use super::overwrite::refuse_folder;
+use super::pose_arg::positions;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -65,8 +66,8 @@ pub(crate) struct Args {
     /// Tool point in the flange frame, m [default: the origin of that frame]
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     tool: Option<Vec<f64>>,
-    /// Joint positions, base first, separated by commas, rad or m; give it again for more poses [default: the middle of
-    /// the ranges]
+    /// Joint positions, base first, separated by commas or spaces, rad or m; give it again for more poses [default: the
+    /// middle of the ranges]
     #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true)]
     pose: Vec<String>,
     /// The two joints of the map of the compliance, separated by a comma [default: the second and the third, else the first
@@ -223,25 +224,11 @@ impl Args {
             poses: self
                 .pose
                 .iter()
-                .map(|p| pose(p))
+                .map(|text| positions(text))
                 .collect::<Result<_, _>>()?,
             map,
         })
     }
-}
-
-/// Reads a pose.
-fn pose(text: &str) -> Result<Vec<f64>, CommandError> {
-    (text.split(','))
-        .map(|part| {
-            part.trim().parse::<f64>().map_err(|_| {
-                CommandError::Sentence(format!(
-                    "--pose {text}: `{}` is not a number; give one position for each joint, separated by commas.",
-                    part.trim()
-                ))
-            })
-        })
-        .collect()
 }
 
 /// Writes all files of the result.

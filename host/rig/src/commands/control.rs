@@ -7,6 +7,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use super::error::CommandError;
 use super::input::{RobotArg, described};
 use super::overwrite::{refuse_file, refuse_folder};
+use super::pose_arg::positions;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -117,12 +118,20 @@ struct ContactArgs {
     /// Tool point in the frame of the last joint, m
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     tool: Option<Vec<f64>>,
-    /// Start pose, rad or m of each joint
-    #[arg(long, num_args = 1..)]
-    pose: Option<Vec<f64>>,
+    /// Joint positions at the start, base first, separated by commas or spaces, rad or m
+    #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true)]
+    pose: Vec<String>,
     /// Direction into the surface, in the base frame
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     normal: Option<Vec<f64>>,
+}
+
+impl ContactArgs {
+    /// Returns the given start pose.
+    fn start(&self) -> Result<Option<Vec<f64>>, CommandError> {
+        let all: Result<Vec<_>, _> = self.pose.iter().map(|text| positions(text)).collect();
+        Ok(Some(all?.concat()).filter(|pose| !pose.is_empty()))
+    }
 }
 
 /// A law, or several.
@@ -204,7 +213,7 @@ impl Args {
             ("--press", contact.press.is_some()),
             ("--slide", contact.slide.is_some()),
             ("--noise-force", contact.noise_force.is_some()),
-            ("--pose", contact.pose.is_some()),
+            ("--pose", !contact.pose.is_empty()),
             ("--normal", contact.normal.is_some()),
         ];
         let of_tracking = [
@@ -470,7 +479,7 @@ impl Whole<'_> {
                 gap: given.gap.unwrap_or(usual.gap),
             },
             tool: three("tool", given.tool.as_deref())?,
-            pose: given.pose.clone(),
+            pose: given.start()?,
             normal: three("normal", given.normal.as_deref())?,
             force: given.press,
             slide: given.slide.unwrap_or(SLIDE),

@@ -2,6 +2,40 @@
 //!
 //! The Python package (`host/python`) shares their checks of recordings and the writing of results.
 
+/// Implements [`Parser`] for a command line in which `--pose` takes several values.
+macro_rules! reads_poses {
+    ($words:ty) => {
+        impl Parser for $words {
+            fn parse() -> Self {
+                Self::parse_from(std::env::args_os())
+            }
+
+            fn try_parse() -> Result<Self, clap::Error> {
+                Self::try_parse_from(std::env::args_os())
+            }
+
+            fn parse_from<I, T>(words: I) -> Self
+            where
+                I: IntoIterator<Item = T>,
+                T: Into<std::ffi::OsString> + Clone,
+            {
+                Self::try_parse_from(words).unwrap_or_else(|error| error.exit())
+            }
+
+            fn try_parse_from<I, T>(words: I) -> Result<Self, clap::Error>
+            where
+                I: IntoIterator<Item = T>,
+                T: Into<std::ffi::OsString> + Clone,
+            {
+                let words = $crate::commands::pose_arg::with_poses_joined(words);
+                let mut matches = Self::command().try_get_matches_from(words)?;
+                <Self as clap::FromArgMatches>::from_arg_matches_mut(&mut matches)
+                    .map_err(|error| error.format(&mut Self::command()))
+            }
+        }
+    };
+}
+
 mod audit;
 mod base;
 mod board;
@@ -31,6 +65,7 @@ mod map_arg;
 mod mjcf;
 mod overwrite;
 mod pictures;
+mod pose_arg;
 mod record;
 mod run;
 mod same_file;
@@ -89,7 +124,7 @@ impl CommandFactory for Cli {
     }
 }
 
-impl Parser for Cli {}
+reads_poses!(Cli);
 
 impl Cli {
     /// Runs the command; returns the exit status.

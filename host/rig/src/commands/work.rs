@@ -49,15 +49,17 @@ impl CommandFactory for Words {
     }
 }
 
-impl Parser for Words {}
+reads_poses!(Words);
 
-/// Lets every option of a command and of its subcommands take a negative number. The check of the value then says what is
+/// Lets every option of a command and of its subcommands take a negative number, or a list that begins with one. The check of the value then says what is
 /// possible, instead of clap that `-2` is no option.
 pub(crate) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let names: Vec<String> = (command.get_subcommands())
         .map(|own| own.get_name().to_owned())
         .collect();
     let command = command.mut_args(|own| match own.get_action().takes_values() {
+        // A list is one word, and for clap no number.
+        true if own.get_value_delimiter().is_some() => own.allow_hyphen_values(true),
         true if !own.is_positional() => own.allow_negative_numbers(true),
         _ => own,
     });

@@ -300,7 +300,7 @@ fn option(argument: &clap::Arg, value: &Value) -> Result<(Vec<String>, Vec<Strin
     let words = if fixed.is_some() {
         let name = std::iter::once(format!("--{name}"));
         name.chain(values.iter().cloned()).collect()
-    } else if argument.get_value_delimiter().is_some() {
+    } else if argument.get_value_delimiter().is_some() || is_pose(name, &values) {
         vec![format!("--{name}={}", values.join(","))]
     } else if values.len() > 1 && !matches!(argument.get_action(), ArgAction::Append) {
         return Err(format!(
@@ -313,6 +313,11 @@ fn option(argument: &clap::Arg, value: &Value) -> Result<(Vec<String>, Vec<Strin
             .collect()
     };
     Ok((words, values))
+}
+
+/// Returns true for the positions of one pose, not several poses as text.
+fn is_pose(name: &str, values: &[String]) -> bool {
+    name == "pose" && values.iter().all(|value| value.parse::<f64>().is_ok())
 }
 
 /// Returns the entries of a table as KEY=VALUE, and as KEY=VALUE,VALUE where the value is a list.
