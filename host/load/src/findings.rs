@@ -167,8 +167,13 @@ impl Told<'_> {
         }
         let biases = self.biases();
         for bias in &biases {
-            warnings.extend(jump_words(bias));
-            warnings.extend(drift_words(bias, self.fit.noise));
+            let told = [jump_words(bias), drift_words(bias, self.fit.noise)];
+            let doubt = self.advice("");
+            let doubted = told
+                .into_iter()
+                .flatten()
+                .map(|text| text + doubt.trim_end());
+            warnings.extend(doubted);
         }
         SensorFindings {
             reads,
