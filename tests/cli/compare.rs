@@ -189,6 +189,43 @@ fn a_robot_is_simulated_and_identified_in_four_ways() {
     assert!(said.contains("--force"), "{said}");
 }
 
+/// The table of docs/compare.md has what the command prints.
+#[test]
+fn the_documented_comparison_of_methods_is_what_is_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = rig();
+    command.args(["compare", "--simulated", "--out"]);
+    let said = succeed(command.arg(folder.path().join("methods")));
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/compare.md");
+    let page = fs::read_to_string(page).unwrap();
+    let between = |text: &str, before: &str, after: &str| -> String {
+        let rest = text.split_once(before).unwrap().1;
+        rest.split_once(after).unwrap().0.to_owned()
+    };
+    for (name, shown) in [
+        ("one-link", "one-link"),
+        ("irp6", "IRp-6"),
+        ("edda", "EDDA"),
+    ] {
+        let mut lines = said.lines();
+        let head = lines
+            .find(|line| line.starts_with(&format!("{name}: ")))
+            .unwrap();
+        let mut cells = vec![
+            shown.to_owned(),
+            between(head, ": ", " base parameters"),
+            between(head, "motion of ", ","),
+            between(head, "cut off at ", ","),
+            between(head, "Hz, ", " rows/s") + " /s",
+        ];
+        for line in lines.take(4) {
+            cells.push(between(line, "torque error ", ","));
+        }
+        let row = format!("| {} |", cells.join(" | "));
+        assert!(page.contains(&row), "docs/compare.md lacks {row}");
+    }
+}
+
 /// The two public recordings of EMPS: the second one gives 1 % less mass, and the pooled values are near the published
 /// ones.
 #[test]
