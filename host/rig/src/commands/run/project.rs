@@ -377,7 +377,7 @@ mod tests {
 
     #[test]
     fn tables_become_the_words_of_the_command() {
-        let text = "unit = { q = \"deg\", t = \"ms\" }\n\n[a]\ncommand = \"identify\"\nrobot = \"arm.urdf\"\ndata = [\"1.csv\", \"2.csv\"]\nlock.finger = -0.5\nas-described = true\neven-if-wrong = false\n\n[b]\ncommand = \"excite\"\nrobot = \"arm.urdf\"\nstart = [-1.5, 0]\n\n[c]\ncommand = \"convert\"\nfile = \"1.csv\"\n\n[d]\ncommand = \"compare\"\nrobot = \"arm.urdf\"\nset = { cold = [\"1.csv\", \"2.csv\"] }\n";
+        let text = "unit = { q = \"deg\", t = \"ms\" }\n\n[a]\ncommand = \"identify\"\nrobot = \"arm.urdf\"\ndata = [\"1.csv\", \"2.csv\"]\nlock.finger = -0.5\nas-described = true\neven-if-wrong = false\n\n[b]\ncommand = \"excite\"\nrobot = \"arm.urdf\"\nstart = [-1.5, 0]\n\n[c]\ncommand = \"convert\"\nfile = \"1.csv\"\n\n[e]\ncommand = \"control\"\nrobot = \"arm.urdf\"\npose = [-1.5, 0]\n\n[f]\ncommand = \"compliance\"\nrobot = \"arm.urdf\"\npose = [\"-1.5,0\", \"1,2\"]\n\n[d]\ncommand = \"compare\"\nrobot = \"arm.urdf\"\nset = { cold = [\"1.csv\", \"2.csv\"] }\n";
         let found = steps(Path::new("lab.toml"), text).unwrap();
         let words: Vec<String> = found.iter().map(|step| step.words.join(" ")).collect();
         assert_eq!(
@@ -386,6 +386,8 @@ mod tests {
                 "identify --unit=q=deg --unit=t=ms --robot=arm.urdf --data=1.csv --data=2.csv --lock=finger=-0.5 --as-described --out=a",
                 "excite --robot=arm.urdf --start=-1.5,0 --out=b.toml",
                 "convert --unit=q=deg --unit=t=ms 1.csv c.npz",
+                "control --robot=arm.urdf --pose=-1.5,0 --out=e",
+                "compliance --unit=q=deg --unit=t=ms --robot=arm.urdf --pose=-1.5,0 --pose=1,2 --out=f",
                 "compare --unit=q=deg --unit=t=ms --robot=arm.urdf --set=cold=1.csv,2.csv --out=d",
             ]
         );
