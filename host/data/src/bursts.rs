@@ -1,9 +1,12 @@
 //! Rows stamped on arrival, several at a time: a USB latency timer, a network that collects packets.
 //!
 //! No row is missing. The stamps of a burst are close together. A long interval follows that lasts as long as the rows
-//! of the burst took.
+//! of the burst took. The positions change from row to row as if the rows were evenly spaced. Rows that are recorded only
+//! where a robot stops are close together, too, but there it moves between the stops.
 
 use rig_numerics::statistics::median;
+
+use super::columns::{Layout, Role};
 
 /// Minimum ratio of the long intervals to the short ones.
 const APART: f64 = 5.0;
@@ -23,13 +26,48 @@ pub(super) struct Bursts {
     pub rate: f64,
 }
 
-/// Returns the bursts in which rows with these stamps arrived; `None` if they arrived one by one.
-pub(super) fn bursts(times: &[f64]) -> Option<Bursts> {
+/// Sizes of the changes of the positions from row to row.
+pub(super) struct Changes {
+    /// Columns of the positions.
+    columns: Vec<usize>,
+    last: Option<Vec<f64>>,
+    /// Sum over the joints, by row from the second on.
+    pub sizes: Vec<f64>,
+}
+
+impl Changes {
+    pub(super) fn of(layout: &Layout) -> Self {
+        let is_position = |k: &usize| {
+            let role = &layout.columns[*k].role;
+            matches!(role, Role::Position(_) | Role::MotorPosition(_))
+        };
+        Self {
+            columns: (0..layout.columns.len()).filter(is_position).collect(),
+            last: None,
+            sizes: Vec::new(),
+        }
+    }
+
+    /// Takes the values of a row.
+    pub(super) fn push(&mut self, values: &[f64]) {
+        let now: Vec<f64> = self.columns.iter().map(|k| values[*k]).collect();
+        if let Some(last) = &self.last {
+            let steps = now.iter().zip(last).map(|(now, last)| (now - last).abs());
+            self.sizes.push(steps.sum());
+        }
+        self.last = Some(now);
+    }
+}
+
+/// Returns the bursts in which rows with these stamps arrived; `None` if they arrived one by one. `moved` has the sizes of the
+/// changes of the positions ([`Changes`]).
+pub(super) fn bursts(times: &[f64], moved: &[f64]) -> Option<Bursts> {
     let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let (first, last) = (times.first()?, times.last()?);
     let mean = (last - first) / intervals.len().max(1) as f64;
     // Intervals within a burst are shorter than the mean, the one at its end is longer.
     let (short, long): (Vec<f64>, Vec<f64>) = intervals.iter().partition(|step| **step < mean);
+    let short_count = short.len();
     let (short, typical) = (median(short)?, median(long.clone())?);
     let steady = long
         .iter()
@@ -40,6 +78,13 @@ pub(super) fn bursts(times: &[f64]) -> Option<Bursts> {
     let ends: Vec<usize> = (0..intervals.len())
         .filter(|k| intervals[*k] >= mean)
         .collect();
+    let between: f64 = ends.iter().filter_map(|k| moved.get(*k)).sum();
+    let within = moved.iter().sum::<f64>() - between;
+    let [between, within] = [between / long.len() as f64, within / short_count as f64];
+    // By rows the two are alike, by stamps they have the ratio of the intervals: which is nearer?
+    if between * between * short > within * within * typical {
+        return None;
+    }
     let sizes: Vec<f64> = ends
         .windows(2)
         .map(|pair| (pair[1] - pair[0]) as f64)
@@ -84,10 +129,35 @@ mod tests {
                             }
                     })
                     .collect();
-                let found = bursts(&times).unwrap();
+                let even = vec![1e-3; times.len() - 1];
+                assert_eq!(bursts(&times, &[]), bursts(&times, &even));
+                let found = bursts(&times, &even).unwrap();
                 assert_eq!(found.rows, rows as usize);
                 assert!((found.rate / rate - 1.0).abs() < 0.02, "{found:?}");
             }
+        }
+    }
+
+    /// Five rows at 100 Hz in each pose, some seconds apart, with and without noise of the positions.
+    #[test]
+    fn rows_where_a_robot_stops_are_no_bursts() {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
+        for noise in [0.0, 1e-4] {
+            let rows = 0..200_u32;
+            let time = |k: u32| f64::from(k / 5) * 6.0 + f64::from(k % 5) * 0.01;
+            let times: Vec<f64> = rows.clone().map(time).collect();
+            let position = |k: u32| 0.7 * f64::from(k / 5).sin();
+            let mut at = |k: u32| position(k) + noise * rng.random::<f64>();
+            let places: Vec<f64> = rows.map(&mut at).collect();
+            let moved: Vec<f64> = places
+                .windows(2)
+                .map(|two| (two[1] - two[0]).abs())
+                .collect();
+            assert_eq!(bursts(&times, &moved), None);
+            assert!(
+                bursts(&times, &[]).is_some(),
+                "by their stamps they look alike"
+            );
         }
     }
 
@@ -109,7 +179,7 @@ mod tests {
             .map(|k| even(k) + if k % 50 == 0 { 9e-4 } else { 0.0 })
             .collect();
         for times in [stamps, jitter, lossy, frames, twice] {
-            assert_eq!(bursts(&times), None);
+            assert_eq!(bursts(&times, &[]), None);
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::block::{Block, JointColumns};
-use super::bursts::bursts;
+use super::bursts::{Changes, bursts};
 use super::columns::{EffortNeed, Layout, Role};
 use super::csv::CsvRows;
 use super::error::{DataError, Warning};
@@ -166,7 +166,7 @@ impl Source {
         let mut layout = layout(path, &header, robot, need)
             .map_err(|error| error.explained(header.remarks.iter().chain(&rows.remarks())))?;
         let mut values = vec![0.0; layout.columns.len()];
-        let mut times = Vec::new();
+        let (mut times, mut changes) = (Vec::new(), Changes::of(&layout));
         while times.len() < PROBED_ROWS
             && let Some(line) = rows.next_raw(&layout, &mut values)?
         {
@@ -180,11 +180,12 @@ impl Source {
             let now = values[layout.time];
             rows.check_growth(path, line, times.last().copied(), now)?;
             times.push(now);
+            changes.push(&values);
         }
         if times.is_empty() {
             return Err(DataError::NoRows { path: path.into() });
         }
-        if let Some(found) = bursts(&times) {
+        if let Some(found) = bursts(&times, &changes.sizes) {
             return Err(DataError::Bursts {
                 path: path.into(),
                 rows: found.rows,

@@ -9,6 +9,9 @@ pub(crate) const AT_REST: f64 = 5e-3;
 /// Time between rows beyond which they are no recording of a motion, s. Joints of arms reach a few rad/s and turn within a
 /// second; a motion that is sampled more seldom has no acceleration that could be computed.
 const LONGEST_STEP: f64 = 0.15;
+/// Fastest joint of a robot that rests, rad/s or m/s: what such a motion does to the readings is below one per cent of the
+/// weight.
+const SLOWEST: f64 = 0.025;
 /// Multiple of the described speed of a joint beyond which it does not move from one row to the next: the rows of two poses
 /// stand beside each other.
 const TOO_FAST: f64 = 1.5;
@@ -22,6 +25,50 @@ pub(crate) enum Pace {
     Listed,
     /// Rows follow each other in time, whether the robot moves or stands.
     Continuous,
+}
+
+/// Rows that follow each other without a long step between them.
+#[derive(Clone, Debug)]
+pub(crate) struct Run {
+    first: Vec<f64>,
+    /// Time of its first and last row, s.
+    since: f64,
+    until: f64,
+    /// Furthest of its positions from the first.
+    spread: f64,
+}
+
+impl Run {
+    /// Begins with a row.
+    pub(crate) fn of(t: f64, q: Vec<f64>) -> Self {
+        Self {
+            first: q,
+            since: t,
+            until: t,
+            spread: 0.0,
+        }
+    }
+
+    /// Returns the positions of the first row.
+    pub(crate) fn first(&self) -> &[f64] {
+        &self.first
+    }
+
+    /// Returns the furthest that a joint is from its position in the first row.
+    pub(crate) fn distance(&self, q: &[f64]) -> f64 {
+        (self.first.iter().zip(q)).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+    }
+
+    /// Takes a row.
+    pub(crate) fn push(&mut self, t: f64, q: &[f64]) {
+        self.until = t;
+        self.spread = self.spread.max(self.distance(q));
+    }
+
+    /// Returns true if its rows show that the robot rests. One row alone shows nothing.
+    pub(crate) fn rests(&self) -> bool {
+        self.until > self.since && self.spread <= SLOWEST * (self.until - self.since)
+    }
 }
 
 /// Sums over the steps from row to row.
@@ -40,6 +87,10 @@ pub(crate) struct Steps {
     leaps: usize,
     /// Squares of the changes, and of the changes of the changes.
     squares: [f64; 2],
+    /// Rows since the last long step.
+    run: Option<Run>,
+    /// Runs of rows before it, and those of them in which the robot rests.
+    runs: [usize; 2],
 }
 
 impl Steps {
@@ -58,12 +109,34 @@ impl Steps {
             moves: 0,
             leaps: 0,
             squares: [0.0; 2],
+            run: None,
+            runs: [0; 2],
         }
+    }
+
+    /// Takes a row into the run of rows.
+    fn follow(&mut self, t: f64, q: &[f64]) {
+        let goes_on = |run: &&mut Run| t - run.until <= LONGEST_STEP;
+        if let Some(run) = self.run.as_mut().filter(goes_on) {
+            run.push(t, q);
+            return;
+        }
+        if let Some(before) = self.run.replace(Run::of(t, q.to_vec())) {
+            self.runs[0] += 1;
+            self.runs[1] += usize::from(before.rests());
+        }
+    }
+
+    /// Returns true if rows were recorded only where the robot rests.
+    fn rests_in_all_runs(&self) -> bool {
+        let [runs, at_rest] = self.runs;
+        runs > 0 && runs == at_rest && self.run.as_ref().is_some_and(Run::rests)
     }
 
     /// Takes a row.
     pub(crate) fn push(&mut self, t: f64, q: Vec<f64>) {
         self.rows += 1;
+        self.follow(t, &q);
         if let Some((before, from)) = self.last.take() {
             let step = t - before;
             let change: Vec<f64> = q.iter().zip(&from).map(|(a, b)| a - b).collect();
@@ -86,7 +159,8 @@ impl Steps {
         let is_seldom = 2 * self.long + 1 > self.rows;
         // Where many rows are far apart in time, those of a slow motion lie on a smooth path.
         let is_smooth = self.rows >= FEWEST_ROWS && self.squares[1] < self.squares[0];
-        match is_seldom && !is_smooth || self.leaps > 0 && 2 * self.leaps >= self.moves {
+        let is_led = self.leaps > 0 && 2 * self.leaps >= self.moves;
+        match is_seldom && !is_smooth || is_led || self.rests_in_all_runs() {
             true => Pace::Listed,
             false => Pace::Continuous,
         }

@@ -5,13 +5,10 @@ use rig_shared::multibody::{Chain, wrench_regressor};
 
 use crate::axes::SensorAxes;
 use crate::error::LoadError;
-use crate::pace::{AT_REST, Pace};
+use crate::pace::{AT_REST, Pace, Run};
 use crate::rows::{Ends, FEWEST_ROWS, base_axes, beyond, each_readings, temperature};
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
 
-/// Shortest time at one position that is a rest in rows that follow each other in time, s: a joint that passes through
-/// [`AT_REST`] meanwhile has 25 mrad/s, and what it does to the readings is below one per cent of the weight.
-const SHORTEST_REST: f64 = 0.2;
 /// Poses nearer than this multiple of [`AT_REST`] follow each other in a motion.
 const NEAR: f64 = 3.0;
 /// Shorter than this share of the longest pose, rows belong to the way between two.
@@ -52,7 +49,7 @@ pub(crate) fn poses(
         Ok(())
     })?;
     if pace == Pace::Continuous {
-        poses.retain(|pose| pose.until - pose.since >= SHORTEST_REST);
+        poses.retain(|pose| pose.run.rests());
     }
     let longest = poses.iter().map(|pose| pose.rows).max().unwrap_or(0);
     poses.retain(|pose| pose.rows as f64 >= SHORT * longest as f64);
@@ -102,10 +99,7 @@ fn never_rests(label: &str, rows: u64) -> LoadError {
 
 /// Sums over the rows of one pose.
 struct Pose {
-    first: Vec<f64>,
-    /// Time of its first and last row, s.
-    since: f64,
-    until: f64,
+    run: Run,
     rows: u64,
     q: Vec<f64>,
     readings: [f64; 6],
@@ -116,9 +110,7 @@ struct Pose {
 impl Pose {
     fn new(q: Vec<f64>, readings: [f64; 6], others: [f64; 2]) -> Self {
         Self {
-            first: q.clone(),
-            since: others[0],
-            until: others[0],
+            run: Run::of(others[0], q.clone()),
             rows: 1,
             q,
             readings,
@@ -126,21 +118,17 @@ impl Pose {
         }
     }
 
-    fn distance(&self, q: &[f64]) -> f64 {
-        (self.first.iter().zip(q)).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
-    }
-
     fn is_at(&self, q: &[f64]) -> bool {
-        self.distance(q) < AT_REST
+        self.run.distance(q) < AT_REST
     }
 
     fn is_near(&self, other: &Self) -> bool {
-        self.distance(&other.first) < NEAR * AT_REST
+        self.run.distance(other.run.first()) < NEAR * AT_REST
     }
 
     fn add(&mut self, q: &[f64], readings: &[f64; 6], others: [f64; 2]) {
         self.rows += 1;
-        self.until = others[0];
+        self.run.push(others[0], q);
         let sums = self
             .q
             .iter_mut()

@@ -364,6 +364,24 @@ fn rest_and_motion_are_told_by_the_rows_and_not_by_their_number() {
     let found = identify(&stopping, false).unwrap();
     assert_eq!(found.sensor.as_ref().unwrap().rows, 6);
     assert!(errors(&found, &points)[0] < 0.02);
+    // Some rows a pose, recorded only while the robot stands, with and without noise of the positions.
+    for (rows, step, noise) in [
+        (2, 0.01, 0.0),
+        (5, 0.01, 1e-5),
+        (50, 0.01, 1e-4),
+        (10, 0.1, 0.0),
+    ] {
+        let turn = |k: usize| noise * (7.3 * k as f64).sin();
+        let all = (0..6 * rows).map(|k| stops[k / rows].iter().map(|q| q + turn(k)).collect());
+        let mut few = poses(&moving, &points, &sensor, &all.collect::<Vec<_>>(), 4);
+        let times = few.blocks[0].t.iter_mut().enumerate();
+        times.for_each(|(k, t)| *t = 9.0 * (k / rows) as f64 + step * (k % rows) as f64);
+        for flag in [false, true] {
+            let found = identify(&few, flag).unwrap();
+            assert_eq!(found.sensor.as_ref().unwrap().rows, 6, "{rows} rows");
+            assert!(errors(&found, &points)[0] < 0.02);
+        }
+    }
     // One row a pose, written without a clock: no joint makes such steps.
     let mut listed = poses(&moving, &points, &sensor, &stops, 4);
     let times = listed.blocks[0].t.iter_mut().enumerate();
