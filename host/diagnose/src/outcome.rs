@@ -395,6 +395,8 @@ pub enum FaultKind {
     Held,
     /// A signed column that was read as unsigned.
     Unsigned,
+    /// A torque whose gain changes within the recording.
+    Gain,
     /// Too few rows.
     TooShort,
     /// No motion.
@@ -417,6 +419,7 @@ impl FaultKind {
             Self::Jump => "jump",
             Self::Held => "held",
             Self::Unsigned => "unsigned",
+            Self::Gain => "gain",
             Self::TooShort => "too-short",
             Self::NotMoving => "not-moving",
         }

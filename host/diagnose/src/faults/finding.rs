@@ -124,7 +124,12 @@ impl Fault {
 
     /// Returns true if nothing without a fault explains the data.
     pub(crate) fn is_certain(&self) -> bool {
-        let doubt = matches!(&self.finding, Finding::Column(problem, _) | Finding::Clock(problem) if problem.is_doubt());
+        let doubt = match &self.finding {
+            Finding::Column(problem, _) | Finding::Clock(problem) => problem.is_doubt(),
+            // The drive itself may have changed.
+            Finding::Fit(Misfit::GainChanged { .. }) => true,
+            _ => false,
+        };
         !doubt && !matches!(self.beside, Beside::NoFault(_))
     }
 }

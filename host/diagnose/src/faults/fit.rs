@@ -6,7 +6,7 @@ use rig_identify::independent_columns;
 use rig_numerics::statistics::squares_about_mean;
 
 /// Share of a column that must be independent of the others to be excited.
-const EXCITED: f64 = 1e-5;
+pub(crate) const EXCITED: f64 = 1e-5;
 /// Most stretches that count as independent.
 const STRETCHES: usize = 60;
 /// Least rows of a stretch, more than the correlation length of residuals.
@@ -64,7 +64,7 @@ impl Measured {
 /// stretch g and e_g their residual. Leaving it out moves the coordinates by (1 − Q_gᵀ·Q_g)⁻¹·Q_gᵀ·e_g. Residuals
 /// without the inverse are far too small with nearly as many parameters as stretches, as the fit adapts to them. A
 /// direction in only one stretch has no bounds.
-fn jackknife(basis: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, usize) {
+pub(crate) fn jackknife(basis: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, usize) {
     let (rows, size) = basis.shape();
     let length = rows.div_ceil(STRETCHES).max(LEAST_STRETCH);
     let mut sum = DMatrix::zeros(size, size);

@@ -143,6 +143,14 @@ pub(crate) enum Misfit {
     },
     /// A described rotor with more inertia than its joint; kg·m² or kg.
     HeavyRotor { rotor: f64, whole: f64 },
+    /// A torque whose gain changes within the recording.
+    GainChanged {
+        /// Earliest and latest time of the change, s.
+        between: [f64; 2],
+        /// Gain after the change over that before, and its standard deviation.
+        factor: [f64; 2],
+        left: [f64; 2],
+    },
     /// A torque without its sign, which should be negative for some per cent of the time.
     Magnitude { percent: f64 },
 }
@@ -173,6 +181,7 @@ impl Misfit {
             | Self::StrongestElsewhere { .. } => FaultKind::Gravity,
             Self::Alike { .. } | Self::HeavyRotor { .. } => FaultKind::Ratio,
             Self::Magnitude { .. } => FaultKind::Magnitude,
+            Self::GainChanged { .. } => FaultKind::Gain,
         }
     }
 

@@ -15,6 +15,7 @@ mod described;
 mod factors;
 mod finding;
 mod fit;
+mod gain;
 mod gravity;
 mod judge;
 mod levels;
@@ -186,6 +187,10 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<Fault>, DiagnoseError> {
     if torque {
         for round in judge::Judge::new(robot, runs)?.faults()? {
             judged.extend(unsaid(robot, &judged, round));
+        }
+        // A torque that fits after a certain fault is undone shows no gain as recorded.
+        if units.iter().chain(&judged).all(|fault| !fault.is_certain()) {
+            judged.extend(gain::changes(robot, runs)?);
         }
     }
     let (units, doubts): (Vec<_>, Vec<_>) = units.into_iter().partition(Fault::is_certain);

@@ -1,5 +1,7 @@
 //! A recording as a few thousand rows: means over short stretches, for regressor and torque alike.
 
+use core::ops::Range;
+
 use nalgebra::DMatrix;
 use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission};
@@ -41,6 +43,11 @@ impl Form {
         })
     }
 
+    /// Returns the number of joints.
+    pub(crate) fn joints(&self) -> usize {
+        self.chain.joint_count()
+    }
+
     /// Returns the number of columns: the joints' own, then the motors'.
     pub(crate) fn width(&self) -> usize {
         let motors = self.drives.as_ref().map_or(0, |_| MOTOR_COLUMNS);
@@ -53,6 +60,10 @@ impl Form {
 pub(crate) struct Rows {
     /// s between rows
     pub(crate) period: f64,
+    /// Middle of each row, s on the clock of the recording.
+    pub(crate) t: Vec<f64>,
+    /// True where the drive was off, or an event left out, for a part of the row.
+    pub(crate) off: Vec<bool>,
     /// Position, velocity, acceleration and torque, joint by joint.
     pub(crate) q: Vec<Vec<f64>>,
     pub(crate) qd: Vec<Vec<f64>>,
@@ -79,12 +90,23 @@ fn pile(values: &[f64], near: f64) -> f64 {
 }
 
 impl Rows {
-    /// Returns the rows of one recording with torque.
+    /// Returns the first rows of one recording with torque.
     pub(crate) fn of(runs: &[&Run], joints: usize) -> Self {
+        Self::first(runs, joints, MOST)
+    }
+
+    /// Returns rows over all of one recording with torque: every n-th where there are too many.
+    pub(crate) fn over_all(runs: &[&Run], joints: usize) -> Self {
+        Self::first(runs, joints, usize::MAX).thinned(MOST)
+    }
+
+    fn first(runs: &[&Run], joints: usize, most: usize) -> Self {
         let rate = runs.first().map_or(RATE, |run| run.rate);
         let stride = (rate / RATE).round().max(1.0) as usize;
         let mut rows = Self {
             period: stride as f64 / rate,
+            t: Vec::new(),
+            off: Vec::new(),
             q: vec![Vec::new(); joints],
             qd: vec![Vec::new(); joints],
             qdd: vec![Vec::new(); joints],
@@ -104,7 +126,13 @@ impl Rows {
                 let mean = |x: &[f64], from: usize| statistics::mean(&x[from..from + stride]);
                 let columns = [&joint.q, &joint.qd, &joint.qdd, &joint.tau];
                 let whole = columns.iter().map(|x| x.len()).min().unwrap_or(0) / stride;
-                for k in (0..whole.min(MOST.saturating_sub(rows.q[j].len()))).map(|k| k * stride) {
+                for k in (0..whole.min(most.saturating_sub(rows.q[j].len()))).map(|k| k * stride) {
+                    if j == 0 {
+                        let away = |range: &Range<usize>| range.start < k + stride && k < range.end;
+                        rows.t.push(mean(&run.t, k));
+                        rows.off
+                            .push(run.coasting.iter().chain(&run.left_out).any(away));
+                    }
                     rows.q[j].push(mean(&joint.q, k));
                     rows.qd[j].push(mean(&joint.qd, k));
                     rows.qdd[j].push(mean(&joint.qdd, k));
@@ -149,6 +177,8 @@ impl Rows {
         };
         Self {
             period: self.period * step as f64,
+            t: self.t.iter().copied().step_by(step).collect(),
+            off: self.off.iter().copied().step_by(step).collect(),
             q: thin(&self.q),
             qd: thin(&self.qd),
             qdd: thin(&self.qdd),

@@ -3,6 +3,7 @@
 mod alike;
 mod coarse;
 mod doubts;
+mod gain;
 mod mounts;
 mod scales;
 mod transformed;

@@ -8,7 +8,7 @@ use crate::faults::misfit::{Misfit, Needs, Reversal, Sense};
 use crate::faults::names::Name;
 use crate::faults::undo::Columns;
 use rig_model::robot::{Joint, JointKind, Robot};
-use rig_output::{format_significant, format_trimmed, format_unit, listed};
+use rig_output::{format_significant, format_trimmed, format_unit, format_value, listed};
 
 /// Relative difference below which two factors are the same.
 const SAME: f64 = 0.1;
@@ -81,6 +81,11 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Misfit) -> String {
             dry,
         } => alike(n, [factor, weight, viscous, dry]),
         Misfit::HeavyRotor { rotor, whole } => heavy_rotor(joint, [rotor, whole]),
+        Misfit::GainChanged {
+            between,
+            factor,
+            left,
+        } => gain_changed(n, between, factor, left),
         Misfit::Magnitude { percent } => format!(
             "tau{n} is never negative though the joint turns both ways: it is a magnitude whose sign was lost (by the motion it should be negative for about {percent:.0} % of the time). Record the signed torque or current; a register of load or current that is read as unsigned has the sign in its highest bit or in the two's complement."
         ),
@@ -96,6 +101,14 @@ fn leaves(left: [f64; 2], beside: &str) -> String {
 /// Formats an angle with the resolution of a fit of gravity.
 fn hundredths(angle: f64) -> String {
     format_significant((100.0 * angle).round() / 100.0, 3)
+}
+
+fn gain_changed(n: usize, [from, to]: [f64; 2], [factor, std]: [f64; 2], left: [f64; 2]) -> String {
+    format!(
+        "tau{n} is {} times as large after the change at t = {from:.2} … {to:.2} s as before (with its gain undone, the model {}); no load, no friction and no drift that changes there explains as much. Values of the whole recording belong to neither part: look for a range of the current sensor, a torque constant or a unit that was switched, divide the later torque by this factor or multiply the earlier one by it, or cut the recording there.",
+        format_value(factor, std),
+        leaves(left, "")
+    )
 }
 
 fn shifted(n: usize, shift: f64, left: [f64; 2]) -> String {
