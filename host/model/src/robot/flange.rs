@@ -7,7 +7,6 @@ use super::array::exact;
 use super::fault::{Fault, Step, is_safe_magnitude, written};
 use super::frame::roll_pitch_yaw;
 use super::right_angle::{ROUNDING, right_angle};
-use super::serial_robot::Robot;
 
 /// Pose of the flange frame in the frame of the last joint; the same frame if it is not described. For a URDF it is the
 /// frame of the link that the chain ends at (its tip).
@@ -67,13 +66,6 @@ impl Flange {
     }
 }
 
-impl Robot {
-    /// Returns the pose of the flange frame in the frame of the last joint.
-    pub fn flange_pose(&self) -> Isometry3<f64> {
-        self.flange.pose()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -82,7 +74,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::robot::ONE_LINK_TEMPLATE;
+    use crate::robot::{ONE_LINK_TEMPLATE, Robot};
 
     fn read(table: &str) -> Result<Robot, String> {
         let text = format!("{ONE_LINK_TEMPLATE}\n[flange]\n{table}\n");

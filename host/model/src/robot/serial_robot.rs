@@ -44,6 +44,11 @@ pub struct Robot {
 }
 
 impl Robot {
+    /// Returns the pose of the flange frame in the frame of the last joint.
+    pub fn flange_pose(&self) -> nalgebra::Isometry3<f64> {
+        self.flange.pose()
+    }
+
     /// Returns the index (from 0) of the joint called `name`.
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|j| j.name == name)
