@@ -142,20 +142,7 @@ impl Told<'_> {
         let gravity = self.gravity(warnings);
         let delay = self.delay(warnings);
         let position = self.position(warnings);
-        for [found, other] in &self.alternatives {
-            let factor = self.scale.filter(|_| *other == Nuisance::Scale);
-            let factor = factor.map_or_else(String::new, |[scale, std]| {
-                format!(
-                    " ({} times, ± one standard deviation)",
-                    format_value(scale, std)
-                )
-            });
-            warnings.push(format!(
-                "{}{factor} explains the readings as well as {}: poses in more directions, or a livelier motion, tell them apart.",
-                capital(words(*other)),
-                words(*found)
-            ));
-        }
+        warnings.extend(self.alternative_words());
         if self.sensor.reads.is_none() {
             let [whose, key] = match reads {
                 Reads::Load => ["load on the robot", "load"],
@@ -200,6 +187,24 @@ impl Told<'_> {
                 .sum(),
             prepared,
         }
+    }
+
+    /// Says what explains the readings as well as what was found.
+    fn alternative_words(&self) -> impl Iterator<Item = String> {
+        self.alternatives.iter().map(|[found, other]| {
+            let factor = self.scale.filter(|_| *other == Nuisance::Scale);
+            let factor = factor.map_or_else(String::new, |[scale, std]| {
+                format!(
+                    " ({} times, ± one standard deviation)",
+                    format_value(scale, std)
+                )
+            });
+            format!(
+                "{}{factor} explains the readings as well as {}: poses in more directions, or a livelier motion, tell them apart.",
+                capital(words(*other)),
+                words(*found)
+            )
+        })
     }
 
     fn turned(&self, angle: f64, axis: &Vector3<f64>, [roll, pitch, yaw]: [f64; 3]) -> String {
