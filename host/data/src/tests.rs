@@ -135,9 +135,7 @@ fn positions_in_degrees_at_a_ball_screw_are_no_gear_ratio() {
             format!("{t},{},1,{s},{s},{s},{s}\n", q.join(","))
         })
         .collect();
-    let path = folder.file(&format!(
-        "t,q1,q2,q3,q4,q5,tau1,tau2,tau3,tau4,tau5\n{rows}"
-    ));
+    let path = folder.file(format!("t,q1,q2,q3,q4,q5,tau1,tau2,tau3,tau4,tau5\n{rows}"));
     let (blocks, _) = Source::open_with(&path, &robot, EffortNeed::Required)
         .unwrap()
         .read_all()
