@@ -149,8 +149,8 @@ pub(crate) fn exchanged_and_scaled(
     kept.filter(is_other).collect()
 }
 
-/// Returns the exchanges of channels that fit best, the best first. Rotations of
-/// both kinds alike are left out. With `sign_stated` the mass must be positive.
+/// Returns the exchanges of channels that fit best, the best first. Rotations of both kinds alike are left out. With
+/// `sign_stated` the mass must be positive.
 pub(crate) fn exchanged(
     sensed: &Sensed,
     mounting: &Mounting,

@@ -134,7 +134,7 @@ fn compare(
     };
     let described = trial.taken_in(Cause::Described, mounting, plain.clone());
     let fit = &described.selected.fit;
-    // Jumps of the bias, and a wrong position of the sensor, are alike to other causes.
+    // Jumps of the bias and a wrong position of the sensor can stand for other causes.
     let is_plain = fit.unknowns.jumps.is_empty() && !fit.unknowns.has(Nuisance::Origin);
     let is_certain = noise_floor(sensed.recordings).is_some() && is_plain;
     if sensed.is_exact(fit) || is_certain && explains(sensed, fit) {
@@ -458,11 +458,8 @@ impl Trial<'_> {
         let [own, others] = [fit, other].map(|own| self.sensed.squares_by_segment(own));
         let over = |s: &[f64; 2]| s[0] / fit.noise[0].powi(2) + s[1] / fit.noise[1].powi(2);
         let pairs = own.iter().filter_map(|(at, a)| Some((a, others.get(at)?)));
-        let (mut less, mut count) = (0, 0);
-        for (a, b) in pairs {
-            count += 1;
-            less += usize::from(over(a) < over(b));
-        }
-        less as f64 >= NEARLY_ALL * f64::from(count)
+        let is_less: Vec<bool> = pairs.map(|(a, b)| over(a) < over(b)).collect();
+        let less = is_less.iter().filter(|is_less| **is_less).count();
+        less as f64 >= NEARLY_ALL * is_less.len() as f64
     }
 }

@@ -1,4 +1,4 @@
-//! Rows with faulty readings that the other rows tell: they are left out, and said.
+//! Rows whose readings the load by all other rows contradicts: they are left out, and a sentence names them.
 
 use rig_model::robot::WristSensor;
 

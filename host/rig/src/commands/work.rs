@@ -51,8 +51,8 @@ impl CommandFactory for Words {
 
 reads_poses!(Words);
 
-/// Lets every option of a command and of its subcommands take a negative number, or a list that begins with one. The check of the value then says what is
-/// possible, instead of clap that `-2` is no option.
+/// Lets every option of a command and of its subcommands take a negative number, or a list that begins with one. The check
+/// of the value then says what is possible, instead of clap that `-2` is no option.
 pub(crate) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let names: Vec<String> = (command.get_subcommands())
         .map(|own| own.get_name().to_owned())
