@@ -330,6 +330,25 @@ pub(crate) fn explains(sensed: &Sensed, fit: &Fit) -> bool {
     }
 }
 
+/// Returns −2·ln of the likelihood with the noise by degrees of freedom, each unknown counted as the information criterion of
+/// Schwarz (1978) does; infinite without a degree of freedom.
+pub(crate) fn score(sensed: &Sensed, fit: &Fit) -> f64 {
+    let is_still = sensed.recordings.iter().all(|r| r.poses);
+    let bodies = 1 + usize::from(fit.unknowns.tool);
+    // At rest the six inertias of a body are no unknowns.
+    let hidden = if is_still { 6 * bodies } else { 0 };
+    let unknowns = fit.values.len().saturating_sub(hidden) as f64;
+    let equations = fit.equations as f64;
+    let freedom = equations - unknowns;
+    if freedom < 1.0 {
+        return f64::INFINITY;
+    }
+    let unbiased = equations * (equations / freedom).ln();
+    // Jumps leave out segments, so fits of unlike many equations are compared.
+    let all = 6.0 * sensed.used_rows(&Unknowns::default()) as f64;
+    (fit.misfit() + unbiased + unknowns * equations.ln()) * all / equations
+}
+
 /// What causes are tried on.
 struct Trial<'a> {
     sensed: &'a Sensed<'a>,
@@ -345,7 +364,7 @@ impl Trial<'_> {
         Tried {
             cause,
             start: start.clone(),
-            score: self.score(&selected.fit),
+            score: score(self.sensed, &selected.fit),
             selected,
         }
     }
@@ -408,25 +427,6 @@ impl Trial<'_> {
             }
         }
         all
-    }
-
-    /// Returns −2·ln of the likelihood with the noise by degrees of freedom, each unknown counted as the information
-    /// criterion of Schwarz (1978) does; infinite without a degree of freedom.
-    fn score(&self, fit: &Fit) -> f64 {
-        let is_still = self.sensed.recordings.iter().all(|r| r.poses);
-        let bodies = 1 + usize::from(fit.unknowns.tool);
-        // At rest the six inertias of a body are no unknowns.
-        let hidden = if is_still { 6 * bodies } else { 0 };
-        let unknowns = fit.values.len().saturating_sub(hidden) as f64;
-        let equations = fit.equations as f64;
-        let freedom = equations - unknowns;
-        if freedom < 1.0 {
-            return f64::INFINITY;
-        }
-        let unbiased = equations * (equations / freedom).ln();
-        // Jumps leave out segments, so fits of unlike many equations are compared.
-        let all = 6.0 * self.sensed.used_rows(&Unknowns::default()) as f64;
-        (fit.misfit() + unbiased + unknowns * equations.ln()) * all / equations
     }
 
     /// Returns true unless a gain of a channel of poses leaves less by chance (F test for the channels of its kind, all six

@@ -97,6 +97,31 @@ pub(crate) fn cut_at(
 
 /// Says where readings are cut.
 pub(crate) fn words(recorded: &Recorded, channel: usize, level: f64, range: Option<f64>) -> String {
+    format!(
+        "{}: the load by all other rows would read more there. {:.1} % of the rows were left out. {CHECK}",
+        begin(recorded, (channel, level), range),
+        100.0 * recorded.left_out()
+    )
+}
+
+/// Says that a channel is cut in most poses.
+pub(crate) fn poses_words(
+    recorded: &Recorded,
+    cut: (usize, f64),
+    range: Option<f64>,
+    poses: usize,
+) -> String {
+    format!(
+        "{}: the load by the five other channels would read more in {poses} of {} poses. {CHECK}",
+        begin(recorded, cut, range),
+        recorded.rows()
+    )
+}
+
+/// What to do about readings that are cut.
+const CHECK: &str = "Check the amplifier, and the range that is set in the sensor.";
+
+fn begin(recorded: &Recorded, (channel, level): (usize, f64), range: Option<f64>) -> String {
     let unit = if channel < 3 { "N" } else { "N·m" };
     let described = range.map_or_else(String::new, |range| {
         format!(
@@ -105,10 +130,9 @@ pub(crate) fn words(recorded: &Recorded, channel: usize, level: f64, range: Opti
         )
     });
     format!(
-        "{}: the readings of {} are cut at about {} {unit}{described}: the load by all other rows would read more there. {:.1} % of the rows were left out. Check the amplifier, and the range that is set in the sensor.",
+        "{}: the readings of {} are cut at about {} {unit}{described}",
         recorded.label,
         WRENCH_COLUMNS[channel],
         format_significant(level, 3),
-        100.0 * recorded.left_out()
     )
 }

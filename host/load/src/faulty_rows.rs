@@ -2,14 +2,15 @@
 
 use rig_model::robot::WristSensor;
 
-use crate::causes::{Compared, compared, explains};
+use crate::causes::{Compared, compared, explains, score};
 use crate::clipping::{self, Suspect};
+use crate::cut_channel::{CutChannel, cut_channel};
 use crate::error::LoadError;
 use crate::intake::{Intake, MOST_SATURATED};
 use crate::odd_pose::{OddPoses, odd_poses};
 use crate::settle::DECISIVE;
 use crate::statistics::Recorded;
-use crate::system::{Fit, Sensed, Unknowns};
+use crate::system::{Fit, Sensed};
 
 /// Rows that were found to be faulty.
 #[derive(Default)]
@@ -18,7 +19,30 @@ pub(crate) struct FaultyRows {
     /// True once readings that are cut have been looked for.
     is_searched: bool,
     /// Poses in the order in which they are left out.
-    odd: Vec<OddPoses>,
+    poses: Vec<FaultyPoses>,
+    /// A channel that is cut in more than half of the poses.
+    channel: Option<CutChannel>,
+}
+
+/// Poses of a recording that are left out.
+enum FaultyPoses {
+    /// A channel is cut there.
+    Cut(CutChannel),
+    /// The load by the others does not explain them.
+    Odd(OddPoses),
+}
+
+impl FaultyPoses {
+    /// Leaves the poses out.
+    fn leave_out(&self, recordings: &mut [Recorded]) {
+        let (recording, poses) = match self {
+            Self::Cut(own) => (own.recording, &own.poses),
+            Self::Odd(own) => (own.recording, &own.poses),
+        };
+        if let Some(recorded) = recordings.get_mut(recording) {
+            *recorded = recorded.without_poses(poses);
+        }
+    }
 }
 
 impl FaultyRows {
@@ -33,7 +57,7 @@ impl FaultyRows {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Recorded>, LoadError> {
         let mut recordings = intake.read(delay, &places(&self.cut), warnings)?;
-        for own in &self.odd {
+        for own in &self.poses {
             own.leave_out(&mut recordings);
         }
         Ok(recordings)
@@ -58,9 +82,31 @@ impl FaultyRows {
             }
         }
         let odd = odd_beside(sensed, compared, sensor)?;
-        let is_found = odd.is_some();
-        self.odd.extend(odd);
-        Ok(is_found)
+        let cut = cut_channel(sensed, compared);
+        let cut = cut.filter(|cut| odd.as_ref().is_none_or(|odd| cut.score < odd.1));
+        let found = match (cut, odd) {
+            (Some(cut), _)
+                if sensed.recordings[cut.recording].rows() < 2 * cut.poses.len() as u64 =>
+            {
+                self.channel = Some(cut);
+                return Ok(false);
+            }
+            (Some(cut), _) => FaultyPoses::Cut(cut),
+            (None, Some((odd, _))) => FaultyPoses::Odd(odd),
+            (None, None) => return Ok(false),
+        };
+        self.poses.push(found);
+        Ok(true)
+    }
+
+    /// Returns the channel that is cut in more than half of the poses, and says where.
+    pub(crate) fn channel(&self, sensed: &Sensed, sensor: &WristSensor) -> Option<(usize, String)> {
+        let cut = self.channel.as_ref()?;
+        let recorded = &sensed.recordings[cut.recording];
+        let range = range(sensor, cut.channel);
+        let text =
+            clipping::poses_words(recorded, (cut.channel, cut.level), range, cut.poses.len());
+        Some((cut.channel, text))
     }
 
     /// Says which rows were left out, and why.
@@ -79,9 +125,9 @@ impl FaultyRows {
         };
         let rows = self.cut.iter();
         let rows = rows.map(|own| cut(own.recording, own.suspect.channel, own.level));
-        let poses = self.odd.iter().map(|own| match own.cut {
-            Some((channel, level)) => cut(own.recording, channel, level),
-            None => Ok(own.words().to_owned()),
+        let poses = self.poses.iter().map(|own| match own {
+            FaultyPoses::Cut(own) => cut(own.recording, own.channel, own.level),
+            FaultyPoses::Odd(own) => Ok(own.text.clone()),
         });
         rows.chain(poses).collect()
     }
@@ -105,20 +151,24 @@ fn cut_words(
     sensor: &WristSensor,
     even_if_wrong: bool,
 ) -> Result<String, LoadError> {
-    let range = match channel {
-        0..3 => sensor.force_range,
-        _ => sensor.moment_range,
-    };
-    let text = clipping::words(recorded, channel, level, range);
+    let text = clipping::words(recorded, channel, level, range(sensor, channel));
     match recorded.left_out() > MOST_SATURATED && !even_if_wrong {
         true => Err(LoadError::Fault(text)),
         false => Ok(text),
     }
 }
 
-/// Finds poses that the load by the others does not explain, and without which the description fits decisively better than
-/// it or any cause does with them. Some of them bend what is found beside the load, so the plain description is looked at
-/// first.
+/// Returns the described range of a channel.
+fn range(sensor: &WristSensor, channel: usize) -> Option<f64> {
+    match channel {
+        0..3 => sensor.force_range,
+        _ => sensor.moment_range,
+    }
+}
+
+/// Finds poses that the load by the others does not explain, if an error of each of their readings explains all readings
+/// decisively better than the description or any cause does. Beside them stands the score of this explanation. Some causes bend
+/// what is found beside the load, so the plain description is looked at first.
 ///
 /// # Errors
 /// [`LoadError`].
@@ -126,18 +176,13 @@ fn odd_beside(
     sensed: &Sensed,
     compared: &Compared,
     sensor: &WristSensor,
-) -> Result<Option<OddPoses>, LoadError> {
+) -> Result<Option<(OddPoses, f64)>, LoadError> {
     if sensed.recordings.iter().any(|recorded| !recorded.poses) {
         return Ok(None);
     }
     let described = &compared.described;
     let own = &described.selected.fit;
-    let plain = Unknowns {
-        tool: own.unknowns.tool,
-        ..Unknowns::default()
-    };
-    let plain = sensed.fit(&described.start, &plain);
-    let by_row = |sensed: &Sensed, score: f64| score / sensed.used_rows(&own.unknowns) as f64;
+    let plain = sensed.fit(&described.start, &own.unknowns.plain());
     let all = compared.causes.iter().chain([described]);
     let least = all.map(|own| own.score).fold(f64::INFINITY, f64::min);
     for fit in [&plain, own] {
@@ -148,15 +193,21 @@ fn odd_beside(
             continue;
         };
         let mut recordings = sensed.recordings.to_vec();
-        odd.leave_out(&mut recordings);
+        if let Some(own) = recordings.get_mut(odd.recording) {
+            *own = own.without_poses(&odd.poses);
+        }
         let without = Sensed {
             recordings: &recordings,
             ..*sensed
         };
-        let score = by_row(&without, self::compared(&without, sensor)?.described.score);
-        let rows = sensed.used_rows(&own.unknowns) as f64;
-        if rows * (score - by_row(sensed, least)) < -DECISIVE {
-            return Ok(Some(odd));
+        // The errors are further unknowns, and nothing is left in these poses.
+        let mut explained = self::compared(&without, sensor)?.described.selected.fit;
+        let errors = 6 * odd.poses.len();
+        explained.values.extend(vec![0.0; errors]);
+        explained.equations += errors as u64;
+        let score = score(sensed, &explained);
+        if score < least - DECISIVE {
+            return Ok(Some((odd, score)));
         }
     }
     Ok(None)

@@ -5,10 +5,12 @@ use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::PreprocessingPlan;
 use rig_model::robot::{Reads, Robot, WristSensor};
 use rig_output::{capital, format_significant, format_value, listed};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::error::LoadError;
 use crate::estimate::Estimate;
 use crate::mounting::Channels;
+use crate::pose_noise::Scatter;
 use crate::statistics::{Recorded, noise_floor};
 use crate::system::{Fit, Nuisance, Sensed};
 use crate::units::{alternatives, by_lever};
@@ -174,7 +176,8 @@ impl Told<'_> {
             position,
             residual: self.fit.noise,
             share: self.sensed.share(self.fit),
-            noise: noise_floor(self.sensed.recordings),
+            noise: noise_floor(self.sensed.recordings)
+                .or_else(|| self.scatter().noise().map(|(noise, _)| noise)),
             biases,
             warming: self.sensed.warming(self.fit),
             traces: self.traces(),
@@ -327,23 +330,26 @@ impl Told<'_> {
             .collect();
         own.sort_unstable();
         let told = |(segment, at): (usize, usize)| {
-            let share = segment as f64 / recorded.segments.len() as f64;
-            (
-                share * recorded.length,
-                self.sensed.bias_after(self.fit, at),
-            )
+            let first = recorded.segments.get(segment);
+            let begin = first.map_or(recorded.length, |segment| segment.begin);
+            (begin, self.sensed.bias_after(self.fit, at))
         };
         own.into_iter().map(told).collect()
     }
 
-    /// Says if more is left than noise: half of the residual's power is not explained by the noise above the band. Refuses
-    /// readings of which a rigid load leaves more than half of the power.
+    /// Says if more is left than noise: half of the residual's power is not explained by the noise above the band, or at rest
+    /// by the noise of the rows of the poses. Refuses readings of which a rigid load leaves more than half of the power.
     ///
     /// # Errors
     /// [`LoadError::Fault`] with the residual, unless the user goes on.
     pub(crate) fn not_rigid(&self, even_if_wrong: bool) -> Result<Option<String>, LoadError> {
-        let Some(noise) = noise_floor(self.sensed.recordings) else {
-            return Ok(None);
+        let (noise, of) = match (noise_floor(self.sensed.recordings), self.scatter().noise()) {
+            (Some(noise), _) => (noise, "noise as that above the band"),
+            (_, Some((noise, freedom))) if self.is_beyond(noise, freedom) => {
+                (noise, "noise by which the rows of a pose differ")
+            }
+            (None, Some(_)) => return Ok(None),
+            (None, None) => return Ok(self.one_row_a_pose()),
         };
         let over =
             |kind: usize| (self.fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2);
@@ -352,7 +358,7 @@ impl Told<'_> {
         }
         let share = self.sensed.share(self.fit);
         let text = format!(
-            "A rigid load leaves {} N and {} N·m RMS ({} and {} % of what the sensor reads beside the bias); noise as that above the band would leave {} N and {} N·m. Something else acts on the sensor (cables that pull, contact, elasticity, gain and crosstalk, another robot), or its noise is slow. {}",
+            "A rigid load leaves {} N and {} N·m RMS ({} and {} % of what the sensor reads beside the bias); {of} would leave {} N and {} N·m. Something else acts on the sensor (cables that pull, contact, elasticity, gain and crosstalk, another robot), or its noise is slow. {}",
             format_significant(self.fit.noise[0], 3),
             format_significant(self.fit.noise[1], 3),
             format_significant(100.0 * share[0], 2),
@@ -374,6 +380,31 @@ impl Told<'_> {
         }
     }
 
+    /// Returns how the rows of the poses differ.
+    fn scatter(&self) -> Scatter {
+        let recordings = self.sensed.recordings.iter();
+        recordings.fold(Scatter::default(), |sum, own| sum.and(own.passed.scatter))
+    }
+
+    /// Returns true if the residual is no such noise of the mean readings of the poses by chance (F test).
+    fn is_beyond(&self, noise: [f64; 2], freedom: f64) -> bool {
+        let own = (0.5 * self.fit.freedom()).max(1.0);
+        let is_more = |kind: usize| {
+            let ratio = (self.fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2);
+            let by_chance = FisherSnedecor::new(own, freedom);
+            by_chance.is_ok_and(|all| 2.0 * all.sf(ratio) < BY_CHANCE)
+        };
+        is_more(0) || is_more(1)
+    }
+
+    /// Says that nothing tells the noise of poses; nothing for a motion.
+    fn one_row_a_pose(&self) -> Option<String> {
+        let are_poses = self.sensed.recordings.iter().all(|own| own.poses);
+        are_poses.then(|| {
+            "One row a pose does not tell the noise of the sensor. If what is left unexplained is more than that noise, something else acts on the sensor: record some rows a pose to see it.".to_owned()
+        })
+    }
+
     /// Says where most of the residual lies; empty if it lies in no single segment.
     fn hit(&self) -> String {
         let worst = self.sensed.worst_segment(self.fit);
@@ -381,6 +412,10 @@ impl Told<'_> {
             return String::new();
         };
         let recorded = &self.sensed.recordings[recording];
+        if recorded.poses {
+            // Such poses are left out with a sentence of their own.
+            return String::new();
+        }
         let count = recorded.segments.len() as f64;
         let [from, to] = [number, number + 1].map(|k| k as f64 / count * recorded.length);
         format!(
@@ -439,6 +474,8 @@ fn unit_by_lever(lever: f64) -> String {
     }
 }
 
+/// Probability by chance below which the residual at rest is more than the noise of the rows of the poses.
+const BY_CHANCE: f64 = 1e-4;
 /// Share of the residual's power in one of twenty segments from which something happened in it.
 const MOST: f64 = 0.5;
 
@@ -478,7 +515,7 @@ fn drift_words(bias: &Bias, noise: [f64; 2]) -> Option<String> {
         false => change.join(", "),
     };
     Some(format!(
-        "{}: the bias of the sensor drifts from the begin to the end of the recording ({which}); the load was identified beside it. Let the sensor warm up before the recording.",
+        "{}: the bias of the sensor drifts over the recording ({which}); the load was identified beside it. Let the sensor warm up before the recording.",
         bias.recording
     ))
 }

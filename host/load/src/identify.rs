@@ -395,7 +395,10 @@ fn contradiction(agreement: &Agreement) -> Option<String> {
     })
 }
 
-/// Says that no body has the estimated parameters.
+/// Standard deviations up to which a value lies within its uncertainty.
+const WITHIN: f64 = 2.0;
+
+/// Says that no body has the estimated parameters, and whether one has values within their uncertainty.
 fn inconsistent(found: &Estimate, body: &Parameters) -> String {
     let off = body - found.values;
     let std = found.std();
@@ -405,11 +408,18 @@ fn inconsistent(found: &Estimate, body: &Parameters) -> String {
             (0, 0.0),
             |best, own| if own.1 > best.1 { own } else { best },
         );
-    format!(
-        "No rigid body has exactly these ten values. The nearest body, in load.toml, differs most in {} ({} instead of {} in SI units, {:.1} standard deviations).",
+    let figures = format!(
+        "differs most in {} ({} instead of {} in SI units, {size:.1} standard deviations)",
         COLUMN_NAMES[worst],
         format_significant(body[worst], 4),
         format_significant(found.values[worst], 4),
-        size
-    )
+    );
+    match size <= WITHIN {
+        true => format!(
+            "load.toml has the nearest values of a rigid body, because the estimated ones are those of none. This is within their uncertainty: it {figures}."
+        ),
+        false => format!(
+            "No rigid body has these ten values, or values within their uncertainty. The nearest body, in load.toml, {figures}."
+        ),
+    }
 }

@@ -13,7 +13,7 @@ use crate::clipping::Suspect;
 use crate::error::LoadError;
 use crate::pace::Pace;
 use crate::poses::poses;
-use crate::rows::{Passed, each_row};
+use crate::rows::each_row;
 use crate::statistics::{Collector, Recorded};
 use crate::torqueless::Torqueless;
 use crate::wrench_row::WrenchRow;
@@ -147,16 +147,12 @@ impl<'a> Intake<'a> {
                 }
                 _ => {
                     let read = (&ends, judged.pace);
-                    let (rows, saturated) = self::poses(sensing.chain, &axes, *recording, read)?;
+                    let (rows, passed) = self::poses(sensing.chain, &axes, *recording, read)?;
                     let mut collector = Collector::new(rows.len() as u64, judged.length);
                     rows.iter().for_each(|row| collector.push(row));
                     if !sensing.poses {
                         warnings.push(taken_as_poses(&label, judged, collector.rows()));
                     }
-                    let passed = Passed {
-                        saturated,
-                        noise: None,
-                    };
                     (collector, passed)
                 }
             };

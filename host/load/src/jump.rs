@@ -2,6 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::settle::settled;
 use crate::system::{Fit, Jump, Sensed};
 
 /// Probability by chance, of all channels and places together, below which the bias is said to jump.
@@ -16,6 +17,12 @@ pub(crate) fn jumps(sensed: &Sensed, fit: &Fit) -> Vec<Jump> {
     let (mut least, mut clearest) = (JUMPS, Vec::new());
     for (recording, means) in sensed.mean_residuals(fit) {
         if sensed.recordings[recording].poses {
+            let between = means.iter().map(|(segment, _)| *segment);
+            if let Some((p, jump)) = between_poses(sensed, fit, recording, between.collect())
+                && p < least
+            {
+                (least, clearest) = (p, vec![jump]);
+            }
             continue;
         }
         let places = places(means.len());
@@ -36,6 +43,27 @@ pub(crate) fn jumps(sensed: &Sensed, fit: &Fit) -> Vec<Jump> {
         }
     }
     clearest
+}
+
+/// Returns the jump between two poses with which the fit leaves least, and the probability that any such jump leaves as little
+/// by chance (F test). The load takes up much of a jump between few poses, so each is fitted.
+fn between_poses(
+    sensed: &Sensed,
+    fit: &Fit,
+    recording: usize,
+    segments: Vec<usize>,
+) -> Option<(f64, Jump)> {
+    let places = LEAST_SIDE..(segments.len() + 1).saturating_sub(LEAST_SIDE);
+    let count = places.len() as f64;
+    let fits = places.map(|place| {
+        let segment = segments[place];
+        let jump = Jump { recording, segment };
+        let mut unknowns = fit.unknowns.clone();
+        unknowns.jumps.push(jump);
+        (settled(sensed, &fit.mounting, &unknowns), jump)
+    });
+    let (larger, jump) = fits.min_by(|a, b| a.0.misfit().total_cmp(&b.0.misfit()))?;
+    Some((count * larger.chance_over(fit)?, jump))
 }
 
 /// Returns the places of one jump and of two in a stretch of segments.

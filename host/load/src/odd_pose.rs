@@ -1,13 +1,19 @@
-//! Poses that the load by all other poses does not explain: one with a contact, or several in which a channel is cut.
+//! Poses that the load by all other poses does not explain, as those with a contact or of a robot that still moved.
 //!
-//! At rest forces and moments are apart: the forces show the mass, the moments the first moments. A set of poses is left
-//! out if the residual of one of them falls by more than chance has it (F test for deleted observations, Cook & Weisberg
-//! 1982, corrected for all sets that are tried).
+//! Such poses may hide one another, so they are not looked for one by one. A fit that half of the poses bear (least trimmed
+//! squares, Rousseeuw & Van Driessen 2006) orders all poses by their distance. Those that are farthest, one to half of all,
+//! are left out if the residual falls by more than chance has it (F test for deleted observations, Cook & Weisberg 1982,
+//! corrected for all sets of as many poses). At rest forces and moments are apart: the forces show the mass, the moments the
+//! first moments.
 
 use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand::seq::index::sample;
+use rand_pcg::Pcg64;
 use rig_data::WRENCH_COLUMNS;
-use rig_output::format_significant;
+use rig_output::{format_significant, listed};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::function::factorial::ln_binomial;
 
 use crate::statistics::Recorded;
 use crate::system::{Fit, Sensed};
@@ -18,33 +24,22 @@ const BY_CHANCE: f64 = 1e-4;
 const ROUNDING: f64 = 1e-9;
 /// Smallest eigenvalue of what a set of poses leaves to the others, from which these predict it.
 const PREDICTED: f64 = 1e-6;
+/// Drawn subsets from which a fit of half of the poses begins. If 3 of 10 poses are odd, a third of the subsets of three
+/// poses has none of them.
+const STARTS: usize = 200;
+/// Most steps of a fit of half of the poses. Each leaves less; most end after three.
+const STEPS: usize = 20;
 
 /// Poses of a recording that are left out.
 pub(crate) struct OddPoses {
     /// Index of the recording.
     pub recording: usize,
     /// Their numbers among its poses.
-    poses: Vec<usize>,
+    pub poses: Vec<usize>,
     /// Probability by chance, of all sets together.
     chance: f64,
-    /// Channel and mean reading, if it is cut there.
-    pub cut: Option<(usize, f64)>,
     /// What they read, and what the load by the others gives.
-    text: String,
-}
-
-impl OddPoses {
-    /// Leaves the poses out.
-    pub(crate) fn leave_out(&self, recordings: &mut [Recorded]) {
-        if let Some(recorded) = recordings.get_mut(self.recording) {
-            *recorded = recorded.without_poses(&self.poses);
-        }
-    }
-
-    /// Says what is odd about them.
-    pub(crate) fn words(&self) -> &str {
-        &self.text
-    }
+    pub text: String,
 }
 
 /// Finds the poses that fit the load by the others least, if this is no chance.
@@ -53,124 +48,72 @@ pub(crate) fn odd_poses(sensed: &Sensed, fit: &Fit) -> Option<OddPoses> {
     let listed = all.filter(|(_, recorded)| recorded.poses && recorded.is_sampled());
     let found = listed.filter_map(|(recording, recorded)| {
         let equations = [0, 3].map(|first| Equations::of(sensed, fit, recording, first));
-        let sets = sets(recorded);
-        let tried = 2 * sets.len();
-        let odd = sets.into_iter().filter_map(|set| set.judged(&equations));
-        let least = odd.min_by(|a, b| a.1.total_cmp(&b.1));
-        let (set, chance) = least?;
-        Some(set.told(recorded, recording, tried as f64 * chance, &equations))
+        let count = recorded.sample.len();
+        let sets = equations.iter().flat_map(|own| own.farthest(count));
+        let judged = sets.filter_map(|poses| Some((chance(&equations, &poses, count)?, poses)));
+        let (chance, mut poses) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        poses.sort_unstable();
+        Some(OddPoses {
+            text: told(recorded, &poses, &equations),
+            recording,
+            poses,
+            chance,
+        })
     });
     let least = found.min_by(|a, b| a.chance.total_cmp(&b.chance))?;
     (least.chance < BY_CHANCE).then_some(least)
 }
 
-/// Returns single poses, and those with the highest or lowest readings of a channel: at most half of all.
-fn sets(recorded: &Recorded) -> Vec<Set> {
-    let count = recorded.sample.len();
-    let mut sets: Vec<Set> = (0..count)
-        .map(|k| Set {
-            poses: vec![k],
-            end: None,
-        })
-        .collect();
-    for channel in 0..6 {
-        let mut order: Vec<usize> = (0..count).collect();
-        let reading = |k: &usize| recorded.sample[*k].readings[channel];
-        order.sort_by(|a, b| reading(a).total_cmp(&reading(b)));
-        for outwards in [-1.0, 1.0] {
-            for size in 2..=count / 2 {
-                let poses = match outwards < 0.0 {
-                    true => order[..size].to_vec(),
-                    false => order[count - size..].to_vec(),
-                };
-                sets.push(Set {
-                    poses,
-                    end: Some((channel, outwards)),
-                });
-            }
-        }
+/// Returns the probability by chance that any set of as many poses is predicted as badly by the others; `None` if these
+/// cannot predict it.
+fn chance(equations: &[Equations; 2], poses: &[usize], count: usize) -> Option<f64> {
+    let mut least = 1.0_f64;
+    for own in equations {
+        least = least.min(own.deleted(poses)?.1);
     }
-    sets
+    let sets = ln_binomial(count as u64, poses.len() as u64).exp();
+    Some(2.0 * sets * least)
 }
 
-/// A set of poses.
-struct Set {
-    poses: Vec<usize>,
-    /// Channel, and −1 for its lowest, 1 for its highest readings.
-    end: Option<(usize, f64)>,
+/// Says which poses do not fit, and their reading that is furthest off.
+fn told(recorded: &Recorded, poses: &[usize], equations: &[Equations; 2]) -> String {
+    let rows = poses.iter().map(|k| &recorded.sample[*k]);
+    let times: Vec<String> = rows.map(|row| format_significant(row.time, 4)).collect();
+    let (subject, verb, object) = match times.len() {
+        1 => ("pose", "does", "it was"),
+        _ => ("poses", "do", "they were"),
+    };
+    format!(
+        "{}: the {subject} at t = {} s {verb} not fit the load by all other poses ({}); {object} left out. Look for a contact, a cable that pulls, or a robot that still moved.",
+        recorded.label,
+        listed(&times),
+        worst(recorded, poses, equations)
+    )
 }
 
-impl Set {
-    /// Returns the set with the probability by chance that the others predict it as badly. `None` if they cannot predict it,
-    /// or if the load would not read further out than a channel that is cut.
-    fn judged(self, equations: &[Equations; 2]) -> Option<(Self, f64)> {
-        let kinds = match self.end {
-            None => 0..2,
-            Some((channel, _)) => channel / 3..channel / 3 + 1,
-        };
-        let mut least = 1.0_f64;
-        for kind in kinds {
-            let (errors, chance) = equations[kind].deleted(&self.poses)?;
-            let is_beyond = |(channel, outwards): (usize, f64)| {
-                errors
-                    .iter()
-                    .skip(channel % 3)
-                    .step_by(3)
-                    .all(|error| error * outwards < 0.0)
-            };
-            if self.end.is_none_or(is_beyond) {
-                least = least.min(chance);
-            }
-        }
-        Some((self, least))
-    }
-
-    fn told(
-        self,
-        recorded: &Recorded,
-        recording: usize,
-        chance: f64,
-        equations: &[Equations; 2],
-    ) -> OddPoses {
-        let rows: Vec<_> = self.poses.iter().map(|k| &recorded.sample[*k]).collect();
-        let cut = self.end.map(|(channel, _)| {
-            let sum: f64 = rows.iter().map(|row| row.readings[channel]).sum();
-            (channel, sum / rows.len() as f64)
-        });
-        let text = format!(
-            "{}: the pose at t = {} s does not fit the load by all other poses ({}); it was left out. Look for a contact, a cable that pulls, a reading that is cut, or a robot that still moved.",
-            recorded.label,
-            format_significant(rows[0].time, 4),
-            worst(&rows[0].readings, self.poses[0], equations)
-        );
-        OddPoses {
-            recording,
-            poses: self.poses,
-            chance,
-            cut,
-            text,
-        }
-    }
-}
-
-/// Says which reading of a pose is furthest from the load by the others, in units of what these leave.
-fn worst(readings: &[f64; 6], pose: usize, equations: &[Equations; 2]) -> String {
+/// Says which reading of some poses is furthest from the load by the others, in units of what these leave.
+fn worst(recorded: &Recorded, poses: &[usize], equations: &[Equations; 2]) -> String {
     let (mut most, mut words) = (0.0, String::new());
     for (kind, own) in equations.iter().enumerate() {
-        let Some((errors, _)) = own.deleted(&[pose]) else {
+        let Some((errors, _)) = own.deleted(poses) else {
             continue;
         };
-        for (axis, error) in errors.iter().enumerate() {
-            let channel = 3 * kind + axis;
+        for (at, error) in errors.iter().enumerate() {
+            let channel = 3 * kind + at % 3;
+            let row = &recorded.sample[poses[at / 3]];
             let size = error.abs() / own.residual.norm();
             if size > most {
                 most = size;
+                let when = match poses.len() {
+                    1 => String::new(),
+                    _ => format!(" at t = {} s", format_significant(row.time, 4)),
+                };
                 words = format!(
-                    "{} reads {} {} instead of {}",
+                    "{} reads {} {} instead of {}{when}",
                     WRENCH_COLUMNS[channel],
-                    format_significant(readings[channel], 3),
+                    format_significant(row.readings[channel], 3),
                     ["N", "N·m"][kind],
-                    format_significant(readings[channel] - error, 3)
+                    format_significant(row.readings[channel] - error, 3)
                 );
             }
         }
@@ -223,13 +166,60 @@ impl Equations {
         Self { span, residual }
     }
 
+    /// Returns the one to half of all `count` poses that are farthest from a fit that half of the poses bear.
+    fn farthest(&self, count: usize) -> Vec<Vec<usize>> {
+        let fewest = self.span.ncols() / 3 + 1;
+        let half = count - count / 2;
+        if half < fewest {
+            return Vec::new();
+        }
+        let mut random = Pcg64::seed_from_u64(count as u64);
+        let trimmed =
+            (0..STARTS).map(|_| self.trimmed(sample(&mut random, count, fewest).into_vec(), half));
+        let Some((_, order)) = trimmed.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return Vec::new();
+        };
+        (1..=count / 2)
+            .map(|size| order[count - size..].to_vec())
+            .collect()
+    }
+
+    /// Fits some poses, then the `half` that are nearest to this fit, until they stay the same. Returns what these leave, and
+    /// all poses by their distance.
+    fn trimmed(&self, start: Vec<usize>, half: usize) -> (f64, Vec<usize>) {
+        let (mut left, mut order) = (f64::INFINITY, start);
+        let mut size = order.len();
+        for _ in 0..STEPS {
+            let rows = rows_of(&order[..size]);
+            let [own, right] = [
+                self.span.select_rows(&rows),
+                DMatrix::from_column_slice(
+                    rows.len(),
+                    1,
+                    self.residual.select_rows(&rows).as_slice(),
+                ),
+            ];
+            let Ok(change) = own.svd(true, true).solve(&right, ROUNDING) else {
+                break;
+            };
+            let off = &self.residual - &self.span * change.column(0);
+            let distance = |pose: usize| off.rows(3 * pose, 3).norm_squared();
+            let mut next: Vec<usize> = (0..off.len() / 3).collect();
+            next.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+            let sum: f64 = next[..half].iter().map(|pose| distance(*pose)).sum();
+            let is_less = sum < left;
+            if !is_less {
+                break;
+            }
+            (left, order, size) = (sum, next, half);
+        }
+        (left, order)
+    }
+
     /// Returns the errors of the readings of some poses against the load by the others, and the probability that they are
     /// chance. `None` if the others do not predict them.
     fn deleted(&self, poses: &[usize]) -> Option<(DVector<f64>, f64)> {
-        let rows: Vec<usize> = poses
-            .iter()
-            .flat_map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
-            .collect();
+        let rows = rows_of(poses);
         let own = self.span.select_rows(&rows);
         let rest = DMatrix::identity(own.ncols(), own.ncols()) - own.tr_mul(&own);
         let eigen = rest.symmetric_eigen();
@@ -251,4 +241,12 @@ impl Equations {
             .sf(ratio.max(0.0));
         Some((errors, chance))
     }
+}
+
+/// Returns the rows of some poses.
+fn rows_of(poses: &[usize]) -> Vec<usize> {
+    poses
+        .iter()
+        .flat_map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+        .collect()
 }

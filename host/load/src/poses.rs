@@ -6,7 +6,8 @@ use rig_shared::multibody::{Chain, wrench_regressor};
 use crate::axes::SensorAxes;
 use crate::error::LoadError;
 use crate::pace::{AT_REST, Pace, Run};
-use crate::rows::{Ends, FEWEST_ROWS, base_axes, beyond, each_readings, temperature};
+use crate::pose_noise::{Batches, Scatter};
+use crate::rows::{Ends, FEWEST_ROWS, Passed, base_axes, beyond, each_readings, temperature};
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
 
 /// Poses nearer than this multiple of [`AT_REST`] follow each other in a motion.
@@ -16,7 +17,7 @@ const SHORT: f64 = 0.05;
 
 /// Returns the poses of a recording: consecutive rows at one position are one pose, with their mean readings, because the
 /// errors of one pose are not independent. Rows between poses are left out; of rows that follow each other in time those are
-/// poses in which the robot rests. Beside them stands the number of rows beyond `ends`.
+/// poses in which the robot rests. Beside them stands what the rows tell beside the fit.
 ///
 /// # Errors
 /// As [`each_readings`]; [`LoadError::Moves`] if the recording never rests.
@@ -25,7 +26,7 @@ pub(crate) fn poses(
     sensor: &SensorAxes,
     recording: &dyn Recording,
     (ends, pace): (&Ends, Pace),
-) -> Result<(Vec<WrenchRow>, u64), LoadError> {
+) -> Result<(Vec<WrenchRow>, Passed), LoadError> {
     let mut poses: Vec<Pose> = Vec::new();
     let (mut left_out, mut rows) = (0, 0u64);
     each_readings(recording, &mut |block, readings| {
@@ -62,7 +63,9 @@ pub(crate) fn poses(
     }
     let still = vec![0.0; chain.joint_count()];
     let mut found = Vec::with_capacity(poses.len());
+    let mut scatter = Scatter::default();
     for pose in &poses {
+        scatter.add(&pose.batches);
         let count = pose.rows as f64;
         let q: Vec<f64> = pose.q.iter().map(|sum| sum / count).collect();
         let mut regressor = [0.0; ENTRIES];
@@ -80,7 +83,12 @@ pub(crate) fn poses(
             readings: pose.readings.map(|sum| sum / count),
         });
     }
-    Ok((found, left_out))
+    let passed = Passed {
+        saturated: left_out,
+        scatter,
+        ..Passed::default()
+    };
+    Ok((found, passed))
 }
 
 /// Says that the rows of a recording are no poses.
@@ -103,17 +111,21 @@ struct Pose {
     rows: u64,
     q: Vec<f64>,
     readings: [f64; 6],
+    batches: Batches,
     /// Time and temperature.
     others: [f64; 2],
 }
 
 impl Pose {
     fn new(q: Vec<f64>, readings: [f64; 6], others: [f64; 2]) -> Self {
+        let mut batches = Batches::new();
+        batches.add(&readings);
         Self {
             run: Run::of(others[0], q.clone()),
             rows: 1,
             q,
             readings,
+            batches,
             others,
         }
     }
@@ -129,6 +141,7 @@ impl Pose {
     fn add(&mut self, q: &[f64], readings: &[f64; 6], others: [f64; 2]) {
         self.rows += 1;
         self.run.push(others[0], q);
+        self.batches.add(readings);
         let sums = self
             .q
             .iter_mut()

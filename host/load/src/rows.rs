@@ -8,6 +8,7 @@ use rig_shared::multibody::{Chain, MultibodyError, Pose as Frame, frame_pose, wr
 use crate::axes::SensorAxes;
 use crate::error::LoadError;
 use crate::noise_floor::NoiseFloor;
+use crate::pose_noise::Scatter;
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
 
 /// Name of the column with the sensor's temperature.
@@ -29,6 +30,8 @@ pub(crate) struct Passed {
     /// Noise of forces (N) and moments (N·m) in the band of the fit, if that of the messages is white; `None` if the band
     /// leaves nothing above it.
     pub noise: Option<[f64; 2]>,
+    /// How the rows of the poses differ.
+    pub scatter: Scatter,
 }
 
 /// Streams the rows of a recording of motion. Position, regressor and readings pass the same low-pass, so that they

@@ -19,19 +19,9 @@ use crate::system::{Fit, Nuisance, Sensed};
 /// Probability by chance below which a further unknown is taken in.
 const TAKEN_IN: f64 = 1e-3;
 
-/// Returns true if the larger fit leaves less than chance would have it (F test, both in the noise of the larger).
+/// Returns true if the larger fit leaves less than chance would have it.
 fn is_better(larger: &Fit, smaller: &Fit) -> bool {
-    let further = larger.values.len() as f64 - smaller.values.len() as f64;
-    let freedom = larger.freedom();
-    if further <= 0.0 || freedom <= 0.0 {
-        return false;
-    }
-    let own = larger.squares_over(larger);
-    // Fits of unlike many equations are compared by equation.
-    let before = smaller.squares_over(larger) * larger.equations as f64 / smaller.equations as f64;
-    let ratio = (before - own) / further / (own / freedom);
-    let chance = FisherSnedecor::new(further, freedom).map(|f| f.sf(ratio.max(0.0)));
-    chance.is_ok_and(|p| p < TAKEN_IN)
+    (larger.chance_over(smaller)).is_some_and(|p| p < TAKEN_IN)
 }
 
 /// Returns the values of a nuisance of a fit, rotations counted from the mounting of a fit without it.

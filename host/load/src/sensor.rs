@@ -14,7 +14,7 @@ use crate::faulty_rows::FaultyRows;
 use crate::findings::{SensorFindings, Told};
 use crate::intake::{Intake, Sensing, judged, moving};
 use crate::mounting::Channels;
-use crate::selection::deviation;
+use crate::selection::{deviation, selected};
 use crate::settle::settled;
 use crate::system::{Fit, Nuisance, Sensed};
 use crate::units::{alternatives, named};
@@ -68,7 +68,10 @@ pub(crate) fn by_sensor(
             shifts += 1;
             continue;
         }
-        let fitted = believed(&sensed, compared, sensing, &mut said)?;
+        let fitted = match faulty.channel(&sensed, &sensor) {
+            Some(cut) => without_cut(&sensed, &compared, sensing, cut, &mut said)?,
+            None => believed(&sensed, compared, sensing, &mut said)?,
+        };
         warnings.extend(said);
         warnings.extend(faulty.words(&sensed, &sensor, sensing.even_if_wrong)?);
         return finished(
@@ -152,6 +155,33 @@ fn believed(
             warnings.push(text);
             fitted(described, as_recorded)
         }
+    })
+}
+
+/// Returns the fit of the five channels beside one that is cut in most poses.
+///
+/// # Errors
+/// [`LoadError::Fault`] with the channel, unless the user goes on.
+fn without_cut(
+    sensed: &Sensed,
+    compared: &Compared,
+    sensing: &Sensing,
+    (channel, text): (usize, String),
+    warnings: &mut Vec<String>,
+) -> Result<Fitted, LoadError> {
+    if !sensing.even_if_wrong {
+        return Err(LoadError::Fault(text));
+    }
+    warnings.push(left_out(&text, channel));
+    let described = &compared.described;
+    let start = described.start.with_gain(channel, 0.0);
+    let plain = described.selected.fit.unknowns.plain();
+    let own = selected(sensed, sensed.fit(&start, &plain), &start);
+    Ok(Fitted {
+        fit: own.fit,
+        channels: Channels::as_recorded(),
+        alternatives: own.alternatives,
+        scale: None,
     })
 }
 
@@ -384,7 +414,7 @@ fn gain_words(sensed: &Sensed, fit: &Fit, channel: usize) -> [String; 2] {
     let name = WRENCH_COLUMNS[channel];
     let gain = match sensed.gain(fit) {
         None => format!(
-            "{name} shows nothing of the load that the five others carry: it is dead, or reads its noise only"
+            "{name} shows nothing of the load that the five others carry: it is dead, or cut in nearly all rows, or reads its noise only"
         ),
         Some(_) => {
             let std = deviation(sensed, fit, Nuisance::Gain(channel));

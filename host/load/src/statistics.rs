@@ -45,6 +45,8 @@ pub(crate) struct Segment {
     pub channels: [DMatrix<f64>; 6],
     /// Rows in it.
     pub rows: u64,
+    /// Time of the first of them, s.
+    pub begin: f64,
 }
 
 impl Segment {
@@ -61,6 +63,7 @@ impl Segment {
         Self {
             channels: std::array::from_fn(merged),
             rows: segments.iter().map(|s| s.rows).sum(),
+            begin: segments.first().map_or(0.0, |s| s.begin),
         }
     }
 }
@@ -148,6 +151,7 @@ pub(crate) fn noise_floor(recordings: &[Recorded]) -> Option<[f64; 2]> {
 pub(crate) struct Collector {
     factors: Vec<[TriangularFactor; 6]>,
     counts: Vec<u64>,
+    begins: Vec<f64>,
     expected: u64,
     seen: u64,
     length: f64,
@@ -163,6 +167,7 @@ impl Collector {
         Self {
             factors: (0..SEGMENTS).map(|_| empty()).collect(),
             counts: vec![0; SEGMENTS],
+            begins: vec![0.0; SEGMENTS],
             expected: expected.max(1),
             seen: 0,
             length: length.max(f64::MIN_POSITIVE),
@@ -185,6 +190,9 @@ impl Collector {
             self.sample.push(row.clone());
         }
         self.seen += 1;
+        if self.counts[segment] == 0 {
+            self.begins[segment] = row.time;
+        }
         self.counts[segment] += 1;
         let reference = *self.reference.get_or_insert(row.temperature);
         let warmer = row.temperature - reference;
@@ -228,15 +236,16 @@ impl Collector {
         poses: bool,
         passed: Passed,
     ) -> Recorded {
-        let segments = self.factors.iter().zip(&self.counts);
+        let segments = self.factors.iter().zip(&self.counts).zip(&self.begins);
         let segments: Vec<Segment> = segments
-            .filter(|(_, rows)| **rows > 0)
-            .map(|(factors, rows)| Segment {
+            .filter(|((_, rows), _)| **rows > 0)
+            .map(|((factors, rows), begin)| Segment {
                 channels: std::array::from_fn(|c| {
                     let width = column::COUNT;
                     DMatrix::from_vec(width, width, factors[c].triangle())
                 }),
                 rows: *rows,
+                begin: *begin,
             })
             .collect();
         Recorded {

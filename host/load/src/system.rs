@@ -14,6 +14,7 @@ use nalgebra::{
 };
 use rig_identify::TriangularFactor;
 use rig_shared::multibody::INERTIAL_PARAMETERS;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::estimate::{Parameters, solved};
 use crate::mounting::Mounting;
@@ -30,14 +31,14 @@ const ROUNDS: usize = 4;
 pub(crate) struct Jump {
     /// Index of the recording.
     pub recording: usize,
-    /// First segment after the jump. This one and the one before it are left out.
+    /// First segment after the jump. Of a motion, this one and the one before it are left out. Poses have a jump between them.
     pub segment: usize,
 }
 
 impl Jump {
     /// Returns true if a segment of its recording is left out because of it.
-    fn is_beside(&self, segment: usize) -> bool {
-        segment + 1 == self.segment || segment == self.segment
+    fn is_beside(&self, segment: usize, poses: bool) -> bool {
+        !poses && (segment + 1 == self.segment || segment == self.segment)
     }
 }
 
@@ -105,6 +106,14 @@ pub(crate) struct Unknowns {
 }
 
 impl Unknowns {
+    /// Returns them without jumps and nuisances.
+    pub(crate) fn plain(&self) -> Self {
+        Self {
+            tool: self.tool,
+            ..Self::default()
+        }
+    }
+
     /// Returns true if `nuisance` is among them.
     pub(crate) fn has(&self, nuisance: Nuisance) -> bool {
         self.nuisances.contains(&nuisance)
@@ -228,6 +237,22 @@ impl Fit {
             .map(|(s, n)| s / (n * n))
             .sum()
     }
+
+    /// Returns the probability that this fit leaves less than one with fewer unknowns by chance (F test, both in the noise of
+    /// this one); `None` if it has no further unknowns.
+    pub(crate) fn chance_over(&self, smaller: &Self) -> Option<f64> {
+        let further = self.values.len() as f64 - smaller.values.len() as f64;
+        let freedom = self.freedom();
+        if further <= 0.0 || freedom <= 0.0 {
+            return None;
+        }
+        let own = self.squares_over(self);
+        // Fits of unlike many equations are compared by equation.
+        let before = smaller.squares_over(self) * self.equations as f64 / smaller.equations as f64;
+        let ratio = (before - own) / further / (own / freedom);
+        let chance = FisherSnedecor::new(further, freedom).ok()?;
+        Some(chance.sf(ratio.max(0.0)))
+    }
 }
 
 impl Sensed<'_> {
@@ -248,8 +273,8 @@ impl Sensed<'_> {
         for (r, recorded) in self.recordings.iter().enumerate() {
             for (g, segment) in recorded.segments.iter().enumerate() {
                 let own = unknowns.jumps.iter().filter(|jump| jump.recording == r);
-                if !own.clone().any(|jump| jump.is_beside(g)) {
-                    let last = unknowns.last_jump(r, |jump| jump.segment < g);
+                if !own.clone().any(|jump| jump.is_beside(g, recorded.poses)) {
+                    let last = unknowns.last_jump(r, |jump| jump.segment <= g);
                     let bias = last.map_or(layout.bias(r), |at| layout.after_jump(at));
                     take(r, g, segment, bias);
                 }
@@ -624,8 +649,8 @@ impl Sensed<'_> {
     pub(crate) fn predicted(&self, fit: &Fit, recording: usize, row: &WrenchRow) -> [f64; 6] {
         let (layout, recorded) = (self.layout(&fit.unknowns), &self.recordings[recording]);
         let after = fit.unknowns.last_jump(recording, |jump| {
-            let share = jump.segment as f64 / recorded.segments.len() as f64;
-            row.time > share * recorded.length
+            let first = recorded.segments.get(jump.segment);
+            first.is_some_and(|segment| row.time >= segment.begin)
         });
         let bias = after.map_or(layout.bias(recording), |at| layout.after_jump(at));
         let part =

@@ -291,10 +291,16 @@ fn rows_of_one_pose_are_one_reading_and_a_motion_is_no_list_of_poses() {
             }
         }
         let found = identify_load(&moving.robot, &[&still], &[], &LoadOptions::default()).unwrap();
-        found.mass.std
+        (found.mass.std, found.warnings.join(" "))
     };
-    let [one, forty] = [std(&once, 1), std(&often, 40)];
+    let [(one, unknown), (forty, told)] = [std(&once, 1), std(&often, 40)];
     assert!(forty > 0.5 * one, "{one} {forty}");
+    // The noise of one row a pose is unknown. That of forty tells that something else acts.
+    assert!(unknown.contains("does not tell the noise"), "{unknown}");
+    assert!(
+        told.contains("noise by which the rows of a pose differ"),
+        "{told}"
+    );
     let motion = recorded(
         &moving,
         &points,
@@ -311,6 +317,41 @@ fn rows_of_one_pose_are_one_reading_and_a_motion_is_no_list_of_poses() {
         .unwrap_err()
         .to_string();
     assert!(text.contains("moves all the time"), "{text}");
+}
+
+/// Noise that is correlated over some rows is noise too.
+#[test]
+fn the_noise_of_poses_with_several_rows_is_no_disturbance() {
+    let points = tool();
+    for (rows, correlation) in [(2, 0.0), (5, 0.0), (40, 0.0), (40, 0.5), (200, 0.9)] {
+        for seed in 0..20 {
+            let moving = Moving::new(irp6(), 0.8, seed);
+            let list: Vec<Vec<f64>> = (0..8 * rows)
+                .map(|k| moving.position(3.1 * f64::from(k / rows)))
+                .collect();
+            let silent = Sensor {
+                noise: [0.0; 2],
+                ..Sensor::default()
+            };
+            let mut still = poses(&moving, &points, &silent, &list, seed);
+            let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+            for (c, (_, column)) in still.blocks[0].extra.iter_mut().enumerate() {
+                let size = if c < 3 { 0.2 } else { 0.02 };
+                let mut noise = 0.0;
+                for value in column {
+                    let fresh: f64 = random.sample(rand_distr::StandardNormal);
+                    noise = correlation * noise + fresh;
+                    *value += size * noise;
+                }
+            }
+            let found = identify_load(&moving.robot, &[&still], &[], &LoadOptions::default());
+            let text = found.unwrap().warnings.join(" ");
+            assert!(
+                !text.contains("A rigid load leaves"),
+                "{rows} {seed}: {text}"
+            );
+        }
+    }
 }
 
 /// Whether rows are poses follows from their times and positions: a motion is none however few rows it has, and poses are

@@ -193,7 +193,11 @@ fn readings(sensor: &SensorFindings) -> Section {
         format_significant(sensor.residual[1], 3),
         format_significant(100.0 * sensor.share[1], 2),
         sensor.noise.map_or_else(String::new, |[force, moment]| format!(
-            "Noise as that of the readings above the band would leave {} N and {} N·m. ",
+            "{} would leave {} N and {} N·m. ",
+            match sensor.prepared.is_some() {
+                true => "Noise as that of the readings above the band",
+                false => "Noise by which the rows of a pose differ",
+            },
             format_significant(force, 3),
             format_significant(moment, 3)
         )),
