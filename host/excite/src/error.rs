@@ -85,16 +85,18 @@ pub enum ExciteError {
     },
     /// A limit so low that a motion over the range would take too long.
     #[error(
-        "a motion over the range of joint \"{joint}\" needs a period of {} s at its {limit} of {} {unit}, but a period lasts 3600 s at most: correct the limit, narrow the position limits, or give the period",
-        format_significant(*period, 3), format_significant(*value, 3)
+        "a motion over the range of joint \"{joint}\" needs a period of {} s at its {limit} of {} {unit}{}, but a period lasts 3600 s at most: correct the limit, narrow the position limits, or give the period",
+        format_significant(*period, 3), format_significant(*value, 3), used_share(*share)
     )]
     Slow {
         /// The joint's name.
         joint: String,
         /// The words for the limit.
         limit: &'static str,
-        /// The limit.
+        /// The described limit.
         value: f64,
+        /// Share of it that the motion may use.
+        share: f64,
         /// Its unit.
         unit: &'static str,
         /// The period that it needs, s.
@@ -300,4 +302,15 @@ fn limitless(joints: &[String]) -> String {
 /// Returns the error of an option: its name, its value and a remedy.
 pub(super) fn wrong(name: &'static str, value: String, right: String) -> ExciteError {
     ExciteError::Option { name, value, right }
+}
+
+/// Says which share of a limit is used; nothing if all of it is.
+pub(crate) fn used_share(share: f64) -> String {
+    match share < 1.0 {
+        true => format!(
+            " (of which a share of {} is used)",
+            format_significant(share, 3)
+        ),
+        false => String::new(),
+    }
 }

@@ -42,6 +42,11 @@ impl MotorBounds {
         robot.joints.iter().map(of).collect()
     }
 
+    /// Returns true if an angle lies within the range.
+    pub(super) fn has(&self, angle: f64) -> bool {
+        self.range[0] <= angle && angle <= self.range[1]
+    }
+
     /// Returns the middle of the range and its half, if it is limited.
     pub(super) fn middle_and_half(&self) -> Option<[f64; 2]> {
         let [low, high] = self.range;

@@ -46,16 +46,22 @@ fn period_within(robot: &Robot, bounds: &[Bounds], harmonics: usize) -> Result<f
 /// Returns the error of a joint that is too slow, by its velocity limit or by what bounds its acceleration.
 fn slow(joint: &Joint, bounds: &Bounds, of_velocity: bool, period: f64) -> ExciteError {
     let turns = joint.kind == JointKind::Revolute;
-    let (limit, value, units) = match (of_velocity, bounds.acceleration, bounds.torque) {
-        (false, None, Some(torque)) => ("torque limit", torque, ["N·m", "N"]),
+    // The described limit, and the share of it that is used.
+    let described = |used: f64, limit: Option<f64>| {
+        let limit = limit.unwrap_or(used);
+        (limit, used / limit)
+    };
+    let limits = joint.limits.as_ref();
+    let (limit, (value, share), units) = match (of_velocity, bounds.acceleration, bounds.torque) {
+        (false, None, Some(torque)) => ("torque limit", (torque, 1.0), ["N·m", "N"]),
         (false, Some(acceleration), _) => (
-            "acceleration limit, times the square of the speed share,",
-            acceleration,
+            "acceleration limit",
+            described(acceleration, limits.and_then(|l| l.acceleration)),
             ["rad/s²", "m/s²"],
         ),
         _ => (
-            "velocity limit, times the speed share,",
-            bounds.velocity,
+            "velocity limit",
+            described(bounds.velocity, limits.map(|l| l.velocity)),
             ["rad/s", "m/s"],
         ),
     };
@@ -63,6 +69,7 @@ fn slow(joint: &Joint, bounds: &Bounds, of_velocity: bool, period: f64) -> Excit
         joint: joint.name.clone(),
         limit,
         value,
+        share,
         unit: units[usize::from(!turns)],
         period,
     }

@@ -9,6 +9,7 @@ use rig_shared::trajectory::{
 
 use crate::bounds::{Bounds, Room, bounds_of, prior};
 use crate::drives::{Combined, Drives, into_cranks};
+use crate::error::used_share;
 use crate::feasible::refuse_unreachable;
 use crate::instants::{Instants, MOTOR_STEPS, TORQUE_STEPS};
 use crate::motor_limits::exceeded;
@@ -376,6 +377,7 @@ fn distance_of(
 
 /// Rejects speeds above the limits.
 fn refuse_fast(options: &StagedOptions, bounds: &Bounds) -> Result<(), ExciteError> {
+    let share = options.speed_share.unwrap_or(1.0);
     let fastest = options.speeds.iter().flatten().copied().fold(0.0, f64::max);
     if fastest <= bounds.velocity {
         return Ok(());
@@ -384,8 +386,9 @@ fn refuse_fast(options: &StagedOptions, bounds: &Bounds) -> Result<(), ExciteErr
         name: "speed",
         value: fastest.to_string(),
         right: format!(
-            "the velocity limit, times the speed share, is {:.4}",
-            bounds.velocity
+            "the velocity limit is {:.4}{}",
+            bounds.velocity / share,
+            used_share(share)
         ),
     })
 }

@@ -4,13 +4,16 @@ use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rig_shared::multibody::{column, inverse_dynamics, point_position};
+use rig_shared::transmission::Transmission;
 
 use crate::ExciteError;
 use crate::bounds::{Bounds, prior};
-use crate::drives::{Combined, into_cranks};
+use crate::drives::{Combined, Drives, into_cranks};
+use crate::feasible::refuse_unreachable;
+use crate::motor_limits::MotorBounds;
 use crate::workspace::{Plane, planes_of};
 use rig_model::robot::{Robot, WristSensor};
-use rig_model::simulate::Model;
+use rig_model::simulate::{Model, SimulateError};
 
 /// Share of a torque limit that holding a pose may take; the rest is for moving and for friction.
 const HOLDING: f64 = 0.8;
@@ -38,6 +41,9 @@ pub(super) struct Space<'a> {
     pub model: Model,
     pub bounds: Vec<Bounds>,
     combined: Vec<Combined>,
+    transmission: Transmission<f64>,
+    /// Limits of the motors; empty if there are none.
+    motors: Vec<MotorBounds>,
     pub planes: Vec<Plane>,
     /// True if the torque is known and limited.
     pub knows_torque: bool,
@@ -53,14 +59,20 @@ impl<'a> Space<'a> {
     ) -> Result<Self, ExciteError> {
         let model = Model::from_robot(robot)?;
         let limited = bounds.iter().any(|b| b.torque.is_some());
+        let has_bodies = prior(robot, &model).is_ok();
+        let combined = Combined::of(robot);
+        let drives = Drives::of(robot, model.motors.clone(), &bounds, 1.0)?;
+        refuse_unreachable(robot, &bounds, &combined, drives.as_ref(), has_bodies)?;
         Ok(Self {
             robot,
             sensor: robot.flange_pose() * sensor.pose(),
-            knows_torque: limited && prior(robot, &model).is_ok(),
-            has_bodies: prior(robot, &model).is_ok(),
+            knows_torque: limited && has_bodies,
+            has_bodies,
+            transmission: robot.transmission().map_err(SimulateError::from)?,
+            motors: MotorBounds::all(robot, 1.0),
             model,
             bounds,
-            combined: Combined::of(robot),
+            combined,
             planes: planes_of(robot),
         })
     }
@@ -91,6 +103,16 @@ impl<'a> Space<'a> {
         for limit in &self.combined {
             if !(limit.low..=limit.high).contains(&limit.at(q.iter().copied())) {
                 return Ok(Some((limit.joint, "crank")));
+            }
+        }
+        if !self.motors.is_empty() {
+            let mut angles = vec![0.0; q.len()];
+            (self.transmission)
+                .motor_position(q, &mut angles)
+                .map_err(SimulateError::from)?;
+            let mut pairs = self.motors.iter().zip(&angles);
+            if let Some(j) = pairs.position(|(own, angle)| !own.has(*angle)) {
+                return Ok(Some((j, "motor angle")));
             }
         }
         for plane in &self.planes {

@@ -1,14 +1,14 @@
 //! Limits of the motors, on their side: the IRp-6 with screws and a coupled wrist, and a simple drive.
 
 use rand::SeedableRng;
-use rig_model::robot::{IRP6_TEMPLATE, MotorLimits};
+use rig_model::robot::{IRP6_TEMPLATE, MotorLimits, WristSensor};
 
 use super::*;
 use crate::criterion::Smoothing;
 use crate::optimise::Round;
 use crate::problem::Problem;
 use crate::search::random_motion;
-use crate::{StagedKind, StagedOptions, staged};
+use crate::{PoseOptions, StagedKind, StagedOptions, poses, staged};
 
 fn irp6() -> Robot {
     Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap()
@@ -201,6 +201,55 @@ fn limits_of_motors_that_no_pose_keeps_are_refused_before_the_search() {
         "{text}"
     );
     assert!(!searched.get());
+}
+
+/// Poses for a load are looked for within the ranges of the motors, and not at all if no pose keeps one.
+#[test]
+fn poses_for_a_load_keep_the_ranges_of_the_motors() {
+    let mut robot = irp6();
+    robot.wrist_sensor = Some(WristSensor::default());
+    let options = PoseOptions {
+        count: 4,
+        start: None,
+        margin: 0.05,
+        speed_share: 0.8,
+        seed: 1,
+    };
+    let joint = robot.joint_index("wrist_turn").unwrap();
+    let found = |range| {
+        let mut robot = robot.clone();
+        robot.joints[joint].drive.as_mut().unwrap().limits = Some(MotorLimits {
+            position: Some(range),
+            ..MotorLimits::default()
+        });
+        poses(&robot, &options)
+    };
+    let text = found([9e3, 1e4]).unwrap_err().to_string();
+    assert!(
+        text.contains("wrist_turn") && text.contains("9000 and 10000 rad"),
+        "{text}"
+    );
+    let motors = |q: &[f64]| {
+        let mut angles = vec![0.0; q.len()];
+        (robot.transmission().unwrap())
+            .motor_position(q, &mut angles)
+            .unwrap();
+        angles[joint]
+    };
+    // Half of the range that poses without this limit use.
+    let free = poses(&robot, &options).unwrap();
+    let angles: Vec<f64> = free.positions.iter().map(|q| motors(q)).collect();
+    let low = angles.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = angles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let half = [low, 0.5 * (low + high)];
+    let kept = found(half).unwrap();
+    for q in &kept.positions {
+        assert!(
+            half[0] <= motors(q) && motors(q) <= half[1],
+            "{half:?} {}",
+            motors(q)
+        );
+    }
 }
 
 /// Limits below the Coulomb friction, or too slow for an hour, are named with joint and value, whatever the motion.
