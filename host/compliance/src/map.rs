@@ -79,7 +79,7 @@ pub fn compliance_map(
         (0..GRID).map(|i| low + step * i as f64).collect()
     };
     let (x, y) = (grid(a), grid(b));
-    let dead = DeadCentres::of(tool, [(a, &x), (b, &y)], pose)?;
+    let dead = DeadCentres::of(tool, stiffness, [(a, &x), (b, &y)], pose)?;
     let mut q = pose.to_vec();
     let mut best: Option<([f64; 2], [Vec<f64>; 2])> = None;
     let mut values = Vec::with_capacity(GRID);
@@ -127,9 +127,9 @@ pub fn compliance_map(
     })
 }
 
-/// The dead centres of the drives over a map.
+/// The dead centres of the elastic drives over a map. A rigid drive yields nowhere.
 struct DeadCentres {
-    /// Largest motion of each motor per motion of the joints.
+    /// Largest motion of each motor per motion of the joints; 0 for a rigid drive.
     most: Vec<f64>,
     poses: Vec<SingularPose>,
 }
@@ -137,6 +137,7 @@ struct DeadCentres {
 impl DeadCentres {
     fn of(
         tool: &ToolPoint<'_>,
+        stiffness: &[DriveStiffness],
         [(a, x), (b, y)]: [(usize, &Vec<f64>); 2],
         pose: &[f64],
     ) -> Result<Self, ComplianceError> {
@@ -152,7 +153,10 @@ impl DeadCentres {
             most: vec![0.0; tool.count()],
             poses: Vec::new(),
         };
-        for (k, most) in found.most.iter_mut().enumerate() {
+        for (k, (most, drive)) in found.most.iter_mut().zip(stiffness).enumerate() {
+            if drive.stiffness.is_none() {
+                continue;
+            }
             *most = cells.iter().map(|(_, s)| s[k]).fold(0.0, f64::max);
             let near = cells.iter().filter(|(_, s)| s[k] < DEAD_CENTRE * *most);
             let nearest = near.clone().min_by(|m, n| m.1[k].total_cmp(&n.1[k]));

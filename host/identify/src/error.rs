@@ -53,7 +53,7 @@ pub enum IdentifyError {
     },
     /// The torque is zero in all rows.
     #[error(
-        "The torque of joint {joint} is zero throughout; record the torque or the motor current{}.", if *.still { ", or make the joint, which stands still, type=\"fixed\" in the URDF" } else { "" }
+        "The torque of joint {joint} is zero throughout; record the torque or the motor current{}.", if *.still { ", or make the joint, which stands still, fixed in the description (type=\"fixed\" in a URDF)" } else { "" }
     )]
     NoTorque {
         /// Number of the joint, from 1.

@@ -233,7 +233,7 @@ impl JointFinding {
         };
         match &self.what {
             AtJoint::Still(at) => format!(
-                "Joint {name} stands still at {at} {length} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves."
+                "Joint {name} stands still at {at} {length} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more, or make it fixed in the description (type=\"fixed\" in a URDF) where it never moves."
             ),
             AtJoint::Unexplained(share) => format!(
                 "Joint {name}: the model leaves {:.0} % of the torque unexplained on the data it was fitted to. Look at its zero, axis and lengths in the description, at the order of the columns, and at the robot for what no rigid model has.",
@@ -249,7 +249,7 @@ impl JointFinding {
                 format_significant(*travel, 2)
             ),
             AtJoint::OnlyNoise { part: own, slowest } => format!(
-                "Joint {name} stands still in the {} but for the noise of its encoder: no row is faster than {} {length}/s, so nothing is said of its torque there. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves.",
+                "Joint {name} stands still in the {} but for the noise of its encoder: no row is faster than {} {length}/s, so nothing is said of its torque there. Record a motion of it for more, or make it fixed in the description (type=\"fixed\" in a URDF) where it never moves.",
                 part(own),
                 format_significant(*slowest, 2)
             ),

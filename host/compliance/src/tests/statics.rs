@@ -308,6 +308,18 @@ fn a_dead_centre_is_named_and_left_blank() {
     assert!(!map.singular.is_empty() && blank > 0 && blank < 400);
     assert!(map.range[1] < 1.0, "{:?}", map.range);
     assert!(found.warnings.iter().any(|w| w.contains("dead centre")));
+    // A rigid screw does not yield there.
+    let rigid = f64::INFINITY;
+    let options = ComplianceOptions {
+        stiffness: vec![5e4, rigid, rigid, 5e3, 5e3],
+        map: Some([1, 2]),
+        ..ComplianceOptions::default()
+    };
+    let found = identify_compliance(&robot, &[], &[], &options).unwrap();
+    let map = found.map.unwrap();
+    assert!(map.singular.is_empty(), "{:?}", map.singular);
+    assert!(map.values.iter().flatten().all(Option::is_some));
+    assert!(!found.warnings.iter().any(|w| w.contains("dead centre")));
 }
 
 #[test]

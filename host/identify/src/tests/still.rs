@@ -244,7 +244,7 @@ fn a_finger_without_torque_that_stands_still_may_be_fixed() {
         found.unwrap_err().to_string()
     };
     assert!(
-        said(&finger).contains("type=\"fixed\" in the URDF"),
+        said(&finger).contains("type=\"fixed\" in a URDF"),
         "{}",
         said(&finger)
     );
