@@ -8,6 +8,7 @@
 //! Not covered: backlash and dead time (no column is linear in them), LuGre (three shapes), more than one joint.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 use rig_shared::effects::Kind;
 
 use super::answer::{Answer, Method, Named};
@@ -130,9 +131,7 @@ impl Problem {
             DMatrix::from_columns(&columns)
         };
         let (fitted, seen) = (matrix(&self.train), matrix(&self.holdout));
-        let Ok(values) = fitted.svd(true, true).solve(&self.train.torque, 1e-10) else {
-            return f64::INFINITY;
-        };
+        let values = Svd::of(fitted).solve(&self.train.torque, 1e-10);
         let left = &self.holdout.torque - seen * values;
         (left.norm_squared() / left.len().max(1) as f64).sqrt()
     }

@@ -1,6 +1,7 @@
 //! Inverses of covariances whose entries differ by orders of magnitude.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rig_numerics::svd::Svd;
 
 /// Returns the inverse of a positive definite matrix; `None` for another one. Scales it to a unit diagonal first.
 pub(crate) fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
@@ -18,10 +19,8 @@ pub(crate) fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// Returns the pseudo-inverse; singular values below 1e-9 of the largest count as zero.
 pub(crate) fn pseudo_inverse(m: &DMatrix<f64>) -> DMatrix<f64> {
-    let svd = m.clone().svd(true, true);
-    let least = 1e-9 * svd.singular_values.max();
-    svd.pseudo_inverse(least)
-        .unwrap_or_else(|_| DMatrix::zeros(m.ncols(), m.nrows()))
+    let svd = Svd::of(m.clone());
+    svd.pseudo_inverse(1e-9 * svd.singular_values.max())
 }
 
 /// Returns the pseudo-inverse of a symmetric, positive semi-definite matrix, and its rank.

@@ -13,6 +13,7 @@
 use nalgebra::DMatrix;
 use rig_model::effects::Effects;
 use rig_model::robot::{JointKind, Robot};
+use rig_numerics::svd::Svd;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{DriveKind, Transmission, motor_column};
 
@@ -115,7 +116,7 @@ impl Drives {
             }
             row /= *length;
         }
-        let values = rows.singular_values();
+        let values = Svd::of(rows.clone()).singular_values;
         if !(values.min() > SINGULAR * values.max()) {
             return Err(singular());
         }

@@ -1,6 +1,7 @@
 //! Data common to all starts of a design, and the regressor's rows.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 use rig_shared::lanes::Lanes;
 use rig_shared::multibody::{COLUMNS, Chain, INERTIAL_PARAMETERS, differential_regressor};
 use rig_shared::transmission::MOTOR_COLUMNS;
@@ -143,8 +144,7 @@ pub(super) fn values_of(
         plain[(row, c)] * frame.weights[row % readings] / frame.sizes[c]
     });
     let condition = |s: &DVector<f64>| s.max() / s.min();
-    // The triangular factor has the same singular values and is far smaller.
-    let singular_values = |m: DMatrix<f64>| m.qr().r().singular_values();
+    let singular_values = |m: DMatrix<f64>| Svd::of(m).singular_values;
     let singular = singular_values(scaled);
     let root = (samples as f64).sqrt();
     let logs: f64 = singular.iter().map(|s| (s / root).ln()).sum();

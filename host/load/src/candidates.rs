@@ -2,6 +2,7 @@
 //! a fault of one kind would bend what the other kind says.
 
 use nalgebra::{DMatrix, Matrix3};
+use rig_numerics::svd::Svd;
 
 use crate::mounting::{Channels, Mounting, signed_permutations};
 use crate::statistics::column;
@@ -24,16 +25,15 @@ const DECADES: i32 = 4;
 pub(crate) fn turned(sensed: &Sensed, mounting: &Mounting) -> Vec<Mounting> {
     let covariance = weights_by_forces(sensed);
     let sign = mounting.force.determinant().signum();
-    let svd = covariance.svd(true, true);
-    let (Some(u), Some(v)) = (svd.u, svd.v_t) else {
-        return Vec::new();
-    };
-    let mut sizes: Vec<f64> = svd.singular_values.iter().copied().collect();
-    sizes.sort_by(|a, b| b.total_cmp(a));
+    let svd = Svd::of(DMatrix::from_column_slice(3, 3, covariance.as_slice()));
+    let sizes = &svd.singular_values;
     if !(sizes[1] > ONE_DIRECTION * sizes[0]) {
         return Vec::new();
     }
-    let least = svd.singular_values.imin();
+    let [mut u, v] = [&svd.u, &svd.v_t].map(|m| Matrix3::from_iterator(m.iter().copied()));
+    // Weights in a plane leave the third direction to the first two.
+    u.set_column(2, &u.column(0).cross(&u.column(1)));
+    let least = 2;
     [sign, -sign]
         .map(|sense| {
             let mut signs = Matrix3::identity() * sense;

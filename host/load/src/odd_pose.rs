@@ -11,6 +11,7 @@ use rand::SeedableRng;
 use rand::seq::index::sample;
 use rand_pcg::Pcg64;
 use rig_data::WRENCH_COLUMNS;
+use rig_numerics::svd::Svd;
 use rig_output::{format_significant, listed};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use statrs::function::factorial::ln_binomial;
@@ -156,12 +157,12 @@ impl Equations {
         for (mut column, length) in columns.column_iter_mut().zip(lengths) {
             column /= length.max(f64::MIN_POSITIVE);
         }
-        let svd = columns.svd(true, false);
+        let svd = Svd::of(columns);
         let least = ROUNDING * svd.singular_values.max();
         let kept: Vec<usize> = (0..svd.singular_values.len())
             .filter(|k| svd.singular_values[*k] > least)
             .collect();
-        let span = svd.u.unwrap_or_default().select_columns(&kept);
+        let span = svd.u.select_columns(&kept);
         let residual = &right - &span * span.tr_mul(&right);
         Self { span, residual }
     }
@@ -191,18 +192,9 @@ impl Equations {
         let mut size = order.len();
         for _ in 0..STEPS {
             let rows = rows_of(&order[..size]);
-            let [own, right] = [
-                self.span.select_rows(&rows),
-                DMatrix::from_column_slice(
-                    rows.len(),
-                    1,
-                    self.residual.select_rows(&rows).as_slice(),
-                ),
-            ];
-            let Ok(change) = own.svd(true, true).solve(&right, ROUNDING) else {
-                break;
-            };
-            let off = &self.residual - &self.span * change.column(0);
+            let right = self.residual.select_rows(&rows);
+            let change = Svd::of(self.span.select_rows(&rows)).solve(&right, ROUNDING);
+            let off = &self.residual - &self.span * change;
             let distance = |pose: usize| off.rows(3 * pose, 3).norm_squared();
             let mut next: Vec<usize> = (0..off.len() / 3).collect();
             next.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));

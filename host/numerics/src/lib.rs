@@ -1,4 +1,4 @@
-//! Statistics of samples, autocorrelation, sums over vectors, and optimisers.
+//! Statistics of samples, autocorrelation, sums over vectors, singular values, and optimisers.
 //!
 //! The crates that estimate something use it. It does not depend on robots.
 //!
@@ -12,4 +12,5 @@
 pub mod autocorrelation;
 pub mod optimise;
 pub mod statistics;
+pub mod svd;
 pub mod vector;

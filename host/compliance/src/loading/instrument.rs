@@ -5,6 +5,7 @@
 //! Stoica 1989). Covariance with correlated residuals: Newey & West 1987.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 /// Singular value over the largest below which a direction is not determined. Columns have unit length.
 const SINGULAR: f64 = 1e-7;
@@ -171,15 +172,14 @@ fn pseudo_inverse(cross: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<bool>)> {
         return None;
     }
     let count = cross.ncols();
-    let svd = cross.clone().svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
+    let svd = Svd::of(cross.clone());
     let most = svd.singular_values.max();
     let mut inverse = DMatrix::zeros(count, count);
     let mut lost = vec![0.0; count];
     for (k, value) in svd.singular_values.iter().enumerate() {
-        let right = v_t.row(k).transpose();
+        let right = svd.v_t.row(k).transpose();
         if *value > SINGULAR * most {
-            inverse += &right * u.column(k).transpose() / *value;
+            inverse += &right * svd.u.column(k).transpose() / *value;
         } else {
             for (sum, v) in lost.iter_mut().zip(right.iter()) {
                 *sum += v * v;

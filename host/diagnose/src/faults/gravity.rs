@@ -135,9 +135,13 @@ impl Judge<'_> {
                 }
             }
         }
-        let Ok(inverse) = normal.pseudo_inverse(DETERMINED * normal.norm()) else {
-            return Ok(None);
-        };
+        let eigen = normal.symmetric_eigen();
+        let least = DETERMINED * normal.norm();
+        let kept = eigen
+            .eigenvalues
+            .map(|e| if e > least { 1.0 / e } else { 0.0 });
+        let inverse =
+            eigen.eigenvectors * Matrix3::from_diagonal(&kept) * eigen.eigenvectors.transpose();
         // An arm with parallel axes does not show gravity along them.
         let (shown, seen) = (inverse * right, inverse * normal * stated);
         let strength = shown.norm() / seen.norm();

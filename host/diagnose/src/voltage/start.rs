@@ -5,6 +5,7 @@
 //! of the measured position, so encoder steps do not bias the inertia and no simulation can diverge.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use crate::voltage::log::Log;
 use crate::voltage::plant::{NOMINAL, Plant};
@@ -172,7 +173,7 @@ pub(crate) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
     let squares = sum_of_squares(&right);
     let x = DMatrix::from_row_slice(right.len(), OF_GRAVITY, &rows);
     let y = DVector::from_vec(right);
-    let fit = x.clone().svd(true, true).solve(&y, TINY).ok()?;
+    let fit = Svd::of(x.clone()).solve(&y, TINY);
     (squares > 0.0).then(|| (y - x * fit).norm_squared() / squares)
 }
 

@@ -166,7 +166,7 @@ fn load_by_torques_is_a_part_of_the_last_link() {
             }
         }
     }
-    let singular = rows.singular_values();
+    let singular = rig_numerics::svd::Svd::of(rows.clone()).singular_values;
     let condition = singular.max() / singular.min();
     let printed = found.values.condition_number;
     assert!(

@@ -212,10 +212,7 @@ fn rests_of_a_simulated_run_give_mass_and_centre() {
         }
     }
     let matrix = DMatrix::from_fn(rows.len(), 10, |r, c| rows[r][c]);
-    let solved = matrix
-        .svd(true, true)
-        .solve(&DVector::from_vec(read), 1e-12)
-        .unwrap();
+    let solved = rig_numerics::svd::Svd::of(matrix).solve(&DVector::from_vec(read), 1e-12);
     let centre = sensor.inverse() * nalgebra::Point3::from(Vector3::from(load.first_moment) / 0.8);
     println!("{solved}");
     assert!((solved[0] - 0.8).abs() < 2e-3, "{}", solved[0]);

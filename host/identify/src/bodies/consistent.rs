@@ -15,6 +15,7 @@
 //! mass.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use super::prior::{Prior, Rule};
 use super::pseudo_inertia::INERTIAL;
@@ -67,20 +68,15 @@ impl Coordinates {
         for (c, mut column) in square.column_iter_mut().enumerate() {
             column *= prior.scale[c];
         }
-        let svd = square.svd(true, true);
+        let svd = Svd::of(square);
         let mut right = DVector::zeros(m);
         right.rows_mut(0, rows).copy_from(&data.right.rows(0, rows));
-        // Both factors were requested, so the identity is never used.
-        let u = svd.u.unwrap_or_else(|| DMatrix::identity(m, m));
-        let mut lift = svd
-            .v_t
-            .unwrap_or_else(|| DMatrix::identity(m, m))
-            .transpose();
+        let mut lift = svd.v_t.transpose();
         for (c, mut row) in lift.row_iter_mut().enumerate() {
             row *= prior.scale[c];
         }
         Self {
-            target: u.transpose() * right,
+            target: svd.u.transpose() * right,
             singular: svd.singular_values,
             lift,
         }

@@ -8,6 +8,7 @@
 //! Limits: no correlated priors; errors of the model also shift values.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use rig_model::robot::CONTRADICTED;
 
@@ -51,10 +52,9 @@ pub fn contradicted(
 
 /// Returns each value's shift over its standard deviation under the prior; 0 without information. None if rounded away.
 fn shifts(scaled: &DMatrix<f64>, surprise: &DVector<f64>) -> Option<Vec<f64>> {
-    let svd = scaled.clone().svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let along = u.tr_mul(surprise);
-    let gains = &svd.singular_values;
+    let svd = Svd::of(scaled.clone());
+    let (v_t, gains) = (&svd.v_t, &svd.singular_values);
+    let along = svd.u.tr_mul(surprise);
     let step = v_t.tr_mul(&DVector::from_fn(gains.len(), |k, _| {
         gains[k] / (1.0 + gains[k] * gains[k]) * along[k]
     }));

@@ -9,6 +9,7 @@
 //! Limits: the uncertainty of s and of the factors is not included.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use super::consistent::scaled_cholesky;
 use super::prior::{Prior, Rule};
@@ -220,12 +221,12 @@ impl Belief {
         let spread = self.spread(deviation);
         let seen = r * &spread;
         // In the basis of its singular vectors the data's covariance is diagonal, so no condition number is squared.
-        let svd = seen.svd(true, true);
-        let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-            return Err(singular("of the ridge problem"));
-        };
+        let Svd {
+            u,
+            singular_values: gains,
+            v_t,
+        } = Svd::of(seen);
         let surprise = u.transpose() * (z - r * (&self.combination * &self.centre));
-        let gains = &svd.singular_values;
         let step = DVector::from_fn(gains.len(), |k, _| {
             gains[k] / (1.0 + gains[k] * gains[k]) * surprise[k]
         });
@@ -233,7 +234,7 @@ impl Belief {
         Ok(Posterior {
             standard,
             spread,
-            gains: gains.clone(),
+            gains,
             v_t,
         })
     }

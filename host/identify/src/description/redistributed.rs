@@ -1,6 +1,7 @@
 //! Base parameters distributed over the links of a description.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::combinations::Combinations;
@@ -29,14 +30,12 @@ pub fn redistributed(
         Some(weights) => DMatrix::from_fn(k.nrows(), k.ncols(), |i, c| k[(i, c)] * weights[c]),
         None => k.clone(),
     };
-    if let Ok(inverse) = pseudo_inverse(&scaled) {
-        let step = inverse * missing;
-        pi += match weights {
-            Some(weights) => step.component_mul(weights),
-            None => step,
-        };
-        without_negative_masses(robot, k, &mut pi, &mut remarks);
-    }
+    let step = Svd::of(scaled).solve(&missing, UNDETERMINED);
+    pi += match weights {
+        Some(weights) => step.component_mul(weights),
+        None => step,
+    };
+    without_negative_masses(robot, k, &mut pi, &mut remarks);
     written(robot, &pi, remarks)
 }
 
@@ -56,20 +55,14 @@ fn without_negative_masses(
     if lacking.amax() == 0.0 {
         return;
     }
-    let Ok(inverse) = pseudo_inverse(k) else {
-        return;
-    };
+    let inverse = Svd::of(k.clone()).pseudo_inverse(UNDETERMINED);
     // Projection onto the directions that the data do not determine; its columns are the masses.
     let seen = inverse * k;
     let free = DMatrix::from_fn(pi.len(), masses.len(), |i, m| {
         f64::from(u8::from(i == masses[m])) - seen[(i, masses[m])]
     });
     let own = free.select_rows(masses.iter());
-    let step = own
-        .clone()
-        .svd(true, true)
-        .solve(&lacking, 1e-9)
-        .ok()
+    let step = Some(Svd::of(own.clone()).solve(&lacking, 1e-9))
         .filter(|y| (&own * y - &lacking).amax() <= 1e-9 * lacking.amax());
     if let Some(y) = step {
         *pi += free * y;
@@ -92,6 +85,5 @@ fn without_negative_masses(
     }
 }
 
-fn pseudo_inverse(k: &DMatrix<f64>) -> Result<DMatrix<f64>, &'static str> {
-    k.clone().pseudo_inverse(1e-12)
-}
+/// Singular value of the combinations up to which a direction is not determined.
+const UNDETERMINED: f64 = 1e-12;

@@ -1,6 +1,7 @@
 //! The simulated closed-loop motion of an identified model, in step with the recording.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 use rig_shared::multibody::{COLUMNS, Chain};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS};
 
@@ -282,15 +283,14 @@ impl Companion for ReferenceMotion {
 fn first_state(block: &Block, period: f64) -> (Vec<f64>, Vec<f64>) {
     let rows = FIRST_ROWS.min(block.len());
     let a = DMatrix::from_fn(rows, 3, |i, power| (i as f64).powi(power as i32));
-    let svd = a.svd(true, true);
+    let svd = Svd::of(a);
     block
         .joints
         .iter()
         .map(|joint| {
             let y = DVector::from_fn(rows, |i, _| joint.q[i]);
-            // A parabola over distinct instants always has a solution; the first row is the fallback.
-            svd.solve(&y, 1e-12)
-                .map_or((joint.q[0], 0.0), |x| (x[0], x[1] / period))
+            let x = svd.solve(&y, 1e-12);
+            (x[0], x[1] / period)
         })
         .unzip()
 }

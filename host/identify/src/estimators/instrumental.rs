@@ -12,6 +12,7 @@
 //! Limits: joint weights are not re-estimated between passes; no refined IV with a noise model (RIV).
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use super::closed::{Source, nearest};
 use super::fitted::Fitted;
@@ -63,7 +64,7 @@ fn strength(factor: &TriangularFactor, size: usize) -> f64 {
     let shared = r.view((0, size), (size, size)).into_owned();
     let own = r.view((0, size), (2 * size, size)).into_owned().qr().r();
     match own.try_inverse() {
-        Some(inverse) => (shared * inverse).singular_values().min(),
+        Some(inverse) => Svd::of(shared * inverse).singular_values.min(),
         None => 0.0,
     }
 }

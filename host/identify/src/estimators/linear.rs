@@ -1,6 +1,7 @@
 //! Least squares on a triangular factor, with some columns left out.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use crate::error::IdentifyError;
 use crate::rows::factor::TriangularFactor;
@@ -34,9 +35,9 @@ pub(crate) fn weighted_minimum_norm(
         }
     }
     let (r, z) = all.system();
-    let svd = r.svd(true, true);
+    let svd = Svd::of(r);
     let smallest = 1e-10 * svd.singular_values.max();
-    svd.solve(&z, smallest).ok()
+    Some(svd.solve(&z, smallest))
 }
 
 /// Returns the minimum-norm solution over all joints, weighted by their residuals. None if there is no solution.

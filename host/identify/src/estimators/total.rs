@@ -11,6 +11,7 @@
 //! Limits: no torque noise that the position noise causes through the controller (use instrumental variables); no
 //! position noise that is not white below the cut-off; no second-order errors in the noise.
 
+use rig_numerics::svd::Svd;
 use std::cell::RefCell;
 
 use nalgebra::{DMatrix, DVector};
@@ -186,10 +187,8 @@ fn solve(
         }
         let last = stacked.nrows() - 1;
         stacked[(last, size)] = right.sqrt();
-        let svd = (stacked * &inverse).svd(false, true);
-        let v_t = svd.v_t.ok_or_else(|| singular("of [regressor | torque]"))?;
-        let largest = svd.singular_values.imax();
-        let v = &inverse * v_t.row(largest).transpose();
+        let svd = Svd::of(stacked * &inverse);
+        let v = &inverse * svd.v_t.row(0).transpose();
         let next: Vec<f64> = (0..size).map(|k| -v[k] / v[size]).collect();
         if !next.iter().all(|x| x.is_finite()) {
             return Err(singular("of [regressor | torque]"));

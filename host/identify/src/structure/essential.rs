@@ -10,6 +10,7 @@
 //! if the estimate is physically consistent.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -76,7 +77,7 @@ impl Known {
         memory: f64,
     ) -> Option<Self> {
         let (r, z) = factor.system();
-        let solution = r.clone().svd(true, true).solve(&z, 1e-12 * r.norm()).ok()?;
+        let solution = Svd::of(r.clone()).solve(&z, 1e-12 * r.norm());
         let rest =
             factor.residual_squares(solution.as_slice()) - (&r * &solution - &z).norm_squared();
         Some(Self {

@@ -26,6 +26,7 @@
 //! joints. All other motor parameters are taken as independent.
 
 use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
+use rig_numerics::svd::Svd;
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind, column};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, Transmission, motor_column};
 
@@ -159,8 +160,8 @@ fn join(
         forms[c].1.as_slice()[entry]
     });
     let scale = wanted.amax();
-    let found = there.clone().svd(true, true).solve(&wanted, EXACT).ok();
-    match found.filter(|x| (&there * x - &wanted).amax() < EXACT * scale) {
+    let factors = Svd::of(there.clone()).solve(&wanted, EXACT);
+    match Some(factors).filter(|x| (&there * x - &wanted).amax() < EXACT * scale) {
         Some(factors) => {
             let mut combination = vec![0.0; columns[own].len()];
             for ((from, _), factor) in forms.iter().zip(factors.iter()) {

@@ -12,6 +12,7 @@ use crate::rows::plan::Plan;
 use crate::rows::stream::each_rows;
 use rig_data::prepare::Recording;
 use rig_numerics::autocorrelation::Autocorrelation;
+use rig_numerics::svd::Svd;
 use rig_numerics::vector::dot_in_order;
 
 /// Share of the RMS speed above which rows are always used; no threshold is higher.
@@ -193,10 +194,9 @@ fn believed(rows: &TriangularFactor, p: usize) -> Vec<f64> {
     let mut believed = TriangularFactor::new(p + OWN);
     add(&mut believed, rows, false);
     let (r, z) = believed.system();
-    let svd = r.svd(true, true);
+    let svd = Svd::of(r);
     let smallest = 1e-10 * svd.singular_values.max();
-    svd.solve(&z, smallest)
-        .map_or(vec![0.0; p], |x| x.as_slice()[..p].to_vec())
+    svd.solve(&z, smallest).as_slice()[..p].to_vec()
 }
 
 /// Finds the thresholds of several joints. From fast to slow, the first bin that is [`NOISIER`] than all faster rows

@@ -1,6 +1,7 @@
 //! An estimate with its covariance and intervals.
 
 use nalgebra::DMatrix;
+use rig_numerics::svd::Svd;
 use serde::Serialize;
 use statrs::distribution::ContinuousCDF;
 use statrs::distribution::FisherSnedecor;
@@ -53,7 +54,7 @@ impl Estimate {
             .collect();
         let quantile = t_quantile(degrees_of_freedom as f64);
         let condition = |m: &DMatrix<f64>| {
-            let s = m.singular_values();
+            let s = Svd::of(m.clone()).singular_values;
             s.max() / s.min()
         };
         let mut scaled = regressor.clone();

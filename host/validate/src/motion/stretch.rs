@@ -1,6 +1,7 @@
 //! Stretches of a recording without a gap.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use super::reference::no_reference;
 use crate::ValidateError;
@@ -106,15 +107,12 @@ pub(super) fn first_state(stretch: &Stretch, period: f64) -> (Vec<f64>, Vec<f64>
     let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
     let rows = FIRST_ROWS.min(stretch.t.len());
     let a = DMatrix::from_fn(rows, 3, |i, power| (i as f64).powi(power as i32));
-    let svd = a.svd(true, true);
+    let svd = Svd::of(a);
     for j in 0..n {
         let y = DVector::from_fn(rows, |i, _| stretch.q[j][i]);
-        // A parabola over distinct instants always has a solution; the first row is the fallback.
-        let (position, slope) = svd
-            .solve(&y, 1e-12)
-            .map_or((stretch.q[j][0], 0.0), |x| (x[0], x[1] / period));
-        q[j] = position;
-        v[j] = stretch.first_velocity[j].unwrap_or(slope);
+        let x = svd.solve(&y, 1e-12);
+        q[j] = x[0];
+        v[j] = stretch.first_velocity[j].unwrap_or(x[1] / period);
     }
     (q, v)
 }

@@ -1,6 +1,7 @@
 //! Controllers that hold a simulated motion at the recorded one.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use rig_data::runs::Run;
 use rig_model::robot::{Controller, Robot};
@@ -159,8 +160,7 @@ pub(super) fn regressed(runs: &[Run], joint: usize) -> Option<Controller> {
             scale(i) * scale(j) * normal[(i, j)]
         };
         let target = DVector::from_fn(n, |a, _| scale(set[a]) * right[set[a]]);
-        let svd = DMatrix::from_fn(n, n, entry).svd(true, true);
-        let x = svd.solve(&target, 1.0e-10).ok()?;
+        let x = Svd::of(DMatrix::from_fn(n, n, entry)).solve(&target, 1.0e-10);
         let explained = x.dot(&target) - constant;
         let (kp, kd) = (scale(0) * x[0], scale(1) * x[1]);
         (explained >= EXPLAINED * (power - constant) && kp > 0.0 && kd > 0.0).then_some(

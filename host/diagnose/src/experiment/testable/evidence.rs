@@ -2,6 +2,7 @@
 
 use rig_data::runs::{JointRun, Run};
 use rig_numerics::statistics;
+use rig_numerics::svd::Svd;
 
 /// Length of the windows for speeds, s: a low-pass of 20 Hz resolves it well.
 const WINDOW: f64 = 0.1;
@@ -91,10 +92,8 @@ fn friction(runs: &[&Run], joint: usize) -> [f64; 2] {
     }
     // With little motion, gravity and constant are collinear: the least-norm solution keeps both small.
     let cut = 1e-9 * inner.diagonal().max();
-    inner
-        .svd(true, true)
-        .solve(&right, cut)
-        .map_or([0.0; 2], |x| [x[0], x[1]])
+    let x = Svd::of(inner).solve(&right, cut);
+    [x[0], x[1]]
 }
 
 impl Evidence {

@@ -39,6 +39,8 @@ const OTHERS: usize = 3;
 const SLIDING: f64 = 0.02;
 /// Least rows per column.
 const ROWS_PER_COLUMN: usize = 8;
+/// Standard deviations by which a factor must differ from one: odds are no reason if its own size is not known.
+const SHOWN: f64 = 3.0;
 /// Log odds that the time of the change is not known better than.
 const TIMES: f64 = 3.0;
 
@@ -258,9 +260,13 @@ impl Torque {
         let from = likely.next()?;
         let to = likely.next_back().unwrap_or(from);
         let total = squares_about_mean(self.torque.as_slice());
+        let deviation = gain.factor().abs() * std;
+        if !((gain.factor() - 1.0).abs() > SHOWN * deviation) {
+            return None;
+        }
         Some(Misfit::GainChanged {
             between: [self.t[from - 1], self.t[to]],
-            factor: [gain.factor(), gain.factor().abs() * std],
+            factor: [gain.factor(), deviation],
             left: [fitted.squares() / total, gain.squares / total],
         })
     }
