@@ -24,7 +24,7 @@ const ABOUT: f64 = 2.0;
 /// Residual as a share of what the readings change by, up to which a fit counts as exact: sensors resolve no less.
 const EXACT: f64 = 1e-3;
 /// The same for recordings that tell no noise, as poses: a wrong cause leaves half of the readings or more.
-const EXPLAINED: f64 = 0.22;
+pub(crate) const EXPLAINED: f64 = 0.22;
 /// Ratio to the least residual of the forces beyond which a cause is not looked at further. Delays, leaning bases and jumps
 /// change what all causes leave.
 const HOPELESS: f64 = 10.0;

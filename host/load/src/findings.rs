@@ -247,7 +247,7 @@ impl Told<'_> {
             "The base leans by {} degrees against the description; the load was identified with the estimated gravity.{}",
             format_significant(turn.angle().to_degrees(), 3),
             self.advice(&format!(
-                "Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into the description.",
+                "Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into the description. At rest a joint whose zero is off by this angle looks alike.",
                 gravity.x, gravity.y, gravity.z
             ))
         ));
@@ -338,33 +338,43 @@ impl Told<'_> {
     }
 
     /// Says if more is left than noise: half of the residual's power is not explained by the noise above the band, or at rest
-    /// by the noise of the rows of the poses. Refuses readings of which a rigid load leaves more than half of the power.
+    /// by the noise of the rows of the poses. Refuses readings of which a rigid load leaves more than half of the power, and poses that nothing explains.
     ///
     /// # Errors
     /// [`LoadError::Fault`] with the residual, unless the user goes on.
     pub(crate) fn not_rigid(&self, even_if_wrong: bool) -> Result<Option<String>, LoadError> {
+        let are_poses = self.sensed.recordings.iter().all(|own| own.poses);
+        let is_unexplained = are_poses && !self.explains;
         let (noise, of) = match (noise_floor(self.sensed.recordings), self.scatter().noise()) {
-            (Some(noise), _) => (noise, "noise as that above the band"),
+            (Some(noise), _) => (Some(noise), "noise as that above the band"),
             (_, Some((noise, freedom))) if self.is_beyond(noise, freedom) => {
-                (noise, "noise by which the rows of a pose differ")
+                (Some(noise), "noise by which the rows of a pose differ")
             }
+            _ if is_unexplained => (None, ""),
             (None, Some(_)) => return Ok(None),
             (None, None) => return Ok(self.one_row_a_pose()),
         };
-        let over =
-            |kind: usize| (self.fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2);
+        let over = |kind: usize| match noise {
+            Some(noise) => (self.fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2),
+            None => f64::INFINITY,
+        };
         if self.sensed.is_exact(self.fit) || over(0).max(over(1)) <= 2.0 {
             return Ok(None);
         }
+        let would = noise.map_or_else(String::new, |noise| {
+            format!(
+                "; {of} would leave {} N and {} N·m",
+                format_significant(noise[0], 3),
+                format_significant(noise[1], 3)
+            )
+        });
         let share = self.sensed.share(self.fit);
         let text = format!(
-            "A rigid load leaves {} N and {} N·m RMS ({} and {} % of what the sensor reads beside the bias); {of} would leave {} N and {} N·m. Something else acts on the sensor (cables that pull, contact, elasticity, gain and crosstalk, another robot), or its noise is slow. {}",
+            "A rigid load leaves {} N and {} N·m RMS ({} and {} % of what the sensor reads beside the bias){would}. Something else acts on the sensor (cables that pull, contact, elasticity, gain and crosstalk, another robot), or its noise is slow. {}",
             format_significant(self.fit.noise[0], 3),
             format_significant(self.fit.noise[1], 3),
             format_significant(100.0 * share[0], 2),
             format_significant(100.0 * share[1], 2),
-            format_significant(noise[0], 3),
-            format_significant(noise[1], 3),
             match self.explains {
                 true => "",
                 false => NO_CAUSE,
@@ -374,7 +384,7 @@ impl Told<'_> {
             .trim_end()
             .to_owned();
         let lost = |kind: usize| share[kind].powi(2) > 0.5 && over(kind) > 2.0;
-        match (lost(0) || lost(1)) && !even_if_wrong {
+        match (lost(0) || lost(1) || is_unexplained) && !even_if_wrong {
             true => Err(LoadError::Fault(text)),
             false => Ok(Some(text)),
         }

@@ -67,6 +67,7 @@ mod options;
 mod pace;
 mod pose_noise;
 mod poses;
+mod position_columns;
 mod result;
 mod rows;
 mod selection;

@@ -14,6 +14,7 @@ use crate::faulty_rows::FaultyRows;
 use crate::findings::{SensorFindings, Told};
 use crate::intake::{Intake, Sensing, judged, moving};
 use crate::mounting::Channels;
+use crate::position_columns::changed_positions;
 use crate::selection::{deviation, selected};
 use crate::settle::settled;
 use crate::system::{Fit, Nuisance, Sensed};
@@ -68,6 +69,7 @@ pub(crate) fn by_sensor(
             shifts += 1;
             continue;
         }
+        said.extend(wrong_positions(sensing, &sensor, &sensed, &compared)?);
         let fitted = match faulty.channel(&sensed, &sensor) {
             Some(cut) => without_cut(&sensed, &compared, sensing, cut, &mut said)?,
             None => believed(&sensed, compared, sensing, &mut said)?,
@@ -156,6 +158,28 @@ fn believed(
             fitted(described, as_recorded)
         }
     })
+}
+
+/// Says which error of the position columns explains poses that nothing else does.
+///
+/// # Errors
+/// [`LoadError::Fault`] with the columns, unless the user goes on.
+fn wrong_positions(
+    sensing: &Sensing,
+    sensor: &WristSensor,
+    sensed: &Sensed,
+    compared: &Compared,
+) -> Result<Option<String>, LoadError> {
+    let described = &compared.described;
+    let is_still = sensed.recordings.iter().all(|own| own.poses);
+    if !is_still || !compared.causes.is_empty() || explains(sensed, &described.selected.fit) {
+        return Ok(None);
+    }
+    let found = changed_positions(sensing, sensor, sensed, &described.start)?;
+    match found {
+        Some(text) if !sensing.even_if_wrong => Err(LoadError::Fault(text)),
+        other => Ok(other),
+    }
 }
 
 /// Returns the fit of the five channels beside one that is cut in most poses.

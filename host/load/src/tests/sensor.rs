@@ -319,6 +319,37 @@ fn rows_of_one_pose_are_one_reading_and_a_motion_is_no_list_of_poses() {
     assert!(text.contains("moves all the time"), "{text}");
 }
 
+/// Poses that no property of the sensor explains: the columns of the positions are looked at, and nothing is written.
+#[test]
+fn position_columns_that_are_wrong_are_named_at_rest() {
+    let points = tool();
+    for rows in [1, 20] {
+        let moving = Moving::new(tx40(), 0.8, 5);
+        let list: Vec<Vec<f64>> = (0..10 * rows)
+            .map(|k| moving.position(3.1 * f64::from(k / rows)))
+            .collect();
+        let still = poses(&moving, &points, &Sensor::default(), &list, 7);
+        let said = |change: &dyn Fn(&mut InMemory)| {
+            let mut wrong = still.clone();
+            change(&mut wrong);
+            let found = identify_load(&moving.robot, &[&wrong], &[], &LoadOptions::default());
+            found.map_or_else(|e| e.to_string(), |found| found.warnings.join(" "))
+        };
+        let sound = said(&|_| {});
+        assert!(!sound.contains("positions look wrong"), "{sound}");
+        let text = said(&|own| own.blocks[0].joints.swap(3, 4));
+        assert!(text.contains("q4 and q5 are exchanged"), "{rows}: {text}");
+        let text = said(&|own| own.blocks[0].joints[4].q.iter_mut().for_each(|q| *q = -*q));
+        assert!(text.contains("q5 has the opposite sign"), "{rows}: {text}");
+        let text = said(&|own| own.blocks[0].joints[4].q.iter_mut().for_each(|q| *q += 0.7));
+        let rest = text.split("q5 is counted from another zero (−").nth(1);
+        let angle: f64 = (rest.and_then(|rest| rest.split(' ').next()))
+            .and_then(|angle| angle.parse().ok())
+            .unwrap_or(0.0);
+        assert!((angle - 0.7).abs() < 0.01, "{rows}: {text}");
+    }
+}
+
 /// Noise that is correlated over some rows is noise too.
 #[test]
 fn the_noise_of_poses_with_several_rows_is_no_disturbance() {

@@ -18,6 +18,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::DiagnoseError;
 use crate::faults::finding::Fault;
 use crate::faults::fit::{EXCITED, jackknife};
+use crate::faults::levels::GOOD;
 use crate::faults::misfit::Misfit;
 use crate::faults::rows::{Form, Rows};
 use alternative::Alternative;
@@ -261,7 +262,8 @@ impl Torque {
         let to = likely.next_back().unwrap_or(from);
         let total = squares_about_mean(self.torque.as_slice());
         let deviation = gain.factor().abs() * std;
-        if !((gain.factor() - 1.0).abs() > SHOWN * deviation) {
+        let is_explained = gain.squares < GOOD * total;
+        if !is_explained || !((gain.factor() - 1.0).abs() > SHOWN * deviation) {
             return None;
         }
         Some(Misfit::GainChanged {
