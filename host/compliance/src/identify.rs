@@ -292,6 +292,7 @@ fn measured(
         let before = own.source.is_measured();
         match own.stiffness.filter(|_| before) {
             None => {
+                warnings.extend(replaced(own, value));
                 own.damping = None;
                 (own.stiffness, own.source) = (Some(value), source);
             }
@@ -314,6 +315,22 @@ fn measured(
             own.damping = Some(response.damping);
         }
     }
+}
+
+/// Says that a given stiffness is not used, because another one was measured.
+fn replaced(drive: &DriveStiffness, measured: Value) -> Option<String> {
+    let given = drive.stiffness.filter(|_| drive.source == Source::Given)?;
+    let off = (given.value - measured.value).abs();
+    (off > CONTRADICTS * measured.std && off > AGREES * given.value.min(measured.value)).then(|| {
+        format!(
+            "The given stiffness of joint \"{}\", {} {unit}, contradicts the measured one, {} ± {} {unit}. The measured one is used. If the given one is right, check the unit of the force or torque, the pose and the tool point.",
+            drive.joint,
+            format_significant(given.value, 4),
+            format_significant(measured.value, 4),
+            format_significant(measured.std, 2),
+            unit = format_unit(drive.unit)
+        )
+    })
 }
 
 /// Weighted mean of two independent estimates.

@@ -296,6 +296,14 @@ pub enum Warning {
 }
 
 impl Warning {
+    /// Returns true if the times of the rows are uneven.
+    pub fn is_of_time(&self) -> bool {
+        matches!(
+            self,
+            Self::Gap { .. } | Self::Uneven { .. } | Self::Misplaced { .. }
+        )
+    }
+
     /// Returns the rank of its kind (the most serious first) and its severity within that kind.
     pub fn rank(&self) -> (usize, f64) {
         match self {

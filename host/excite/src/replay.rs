@@ -233,11 +233,16 @@ fn tracking_notes(robot: &Robot, motion: &Motion, asked: &[Vec<f64>]) -> Vec<Str
     for ((joint, q), asked) in robot.joints.iter().zip(&motion.q).zip(asked) {
         let (off, moved) = followed(q, asked);
         if off > OFF * moved {
+            let of = match moved > 0.0 {
+                true => format!(
+                    "{:.0} % of the motion that was asked for",
+                    100.0 * off / moved
+                ),
+                false => "though it should rest".to_owned(),
+            };
             notes.push(format!(
-                "Joint \"{}\" is off its reference by {off:.3e} {unit} RMS, {:.0} % of the motion that was asked for: the recording \
-                 shows what it did, not what was designed.",
+                "Joint \"{}\" is off its reference by {off:.3e} {unit} RMS, {of}: the recording shows what it did, not what was designed.",
                 joint.name,
-                100.0 * off / moved,
                 unit = joint.kind.units().0,
             ));
         }

@@ -294,7 +294,7 @@ fn weighing(
             Reads::Robot => ["load", "robot"],
         };
         let text = format!(
-            "The load would weigh {} kg: the readings have the sign of reads = \"{is}\", but [wrist_sensor] says reads = \"{says}\". Correct it.",
+            "The load would weigh {} kg: the readings have the sign of reads = \"{is}\", but [wrist_sensor] says reads = \"{says}\". Correct it, or look for a position column with the opposite sign.",
             format_significant(sensed_mass(&fit), 4)
         );
         if !sensing.even_if_wrong {

@@ -92,7 +92,7 @@ impl DriveLoading {
         self.reverses = true;
         if zero.abs() > MISPLACED * (self.load[1] - self.load[0]) {
             self.warnings.push(format!(
-                "The gap of joint \"{}\" is crossed where the load is {} by the description, but a gap is crossed at 0: the described weight of the links is not that of this arm, or the force has a bias. Stiffness and gap do not depend on it.",
+                "The gap of joint \"{}\" is crossed where the load is {} by the description, but a gap is crossed at 0: the described weight of the links is not that of this arm, or the force has a bias, which do not change stiffness and gap; or the force has another unit (N is meant), or the pose or the tool point is not the given one, which change the stiffness.",
                 self.joint,
                 format_significant(zero, 2)
             ));

@@ -592,7 +592,7 @@ fn speed_up(effort: &Effort) -> String {
         "elapsed time, waiting for a processor included,"
     };
     format!(
-        "Search: {:.1} s of {kind} by {threads} in {:.1} s, {:.2} at the same time on average.",
+        "Search: {:.1} s of {kind} by {threads} in {:.1} s: {:.2} times as fast as one thread.",
         effort.work.as_secs_f64(),
         effort.wall.as_secs_f64(),
         effort.speed_up()

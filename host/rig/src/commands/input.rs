@@ -403,6 +403,11 @@ impl Inputs {
     /// Warnings about the rows: those that were not checked for faults, then for each recording and kind one line, with the
     /// worst row and the number of others.
     pub fn heard(&self) -> Vec<String> {
+        self.heard_but(&|_| false)
+    }
+
+    /// The same without warnings of a kind.
+    pub fn heard_but(&self, is_left_out: &dyn Fn(&Warning) -> bool) -> Vec<String> {
         let mut all = self.unchecked.borrow().clone();
         for (source, heard) in self.sources.iter().zip(&self.heard) {
             let (path, heard) = (source.path().display(), heard.borrow());
@@ -410,7 +415,8 @@ impl Inputs {
                 KEPT_WARNINGS.. => "at least ",
                 _ => "",
             };
-            let mut kinds = worst_first(heard.iter(), |warning| warning.rank());
+            let own = heard.iter().filter(|warning| !is_left_out(warning));
+            let mut kinds = worst_first(own, |warning| warning.rank());
             kinds.sort_by_key(|own| own[0].rank().0);
             for own in kinds {
                 let (worst, more) = (own[0], own.len() - 1);

@@ -208,8 +208,17 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &options,
     )?;
     found.warnings.extend(urdf.as_ref().and_then(beyond_flange));
-    found.warnings.extend(with.heard());
-    found.warnings.extend(without.heard());
+    let are_poses = found
+        .sensor
+        .as_ref()
+        .is_some_and(|own| own.prepared.is_none());
+    for inputs in [&with, &without] {
+        // Time passes from one pose to the next.
+        found.warnings.extend(match are_poses {
+            true => inputs.heard_but(&|warning| warning.is_of_time()),
+            false => inputs.heard(),
+        });
+    }
     let numbers = controller_numbers(&found);
     let context = Context {
         command: ui.command_line(),
