@@ -33,6 +33,9 @@ const EVIDENT: f64 = 10.0;
 const UNCERTAIN: f64 = 0.1;
 /// Relative difference of an inertia from the described one that is told, beyond three standard deviations.
 const DIFFERS: f64 = 0.15;
+/// Velocity of another joint over that of the joint, RMS, from which the other one is no longer held. On the simulated EDDA with
+/// 600 N·m/rad at the elbow, a shoulder with 0.023 to 0.025 of the elbow's velocity made it 824 and 989.
+const HELD: f64 = 0.01;
 /// Share of rows at the highest torque that shows saturation.
 const SATURATED: f64 = 0.01;
 /// Share of rows at the highest torque beyond which the response is not computed.
@@ -223,6 +226,7 @@ fn check_motion(
                 k + 1
             )));
         }
+        warnings.extend(yielding(robot, stretch, k, &movement));
         let tau = &stretch.joints[k].tau;
         let most = tau.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
         let at = tau.iter().filter(|t| t.abs() >= 0.999 * most).count();
@@ -241,6 +245,28 @@ fn check_motion(
         }
     }
     Ok(())
+}
+
+/// Says that another joint moves along: it belongs to the link's mass then, by its own controller.
+fn yielding(
+    robot: &Robot,
+    stretch: &Signals,
+    k: usize,
+    movement: &dyn Fn(usize) -> f64,
+) -> Option<String> {
+    let share = |j: usize| (movement(j) / movement(k)).sqrt();
+    let others = (0..stretch.joints.len())
+        .filter(|j| *j != k && robot.joints[*j].kind == robot.joints[k].kind);
+    let most = others.max_by(|a, b| share(*a).total_cmp(&share(*b)))?;
+    (share(most) > HELD).then(|| {
+        format!(
+            "{}: joint \"{}\" moves with {:.1} % of the velocity of joint \"{}\" (RMS). The other joints count as held; where one yields, its controller belongs to the response, and the stiffness can be wrong by tens of per cent. Lock that joint, or use static loading (--static).",
+            stretch.label,
+            robot.joints[most].name,
+            100.0 * share(most),
+            robot.joints[k].name
+        )
+    })
 }
 
 /// Returns the range of the bands with significant coherence, Hz.
