@@ -45,6 +45,8 @@ pub struct BoardMeasurement {
     pub stack_free: u32,
     /// As [`Health::bad_requests`].
     pub bad_requests: u32,
+    /// As [`Health::line_errors`].
+    pub line_errors: u32,
     /// As [`Health::dropped`].
     pub dropped: u32,
 }
@@ -78,6 +80,7 @@ impl BoardStart {
             tick_cycles_mean: measured.tick_cycles_mean,
             stack_free: measured.stack_free,
             bad_requests: measured.bad_requests,
+            line_errors: measured.line_errors,
             dropped: measured.dropped,
             crash: self.crash,
         }

@@ -12,6 +12,9 @@ use super::stack;
 /// Damaged requests; counted by the command task.
 pub(crate) static BAD_REQUESTS: AtomicU32 = AtomicU32::new(0);
 
+/// Errors of the serial line: bytes with a framing or noise error, and bytes lost for lack of room.
+pub(crate) static LINE_ERRORS: AtomicU32 = AtomicU32::new(0);
+
 /// Cycles of the ticks since the last report.
 pub(crate) struct HealthMonitor {
     report_ticks: u32,
@@ -53,6 +56,7 @@ impl HealthMonitor {
             tick_cycles_mean: self.sum / self.ticks.max(1),
             stack_free: stack::free(),
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
+            line_errors: LINE_ERRORS.load(Ordering::Relaxed),
             dropped,
         };
         *self = Self::new(self.report_ticks);

@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2, LPUART1};
 use embassy_stm32::usart::{
-    Config as UartConfig, ConfigError, InterruptHandler, RingBufferedUartRx, Uart, UartTx,
+    Config as UartConfig, ConfigError, InterruptHandler, RxDma, Uart, UartTx,
 };
 use embassy_stm32::{bind_interrupts, dma, mode};
 use embassy_time::{Duration, Ticker, Timer, with_timeout};
@@ -26,36 +26,33 @@ use super::health::BAD_REQUESTS;
 use super::pins::LinkPins;
 use super::probe;
 use super::queue::{Numbered, URGENT_WAITS};
+use super::receiver::{LineEvents, Receiver, RingEvents};
 use super::return_barrier::ReturnBarrier;
 use super::watchdog::{Task, check_in};
 
 /// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
 const BAUD: u32 = 921_600;
-/// Input buffer while the receiving task is busy, bytes: 11 ms of data.
-const RECEIVE_BYTES: usize = 1024;
 /// Output buffer, bytes: two of the longest frames.
 const SEND_BYTES: usize = 2 * MAX_FRAME;
 /// Longest wait for bytes, so that the receiving task reports to the watchdog while no data arrive.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
 
-static RING_BUFFER: ConstStaticCell<[u8; RECEIVE_BYTES]> = ConstStaticCell::new([0; RECEIVE_BYTES]);
 static SEND_BUFFER: ConstStaticCell<Vec<u8, SEND_BYTES>> = ConstStaticCell::new(Vec::new());
 
 bind_interrupts!(struct Interrupts {
-    LPUART1 => InterruptHandler<LPUART1>, ReturnBarrier;
+    LPUART1 => LineEvents, InterruptHandler<LPUART1>, ReturnBarrier;
     DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>, ReturnBarrier;
-    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>, ReturnBarrier;
+    DMA1_CHANNEL2 => RingEvents, dma::InterruptHandler<DMA1_CH2>, ReturnBarrier;
 });
 
 /// Outgoing half.
 pub(crate) type Sender = UartTx<'static, mode::Async>;
-/// Incoming half.
-pub(crate) type Receiver = RingBufferedUartRx<'static>;
 
 /// Opens the line.
 pub(crate) fn open(pins: LinkPins) -> Result<(Sender, Receiver), ConfigError> {
     let mut config = UartConfig::default();
     config.baudrate = BAUD;
+    let request = RxDma::<LPUART1>::request(&*pins.rx_dma);
     let uart = Uart::new(
         pins.uart,
         pins.rx,
@@ -66,8 +63,8 @@ pub(crate) fn open(pins: LinkPins) -> Result<(Sender, Receiver), ConfigError> {
         config,
     )?;
     interrupt::LPUART1.set_priority(LINK_PRIORITY);
-    let (sender, receiver) = uart.split();
-    Ok((sender, receiver.into_ring_buffered(RING_BUFFER.take())))
+    let (sender, port) = uart.split();
+    Ok((sender, Receiver::start(port, request)))
 }
 
 /// Takes events from the tick a thousand times a second, encodes them as frames and sends these.
@@ -198,15 +195,9 @@ pub(crate) async fn receive(
     let mut bytes = [0; 64];
     loop {
         check_in(Task::Receive);
-        let count = match with_timeout(READ_TIMEOUT, line.read(&mut bytes)).await {
-            Ok(Ok(count)) => count,
-            // A damaged or additional byte: the check sum of the frame detects it, and the host repeats its request.
-            Ok(Err(_)) => {
-                defmt::warn!("an error on the serial line");
-                0
-            }
-            Err(_) => 0,
-        };
+        let count = with_timeout(READ_TIMEOUT, line.read(&mut bytes))
+            .await
+            .unwrap_or(0);
         for &byte in bytes.iter().take(count) {
             distributor.pass(line_decoder.push(byte));
         }

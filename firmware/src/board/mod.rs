@@ -15,6 +15,7 @@ mod pins;
 mod probe;
 mod pwm;
 mod queue;
+mod receiver;
 mod return_barrier;
 mod stack;
 pub(crate) mod start;

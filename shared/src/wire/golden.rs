@@ -310,6 +310,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 tick_cycles_mean: 3000,
                 stack_free: 20_000,
                 bad_requests: 1,
+                line_errors: 2,
                 dropped: 8,
                 crash: Some(Crash {
                     kind: CrashKind::ProcessorFault,
@@ -320,7 +321,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                     line: 0,
                 }),
             }),
-            "2708904e030380fd875101018827b817a09c0101080101b4a4804081828040808402808080800405b191b85f00"
+            "2808904e030380fd875101018827b817a09c010102080101b4a48040818280408084028080808004058d3e839600"
         ),
     ]
 }

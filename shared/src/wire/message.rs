@@ -362,6 +362,9 @@ pub struct Health {
     pub stack_free: u32,
     /// Damaged requests since power on.
     pub bad_requests: u32,
+    /// Errors of the serial line from the host since power on: bytes with a framing or noise error, and losses for lack of
+    /// room.
+    pub line_errors: u32,
     /// Telemetry windows dropped for lack of room since power on.
     pub dropped: u32,
     /// The failure of the program before the last start; `None` if there was none, or if the power was off since.

@@ -15,6 +15,7 @@ pub mod cost;
 pub mod cpu;
 pub mod emulation;
 pub mod image;
+pub mod line_noise;
 pub mod map;
 pub mod nvic;
 pub mod peripheral;

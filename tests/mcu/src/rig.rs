@@ -9,6 +9,7 @@ use crate::board::Board;
 use crate::chip::Chip;
 use crate::emulation::Emulation;
 use crate::image::Image;
+use crate::line_noise::LineNoise;
 use crate::unicorn::{EngineError, UnicornCpu};
 
 /// A board run by unicorn.
@@ -30,12 +31,18 @@ pub struct Line {
     pub board: EmulatedBoard,
     /// Everything that the board sent, if kept.
     pub heard: Option<Vec<u8>>,
+    /// Faults of the line to the board.
+    pub noise: Option<LineNoise>,
 }
 
 impl Device for Line {
     fn exchange(&mut self, from_host: &[u8], to_host: &mut Vec<u8>) {
         let silent = self.board.failure().is_some();
-        self.board.with_chip(|chip| chip.send(from_host));
+        let noise = &mut self.noise;
+        self.board.with_chip(|chip| match noise {
+            Some(noise) => noise.send(chip, from_host),
+            None => chip.send(from_host),
+        });
         if let Err(failure) = self.board.run_for(self.slice().as_secs_f64())
             && !silent
         {

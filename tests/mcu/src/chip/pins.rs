@@ -5,6 +5,7 @@ use super::state::Chip;
 use crate::board::Bridge;
 use crate::peripheral::Refusal;
 use crate::peripheral::gpio::Function;
+use crate::peripheral::lpuart::LineError;
 use crate::ripple::Ripple;
 use crate::time::{Instant, to_seconds};
 
@@ -125,8 +126,15 @@ impl Chip {
 
     /// Sends bytes of the host to the serial line. They reach the port only if PA3 is set up for it.
     pub fn send(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.send_byte(byte, None);
+        }
+    }
+
+    /// Sends a byte of the host likewise, with a fault of the line.
+    pub fn send_byte(&mut self, byte: u8, error: Option<LineError>) {
         if self.gpio[0].function(3) == Function::Alternate(12) {
-            self.lpuart.receive(self.work.now, bytes);
+            self.lpuart.receive_byte(self.work.now, byte, error);
             self.deadline = 0;
         }
     }

@@ -1,5 +1,9 @@
 //! DMA controller (RM0440 section 12.6): memory to peripheral and back, one item a request.
 //!
+//! A channel that is disabled before its end and enabled again needs a new count. To resume it with what is left "is not
+//! supported by the DMA hardware" (RM0440 section 12.4, "Channel state and disabling a channel"), so it is refused here.
+//! A circular channel begins again with the count that was last written.
+//!
 //! Left out: memory to memory, bus time, priorities between channels (requests are served as they come).
 
 use super::{Refusal, told};
@@ -21,9 +25,11 @@ struct Channel {
     count: u32,
     peripheral: u32,
     memory: u32,
-    /// Items of a whole transfer, and number of finished items.
+    /// Items of a whole transfer, as last written, and number of finished items.
     length: u32,
     done: u32,
+    /// True if the channel was disabled with items left, and its count was not written since.
+    suspended: bool,
     flags: u32,
 }
 
@@ -148,8 +154,17 @@ impl Dma {
                         number + 1
                     ));
                 }
+                if running && value & EN == 0 {
+                    channel.suspended = channel.count > 0;
+                }
                 if value & EN != 0 && !running {
-                    channel.length = channel.count;
+                    if channel.suspended {
+                        return told(format!(
+                            "DMA channel {} was disabled with {} items left and is enabled again without a new count, which the hardware does not support",
+                            number + 1,
+                            channel.count
+                        ));
+                    }
                     channel.done = 0;
                 }
                 channel.control = value;
@@ -160,7 +175,11 @@ impl Dma {
                     number + 1
                 ));
             }
-            4 => channel.count = value & 0xFFFF,
+            4 => {
+                channel.count = value & 0xFFFF;
+                channel.length = channel.count;
+                channel.suspended = false;
+            }
             8 => channel.peripheral = value,
             _ => channel.memory = value,
         }
@@ -206,5 +225,22 @@ mod test {
             [(0, 0, 3), (1, 5, 2), (2, 0, 1), (3, 3, 4), (0, 0, 3)]
         );
         assert!(dma.write(0x0C, 1).is_err(), "count while running");
+    }
+    #[test]
+    fn a_channel_that_was_stopped_needs_a_new_count() {
+        let on = EN | CIRC | MINC;
+        let mut dma = Dma::default();
+        dma.write(0x0C, 4).unwrap();
+        dma.write(0x14, 0x2000_0100).unwrap();
+        dma.write(0x08, on).unwrap();
+        dma.serve(0).unwrap();
+        dma.write(0x08, on & !EN).unwrap();
+        assert!(dma.write(0x08, on).is_err(), "resumed with three left");
+        dma.write(0x0C, 2).unwrap();
+        dma.write(0x08, on).unwrap();
+        let places: Vec<u32> = (0..3)
+            .map(|_| dma.serve(0).unwrap().unwrap().memory - 0x2000_0100)
+            .collect();
+        assert_eq!(places, [0, 1, 0]);
     }
 }

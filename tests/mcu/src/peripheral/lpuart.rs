@@ -1,5 +1,8 @@
-//! Low-power UART (RM0440 section 38): frames of eight bits, stop bits always as one, with or without FIFO, DMA. Left
-//! out: parity, flow control, addressing, wake-up.
+//! Low-power UART (RM0440 section 38): frames of eight bits, stop bits always as one, with or without FIFO, DMA, framing
+//! and noise errors. Left out: parity, flow control, addressing, wake-up.
+//!
+//! A byte with an error raises its flag. With DMA it is not passed on, as DDRE = 0 says (`LPUART_CR3`); DDRE = 1 is
+//! refused.
 
 use std::collections::VecDeque;
 
@@ -21,6 +24,8 @@ const EIE: u32 = 1;
 const DMAR: u32 = 1 << 6;
 const DMAT: u32 = 1 << 7;
 
+const FE: u32 = 1 << 1;
+const NE: u32 = 1 << 2;
 const ORE: u32 = 1 << 3;
 const IDLE: u32 = 1 << 4;
 const RXNE: u32 = 1 << 5;
@@ -31,11 +36,20 @@ const TXE: u32 = 1 << 7;
 const REGISTERS: &[Register] = &[
     Register(0x00, "LPUART_CR1", 0, 0x2000_01FD),
     Register(0x04, "LPUART_CR2", 0, 0x0000_3000),
-    Register(0x08, "LPUART_CR3", 0, 0xEE00_30C9),
+    Register(0x08, "LPUART_CR3", 0, 0xEE00_10C9),
     Register(0x0C, "LPUART_BRR", 0, 0x000F_FFFF),
     Register(0x18, "LPUART_RQR", 0, 0x0000_0018),
     Register(0x2C, "LPUART_PRESC", 0, 0x0000_000F),
 ];
+
+/// A fault of the line in one byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineError {
+    /// The stop bit is low.
+    Framing,
+    /// The samples of the start bit differ.
+    Noise,
+}
 
 /// The port and the line behind it.
 #[derive(Clone, Debug)]
@@ -49,7 +63,7 @@ pub struct Lpuart {
     /// Byte in the transmit shift register, and the end of its transmission.
     shifting: Option<(Instant, u8)>,
     /// Bytes on the way from the host.
-    incoming: VecDeque<u8>,
+    incoming: VecDeque<(u8, Option<LineError>)>,
     /// Arrival of the next of them.
     arrives: Instant,
     /// Time at which the line has been idle for a frame.
@@ -119,13 +133,17 @@ impl Lpuart {
 
     /// Takes bytes that the host sends at `now`.
     pub fn receive(&mut self, now: Instant, bytes: &[u8]) {
-        if bytes.is_empty() {
-            return;
+        for &byte in bytes {
+            self.receive_byte(now, byte, None);
         }
+    }
+
+    /// Takes a byte that the host sends at `now`, with a fault of the line.
+    pub fn receive_byte(&mut self, now: Instant, byte: u8, error: Option<LineError>) {
         if self.incoming.is_empty() {
             self.arrives = now + self.frame();
         }
-        self.incoming.extend(bytes);
+        self.incoming.push_back((byte, error));
     }
 
     /// Returns the time of the next event.
@@ -157,18 +175,27 @@ impl Lpuart {
     }
 
     fn take(&mut self, at: Instant) {
-        let byte = self.incoming.pop_front();
+        let incoming = self.incoming.pop_front();
         self.arrives = if self.incoming.is_empty() {
             NEVER
         } else {
             at + self.frame()
         };
-        let Some(byte) = byte else { return };
+        let Some((byte, error)) = incoming else {
+            return;
+        };
         if self.bank.get(CR1) & (UE | RE) != UE | RE {
             self.overruns += 1;
             return;
         }
-        if self.received.len() >= self.depth() {
+        self.flags |= match error {
+            Some(LineError::Framing) => FE,
+            Some(LineError::Noise) => NE,
+            None => 0,
+        };
+        if error.is_some() && self.bank.get(CR3) & DMAR != 0 {
+            // Not passed on.
+        } else if self.received.len() >= self.depth() {
             self.flags |= ORE;
             self.overruns += 1;
         } else {
@@ -206,7 +233,7 @@ impl Lpuart {
                 || control & RXNEIE != 0 && status & (RXNE | ORE) != 0
                 || control & TCIE != 0 && status & TC != 0
                 || control & TXEIE != 0 && status & TXE != 0
-                || self.bank.get(CR3) & EIE != 0 && status & ORE != 0)
+                || self.bank.get(CR3) & EIE != 0 && status & (FE | NE | ORE) != 0)
     }
 
     fn status(&self) -> u32 {
@@ -248,7 +275,7 @@ impl Lpuart {
     /// An access that is not modelled.
     pub fn write(&mut self, now: Instant, offset: u32, value: u32) -> Result<(), Refusal> {
         match offset {
-            0x20 => self.flags &= !(value & (ORE | IDLE | TC)),
+            0x20 => self.flags &= !(value & (FE | NE | ORE | IDLE | TC)),
             0x28 => {
                 if self.to_send.len() >= self.depth() {
                     return told("LPUART_TDR was written while full: a byte would be lost");

@@ -42,6 +42,7 @@ fn conversation(seed: u64) -> Vec<u8> {
     let line = Line {
         board: powered(seed),
         heard: Some(Vec::new()),
+        noise: None,
     };
     let mut port = EmulatedPort::new(line);
     port.device_mut().board.run_for(0.05).unwrap();

@@ -10,6 +10,7 @@ mod dynamics;
 mod faults;
 mod hardware;
 mod identification;
+mod line;
 mod requests;
 mod storage;
 
@@ -62,7 +63,11 @@ fn powered(seed: u64) -> EmulatedBoard {
 
 /// Greets a board.
 fn greeted(board: EmulatedBoard) -> BoardSession {
-    let line = Line { board, heard: None };
+    let line = Line {
+        board,
+        heard: None,
+        noise: None,
+    };
     let mut port = EmulatedPort::new(line);
     // The port listens once the firmware has set it up.
     port.device_mut().board.run_for(0.05).unwrap();

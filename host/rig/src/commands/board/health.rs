@@ -51,7 +51,7 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
          clock           {:.3} MHz, {}{}\n\
          control tick    {:.1} % of its time on average, {:.1} % at most in the last second\n\
          stack           {} bytes never used\n\
-         line            {} damaged requests, {} telemetry samples without room",
+         line            {} damaged requests, {} line errors, {} telemetry samples without room",
         greeting.firmware,
         health.tick as f64 / f64::from(greeting.control_rate_hz),
         health.reset,
@@ -70,6 +70,7 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
         share(health.tick_cycles_max),
         health.stack_free,
         health.bad_requests,
+        health.line_errors,
         health.dropped,
     ) + &health.crash.map_or(String::new(), |crash| {
         format!("\nlast failure    {}", describe_crash(&crash))
