@@ -16,10 +16,10 @@ pub(super) struct Acting<'a> {
     memory: Vec<Memory<f64>>,
     motor: Vec<f64>,
     time: f64,
-    /// Coordinate of each joint's link: the joint's number, or another one if the link is a separate mass.
-    links: Vec<usize>,
     /// Torques that do not depend on the direction of motion, one a coordinate.
     pub torque: Vec<f64>,
+    /// Such torques on links that are not at the coordinates of their joints, one a joint.
+    pub of_links: Vec<f64>,
     /// Dry friction that effects add, for motion backwards and forwards, one a joint.
     dry: Vec<[f64; 2]>,
     /// Part of `dry` from presliding, whose hidden state replaces the direction.
@@ -35,16 +35,15 @@ pub(super) struct Acting<'a> {
 }
 
 impl<'a> Acting<'a> {
-    /// Prepares the effects for `coordinates`, with the coordinate of each joint's link.
-    pub(super) fn new(effects: &'a Effects, coordinates: usize, links: Vec<usize>) -> Self {
-        let joints = links.len();
+    /// Prepares the effects for `coordinates`, the first of which are those of the joints.
+    pub(super) fn new(effects: &'a Effects, coordinates: usize, joints: usize) -> Self {
         Self {
             effects,
             memory: vec![Memory::default(); effects.placed().len()],
             motor: vec![0.0; joints],
             time: 0.0,
-            links,
             torque: vec![0.0; coordinates],
+            of_links: vec![0.0; joints],
             dry: vec![[0.0; 2]; joints],
             remembered: vec![[0.0; 2]; joints],
             bent: vec![None; joints],
@@ -76,11 +75,13 @@ impl<'a> Acting<'a> {
             .filter_map(|p| Some((p.joint, p.other?, p.effect.gains[0])))
     }
 
-    /// Returns the inputs of effect `k`. The coupled acceleration is zero: its inertia is in the mass matrix.
+    /// Returns the inputs of effect `k`; `links`: positions and velocities of the links. The coupled acceleration is zero:
+    /// its inertia is in the mass matrix.
     fn instant(
         &self,
         k: usize,
         [q, v, a, drive]: [&[f64]; 4],
+        links: [&[f64]; 2],
         period: f64,
     ) -> rig_shared::effects::Instant<f64> {
         let place = self.effects.placed()[k];
@@ -102,9 +103,9 @@ impl<'a> Acting<'a> {
             instant.extra_friction_ratio = self.beside[place.joint];
         }
         if place.effect.kind.acts_on_link() {
-            let link = self.links[place.joint];
-            (instant.position, instant.velocity) = (q[link], v[link]);
-            if let Some(other) = place.other.map(|other| self.links[other]) {
+            let [q, v] = links;
+            (instant.position, instant.velocity) = (q[place.joint], v[place.joint]);
+            if let Some(other) = place.other {
                 (instant.other[0], instant.other[1]) = (q[other], v[other]);
             }
         }
@@ -112,20 +113,24 @@ impl<'a> Acting<'a> {
     }
 
     /// Computes all torques in the middle of a step of `dt`. `motion`: positions, mean velocities and accelerations of
-    /// all coordinates, torques of the drives. `links`: loads of the links on the gears.
+    /// all coordinates, torques of the drives. `links`: positions and velocities of the links. `separate`: of a joint,
+    /// whether its link is elsewhere than its motor. `loads`: of the links on the gears.
     pub(super) fn evaluate(
         &mut self,
         motion: [&[f64]; 4],
-        links: &[f64],
+        links: [&[f64]; 2],
+        separate: impl Fn(usize) -> bool,
+        loads: &[f64],
         dt: f64,
     ) -> Result<(), SimulateError> {
         self.torque.fill(0.0);
+        self.of_links.fill(0.0);
         self.dry.fill([0.0; 2]);
         self.remembered.fill([0.0; 2]);
         let joints = self.motor.len();
         self.effects
             .motor_angles(&motion[0][..joints], &mut self.motor)?;
-        let mut load = links.to_vec();
+        let mut load = loads.to_vec();
         self.bent.fill(None);
         self.through.fill(0.0);
         self.warmed.fill(0.0);
@@ -138,7 +143,7 @@ impl<'a> Acting<'a> {
                 if !is_torque(kind) || Turn::of(kind) != turn {
                     continue;
                 }
-                let mut instant = self.instant(k, motion, 0.5 * dt);
+                let mut instant = self.instant(k, motion, links, 0.5 * dt);
                 instant.load = load[p.joint];
                 if kind.about().direction == Direction::Dry {
                     let beside = instant.extra_friction_ratio;
@@ -170,11 +175,13 @@ impl<'a> Acting<'a> {
                     self.warmed[p.joint] += torque / instant.velocity;
                     self.refuse_driving(p.joint)?;
                 }
-                let link = self.links[p.joint];
-                let at = if kind.acts_on_link() { link } else { p.joint };
-                self.torque[at] += torque;
-                // The torque of an elastic gear contains it already.
-                if kind.acts_on_link() && link == p.joint {
+                if !kind.acts_on_link() {
+                    self.torque[p.joint] += torque;
+                } else if separate(p.joint) {
+                    // The load on the gears contains it already.
+                    self.of_links[p.joint] += torque;
+                } else {
+                    self.torque[p.joint] += torque;
                     load[p.joint] += torque;
                 }
             }
@@ -233,9 +240,9 @@ impl<'a> Acting<'a> {
     }
 
     /// Computes hidden states and time at the end of the step.
-    pub(super) fn advance(&mut self, motion: [&[f64]; 4], dt: f64) {
+    pub(super) fn advance(&mut self, motion: [&[f64]; 4], links: [&[f64]; 2], dt: f64) {
         for k in 0..self.memory.len() {
-            let instant = self.instant(k, motion, dt);
+            let instant = self.instant(k, motion, links, dt);
             let p = &self.effects.placed()[k].effect;
             let _: [f64; GAINS] = p.kind.terms(&p.shapes, &mut self.memory[k].0, &instant);
         }

@@ -2,13 +2,13 @@
 //!
 //! A robot of n joints has n coordinates, and one more for the link of each joint with such a gear. The first n are the
 //! motors': positions θ that the motors would give the joints through stiff gears. With coupled drives they are the
-//! solution of Ψ = F(θ). A joint without such a gear has its link at the same coordinate. The inertia of coupled motors,
-//! its change with the position, and their friction belong to the first n coordinates.
+//! solution of Ψ = F(θ). The inertia of coupled motors, its change with the position, and their friction belong to them.
+//! A joint without such a gear has its link at the same coordinate, unless its drive is coupled with one that has.
 //!
 //! The gear of a drive is a spring in series with its motor: its twist is Ψ(θ) − Ψ(q), q the links, and its torque acts
 //! on θ and on q by the Jacobian of Ψ at either. Twist and stiffness are those of the joint for simple and coupled drives
-//! (motor radians over the drive's own ratio), and those of the motor for a screw, whose ratio changes. A coupled drive
-//! connects joints, so all drives that are coupled have such a gear, or none.
+//! (motor radians over the drive's own ratio), and those of the motor for a screw, whose ratio changes. Where coupled
+//! drives have elastic and stiff gears, a stiff one connects the joints on both sides ([`super::link_map`]).
 //!
 //! Sources: Spong 1987 (eqs. 8 and 9: no gyroscopic torque of the rotors); Nordin and Gutman 2002. The drive's inertia,
 //! the position sensor and the joint's friction are on the motor's side. The effect moves a share of the joint's viscous
@@ -18,11 +18,12 @@ use std::f64::consts::TAU;
 
 use rig_shared::effects::{Kind, SHAPES, transmission_torque};
 use rig_shared::multibody::{bias_torque, column, inertia_matrix};
-use rig_shared::transmission::{DriveKind, motor_column};
+use rig_shared::transmission::{DriveKind, Transmission, motor_column};
 
 use nalgebra::{DMatrix, DVector};
 
 use super::error::{Light, SimulateError, TooStiff};
+use super::link_map::LinkMap;
 use super::model::Model;
 use super::solve::invert;
 
@@ -43,8 +44,6 @@ pub(super) struct Gear {
     /// Coordinate of its link.
     pub link: usize,
     law: [f64; 3],
-    /// Motor radians per unit of twist: the drive's own ratio; 1 for a screw.
-    scale: f64,
     /// Share of the joint's friction that acts on the link.
     pub link_friction: f64,
 }
@@ -62,8 +61,8 @@ impl Gear {
 pub(super) struct Elastic {
     /// By joint.
     pub gears: Vec<Gear>,
-    /// Coordinate of each joint's link.
-    pub at: Vec<usize>,
+    /// The links' motion from that of the coordinates.
+    pub map: LinkMap,
     /// Positions of the coordinates beyond the joints'.
     pub q: Vec<f64>,
     /// Their velocities.
@@ -80,8 +79,6 @@ pub(super) struct Elastic {
 /// Buffers for one side of the gears.
 #[derive(Clone, Debug)]
 struct Side {
-    q: Vec<f64>,
-    v: Vec<f64>,
     position: Vec<f64>,
     speed: Vec<f64>,
     /// n × n, motors' side and links' side.
@@ -115,17 +112,14 @@ impl Elastic {
                 joint,
                 link,
                 law,
-                scale: 1.0,
                 link_friction,
             });
         }
-        refuse_half_coupled(model, &mut gears)?;
+        refuse_link_friction(model, &gears)?;
         let list = || vec![0.0; n];
         let mut elastic = Self {
             torque: [list(), list()],
             side: Side {
-                q: list(),
-                v: list(),
                 position: list(),
                 speed: list(),
                 jacobians: [vec![0.0; n * n], vec![0.0; n * n]],
@@ -134,15 +128,19 @@ impl Elastic {
             q: vec![0.0; gears.len()],
             v: vec![0.0; gears.len()],
             gears,
-            at,
+            map: LinkMap::of(model, at),
             moving: false,
             rate: None,
         };
         if elastic.is_empty() {
             return Ok(elastic);
         }
-        // Refuses links and motors without inertia.
-        elastic.link_mobility(model, &vec![0.0; n])?;
+        // Refuses links and motors without inertia. The ratios of screws may have no inverse at the origin: a robot with
+        // screws is checked at its first step.
+        let drives = model.motors.as_ref().map(|motors| &motors.transmission);
+        if drives.is_none_or(Transmission::is_constant) {
+            elastic.link_mobility(model, &vec![0.0; n], &vec![0.0; n])?;
+        }
         if n == 1 && model.motors.is_none() {
             elastic.rate = Some(elastic.fastest(model, &[0.0])?);
         }
@@ -164,14 +162,8 @@ impl Elastic {
         self.gears.iter().find(|gear| gear.joint == joint)
     }
 
-    /// Copies the values of the links from those of all coordinates.
-    pub(super) fn links(&self, all: &[f64], out: &mut [f64]) {
-        for (own, at) in out.iter_mut().zip(&self.at) {
-            *own = all[*at];
-        }
-    }
-
-    /// Computes the torques of all gears from positions and velocities of all coordinates.
+    /// Computes the torques of all gears from positions and velocities of all coordinates, with the links where
+    /// [`Self::map`] has put them.
     ///
     /// # Errors
     /// [`SimulateError::Drives`] on wrong lengths.
@@ -181,7 +173,7 @@ impl Elastic {
         q: &[f64],
         v: &[f64],
     ) -> Result<(), SimulateError> {
-        let n = self.at.len();
+        let n = self.map.q.len();
         for side in &mut self.torque {
             side.fill(0.0);
         }
@@ -196,15 +188,13 @@ impl Elastic {
         };
         let own = &mut self.side;
         own.twist.fill([0.0; 2]);
-        for (side, sign) in [(0, 1.0), (1, -1.0)] {
-            for j in 0..n {
-                let at = if side == 0 { j } else { self.at[j] };
-                (own.q[j], own.v[j]) = (q[at], v[at]);
-            }
+        let of_motors = [&q[..n], &v[..n]];
+        let of_links = [&self.map.q[..], &self.map.v];
+        for (side, sign, [q, v]) in [(0, 1.0, of_motors), (1, -1.0, of_links)] {
             let t = &motors.transmission;
-            t.motor_position(&own.q, &mut own.position)?;
-            t.motor_velocity(&own.q, &own.v, &mut own.speed)?;
-            t.jacobian(&own.q, &mut own.jacobians[side])?;
+            t.motor_position(q, &mut own.position)?;
+            t.motor_velocity(q, v, &mut own.speed)?;
+            t.jacobian(q, &mut own.jacobians[side])?;
             for (twist, (position, speed)) in
                 (own.twist.iter_mut()).zip(own.position.iter().zip(&own.speed))
             {
@@ -214,8 +204,9 @@ impl Elastic {
         }
         for gear in &self.gears {
             let k = gear.joint;
-            let [twist, speed] = own.twist[k].map(|x| x / gear.scale);
-            let torque = gear.torque(twist, speed) / gear.scale;
+            let turns = self.map.turns(k);
+            let [twist, speed] = own.twist[k].map(|x| x / turns);
+            let torque = gear.torque(twist, speed) / turns;
             for (jacobian, torques) in own.jacobians.iter().zip(&mut self.torque) {
                 let row = &jacobian[k * n..(k + 1) * n];
                 for (to, entry) in torques.iter_mut().zip(row) {
@@ -226,42 +217,46 @@ impl Elastic {
         Ok(())
     }
 
-    /// Returns the twist of each gear per motion of the joints (rows: gears) at positions of the joints.
-    fn twists(&self, model: &Model, q: &[f64]) -> Result<DMatrix<f64>, SimulateError> {
+    /// Returns the inertia of the drives in the motors' coordinates `q` (n × n).
+    fn drive_inertia(model: &Model, q: &[f64]) -> Result<DMatrix<f64>, SimulateError> {
         let n = q.len();
-        let Some(motors) = &model.motors else {
-            return Ok(DMatrix::from_fn(self.gears.len(), n, |k, j| {
-                f64::from(u8::from(self.gears[k].joint == j))
-            }));
-        };
-        let mut jacobian = vec![0.0; n * n];
-        motors.transmission.jacobian(q, &mut jacobian)?;
-        Ok(DMatrix::from_fn(self.gears.len(), n, |k, j| {
-            jacobian[self.gears[k].joint * n + j] / self.gears[k].scale
-        }))
+        let mut matrix = DMatrix::zeros(n, n);
+        for (j, own) in model.parameters.iter().enumerate() {
+            matrix[(j, j)] = own[column::DRIVE_INERTIA];
+        }
+        if let Some(motors) = &model.motors {
+            let t = &motors.transmission;
+            t.add_motor_inertia(&motors.parameters, q, matrix.as_mut_slice())?;
+        }
+        Ok(matrix)
     }
 
     /// Returns the inverse of the inertia matrix of the links and of the motors with stiff gears (n × n), the other motors
-    /// at rest.
-    fn link_mobility(&self, model: &Model, q: &[f64]) -> Result<Vec<f64>, SimulateError> {
+    /// at rest. `q`: positions of the motors; `links`: of the links.
+    fn link_mobility(
+        &self,
+        model: &Model,
+        q: &[f64],
+        links: &[f64],
+    ) -> Result<DMatrix<f64>, SimulateError> {
         let n = q.len();
         let mut rows = model.parameters.clone();
-        for gear in &self.gears {
-            rows[gear.joint][column::DRIVE_INERTIA] = 0.0;
+        for row in &mut rows {
+            row[column::DRIVE_INERTIA] = 0.0;
         }
         let mut matrix = vec![0.0; n * n];
-        inertia_matrix(&model.chain, &rows, q, &mut matrix)?;
-        if let Some(coupled) = &model.motors {
-            let mut motors = vec![0.0; n * n];
-            let t = &coupled.transmission;
-            t.add_motor_inertia(&coupled.parameters, q, &mut motors)?;
-            let stiff = |j: usize| self.at[j] == j;
-            for k in (0..n * n).filter(|k| stiff(k / n) && stiff(k % n)) {
-                matrix[k] += motors[k];
-            }
+        inertia_matrix(&model.chain, &rows, links, &mut matrix)?;
+        let mut stiff = self.map.jacobian(model, links)?;
+        for gear in &self.gears {
+            stiff.row_mut(gear.joint).fill(0.0);
         }
-        let mut inverse = vec![0.0; n * n];
-        invert(&mut matrix, &mut inverse, n)?;
+        let turned = self.map.inverse(model, q)? * stiff;
+        let motors = turned.tr_mul(&(Self::drive_inertia(model, q)? * &turned));
+        for (entry, motor) in matrix.iter_mut().zip(&motors) {
+            *entry += motor;
+        }
+        let mut inverse = DMatrix::zeros(n, n);
+        invert(&mut matrix, inverse.as_mut_slice(), n)?;
         Ok(inverse)
     }
 
@@ -284,29 +279,14 @@ impl Elastic {
     /// # Errors
     /// [`SimulateError::TooStiff`] beyond [`HIGHEST`].
     fn fastest(&self, model: &Model, q: &[f64]) -> Result<f64, SimulateError> {
-        let n = q.len();
-        let mut at = q.to_vec();
-        for (gear, link) in self.gears.iter().zip(&self.q) {
-            at[gear.joint] = *link;
-        }
-        let links = self.link_mobility(model, &at)?;
-        let mut motors = vec![0.0; n * n];
-        // Joints with stiff gears move with their links: here they only need an inertia.
-        for (j, own) in model.parameters.iter().enumerate() {
-            motors[j * n + j] = own[column::DRIVE_INERTIA];
-        }
-        if let Some(coupled) = &model.motors {
-            let t = &coupled.transmission;
-            t.add_motor_inertia(&coupled.parameters, q, &mut motors)?;
-        }
-        let motors = self.motor_mobility(&motors, n)?;
-        let links = DMatrix::from_row_slice(n, n, &links);
-        let [of_motors, of_links] = [self.twists(model, q)?, self.twists(model, &at)?];
+        let links = self.link_mobility(model, q, &self.map.q)?;
+        let motors = self.motor_mobility(model, q)?;
+        let twists = self.map.jacobian(model, &self.map.q)?;
         let mut rate = 0.0_f64;
         for (k, gear) in self.gears.iter().enumerate() {
-            let of_motor = of_motors.row(k).select_columns(&self.joints());
-            let motor = (&of_motor * &motors).dot(&of_motor);
-            let link = (of_links.row(k) * &links).dot(&of_links.row(k));
+            let of_link = twists.row(gear.joint);
+            let motor = motors[(k, k)];
+            let link = (of_link * &links).dot(&of_link);
             let reduced = 1.0 / (motor + link);
             let [_, stiffness, damping] = gear.law;
             let [spring, damper] = [(stiffness / reduced).sqrt(), damping / reduced];
@@ -334,34 +314,36 @@ impl Elastic {
         Ok(rate)
     }
 
-    /// Returns the joints with gears.
-    fn joints(&self) -> Vec<usize> {
-        self.gears.iter().map(|gear| gear.joint).collect()
-    }
-
-    /// Returns the accelerations of the motors behind gears per torque on them, from the motors' inertia matrix (n × n).
+    /// Returns the accelerations of the outputs of the motors behind gears, in the unit of the twist, per torque on them.
     /// Motors of stiff gears are held by their links.
-    fn motor_mobility(&self, motors: &[f64], n: usize) -> Result<DMatrix<f64>, SimulateError> {
-        let count = self.gears.len();
-        let mut own = vec![0.0; count * count];
-        for (r, row) in self.gears.iter().enumerate() {
-            for (c, col) in self.gears.iter().enumerate() {
-                own[r * count + c] = motors[row.joint * n + col.joint];
-            }
-        }
-        let mut inverse = vec![0.0; count * count];
-        let joint = self.gears.first().map_or(1, |gear| gear.joint + 1);
-        invert(&mut own, &mut inverse, count)
+    fn motor_mobility(&self, model: &Model, q: &[f64]) -> Result<DMatrix<f64>, SimulateError> {
+        let joints: Vec<usize> = self.gears.iter().map(|gear| gear.joint).collect();
+        let count = joints.len();
+        let turned = self.map.inverse(model, q)?.select_columns(&joints);
+        let mut own = turned.tr_mul(&(Self::drive_inertia(model, q)? * &turned));
+        let mut inverse = DMatrix::zeros(count, count);
+        let joint = joints.first().map_or(1, |joint| joint + 1);
+        invert(own.as_mut_slice(), inverse.as_mut_slice(), count)
             .map_err(|_| SimulateError::NotPositiveDefinite { joint })?;
-        Ok(DMatrix::from_row_slice(count, count, &inverse))
+        Ok(inverse)
     }
 
-    /// Returns the twist of a gear, of which [`Self::transmit`] has just computed the torque.
-    fn twist(&self, model: &Model, q: &[f64], gear: &Gear) -> f64 {
-        match model.motors {
-            Some(_) => self.side.twist[gear.joint][0] / gear.scale,
-            None => q[gear.joint] - q[gear.link],
-        }
+    /// Notes positions and velocities of all coordinates, and where the links are.
+    ///
+    /// # Errors
+    /// [`SimulateError::Drives`] if no position of the links fits the drives.
+    pub(super) fn note(
+        &mut self,
+        model: &Model,
+        q: &[f64],
+        v: &[f64],
+    ) -> Result<(), SimulateError> {
+        let n = self.map.q.len();
+        self.q.copy_from_slice(&q[n..]);
+        self.v.copy_from_slice(&v[n..]);
+        self.map.locate(model, q)?;
+        self.map.follow(model, v)?;
+        Ok(())
     }
 
     /// Puts the links at rest under gravity behind motors at `q`, with the velocities `v` of the motors.
@@ -377,57 +359,45 @@ impl Elastic {
         let n = q.len();
         let (mut links, mut load) = (q.to_vec(), vec![0.0; n]);
         let still = vec![0.0; n];
-        let joints = self.joints();
-        let mut all = q.to_vec();
-        all.resize(n + joints.len(), 0.0);
-        let at_rest = vec![0.0; all.len()];
+        let motors = self.map.positions(model, q)?;
         for _ in 0..REST_PASSES {
             bias_torque(&model.chain, &model.parameters, &links, &still, &mut load)?;
             // The model's own offset and friction act on the motor.
-            let pull = DVector::from_iterator(
-                joints.len(),
-                joints
-                    .iter()
-                    .map(|&j| load[j] - model.parameters[j][column::OFFSET]),
-            );
-            let to_twist = self.twists(model, &links)?.select_columns(&joints);
-            let singular = || SimulateError::NotPositiveDefinite {
-                joint: joints.first().map_or(1, |j| j + 1),
-            };
-            let lu = to_twist.clone().lu();
-            let torque = to_twist
-                .transpose()
-                .lu()
-                .solve(&pull)
-                .ok_or_else(singular)?;
-            for (gear, link) in self.gears.iter().zip(joints.iter().map(|&j| links[j])) {
-                all[gear.link] = link;
+            for (load, own) in load.iter_mut().zip(&model.parameters) {
+                *load -= own[column::OFFSET];
             }
-            self.transmit(model, &all, &at_rest)?;
-            let wanted = self.gears.iter().zip(torque.iter()).map(|(gear, pull)| {
+            let inverse = self.map.inverse(model, &links)?;
+            let pull = inverse.tr_mul(&DVector::from_column_slice(&load));
+            // A stiff gear has no twist.
+            let mut beyond = DVector::from_vec(self.map.positions(model, &links)?);
+            beyond -= DVector::from_column_slice(&motors);
+            for gear in &self.gears {
                 let [gap, stiffness, _] = gear.law;
-                let contact = 0.5 * gap * f64::from(i8::from(*pull > 0.0) - i8::from(*pull < 0.0));
-                pull / stiffness + contact
-            });
-            let twist = self.gears.iter().map(|gear| self.twist(model, &all, gear));
-            let beyond = DVector::from_iterator(
-                joints.len(),
-                wanted.zip(twist).map(|(wanted, twist)| wanted - twist),
-            );
-            let step = lu.solve(&beyond).ok_or_else(singular)?;
+                let pull = pull[gear.joint];
+                let contact = 0.5 * gap * f64::from(i8::from(pull > 0.0) - i8::from(pull < 0.0));
+                beyond[gear.joint] += pull / stiffness + contact;
+            }
             let mut moved = false;
-            for (&j, step) in joints.iter().zip(step.iter()) {
-                let link = links[j] - step;
-                moved |= link != links[j];
-                links[j] = link;
+            for (link, step) in links.iter_mut().zip(&(inverse * beyond)) {
+                let next = *link - step;
+                moved |= next != *link;
+                *link = next;
             }
             if !moved {
                 break;
             }
         }
-        for (k, gear) in self.gears.iter().enumerate() {
-            (self.q[k], self.v[k]) = (links[gear.joint], v[gear.joint]);
+        let outputs = self.map.positions(model, &links)?;
+        let speeds = self.map.jacobian(model, q)? * DVector::from_column_slice(v);
+        let (mut positions, mut velocities) = (q.to_vec(), v.to_vec());
+        for gear in &self.gears {
+            let j = gear.joint;
+            let mixed = self.map.is_mixed(j);
+            positions.push(if mixed { outputs[j] } else { links[j] });
+            velocities.push(if mixed { speeds[j] } else { v[j] });
         }
+        self.map.q = links;
+        self.note(model, &positions, &velocities)?;
         self.moving = true;
         Ok(())
     }
@@ -455,39 +425,19 @@ fn named_gear(model: &Model, joint: usize) -> String {
     model.effects.named_at(joint, elastic).unwrap_or_default()
 }
 
-/// Gives the gears of coupled drives their ratios. Refuses a gear of a drive that is coupled with one whose gear is
-/// stiff: a stiff gear binds coordinates of several joints, and these would be no coordinates of their own.
-fn refuse_half_coupled(model: &Model, gears: &mut [Gear]) -> Result<(), SimulateError> {
+/// Refuses friction on the link's side of a coupled drive.
+fn refuse_link_friction(model: &Model, gears: &[Gear]) -> Result<(), SimulateError> {
     let Some(motors) = &model.motors else {
         return Ok(());
     };
-    let n = model.parameters.len();
-    let t = &motors.transmission;
-    let has = |joint: usize| gears.iter().any(|gear| gear.joint == joint);
-    for drive in 0..n {
-        for joint in 0..n {
-            if !t.turns_with(drive, joint) || has(drive) == has(joint) {
-                continue;
-            }
-            let (own, other) = if has(drive) {
-                (drive, joint)
-            } else {
-                (joint, drive)
-            };
-            return Err(SimulateError::HalfCoupled {
-                effect: named_gear(model, own),
-                other: other + 1,
-            });
-        }
-    }
     for gear in gears {
-        if t.kind(gear.joint) != Some(DriveKind::Simple) && gear.link_friction > 0.0 {
+        let kind = motors.transmission.kind(gear.joint);
+        if kind != Some(DriveKind::Simple) && gear.link_friction > 0.0 {
             return Err(SimulateError::LinkFriction {
                 effect: named_gear(model, gear.joint),
                 share: gear.link_friction,
             });
         }
-        gear.scale = t.own_turns(gear.joint).unwrap_or(1.0);
     }
     Ok(())
 }

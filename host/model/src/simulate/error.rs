@@ -94,16 +94,6 @@ pub enum SimulateError {
     /// A gear that would need steps without end.
     #[error(transparent)]
     TooStiff(Box<TooStiff>),
-    /// Backlash or elasticity of one of several coupled drives.
-    #[error(
-        "{effect}: the drive is coupled with that of joint {other}, whose gear is stiff, and the simulation needs all coupled drives with such a gear or none; give the others joint_elasticity too, with a large stiffness if they are nearly rigid."
-    )]
-    HalfCoupled {
-        /// The effect and its joint.
-        effect: String,
-        /// Joint with a stiff gear, from 1 at the base.
-        other: usize,
-    },
     /// Friction of a coupled drive on the link's side.
     #[error(
         "{effect}: link_friction is {share}, but the friction of a coupled drive or screw holds that of its motor, which stays on the motor's side; give link_friction = 0."

@@ -9,8 +9,11 @@ mod elastic_tests;
 mod error;
 mod friction;
 mod history;
+mod link_map;
 mod link_motion;
 mod load_wrench;
+#[cfg(test)]
+mod mixed_tests;
 mod model;
 mod solve;
 mod step;

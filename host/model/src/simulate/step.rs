@@ -15,7 +15,7 @@
 //!
 //! Leaves out end stops, temperatures and the electrical side.
 
-use rig_shared::multibody::{COLUMNS, MultibodyError, bias_torque, column, inertia_matrix};
+use rig_shared::multibody::{COLUMNS, MultibodyError, column, inertia_matrix, inverse_dynamics};
 use rig_shared::scalar::Real as _;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
@@ -65,9 +65,7 @@ pub struct Stepper<'a> {
 
 /// Terms of the joints alone, before they are placed among all coordinates.
 struct JointBuffers {
-    /// Positions and velocities of the links.
-    q: Vec<f64>,
-    v: Vec<f64>,
+    acceleration: Vec<f64>,
     torque: Vec<f64>,
     /// n × n.
     matrix: Vec<f64>,
@@ -107,14 +105,13 @@ impl<'a> Stepper<'a> {
             next: vec![0.0; n],
             damping: vec![0.0; n * n],
             friction: DryFriction::new(coulomb, n),
-            acting: Acting::new(&model.effects, n, elastic.at.clone()),
+            acting: Acting::new(&model.effects, n, joints),
             acceleration: vec![0.0; n],
             loads: vec![0.0; joints],
             columns,
             external: Vec::with_capacity(joints),
             joints: JointBuffers {
-                q: vec![0.0; joints],
-                v: vec![0.0; joints],
+                acceleration: vec![0.0; joints],
                 torque: vec![0.0; joints],
                 matrix: vec![0.0; joints * joints],
             },
@@ -129,26 +126,24 @@ impl<'a> Stepper<'a> {
     fn place(&mut self) -> Result<(), SimulateError> {
         let n = self.middle.len();
         let own = &mut self.joints;
-        let joints = own.q.len();
-        self.elastic.links(&self.middle, &mut own.q);
-        inertia_matrix(&self.model.chain, &self.smooth, &own.q, &mut own.matrix)?;
-        self.mass.fill(0.0);
-        let at = &self.elastic.at;
-        for (i, row) in own.matrix.chunks_exact(joints).enumerate() {
-            for (j, value) in row.iter().enumerate() {
-                self.mass[at[i] * n + at[j]] = *value;
-            }
-        }
+        let joints = own.torque.len();
+        let map = &mut self.elastic.map;
+        map.locate(self.model, &self.middle)?;
+        inertia_matrix(&self.model.chain, &self.smooth, &map.q, &mut own.matrix)?;
         for (joint, other, inertia) in self.acting.couplings() {
-            self.mass[at[joint] * n + at[other]] += inertia;
+            own.matrix[joint * joints + other] += inertia;
         }
+        self.mass.fill(0.0);
+        map.add_matrix(&own.matrix, &mut self.mass, n);
         self.damping.fill(0.0);
         for (i, parameters) in self.model.parameters.iter().enumerate() {
             self.damping[i * n + i] = parameters[column::VISCOUS];
+            if map.is_separate(i) {
+                self.mass[i * n + i] += parameters[column::DRIVE_INERTIA];
+            }
         }
         for gear in &self.elastic.gears {
             let (motor, link) = (gear.joint * n + gear.joint, gear.link * n + gear.link);
-            self.mass[motor] = self.model.parameters[gear.joint][column::DRIVE_INERTIA];
             let viscous = self.damping[motor];
             self.damping[motor] = (1.0 - gear.link_friction) * viscous;
             self.damping[link] = gear.link_friction * viscous;
@@ -161,7 +156,7 @@ impl<'a> Stepper<'a> {
         let Some(motors) = &self.model.motors else {
             return Ok(());
         };
-        let (n, joints) = (self.middle.len(), self.joints.q.len());
+        let (n, joints) = (self.middle.len(), self.joints.torque.len());
         let q = &self.middle[..joints];
         let (t, parameters) = (&motors.transmission, &motors.parameters);
         let matrix = &mut self.joints.matrix;
@@ -180,26 +175,17 @@ impl<'a> Stepper<'a> {
     /// from outside.
     fn bias(&mut self) -> Result<(), SimulateError> {
         let own = &mut self.joints;
-        self.elastic.links(&self.middle, &mut own.q);
-        self.elastic.links(&self.mean_velocity, &mut own.v);
-        bias_torque(
-            &self.model.chain,
-            &self.smooth,
-            &own.q,
-            &own.v,
-            &mut own.torque,
-        )?;
-        for (torque, external) in own.torque.iter_mut().zip(&self.external) {
-            *torque -= external;
-        }
+        let map = &mut self.elastic.map;
+        map.follow(self.model, &self.mean_velocity)?;
+        own.acceleration.copy_from_slice(&map.convective);
+        self.load_links()?;
+        let own = &mut self.joints;
         self.bias.fill(0.0);
-        for (torque, at) in own.torque.iter().zip(&self.elastic.at) {
-            self.bias[*at] = *torque;
-        }
+        (self.elastic.map).add_torques(1.0, &own.torque, &mut self.bias);
         if let Some(motors) = &self.model.motors
             && !motors.transmission.is_constant()
         {
-            let joints = own.q.len();
+            let joints = own.torque.len();
             // Accelerations of zero.
             own.torque.fill(0.0);
             motors.transmission.motor_columns(
@@ -221,9 +207,32 @@ impl<'a> Stepper<'a> {
         }
         (self.elastic).transmit(self.model, &self.middle, &self.mean_velocity)?;
         let [of_motors, of_links] = &self.elastic.torque;
-        for (j, at) in self.elastic.at.iter().enumerate() {
-            self.bias[j] += of_motors[j];
-            self.bias[*at] -= of_links[j];
+        for (bias, torque) in self.bias.iter_mut().zip(of_motors) {
+            *bias += torque;
+        }
+        (self.elastic.map).add_torques(-1.0, of_links, &mut self.bias);
+        Ok(())
+    }
+
+    /// Computes the torques that move the links at the accelerations in [`JointBuffers::acceleration`], without friction
+    /// and effects, but with coupled inertia and torques from outside.
+    fn load_links(&mut self) -> Result<(), SimulateError> {
+        let own = &mut self.joints;
+        let map = &self.elastic.map;
+        let (chain, smooth) = (&self.model.chain, &self.smooth);
+        inverse_dynamics(
+            chain,
+            smooth,
+            &map.q,
+            &map.v,
+            &own.acceleration,
+            &mut own.torque,
+        )?;
+        for (joint, other, inertia) in self.acting.couplings() {
+            own.torque[joint] += inertia * own.acceleration[other];
+        }
+        for (torque, external) in own.torque.iter_mut().zip(&self.external) {
+            *torque -= external;
         }
         Ok(())
     }
@@ -234,11 +243,20 @@ impl<'a> Stepper<'a> {
             return Ok(());
         }
         let n = self.middle.len();
+        let map = &self.elastic.map;
+        if map.any_mixed() {
+            map.accelerations(&self.acceleration, &mut self.joints.acceleration);
+            self.load_links()?;
+        }
         for (j, load) in self.loads.iter_mut().enumerate() {
             let row = self.mass[j * n..(j + 1) * n].iter();
             let inertia: f64 = row.zip(&self.acceleration).map(|(m, a)| m * a).sum();
             let rotor = self.smooth[j][column::DRIVE_INERTIA] * self.acceleration[j];
             *load = match self.elastic.gear(j) {
+                // Effects on the link, of the pass before, load stiff and elastic gears alike.
+                _ if self.elastic.map.is_mixed(j) => {
+                    self.joints.torque[j] + self.acting.of_links[j]
+                }
                 // Torque of the shaft without friction on the link's side. A law adds the torque that it transmits.
                 Some(gear) => {
                     let speed = self.mean_velocity[gear.link];
@@ -254,7 +272,11 @@ impl<'a> Stepper<'a> {
             &self.acceleration,
             torque,
         ];
-        self.acting.evaluate(motion, &self.loads, dt)?;
+        let map = &self.elastic.map;
+        let links = [&map.q[..], &map.v];
+        let separate = |j: usize| map.is_separate(j);
+        (self.acting).evaluate(motion, links, separate, &self.loads, dt)?;
+        map.add_torques(1.0, &self.acting.of_links, &mut self.acting.torque);
         for j in 0..self.loads.len() {
             self.friction.limits[j] =
                 self.acting
@@ -294,7 +316,6 @@ impl<'a> Stepper<'a> {
         }
         self.put_links_at_rest(q, v)?;
         let joints = q.len();
-        let steps = self.elastic.steps(self.model, q, dt)?;
         let [mut positions, mut speeds] = std::mem::take(&mut self.both);
         for (all, own, links) in [
             (&mut positions, &*q, &self.elastic.q),
@@ -304,14 +325,15 @@ impl<'a> Stepper<'a> {
             all.extend_from_slice(own);
             all.extend_from_slice(links);
         }
+        self.elastic.map.locate(self.model, &positions)?;
+        let steps = self.elastic.steps(self.model, q, dt)?;
         for _ in 0..steps {
             self.advance(&mut positions, &mut speeds, torque, dt / steps as f64)
                 .map_err(|e| self.with_joint(e))?;
         }
         q.copy_from_slice(&positions[..joints]);
         v.copy_from_slice(&speeds[..joints]);
-        self.elastic.q.copy_from_slice(&positions[joints..]);
-        self.elastic.v.copy_from_slice(&speeds[joints..]);
+        self.elastic.note(self.model, &positions, &speeds)?;
         self.both = [positions, speeds];
         Ok(())
     }
@@ -328,12 +350,12 @@ impl<'a> Stepper<'a> {
         self.elastic.put_at_rest(self.model, q, v)
     }
 
-    /// Returns position and velocity of the link of a joint (from 0) if it is a separate mass and has a state: after
-    /// the first step, or after [`Self::put_links_at_rest`].
+    /// Returns position and velocity of the link of a joint (from 0) if it may be elsewhere than its motor and has a
+    /// state: after the first step, or after [`Self::put_links_at_rest`].
     pub fn link(&self, joint: usize) -> Option<[f64; 2]> {
-        let of = |gear: &super::elastic::Gear| gear.joint == joint;
-        let place = self.elastic.gears.iter().position(of)?;
-        (self.elastic.moving).then(|| [self.elastic.q[place], self.elastic.v[place]])
+        let Elastic { map, moving, .. } = &self.elastic;
+        let known = *moving && joint < map.q.len() && map.is_separate(joint);
+        known.then(|| [map.q[joint], map.v[joint]])
     }
 
     /// Returns the error with the number of a joint instead of a coordinate.
@@ -413,7 +435,9 @@ impl<'a> Stepper<'a> {
                 &self.acceleration,
                 torque,
             ];
-            self.acting.advance(motion, dt);
+            let map = &mut self.elastic.map;
+            map.follow(self.model, &self.mean_velocity)?;
+            self.acting.advance(motion, [&map.q, &map.v], dt);
         }
         for i in 0..n {
             q[i] = self.middle[i] + 0.5 * dt * self.next[i];
@@ -431,7 +455,8 @@ fn copy_rows(from: &[f64], width: usize, to: &mut [f64], to_width: usize) {
     }
 }
 
-/// Returns the parameters without friction and offset, and without the drives' inertia if the gear is elastic.
+/// Returns the parameters without friction and offset, and without the drives' inertia if the link may be elsewhere than
+/// its motor.
 ///
 /// # Errors
 /// [`SimulateError::NegativeFriction`].
@@ -447,7 +472,7 @@ fn without_friction(
         row[column::VISCOUS] = 0.0;
         row[column::COULOMB] = 0.0;
         row[column::OFFSET] = 0.0;
-        if elastic.gear(joint).is_some() {
+        if elastic.map.is_separate(joint) {
             row[column::DRIVE_INERTIA] = 0.0;
         }
     }
