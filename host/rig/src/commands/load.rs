@@ -187,20 +187,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             ui,
         )?,
     }
-    let options = LoadOptions {
-        by: match args.by {
-            Measured::Sensor => By::Sensor,
-            Measured::Torque => By::Torque,
-            Measured::Both => By::Both,
-        },
-        poses: args.poses,
-        tool: args.tool.as_deref().map(Load::read).transpose()?,
-        prepare: PrepareOptions {
-            cutoff: args.cutoff.map_or(Choice::Auto, Choice::Fixed),
-            ..PrepareOptions::default()
-        },
-        even_if_wrong: args.even_if_wrong,
-    };
+    let options = options(args)?;
     let mut found = identify_load(
         &robot,
         &recordings(&with.listened()),
@@ -330,6 +317,24 @@ fn write(
         &pages::load(found, controllers, context),
     )?;
     Ok(())
+}
+
+/// Returns the options of the identification.
+fn options(args: &Args) -> Result<LoadOptions, CommandError> {
+    Ok(LoadOptions {
+        by: match args.by {
+            Measured::Sensor => By::Sensor,
+            Measured::Torque => By::Torque,
+            Measured::Both => By::Both,
+        },
+        poses: args.poses,
+        tool: args.tool.as_deref().map(Load::read).transpose()?,
+        prepare: PrepareOptions {
+            cutoff: args.cutoff.map_or(Choice::Auto, Choice::Fixed),
+            ..PrepareOptions::default()
+        },
+        even_if_wrong: args.even_if_wrong,
+    })
 }
 
 /// Returns the printed answer.
