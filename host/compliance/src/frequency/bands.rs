@@ -20,6 +20,10 @@ const WIDTH: f64 = 0.025;
 /// Probability by which a coherence is beyond that of unrelated noise.
 const CERTAIN: f64 = 0.99;
 
+/// Acceleration of the reference, or torque, over the largest one, from which on it excites a band. What a recording without noise
+/// shows below is coherent by rounding and by friction alone.
+pub(super) const EXCITED: f64 = 1e-3;
+
 /// The frequency response in one band.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Band {
@@ -35,7 +39,7 @@ pub struct Band {
     pub coherence: f64,
     /// Number of independent averages.
     pub averages: f64,
-    /// True if the coherence is significant: the fit uses the band.
+    /// True if the band is excited and its coherence significant: the fit uses it.
     pub used: bool,
 }
 
@@ -62,6 +66,18 @@ pub(crate) fn bands(spectra: &Spectra) -> Vec<BandBins<'_>> {
         let (own, more) = rest.split_at(count);
         bands.extend(band(own, spectra.weight, spectra.by_reference));
         rest = more;
+    }
+    let acceleration = |band: &BandBins<'_>| -> f64 {
+        let derivatives = if spectra.by_reference { 2 } else { 0 };
+        let squares = band.bins.iter().map(|b| {
+            let acceleration = b.instrument * b.omega.powi(derivatives);
+            acceleration.norm_sqr()
+        });
+        (squares.sum::<f64>() / band.bins.len() as f64).sqrt()
+    };
+    let most = bands.iter().map(acceleration).fold(0.0, f64::max);
+    for band in &mut bands {
+        band.band.used &= acceleration(band) > EXCITED * most;
     }
     bands
 }

@@ -1,5 +1,7 @@
 //! The columns of one joint over one stretch.
 
+use std::f64::consts::TAU;
+
 use rig_numerics::statistics::{mean, median_of_finite, rms};
 
 use super::link_motion::{MotorMotion, predict};
@@ -13,6 +15,11 @@ const END: f64 = 0.01;
 const MOST: usize = 50;
 /// Rows at each end that show whether the joint rests there.
 const RESTING: usize = 16;
+/// Rows on either side that the first velocity takes in.
+const HALF: usize = 2;
+/// Half the time over which the velocity is taken, over a period of the antiresonance: a sine of this frequency loses 1 % of its
+/// velocity by it.
+const SPAN: f64 = 0.035;
 /// Movement of the reference over that of the joint below which the reference rests.
 const STILL: f64 = 1e-2;
 /// Speed at the ends over the RMS speed below which the joint rests.
@@ -33,8 +40,10 @@ pub(super) struct Columns {
     pub(super) gap: Vec<f64>,
     /// Torque of gravity on the link less its linear part; zero until a model predicts the motion of the link.
     pub(super) gravity: Vec<f64>,
-    /// Sign of the motor's velocity by the measured velocity alone; near 0 where noise decides it.
-    moving: Vec<f64>,
+    /// Torque as recorded.
+    recorded: Vec<f64>,
+    /// True if the reference is periodic: the columns have no line through their ends then, but a mean.
+    periodic: bool,
     pub(super) velocity: Vec<f64>,
     position: Vec<f64>,
 }
@@ -42,17 +51,25 @@ pub(super) struct Columns {
 impl Columns {
     /// Predicts friction, backlash and gravity by a model of two masses.
     pub(super) fn predict(&mut self, model: &TwoMass, gravity: &Gravity, rate: f64) {
+        let swing = TAU * rate / model.antiresonance();
+        let half = ((SPAN * swing).round() as usize).max(1);
+        let velocity = smoothed(&self.moved, rate, half);
         let motion = MotorMotion {
             position: &self.position,
             first: -mean(&self.position),
-            velocity: &self.velocity,
-            torque: &self.torque,
-            moving: &self.moving,
+            moving: &moving(&velocity),
+            velocity: &velocity,
+            torque: &self.recorded,
             dt: 1.0 / rate,
+            smeared: half - 1,
         };
         let found = predict(model, &motion, gravity);
-        (self.sign, self.link_sign) = (found.motor_friction, found.link_friction);
-        (self.gap, self.gravity) = (found.gap, found.gravity);
+        // The torque has lost the line through its ends, and so must what it balances there.
+        let level = |values: &[f64]| level(values, self.periodic);
+        self.sign = level(&found.motor_friction);
+        self.link_sign = level(&found.link_friction);
+        self.gap = level(&found.gap);
+        self.gravity = level(&found.gravity);
     }
 }
 
@@ -89,18 +106,17 @@ pub(super) fn columns_of(
             stretch.label
         )));
     }
-    let velocity = smoothed(&moved, stretch.rate());
-    let scale = 2.0 * noise(&velocity).max(1e-3 * rms(&velocity));
+    let velocity = smoothed(&moved, stretch.rate(), HALF);
     let instrument = match (&joint.reference, by_reference) {
         (Some(reference), true) => &reference[..n],
         _ => &joint.tau[..n],
     };
-    let level = |values: &[f64]| match periodic {
-        true => without_mean(values),
-        false => without_line(values),
+    // A reference has no noise: its ends are exact.
+    let instrument = match by_reference && !periodic {
+        true => without_line(instrument, 1),
+        false => level(instrument, periodic),
     };
-    let instrument = level(instrument);
-    let still = rms(&instrument) < STILL * rms(&without_line(&joint.q[..n]));
+    let still = rms(&instrument) < STILL * rms(&level(&joint.q[..n], false));
     if by_reference && still {
         return Err(ComplianceError::Recording(format!(
             "{}: the reference of joint \"{name}\" (ref{}) does not move, so nothing known excites the joint; record a chirp, or give --instrument torque if the torque was commanded without feedback.",
@@ -108,31 +124,37 @@ pub(super) fn columns_of(
             k + 1
         )));
     }
-    let moving: Vec<f64> = velocity.iter().map(|v| (v / scale).tanh()).collect();
     Ok(Columns {
         instrument,
-        torque: level(&joint.tau[..n]),
-        sign: moving.clone(),
+        torque: level(&joint.tau[..n], periodic),
+        sign: moving(&velocity),
+        recorded: joint.tau[..n].to_vec(),
+        periodic,
         link_sign: vec![0.0; n],
         gap: vec![0.0; n],
         gravity: vec![0.0; n],
-        moving,
         position: joint.q[..n].iter().map(|q| q - joint.q[0]).collect(),
         velocity,
         moved,
     })
 }
 
-/// Returns the velocity at the rows, a mean over five differences centred on the row.
-fn smoothed(moved: &[f64], rate: f64) -> Vec<f64> {
+/// Returns the velocity at the rows: the difference of the positions `half` rows before and after.
+fn smoothed(moved: &[f64], rate: f64, half: usize) -> Vec<f64> {
     let n = moved.len();
     (0..n)
         .map(|k| {
             // The difference k spans rows k and k + 1; row k lies between differences k − 1 and k.
-            let (low, high) = (k.saturating_sub(2), (k + 2).min(n));
+            let (low, high) = (k.saturating_sub(half), (k + half).min(n));
             mean(&moved[low..high]) * rate
         })
         .collect()
+}
+
+/// Returns the sign of a velocity by itself: near 0 where noise decides it.
+fn moving(velocity: &[f64]) -> Vec<f64> {
+    let scale = 2.0 * noise(velocity).max(1e-3 * rms(velocity));
+    velocity.iter().map(|v| (v / scale).tanh()).collect()
 }
 
 /// Noise of a velocity that changes slowly, from its second differences.
@@ -144,15 +166,25 @@ fn noise(velocity: &[f64]) -> f64 {
     median_of_finite(second).unwrap_or(0.0) / (0.6745 * 6f64.sqrt())
 }
 
+/// Returns values less their mean if they are periodic, else less the line through their ends.
+fn level(values: &[f64], periodic: bool) -> Vec<f64> {
+    match periodic {
+        true => without_mean(values),
+        false => without_line(
+            values,
+            ((END * values.len() as f64) as usize).clamp(1, MOST),
+        ),
+    }
+}
+
 fn without_mean(values: &[f64]) -> Vec<f64> {
     let middle = mean(values);
     values.iter().map(|v| v - middle).collect()
 }
 
-/// Subtracts the line through the two ends: what holds the joint at rest.
-fn without_line(values: &[f64]) -> Vec<f64> {
+/// Subtracts the line through the means of `end` rows at both ends: what holds the joint at rest.
+fn without_line(values: &[f64], end: usize) -> Vec<f64> {
     let n = values.len();
-    let end = ((END * n as f64) as usize).clamp(1, MOST);
     let (first, last) = (mean(&values[..end]), mean(&values[n - end..]));
     let slope = (last - first) / (n - 1).max(1) as f64;
     (values.iter().enumerate())

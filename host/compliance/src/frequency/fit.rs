@@ -4,6 +4,9 @@
 //! instrumental-variable estimate with the weights of maximum likelihood (Pintelon & Schoukens 2012, ch. 9). H is not
 //! averaged over the band, so that a narrow antiresonance is not smoothed. Coulomb friction of motor and link are further
 //! inputs; that of the link follows from a first fit, which predicts the motion of the link.
+//!
+//! What the torque is between two rows is not recorded. The gains of a torque that is held for a row T and of a smooth one differ by
+//! (ωT)²/24 at ω, which counts as a relative standard deviation of stiffness and inertias, at the antiresonance.
 
 use std::f64::consts::TAU;
 
@@ -22,6 +25,8 @@ const COUNT: usize = 10;
 const LINK: usize = 1;
 /// Index of ln Jm.
 const MOTOR: usize = 2;
+/// Index of the delay.
+const DELAY: usize = 6;
 /// Index of the first parameter of the link's friction.
 const LINK_FRICTION: usize = 7;
 /// Index of the gap.
@@ -98,21 +103,13 @@ pub(crate) fn fit(
         Some(model) => *model,
         None => start(&used)?,
     };
-    let mut theta = vec![
-        start.stiffness.ln(),
-        known.link_inertia.unwrap_or(start.link_inertia).ln(),
-        known.motor_inertia.unwrap_or(start.motor_inertia).ln(),
-        start.damping.ln(),
-        start.viscous,
-        start.coulomb.max(0.0),
-        match first {
-            Some(model) => model.delay * known.rate,
-            None => 0.05,
-        },
-        start.link_coulomb,
-        start.link_viscous,
-        start.gap,
-    ];
+    let mut theta = theta_of(&start, known.rate);
+    for (place, inertia) in [(LINK, known.link_inertia), (MOTOR, known.motor_inertia)] {
+        theta[place] = inertia.map_or(theta[place], f64::ln);
+    }
+    if first.is_none() {
+        theta[DELAY] = 0.05;
+    }
     let free: Vec<usize> = (0..COUNT)
         .filter(|p| *p != LINK || known.link_inertia.is_none())
         .filter(|p| *p != MOTOR || known.motor_inertia.is_none())
@@ -153,6 +150,14 @@ pub(crate) fn fit(
         }
     }
     let model = model(&theta, known);
+    let unrecorded = (model.antiresonance() / known.rate).powi(2) / 24.0;
+    // Another gain of the torque changes them alike.
+    let scaled: Vec<usize> = free.iter().copied().filter(|p| *p <= MOTOR).collect();
+    for p in &scaled {
+        for r in &scaled {
+            covariance[(*p, *r)] += unrecorded * unrecorded;
+        }
+    }
     Some(Fitted {
         model,
         covariance,
@@ -215,6 +220,22 @@ fn correlation(
     (0..3)
         .map(|k| sandwich[(k, k)] / (inverse[(k, k)] * misfit))
         .fold(1.0, f64::max)
+}
+
+/// Returns the parameters of a model; the delay is in rows.
+fn theta_of(model: &TwoMass, rate: f64) -> Vec<f64> {
+    vec![
+        model.stiffness.ln(),
+        model.link_inertia.ln(),
+        model.motor_inertia.ln(),
+        model.damping.ln(),
+        model.viscous,
+        model.coulomb.max(0.0),
+        model.delay * rate,
+        model.link_coulomb,
+        model.link_viscous,
+        model.gap,
+    ]
 }
 
 fn model(theta: &[f64], known: &Known) -> TwoMass {

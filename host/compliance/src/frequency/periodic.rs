@@ -7,6 +7,7 @@
 
 use serde::Serialize;
 
+use super::bands::EXCITED;
 use super::bin::Bin;
 use super::two_mass::{C, TwoMass};
 
@@ -18,9 +19,8 @@ const SAME: f64 = 1e-6;
 const FEWEST: usize = 3;
 /// Fewest harmonics that the reference must hold.
 const HARMONICS: usize = 96;
-/// Amplitude of a harmonic over that of its neighbours, and its acceleration over the largest one, from which on the reference
-/// holds it.
-const HELD: [f64; 2] = [0.1, 1e-4];
+/// Amplitude of a harmonic over that of its neighbours from which on the reference holds it.
+const HELD: f64 = 0.1;
 /// Neighbours of a harmonic on either side.
 const NEIGHBOURS: usize = 4;
 
@@ -114,7 +114,7 @@ pub(super) fn harmonics(periods: &[Vec<Bin>]) -> Option<Harmonics> {
     let fastest = (0..bins).map(fast).fold(0.0, f64::max);
     let held = |k: usize| {
         let near = k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(bins);
-        size(k) > HELD[0] * near.map(size).fold(0.0, f64::max) && fast(k) > HELD[1] * fastest
+        size(k) > HELD * near.map(size).fold(0.0, f64::max) && fast(k) > EXCITED * fastest
     };
     let mut all = Harmonics {
         count: periods.len(),

@@ -13,8 +13,8 @@ use super::bands::bands;
 use super::fit::{Fitted, Known, fit};
 use super::spectra::Spectra;
 
-/// Predictions of the friction; a third changes the stiffness by less than a tenth of its standard deviation.
-const PREDICTIONS: usize = 3;
+/// Predictions of the friction; four more change the stiffness by less than a twentieth of its standard deviation.
+const PREDICTIONS: usize = 8;
 /// Gaps that are tried at first, over the twist by the RMS torque.
 const TRIED: [f64; 3] = [0.1, 0.5, 2.0];
 /// Predictions with a gap. The last ones differ by a few per cent: the motion of a link in a gap is not predictable in detail.

@@ -267,13 +267,15 @@ fn segment(
         let omega = TAU * k as f64 / (length as f64 * dt);
         // The difference over one row is exactly e^{jωdt} − 1 times the position.
         let derivative = C::new(0.0, omega) / (C::from_polar(1.0, omega * dt) - 1.0);
+        // Friction is the mean over the time of a row.
+        let meaned = (0.5 * omega * dt).sin() / (0.5 * omega * dt);
         bins.push(Bin {
             omega,
             instrument: instrument[k],
             torque: torque[k],
             velocity: moved[k] * derivative,
-            sign: sign[k],
-            link_sign: link_sign[k],
+            sign: sign[k] / meaned,
+            link_sign: link_sign[k] / meaned,
             gap: gap[k],
             gravity: gravity[k],
         });
