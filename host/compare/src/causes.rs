@@ -9,6 +9,8 @@
 //! of the model that changes with the motion therefore looks like a difference that no hypothesis explains.
 
 use nalgebra::{DMatrix, DVector};
+use rig_model::robot::Robot;
+use rig_output::format_value;
 use rig_shared::multibody::{COLUMNS, INERTIAL_PARAMETERS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
@@ -22,14 +24,17 @@ pub const ODDS: f64 = 20.0;
 /// Largest number of steps to the scales, and their relative change at the end.
 const SCALE_STEPS: (usize, f64) = (100, 1e-10);
 
-/// Tests all hypotheses. `combination` and `columns` are those of all parameters; the robot has `joints` joints.
+/// Tests all hypotheses, and compares them with those of shifted zeros. `combination` and `columns` are those of all
+/// parameters.
 pub(crate) fn causes(
     common: &Common,
     names: &[String],
     combination: &DMatrix<f64>,
     columns: &[usize],
-    joints: usize,
+    robot: &Robot,
+    zeros: Vec<Hypothesis>,
 ) -> Option<Causes> {
+    let joints = robot.joints.len();
     let own: Vec<usize> = common.parameters.iter().map(|&k| columns[k]).collect();
     let units = |of: &dyn Fn(usize) -> bool| {
         let chosen: Vec<usize> = (0..own.len()).filter(|&k| of(own[k])).collect();
@@ -79,8 +84,9 @@ pub(crate) fn causes(
         )?,
         differing(common, "anything", "every parameter", &all)?,
     ];
+    found.extend(zeros);
     rate(&mut found);
-    let (named, sentence) = answer(&found, names);
+    let (named, sentence) = answer(&found, names, robot);
     Some(Causes {
         hypotheses: found,
         named,
@@ -92,7 +98,7 @@ pub(crate) fn causes(
 fn differing(
     common: &Common,
     name: &'static str,
-    what: &'static str,
+    what: &str,
     d: &DMatrix<f64>,
 ) -> Option<Hypothesis> {
     let c = common.parameters.len();
@@ -114,13 +120,14 @@ fn differing(
     } else {
         common.about_mean(&weights)?.1
     };
-    Some(hypothesis(common, name, what, free, chi2))
+    Some(hypothesis(common, name, what.to_owned(), free, chi2))
 }
 
-fn hypothesis(
+/// Returns a hypothesis with `free` values that leaves `chi2`; it is not compared with others yet.
+pub(crate) fn hypothesis(
     common: &Common,
     name: &'static str,
-    what: &'static str,
+    what: String,
     free: usize,
     chi2: f64,
 ) -> Hypothesis {
@@ -139,6 +146,8 @@ fn hypothesis(
         odds_against: 1.0,
         explains: p >= FAMILY_LEVEL,
         scales: Vec::new(),
+        shifts: Vec::new(),
+        joint: None,
     }
 }
 
@@ -180,7 +189,13 @@ fn scaled(common: &Common) -> Option<Hypothesis> {
     let scales = (0..n).map(own).collect();
     Some(Hypothesis {
         scales,
-        ..hypothesis(common, "scale", "one scale of all torques", n - 1, chi2)
+        ..hypothesis(
+            common,
+            "scale",
+            "one scale of all torques".to_owned(),
+            n - 1,
+            chi2,
+        )
     })
 }
 
@@ -200,7 +215,7 @@ fn rate(list: &mut [Hypothesis]) {
 }
 
 /// Returns the name of the cause, if one can be given, and the answer in words.
-fn answer(list: &[Hypothesis], names: &[String]) -> (Option<String>, String) {
+fn answer(list: &[Hypothesis], names: &[String], robot: &Robot) -> (Option<String>, String) {
     let Some(best) = list.first() else {
         return (None, String::new());
     };
@@ -221,19 +236,9 @@ fn answer(list: &[Hypothesis], names: &[String]) -> (Option<String>, String) {
             "None of the tested causes explains the difference better than one of all parameters: the sets differ in several ways at once, or the model has an error that depends on the motion.".into(),
         ),
         [only] => {
-            let sizes: Vec<String> = (only.scales.iter().zip(names).skip(1))
-                .map(|([scale, std], name)| {
-                    format!(
-                        "{name} {:+.2} % ± {:.2} % relative to {}",
-                        100.0 * (scale - 1.0),
-                        100.0 * std,
-                        names[0]
-                    )
-                })
-                .collect();
-            let sizes = match sizes.is_empty() {
-                true => String::new(),
-                false => format!(" ({})", sizes.join(", ")),
+            let sizes = match sizes(only, names, robot).join(", ") {
+                none if none.is_empty() => none,
+                some => format!(" ({some}, relative to {})", names[0]),
             };
             (
                 Some(only.name.into()),
@@ -247,9 +252,24 @@ fn answer(list: &[Hypothesis], names: &[String]) -> (Option<String>, String) {
             None,
             format!(
                 "Several causes explain the difference about equally well: {}. The odds against the last of them are {:.1} to 1.",
-                several.iter().map(|h| h.what).collect::<Vec<_>>().join("; "),
+                several.iter().map(|h| h.what.as_str()).collect::<Vec<_>>().join("; "),
                 several.last().map_or(best.odds_against, |h| h.odds_against)
             ),
         ),
     }
+}
+
+/// Returns the size of a scale or a shift in each set but the first.
+fn sizes(found: &Hypothesis, names: &[String], robot: &Robot) -> Vec<String> {
+    let scales = (found.scales.iter().zip(names).skip(1)).map(|([scale, std], name)| {
+        format!(
+            "{name} {:+.2} % ± {:.2} %",
+            100.0 * (scale - 1.0),
+            100.0 * std
+        )
+    });
+    let unit = (found.joint).map_or("", |j| robot.joints[j].kind.units().0);
+    let shifts = (found.shifts.iter().zip(names).skip(1))
+        .map(|([shift, std], name)| format!("{name} {} {unit}", format_value(*shift, *std)));
+    scales.chain(shifts).collect()
 }

@@ -23,6 +23,7 @@ use crate::single::{Single, Spread, spread};
 use crate::torque::torque_matrix;
 use crate::trades::trades;
 use crate::warnings::{brief_warnings, drifting, warnings};
+use crate::zero_shift::Zeros;
 
 /// Compares the parameters that several sets of recordings of one robot give. Memory does not grow with the recordings.
 ///
@@ -81,16 +82,24 @@ fn compared(
     let common = Common::of(sets, &basis)?;
     let joint_test = joint_test(&common);
     let names: Vec<String> = sets.iter().map(|s| s.name.clone()).collect();
-    let causes = differing(joint_test.as_ref(), &parameters).then(|| {
-        causes(
-            &common,
-            &names,
-            &basis.combination,
-            &basis.columns,
-            robot.joints.len(),
-        )
-    });
-    let causes = causes.flatten();
+    let causes = match differing(joint_test.as_ref(), &parameters) {
+        true => {
+            let zeros = Zeros {
+                robot,
+                base,
+                given,
+                sets,
+                basis: &basis,
+                common: &common,
+            };
+            let zeros = zeros
+                .hypotheses()
+                .map_err(|why| CompareError::Read(why.to_string()))?;
+            let (combination, columns) = (&basis.combination, &basis.columns);
+            causes(&common, &names, combination, columns, robot, zeros)
+        }
+        false => None,
+    };
     let joints = robot.joints.iter().map(|j| j.name.clone()).collect();
     let torque = torque_matrix(sets, &basis, &pooled.values, joints);
     let without = without(&common);

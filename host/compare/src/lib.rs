@@ -33,6 +33,7 @@ mod tests;
 mod torque;
 mod trades;
 mod warnings;
+mod zero_shift;
 
 pub use causes::ODDS;
 pub use compare::compare;

@@ -197,10 +197,10 @@ pub struct Causes {
 /// A hypothesis on what differs between the sets.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hypothesis {
-    /// Name: nothing, scale, friction, offset, gravity, payload, anything.
+    /// Name: nothing, scale, friction, offset, gravity, payload, zero, anything.
     pub name: &'static str,
     /// What may differ, words.
-    pub what: &'static str,
+    pub what: String,
     /// Number of free values.
     pub free: usize,
     /// Remaining sum of squares.
@@ -219,6 +219,10 @@ pub struct Hypothesis {
     pub explains: bool,
     /// By set, the scale with its standard deviation relative to the first set; only for "scale".
     pub scales: Vec<[f64; 2]>,
+    /// By set, the shift of the zero with its standard deviation relative to the first set, rad (m); only for "zero".
+    pub shifts: Vec<[f64; 2]>,
+    /// Index of the joint, from 0; only for "zero".
+    pub joint: Option<usize>,
 }
 
 /// Torque residuals of each set's parameters on each set's motion.

@@ -101,6 +101,41 @@ fn an_offset_of_one_joint_is_named_offset() {
     assert!(offset >= 18 && different == DRAWS, "{offset} {different}");
 }
 
+/// A zero that is wrong by 0.02 rad in one set: that of the first joint turns the arm against gravity, that of the second one
+/// bends it, which no parameters of the last link can stand for.
+#[test]
+fn a_zero_that_moved_is_named_with_its_joint_and_size() {
+    for joint in 0..2 {
+        let mut counts = [0, 0];
+        for draw in 0..DRAWS {
+            let sets = (0..4).map(|s| {
+                let mut made = Made::new(40_000 + 10 * draw + s);
+                made.zero[joint] = if s == 2 { 0.02 } else { 0.0 };
+                (made, Truth::default())
+            });
+            let causes = compared(&sets.collect::<Vec<_>>()).causes.unwrap();
+            let found = &causes.hypotheses[0];
+            let is_named = causes.named.as_deref() == Some("zero") && found.joint == Some(joint);
+            counts[0] += usize::from(is_named);
+            if !is_named {
+                println!("joint {joint}, draw {draw}: {}", causes.sentence);
+                continue;
+            }
+            let [shift, std] = found.shifts[2];
+            assert!(
+                std < 2e-3 && (shift - 0.02).abs() < 5.0 * std,
+                "{shift} {std}"
+            );
+            counts[1] += usize::from((shift - 0.02).abs() < 2.0 * std);
+        }
+        println!(
+            "zero of joint {joint}: named in {} of {DRAWS}, within two standard deviations in {}",
+            counts[0], counts[1]
+        );
+        assert!(counts[0] >= 18, "{counts:?}");
+    }
+}
+
 /// Friction, scale and payload at once are none of the tested causes.
 #[test]
 fn several_changes_at_once_are_not_given_one_name() {

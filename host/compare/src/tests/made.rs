@@ -128,6 +128,8 @@ pub(super) struct Made {
     pub pure: bool,
     /// Standard deviation of the torque noise, N·m; correlated over 25 ms.
     pub noise: f64,
+    /// What each joint's recorded position is too large by, rad.
+    pub zero: [f64; 2],
 }
 
 impl Made {
@@ -138,6 +140,7 @@ impl Made {
             size: [1.0; 2],
             pure: false,
             noise: 0.05,
+            zero: [0.0; 2],
         }
     }
 
@@ -178,7 +181,7 @@ impl Made {
             let tau = truth.torque(time, [q, v, w]);
             for j in 0..2 {
                 coloured[j] = rho * coloured[j] + (1.0 - rho * rho).sqrt() * self.noise * normal();
-                joints[j].q.push(q[j] + 1e-5 * normal());
+                joints[j].q.push(q[j] + self.zero[j] + 1e-5 * normal());
                 joints[j].tau.push(tau[j] + coloured[j]);
             }
             t.push(time);

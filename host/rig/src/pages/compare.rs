@@ -376,7 +376,7 @@ fn causes(found: &Comparison) -> Option<Section> {
             probability(h.p),
             format!("{:.1} ({})", h.chi2, h.degrees_of_freedom),
             h.free.to_string(),
-            h.what.to_owned(),
+            h.what.clone(),
         ]
     });
     Some(

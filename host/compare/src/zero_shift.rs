@@ -1,0 +1,278 @@
+//! A zero of one joint's positions that differs between the sets, as after another homing.
+//!
+//! A zero error ε of a joint adds ε to all its positions. The parameters that a set shows then change along D·ε, and D is
+//! found by shifting the recorded positions and solving the least-squares problem again. One set keeps its zero; the shifts
+//! of the others make all sets agree as well as they can (Gauss and Newton). A zero of the first joint and a base that leans
+//! about its axis are the same.
+//!
+//! Leaves out: zeros of several joints at once; the zero that all sets share; estimators other than weighted least squares,
+//! whose change with the zero counts as that of weighted least squares.
+
+use nalgebra::{DMatrix, DVector};
+use rig_data::Block;
+use rig_data::prepare::{PrepareError, Recording};
+use rig_identify::{Base, IdentifyError, ModelKind, TriangularFactor};
+use rig_model::robot::Robot;
+
+use crate::basis::Basis;
+use crate::causes::hypothesis;
+use crate::common::Common;
+use crate::identified_set::IdentifiedSet;
+use crate::matrices::{pseudo_inverse, quadratic};
+use crate::result::Hypothesis;
+use crate::rows::each_row;
+use crate::set::RecordingSet;
+
+/// Step of the difference that gives D, rad or m.
+const STEP: f64 = 1e-3;
+/// Largest standard deviation of a shift, rad or m, with which a set tells it. About an axis along gravity none does.
+const TOLD: f64 = 0.5;
+/// Most steps to the shifts, and the last change over their standard deviation at which they end.
+const STEPS: (usize, f64) = (6, 0.1);
+
+/// A recording whose positions of one joint are shifted.
+struct Shifted<'a> {
+    inner: &'a dyn Recording,
+    joint: usize,
+    by: f64,
+}
+
+impl Recording for Shifted<'_> {
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.inner)
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        self.inner.each_block(rows, &mut |mut block| {
+            if let Some(joint) = block.joints.get_mut(self.joint) {
+                joint.q.iter_mut().for_each(|q| *q += self.by);
+            }
+            take(block)
+        })
+    }
+}
+
+/// The sets whose zeros may differ.
+pub(crate) struct Zeros<'a> {
+    pub robot: &'a Robot,
+    pub base: &'a Base,
+    pub given: &'a [RecordingSet<'a>],
+    pub sets: &'a [IdentifiedSet],
+    pub basis: &'a Basis,
+    pub common: &'a Common,
+}
+
+/// Shifts of one joint's zero by set, and what they leave.
+struct Fitted {
+    shifts: Vec<f64>,
+    /// Variance of each by the errors of its set alone.
+    variances: Vec<f64>,
+    chi2: f64,
+}
+
+impl Zeros<'_> {
+    /// Returns the hypothesis that the zero of a joint differs, for each joint whose zero all sets tell; the most likely one
+    /// is refined.
+    ///
+    /// # Errors
+    /// Recordings that cannot be read.
+    pub(crate) fn hypotheses(&self) -> Result<Vec<Hypothesis>, IdentifyError> {
+        let mut found: Vec<(usize, Fitted)> = Vec::new();
+        for joint in 0..self.robot.joints.len() {
+            found.extend(self.fitted(joint, 1)?.map(|own| (joint, own)));
+        }
+        let best = found
+            .iter_mut()
+            .min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
+        if let Some((joint, own)) = best
+            && let Some(refined) = self.fitted(*joint, STEPS.0)?
+        {
+            *own = refined;
+        }
+        Ok(found
+            .iter()
+            .map(|(j, own)| self.hypothesis(*j, own))
+            .collect())
+    }
+
+    fn hypothesis(&self, joint: usize, own: &Fitted) -> Hypothesis {
+        let relative = |s: usize| match s {
+            0 => [0.0; 2],
+            _ => [
+                own.shifts[s] - own.shifts[0],
+                (own.variances[s] + own.variances[0]).sqrt(),
+            ],
+        };
+        // The first joint's axis does not move.
+        let or = match joint {
+            0 => ", or a base that leans about its axis",
+            _ => "",
+        };
+        let what = format!(
+            "the zero of joint \"{}\"{or}",
+            self.robot.joints[joint].name
+        );
+        Hypothesis {
+            shifts: (0..self.sets.len()).map(relative).collect(),
+            joint: Some(joint),
+            ..hypothesis(self.common, "zero", what, self.sets.len() - 1, own.chi2)
+        }
+    }
+
+    /// Fits the shifts of a joint's zero; `None` if a set does not tell it.
+    fn fitted(&self, joint: usize, steps: usize) -> Result<Option<Fitted>, IdentifyError> {
+        let n = self.sets.len();
+        let reference = self.reference();
+        let mut found = Fitted {
+            shifts: vec![0.0; n],
+            variances: vec![0.0; n],
+            chi2: f64::INFINITY,
+        };
+        for _ in 0..steps {
+            let mut values = Vec::with_capacity(n);
+            let mut along = Vec::with_capacity(n);
+            for s in 0..n {
+                let [at, beside] = self.values(s, joint, found.shifts[s])?;
+                let d = (beside - &at) / STEP;
+                found.variances[s] = 1.0 / quadratic(&self.common.weights[s], &d);
+                values.push(at);
+                along.push(d);
+            }
+            if !found.variances.iter().all(|v| v.sqrt() < TOLD) {
+                return Ok(None);
+            }
+            let Some((changes, chi2)) = self.step(&values, &along, reference) else {
+                return Ok(None);
+            };
+            let mut largest = 0.0f64;
+            for s in 0..n {
+                found.shifts[s] += changes[s];
+                largest = largest.max(changes[s].abs() / found.variances[s].sqrt());
+            }
+            found.chi2 = chi2;
+            if largest < STEPS.1 {
+                break;
+            }
+        }
+        Ok(Some(found))
+    }
+
+    /// Returns the changes of the shifts that make the values agree best, and the sum of squares that is left then.
+    fn step(
+        &self,
+        values: &[DVector<f64>],
+        along: &[DVector<f64>],
+        reference: usize,
+    ) -> Option<(Vec<f64>, f64)> {
+        let weights: Vec<DMatrix<f64>> = (self.common.weights.iter().zip(along).enumerate())
+            .map(|(s, (weight, d))| match s == reference {
+                true => weight.clone(),
+                false => {
+                    let seen = weight * d;
+                    weight - &seen * seen.transpose() / d.dot(&seen)
+                }
+            })
+            .collect();
+        let shifted = Common {
+            parameters: self.common.parameters.clone(),
+            values: values.to_vec(),
+            weights: self.common.weights.clone(),
+        };
+        let (mean, chi2) = shifted.about_mean(&weights)?;
+        let change = |s: usize| match s == reference {
+            true => 0.0,
+            false => {
+                let seen = &self.common.weights[s] * &along[s];
+                seen.dot(&(&values[s] - &mean)) / along[s].dot(&seen)
+            }
+        };
+        Some(((0..values.len()).map(change).collect(), chi2))
+    }
+
+    /// Returns the set that is nearest to all others: a set apart is best described against them.
+    fn reference(&self) -> usize {
+        let Common {
+            values, weights, ..
+        } = self.common;
+        let distance = |r: usize| -> f64 {
+            (values.iter().zip(weights))
+                .map(|(y, weight)| quadratic(weight, &(y - &values[r])))
+                .sum()
+        };
+        let nearest = (0..values.len()).min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        nearest.unwrap_or(0)
+    }
+
+    /// Returns the common parameters that a set shows if the zero of a joint is `shift` too large in its recordings, and if it
+    /// is one step less than that.
+    fn values(
+        &self,
+        s: usize,
+        joint: usize,
+        shift: f64,
+    ) -> Result<[DVector<f64>; 2], IdentifyError> {
+        let from = self.basis.from_set[s].select_rows(&self.common.parameters);
+        let recorded = self.solved(s, &self.recorded(s));
+        let at = |by: f64| -> Result<DVector<f64>, IdentifyError> {
+            let values = match by == 0.0 {
+                true => recorded.clone(),
+                false => self.solved(s, &self.shifted(s, joint, by)?),
+            };
+            Ok(&self.common.values[s] + &from * (values - &recorded))
+        };
+        Ok([at(-shift)?, at(STEP - shift)?])
+    }
+
+    /// Returns the factor of a set's rows as recorded, those of each joint in units of its residual.
+    fn recorded(&self, s: usize) -> TriangularFactor {
+        let set = &self.sets[s];
+        let mut all = TriangularFactor::new(self.base.len());
+        for (own, noise) in set.factors.iter().zip(self.noise(s)) {
+            all.merge(own, 1.0 / noise);
+        }
+        all
+    }
+
+    /// The same with positions of a joint that are shifted.
+    fn shifted(&self, s: usize, joint: usize, by: f64) -> Result<TriangularFactor, IdentifyError> {
+        let shifted: Vec<Shifted<'_>> = (self.given[s].recordings.iter())
+            .map(|inner| Shifted {
+                inner: *inner,
+                joint,
+                by,
+            })
+            .collect();
+        let recordings: Vec<&dyn Recording> = shifted.iter().map(|r| r as _).collect();
+        let p = self.base.len();
+        let noise = self.noise(s);
+        let mut all = TriangularFactor::new(p);
+        let found = &self.sets[s].found;
+        let model = ModelKind::Differential;
+        let mut take = |_: usize, rows: &rig_identify::Rows| {
+            for (equation, noise) in rows.equations.iter().zip(&noise) {
+                for k in (0..rows.t.len()).filter(|k| equation.keep[*k]) {
+                    all.push(&equation.x[k * p..(k + 1) * p], equation.y[k], 1.0 / noise);
+                }
+            }
+        };
+        each_row(self.robot, self.base, &recordings, found, model, &mut take)?;
+        Ok(all)
+    }
+
+    /// Returns the residual of each joint of a set; infinite, so that the joint does not count, if it has none.
+    fn noise(&self, s: usize) -> Vec<f64> {
+        let joints = self.sets[s].found.joints.iter();
+        let of = |rms: f64| if rms > 0.0 { rms } else { f64::INFINITY };
+        joints.map(|joint| of(joint.train_residual_rms)).collect()
+    }
+
+    /// Returns the identified values of a set that its rows give by least squares.
+    fn solved(&self, s: usize, factor: &TriangularFactor) -> DVector<f64> {
+        let (r, z) = factor.system();
+        pseudo_inverse(&(r * pseudo_inverse(&self.sets[s].of_base))) * z
+    }
+}
