@@ -51,7 +51,7 @@ pub struct Options {
     /// Start positions of the joints, rad or m; free if absent.
     pub start: Option<Vec<f64>>,
     /// Free share of the position range, half of it at each end. It must contain the controller's error at a turning
-    /// point. Limits of cranks and regions of the workspace have no margin.
+    /// point. Limits of cranks and motors, and regions of the workspace have no margin.
     pub margin: f64,
     /// Used share of the velocity limits, and its square of the acceleration limits, as if time ran slower.
     pub speed_share: f64,
