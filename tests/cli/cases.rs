@@ -361,7 +361,7 @@ fn impossible_values_do_not_pass() {
         "impossible-values-without-a-word",
         &[
             "exit 1",
-            "qd1 is −1200 rad/s",
+            "qd1 is -1200 rad/s",
             "q1 changes only in every 10th row",
         ],
         &["exit 0", "fc1", "Izz1"],

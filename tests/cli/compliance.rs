@@ -295,7 +295,7 @@ fn units_and_names_of_held_recordings_are_told() {
     // A pose in degrees.
     let said = refuse(&mut run(&good, "out", &["--pose", "-90"]));
     assert!(
-        said.contains("looks like degrees") && said.contains("−1.571"),
+        said.contains("looks like degrees") && said.contains("-1.571"),
         "{said}"
     );
     // Other names: listed, then mapped.

@@ -50,7 +50,7 @@ pub(crate) fn refuse(command: &mut Command) -> String {
         panic!("{command:?} said more than one line:\n{text}")
     };
     assert!(
-        sentence.starts_with("rig: ") && !sentence.contains("panicked"),
+        sentence.starts_with("rig: error: ") && !sentence.contains("panicked"),
         "{sentence}"
     );
     (*sentence).to_string()

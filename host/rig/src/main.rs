@@ -3,13 +3,13 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use rig::commands::Cli;
+use rig::commands::{Cli, plain};
 
 fn main() -> ExitCode {
     match Cli::parse().run() {
         Ok(status) => ExitCode::from(status),
         Err(error) => {
-            eprintln!("rig: {error}");
+            eprintln!("rig: error: {}", plain(&error.to_string()));
             ExitCode::FAILURE
         }
     }

@@ -28,7 +28,7 @@ pub(crate) fn run(
         ui.say(&format!("{}:{place}: {sentence}.", path.display()));
     }
     for sentence in &audit.unchecked {
-        ui.remark(sentence);
+        ui.note(sentence);
     }
     let counts = audit
         .checks

@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     if same {
         ui.say("Numeric rank and the grouping rules for modified Denavit-Hartenberg frames give the same set.");
     } else {
-        ui.remark(&format!(
+        ui.note(&format!(
             "The grouping rules give {} parameters, the numeric rank {}, and the sets differ; the list is that of the numeric rank.",
             rules.len(),
             list.len()

@@ -130,7 +130,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let load = read(&args.load, EffortNeed::Optional)?;
     let response = read(&args.frequency, EffortNeed::Required)?;
     for warning in load.warnings().chain(response.warnings()) {
-        ui.remark(&warning);
+        ui.warn(&warning);
     }
     load.refuse_scales(&robot)?;
     response.refuse_scales(&robot)?;
@@ -149,7 +149,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     write(args, &found, &context)?;
     for warning in &found.warnings {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     for line in lines(&robot, &found) {
         ui.answer(&line);

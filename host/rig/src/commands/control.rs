@@ -292,10 +292,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     refuse_all_failed(&evaluation)?;
     for note in &evaluation.notes {
-        ui.remark(note);
+        ui.note(note);
     }
     for warning in evaluation.warnings() {
-        ui.remark(&format!("Warning: {warning}"));
+        ui.warn(&warning);
     }
     write(args, &robot, &evaluation, &motions, ui)?;
     for line in lines(&evaluation) {

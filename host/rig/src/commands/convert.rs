@@ -78,7 +78,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let mapping = args.columns.mapping()?;
     let source = Source::open_mapped(&args.file, &robot, EffortNeed::Optional, &mapping)?;
     for warning in source.warnings() {
-        ui.remark(&format!("{}: {warning}.", args.file.display()));
+        ui.warn(&format!("{}: {warning}.", args.file.display()));
     }
     let mut progress = ui.progress("converting", 2 * source.bytes());
     let mut at = |bytes| progress.at(bytes);
@@ -116,7 +116,7 @@ fn joints_in(path: &Path, ui: &Ui) -> Result<Robot, CommandError> {
             .iter()
             .map(|joint| joint.name.as_str())
             .collect();
-        ui.remark(&format!(
+        ui.note(&format!(
             "{}: the joints are {}, in this order; give --robot for that of a description.",
             path.display(),
             names.join(", ")
@@ -153,12 +153,12 @@ fn kept(
             .iter()
             .any(|own| own.to_string() == remark);
         if !of_file {
-            ui.remark(&format!("{}: {remark}.", source.path().display()));
+            ui.note(&format!("{}: {remark}.", source.path().display()));
         }
     }
     for (column, first) in columns.iter().zip(&first_text) {
         if let Some(place) = first {
-            ui.remark(&format!(
+            ui.warn(&format!(
                 "{}: column `{}` is left out, because it holds no number ({}).",
                 source.path().display(),
                 column.name,

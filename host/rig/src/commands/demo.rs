@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for line in demo.summary()? {
         ui.say(&line);
     }
-    ui.remark(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));
+    ui.note(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));
     ui.say(&format!("report: {}", path.display()));
     Ok(())
 }

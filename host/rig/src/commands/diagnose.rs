@@ -128,11 +128,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
     };
     let mut warnings = logs.warnings();
     for warning in &warnings {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     for inputs in [&logs.training, &logs.holdout] {
         for sentence in inputs.strange_references(&robot)? {
-            ui.remark(&format!(
+            ui.warn(&format!(
                 "{sentence} References are used to find recordings that repeat one motion and, under voltage, to identify the controller."
             ));
         }
@@ -141,7 +141,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
     let (mut found, model) = logs.diagnosed(&robot, workflow, &options, ui)?;
     let heard = logs.heard();
     for warning in &heard {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     warnings.extend(heard);
     if !args.without.is_empty() {
@@ -357,7 +357,7 @@ fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandEr
         .collect::<Result<Vec<_>, _>>()?
         .concat();
     for warning in log.warnings().chain(log.heard()) {
-        ui.remark(&warning);
+        ui.warn(&warning);
     }
     Ok(zeros)
 }
@@ -371,7 +371,7 @@ fn clamps(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<Run>, CommandError>
         .collect::<Result<Vec<_>, _>>()?
         .concat();
     for warning in logs.warnings().chain(logs.heard()) {
-        ui.remark(&warning);
+        ui.warn(&warning);
     }
     Ok(runs)
 }

@@ -394,7 +394,7 @@ fn design(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     let (file, notes) = staged(robot, kind, &args.staged_options()?)?;
     file.save(&args.out, robot, args.rate)?;
     for note in notes {
-        ui.remark(&note);
+        ui.note(&note);
     }
     ui.answer(&format!(
         "{}: the motion, {} of {:.1} s.",
@@ -428,7 +428,7 @@ fn many_sines(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     )?;
     found.reference.save(&args.out, robot)?;
     for note in &found.notes {
-        ui.remark(note);
+        ui.note(note);
     }
     let [position, velocity, acceleration] = found.shares.map(|share| 100.0 * share);
     ui.say(&format!(
@@ -465,7 +465,7 @@ fn at_rest(args: &Args, count: usize, robot: &Robot, ui: &Ui) -> Result<(), Comm
     };
     let found = poses(robot, &options)?;
     for note in &found.notes {
-        ui.remark(note);
+        ui.note(note);
     }
     found.file.save(&args.out, robot, args.rate)?;
     for line in summary_of_poses(&found) {
@@ -547,7 +547,7 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         design_measured(robot, &options, |done, total| progress.at_of(done, total))?;
     drop(progress);
     for note in &found.notes {
-        ui.remark(note);
+        ui.note(note);
     }
     let condition = found.values.condition_number;
     if condition > TELLS_NOTHING {

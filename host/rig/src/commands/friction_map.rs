@@ -89,7 +89,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let training = read(&args.data)?;
     let sweep = read(std::slice::from_ref(&args.sweep))?;
     for warning in training.warnings().chain(sweep.warnings()) {
-        ui.remark(&warning);
+        ui.warn(&warning);
     }
     refuse_faults(
         &robot,
@@ -114,7 +114,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         );
         if drawn.is_err() {
             // Missing rows may be the reason.
-            sweep.heard().iter().for_each(|warning| ui.remark(warning));
+            sweep.heard().iter().for_each(|warning| ui.warn(warning));
         }
         let map = drawn?;
         if !map.doubts.is_empty() && !args.even_if_wrong {
@@ -127,7 +127,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         heard.extend([training.outside(), sweep.outside()].concat());
         heard.extend(map.note.clone());
         for warning in &heard {
-            ui.remark(warning);
+            ui.warn(warning);
         }
         let warnings = training.warnings().chain(sweep.warnings()).chain(heard);
         write(&args.out, &robot, &map, warnings.collect(), ui)?;

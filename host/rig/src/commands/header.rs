@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let header = c_header(&robot, &from.to_string_lossy());
     write_whole(&args.out, header.text.as_bytes())?;
     for sentence in &header.left_out {
-        ui.remark(sentence);
+        ui.warn(sentence);
     }
     ui.answer(&format!(
         "{}: friction of {}",

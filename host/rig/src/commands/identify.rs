@@ -268,7 +268,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let (training, holdout) = (read(&args.data)?, read(&args.holdout)?);
     let warnings: Vec<String> = training.warnings().chain(holdout.warnings()).collect();
     for warning in &warnings {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     refuse_repeated(args)?;
     let wrong = strange_columns(robot, args, [&training, &holdout], ui)?;
@@ -328,7 +328,7 @@ fn strange_columns(
         wrong.extend(strange);
     } else {
         for sentence in strange {
-            ui.remark(&format!(
+            ui.note(&format!(
                 "{sentence} They are not used: --estimator iv and the comparison use the smoothed position instead; only output-error needs references."
             ));
         }

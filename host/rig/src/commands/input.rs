@@ -89,7 +89,7 @@ pub(crate) fn described(
 ) -> Result<Description, CommandError> {
     let description = Description::load_chain(path, &chain.choice())?;
     for remark in &description.remarks {
-        ui.remark(remark);
+        ui.warn(remark);
     }
     Ok(description)
 }
@@ -589,13 +589,13 @@ pub(crate) fn refuse_faults(
             Use::Compare => (Vec::new(), found.described),
         };
         for sentence in told.iter().chain(&found.doubtful) {
-            ui.remark(sentence);
+            ui.warn(sentence);
         }
         wrong.extend(found.wrong.into_iter().chain(refused));
     }
     wrong.extend(more);
     if even_if_wrong {
-        wrong.iter().for_each(|sentence| ui.remark(sentence));
+        wrong.iter().for_each(|sentence| ui.warn(sentence));
         Ok(())
     } else if wrong.is_empty() {
         Ok(())

@@ -147,7 +147,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             ui,
         )?;
         if args.home.is_none() {
-            ui.remark("the emulated link hangs, at -1.5708 rad; --home puts it elsewhere.");
+            ui.note("the emulated link hangs, at -1.5708 rad; --home puts it elsewhere.");
         }
         show(Paced::new(EmulatedPort::new(emulated)), rig, listeners, ui)
     }

@@ -171,7 +171,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let read = |paths| Inputs::read_mapped(&robot, paths, need, &mapping);
     let (with, without) = (read(&args.data)?, read(&args.without)?);
     for warning in with.warnings().chain(without.warnings()) {
-        ui.remark(&warning);
+        ui.warn(&warning);
     }
     match args.by {
         Measured::Sensor => {
@@ -215,7 +215,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let flange = urdf.as_ref().map(Original::tip);
     write(args, &found, (flange, numbers.as_ref()), &context)?;
     for warning in &found.warnings {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     for line in lines(&robot, &found, numbers.as_ref()) {
         ui.answer(&line);

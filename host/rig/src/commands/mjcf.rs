@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let written = robot.to_mjcf_joints();
     write_whole(&args.out, written.text.as_bytes())?;
     for remark in &written.remarks {
-        ui.remark(remark);
+        ui.warn(remark);
     }
     ui.answer(&format!(
         "{}: {} joints",

@@ -84,6 +84,7 @@ pub use identify::{Compare, Impossible, write_identification};
 pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
 pub use overwrite::{refuse_file, refuse_folder};
 use ui::Ui;
+pub use ui::plain;
 use work::{Work, with_negative_numbers};
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.

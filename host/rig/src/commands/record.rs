@@ -204,12 +204,12 @@ pub(crate) fn doubt(
     let nameplate = Nameplate::from_robot(robot)?;
     let plant = rig.plant().config();
     if let Some(sentence) = other_link(plant, &nameplate, robot) {
-        ui.remark(&sentence);
+        ui.warn(&sentence);
     }
     let Some(motion) = motion else { return Ok(()) };
     let short = shortfalls(plant, &nameplate, &motion.trajectory, motion.start);
     if !short.is_empty() {
-        ui.remark(&format!(
+        ui.warn(&format!(
             "The described drive is too weak to move the link of the emulated rig like this. {} Design a slower or smaller motion from this description (`rig excite --speed-share`), or describe another drive.",
             short.join(" ")
         ));

@@ -265,7 +265,7 @@ impl Run<'_> {
             status,
         });
         self.state.save(&self.state_file)?;
-        self.ui.remark(&format!(
+        self.ui.note(&format!(
             "[{}] done in {:.1} s",
             step.name,
             begin.elapsed().as_secs_f64()

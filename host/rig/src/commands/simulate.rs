@@ -127,12 +127,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     drop(progress);
     if args.quantised {
         for note in done.quantise(&robot) {
-            ui.remark(&note);
+            ui.note(&note);
         }
     }
     done.save(&args.out, &robot)?;
     for note in &done.notes {
-        ui.remark(note);
+        ui.note(note);
     }
     let rows = done.motion.q.first().map_or(0, Vec::len);
     ui.answer(&format!(
@@ -152,7 +152,7 @@ impl Args {
         };
         let (reference, from) = reference_at(path, robot, rate)?;
         if let Some(from) = from {
-            ui.remark(&format!(
+            ui.note(&format!(
                 "{}: the motion is sampled at {} Hz; quintics through its samples give it at the {} Hz of --rate.",
                 path.display(),
                 format_trimmed(from, 6),
@@ -186,13 +186,13 @@ fn carried(args: &Args, robot: &Robot, ui: &Ui) -> Result<Carried, CommandError>
     let load = args.load.as_deref().map(Load::read).transpose()?;
     if let (Some(load), Some(path)) = (&load, &args.load) {
         if let Some(why) = load.implausibility() {
-            ui.remark(&format!(
+            ui.warn(&format!(
                 "The load of {} {why}. It is simulated with the values of the file.",
                 path.display()
             ));
         }
         if robot.wrist_sensor.is_none() {
-            ui.remark(&format!(
+            ui.note(&format!(
                 "{} has no [wrist_sensor], so the load changes only the torques.",
                 args.robot.display()
             ));
@@ -203,7 +203,7 @@ fn carried(args: &Args, robot: &Robot, ui: &Ui) -> Result<Carried, CommandError>
         .as_ref()
         .is_some_and(|sensor| sensor.reads.is_none())
     {
-        ui.remark("[wrist_sensor] has no `reads`; the readings are the load's wrench on the robot, as with reads = \"load\".");
+        ui.note("[wrist_sensor] has no `reads`; the readings are the load's wrench on the robot, as with reads = \"load\".");
     }
     let mut bias = [0.0; 6];
     for (own, given) in bias.iter_mut().zip(args.sensor_bias.iter().flatten()) {
@@ -239,9 +239,7 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError
         )));
     }
     if robot.wrist_sensor.is_some() {
-        ui.remark(
-            "The wrist sensor is not simulated: the joint runs under voltage, without a load.",
-        );
+        ui.note("The wrist sensor is not simulated: the joint runs under voltage, without a load.");
     }
     let noise = Noise {
         position: args.noise_position,
@@ -260,7 +258,7 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError
     let done = replay_voltage(robot, &args.trajectory, rate, noise, args.seed)?;
     done.save(&args.out, robot)?;
     for note in &done.notes {
-        ui.remark(note);
+        ui.note(note);
     }
     let length = done
         .t

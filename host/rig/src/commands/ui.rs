@@ -100,7 +100,7 @@ impl Ui {
     /// Prints a result: one line on standard output.
     pub(crate) fn say(&self, text: &str) {
         if self.has_results {
-            self.print(text);
+            self.print(&plain(text));
         }
     }
 
@@ -117,15 +117,24 @@ impl Ui {
             if error.kind() == std::io::ErrorKind::BrokenPipe {
                 std::process::exit(0);
             }
-            eprintln!("rig: standard output cannot be written: {error}.");
+            eprintln!("rig: error: standard output cannot be written: {error}.");
             std::process::exit(1);
         }
     }
 
-    /// Prints a remark: one line on standard error.
-    pub(crate) fn remark(&self, text: &str) {
+    /// Prints what may make a result wrong: one line on standard error.
+    pub(crate) fn warn(&self, text: &str) {
+        self.remark("warning", text);
+    }
+
+    /// Prints what is good to know: one line on standard error.
+    pub(crate) fn note(&self, text: &str) {
+        self.remark("note", text);
+    }
+
+    fn remark(&self, kind: &str, text: &str) {
         if self.has_remarks {
-            eprintln!("rig: {text}");
+            eprintln!("rig: {kind}: {}", plain(text));
         }
     }
 
@@ -145,6 +154,11 @@ impl Ui {
             started: Some(std::time::Instant::now()),
         }
     }
+}
+
+/// Returns a text with minus signs as programs read them: numbers are copied from a terminal.
+pub fn plain(text: &str) -> String {
+    text.replace('−', "-")
 }
 
 /// Puts a word in quotation marks if a shell needs them.

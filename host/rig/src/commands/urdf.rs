@@ -76,7 +76,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     write_whole(out, urdf.text.as_bytes())?;
     for remark in &urdf.remarks {
-        ui.remark(remark);
+        ui.warn(remark);
     }
     let what = match (&original, &args.into) {
         (Some(_), None) => "the unchanged URDF file",

@@ -71,11 +71,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load(ui)?;
     let (inputs, voltage) = opened(&robot, &args.data, &args.columns.mapping()?)?;
     for warning in inputs.warnings() {
-        ui.remark(&warning);
+        ui.warn(&warning);
     }
     if voltage {
         for sentence in inputs.strange_references(&robot)? {
-            ui.remark(&format!(
+            ui.warn(&format!(
                 "{sentence} These references were used to identify the controller that moved the joint."
             ));
         }
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui,
     )?;
     if let Some(fuller) = args.robot.fuller() {
-        ui.remark(&fuller);
+        ui.warn(&fuller);
     }
     let mut progress = ui.progress("validating", 1000);
     let mut validation = validate(
@@ -150,7 +150,7 @@ fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
         ui.answer(line);
     }
     for warning in warnings {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     ui.say(&format!(
         "report: {}",

@@ -199,7 +199,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let inputs = (sets.iter()).map(read).collect::<Result<Vec<_>, _>>()?;
     let read: Vec<String> = inputs.iter().flat_map(Inputs::warnings).collect();
     for warning in &read {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     let all: Vec<&Inputs> = inputs.iter().collect();
     refuse_faults(&robot, &all, (Use::Fit, Vec::new()), args.even_if_wrong, ui)?;
@@ -219,10 +219,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .flat_map(|inputs| inputs.heard().into_iter().chain(inputs.outside()))
         .collect();
     for warning in found.brief_warnings.iter().chain(&own) {
-        ui.remark(warning);
+        ui.warn(warning);
     }
     if !found.brief_warnings.is_empty() {
-        ui.remark(pages::SEE_IDENTIFY);
+        ui.note(pages::SEE_IDENTIFY);
     }
     found.warnings.extend(own);
     write(args, &robot, &found, read, ui)?;

@@ -14,7 +14,7 @@ const ANSWER: usize = 2;
 pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
     let lines = summary(found);
     for fault in &found.data_faults {
-        ui.remark(&match fault.recording.as_str() {
+        ui.warn(&match fault.recording.as_str() {
             recording if fault.text.contains(recording) => fault.text.clone(),
             recording => format!("{recording}: {}", fault.text),
         });
@@ -30,7 +30,7 @@ pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
             true => " Give --even-if-wrong to fit in spite of this.",
             false => "",
         };
-        ui.remark(&format!(
+        ui.warn(&format!(
             "nothing was fitted; model.toml is the unchanged description.{way_on}"
         ));
     }

@@ -70,7 +70,7 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
         ui.say(&comparison.recommendation);
     }
     for warning in &result.warnings {
-        ui.remark(&warning.to_string());
+        ui.warn(&warning.to_string());
     }
 }
 
