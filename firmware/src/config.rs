@@ -13,7 +13,7 @@ use rig_shared::safety::monitor::MonitorConfig;
 use rig_shared::safety::voltage::VoltageModel;
 use serde::{Deserialize, Serialize};
 
-use crate::sample::Scaling;
+use crate::sample::{PWM_HZ, SAMPLE_HALF_SPAN_NS, Scaling};
 
 /// Rates, as integers so that every dependent constant is exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,13 +91,22 @@ pub struct Config {
     pub host_silent_ticks: u32,
     /// Time from the bridge's enable to active outputs, ticks; no motion is commanded meanwhile.
     pub wake_ticks: u32,
+    /// Largest duty at which the current's samples have settled ([`settled_duty`]).
+    pub settled_duty: f32,
     /// Further silence after which the bridge is switched off and the fault latches, ticks.
     pub host_lost_ticks: u32,
 }
 
 impl Config {
-    /// Derives the configuration from the parts, the rates and the limits for which the parts were chosen.
-    pub fn new(rates: Rates, drive: Drive<f32>, encoder: Encoder, limits: &Limits<f32>) -> Self {
+    /// Derives the configuration from the parts, the rates, the limits for which the parts were chosen, and the settling
+    /// time of the current amplifier, ns.
+    pub fn new(
+        rates: Rates,
+        drive: Drive<f32>,
+        encoder: Encoder,
+        limits: &Limits<f32>,
+        sense_settling_ns: u32,
+    ) -> Self {
         let rate = rates.control_hz;
         let counts_per_radian =
             encoder.counts_per_motor_turn as f32 * drive.gear_ratio.abs() / core::f32::consts::TAU;
@@ -131,6 +140,7 @@ impl Config {
             largest_offset: 0.5,
             host_silent_ticks: rate / 2,
             wake_ticks: wake_ticks(rate),
+            settled_duty: settled_duty(sense_settling_ns),
             host_lost_ticks: rate,
         }
     }
@@ -149,6 +159,17 @@ impl Config {
 /// plus one partial tick.
 pub const fn wake_ticks(control_hz: u32) -> u32 {
     control_hz.div_ceil(1000) + 1
+}
+
+/// Returns the largest duty at which every sample of the current comes at least `settling_ns` after the last edge of the
+/// bridge.
+///
+/// The samples are centred on the middle of a braking interval, so the last edge lies (1 − |duty|)/2 of a pulse before
+/// their middle. Both directions count: which of them moves the amplifier's inputs depends on the wire with the shunt.
+/// Duty 0 has no edges.
+pub fn settled_duty(settling_ns: u32) -> f32 {
+    let before = 1e-9 * (settling_ns.saturating_add(SAMPLE_HALF_SPAN_NS)) as f32;
+    (1.0 - 2.0 * PWM_HZ as f32 * before).max(0.0)
 }
 
 /// Returns the ratings of parts that were chosen for these limits. Currents and torque: 25 % more, because over-current
@@ -191,6 +212,27 @@ pub struct Settings {
 
 #[cfg(test)]
 mod tests {
+    use super::settled_duty;
+
+    /// A pulse of 50 µs: at the returned duty the braking interval is as long before its middle as the amplifier needs, and
+    /// the first sample is held 1.31 µs before the middle.
+    #[test]
+    fn the_settled_duty_leaves_the_amplifier_its_time() {
+        for settling in [0_u32, 2000, 9600, 20_000] {
+            let duty = f64::from(settled_duty(settling));
+            let braking = (1.0 - duty) * 50e-6;
+            let first = 0.5 * braking - 1.31e-6;
+            assert!(
+                (first - 1e-9 * f64::from(settling)).abs() < 1e-11,
+                "{settling}"
+            );
+        }
+        assert!((settled_duty(9600) - 0.5636).abs() < 1e-6);
+        // Longer than half a pulse: only a bridge without edges gives settled samples.
+        assert!(settled_duty(30_000).abs() < f32::MIN_POSITIVE);
+        assert!(settled_duty(u32::MAX).abs() < f32::MIN_POSITIVE);
+    }
+
     #[test]
     fn comparators_act_between_the_checks_and_the_ends_of_the_converter() {
         let (config, settings) = crate::nameplate::one_link();

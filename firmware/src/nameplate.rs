@@ -25,6 +25,13 @@ pub const RATES: Rates = Rates::TEMPLATE;
 /// on your board with an oscilloscope (docs/firmware.md, "Scaling").
 pub const SENSE_DELAY_NS: u32 = 1000;
 
+/// Time from an edge at the amplifier's inputs until its output is settled, ns. A current that is read earlier is marked
+/// ([`rig_shared::safety::Limit::Unsettled`]), and the on-line estimator does not learn from it.
+///
+/// 9600 ns: an INA240 to 0.5 % (its data sheet SBOS662, "settling time"). 0 for a sensor without a common-mode step, such as
+/// a Hall-effect sensor.
+pub const SENSE_SETTLING_NS: u32 = 9600;
+
 /// Returns the one-link rig of the template: its fixed values, and the settings until the host replaces them.
 pub fn one_link() -> (Config, Settings) {
     one_link_at(RATES)
@@ -54,7 +61,7 @@ pub fn one_link_at(rates: Rates) -> (Config, Settings) {
         observer_bandwidth: 200.0,
         index_levels: 0b00,
     };
-    let config = Config::new(rates, drive, encoder, &limits);
+    let config = Config::new(rates, drive, encoder, &limits, SENSE_SETTLING_NS);
     let settings = Settings {
         control: ControlKind::ProportionalDerivative,
         gains: Gains {

@@ -5,6 +5,12 @@ use rig_shared::units::{AdcCode, Duty, EncoderCount};
 /// Clock of the timer that captures the encoder's edges, Hz.
 pub const EDGE_CLOCK_HZ: u32 = 170_000_000;
 
+/// Pulses of the bridge per second. A pulse drives for the share |duty| of its period and brakes for the rest.
+pub const PWM_HZ: u32 = 20_000;
+
+/// Longest time from the middle of the current's samples to the first or last of them, ns.
+pub const SAMPLE_HALF_SPAN_NS: u32 = 1310;
+
 /// Inputs of one control tick, started by one hardware trigger. A converter reads its inputs one after the other, and
 /// the encoder is read afterwards: on the board about 9 µs after the middle of the current's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

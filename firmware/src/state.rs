@@ -93,6 +93,8 @@ pub struct State {
     pub(crate) report_due: bool,
     /// Duty cycle that acts during this tick.
     pub(crate) duty: f32,
+    /// Marks of the next tick's readings.
+    pub(crate) marks: LimitSet,
     pub(crate) run: Run,
     /// Present if the motor brakes after a fault.
     pub(crate) motor_brake: Option<MotorBrake>,
@@ -206,6 +208,7 @@ impl State {
             updates_since_report: 0,
             report_due: false,
             duty: 0.0,
+            marks: LimitSet::default(),
             run: Run::default(),
             motor_brake: None,
         }

@@ -60,7 +60,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         output.fault = latch_fault(state, fault, value);
     }
 
-    let mut limits = LimitSet::default();
+    let mut limits = state.marks;
     limits.set(Limit::LateTick, sample.late_ticks > 0);
     state.reference = reference(config, state, &mut limits);
     let DriveOutput {
@@ -109,6 +109,11 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         duty: Duty(duty),
         bridge,
     };
+    // The duty that has acted during this tick makes the last edge before the next tick's samples. Bits of positive numbers
+    // are in the order of the numbers, and integers are compared in fewer cycles.
+    let unsettled = state.duty.abs().to_bits() > config.settled_duty.to_bits();
+    state.marks = LimitSet::default();
+    state.marks.set(Limit::Unsettled, unsettled);
     state.duty = duty;
     state.tick += 1;
     output
@@ -455,6 +460,27 @@ mod tests {
             fault = fault.or(output.fault);
         }
         assert_eq!(fault.map(|record| record.fault), Some(Fault::OverCurrent));
+    }
+
+    /// The samples of a tick follow the last edge of the pulse that acted during the tick before. Its duty decides, in both
+    /// directions.
+    #[test]
+    fn a_current_read_soon_after_an_edge_is_marked_in_the_next_tick() {
+        let (config, settings) = one_link();
+        let mut state = State::new(&config, settings).unwrap();
+        let mut marks = |duty: f32| {
+            state.duty = duty;
+            [0; 3].map(|_| {
+                step(&config, &mut state, Sample::default());
+                state.limits.has(Limit::Unsettled)
+            })
+        };
+        for duty in [0.57, -0.57, 0.95, -0.95] {
+            assert_eq!(marks(duty), [false, true, false], "{duty}");
+        }
+        for duty in [0.0, 0.56, -0.56] {
+            assert_eq!(marks(duty), [false; 3], "{duty}");
+        }
     }
 
     /// New effects start from zero: the state of a cogging in N·m is never used as radians of an encoder's error, in

@@ -11,6 +11,7 @@ use embassy_stm32::pac::adc::vals::{Adcaldif, Difsel, Exten, SampleTime};
 use embassy_stm32::pac::adccommon::vals::{Ckmode, Presc};
 use embassy_stm32::pac::{ADC1, ADC12_COMMON, RCC, VREFINTCAL};
 use rig_firmware::nameplate::{RATES, SENSE_DELAY_NS};
+use rig_firmware::sample::SAMPLE_HALF_SPAN_NS;
 use rig_shared::units::AdcCode;
 
 use super::clock::{CORE_HZ, TICK_PRIORITY};
@@ -31,6 +32,9 @@ const APPROXIMATION: u16 = 2 * 12 + 1;
 /// sampling time.
 const MEAN_HOLD: u16 =
     (2 * (LATENCY + SAMPLING) + (CONVERSIONS - 1) * (SAMPLING + APPROXIMATION)) * PRESCALER / 4;
+/// Core cycles from the mean instant to the first or last of the samples.
+const HALF_SPAN: u16 = (CONVERSIONS - 1) * (SAMPLING + APPROXIMATION) * PRESCALER / 4;
+const _: () = assert!(HALF_SPAN as u32 * 1000 <= SAMPLE_HALF_SPAN_NS * (CORE_HZ / 1_000_000));
 /// Delay of bridge and amplifier, core cycles, in whole converter cycles.
 const SENSE_DELAY: u16 =
     (SENSE_DELAY_NS * (CORE_HZ / 1_000_000) / 1000) as u16 / PRESCALER * PRESCALER;

@@ -19,15 +19,13 @@ use embassy_stm32::pac::timer::vals::{
 };
 use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1, TIM4};
 use rig_firmware::nameplate;
-use rig_firmware::sample::Command;
+use rig_firmware::sample::{Command, PWM_HZ};
 
 use super::adc::SAMPLING_LEAD;
 use super::clock::CORE_HZ;
 use super::comparator;
 use super::pins::{BridgePins, disable_bridge, is_fault_line_low};
 
-/// Pulses a second.
-pub(crate) const PWM_HZ: u32 = 20_000;
 // A whole number of pulses between two ticks: every update is then an underflow.
 const _: () = assert!(PWM_HZ.is_multiple_of(nameplate::RATES.control_hz));
 /// Top of the ramp: up and down form one pulse.

@@ -1,7 +1,7 @@
 //! Inputs of the on-line estimator, and its reports.
 
 use rig_shared::link::PARAMETER_COUNT;
-use rig_shared::safety::Mode;
+use rig_shared::safety::{Limit, Mode};
 use rig_shared::wire::message::Estimate;
 
 use crate::config::Config;
@@ -39,9 +39,10 @@ fn accumulate(config: &Config, state: &mut State, tick: &Tick) {
         state.estimator.restart();
         return;
     }
-    // With the bridge off a hand may move the link, and after a fault the readings are in doubt: neither is information
-    // on the rig's parameters.
-    if !state.mode.drives() {
+    // With the bridge off a hand may move the link, after a fault the readings are in doubt, and a current that has not
+    // settled is biased: none of them is information on the rig's parameters. The filter starts anew after them, because
+    // its memory would keep their bias.
+    if !state.mode.drives() || window.limits.has(Limit::Unsettled) {
         state.previous_window = None;
         state.estimator.interrupt();
     } else if let Some(previous) = state.previous_window.replace(window) {
@@ -97,4 +98,48 @@ fn estimate_report(state: &State) -> Estimate {
         libm::sqrtf(estimate.std[OFFSET_INDEX] * estimate.std[OFFSET_INDEX] + measured * measured);
     estimate.trusted = report.trusted;
     estimate
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::nameplate::one_link;
+    use rig_shared::safety::LimitSet;
+
+    /// Returns the estimator after four seconds of a motion under a consistent current, in which some ticks have another
+    /// current, A, and a mark if `marked`.
+    fn learnt(other: f32, marked: bool) -> rig_shared::estimation::OneLinkEstimator<f32> {
+        let (config, settings) = one_link();
+        let mut state = State::new(&config, settings).unwrap();
+        state.mode = Mode::Running;
+        for k in 0..40_000_u32 {
+            state.tick = u64::from(k);
+            let t = 1e-4 * k as f32;
+            let (sin, cos) = (5.0 * t).sin_cos();
+            let (q, qd, qdd) = (0.6 * sin, 3.0 * cos, -15.0 * sin);
+            let torque = 0.2 * qdd + 2.9 * q.cos() + 0.3 * qd + 0.4 * qd.signum();
+            let disturbed = k % 1000 < 7;
+            let mut limits = LimitSet::default();
+            limits.set(Limit::Unsettled, disturbed && marked);
+            let current = torque / state.derived.torque_per_ampere;
+            let tick = Tick {
+                position: (q / state.derived.radians_per_count) as i64,
+                current: if disturbed { current + other } else { current },
+                limits,
+                ..Tick::default()
+            };
+            accumulate(&config, &mut state, &tick);
+        }
+        assert_ne!(state.estimator.report().value, [0.0; PARAMETER_COUNT]);
+        state.estimator
+    }
+
+    /// What the current of a marked tick is, makes no difference to the estimator in any bit. Without the mark it does.
+    #[test]
+    fn a_current_that_has_not_settled_is_not_learnt_from() {
+        assert_eq!(learnt(0.0, true), learnt(1.0, true));
+        assert_ne!(learnt(0.0, false), learnt(1.0, false));
+        assert_ne!(learnt(0.0, true), learnt(0.0, false));
+    }
 }

@@ -1,5 +1,5 @@
 //! Limits of the rig, and the limits that act now. A limit is no fault: the rig goes on, and reports why torque is
-//! missing.
+//! missing. The set of acting limits also has marks: ticks that come late, and readings that are in doubt.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -53,7 +53,7 @@ impl<T: Real<Mask = bool>> Limits<T> {
     }
 }
 
-/// A limit that can act.
+/// A limit that can act, or a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Limit {
@@ -69,17 +69,21 @@ pub enum Limit {
     HostSilent = 16,
     /// A control tick was missed or finished late. The next one within a tenth of a second is a fault.
     LateTick = 32,
+    /// Mark: the current was read before its amplifier had settled after an edge of the bridge. The on-line estimator
+    /// does not learn from such a reading.
+    Unsettled = 64,
 }
 
 impl Limit {
     /// Every limit, for iteration.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Torque,
         Self::Current,
         Self::Voltage,
         Self::Position,
         Self::HostSilent,
         Self::LateTick,
+        Self::Unsettled,
     ];
 
     /// Returns the name for plots and tables.
@@ -91,11 +95,12 @@ impl Limit {
             Self::Position => "position",
             Self::HostSilent => "host silent",
             Self::LateTick => "late tick",
+            Self::Unsettled => "current not settled",
         }
     }
 }
 
-/// Limits that act now, as a set of bits (the values of [`Limit`]).
+/// Limits and marks that act now, as a set of bits (the values of [`Limit`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct LimitSet(pub u8);
 

@@ -3,6 +3,7 @@
 use core::f64::consts::FRAC_PI_2;
 
 use rig_firmware::config::{Config, Encoder, Rates, Settings};
+use rig_firmware::nameplate::SENSE_SETTLING_NS;
 use rig_shared::compensation::{EFFECTS, Effects};
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
@@ -159,7 +160,7 @@ impl Nameplate {
             observer_bandwidth: OBSERVER_BANDWIDTH,
             index_levels: 0b00,
         };
-        let config = Config::new(rates, parts, encoder, &limits);
+        let config = Config::new(rates, parts, encoder, &limits, SENSE_SETTLING_NS);
         let gains = Gains::design(f64::from(model.inertia), POSITION_BANDWIDTH, 1.0);
         let settings = Settings {
             control: ControlKind::ProportionalDerivative,

@@ -254,6 +254,8 @@ fn replay(
     let (mut config, settings) = nameplate::one_link();
     // The samples answer to the board's own duty, not to the one that is worked out here.
     config.monitor.voltage.floor = f32::INFINITY;
+    // The motion is slow enough that the board marks no current as not settled.
+    config.settled_duty = f32::INFINITY;
     let mut state = State::new(&config, settings).unwrap();
     let ask = |state: &mut State, body: RequestBody| {
         execute(&config, state, &precheck(&config, Request { id: 0, body })).unwrap();
