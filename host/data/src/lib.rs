@@ -86,6 +86,7 @@ mod thermal_history;
 mod time_names;
 mod torque_spike;
 mod unit;
+mod unsettled;
 mod unsigned;
 mod writer;
 

@@ -9,6 +9,7 @@ use super::block::Block;
 use super::prepare::PrepareError;
 use super::prepare::{LowPass, Recording, central_difference, second_difference};
 use super::thermal_history::ThermalHistory;
+use super::unsettled::unsettled;
 
 /// Ratio of the noise variance from third differences to that from second differences above which noise counts as
 /// white. White noise has a ratio of 1; a low-pass filter lowers it. Noise that rises with frequency also counts as
@@ -399,19 +400,15 @@ fn append(run: &mut Run, block: Block) {
     }
     let before = run.t.len();
     let modes = block.extra.iter().find(|(name, _)| name == "mode");
-    for (k, mode) in modes
-        .iter()
-        .flat_map(|(_, values)| values.iter().enumerate())
-    {
-        if *mode != f64::from(Mode::Disarmed as u8) {
-            continue;
-        }
-        let sample = before + k;
-        match run.coasting.last_mut() {
-            Some(last) if last.end == sample => last.end += 1,
-            _ => run.coasting.push(sample..sample + 1),
-        }
+    if let Some((_, modes)) = modes {
+        let is_off = |mode: &f64| *mode == f64::from(Mode::Disarmed as u8);
+        extend_ranges(&mut run.coasting, before, modes.iter().map(is_off));
     }
+    extend_ranges(
+        &mut run.left_out,
+        before,
+        unsettled(&block.extra).into_iter(),
+    );
     run.t.extend(block.t);
     for (to, from) in run.joints.iter_mut().zip(block.joints) {
         to.q_raw.extend(from.q);
@@ -427,6 +424,18 @@ fn append(run: &mut Run, block: Block) {
         join(&mut to.voltage, from.voltage, before);
         join(&mut to.temperature, from.temperature, before);
         join(&mut to.link_raw, from.link, before);
+    }
+}
+
+/// Extends ranges of samples by those that are `true` among the samples from `first` on.
+fn extend_ranges(ranges: &mut Vec<Range<usize>>, first: usize, flags: impl Iterator<Item = bool>) {
+    for (k, flag) in flags.enumerate() {
+        let sample = first + k;
+        match ranges.last_mut() {
+            _ if !flag => {}
+            Some(last) if last.end == sample => last.end += 1,
+            _ => ranges.push(sample..sample + 1),
+        }
     }
 }
 

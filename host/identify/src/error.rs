@@ -3,8 +3,10 @@
 use rig_data::prepare::PrepareError;
 
 /// Returns the advice for a recording with too few usable rows, by the main reason for the unusable ones.
-fn what_helps(slow: u64, saturated: u64) -> &'static str {
-    if saturated > slow {
+fn what_helps(slow: u64, saturated: u64, unsettled: u64) -> &'static str {
+    if unsettled > slow.max(saturated) {
+        "record a slower motion, or with a higher supply voltage: the amplifier of the current then has time to settle"
+    } else if saturated > slow {
         "the torque stands at its limit: record a motion that needs less, or without the limit"
     } else {
         "record a longer or livelier motion"
@@ -39,7 +41,7 @@ pub enum IdentifyError {
     NoRecording,
     /// Too few rows are usable after masking.
     #[error(
-        "Of all rows only {used} are usable for {unknown} parameters (too slow: {slow}, saturated: {saturated}); {}.", what_helps(*slow, *saturated)
+        "Of all rows only {used} are usable for {unknown} parameters (too slow: {slow}, saturated: {saturated}, current not settled: {unsettled}); {}.", what_helps(*slow, *saturated, *unsettled)
     )]
     NothingLeft {
         /// Usable rows.
@@ -50,6 +52,8 @@ pub enum IdentifyError {
         slow: u64,
         /// Rows at a torque limit.
         saturated: u64,
+        /// Rows with a current that had not settled.
+        unsettled: u64,
     },
     /// The torque is zero in all rows.
     #[error(

@@ -5,6 +5,7 @@ use super::filter::{LowPass, central_difference, second_difference};
 use super::pieces::{Piece, Recording, each_piece};
 use super::preprocessing_plan::PreprocessingPlan;
 use super::workers::{in_order, threads};
+use crate::unsettled::unsettled;
 
 /// Motion of one joint over a piece, at the full rate.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,6 +22,8 @@ pub struct JointMotion {
     pub slow: Vec<bool>,
     /// True where the torque is at a limit.
     pub saturated: Vec<bool>,
+    /// True where the rig marked the current as read before its amplifier had settled.
+    pub unsettled: Vec<bool>,
 }
 
 /// A piece of motion with margins; only rows `usable.0 .. usable.1` may be used.
@@ -99,6 +102,8 @@ fn motion_of(
 ) -> Result<Motion, PrepareError> {
     let rows = piece.rows.len();
     let dt = plan.dt();
+    let mut unsettled = unsettled(&piece.rows.extra);
+    unsettled.resize(rows, false);
     let joints = piece
         .rows
         .joints
@@ -131,6 +136,7 @@ fn motion_of(
                     .map(|tau| low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h))
                     .collect(),
                 tau: without(column.tau, column.effects.as_deref()),
+                unsettled: unsettled.clone(),
                 q,
                 qd,
                 qdd,

@@ -8,10 +8,11 @@ use super::error::PrepareError;
 use super::pieces::{Recording, stretch};
 use super::record::{self, Record, begin, put_count, put_numbers, unusable};
 use crate::block::{Block, JointColumns};
+use crate::unsettled::{MARKED_BY, with_marks};
 
 /// A recording that is written to a temporary file while it is first read, and read from there afterwards. Text is thus
-/// parsed once and memory stays constant. Keeps time, position, torque, measured derivatives and temperature; drops
-/// other columns.
+/// parsed once and memory stays constant. Keeps time, position, torque, measured derivatives, temperature and the
+/// marks of the rig; drops other columns.
 pub struct Spooled<'a> {
     source: &'a dyn Recording,
     kept: Mutex<Option<(File, u64)>>,
@@ -89,7 +90,7 @@ fn bare(block: Block) -> Block {
                 ..j
             })
             .collect(),
-        extra: Vec::new(),
+        extra: with_marks(&block.extra),
         ..block
     }
 }
@@ -109,6 +110,10 @@ fn write(to: &mut File, record: &mut Vec<u8>, block: &Block) -> std::io::Result<
                 put_numbers(record, list.iter());
             }
         }
+    }
+    put_count(record, block.extra.len());
+    for (_, list) in &block.extra {
+        put_numbers(record, list.iter());
     }
     record::write(to, record)
 }
@@ -141,12 +146,15 @@ fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<Option<Block>>
             })
         })
         .collect::<std::io::Result<Vec<_>>>()?;
+    let extra = (MARKED_BY.iter().take(record.count()?))
+        .map(|name| Ok(((*name).to_owned(), record.list()?)))
+        .collect::<std::io::Result<Vec<_>>>()?;
     Ok(Some(Block {
         t,
         joints,
+        extra,
         first_line,
         continues,
-        ..Default::default()
     }))
 }
 
@@ -188,9 +196,13 @@ mod tests {
                     ..Default::default()
                 })
                 .collect(),
+            extra: MARKED_BY
+                .iter()
+                .filter(|_| measured)
+                .map(|name| ((*name).to_owned(), list(from, 1.0)))
+                .collect(),
             first_line: from as u64 + 2,
             continues,
-            ..Default::default()
         };
         let source = Counted(
             InMemory {

@@ -151,6 +151,7 @@ impl Collected {
                 unknown: p,
                 slow: tally.slow.iter().sum(),
                 saturated: tally.saturated.iter().sum(),
+                unsettled: tally.unsettled.iter().sum(),
             });
         }
         Ok(Self {

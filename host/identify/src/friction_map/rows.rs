@@ -20,6 +20,7 @@ pub(super) struct Rows {
     /// Torque of the identified model at rest: gravity and the constant torque, N·m or N.
     pub(super) weight: Vec<f64>,
     pub(super) saturated: Vec<bool>,
+    pub(super) unsettled: Vec<bool>,
 }
 
 /// Number of parts of a pass; the joint must advance in each.
@@ -74,12 +75,17 @@ impl Rows {
                 options.shortest
             ));
         }
-        let limited = self.saturated[rows.clone()].iter().filter(|s| **s).count();
-        if limited > 0 {
-            return Err(format!(
-                "the torque is at its limit in {limited} of {} rows",
-                rows.len()
-            ));
+        for (marks, what) in [
+            (&self.saturated, "the torque is at its limit"),
+            (
+                &self.unsettled,
+                "the current was read before its amplifier had settled",
+            ),
+        ] {
+            let marked = marks[rows.clone()].iter().filter(|s| **s).count();
+            if marked > 0 {
+                return Err(format!("{what} in {marked} of {} rows", rows.len()));
+            }
         }
         let x = &self.position.x;
         let speed = slope(&t[rows.clone()], &x[rows.clone()])

@@ -119,6 +119,7 @@ pub(super) fn rows_of(
             rows.whole.push(model + of(&out, &own));
             rows.weight.push(of(&still, &rest));
             rows.saturated.push(motion.joints[joint].saturated[k]);
+            rows.unsettled.push(motion.joints[joint].unsettled[k]);
         }
         Ok(())
     })?;

@@ -277,6 +277,9 @@ fn running_count(list: &[bool]) -> Vec<u32> {
         .collect()
 }
 
+/// Rows on each side of a marked one that the low-pass before the decimation spreads it over, in kept rows.
+const RESPONSE: usize = 3;
+
 /// Decides for each kept row of joint `j` if it is used.
 fn kept(
     joint: &JointMotion,
@@ -293,6 +296,7 @@ fn kept(
         .map(|list| (list, running_count(list)))
         .collect();
     let saturated_before = running_count(&joint.saturated);
+    let unsettled_before = running_count(&joint.unsettled);
     // Number of marked rows within `reach` of k, and number of rows there.
     let around = |before: &[u32], k: usize, reach: usize| {
         let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(rows));
@@ -309,14 +313,9 @@ fn kept(
                 list[k] || dwells || around(before, k, margin).0 > 0
             });
             let saturated = around(&saturated_before, k, step).0 > 0;
-            if saturated {
-                Tally::count(&mut tally.saturated, j);
-            } else if slow {
-                Tally::count(&mut tally.slow, j);
-            } else {
-                tally.used += 1;
-            }
-            !saturated && !slow
+            // The low-pass spreads a wrong torque over its response.
+            let unsettled = around(&unsettled_before, k, RESPONSE * step).0 > 0;
+            tally.decide(j, [saturated, unsettled, slow])
         })
         .collect()
 }

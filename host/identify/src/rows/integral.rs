@@ -9,7 +9,7 @@ use super::momentum::{as_trapezia_see, momentum_rows};
 use super::plan::{Belongs, Plan};
 use super::tally::Tally;
 use crate::error::failed;
-use rig_data::prepare::{LowPass, Motion, PrepareError};
+use rig_data::prepare::{JointMotion, LowPass, Motion, PrepareError};
 
 /// Computes the rows of one recording.
 pub(crate) struct Integral<'a> {
@@ -115,18 +115,12 @@ fn cumulative(rows: usize, dt: f64, rate: &dyn Fn(usize) -> f64) -> Vec<f64> {
 
 /// Decides if a window is used, and counts it.
 fn used(motion: &Motion, [start, end]: [usize; 2], still: bool, tally: &mut Tally) -> bool {
-    let saturated = motion
-        .joints
-        .iter()
-        .any(|j| j.saturated[start..=end].iter().any(|s| *s));
-    if saturated {
-        Tally::count(&mut tally.saturated, 0);
-    } else if still {
-        Tally::count(&mut tally.slow, 0);
-    } else {
-        tally.used += 1;
-    }
-    !still && !saturated
+    let any = |of: &dyn Fn(&JointMotion) -> &[bool]| {
+        (motion.joints.iter()).any(|joint| of(joint)[start..=end].contains(&true))
+    };
+    let saturated = any(&|joint| &joint.saturated);
+    let unsettled = any(&|joint| &joint.unsettled);
+    tally.decide(0, [saturated, unsettled, still])
 }
 
 /// Running integrals from the first row of a piece.

@@ -266,7 +266,7 @@ impl<'a> Instants<'a> {
     }
 }
 
-/// Numbers of slow and of saturated rows before each row of a piece.
+/// Numbers of rows of each kind before each row of a piece.
 struct Excluded {
     /// Per joint, rows in which it is slow, and in which it hardly moves.
     slow: Vec<[Vec<u32>; 2]>,
@@ -274,6 +274,8 @@ struct Excluded {
     motors: Vec<(Vec<bool>, [Vec<u32>; 2])>,
     /// Per joint, rows at the torque limit.
     saturated: Vec<Vec<u32>>,
+    /// Per joint, rows with a current that had not settled.
+    unsettled: Vec<Vec<u32>>,
 }
 
 impl Excluded {
@@ -303,6 +305,9 @@ impl Excluded {
                 .iter()
                 .map(|j| count(&|k| j.saturated[k]))
                 .collect(),
+            unsettled: (motion.joints.iter())
+                .map(|j| count(&|k| j.unsettled[k]))
+                .collect(),
         })
     }
 
@@ -323,14 +328,8 @@ impl Excluded {
         let mut motors = self.motors.iter();
         let still = most(&self.slow[j]) || motors.any(|(moves, c)| moves[j] && most(c));
         let saturated = over(&self.saturated[j]) > 0;
-        if saturated {
-            Tally::count(&mut tally.saturated, j);
-        } else if still {
-            Tally::count(&mut tally.slow, j);
-        } else {
-            tally.used += 1;
-        }
-        !still && !saturated
+        let unsettled = over(&self.unsettled[j]) > 0;
+        tally.decide(j, [saturated, unsettled, still])
     }
 }
 

@@ -11,6 +11,8 @@ pub struct Tally {
     pub slow: Vec<u64>,
     /// Per joint (or window), saturated.
     pub saturated: Vec<u64>,
+    /// Per joint (or window), with a current that had not settled.
+    pub unsettled: Vec<u64>,
     /// Rows, before decimation, in segments too short for the filters.
     pub short: u64,
 }
@@ -23,6 +25,22 @@ impl Tally {
         list[k] += 1;
     }
 
+    /// Counts a row of joint `k` (or a window) that is saturated, not settled or slow, or else used. Returns true if it is
+    /// used.
+    pub(crate) fn decide(&mut self, k: usize, [saturated, unsettled, slow]: [bool; 3]) -> bool {
+        let list = match () {
+            () if saturated => &mut self.saturated,
+            () if unsettled => &mut self.unsettled,
+            () if slow => &mut self.slow,
+            () => {
+                self.used += 1;
+                return true;
+            }
+        };
+        Self::count(list, k);
+        false
+    }
+
     /// Adds another count.
     pub(crate) fn add(&mut self, part: &Self) {
         self.used += part.used;
@@ -30,6 +48,7 @@ impl Tally {
         for (list, more) in [
             (&mut self.slow, &part.slow),
             (&mut self.saturated, &part.saturated),
+            (&mut self.unsettled, &part.unsettled),
         ] {
             list.resize(list.len().max(more.len()), 0);
             for (a, b) in list.iter_mut().zip(more) {
@@ -56,6 +75,10 @@ impl Tally {
             "speed of the joint, or of a motor coupled to it, below the threshold: friction there is not Coulomb and viscous, or its sign is not known",
         );
         all.extend(entries(&self.saturated, "torque at its limit"));
+        all.extend(entries(
+            &self.unsettled,
+            "current read before its amplifier had settled after an edge of the bridge",
+        ));
         if self.short > 0 {
             all.push(Masked {
                 joint: 0,

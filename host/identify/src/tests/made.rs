@@ -176,6 +176,52 @@ fn a_held_command_biases_viscous_friction_unless_its_lead_is_given() {
     assert!(!without.1 && with.1);
 }
 
+/// A recording of the rig, with wrong torques in rows that it marked as not settled: both models leave these rows out and say
+/// so. Without the marks the torques count.
+#[test]
+fn torques_by_a_current_that_had_not_settled_are_left_out() {
+    let mut marked = swing(8, 30.0, false);
+    let block = &mut marked.blocks[0];
+    let is_fast: Vec<bool> = (block.joints[0].q.windows(2))
+        .map(|q| 500.0 * (q[1] - q[0]) > 2.2)
+        .chain([false])
+        .collect();
+    for (tau, fast) in block.joints[0].tau.iter_mut().zip(&is_fast) {
+        *tau += if *fast { 1.2 } else { 0.0 };
+    }
+    let limits = is_fast.iter().map(|fast| if *fast { 65.0 } else { 1.0 });
+    block.extra = vec![
+        ("limits".into(), limits.collect()),
+        ("mode".into(), vec![3.0; is_fast.len()]),
+    ];
+    let mut unmarked = marked.clone();
+    unmarked.blocks[0].extra.clear();
+    for model in [ModelKind::Differential, ModelKind::Integral] {
+        let found = |recording: &InMemory| {
+            let options = Options {
+                model,
+                ..Default::default()
+            };
+            let found = identify(&pendulum(), &[recording], &[], &options).unwrap();
+            let errors = found.base_parameters.iter().zip(TRUTH);
+            let worst = errors.map(|(b, t)| (b.value - t).abs() / b.std);
+            let is_told = found
+                .details
+                .masked
+                .iter()
+                .any(|m| m.why.contains("had settled"));
+            (worst.fold(0.0, f64::max), is_told)
+        };
+        let (with, without) = (found(&marked), found(&unmarked));
+        println!(
+            "{model:?}: largest error {:.1} std, {:.1} without marks",
+            with.0, without.0
+        );
+        assert!(with.0 < 3.5 && with.1, "{with:?}");
+        assert!(without.0 > 5.0 && !without.1, "{without:?}");
+    }
+}
+
 #[test]
 fn robust_fit_withstands_rows_that_are_not_the_robots() {
     let mut recording = swing(7, 30.0, false);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args as ClapArgs};
 use rig_shared::safety::{FaultRecord, Limit, Mode};
-use rig_shared::wire::message::RequestBody;
+use rig_shared::wire::message::{RequestBody, StateSample};
 
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
@@ -317,6 +317,7 @@ fn record<P: Port>(
                     }
                 }
                 ending.done += samples.len() as u64;
+                ending.unsettled += count_unsettled(samples);
                 ending.mode = samples.last().map_or(ending.mode, |sample| sample.mode);
                 progress.at(ending.done);
             }
@@ -345,6 +346,9 @@ fn record<P: Port>(
         }
     };
     writer.finish()?;
+    if let Some(sentence) = ending.unsettled_sentence() {
+        ui.warn(&sentence);
+    }
     ending.judge(out, more, f64::from(greeting.control_rate_hz))?;
     Ok(losses)
 }
@@ -355,6 +359,8 @@ struct Ending {
     mode: Mode,
     /// Number of samples received.
     done: u64,
+    /// Samples with a current that was read before its amplifier had settled.
+    unsettled: u64,
 }
 
 impl Default for Ending {
@@ -363,11 +369,31 @@ impl Default for Ending {
             fault: None,
             mode: Mode::Disarmed,
             done: 0,
+            unsettled: 0,
         }
     }
 }
 
+/// Returns the number of samples with a mark for a current that had not settled.
+fn count_unsettled(samples: &[StateSample]) -> u64 {
+    let marked = |sample: &&StateSample| sample.limits.has(Limit::Unsettled);
+    samples.iter().filter(marked).count() as u64
+}
+
 impl Ending {
+    /// Returns a sentence about currents that had not settled, if there were any.
+    fn unsettled_sentence(&self) -> Option<String> {
+        (self.unsettled > 0).then(|| {
+            format!(
+                "In {} of {} samples ({:.1} %) the current was read before its amplifier had settled after an edge of the bridge, so it may be wrong there. These samples have bit {} in column `limits`; the rig's own estimate and `rig identify` leave them out. A slower motion or a higher supply voltage avoids them.",
+                self.unsettled,
+                self.done,
+                100.0 * self.unsettled as f64 / self.done.max(1) as f64,
+                Limit::Unsettled as u8,
+            )
+        })
+    }
+
     /// # Errors
     /// A sentence if a fault or the user ended the recording.
     fn judge(&self, out: &Path, more: &str, control_rate: f64) -> Result<(), CommandError> {
@@ -400,4 +426,29 @@ fn names(modes: &[Mode]) -> String {
         .map(|(k, mode)| format!("{k} {}", mode.name()))
         .collect();
     list.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn currents_that_had_not_settled_are_told_with_their_number() {
+        let mut unsettled = StateSample::default();
+        unsettled.limits.set(Limit::Unsettled, true);
+        let mut late = StateSample::default();
+        late.limits.set(Limit::LateTick, true);
+        let samples = [unsettled, late, StateSample::default(), unsettled];
+        let ending = Ending {
+            done: 400,
+            unsettled: count_unsettled(&samples),
+            ..Ending::default()
+        };
+        let sentence = ending.unsettled_sentence().unwrap_or_default();
+        assert!(
+            sentence.starts_with("In 2 of 400 samples (0.5 %)"),
+            "{sentence}"
+        );
+        assert_eq!(Ending::default().unsettled_sentence(), None);
+    }
 }
