@@ -8,6 +8,7 @@ use rig_firmware::sample::Command;
 use rig_plant::{Plant, PlantConfig, Truth};
 use rig_shared::units::Duty;
 
+use crate::amplifier::Amplifier;
 use crate::ripple::Ripple;
 use crate::time::{Instant, from_seconds, to_seconds};
 
@@ -30,7 +31,7 @@ const WAKE: f64 = 1e-3;
 
 /// Propagation and dead time of the bridge, and delay of an amplifier with 400 kHz of bandwidth, s: estimates for a DRV8874
 /// and an INA240.
-const BRIDGE_DELAY: f64 = 0.6e-6;
+pub(crate) const BRIDGE_DELAY: f64 = 0.6e-6;
 const AMPLIFIER_DELAY: f64 = 0.4e-6;
 
 /// Faults on the board; [`Plant::faults_mut`] has the faults of the rig.
@@ -122,6 +123,8 @@ pub struct Board {
     pub first_duty: f64,
     /// Time from an edge at the bridge's inputs to the current sense at the converter, s.
     pub sense_delay: f64,
+    /// Amplifier of the current, if its error after an edge of the bridge counts.
+    pub amplifier: Option<Amplifier>,
 }
 
 impl Board {
@@ -158,6 +161,7 @@ impl Board {
             enable_edges: Vec::new(),
             first_duty: 0.0,
             sense_delay: BRIDGE_DELAY + AMPLIFIER_DELAY,
+            amplifier: None,
         }
     }
 
@@ -315,7 +319,9 @@ impl Board {
         Ripple {
             delay: self.sense_delay,
             braking: -drop / motor.inductance,
-            duty: self.bridge.duty.abs().min(1.0),
+            duty: self.bridge.duty.clamp(-1.0, 1.0),
+            supply: config.bridge.supply,
+            amplifier: self.amplifier,
             codes_per_ampere: 1.0 / f64::from(config.sensors.scaling.current_per_code),
         }
     }

@@ -9,11 +9,13 @@
 //! instructions are counted exactly.
 
 pub mod accelerator;
+pub mod amplifier;
 pub mod board;
 pub mod chip;
 pub mod cost;
 pub mod cpu;
 pub mod emulation;
+pub mod ill_board;
 pub mod image;
 pub mod line_noise;
 pub mod map;

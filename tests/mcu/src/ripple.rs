@@ -4,8 +4,8 @@
 //! potential, it changes by −(R·i + Kₑ·ω)/L and equals the mean in the middle; driving reverses the change. Left out:
 //! the curvature exp(−t·R/L) over a pulse of 50 µs against L/R of about 0.8 ms, and the change from pulse to pulse.
 
-/// Pulses a second.
-const PULSES: f64 = 20_000.0;
+use crate::amplifier::{Amplifier, PULSES};
+
 /// Largest code of the converter.
 const LARGEST: f64 = 4095.0;
 
@@ -16,8 +16,12 @@ pub struct Ripple {
     pub delay: f64,
     /// Slope while braking, A/s.
     pub braking: f64,
-    /// Share of a pulse that drives.
+    /// Share of a pulse that drives, with the sign of the direction.
     pub duty: f64,
+    /// Voltage of an edge, V.
+    pub supply: f64,
+    /// The amplifier, if its error after an edge counts.
+    pub amplifier: Option<Amplifier>,
     /// Scale of the current sense.
     pub codes_per_ampere: f64,
 }
@@ -28,7 +32,7 @@ impl Ripple {
         let half = 0.5 / PULSES;
         let after = after - self.delay;
         let within = after - (after * PULSES).round() / PULSES;
-        let edge = half * (1.0 - self.duty);
+        let edge = half * (1.0 - self.duty.abs());
         let distance = within.abs();
         let beside = if distance <= edge {
             distance
@@ -40,7 +44,9 @@ impl Ripple {
 
     /// Returns the converter's code, from the code of the mean.
     pub fn on(&self, code: u16, after: f64) -> u16 {
-        let moved = f64::from(code) + self.codes_per_ampere * self.at(after);
+        let error = |amplifier: Amplifier| amplifier.error_at(after, self.duty, self.supply);
+        let current = self.at(after) + self.amplifier.map_or(0.0, error);
+        let moved = f64::from(code) + self.codes_per_ampere * current;
         moved.round().clamp(0.0, LARGEST) as u16
     }
 }
@@ -56,6 +62,7 @@ mod test {
             braking: -20_000.0,
             duty: 0.4,
             codes_per_ampere: 100.0,
+            ..Ripple::default()
         };
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(close(ripple.at(0.0), 0.0) && close(ripple.at(25e-6), 0.0));

@@ -10,6 +10,7 @@ mod dynamics;
 mod faults;
 mod hardware;
 mod identification;
+mod ill;
 mod line;
 mod requests;
 mod storage;
