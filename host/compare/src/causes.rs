@@ -225,7 +225,10 @@ fn answer(list: &[Hypothesis], names: &[String], robot: &Robot) -> (Option<Strin
     match ties.as_slice() {
         [] if list.iter().all(|h| !h.explains || h.name == "anything") => (
             None,
-            "None of the tested causes explains the difference: its remainder is larger than chance for each of them. The sets differ in several ways at once, or the model has an error that depends on the motion.".into(),
+            format!(
+                "None of the tested causes explains the difference: its remainder is larger than chance for each of them.{} The sets differ in several ways at once, or the model has an error that depends on the motion; recordings of one repeated motion share it.",
+                nearest(list, names, robot)
+            ),
         ),
         [only] if only.name == "nothing" => (
             Some("nothing".into()),
@@ -236,15 +239,11 @@ fn answer(list: &[Hypothesis], names: &[String], robot: &Robot) -> (Option<Strin
             "None of the tested causes explains the difference better than one of all parameters: the sets differ in several ways at once, or the model has an error that depends on the motion.".into(),
         ),
         [only] => {
-            let sizes = match sizes(only, names, robot).join(", ") {
-                none if none.is_empty() => none,
-                some => format!(" ({some}, relative to {})", names[0]),
-            };
             (
                 Some(only.name.into()),
                 format!(
-                    "The difference is in {}{sizes}. This explains it (remainder χ² {:.1} with {} degrees of freedom, p = {:.2}); every other hypothesis is at least {ODDS:.0} times less likely.",
-                    only.what, only.chi2, only.degrees_of_freedom, only.p
+                    "The difference is in {}. This explains it (remainder χ² {:.1} with {} degrees of freedom, p = {:.2}); every other hypothesis is at least {ODDS:.0} times less likely.",
+                    with_sizes(only, names, robot), only.chi2, only.degrees_of_freedom, only.p
                 ),
             )
         }
@@ -252,10 +251,33 @@ fn answer(list: &[Hypothesis], names: &[String], robot: &Robot) -> (Option<Strin
             None,
             format!(
                 "Several causes explain the difference about equally well: {}. The odds against the last of them are {:.1} to 1.",
-                several.iter().map(|h| h.what.as_str()).collect::<Vec<_>>().join("; "),
+                several.iter().map(|h| with_sizes(h, names, robot)).collect::<Vec<_>>().join("; "),
                 several.last().map_or(best.odds_against, |h| h.odds_against)
             ),
         ),
+    }
+}
+
+/// Names the cause that leaves least, if every other one is far less likely: it explains the largest part.
+fn nearest(list: &[Hypothesis], names: &[String], robot: &Robot) -> String {
+    match list {
+        [best, next, ..]
+            if next.odds_against >= ODDS && !["nothing", "anything"].contains(&best.name) =>
+        {
+            format!(
+                " Nearest is {}; every other one is at least {ODDS:.0} times less likely.",
+                with_sizes(best, names, robot)
+            )
+        }
+        _ => String::new(),
+    }
+}
+
+/// Returns a cause in words, with its size in each set if it has one.
+fn with_sizes(found: &Hypothesis, names: &[String], robot: &Robot) -> String {
+    match sizes(found, names, robot).join(", ") {
+        none if none.is_empty() => found.what.clone(),
+        some => format!("{} ({some}, relative to {})", found.what, names[0]),
     }
 }
 

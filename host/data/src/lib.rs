@@ -67,6 +67,7 @@ mod plausibility;
 mod position_jump;
 pub mod prepare;
 mod quantity;
+mod rate_match;
 mod rate_spike;
 mod reference;
 mod remark;

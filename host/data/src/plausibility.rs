@@ -6,6 +6,7 @@
 use super::block::{Block, JointColumns};
 use super::lost_rows::{Advances, LostRows, advances};
 use super::position_jump::largest_position_jump;
+use super::rate_match::{RateMismatch, rate_mismatch};
 use super::rate_spike::rate_spike;
 use super::sample_hold::repeated_rows;
 use super::torque_spike::largest_torque_spike;
@@ -239,6 +240,14 @@ pub enum Implausible {
         /// rad or m.
         unit: &'static str,
     },
+    /// A measured velocity that is not that of the position.
+    #[error("qd{joint} is not the velocity of q{joint}: {how}")]
+    RateMismatch {
+        /// Joint, 1-based.
+        joint: usize,
+        /// What is wrong with it, and what mends it.
+        how: String,
+    },
     /// Effort far above the limit.
     #[error(
         "tau{joint} looks too large by a factor of about 1000, as m{unit} would be (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
@@ -293,9 +302,9 @@ impl Implausible {
             | Self::Position { joint, .. }
             | Self::Jump { joint, .. }
             | Self::Velocity { joint, .. } => format!("q{joint}"),
-            Self::VelocityScale { joint, .. } | Self::RateSpike { joint, .. } => {
-                format!("qd{joint}")
-            }
+            Self::VelocityScale { joint, .. }
+            | Self::RateSpike { joint, .. }
+            | Self::RateMismatch { joint, .. } => format!("qd{joint}"),
             Self::Unsigned { column, joint, .. } | Self::NoRate { column, joint } => {
                 format!("{column}{joint}")
             }
@@ -703,9 +712,38 @@ pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
                 more: more(spike.count),
                 unit: joint.kind.units().0,
             });
+            continue;
         }
+        let moving = columns
+            .qd
+            .as_ref()
+            .filter(|qd| qd.iter().any(|v| *v != 0.0));
+        let mismatch = moving.and_then(|qd| rate_mismatch(&block.t, &columns.q, qd));
+        found.extend(mismatch.map(|wrong| Implausible::RateMismatch {
+            joint: k,
+            how: mismatch_words(k, wrong),
+        }));
     }
     found
+}
+
+/// Says what is wrong with the measured velocity of joint `k`, and what mends it.
+fn mismatch_words(k: usize, wrong: RateMismatch) -> String {
+    match wrong {
+        RateMismatch::Factor(factor) => format!(
+            "it is {} times as fast as q{k} changes. Correct its scale, or leave out --measured-derivatives",
+            format_significant(factor, 4)
+        ),
+        RateMismatch::Late(time) => format!(
+            "it comes {} ms {} than q{k} changes. Correct its clock or its filter, or leave out --measured-derivatives",
+            format_significant(1000.0 * time.abs(), 2),
+            if time > 0.0 { "later" } else { "earlier" }
+        ),
+        RateMismatch::Other(left) => format!(
+            "whatever its scale and delay, {} % of the changes of q{k} (RMS) are not in it. Check the order of the columns and the signs, or leave out --measured-derivatives",
+            format_significant(100.0 * left.sqrt(), 2)
+        ),
+    }
 }
 
 /// Returns the highest mean speed over ten samples, so that a single step of a coarse encoder is not a speed.

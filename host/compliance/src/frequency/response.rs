@@ -418,7 +418,7 @@ fn told_gap(name: &str, unit: &str, found: &Fitted, twist: f64, gap: Gap) -> Opt
     match gap {
         Gap::None => None,
         Gap::Found => Some(format!(
-            "The response of joint \"{name}\" shows backlash of about {} {unit}, which is taken into account; simulated gaps were found to 25 %. Both inertias are those of the description; their errors are not in the standard deviations. Static loading (--static) shows stiffness and backlash apart.",
+            "The response of joint \"{name}\" shows backlash of about {} {unit}, which is taken into account; simulated gaps were found to 25 % by chirps. Both inertias are those of the description; their errors are not in the standard deviations. Static loading (--static) shows stiffness and backlash apart.",
             format_significant(found.model.gap, 2)
         )),
         Gap::Bound => Some(format!(

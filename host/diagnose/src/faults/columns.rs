@@ -223,6 +223,7 @@ fn of_column(robot: &Robot, problem: Implausible) -> Option<Fault> {
         Implausible::NotSeconds { .. }
         | Implausible::ReferenceScale { .. }
         | Implausible::NoRate { .. }
+        | Implausible::RateMismatch { .. }
         | Implausible::RateSpike { .. } => return None,
     };
     let joint = joint.saturating_sub(1);
