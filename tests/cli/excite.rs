@@ -133,6 +133,13 @@ fn the_soft_limits_of_a_urdf_bound_its_motions() {
         "0",
     ];
     both(&mut excite(&at("soft.urdf"), &fits, &out));
+    urdf(
+        &at("degrees.urdf"),
+        "lower=\"-2\" upper=\"2\" velocity=\"3\" effort=\"40\"",
+        "<safety_controller soft_lower_limit=\"-90\" soft_upper_limit=\"90\" k_velocity=\"10\"/>",
+    );
+    let sentence = refuse(&mut excite(&at("degrees.urdf"), &fits, &out));
+    assert!(sentence.contains("look like degrees"), "{sentence}");
 }
 
 #[test]

@@ -14,8 +14,8 @@ const FARTHEST: f64 = 0.1;
 /// Share of the squares of the position's changes that a velocity of its own never leaves: 45 % RMS. A coarse encoder, and a noisy
 /// velocity, leave less over a window.
 const OTHER: f64 = 0.2;
-/// The same from which on a shift matters: 10 % RMS of the velocity is wrong then.
-const MATTERS: f64 = 0.01;
+/// The same from which on a shift matters: 5 % RMS of the velocity is wrong then.
+const MATTERS: f64 = 0.0025;
 /// Error of a factor that is no fault: an inertia is off by as much.
 const EXACT: f64 = 0.03;
 

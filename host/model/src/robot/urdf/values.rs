@@ -150,6 +150,13 @@ impl<'a> Reader<'a> {
         };
         let lower = self.optional_number(node, "soft_lower_limit")?;
         let upper = self.optional_number(node, "soft_upper_limit")?;
+        let reach = low.abs().max(high.abs());
+        let farthest = (lower.into_iter().chain(upper)).fold(0.0, |m: f64, v| m.max(v.abs()));
+        let turns = joint.attribute("type") != Some("prismatic");
+        // The rule of positions that look like degrees.
+        if turns && farthest > 5.0 * reach && farthest.to_radians() <= 1.2 * reach {
+            return Err(self.error(node, format!("the soft limits of joint `{name}` reach {farthest}, but its limits are {low} to {high} rad; they look like degrees, give them in rad")));
+        }
         let soft = [
             lower.map_or(low, |v| v.max(low)),
             upper.map_or(high, |v| v.min(high)),
