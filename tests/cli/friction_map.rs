@@ -393,3 +393,59 @@ fn a_sweep_of_a_joint_without_gravity_is_not_doubted() {
     assert_eq!(map["doubts"].as_array().unwrap().len(), 0, "{map:#}");
     assert!((number(&map["stribeck"]["viscous"]) - VISCOUS).abs() < 0.03);
 }
+
+/// A loop that settles slowly accelerates the joint within its passes, and a link that swings about the horizontal shows little
+/// gravity there: that torque is inertia, and no gravity of another scale.
+#[test]
+fn a_sweep_of_a_slow_controller_about_the_horizontal_is_mapped() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let text = fs::read_to_string(robot("one-link.toml")).unwrap();
+    let slow = "\n[joint.controller]\nposition_gain = 20\nvelocity_gain = 3\ntorque_gain = 1.0\n";
+    fs::write(at("rig.toml"), text + slow).unwrap();
+    for (options, name) in [
+        (&["--start", "-1.5708"][..], "data"),
+        (
+            &[
+                "--kind", "sweep", "--start", "0", "--speeds", "8", "--speed", "0.1,2",
+            ],
+            "sweep",
+        ),
+    ] {
+        let (motion, out) = (at(&format!("{name}.toml")), at(&format!("{name}.csv")));
+        let mut design = rig();
+        design
+            .arg("excite")
+            .arg("--robot")
+            .arg(at("rig.toml"))
+            .args(options);
+        succeed(design.arg("--out").arg(&motion));
+        let mut run = rig();
+        run.arg("simulate")
+            .arg("--robot")
+            .arg(at("rig.toml"))
+            .arg("--trajectory")
+            .arg(&motion);
+        run.args([
+            "--rate",
+            "500",
+            "--noise-position",
+            "1e-5",
+            "--noise-torque",
+            "0.02",
+        ]);
+        succeed(run.arg("--out").arg(&out));
+    }
+    let mut map = rig();
+    map.arg("friction-map").arg("--robot").arg(at("rig.toml"));
+    map.arg("--data")
+        .arg(at("data.csv"))
+        .arg("--sweep")
+        .arg(at("sweep.csv"));
+    succeed(map.arg("--out").arg(at("map")));
+    let found: Value =
+        serde_json::from_str(&fs::read_to_string(at("map/friction-map.json")).unwrap()).unwrap();
+    let value = |name: &str| found["simple"][name].as_f64().unwrap();
+    assert!((value("coulomb") / 0.4 - 1.0).abs() < 0.03, "{found}");
+    assert!((value("viscous") / 0.3 - 1.0).abs() < 0.1, "{found}");
+}

@@ -15,7 +15,7 @@ use crate::identified_set::IdentifiedSet;
 use crate::options::CompareOptions;
 use crate::pool::{Pool, pool};
 use crate::result::{
-    Comparison, Heterogeneity, JointTest, Pooled, PooledParameter, SetSummary, SetValue,
+    Causes, Comparison, Heterogeneity, JointTest, Pooled, PooledParameter, SetSummary, SetValue,
 };
 use crate::set::RecordingSet;
 use crate::significance::{FAMILY_LEVEL, TEST_LEVEL, chi2_p, holm};
@@ -82,22 +82,16 @@ fn compared(
     let common = Common::of(sets, &basis)?;
     let joint_test = joint_test(&common);
     let names: Vec<String> = sets.iter().map(|s| s.name.clone()).collect();
+    let zeros = Zeros {
+        robot,
+        base,
+        given,
+        sets,
+        basis: &basis,
+        common: &common,
+    };
     let causes = match differing(joint_test.as_ref(), &parameters) {
-        true => {
-            let zeros = Zeros {
-                robot,
-                base,
-                given,
-                sets,
-                basis: &basis,
-                common: &common,
-            };
-            let zeros = zeros
-                .hypotheses()
-                .map_err(|why| CompareError::Read(why.to_string()))?;
-            let (combination, columns) = (&basis.combination, &basis.columns);
-            causes(&common, &names, combination, columns, robot, zeros)
-        }
+        true => tested_causes(&zeros, &names)?,
         false => None,
     };
     let joints = robot.joints.iter().map(|j| j.name.clone()).collect();
@@ -127,10 +121,7 @@ fn compared(
         parameters,
         joint_test,
         without,
-        trades: match joint_test {
-            Some(_) => trades(sets, &basis, &common),
-            None => Vec::new(),
-        },
+        trades: joint_test.map_or_else(Vec::new, |_| trades(sets, &basis, &common)),
         causes,
         torque,
         warnings: warnings(sets),
@@ -146,6 +137,26 @@ fn compared(
                 .collect(),
         },
     })
+}
+
+/// Tests the causes of a difference.
+///
+/// # Errors
+/// Recordings that cannot be read.
+fn tested_causes(zeros: &Zeros<'_>, names: &[String]) -> Result<Option<Causes>, CompareError> {
+    let shifts = zeros
+        .hypotheses()
+        .map_err(|why| CompareError::Read(why.to_string()))?;
+    let (combination, columns) = (&zeros.basis.combination, &zeros.basis.columns);
+    let found = causes(
+        zeros.common,
+        names,
+        combination,
+        columns,
+        zeros.robot,
+        shifts,
+    );
+    Ok(found)
 }
 
 /// Returns true if the sets differ by any test: what agrees needs no cause.

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::bin::Bin;
+use super::bin::{Bin, EXCITED};
 use super::spectra::Spectra;
 use super::two_mass::C;
 
@@ -19,10 +19,6 @@ const AVERAGES: f64 = 8.0;
 const WIDTH: f64 = 0.025;
 /// Probability by which a coherence is beyond that of unrelated noise.
 const CERTAIN: f64 = 0.99;
-
-/// Acceleration of the reference, or torque, over the largest one, from which on it excites a band. What a recording without noise
-/// shows below is coherent by rounding and by friction alone.
-pub(super) const EXCITED: f64 = 1e-3;
 
 /// The frequency response in one band.
 #[derive(Clone, Debug, PartialEq, Serialize)]

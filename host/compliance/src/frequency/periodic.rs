@@ -7,8 +7,7 @@
 
 use serde::Serialize;
 
-use super::bands::EXCITED;
-use super::bin::Bin;
+use super::bin::{Bin, EXCITED};
 use super::two_mass::{C, TwoMass};
 
 /// Rows that must repeat before a period is looked at further.

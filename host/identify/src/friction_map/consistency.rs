@@ -123,8 +123,8 @@ impl Rows {
         })
     }
 
-    /// Compares the torque within the passes of `points` with the identified gravity, and returns the residual of the
-    /// identified model there.
+    /// Compares the torque within the passes of `points`, less identified inertia and friction, with the identified gravity, and returns
+    /// the residual of the identified model there.
     pub(super) fn gravity_shown(&self, points: &[FrictionPoint]) -> Shown {
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
         let mut passes = Vec::with_capacity(points.len());
@@ -136,7 +136,11 @@ impl Rows {
                 parts.map(|v| v - mean)
             };
             // Every pass has the same weight, whatever its duration.
-            let (x, y) = (about(&self.weight[rows.clone()]), about(&self.tau[rows]));
+            // The controller settles in a pass: that torque is inertia and friction, not gravity.
+            let held: Vec<f64> = (rows.clone())
+                .map(|k| self.tau[k] - (self.whole[k] - self.weight[k]))
+                .collect();
+            let (x, y) = (about(&self.weight[rows]), about(&held));
             let own = [
                 dot_in_order(&x, &x),
                 dot_in_order(&x, &y),
