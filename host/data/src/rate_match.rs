@@ -69,10 +69,12 @@ pub(super) fn rate_mismatch(t: &[f64], q: &[f64], qd: &[f64]) -> Option<RateMism
     if (factor - 1.0).abs() > EXACT.max(least) {
         return Some(RateMismatch::Factor(factor));
     }
-    (left > MATTERS.max(2.0 * least)).then(|| RateMismatch::Late((best as f64 - most as f64) * dt))
+    (left > MATTERS.max(2.0 * least))
+        .then_some(RateMismatch::Late((best as f64 - most as f64) * dt))
 }
 
 #[cfg(test)]
+#[allow(clippy::panic)]
 mod tests {
     use super::*;
 
