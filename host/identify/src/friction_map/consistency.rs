@@ -123,9 +123,22 @@ impl Rows {
         })
     }
 
-    /// Compares the torque within the passes of `points`, less identified inertia and friction, with the identified gravity, and returns
-    /// the residual of the identified model there.
+    /// Compares the torque within the passes of `points` with the identified gravity, and returns the residual of the identified
+    /// model there. A controller that settles in a pass adds inertia and friction, which the identified model takes away; without
+    /// such a motion the model adds its errors. What leaves less counts: another scale of gravity shows in both.
     pub(super) fn gravity_shown(&self, points: &[FrictionPoint]) -> Shown {
+        let held: Vec<f64> = (self.tau.iter().zip(&self.whole).zip(&self.weight))
+            .map(|((tau, whole), weight)| tau - (whole - weight))
+            .collect();
+        let [recorded, held] = [&self.tau, &held].map(|torque| self.shown_by(torque, points));
+        match held.left < recorded.left {
+            true => held,
+            false => recorded,
+        }
+    }
+
+    /// Compares a torque with the identified gravity.
+    fn shown_by(&self, torque: &[f64], points: &[FrictionPoint]) -> Shown {
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
         let mut passes = Vec::with_capacity(points.len());
         for point in points {
@@ -136,11 +149,7 @@ impl Rows {
                 parts.map(|v| v - mean)
             };
             // Every pass has the same weight, whatever its duration.
-            // The controller settles in a pass: that torque is inertia and friction, not gravity.
-            let held: Vec<f64> = (rows.clone())
-                .map(|k| self.tau[k] - (self.whole[k] - self.weight[k]))
-                .collect();
-            let (x, y) = (about(&self.weight[rows]), about(&held));
+            let (x, y) = (about(&self.weight[rows.clone()]), about(&torque[rows]));
             let own = [
                 dot_in_order(&x, &x),
                 dot_in_order(&x, &y),
