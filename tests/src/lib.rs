@@ -11,6 +11,8 @@ use std::time::Duration;
 use rand::RngExt;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
+use rig_data::prepare::InMemory;
+use rig_data::{Block, JointColumns};
 use rig_link::experiment::{Experiment, run};
 use rig_link::{
     Converter, EmulatedPort, Event, LinkError, LossReport, Port, Row, Session, SessionSettings,
@@ -93,6 +95,23 @@ pub fn cogging_of(plant: &PlantConfig) -> Effect<f32> {
     periodic(amplitude, cogging.order, cogging.phase)
 }
 
+/// Gravity acceleration of description and plant, m/s².
+pub const GRAVITY: f64 = 9.81;
+
+/// A plant's base parameters, in the order of the identification. The joint of the description lies horizontally, so that
+/// gravity acts with −y of its frame: gc = g·mx, gs = −g·my.
+pub fn base_parameters_of(plant: &PlantConfig) -> [f64; PARAMETER_COUNT] {
+    let [inertia, cos, sin, viscous, coulomb, offset] = plant.equivalent().to_array();
+    [
+        cos / GRAVITY,
+        -sin / GRAVITY,
+        inertia,
+        viscous,
+        coulomb,
+        offset,
+    ]
+}
+
 /// By how many of its own standard deviations each parameter of an on-line estimate is off the plant's.
 pub fn deviations(estimate: &Estimate, plant: &PlantConfig) -> [f64; PARAMETER_COUNT] {
     let truth = plant.equivalent().to_array();
@@ -164,6 +183,24 @@ impl Recording {
     /// The last on-line estimate.
     pub fn estimate(&self) -> Estimate {
         *self.estimates.last().unwrap()
+    }
+
+    /// The recording as the identification takes it, without the columns of the rig's marks.
+    pub fn in_memory(&self, label: &str, torque_per_ampere: f64) -> InMemory {
+        let of = |f: &dyn Fn(&Row) -> f64| self.rows.iter().map(f).collect::<Vec<_>>();
+        InMemory {
+            label: label.into(),
+            blocks: vec![Block {
+                t: of(&|row| row.t),
+                joints: vec![JointColumns {
+                    q: of(&|row| row.q1),
+                    tau: of(&|row| row.i1 * torque_per_ampere),
+                    ..JointColumns::default()
+                }],
+                first_line: 2,
+                ..Block::default()
+            }],
+        }
     }
 
     /// RMS of position minus reference over the rows between two times from the first row, rad.

@@ -5,50 +5,12 @@
 //! no motion of the rig can show it. The error of the measured current offset is part of what is covered.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use rig_data::prepare::InMemory;
-use rig_data::{Block, JointColumns};
 use rig_identify::{ModelKind, Options, identify};
-use rig_plant::PlantConfig;
 use rig_shared::wire::message::Estimate;
-use rig_tests::{Recording, bench, driven, excitation, in_parallel, robot};
+use rig_tests::{GRAVITY, base_parameters_of, bench, driven, excitation, in_parallel, robot};
 
 /// Base parameters of the rig, in the order of the tables.
 const NAMES: [&str; 6] = ["mx1", "my1", "Izz1 + Ia1", "fv1", "fc1", "off1"];
-
-/// Gravity acceleration of description and plant, m/s².
-const GRAVITY: f64 = 9.81;
-
-/// The true base parameters. The joint of the description lies horizontally, so that gravity acts with −y of its
-/// frame: gc = g·mx, gs = −g·my.
-fn truth(plant: &PlantConfig) -> [f64; 6] {
-    let [inertia, cos, sin, viscous, coulomb, offset] = plant.equivalent().to_array();
-    [
-        cos / GRAVITY,
-        -sin / GRAVITY,
-        inertia,
-        viscous,
-        coulomb,
-        offset,
-    ]
-}
-
-/// The recording as the identification takes it.
-fn as_recording(label: &str, recording: &Recording, torque_per_ampere: f64) -> InMemory {
-    let of = |f: &dyn Fn(&rig_link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
-    InMemory {
-        label: label.into(),
-        blocks: vec![Block {
-            t: of(&|row| row.t),
-            joints: vec![JointColumns {
-                q: of(&|row| row.q1),
-                tau: of(&|row| row.i1 * torque_per_ampere),
-                ..JointColumns::default()
-            }],
-            first_line: 2,
-            ..Block::default()
-        }],
-    }
-}
 
 /// Rigs of the study.
 const RIGS: u64 = 200;
@@ -101,8 +63,8 @@ fn study(seed: u64) -> Outcome {
         recording
     });
     let [first, second] =
-        [0, 1].map(|k| as_recording(&format!("rig {seed}, run {k}"), &runs[k], torque_per_ampere));
-    let truth = truth(&plant);
+        [0, 1].map(|k| runs[k].in_memory(&format!("rig {seed}, run {k}"), torque_per_ampere));
+    let truth = base_parameters_of(&plant);
     let results = [ModelKind::Differential, ModelKind::Integral].map(|model| {
         let options = Options {
             model,

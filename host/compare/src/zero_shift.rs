@@ -10,7 +10,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rig_data::Block;
-use rig_data::prepare::{PrepareError, Recording};
+use rig_data::prepare::{Changed, Recording};
 use rig_identify::{Base, IdentifyError, ModelKind, TriangularFactor};
 use rig_model::robot::Robot;
 
@@ -29,32 +29,6 @@ const STEP: f64 = 1e-3;
 const TOLD: f64 = 0.5;
 /// Most steps to the shifts, and the last change over their standard deviation at which they end.
 const STEPS: (usize, f64) = (6, 0.1);
-
-/// A recording whose positions of one joint are shifted.
-struct Shifted<'a> {
-    inner: &'a dyn Recording,
-    joint: usize,
-    by: f64,
-}
-
-impl Recording for Shifted<'_> {
-    fn source(&self) -> Option<&dyn Recording> {
-        Some(self.inner)
-    }
-
-    fn each_block(
-        &self,
-        rows: usize,
-        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
-    ) -> Result<(), PrepareError> {
-        self.inner.each_block(rows, &mut |mut block| {
-            if let Some(joint) = block.joints.get_mut(self.joint) {
-                joint.q.iter_mut().for_each(|q| *q += self.by);
-            }
-            take(block)
-        })
-    }
-}
 
 /// The sets whose zeros may differ.
 pub(crate) struct Zeros<'a> {
@@ -81,15 +55,18 @@ impl Zeros<'_> {
     /// # Errors
     /// Recordings that cannot be read.
     pub(crate) fn hypotheses(&self) -> Result<Vec<Hypothesis>, IdentifyError> {
+        let recorded: Vec<DVector<f64>> = (0..self.sets.len())
+            .map(|s| self.solved(s, &self.recorded(s)))
+            .collect();
         let mut found: Vec<(usize, Fitted)> = Vec::new();
         for joint in 0..self.robot.joints.len() {
-            found.extend(self.fitted(joint, 1)?.map(|own| (joint, own)));
+            found.extend(self.fitted(joint, &recorded, 1)?.map(|own| (joint, own)));
         }
         let best = found
             .iter_mut()
             .min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
         if let Some((joint, own)) = best
-            && let Some(refined) = self.fitted(*joint, STEPS.0)?
+            && let Some(refined) = self.fitted(*joint, &recorded, STEPS.0)?
         {
             *own = refined;
         }
@@ -123,8 +100,13 @@ impl Zeros<'_> {
         }
     }
 
-    /// Fits the shifts of a joint's zero; `None` if a set does not tell it.
-    fn fitted(&self, joint: usize, steps: usize) -> Result<Option<Fitted>, IdentifyError> {
+    /// Fits the shifts of a joint's zero; `None` if a set does not tell it. `recorded`: what each set's rows give as recorded.
+    fn fitted(
+        &self,
+        joint: usize,
+        recorded: &[DVector<f64>],
+        steps: usize,
+    ) -> Result<Option<Fitted>, IdentifyError> {
         let n = self.sets.len();
         let reference = self.reference();
         let mut found = Fitted {
@@ -136,7 +118,7 @@ impl Zeros<'_> {
             let mut values = Vec::with_capacity(n);
             let mut along = Vec::with_capacity(n);
             for s in 0..n {
-                let [at, beside] = self.values(s, joint, found.shifts[s])?;
+                let [at, beside] = self.values(s, joint, &recorded[s], found.shifts[s])?;
                 let d = (beside - &at) / STEP;
                 found.variances[s] = 1.0 / quadratic(&self.common.weights[s], &d);
                 values.push(at);
@@ -180,9 +162,9 @@ impl Zeros<'_> {
         let shifted = Common {
             parameters: self.common.parameters.clone(),
             values: values.to_vec(),
-            weights: self.common.weights.clone(),
+            weights,
         };
-        let (mean, chi2) = shifted.about_mean(&weights)?;
+        let (mean, chi2) = shifted.about_mean(&shifted.weights)?;
         let change = |s: usize| match s == reference {
             true => 0.0,
             false => {
@@ -213,16 +195,16 @@ impl Zeros<'_> {
         &self,
         s: usize,
         joint: usize,
+        recorded: &DVector<f64>,
         shift: f64,
     ) -> Result<[DVector<f64>; 2], IdentifyError> {
         let from = self.basis.from_set[s].select_rows(&self.common.parameters);
-        let recorded = self.solved(s, &self.recorded(s));
         let at = |by: f64| -> Result<DVector<f64>, IdentifyError> {
             let values = match by == 0.0 {
                 true => recorded.clone(),
                 false => self.solved(s, &self.shifted(s, joint, by)?),
             };
-            Ok(&self.common.values[s] + &from * (values - &recorded))
+            Ok(&self.common.values[s] + &from * (values - recorded))
         };
         Ok([at(-shift)?, at(STEP - shift)?])
     }
@@ -239,11 +221,15 @@ impl Zeros<'_> {
 
     /// The same with positions of a joint that are shifted.
     fn shifted(&self, s: usize, joint: usize, by: f64) -> Result<TriangularFactor, IdentifyError> {
-        let shifted: Vec<Shifted<'_>> = (self.given[s].recordings.iter())
-            .map(|inner| Shifted {
+        let shift = |block: &mut Block| {
+            if let Some(joint) = block.joints.get_mut(joint) {
+                joint.q.iter_mut().for_each(|q| *q += by);
+            }
+        };
+        let shifted: Vec<Changed<'_>> = (self.given[s].recordings.iter())
+            .map(|inner| Changed {
                 inner: *inner,
-                joint,
-                by,
+                change: &shift,
             })
             .collect();
         let recordings: Vec<&dyn Recording> = shifted.iter().map(|r| r as _).collect();

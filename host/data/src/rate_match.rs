@@ -33,10 +33,12 @@ pub(super) enum RateMismatch {
 /// Returns what is wrong with a velocity, if anything.
 pub(super) fn rate_mismatch(t: &[f64], q: &[f64], qd: &[f64]) -> Option<RateMismatch> {
     let rows = t.len().min(q.len()).min(qd.len());
-    let dt = (t.get(rows.checked_sub(1)?)? - t[0]) / (rows - 1) as f64;
+    let last = rows.checked_sub(1).filter(|last| *last > 0)?;
+    let dt = (t[last] - t[0]) / last as f64;
     let window = (WINDOW / dt).max(FEWEST) as usize;
     let most = (FARTHEST / dt) as usize;
-    if rows < 2 * most + WINDOWS * window {
+    let needed = (most.saturating_mul(2)).saturating_add(window.saturating_mul(WINDOWS));
+    if !(dt > 0.0) || rows < needed {
         return None;
     }
     let mut integral = Vec::with_capacity(rows);
@@ -60,9 +62,10 @@ pub(super) fn rate_mismatch(t: &[f64], q: &[f64], qd: &[f64]) -> Option<RateMism
         let left = 1.0 - xy * xy / (xx * yy).max(f64::MIN_POSITIVE);
         (left, xx / xy)
     };
-    let (left, _) = at(most);
-    let best = (0..=2 * most).min_by(|a, b| at(*a).0.total_cmp(&at(*b).0))?;
-    let (least, factor) = at(best);
+    let shifts: Vec<(f64, f64)> = (0..=2 * most).map(at).collect();
+    let (left, _) = shifts[most];
+    let best = (0..shifts.len()).min_by(|a, b| shifts[*a].0.total_cmp(&shifts[*b].0))?;
+    let (least, factor) = shifts[best];
     if least > OTHER || factor <= 0.0 {
         return Some(RateMismatch::Other(least));
     }
@@ -118,6 +121,19 @@ mod tests {
                 rate_mismatch(&t, &q, &size),
                 Some(RateMismatch::Other(_))
             ));
+        }
+    }
+
+    /// No time between the rows, or too few of them: nothing is told.
+    #[test]
+    fn rows_without_time_between_them_are_no_motion() {
+        let still = vec![1.0; 5000];
+        for step in [0.0, 1e-300, -1.0] {
+            let t: Vec<f64> = (0..5000).map(|k| f64::from(k) * step).collect();
+            assert_eq!(rate_mismatch(&t, &still, &still), None);
+        }
+        for rows in 0..3 {
+            assert_eq!(rate_mismatch(&still[..rows], &still, &still), None);
         }
     }
 

@@ -3,7 +3,7 @@
 //! Each change is undone and the load fitted again. Leaves out: several changes at once, and motions.
 
 use rig_data::Block;
-use rig_data::prepare::{PrepareError, Recording};
+use rig_data::prepare::{Changed, Recording};
 use rig_model::robot::{JointKind, Robot, WristSensor};
 use rig_output::{capital, format_significant};
 
@@ -51,32 +51,14 @@ impl Change {
             ],
         }
     }
-}
 
-/// A recording without a change.
-struct Undone<'a> {
-    inner: &'a dyn Recording,
-    change: Change,
-}
-
-impl Recording for Undone<'_> {
-    fn source(&self) -> Option<&dyn Recording> {
-        Some(self.inner)
-    }
-
-    fn each_block(
-        &self,
-        rows: usize,
-        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
-    ) -> Result<(), PrepareError> {
-        self.inner.each_block(rows, &mut |mut block| {
-            match self.change {
-                Change::Exchanged(a, b) => block.joints.swap(a, b),
-                Change::Reversed(j) => block.joints[j].q.iter_mut().for_each(|q| *q = -*q),
-                Change::Zero(j, angle) => block.joints[j].q.iter_mut().for_each(|q| *q += angle),
-            }
-            take(block)
-        })
+    /// Takes the change out of a block.
+    fn undo(self, block: &mut Block) {
+        match self {
+            Self::Exchanged(a, b) => block.joints.swap(a, b),
+            Self::Reversed(j) => block.joints[j].q.iter_mut().for_each(|q| *q = -*q),
+            Self::Zero(j, angle) => block.joints[j].q.iter_mut().for_each(|q| *q += angle),
+        }
     }
 }
 
@@ -164,10 +146,11 @@ fn misfit(
     like: &Sensed,
     (mounting, change): (&Mounting, Change),
 ) -> Result<Option<f64>, LoadError> {
-    let all: Vec<Undone> = (sensing.recordings.iter())
-        .map(|(inner, _)| Undone {
+    let undo = |block: &mut Block| change.undo(block);
+    let all: Vec<Changed> = (sensing.recordings.iter())
+        .map(|(inner, _)| Changed {
             inner: *inner,
-            change,
+            change: &undo,
         })
         .collect();
     let pairs = all.iter().zip(sensing.recordings);

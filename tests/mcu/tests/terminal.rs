@@ -8,10 +8,8 @@ use std::process::{Child, Command, Stdio};
 use clap::Parser;
 use rig::commands::Cli;
 use rig_plant::PlantConfig;
+use rig_tests::base_parameters_of;
 use serde_json::Value;
-
-/// Gravity acceleration of description and plant, m/s².
-const GRAVITY: f64 = 9.81;
 
 /// A running board; it ends with the test.
 struct Board {
@@ -146,16 +144,7 @@ fn rig_record_and_rig_identify_work_against_the_board_s_serial_port() {
 
     let result = std::fs::read_to_string(found.join("identification.json")).unwrap();
     let result: Value = serde_json::from_str(&result).unwrap();
-    let [inertia, cos, sin, viscous, coulomb, offset] =
-        PlantConfig::default().equivalent().to_array();
-    let truth = [
-        cos / GRAVITY,
-        -sin / GRAVITY,
-        inertia,
-        viscous,
-        coulomb,
-        offset,
-    ];
+    let truth = base_parameters_of(&PlantConfig::default());
     let found = result["base_parameters"].as_array().unwrap();
     assert_eq!(found.len(), truth.len());
     let mut table = String::new();

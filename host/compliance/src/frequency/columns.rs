@@ -52,7 +52,7 @@ impl Columns {
     /// Predicts friction, backlash and gravity by a model of two masses.
     pub(super) fn predict(&mut self, model: &TwoMass, gravity: &Gravity, rate: f64) {
         let swing = TAU * rate / model.antiresonance();
-        let half = ((SPAN * swing).round() as usize).max(1);
+        let half = ((SPAN * swing).round() as usize).clamp(1, self.moved.len().max(1));
         let velocity = smoothed(&self.moved, rate, half);
         let motion = MotorMotion {
             position: &self.position,

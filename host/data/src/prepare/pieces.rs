@@ -175,6 +175,31 @@ impl Recording for Beginning<'_> {
     }
 }
 
+/// A recording whose blocks are changed as they are read.
+pub struct Changed<'a> {
+    /// The recording.
+    pub inner: &'a dyn Recording,
+    /// The change of each block.
+    pub change: &'a dyn Fn(&mut Block),
+}
+
+impl Recording for Changed<'_> {
+    fn source(&self) -> Option<&dyn Recording> {
+        Some(self.inner)
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        self.inner.each_block(rows, &mut |mut block| {
+            (self.change)(&mut block);
+            take(block)
+        })
+    }
+}
+
 /// A recording held in memory.
 #[derive(Clone, Debug, Default)]
 pub struct InMemory {

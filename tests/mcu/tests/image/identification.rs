@@ -2,8 +2,6 @@
 //! desktop computes from the same samples.
 #![allow(clippy::float_cmp)]
 
-use rig_data::prepare::InMemory;
-use rig_data::{Block, JointColumns};
 use rig_firmware::nameplate;
 use rig_firmware::prechecked_request::precheck;
 use rig_firmware::request::execute;
@@ -21,31 +19,14 @@ use rig_shared::safety::Mode;
 use rig_shared::trajectory::{SlowReversals, Trajectory};
 use rig_shared::units::{AdcCode, EncoderCount};
 use rig_shared::wire::message::{Estimate, Request, RequestBody};
-use rig_tests::{Recording, calibrated, deviations, driven, excitation, recorded, robot, wait};
+use rig_tests::{
+    Recording, base_parameters_of, calibrated, deviations, driven, excitation, recorded, robot,
+    wait,
+};
 
 use rig_mcu::rig::power_on;
 
 use crate::{BoardSession, bench, board, greeted, image, plant, powered};
-
-/// Gravity acceleration of description and plant, m/s².
-const GRAVITY: f64 = 9.81;
-
-fn as_recording(recording: &Recording, torque_per_ampere: f64) -> InMemory {
-    let of = |f: &dyn Fn(&rig_link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
-    InMemory {
-        label: "emulated board".into(),
-        blocks: vec![Block {
-            t: of(&|row| row.t),
-            joints: vec![JointColumns {
-                q: of(&|row| row.q1),
-                tau: of(&|row| row.i1 * torque_per_ampere),
-                ..JointColumns::default()
-            }],
-            first_line: 2,
-            ..Block::default()
-        }],
-    }
-}
 
 #[test]
 fn an_excitation_recorded_over_the_wire_gives_the_rig_s_parameters() {
@@ -55,17 +36,9 @@ fn an_excitation_recorded_over_the_wire_gives_the_rig_s_parameters() {
     assert_eq!(run.losses.lost, 0, "{}", run.losses);
     let plant = board(&mut line).with_board(|b| b.plant().config().clone());
     let torque_per_ampere = plant.mechanism.ratio * plant.motor.torque_constant;
-    let recording = as_recording(&run, torque_per_ampere);
+    let recording = run.in_memory("emulated board", torque_per_ampere);
     let found = identify(&robot(), &[&recording], &[], &Options::default()).unwrap();
-    let [inertia, cos, sin, viscous, coulomb, offset] = plant.equivalent().to_array();
-    let truth = [
-        cos / GRAVITY,
-        -sin / GRAVITY,
-        inertia,
-        viscous,
-        coulomb,
-        offset,
-    ];
+    let truth = base_parameters_of(&plant);
     let mut text = String::new();
     let mut fair = true;
     for (base, truth) in found.base_parameters.iter().zip(truth) {

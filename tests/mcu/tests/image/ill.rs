@@ -3,7 +3,6 @@
 //! Four boards, or as many as the environment variable RIG_ILL_BOARDS says.
 
 use rig_data::prepare::InMemory;
-use rig_data::{Block, JointColumns};
 use rig_identify::{Options, identify};
 use rig_link::Row;
 use rig_mcu::ill_board::IllBoard;
@@ -14,12 +13,12 @@ use rig_shared::link::PARAMETER_NAMES;
 use rig_shared::safety::{Limit, LimitSet, Limits};
 use rig_shared::trajectory::{Fourier, Trajectory};
 use rig_shared::wire::message::RequestBody;
-use rig_tests::{Recording, calibrated, deviations, driven, excitation, in_parallel, robot};
+use rig_tests::{
+    Recording, base_parameters_of, calibrated, deviations, driven, excitation, in_parallel, robot,
+};
 
 use crate::{BoardSession, greeted, image, place, plant};
 
-/// Gravity acceleration of description and plant, m/s².
-const GRAVITY: f64 = 9.81;
 /// Boards without the environment variable.
 const BOARDS: u64 = 4;
 /// Chance with which a sound estimator fails a bound of this test.
@@ -107,24 +106,13 @@ fn is_marked(row: &Row) -> bool {
 /// The recording as a file has it, with or without its marks.
 fn as_recording(recording: &Recording, torque_per_ampere: f64, with_marks: bool) -> InMemory {
     let of = |f: &dyn Fn(&Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
-    let mut extra = vec![("mode".to_owned(), of(&|row| row.mode))];
+    let mut made = recording.in_memory("ill board", torque_per_ampere);
+    let extra = &mut made.blocks[0].extra;
+    extra.push(("mode".to_owned(), of(&|row| row.mode)));
     if with_marks {
         extra.push(("limits".to_owned(), of(&|row| row.limits)));
     }
-    InMemory {
-        label: "ill board".into(),
-        blocks: vec![Block {
-            t: of(&|row| row.t),
-            joints: vec![JointColumns {
-                q: of(&|row| row.q1),
-                tau: of(&|row| row.i1 * torque_per_ampere),
-                ..JointColumns::default()
-            }],
-            extra,
-            first_line: 2,
-            ..Block::default()
-        }],
-    }
+    made
 }
 
 /// What was found on one board.
@@ -143,15 +131,7 @@ fn off_line(runs: &[Recording], plant: &PlantConfig, with_marks: bool) -> [f64; 
     let torque_per_ampere = plant.mechanism.ratio * plant.motor.torque_constant;
     let [first, second] = [0, 1].map(|k| as_recording(&runs[k], torque_per_ampere, with_marks));
     let found = identify(&robot(), &[&first, &second], &[], &Options::default()).unwrap();
-    let [inertia, cos, sin, viscous, coulomb, offset] = plant.equivalent().to_array();
-    let truth = [
-        cos / GRAVITY,
-        -sin / GRAVITY,
-        inertia,
-        viscous,
-        coulomb,
-        offset,
-    ];
+    let truth = base_parameters_of(plant);
     assert_eq!(found.base_parameters.len(), truth.len());
     std::array::from_fn(|k| {
         let [low, high] = found.base_parameters[k].interval;
