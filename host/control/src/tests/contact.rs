@@ -231,6 +231,41 @@ fn the_rate_that_a_warning_names_cures_the_peak_of_the_slide() {
     }
 }
 
+/// At small forces the contact itself makes no peak: the approach is slow enough. The peak is that of the slide, and it
+/// does not grow with the force. So a larger force has a smaller overshoot, and a faster loop a smaller peak.
+#[test]
+fn the_force_and_the_rate_that_a_warning_names_cure_a_small_force() {
+    for (name, force) in [("edda.toml", 1.0), ("irp6.toml", 2.0), ("irp6.toml", 5.0)] {
+        let robot = robot(name);
+        let run = |force: f64, rate: f64| {
+            let settings = Settings {
+                rate,
+                ..Settings::default()
+            };
+            let mut own = options(1e4);
+            own.force = Some(force);
+            let task = choose(&robot, &own, &settings);
+            press_wrong(&robot, LawKind::Hybrid, &task, settings, HARDLY_WRONG).measures
+        };
+        let small = run(force, 1000.0);
+        assert!(small.overshoot > 0.1 && small.overshoot_before_slide < 0.02);
+        let said = small.warnings.join(" ");
+        let number = |before: &str, after: char| -> f64 {
+            let rest = said.split(before).nth(1).unwrap();
+            rest.split(after).next().unwrap().parse().unwrap()
+        };
+        let [press, rate] = [number("--press ", ' '), number("--rate ", ',')];
+        let worst = |own: &Contact| own.overshoot.max(own.robustness.as_ref().unwrap().worst);
+        let (larger, faster) = (run(press, 1000.0), run(force, rate));
+        let found = [&small, &larger, &faster].map(worst);
+        println!(
+            "{name}: {found:?} with {force} N, {press} N, and {force} N at {rate} ticks a second"
+        );
+        assert!(found[1] <= 0.1, "{name} {force}: {found:?}");
+        assert!(found[2] < 0.5 * found[0], "{name} {force}: {found:?}");
+    }
+}
+
 #[test]
 fn torques_at_rest_balance_weight_and_contact_force() {
     // τ = ∂U/∂q + ∂x/∂qᵀ·f, by central differences of potential energy and tool position.
