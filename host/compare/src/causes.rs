@@ -14,8 +14,8 @@ use rig_output::format_value;
 use rig_shared::multibody::{COLUMNS, INERTIAL_PARAMETERS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
-use crate::common::Common;
-use crate::matrices::{inverse, quadratic, symmetric_pseudo_inverse};
+use crate::common::{Common, without_changes};
+use crate::matrices::{inverse, quadratic};
 use crate::result::{Causes, Hypothesis};
 use crate::significance::{FAMILY_LEVEL, chi2_p};
 
@@ -34,6 +34,38 @@ pub(crate) fn causes(
     robot: &Robot,
     zeros: Vec<Hypothesis>,
 ) -> Option<Causes> {
+    let all = DMatrix::identity(common.parameters.len(), common.parameters.len());
+    let mut found = vec![
+        differing(
+            common,
+            "nothing",
+            "nothing; chance alone",
+            &DMatrix::zeros(all.nrows(), 0),
+        )?,
+        scaled(common)?,
+    ];
+    for (name, what, d) in changes(common, combination, columns, robot) {
+        found.push(differing(common, name, what, &d)?);
+    }
+    found.push(differing(common, "anything", "every parameter", &all)?);
+    found.extend(zeros);
+    rate(&mut found);
+    let (named, sentence) = answer(&found, names, robot);
+    Some(Causes {
+        hypotheses: found,
+        named,
+        sentence,
+        corrected: None,
+    })
+}
+
+/// Returns the linear changes of the common parameters that are tested: name, words, and directions.
+pub(crate) fn changes(
+    common: &Common,
+    combination: &DMatrix<f64>,
+    columns: &[usize],
+    robot: &Robot,
+) -> [(&'static str, &'static str, DMatrix<f64>); 4] {
     let joints = robot.joints.len();
     let own: Vec<usize> = common.parameters.iter().map(|&k| columns[k]).collect();
     let units = |of: &dyn Fn(usize) -> bool| {
@@ -54,44 +86,16 @@ pub(crate) fn causes(
         .select_rows(&common.parameters)
         .columns(last, INERTIAL_PARAMETERS)
         .into_owned();
-    let all = DMatrix::identity(own.len(), own.len());
-    let mut found = vec![
-        differing(
-            common,
-            "nothing",
-            "nothing; chance alone",
-            &DMatrix::zeros(own.len(), 0),
-        )?,
-        scaled(common)?,
-        differing(
-            common,
-            "friction",
-            "viscous and Coulomb friction",
-            &friction,
-        )?,
-        differing(common, "offset", "constant torques", &offset)?,
-        differing(
-            common,
-            "gravity",
-            "first moments and constant torques",
-            &gravity,
-        )?,
-        differing(
-            common,
+    [
+        ("friction", "viscous and Coulomb friction", friction),
+        ("offset", "constant torques", offset),
+        ("gravity", "first moments and constant torques", gravity),
+        (
             "payload",
             "the ten inertial parameters of the last link",
-            &payload,
-        )?,
-        differing(common, "anything", "every parameter", &all)?,
-    ];
-    found.extend(zeros);
-    rate(&mut found);
-    let (named, sentence) = answer(&found, names, robot);
-    Some(Causes {
-        hypotheses: found,
-        named,
-        sentence,
-    })
+            payload,
+        ),
+    ]
 }
 
 /// Returns the hypothesis that D·δ_s differs between the sets.
@@ -101,21 +105,18 @@ fn differing(
     what: &str,
     d: &DMatrix<f64>,
 ) -> Option<Hypothesis> {
-    let c = common.parameters.len();
     let mut free = 0;
     let mut weights = Vec::with_capacity(common.weights.len());
     for (s, weight) in common.weights.iter().enumerate() {
         // The first set fixes what is common; in the others D·δ is fitted, which removes it from the weight.
-        if s == 0 || d.ncols() == 0 {
-            weights.push(weight.clone());
-            continue;
-        }
-        let along = weight * d;
-        let (inner, rank) = symmetric_pseudo_inverse(&(d.transpose() * &along));
+        let (own, rank) = match s {
+            0 => (weight.clone(), 0),
+            _ => without_changes(weight, d),
+        };
         free += rank;
-        weights.push(weight - &along * inner * along.transpose());
+        weights.push(own);
     }
-    let chi2 = if free == c * (common.values.len() - 1) {
+    let chi2 = if free == common.freedom() {
         0.0
     } else {
         common.about_mean(&weights)?.1
@@ -131,8 +132,7 @@ pub(crate) fn hypothesis(
     free: usize,
     chi2: f64,
 ) -> Hypothesis {
-    let all = common.parameters.len() * (common.values.len() - 1);
-    let degrees_of_freedom = all.saturating_sub(free);
+    let degrees_of_freedom = common.freedom().saturating_sub(free);
     let p = chi2_p(chi2, degrees_of_freedom);
     Hypothesis {
         name,

@@ -5,7 +5,18 @@ use nalgebra::{DMatrix, DVector};
 use crate::basis::Basis;
 use crate::error::CompareError;
 use crate::identified_set::IdentifiedSet;
-use crate::matrices::{inverse, quadratic};
+use crate::matrices::{inverse, quadratic, symmetric_pseudo_inverse};
+
+/// Returns `weight` without what it tells about changes along the columns of `d`: that of values which may change so.
+/// The second result is the number of directions.
+pub(crate) fn without_changes(weight: &DMatrix<f64>, d: &DMatrix<f64>) -> (DMatrix<f64>, usize) {
+    if d.ncols() == 0 {
+        return (weight.clone(), 0);
+    }
+    let along = weight * d;
+    let (inner, rank) = symmetric_pseudo_inverse(&(d.transpose() * &along));
+    (weight - &along * inner * along.transpose(), rank)
+}
 
 /// What every set shows.
 pub(crate) struct Common {
@@ -15,6 +26,8 @@ pub(crate) struct Common {
     pub values: Vec<DVector<f64>>,
     /// By set, the inverse of their covariance.
     pub weights: Vec<DMatrix<f64>>,
+    /// Degrees of freedom of the sets' differences that were fitted before, as shifts of a zero.
+    pub spent: usize,
 }
 
 impl Common {
@@ -37,7 +50,13 @@ impl Common {
             parameters,
             values,
             weights,
+            spent: 0,
         })
+    }
+
+    /// Returns the degrees of freedom of the sets' differences.
+    pub(crate) fn freedom(&self) -> usize {
+        (self.parameters.len() * self.values.len().saturating_sub(1)).saturating_sub(self.spent)
     }
 
     /// Returns the mean with the given weights, and the sum of squares about it.
@@ -65,6 +84,7 @@ impl Common {
             parameters: self.parameters.clone(),
             values,
             weights,
+            spent: self.spent,
         };
         Some(others.about_mean(&others.weights)?.1)
     }

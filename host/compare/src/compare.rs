@@ -3,22 +3,24 @@
 use std::collections::BTreeSet;
 
 use rig_identify::Base;
-use rig_model::robot::Robot;
+use rig_model::robot::{IdentifiedBand, Robot};
 
 use crate::basis::Basis;
 use crate::causes::causes;
 use crate::common::Common;
 use crate::content::refuse_same_rows;
+use crate::corrected_zero::corrected;
 use crate::error::CompareError;
 use crate::grade::{Graded, grade};
 use crate::identified_set::IdentifiedSet;
+use crate::joint_test::{joint_test, without};
 use crate::options::CompareOptions;
 use crate::pool::{Pool, pool};
 use crate::result::{
     Causes, Comparison, Heterogeneity, JointTest, Pooled, PooledParameter, SetSummary, SetValue,
 };
 use crate::set::RecordingSet;
-use crate::significance::{FAMILY_LEVEL, TEST_LEVEL, chi2_p, holm};
+use crate::significance::{FAMILY_LEVEL, TEST_LEVEL, holm};
 use crate::single::{Single, Spread, spread};
 use crate::torque::torque_matrix;
 use crate::trades::trades;
@@ -89,13 +91,14 @@ fn compared(
         sets,
         basis: &basis,
         common: &common,
+        reference: None,
     };
     let causes = match differing(joint_test.as_ref(), &parameters) {
-        true => tested_causes(&zeros, &names)?,
+        true => tested_causes(&zeros, &names, options)?,
         false => None,
     };
-    let joints = robot.joints.iter().map(|j| j.name.clone()).collect();
-    let torque = torque_matrix(sets, &basis, &pooled.values, joints);
+    let joints = robot.joints.iter().map(|j| j.name.clone());
+    let torque = torque_matrix(sets, &basis, &pooled.values, joints.collect());
     let without = without(&common);
     let (grade, reasons) = grade(&Graded {
         names: &names,
@@ -132,9 +135,7 @@ fn compared(
             values: pooled.values.as_slice().to_vec(),
             covariance: pooled.covariance,
             sizes: sizes(sets),
-            bands: (sets.iter())
-                .map(|s| s.found.details.treatment.band())
-                .collect(),
+            bands: bands(sets),
         },
     })
 }
@@ -143,7 +144,11 @@ fn compared(
 ///
 /// # Errors
 /// Recordings that cannot be read.
-fn tested_causes(zeros: &Zeros<'_>, names: &[String]) -> Result<Option<Causes>, CompareError> {
+fn tested_causes(
+    zeros: &Zeros<'_>,
+    names: &[String],
+    options: &CompareOptions,
+) -> Result<Option<Causes>, CompareError> {
     let shifts = zeros
         .hypotheses()
         .map_err(|why| CompareError::Read(why.to_string()))?;
@@ -156,7 +161,15 @@ fn tested_causes(zeros: &Zeros<'_>, names: &[String]) -> Result<Option<Causes>, 
         zeros.robot,
         shifts,
     );
-    Ok(found)
+    let Some(mut found) = found else {
+        return Ok(None);
+    };
+    found.corrected = corrected(zeros, &found, names, &options.identify)?;
+    let second = (found.corrected.as_ref()).and_then(|own| own.named.as_ref());
+    if found.named.is_none() && second.is_some() {
+        found.sentence = "No single one of the tested causes explains the difference; the zero of a joint and another cause do together.".into();
+    }
+    Ok(Some(found))
 }
 
 /// Returns true if the sets differ by any test: what agrees needs no cause.
@@ -237,46 +250,15 @@ fn parameters(
         .collect()
 }
 
-/// Tests all parameters that every set shows; none if there are none.
-fn joint_test(common: &Common) -> Option<JointTest> {
-    if common.parameters.is_empty() {
-        return None;
-    }
-    let (_, chi2) = common.about_mean(&common.weights)?;
-    Some(tested(common, chi2, common.values.len()))
-}
-
-/// Returns the test of a sum of squares over `sets` sets.
-fn tested(common: &Common, chi2: f64, sets: usize) -> JointTest {
-    let degrees_of_freedom = common.parameters.len() * (sets - 1);
-    let p = chi2_p(chi2, degrees_of_freedom);
-    JointTest {
-        chi2,
-        degrees_of_freedom,
-        p,
-        differs: p < TEST_LEVEL,
-    }
-}
-
-/// Tests, for each set, all the others; empty for two sets.
-fn without(common: &Common) -> Vec<JointTest> {
-    let n = common.values.len();
-    if n < 3 || common.parameters.is_empty() {
-        return Vec::new();
-    }
-    (0..n)
-        .filter_map(|s| Some(tested(common, common.about_mean_without(s)?, n - 1)))
-        .collect()
-}
-
 fn summaries(given: &[RecordingSet], sets: &[IdentifiedSet], basis: &Basis) -> Vec<SetSummary> {
     (sets.iter().zip(given).zip(&basis.shown))
         .map(|((set, given), shown)| SetSummary {
             name: set.name.clone(),
             recordings: given.recordings.iter().map(|r| r.label()).collect(),
             rank: set.found.rank,
-            degrees_of_freedom: set.found.details.estimate.degrees_of_freedom,
+            degrees_of_freedom: set.freedom,
             shrinkage: set.shrinkage,
+            repeats_after: set.repeating.as_ref().map(|own| own.period),
             rows: set.found.details.estimate.rows,
             relative_error: (set.found.joints.iter())
                 .map(|j| j.train_relative_error)
@@ -289,6 +271,12 @@ fn summaries(given: &[RecordingSet], sets: &[IdentifiedSet], basis: &Basis) -> V
         .collect()
 }
 
+/// Returns the band of each set.
+fn bands(sets: &[IdentifiedSet]) -> Vec<IdentifiedBand> {
+    let bands = sets.iter().map(|s| s.found.details.treatment.band());
+    bands.collect()
+}
+
 /// Returns the largest RMS torque, speed and acceleration of each joint in a set.
 fn sizes(sets: &[IdentifiedSet]) -> [Vec<f64>; 3] {
     let most = |of: fn(&IdentifiedSet) -> &Vec<f64>| {
@@ -298,8 +286,8 @@ fn sizes(sets: &[IdentifiedSet]) -> [Vec<f64>; 3] {
             .collect()
     };
     [
-        most(|s| &s.sizes.torque),
-        most(|s| &s.sizes.speed),
-        most(|s| &s.sizes.acceleration),
+        most(|s| &s.rows.sizes.torque),
+        most(|s| &s.rows.sizes.speed),
+        most(|s| &s.rows.sizes.acceleration),
     ]
 }

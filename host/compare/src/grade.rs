@@ -78,6 +78,7 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
     }
     if differ && let Some(causes) = of.causes {
         reasons.push(causes.sentence.clone());
+        reasons.extend(causes.corrected.iter().map(|own| own.sentence.clone()));
     }
     reasons.extend_from_slice(of.drifting);
     let grade = match (differ, matters) {
@@ -108,7 +109,7 @@ fn outlier(of: &Graded) -> Option<String> {
 }
 
 /// Writes a probability with its sign of comparison.
-fn written(p: f64) -> String {
+pub(crate) fn written(p: f64) -> String {
     match p < 1e-4 {
         true => "< 0.0001".into(),
         false => format!("= {p:.4}"),

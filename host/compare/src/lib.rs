@@ -13,17 +13,22 @@ mod causes;
 mod common;
 mod compare;
 mod content;
+mod corrected_zero;
 mod error;
 mod friction_drift;
 mod grade;
 mod identified_set;
+mod joint_test;
 mod matrices;
+mod motion_groups;
 mod options;
+mod period;
 mod pool;
 mod result;
 mod robot;
 mod rows;
 mod set;
+mod set_rows;
 mod shrinkage;
 mod significance;
 mod simulated;
@@ -40,8 +45,8 @@ pub use compare::compare;
 pub use error::CompareError;
 pub use options::CompareOptions;
 pub use result::{
-    Causes, Comparison, Grade, Heterogeneity, Hypothesis, JointTest, Pooled, PooledParameter,
-    SetSummary, SetValue, TorqueMatrix, Trade,
+    Causes, Comparison, Corrected, Grade, Heterogeneity, Hypothesis, JointTest, Pooled,
+    PooledParameter, SetSummary, SetValue, TorqueMatrix, Trade,
 };
 pub use robot::pooled_robot;
 pub use set::RecordingSet;

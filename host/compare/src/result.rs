@@ -96,6 +96,9 @@ pub struct SetSummary {
     pub degrees_of_freedom: usize,
     /// Weight of the regressor's covariance in its own, 0 to 1.
     pub shrinkage: f64,
+    /// Time after which the motion repeats, s; absent if it does not. The degrees of freedom are then those of one motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeats_after: Option<f64>,
     /// Rows that were used, over all joints.
     pub rows: u64,
     /// By joint, RMS of the residual over RMS of the torque.
@@ -189,6 +192,27 @@ pub struct Causes {
     /// The hypotheses, the most likely first.
     pub hypotheses: Vec<Hypothesis>,
     /// Name of the cause, if one explains the difference and is better than the others.
+    pub named: Option<String>,
+    /// The answer, a sentence.
+    pub sentence: String,
+    /// The comparison after the zero of a joint was corrected, if a zero differs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub corrected: Option<Corrected>,
+}
+
+/// The sets compared again, with positions whose zero was corrected.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Corrected {
+    /// Index of the joint, from 0.
+    pub joint: usize,
+    /// By set, what its recorded positions were too large by, with its standard deviation, rad (m). The set to which the
+    /// others were corrected has 0.
+    pub shifts: Vec<[f64; 2]>,
+    /// Test of all parameters, identified again from the corrected positions; the zeros stay free.
+    pub joint_test: JointTest,
+    /// Hypotheses on what still differs, the most likely first; empty if nothing does.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Name of the second cause, if there is one.
     pub named: Option<String>,
     /// The answer, a sentence.
     pub sentence: String,

@@ -26,7 +26,7 @@ pub(crate) fn torque_matrix(
     for j in 0..joints.len() {
         let (mut rms, mut whole, mut more) = (Vec::new(), Vec::new(), Vec::new());
         for (motion, set) in sets.iter().enumerate() {
-            let factor = &set.factors[j];
+            let factor = &set.rows.factors[j];
             let rows = factor.rows() as f64;
             let of = |x: &[f64]| factor.residual_squares(x) / rows;
             let squares: Vec<f64> = parameters.iter().map(|x| of(x)).collect();

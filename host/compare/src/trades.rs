@@ -77,7 +77,12 @@ fn torque_metric(sets: &[IdentifiedSet], basis: &Basis) -> DMatrix<f64> {
     let (mut sum, mut rows) = (DMatrix::zeros(p, p), 0.0);
     for set in sets {
         sum += set.information();
-        rows += set.factors.iter().map(|f| f.rows() as f64).sum::<f64>();
+        rows += set
+            .rows
+            .factors
+            .iter()
+            .map(|f| f.rows() as f64)
+            .sum::<f64>();
     }
     basis.to_base.transpose() * sum * &basis.to_base / rows.max(1.0)
 }

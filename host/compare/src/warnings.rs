@@ -67,7 +67,7 @@ fn line(own: &[SetWarning]) -> String {
 pub(crate) fn drifting(sets: &[IdentifiedSet], robot: &Robot, tolerance: f64) -> Vec<String> {
     let all = || {
         (sets.iter()).flat_map(|set| {
-            set.drifts
+            (set.rows.drifts)
                 .iter()
                 .map(move |drift| (set.name.as_str(), drift))
         })

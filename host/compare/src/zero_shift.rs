@@ -16,7 +16,7 @@ use rig_model::robot::Robot;
 
 use crate::basis::Basis;
 use crate::causes::hypothesis;
-use crate::common::Common;
+use crate::common::{Common, without_changes};
 use crate::identified_set::IdentifiedSet;
 use crate::matrices::{pseudo_inverse, quadratic};
 use crate::result::Hypothesis;
@@ -38,14 +38,20 @@ pub(crate) struct Zeros<'a> {
     pub sets: &'a [IdentifiedSet],
     pub basis: &'a Basis,
     pub common: &'a Common,
+    /// Set whose zero is kept; `None` for the one that is nearest to all others.
+    pub reference: Option<usize>,
 }
 
 /// Shifts of one joint's zero by set, and what they leave.
-struct Fitted {
-    shifts: Vec<f64>,
+pub(crate) struct Fitted {
+    /// By set, what its positions are too large by.
+    pub shifts: Vec<f64>,
     /// Variance of each by the errors of its set alone.
-    variances: Vec<f64>,
-    chi2: f64,
+    pub variances: Vec<f64>,
+    /// The sum of squares that is left.
+    pub chi2: f64,
+    /// By set, the change of its parameters by a shift, at these shifts.
+    pub along: Vec<DVector<f64>>,
 }
 
 impl Zeros<'_> {
@@ -55,18 +61,18 @@ impl Zeros<'_> {
     /// # Errors
     /// Recordings that cannot be read.
     pub(crate) fn hypotheses(&self) -> Result<Vec<Hypothesis>, IdentifyError> {
-        let recorded: Vec<DVector<f64>> = (0..self.sets.len())
-            .map(|s| self.solved(s, &self.recorded(s)))
-            .collect();
+        let recorded = self.as_recorded();
+        let none = DMatrix::zeros(self.common.parameters.len(), 0);
         let mut found: Vec<(usize, Fitted)> = Vec::new();
         for joint in 0..self.robot.joints.len() {
-            found.extend(self.fitted(joint, &recorded, 1)?.map(|own| (joint, own)));
+            let own = self.fitted(joint, &recorded, 1, &none)?;
+            found.extend(own.map(|own| (joint, own)));
         }
         let best = found
             .iter_mut()
             .min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
         if let Some((joint, own)) = best
-            && let Some(refined) = self.fitted(*joint, &recorded, STEPS.0)?
+            && let Some(refined) = self.fitted(*joint, &recorded, STEPS.0, &none)?
         {
             *own = refined;
         }
@@ -74,6 +80,12 @@ impl Zeros<'_> {
             .iter()
             .map(|(j, own)| self.hypothesis(*j, own))
             .collect())
+    }
+
+    /// Returns what least squares of each set's rows give, as recorded.
+    pub(crate) fn as_recorded(&self) -> Vec<DVector<f64>> {
+        let sets = 0..self.sets.len();
+        sets.map(|s| self.solved(s, &self.recorded(s))).collect()
     }
 
     fn hypothesis(&self, joint: usize, own: &Fitted) -> Hypothesis {
@@ -101,11 +113,13 @@ impl Zeros<'_> {
     }
 
     /// Fits the shifts of a joint's zero; `None` if a set does not tell it. `recorded`: what each set's rows give as recorded.
-    fn fitted(
+    /// The parameters may differ between the sets along `beside`, too.
+    pub(crate) fn fitted(
         &self,
         joint: usize,
         recorded: &[DVector<f64>],
         steps: usize,
+        beside: &DMatrix<f64>,
     ) -> Result<Option<Fitted>, IdentifyError> {
         let n = self.sets.len();
         let reference = self.reference();
@@ -113,21 +127,28 @@ impl Zeros<'_> {
             shifts: vec![0.0; n],
             variances: vec![0.0; n],
             chi2: f64::INFINITY,
+            along: Vec::new(),
         };
+        let weights =
+            (self.common.weights.iter().enumerate()).map(|(s, weight)| match s == reference {
+                true => weight.clone(),
+                false => without_changes(weight, beside).0,
+            });
+        let weights: Vec<DMatrix<f64>> = weights.collect();
         for _ in 0..steps {
             let mut values = Vec::with_capacity(n);
             let mut along = Vec::with_capacity(n);
             for s in 0..n {
                 let [at, beside] = self.values(s, joint, &recorded[s], found.shifts[s])?;
                 let d = (beside - &at) / STEP;
-                found.variances[s] = 1.0 / quadratic(&self.common.weights[s], &d);
+                found.variances[s] = 1.0 / quadratic(&weights[s], &d);
                 values.push(at);
                 along.push(d);
             }
             if !found.variances.iter().all(|v| v.sqrt() < TOLD) {
                 return Ok(None);
             }
-            let Some((changes, chi2)) = self.step(&values, &along, reference) else {
+            let Some((changes, chi2)) = self.step(&weights, &values, &along, reference) else {
                 return Ok(None);
             };
             let mut largest = 0.0f64;
@@ -135,7 +156,7 @@ impl Zeros<'_> {
                 found.shifts[s] += changes[s];
                 largest = largest.max(changes[s].abs() / found.variances[s].sqrt());
             }
-            found.chi2 = chi2;
+            (found.chi2, found.along) = (chi2, along);
             if largest < STEPS.1 {
                 break;
             }
@@ -143,14 +164,35 @@ impl Zeros<'_> {
         Ok(Some(found))
     }
 
-    /// Returns the changes of the shifts that make the values agree best, and the sum of squares that is left then.
+    /// Returns the set that is nearest to all others in one metric: of several sets one of those that are alike, whatever
+    /// their errors. Of two sets it is the one with narrow errors, because a wrong zero makes them wide.
+    pub(crate) fn alike(&self) -> usize {
+        let Common {
+            values, weights, ..
+        } = self.common;
+        if values.len() < 3 {
+            return self.reference();
+        }
+        let c = self.common.parameters.len();
+        let all = (weights.iter()).fold(DMatrix::zeros(c, c), |sum, weight| sum + weight);
+        let distance = |r: usize| -> f64 {
+            (values.iter())
+                .map(|y| quadratic(&all, &(y - &values[r])))
+                .sum()
+        };
+        let nearest = (0..values.len()).min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        nearest.unwrap_or(0)
+    }
+
+    /// Returns, with the weights `told`, the changes of the shifts that make the values agree best, and the sum of squares that is left then.
     fn step(
         &self,
+        told: &[DMatrix<f64>],
         values: &[DVector<f64>],
         along: &[DVector<f64>],
         reference: usize,
     ) -> Option<(Vec<f64>, f64)> {
-        let weights: Vec<DMatrix<f64>> = (self.common.weights.iter().zip(along).enumerate())
+        let weights: Vec<DMatrix<f64>> = (told.iter().zip(along).enumerate())
             .map(|(s, (weight, d))| match s == reference {
                 true => weight.clone(),
                 false => {
@@ -163,12 +205,13 @@ impl Zeros<'_> {
             parameters: self.common.parameters.clone(),
             values: values.to_vec(),
             weights,
+            spent: 0,
         };
         let (mean, chi2) = shifted.about_mean(&shifted.weights)?;
         let change = |s: usize| match s == reference {
             true => 0.0,
             false => {
-                let seen = &self.common.weights[s] * &along[s];
+                let seen = &told[s] * &along[s];
                 seen.dot(&(&values[s] - &mean)) / along[s].dot(&seen)
             }
         };
@@ -176,7 +219,10 @@ impl Zeros<'_> {
     }
 
     /// Returns the set that is nearest to all others: a set apart is best described against them.
-    fn reference(&self) -> usize {
+    pub(crate) fn reference(&self) -> usize {
+        if let Some(given) = self.reference {
+            return given;
+        }
         let Common {
             values, weights, ..
         } = self.common;
@@ -213,7 +259,7 @@ impl Zeros<'_> {
     fn recorded(&self, s: usize) -> TriangularFactor {
         let set = &self.sets[s];
         let mut all = TriangularFactor::new(self.base.len());
-        for (own, noise) in set.factors.iter().zip(self.noise(s)) {
+        for (own, noise) in set.rows.factors.iter().zip(self.noise(s)) {
             all.merge(own, 1.0 / noise);
         }
         all

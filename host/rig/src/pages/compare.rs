@@ -3,7 +3,8 @@
 use super::context::Context;
 use super::parts;
 use rig_compare::{
-    CORRELATED, Comparison, Grade, ODDS, PooledParameter, SetValue, TOGETHER, TorqueMatrix,
+    CORRELATED, Comparison, Grade, Hypothesis, ODDS, PooledParameter, SetValue, TOGETHER,
+    TorqueMatrix,
 };
 use rig_output::{format_significant, format_unit, format_value};
 use rig_report::{
@@ -42,18 +43,31 @@ pub fn compare(found: &Comparison, context: &Context) -> Document {
     }
 }
 
+/// Returns what the grade `differ-without-effect` means.
+pub(crate) fn same_torque(found: &Comparison) -> String {
+    let most = found.torque.worst().map_or(0.0, |(share, ..)| share);
+    format!(
+        "The parameters differ by more than their errors, but the torque that they predict is the same within {} %: use whichever set.",
+        parts::percent(most)
+    )
+}
+
 fn summary(found: &Comparison, context: &Context) -> Vec<Fact> {
     let (grade, tone) = match found.grade {
         Grade::Agree => ("agree", Tone::Good),
-        Grade::DifferWithoutEffect => ("differ, does not matter", Tone::Notice),
+        Grade::DifferWithoutEffect => ("differ, same torque", Tone::Notice),
         Grade::DifferAndMatter => ("differ and matter", Tone::Warning),
         Grade::Undecided => ("undecided", Tone::Warning),
         Grade::NotComparable => ("not comparable", Tone::Fault),
     };
     let tests = || found.parameters.iter().filter_map(|p| p.test);
     let differing = tests().filter(|t| t.differs).count();
+    let mut grade = Fact::new("Grade", grade).tone(tone);
+    if found.grade == Grade::DifferWithoutEffect {
+        grade = grade.note(same_torque(found));
+    }
     let mut facts = vec![
-        Fact::new("Grade", grade).tone(tone),
+        grade,
         Fact::new(
             "Parameters that differ",
             format!("{differing} of {}", tests().count()),
@@ -80,6 +94,10 @@ fn summary(found: &Comparison, context: &Context) -> Vec<Fact> {
         );
     }
     if let Some(causes) = &found.causes {
+        let second = causes
+            .corrected
+            .as_ref()
+            .and_then(|own| own.named.as_deref());
         let tied = (causes.hypotheses.iter())
             .filter(|h| h.explains && h.odds_against < ODDS)
             .count();
@@ -89,9 +107,13 @@ fn summary(found: &Comparison, context: &Context) -> Vec<Fact> {
                 Some("nothing") => "chance",
                 Some(name) => name,
                 None if tied > 1 => "several possible",
+                None if second.is_some() => "zero",
                 None => "not one of those tested",
             },
         ));
+        if let Some(second) = second {
+            facts.push(Fact::new("Cause with the zero corrected", second));
+        }
     }
     facts.push(parts::warning_count(
         found.warnings.len() + context.warnings.len(),
@@ -107,6 +129,7 @@ fn sets(found: &Comparison) -> Section {
             set.rank.to_string(),
             set.degrees_of_freedom.to_string(),
             format!("{:.2}", set.shrinkage),
+            (set.repeats_after).map_or_else(|| "–".into(), |s| format_significant(s, 3)),
             (set.relative_error.iter())
                 .map(|e| parts::percent(*e))
                 .collect::<Vec<_>>()
@@ -125,11 +148,12 @@ fn sets(found: &Comparison) -> Section {
             Column::number("Rank", ""),
             Column::number("Degrees of freedom", ""),
             Column::number("Shrinkage", ""),
+            Column::number("Motion repeats after", "s"),
             Column::number("Residual by joint", "% of the torque"),
             Column::text("Parameters shown"),
         ],
         rows: rows.collect(),
-        note: "Degrees of freedom: groups of rows that the covariance was estimated from, minus one. Shrinkage: weight of the covariance that the regressor alone gives (0: groups of rows only).".into(),
+        note: "Degrees of freedom: groups of rows that the covariance was estimated from, minus one; if the motion repeats, rows of one place in it are one group. Shrinkage: weight of the covariance that the regressor alone gives (0: groups of rows only).".into(),
     }))
 }
 
@@ -363,41 +387,58 @@ fn by_joint(found: &Comparison, matrix: &TorqueMatrix, j: usize) -> Table {
     }
 }
 
+fn hypothesis(h: &Hypothesis) -> Vec<String> {
+    vec![
+        h.name.to_owned(),
+        if h.explains { "yes" } else { "no" }.to_owned(),
+        match h.odds_against < 1e6 {
+            true => format_significant(h.odds_against, 3),
+            false => "> 1 000 000".into(),
+        },
+        probability(h.p),
+        format!("{:.1} ({})", h.chi2, h.degrees_of_freedom),
+        h.free.to_string(),
+        h.what.clone(),
+    ]
+}
+
 fn causes(found: &Comparison) -> Option<Section> {
     let causes = found.causes.as_ref()?;
-    let rows = causes.hypotheses.iter().map(|h| {
+    let columns = || {
         vec![
-            h.name.to_owned(),
-            if h.explains { "yes" } else { "no" }.to_owned(),
-            match h.odds_against < 1e6 {
-                true => format_significant(h.odds_against, 3),
-                false => "> 1 000 000".into(),
-            },
-            probability(h.p),
-            format!("{:.1} ({})", h.chi2, h.degrees_of_freedom),
-            h.free.to_string(),
-            h.what.clone(),
+            Column::text("Hypothesis"),
+            Column::text("Explains"),
+            Column::number("Odds against the best", ""),
+            Column::number("p of the remainder", ""),
+            Column::number("Remainder χ² (degrees of freedom)", ""),
+            Column::number("Free values", ""),
+            Column::text("What may differ between the sets"),
         ]
-    });
-    Some(
-        Section::new("causes", "Cause of the differences", &causes.sentence).with(Block::Table(Table {
-            caption: "Hypotheses, the most likely first".into(),
-            columns: vec![
-                Column::text("Hypothesis"),
-                Column::text("Explains"),
-                Column::number("Odds against the best", ""),
-                Column::number("p of the remainder", ""),
-                Column::number("Remainder χ² (degrees of freedom)", ""),
-                Column::number("Free values", ""),
-                Column::text("What may differ between the sets"),
-            ],
-            rows: rows.collect(),
+    };
+    let table = |caption: &str, list: &[Hypothesis]| {
+        Block::Table(Table {
+            caption: caption.into(),
+            columns: columns(),
+            rows: list.iter().map(hypothesis).collect(),
             note: format!(
                 "A cause is named if its remainder is consistent with chance (p of {} or more) and the odds against every other such hypothesis are {ODDS} or more. Odds: exp(half the difference of Akaike's criterion).",
                 found.family_level
             ),
-        })),
-    )
+        })
+    };
+    let mut section = Section::new("causes", "Cause of the differences", &causes.sentence).with(
+        table("Hypotheses, the most likely first", &causes.hypotheses),
+    );
+    if let Some(corrected) = &causes.corrected {
+        section = section.with(Block::Text(corrected.sentence.clone()));
+        if !corrected.hypotheses.is_empty() {
+            section = section.with(table(
+                "Hypotheses with the zero corrected",
+                &corrected.hypotheses,
+            ));
+        }
+    }
+    Some(section)
 }
 
 fn trades(found: &Comparison) -> Section {

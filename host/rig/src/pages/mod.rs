@@ -25,8 +25,8 @@ mod treatment;
 mod validation;
 mod validation_voltage;
 
-pub(crate) use compare::SEE_IDENTIFY;
 pub use compare::compare;
+pub(crate) use compare::{SEE_IDENTIFY, same_torque};
 pub use compliance::compliance;
 pub use context::Context;
 pub use control::control;
