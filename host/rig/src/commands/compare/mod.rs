@@ -226,7 +226,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     found.warnings.extend(own);
     write(args, &robot, &found, read, ui)?;
-    ui.answer(grade(&found));
+    ui.answer(&grade(&found));
     for line in lines(&found) {
         ui.say(&line);
     }
@@ -267,17 +267,18 @@ fn write(
 }
 
 /// Returns the answer in a sentence.
-fn grade(found: &Comparison) -> &'static str {
+fn grade(found: &Comparison) -> String {
     match found.grade {
-        Grade::Agree => "The sets agree.",
-        Grade::DifferWithoutEffect => {
-            "The sets differ, and the difference does not matter for the torque."
+        Grade::Agree => "The sets agree.".into(),
+        Grade::DifferWithoutEffect => pages::same_torque(found),
+        Grade::DifferAndMatter => {
+            "The sets differ, and the difference matters for the torque.".into()
         }
-        Grade::DifferAndMatter => "The sets differ, and the difference matters for the torque.",
         Grade::Undecided => {
             "The sets do not differ significantly, but their errors are too large to rely on it."
+                .into()
         }
-        Grade::NotComparable => "The sets are not comparable.",
+        Grade::NotComparable => "The sets are not comparable.".into(),
     }
 }
 
