@@ -13,7 +13,7 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 use crate::description::described_effects::DescribedEffects;
 use crate::rows::nominal::Nominal;
 use crate::rows::regression::{Column, Rows, combined};
-use rig_model::robot::{Quantity, Robot, Worth, worth};
+use rig_model::robot::{Inertial, Quantity, Robot, Worth, worth};
 
 /// A free direction in the space of base parameters: indices and factors.
 pub(crate) type Direction = Vec<(usize, f64)>;
@@ -52,10 +52,7 @@ impl ParameterPrior {
     pub(crate) fn of(robot: &Robot, nominal: &Nominal, stated: &DescribedEffects) -> Self {
         let n = robot.joints.len();
         let prior = nominal.stated(robot);
-        let inertial = robot
-            .joints
-            .iter()
-            .all(|j| j.inertial.as_ref().is_some_and(|i| i.mass > 0.0));
+        let inertial = states_links(robot);
         let (mut held, mut unstated) = (Vec::new(), Vec::new());
         let mut free: Vec<Direction> = Vec::new();
         let mut gravity = Direction::new();
@@ -186,6 +183,16 @@ impl ParameterPrior {
             .map(|direction| direction.iter().map(|&(k, f)| self.prior[k] * f).sum())
             .collect()
     }
+}
+
+/// Returns true if the description states the inertia of its links: each has a mass, or the values are those of
+/// combinations. Combinations leave masses at zero beside moments, and links without values are part of others.
+fn states_links(robot: &Robot) -> bool {
+    let links = || robot.joints.iter().map(|j| j.inertial.as_ref());
+    let moves = |i: &Inertial| i.first_moment.iter().chain(&i.inertia).any(|x| *x != 0.0);
+    let of_combinations = || links().flatten().any(|i| i.mass <= 0.0 && moves(i));
+    let identified = || robot.identified.is_some() && links().flatten().any(moves);
+    links().all(|i| i.is_some_and(|i| i.mass > 0.0)) || of_combinations() || identified()
 }
 
 /// Returns true if a standard column of `n` joints is friction of a joint or a motor.

@@ -395,14 +395,48 @@ impl<'a> Fit<'a> {
         inverse: &DMatrix<f64>,
         rest: &[f64],
     ) -> DMatrix<f64> {
-        let mut scores = DMatrix::<f64>::zeros(columns.len(), self.blocks);
+        self.clustered_covariance(columns, inverse, rest, false)
+    }
+
+    /// Returns the covariance and its number of clusters. The scores of G blocks have rank G at most. For as many columns
+    /// as blocks or more, as in a short recording of an arm, each joint's rows of a block are a cluster of their own.
+    fn robust_covariance(
+        &self,
+        columns: &[Vec<f64>],
+        inverse: &DMatrix<f64>,
+        rest: &[f64],
+    ) -> (DMatrix<f64>, usize) {
+        let by_joint = columns.len() >= self.blocks;
+        let clusters = match by_joint {
+            true => self.blocks * self.rows.joints(),
+            false => self.blocks,
+        };
+        let covariance = self.clustered_covariance(columns, inverse, rest, by_joint);
+        (covariance, clusters)
+    }
+
+    /// Returns the covariance from the scores of blocks, or from those of the joints in each block.
+    fn clustered_covariance(
+        &self,
+        columns: &[impl AsRef<[f64]>],
+        inverse: &DMatrix<f64>,
+        rest: &[f64],
+        by_joint: bool,
+    ) -> DMatrix<f64> {
+        let n = self.rows.count.max(1);
+        let clusters = match by_joint {
+            true => self.blocks * self.rows.joints(),
+            false => self.blocks,
+        };
+        let mut scores = DMatrix::<f64>::zeros(columns.len(), clusters);
         for (c, column) in columns.iter().enumerate() {
             let products = column.as_ref().iter().zip(rest).map(|(x, r)| x * r);
-            for (product, b) in products.zip(self.block.iter().cycle()) {
-                scores[(c, *b)] += product;
+            for (row, (product, b)) in products.zip(self.block.iter().cycle()).enumerate() {
+                let first = if by_joint { row / n * self.blocks } else { 0 };
+                scores[(c, first + *b)] += product;
             }
         }
-        let g = self.blocks as f64;
+        let g = clusters as f64;
         let meat = &scores * scores.transpose() * (g / (g - 1.0).max(1.0));
         inverse * meat * inverse
     }

@@ -3,9 +3,10 @@
 //! A point mass m at p in the last link's frame adds m·(1, p, −[p]×²) to the link's inertial parameters. It changes
 //! base parameters of every joint that carries it, in ratios given by p: Khalil, Gautier & Lemoine 2007,
 //! "Identification of the payload inertial parameters of industrial manipulators". Mass and place are fitted to the
-//! residual of the description without a refit.
+//! residual of the description without a refit. If the residual shows that the payload is no point, its inertia about
+//! its own centre of mass is fitted beside them: an arm that knows the mass by its inertia alone would take it for mass.
 //!
-//! Leaves out: the payload's inertia about its own centre of mass; other errors of the description.
+//! Leaves out: other errors of the description.
 
 use std::collections::BTreeMap;
 
@@ -16,6 +17,7 @@ use crate::fit::evidence::Evidence;
 use crate::fit::least_squares::Fit;
 use crate::fit::solution::Solution;
 use crate::fit::systematic_uncertainty::LINK;
+use crate::levels::SIGNIFICANT;
 use crate::outcome::Value;
 use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
@@ -23,6 +25,7 @@ use rig_identify::independent_columns;
 use rig_model::robot::{Inertial, JointKind};
 use rig_numerics::statistics;
 use rig_numerics::vector::dot;
+use statrs::function::erf::erfc;
 
 /// Least ratio of a change to its standard deviation.
 pub(crate) const LEAST_SIGMAS: f64 = 4.0;
@@ -104,25 +107,117 @@ pub(crate) fn on_last_link(
     rows: &Rows,
     frozen: &Fit,
 ) -> Option<(Load, Evidence)> {
-    let n = context.robot.joints.len();
-    if n < 2 {
+    if context.robot.joints.len() < 2 {
         return None;
     }
+    let (point, fitted) = settled(context, rows, frozen, false)?;
+    let body = fitted
+        .is_no_point(context, rows, frozen)
+        .then(|| settled(context, rows, frozen, true))
+        .flatten()
+        .filter(|(_, body)| body.is_possible());
+    Some(match body {
+        Some((load, body)) => (load, body.evidence),
+        None => (point, fitted.evidence),
+    })
+}
+
+/// A converged fit of a payload.
+struct FittedLoad {
+    /// The unknowns that are identifiable: 0 mass, 1 to 3 place, 4 to 9 inertia about the centre of mass.
+    told: Vec<usize>,
+    /// Their weighted columns, projected.
+    columns: Vec<Vec<f64>>,
+    evidence: Evidence,
+}
+
+impl FittedLoad {
+    /// Returns true if an inertia about the centre of mass is significant beside a point.
+    fn is_no_point(&self, context: &DiagnosisContext, rows: &Rows, frozen: &Fit) -> bool {
+        let own = own_inertia(context, rows);
+        let mut all: Vec<Vec<f64>> = self.columns.clone();
+        all.extend((own.iter()).map(|c| frozen.projected(frozen.weighted(c))));
+        let matrix = |list: &[Vec<f64>]| {
+            let columns: Vec<DVector<f64>> = (list.iter())
+                .map(|c| DVector::from_column_slice(c))
+                .collect();
+            DMatrix::from_columns(&columns)
+        };
+        let order: Vec<usize> = (0..all.len()).collect();
+        let kept = independent_columns(&matrix(&all), &order, TOLD).kept;
+        let picked: Vec<Vec<f64>> = kept.iter().map(|k| all[*k].clone()).collect();
+        let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; picked.len()];
+        let Some(evidence) = frozen.evidence(&picked, &open) else {
+            return false;
+        };
+        let tried = kept.iter().filter(|k| **k >= self.columns.len()).count();
+        (kept.iter().enumerate())
+            .filter(|(_, k)| **k >= self.columns.len())
+            .any(|(place, _)| {
+                let sigmas = evidence.gains[place] / evidence.stds[place];
+                two_sided(sigmas) * tried as f64 <= SIGNIFICANT
+            })
+    }
+
+    /// Returns true if no moment of inertia about the centre of mass is significantly negative.
+    fn is_possible(&self) -> bool {
+        (self.told.iter().enumerate())
+            .filter(|(_, k)| [4, 7, 9].contains(*k))
+            .all(|(place, _)| {
+                self.evidence.gains[place] > -LEAST_SIGMAS * self.evidence.stds[place]
+            })
+    }
+}
+
+/// Returns the two-sided p-value of a normal deviate.
+fn two_sided(sigmas: f64) -> f64 {
+    erfc(sigmas.abs() / std::f64::consts::SQRT_2)
+}
+
+/// Returns the torques of a unit of each element of an inertia on the last link.
+fn own_inertia(context: &DiagnosisContext, rows: &Rows) -> Vec<Column> {
+    (4..10)
+        .map(|k| {
+            column_of(
+                context,
+                rows,
+                &std::array::from_fn(|c| f64::from(u8::from(c == k))),
+            )
+        })
+        .collect()
+}
+
+/// Fits a payload round by round, as a point or with inertia about its centre of mass.
+fn settled(
+    context: &DiagnosisContext,
+    rows: &Rows,
+    frozen: &Fit,
+    extended: bool,
+) -> Option<(Load, FittedLoad)> {
+    let own = if extended {
+        own_inertia(context, rows)
+    } else {
+        Vec::new()
+    };
     let open = |k: usize| match k {
         0 => [0.0, f64::INFINITY],
         _ => [f64::NEG_INFINITY, f64::INFINITY],
     };
     let mut place = Vector3::zeros();
     for _ in 0..ROUNDS {
-        let columns = kilogram(place, &context.robot.flange_pose())
-            .map(|body| column_of(context, rows, &body));
+        let columns: Vec<Column> = kilogram(place, &context.robot.flange_pose())
+            .iter()
+            .map(|body| column_of(context, rows, body))
+            .chain(own.iter().cloned())
+            .collect();
         let weighted: Vec<Vec<f64>> = (columns.iter())
             .map(|c| frozen.projected(frozen.weighted(c)))
             .collect();
         let all: Vec<DVector<f64>> = (weighted.iter())
             .map(|c| DVector::from_column_slice(c))
             .collect();
-        let told = independent_columns(&DMatrix::from_columns(&all), &[0, 1, 2, 3], TOLD).kept;
+        let order: Vec<usize> = (0..all.len()).collect();
+        let told = independent_columns(&DMatrix::from_columns(&all), &order, TOLD).kept;
         if told.first() != Some(&0) {
             return None;
         }
@@ -134,7 +229,8 @@ pub(crate) fn on_last_link(
             return None;
         }
         let mut moved: f64 = 0.0;
-        for (k, gain) in told.iter().zip(&evidence.gains).skip(1) {
+        let of_place = |(k, _): &(&usize, &f64)| (1..4).contains(*k);
+        for (k, gain) in told.iter().zip(&evidence.gains).filter(of_place) {
             let by = (gain / mass).clamp(-FARTHEST, FARTHEST);
             place[k - 1] += by;
             moved = moved.max(by.abs());
@@ -144,21 +240,32 @@ pub(crate) fn on_last_link(
         }
         if moved < SETTLED {
             let off = systematic(context, rows, frozen, &picked)?;
-            let std = |k: usize| evidence.stds[k].hypot(off[k]);
-            let mut at = [None, None, None];
-            for (k, axis) in told.iter().enumerate().skip(1) {
-                at[axis - 1] = Some(value(place[axis - 1], std(k) / mass, "m"));
-            }
-            let rms = |c: &Option<Vec<f64>>| mass * c.as_ref().map_or(0.0, |c| statistics::rms(c));
-            let load = Load {
-                mass: value(mass, std(0), "kg"),
-                place: at,
-                torque: columns[0].iter().map(rms).collect(),
+            let fitted = FittedLoad {
+                told,
+                columns: picked,
+                evidence,
             };
-            return Some((load, evidence));
+            return Some((load(place, &fitted, &off, &columns[0]), fitted));
         }
     }
     None
+}
+
+/// Returns mass, place and torque of a fitted payload; `off` are the systematic errors of its unknowns.
+fn load(place: Vector3<f64>, fitted: &FittedLoad, off: &[f64], kilogram: &Column) -> Load {
+    let evidence = &fitted.evidence;
+    let mass = evidence.gains[0];
+    let std = |k: usize| evidence.stds[k].hypot(off[k]);
+    let mut at = [None, None, None];
+    for (k, axis) in (fitted.told.iter().enumerate()).filter(|(_, axis)| (1..4).contains(*axis)) {
+        at[axis - 1] = Some(value(place[axis - 1], std(k) / mass, "m"));
+    }
+    let rms = |c: &Option<Vec<f64>>| mass * c.as_ref().map_or(0.0, |c| statistics::rms(c));
+    Load {
+        mass: value(mass, std(0), "kg"),
+        place: at,
+        torque: kilogram.iter().map(rms).collect(),
+    }
 }
 
 /// Returns the error of these columns' coefficients if each joint's described torque is wrong by [`LINK`].

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod arm;
+mod identified;
 pub(crate) mod made;
 mod one_way;
 mod pendulum;

@@ -20,14 +20,15 @@ impl Fit<'_> {
             ),
         };
         let (explained, gains) = self.explained(&beside, bounds)?;
-        let (k, g) = (columns.len(), self.blocks as f64);
+        let k = columns.len();
         // The residual under the alternative: with the columns.
         let mut rest = self.residual.clone();
         for (column, gain) in columns.iter().zip(&gains) {
             axpy(-gain, column, &mut rest);
         }
         let inverse = beside.gram.cholesky()?.inverse();
-        let covariance = self.sandwich(columns, &inverse, &rest);
+        let (covariance, clusters) = self.robust_covariance(columns, &inverse, &rest);
+        let g = clusters as f64;
         let stds = (0..k).map(|c| covariance[(c, c)].max(0.0).sqrt()).collect();
         let beta = DVector::from_column_slice(&gains);
         let wald = beta.dot(&covariance.cholesky()?.solve(&beta));
@@ -49,6 +50,7 @@ impl Fit<'_> {
             .iter()
             .fold((0.0, 0.0), |(a, b), e| (a + e[0], b + e[1]));
         let gain = 1.0 - (after / before).sqrt();
+        let g = self.blocks as f64;
         let mean = (before - after) / g;
         let spread = block_errors
             .iter()

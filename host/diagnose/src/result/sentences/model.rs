@@ -28,6 +28,7 @@ pub(crate) fn change(robot: &Robot, cause: &ChangeCause) -> String {
             format_value(own.value, own.std)
         ),
         ChangeCause::Several(moved) => several(moved),
+        ChangeCause::Together => "The described values together do not fit, but this motion does not tell which of them have changed; record a livelier motion of all joints.".into(),
     }
 }
 
