@@ -418,11 +418,11 @@ fn told_gap(name: &str, unit: &str, found: &Fitted, twist: f64, gap: Gap) -> Opt
     match gap {
         Gap::None => None,
         Gap::Found => Some(format!(
-            "The response of joint \"{name}\" shows backlash of about {} {unit}, which is taken into account; simulated gaps were found to 25 % by chirps. Both inertias are those of the description; their errors are not in the standard deviations. Static loading (--static) shows stiffness and backlash apart.",
+            "The response of joint \"{name}\" shows backlash of about {} {unit}, which is taken into account; simulated gaps were found to 25 % by chirps. A spring that grows stiffer with its twist looks alike, and its stiffness is then not the one given. Both inertias are those of the description; their errors are not in the standard deviations. Static loading (--static) shows stiffness and backlash apart.",
             format_significant(found.model.gap, 2)
         )),
         Gap::Bound => Some(format!(
-            "The response of joint \"{name}\" shows backlash that is large against the twist: {} {unit} by the RMS torque and the stiffness found. The stiffness found is only a lower bound, and may be a third of the true one. Measure it by static loading (--static), or with much more torque.",
+            "The response of joint \"{name}\" shows backlash that is large against the twist, or a spring that grows stiffer with its twist, which looks alike; the twist is {} {unit} by the RMS torque and the stiffness found. With backlash the stiffness found is only a lower bound, and may be a third of the true one. With a stiffening spring it is a mean over the twist. Measure it by static loading (--static), or with much more torque.",
             format_significant(twist, 2)
         )),
     }

@@ -397,7 +397,7 @@ fn beyond_chance(drives: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - IMPOSSIBLE / drives.max(1) as f64)
 }
 
-/// Torque and twist of a drive by window, of growing and of falling torque: what the spring and the hysteresis of the drive
+/// Torque and twist of a spring by window, of growing and of falling torque: what the spring and the hysteresis of the drive
 /// explain, with the whole residual over its arm (component plus residual, Larsen & McCleary 1972). Of each window the axis
 /// with the largest arm counts.
 fn partial_twists(rows: &[Row], found: &Fit, k: usize) -> [Vec<[f64; 2]>; 2] {
@@ -426,7 +426,9 @@ fn partial_twists(rows: &[Row], found: &Fit, k: usize) -> [Vec<[f64; 2]>; 2] {
             values[column] * (spring - gap.zero).signum()
         });
         let twist = values[k] * load - values[n + k] * direction + step + found.left(row) / arm;
-        points[usize::from(direction < 0.0)].push([load, twist]);
+        // The weight of the links loads the spring as well: the gap is crossed at a torque of the spring.
+        let weight = row.loads[k] - load;
+        points[usize::from(direction < 0.0)].push([load + weight, twist + values[k] * weight]);
     }
     points
 }

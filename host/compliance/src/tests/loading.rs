@@ -268,6 +268,9 @@ fn a_gap_is_found_where_the_described_weight_does_not_put_it() {
         let value = own.stiffness.unwrap();
         assert!((value.value / stiffness - 1.0).abs() < 0.02, "{own:?}");
         assert!((own.gap.unwrap().value / gap - 1.0).abs() < 0.05, "{own:?}");
+        if own.by == Deflection::Tool {
+            assert_on_line(own, [stiffness, gap]);
+        }
     }
     // The force on the environment.
     reversed
@@ -292,6 +295,23 @@ fn a_gap_is_found_where_the_described_weight_does_not_put_it() {
     }
     let text = said(reversed);
     assert!(text.contains("in metres"), "{text}");
+}
+
+/// The points of the figure lie on the line of the spring and its gap, except in windows that cross the gap.
+fn assert_on_line(own: &DriveLoading, [stiffness, gap]: [f64; 2]) {
+    let zero = own.gap_torque.unwrap();
+    let points: Vec<[f64; 2]> = own.points.iter().flatten().copied().collect();
+    assert!(points.len() > 50, "{}", points.len());
+    let off = |[torque, twist]: &&[f64; 2]| {
+        let line = torque / stiffness + 0.5 * gap * (torque - zero).signum();
+        (twist - line).abs() > 0.1 * gap
+    };
+    let apart = points.iter().filter(off).count();
+    assert!(
+        apart < points.len() / 10,
+        "{apart} of {}: {zero}",
+        points.len()
+    );
 }
 
 /// Two drives have gaps, and both turn in the same displacement. A base without gravity: the gaps are crossed as the force is.
