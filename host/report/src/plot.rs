@@ -112,8 +112,8 @@ pub enum Style {
 pub struct Series {
     /// Name in the legend.
     pub name: String,
-    /// Abscissae in the unit of the x axis; a value that is not finite is a gap. NaN in both coordinates ends a piece of the
-    /// curve and is not counted as missing.
+    /// Abscissae in the unit of the x axis; a value that is not finite is a gap. NaN in all coordinates ends a piece of the
+    /// curve or band and is not counted as missing.
     pub x: Vec<f64>,
     /// Ordinates in the unit of the y axis; a value that is not finite is a gap.
     pub y: Vec<f64>,

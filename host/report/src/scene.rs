@@ -250,18 +250,11 @@ fn drawn<'a>(
     let high_all: Vec<f64> = high_all.into_iter().map(|v| gap(v, plot.y.log)).collect();
 
     let count = x_all.len();
-    // A point that is none in both coordinates ends a piece of the curve.
-    let ends = |i: &usize| source.x[*i].is_nan() && source.y.get(*i).is_some_and(|y| y.is_nan());
-    let samples = (0..count).filter(|i| !ends(i)).count();
-    let missing = (0..count)
-        .filter(|i| !ends(i))
-        .filter(|i| {
-            let hole = |c: &[f64]| c.get(*i).is_some_and(|v| v.is_nan());
-            hole(&x_all)
-                || hole(&y_all)
-                || (shape == Shape::Band && (hole(&low_all) || hole(&high_all)))
-        })
-        .count();
+    let across = match shape {
+        Shape::Band => vec![&low_all, &high_all],
+        _ => vec![&y_all],
+    };
+    let [missing, samples] = missing(source, &x_all, &across);
     if missing > 0 && count > 0 {
         let why = match (plot.x.log, plot.y.log) {
             (false, false) => "not a finite number",
@@ -423,4 +416,18 @@ fn shortest(value: f64, digits: usize) -> String {
         Ok(rounded) => format!("{rounded:e}"),
         Err(_) => "null".to_owned(),
     }
+}
+
+/// Returns the numbers of samples that cannot be drawn, and of all. A point that is NaN in all coordinates ends a piece of
+/// the curve or of the band and is no sample. `x` and `across` are the coordinates as drawn, with NaN for gaps.
+fn missing(source: &Series, x: &[f64], across: &[&Vec<f64>]) -> [usize; 2] {
+    let given = match &source.style {
+        Style::Band { low, high } => [low, high],
+        _ => [&source.y; 2],
+    };
+    let is_nan = |c: &[f64], i: usize| c.get(i).is_some_and(|v| v.is_nan());
+    let ends = |i: usize| source.x[i].is_nan() && given.iter().all(|c| is_nan(c, i));
+    let samples = || (0..x.len()).filter(|i| !ends(*i));
+    let hole = |i: &usize| is_nan(x, *i) || across.iter().any(|c| is_nan(c, *i));
+    [samples().filter(hole).count(), samples().count()]
 }

@@ -273,8 +273,17 @@ fn pieces_of_a_curve_are_no_missing_samples() {
         vec![0.0, 1.0, nan, 2.0, 3.0],
         vec![1.0, 1.0, nan, 2.0, 2.0],
     ));
-    let scene = scene::Scene::new(&plot).unwrap().unwrap();
-    assert!(scene.remarks.is_empty(), "{:?}", scene.remarks);
+    let band = plot.clone().with(Series::band(
+        "interval",
+        Role::Model,
+        vec![0.0, 1.0, nan, 2.0, 3.0],
+        vec![0.5, 0.5, nan, 1.5, 1.5],
+        vec![1.5, 1.5, nan, 2.5, 2.5],
+    ));
+    for plot in [&plot, &band] {
+        let scene = scene::Scene::new(plot).unwrap().unwrap();
+        assert!(scene.remarks.is_empty(), "{:?}", scene.remarks);
+    }
     let picture = svg(&plot).unwrap();
     let parsed = roxmltree::Document::parse(&picture).unwrap();
     let paths = parsed.descendants().filter_map(|n| n.attribute("d"));

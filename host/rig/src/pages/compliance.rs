@@ -198,7 +198,7 @@ fn curve(drive: &DriveLoading) -> Option<Plot> {
     }
     let mut plot = Plot::new(
         format!("{}: twist over torque", drive.joint),
-        Axis::new("torque of the drive", "N·m"),
+        Axis::new("torque of the spring", "N·m"),
         Axis::new("twist", "rad"),
     )
     .note(match drive.by {
@@ -217,7 +217,9 @@ fn curve(drive: &DriveLoading) -> Option<Plot> {
     if let Some(stiffness) = &drive.stiffness {
         let half = drive.gap.map_or(0.0, |gap| 0.5 * gap.value);
         let zero = drive.gap_torque.unwrap_or_default();
-        let [low, high] = drive.load;
+        let loads = || drive.points.iter().flatten().map(|p| p[0]);
+        let low = loads().fold(f64::INFINITY, f64::min);
+        let high = loads().fold(f64::NEG_INFINITY, f64::max);
         let at = |f: f64| f / stiffness.value + half * (f - zero).signum();
         let mut x = vec![low];
         if low < zero && high > zero && half > 0.0 {
@@ -254,9 +256,7 @@ fn frequency(found: &FrequencyResponse) -> Section {
         parts::count(found.rows as u64),
         format_significant(found.rate, 4)
     );
-    let used: Vec<usize> = (0..found.bands.len())
-        .filter(|k| found.bands[*k].used)
-        .collect();
+    let used = used_bands(&found.bands);
     let mut section =
         Section::new("frequency", "Frequency response", lead).with(Block::Table(two_masses(found)));
     if let Some(periodic) = &found.periodic {
@@ -367,8 +367,22 @@ fn two_masses(found: &FrequencyResponse) -> Table {
     }
 }
 
-fn pick(list: &[Band], used: &[usize], of: impl Fn(&Band) -> f64) -> Vec<f64> {
-    used.iter().map(|k| of(&list[*k])).collect()
+/// Returns the used bands, with `None` where others lie between them: a line breaks there.
+fn used_bands(bands: &[Band]) -> Vec<Option<usize>> {
+    let mut list: Vec<Option<usize>> = Vec::new();
+    for (k, band) in bands.iter().enumerate() {
+        match (band.used, list.last()) {
+            (true, _) => list.push(Some(k)),
+            (false, Some(Some(_))) => list.push(None),
+            (false, _) => {}
+        }
+    }
+    list
+}
+
+/// Returns the values of bands, with NaN where a line breaks.
+fn pick(used: &[Option<usize>], of: impl Fn(usize) -> f64) -> Vec<f64> {
+    used.iter().map(|k| k.map_or(f64::NAN, &of)).collect()
 }
 
 /// Marks antiresonance and resonance.
@@ -377,8 +391,8 @@ fn marked(plot: Plot, found: &FrequencyResponse) -> Plot {
         .mark(Marker::vertical(found.resonance.value, "resonance"))
 }
 
-fn magnitude(found: &FrequencyResponse, used: &[usize]) -> Plot {
-    let x = pick(&found.bands, used, |b| b.frequency);
+fn magnitude(found: &FrequencyResponse, used: &[Option<usize>]) -> Plot {
+    let x = pick(used, |k| found.bands[k].frequency);
     let plot = Plot::new(
         "Magnitude of the frequency response",
         Axis::log("frequency", "Hz"),
@@ -388,35 +402,36 @@ fn magnitude(found: &FrequencyResponse, used: &[usize]) -> Plot {
         "95 % band",
         Role::Measured,
         x.clone(),
-        pick(&found.bands, used, |b| {
-            (b.magnitude - b.radius).max(0.05 * b.magnitude)
+        pick(used, |k| {
+            let band = &found.bands[k];
+            (band.magnitude - band.radius).max(0.05 * band.magnitude)
         }),
-        pick(&found.bands, used, |b| b.magnitude + b.radius),
+        pick(used, |k| found.bands[k].magnitude + found.bands[k].radius),
     ))
     .with(Series::points(
         "measured",
         Role::Measured,
         x.clone(),
-        pick(&found.bands, used, |b| b.magnitude),
+        pick(used, |k| found.bands[k].magnitude),
     ))
     .with(Series::points(
         "without friction",
         Role::After,
         x.clone(),
-        used.iter().map(|k| found.frictionless[*k][0]).collect(),
+        pick(used, |k| found.frictionless[k][0]),
     ))
     .with(Series::line(
         "two masses",
         Role::Model,
         x,
-        used.iter().map(|k| found.model[*k][0]).collect(),
+        pick(used, |k| found.model[k][0]),
     ))
     .note("Bands with significant coherence. Without friction: the estimated Coulomb friction is subtracted from the torque; the model is compared with that.");
     marked(plot, found)
 }
 
-fn phase(found: &FrequencyResponse, used: &[usize]) -> Plot {
-    let x = pick(&found.bands, used, |b| b.frequency);
+fn phase(found: &FrequencyResponse, used: &[Option<usize>]) -> Plot {
+    let x = pick(used, |k| found.bands[k].frequency);
     let plot = Plot::new(
         "Phase of the frequency response",
         Axis::log("frequency", "Hz"),
@@ -426,29 +441,24 @@ fn phase(found: &FrequencyResponse, used: &[usize]) -> Plot {
         "measured",
         Role::Measured,
         x.clone(),
-        pick(&found.bands, used, |b| b.phase.to_degrees()),
+        pick(used, |k| found.bands[k].phase.to_degrees()),
     ))
     .with(Series::points(
         "without friction",
         Role::After,
         x.clone(),
-        used.iter()
-            .map(|k| found.frictionless[*k][1].to_degrees())
-            .collect(),
+        pick(used, |k| found.frictionless[k][1].to_degrees()),
     ))
     .with(Series::line(
         "two masses",
         Role::Model,
         x,
-        used.iter()
-            .map(|k| found.model[*k][1].to_degrees())
-            .collect(),
+        pick(used, |k| found.model[k][1].to_degrees()),
     ));
     marked(plot, found)
 }
 
 fn coherence(found: &FrequencyResponse) -> Plot {
-    let all: Vec<usize> = (0..found.bands.len()).collect();
     Plot::new(
         "Coherence",
         Axis::log("frequency", "Hz"),
@@ -457,8 +467,8 @@ fn coherence(found: &FrequencyResponse) -> Plot {
     .with(Series::line(
         "coherence",
         Role::Measured,
-        pick(&found.bands, &all, |b| b.frequency),
-        pick(&found.bands, &all, |b| b.coherence),
+        found.bands.iter().map(|b| b.frequency).collect(),
+        found.bands.iter().map(|b| b.coherence).collect(),
     ))
     .note(match found.by_reference {
         true => "The smaller one of reference and torque, and of reference and velocity.",
