@@ -1,4 +1,4 @@
-//! Statistics of samples, autocorrelation, sums over vectors, singular values, and optimisers.
+//! Statistics of samples, autocorrelation, autoregression, sums over vectors, singular values, and optimisers.
 //!
 //! The crates that estimate something use it. It does not depend on robots.
 //!
@@ -10,6 +10,7 @@
 //! ```
 
 pub mod autocorrelation;
+pub mod autoregression;
 pub mod optimise;
 pub mod statistics;
 pub mod svd;

@@ -25,6 +25,7 @@ use crate::rows::stream::each_rows;
 use crate::uncertainty::jackknife::{LeaveOut, PARTS, joined, part_of};
 use crate::uncertainty::parts::Parts;
 use crate::warning::{Unsettled, Warning};
+use rig_numerics::autoregression::Predictors;
 use rig_numerics::vector::dot_in_order;
 
 /// Highest order of the autoregression.
@@ -37,49 +38,6 @@ const SETTLED: f64 = 0.01;
 /// Largest number of passes; a warning reports it.
 const MOST_PASSES: usize = 30;
 
-/// Predictors of every order up to the chosen one.
-#[derive(Clone, Debug)]
-struct Predictors {
-    /// `coefficients[o][l]`: weight of the value l + 1 rows back in the prediction of order o.
-    coefficients: Vec<Vec<f64>>,
-    /// Standard deviation of the innovation, by order.
-    sigma: Vec<f64>,
-}
-
-/// Runs Levinson's recursion on autocovariances (lag 0 first); order by Bayes' criterion over `rows` rows.
-fn levinson(covariance: &[f64], rows: u64) -> Predictors {
-    let mut coefficients = vec![Vec::new()];
-    let mut variance = vec![covariance[0].max(f64::MIN_POSITIVE)];
-    for order in 1..covariance.len() {
-        let last: &Vec<f64> = &coefficients[order - 1];
-        let predicted: f64 = last
-            .iter()
-            .enumerate()
-            .map(|(l, a)| a * covariance[order - 1 - l])
-            .sum();
-        let reflection = (covariance[order] - predicted) / variance[order - 1];
-        if !(reflection.abs() < 1.0) {
-            break;
-        }
-        let mut next: Vec<f64> = (0..order - 1)
-            .map(|l| last[l] - reflection * last[order - 2 - l])
-            .collect();
-        next.push(reflection);
-        coefficients.push(next);
-        variance.push(variance[order - 1] * (1.0 - reflection * reflection));
-    }
-    let n = rows.max(2) as f64;
-    let criterion = |o: usize| n * variance[o].ln() + o as f64 * n.ln();
-    let best = (0..variance.len())
-        .min_by(|&a, &b| criterion(a).total_cmp(&criterion(b)))
-        .unwrap_or(0);
-    coefficients.truncate(best + 1);
-    Predictors {
-        coefficients,
-        sigma: variance.iter().take(best + 1).map(|v| v.sqrt()).collect(),
-    }
-}
-
 /// The latest consecutive rows of one equation: [x | y] of the kept columns.
 #[derive(Clone, Default)]
 struct Past {
@@ -89,19 +47,19 @@ struct Past {
 impl Past {
     /// Returns the innovation of `row`, in units of its standard deviation.
     fn innovation(&mut self, row: Vec<f64>, predictors: &Predictors) -> Vec<f64> {
-        let order = self.rows.len().min(predictors.sigma.len() - 1);
+        let order = self.rows.len().min(predictors.order());
         let mut out = row.clone();
-        for (a, past) in predictors.coefficients[order].iter().zip(&self.rows) {
+        for (a, past) in predictors.coefficients(order).iter().zip(&self.rows) {
             for (to, from) in out.iter_mut().zip(past) {
                 *to -= a * from;
             }
         }
-        let scale = 1.0 / predictors.sigma[order].max(f64::MIN_POSITIVE);
+        let scale = 1.0 / predictors.sigma(order).max(f64::MIN_POSITIVE);
         for to in &mut out {
             *to *= scale;
         }
         self.rows.push_front(row);
-        self.rows.truncate(predictors.sigma.len().max(2) - 1);
+        self.rows.truncate(predictors.order().max(1));
         out
     }
 }
@@ -167,7 +125,7 @@ fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, I
         .map(|(sum, &count)| {
             let mut covariance: Vec<f64> = sum.iter().map(|s| s / count.max(1) as f64).collect();
             covariance[0] *= 1.0 + WHITE_SHARE;
-            levinson(&covariance, count)
+            Predictors::of(&covariance, count)
         })
         .collect())
 }
@@ -303,10 +261,7 @@ pub(crate) fn likelihood(problem: &Problem, parts: &Parts) -> Result<Fitted, Ide
                     moved: Some(moved),
                 });
             }
-            let orders: Vec<String> = predictors
-                .iter()
-                .map(|p| (p.sigma.len() - 1).to_string())
-                .collect();
+            let orders: Vec<String> = predictors.iter().map(|p| p.order().to_string()).collect();
             let strongest = (0..equations)
                 .flat_map(|i| (0..i).map(move |j| (i, j)))
                 .map(|(i, j)| (whiteners.correlation[(i, j)], j + 1, i + 1))
