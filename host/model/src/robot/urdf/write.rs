@@ -1,8 +1,8 @@
 //! Writes a description as URDF.
 //!
 //! Link frames are the description's own (modified Denavit–Hartenberg), so that every joint turns about z of its frame
-//! and keeps its zero and sense. Remarks name the values that URDF cannot hold: rotor inertia, constant torques,
-//! couplings between drives, effects, and a size of gravity that differs from the one its readers assume.
+//! and keeps its zero and sense. Remarks name the values that URDF cannot hold: constant torques, couplings between
+//! drives and their rotors, effects, and a size of gravity that differs from the one its readers assume.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -96,13 +96,17 @@ impl Robot {
                 "The flange frame is that of link {link}: end the chain there, with --tip {link}."
             ));
         }
-        self.write_transmissions(&mut body);
-        self.left_out(&parameters, &[], &mut remarks);
+        let rotors = self.write_transmissions(&mut body);
+        self.left_out(&parameters, &rotors, &mut remarks);
         let mut text = String::from("<?xml version=\"1.0\"?>\n");
         for remark in &remarks {
             let _ = writeln!(text, "{}", comment(remark));
         }
-        let _ = writeln!(text, "<robot name=\"{}\">", escaped(&self.name));
+        let drake = match rotors.contains(&true) {
+            true => " xmlns:drake=\"http://drake.mit.edu\"",
+            false => "",
+        };
+        let _ = writeln!(text, "<robot name=\"{}\"{drake}>", escaped(&self.name));
         text.push_str(&body);
         text.push_str("</robot>\n");
         Ok(Urdf { text, remarks })
@@ -117,19 +121,33 @@ impl Robot {
         name
     }
 
-    fn write_transmissions(&self, out: &mut String) {
-        for (joint, kind) in self.joints.iter().zip(self.drive_kinds()) {
+    /// Writes gear ratios, and rotors as Drake reads them ("Supported formats", multibody parsing). Returns, for each joint,
+    /// whether its rotor is written.
+    fn write_transmissions(&self, out: &mut String) -> Vec<bool> {
+        let mut rotors = vec![false; self.joints.len()];
+        for (k, (joint, kind)) in self.joints.iter().zip(self.drive_kinds()).enumerate() {
             let Some(drive) = &joint.drive else { continue };
-            if kind != DriveKind::Simple || drive.gear_ratio == 1.0 {
+            let square = drive.gear_ratio * drive.gear_ratio;
+            let rotor_inertia = drive.rotor_inertia + drive.joint_inertia / square;
+            rotors[k] = kind == DriveKind::Simple && rotor_inertia > 0.0;
+            if kind != DriveKind::Simple || drive.gear_ratio == 1.0 && !rotors[k] {
                 continue;
             }
+            let rotor = match rotors[k] {
+                true => format!(
+                    "      <drake:gear_ratio value=\"{:?}\"/>\n      <drake:rotor_inertia value=\"{:?}\"/>\n",
+                    drive.gear_ratio, rotor_inertia
+                ),
+                false => String::new(),
+            };
             let name = escaped(&joint.name);
             let _ = writeln!(
                 out,
-                "  <transmission name=\"{name}_transmission\">\n    <type>transmission_interface/SimpleTransmission</type>\n    <joint name=\"{name}\">\n      <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>\n    </joint>\n    <actuator name=\"{name}_motor\">\n      <mechanicalReduction>{:?}</mechanicalReduction>\n    </actuator>\n  </transmission>",
+                "  <transmission name=\"{name}_transmission\">\n    <type>transmission_interface/SimpleTransmission</type>\n    <joint name=\"{name}\">\n      <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>\n    </joint>\n    <actuator name=\"{name}_motor\">\n      <mechanicalReduction>{:?}</mechanicalReduction>\n{rotor}    </actuator>\n  </transmission>",
                 drive.gear_ratio
             );
         }
+        rotors
     }
 }
 

@@ -6,9 +6,10 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rig_shared::multibody::{Chain, column, inverse_dynamics};
+use rig_shared::transmission::DriveKind;
 
 use crate::robot::{
-    EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, Inertial, Joint, JointFriction, JointKind,
+    Drive, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, Inertial, Joint, JointFriction, JointKind,
     ONE_LINK_TEMPLATE, Robot, TX40, XL330,
 };
 
@@ -39,6 +40,17 @@ pub(in crate::robot) fn body(rng: &mut Pcg64) -> Inertial {
         }
     }
     inertial
+}
+
+/// A simple drive with its rotor.
+fn drive(rng: &mut Pcg64) -> Drive {
+    let gear_ratio = [1.0, -48.0, 120.0][rng.random_range(0..3)];
+    Drive {
+        gear_ratio,
+        rotor_inertia: rng.random_range(0.0..1.0) / (gear_ratio * gear_ratio),
+        joint_inertia: rng.random_range(0.0..0.5),
+        ..Drive::default()
+    }
 }
 
 fn random(rng: &mut Pcg64) -> Robot {
@@ -75,7 +87,7 @@ fn random(rng: &mut Pcg64) -> Robot {
                 viscous: rng.random_range(0.0..2.0),
                 offset: 0.0,
             }),
-            drive: None,
+            drive: rng.random_bool(0.6).then(|| drive(rng)),
             controller: None,
             voltage_controller: None,
         })
@@ -92,13 +104,15 @@ fn random(rng: &mut Pcg64) -> Robot {
     }
 }
 
-fn torques(robot: &Robot, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
+fn torques(robot: &Robot, coupled: &[bool], [q, qd, qdd]: [&[f64]; 3]) -> Vec<f64> {
     let chain = Chain::new(&robot.geometry(), robot.gravity).unwrap();
     let mut parameters = robot.standard_parameters();
-    for row in &mut parameters {
-        // URDF can hold neither.
-        row[column::DRIVE_INERTIA] = 0.0;
+    for (row, coupled) in parameters.iter_mut().zip(coupled) {
+        // URDF holds neither a constant torque nor the inertia of coupled drives.
         row[column::OFFSET] = 0.0;
+        if *coupled {
+            row[column::DRIVE_INERTIA] = 0.0;
+        }
     }
     let mut tau = vec![f64::NAN; q.len()];
     inverse_dynamics(&chain, &parameters, q, qd, qdd, &mut tau).unwrap();
@@ -114,6 +128,9 @@ fn same_dynamics(robot: &Robot, rng: &mut Pcg64) {
     back.gravity = back.gravity.map(|x| x * times);
     let names = |r: &Robot| r.joints.iter().map(|j| j.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&back), names(robot));
+    let coupled: Vec<bool> = (robot.drive_kinds().iter())
+        .map(|kind| *kind != DriveKind::Simple)
+        .collect();
     for _ in 0..5 {
         let mut signal = |range: f64| -> Vec<f64> {
             (0..robot.joints.len())
@@ -121,7 +138,7 @@ fn same_dynamics(robot: &Robot, rng: &mut Pcg64) {
                 .collect()
         };
         let (q, qd, qdd) = (signal(3.0), signal(3.0), signal(10.0));
-        let (a, b) = (torques(robot, &q, &qd, &qdd), torques(&back, &q, &qd, &qdd));
+        let [a, b] = [robot, &back].map(|r| torques(r, &coupled, [&q, &qd, &qdd]));
         let scale = a.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
         for (x, y) in a.iter().zip(&b) {
             assert!((x - y).abs() < 1e-7 * scale, "{a:?} {b:?}\n{text}");
@@ -189,11 +206,16 @@ fn limits_drives_and_what_is_left_out_are_told() {
             .any(|r| r.contains("several joints") && r.contains("joint_6"))
     );
     let irp6 = Robot::from_toml(IRP6_TEMPLATE, Path::new("r.toml")).unwrap();
-    let message = irp6.to_urdf().unwrap().remarks.join(" ");
+    let urdf = irp6.to_urdf().unwrap();
+    let message = urdf.remarks.join(" ");
     assert!(
-        message.contains("inertia of the drives") && message.contains("column 4.99"),
+        message.contains("inertia of the drives, seen at the joints: lower_arm 1.638 kg*m^2,"),
         "{message}"
     );
+    // The column has a drive of its own, whose rotor the file holds.
+    let back = Robot::from_urdf(&urdf.text, Path::new("r.urdf")).unwrap();
+    let own = |robot: &Robot| robot.standard_parameters()[0][column::DRIVE_INERTIA];
+    assert!(own(&irp6) > 4.0 && (own(&back) / own(&irp6) - 1.0).abs() < 1e-12);
 }
 
 #[test]
