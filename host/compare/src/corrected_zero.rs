@@ -125,8 +125,12 @@ fn sentence(
         .filter(|([shift, _], _)| *shift != 0.0)
         .map(|([shift, std], name)| format!("{name} {} {unit}", format_value(*shift, *std)))
         .collect();
+    let which = match names.len() {
+        2 => "; two sets do not tell which of them is off",
+        _ => "",
+    };
     let corrected = format!(
-        "With the zero of joint \"{}\" corrected ({}) and the parameters identified again, the sets",
+        "With the zero of joint \"{}\" corrected ({}{which}) and the parameters identified again, the sets",
         described.name,
         sizes.join(", ")
     );
