@@ -51,10 +51,10 @@ pub fn what_falls(d: &Diagnosis) -> Option<&'static str> {
     }
     match d.verdict {
         Verdict::Explained | Verdict::Remainder => Some(
-            "What fitting the parameters again takes off a residual had come from wrong values; what it leaves above the noise floor comes from physics that the model does not have.",
+            "The part of a residual that goes when the parameters are fitted again came from wrong values of the description. The part that stays above the noise floor comes from physics that the model does not have.",
         ),
         Verdict::ParameterChange => Some(
-            "What fitting the parameters again takes off a residual had come from wrong values.",
+            "The part of a residual that goes when the parameters are fitted again came from wrong values of the description.",
         ),
         Verdict::NothingMissing | Verdict::DataFault => None,
     }

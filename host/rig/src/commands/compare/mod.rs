@@ -275,7 +275,7 @@ fn grade(found: &Comparison) -> String {
             "The sets differ, and the difference matters for the torque.".into()
         }
         Grade::Undecided => {
-            "The sets do not differ significantly, but their errors are too large to rely on it."
+            "The sets do not differ significantly, but their errors are too large to call them equal."
                 .into()
         }
         Grade::NotComparable => "The sets are not comparable.".into(),
