@@ -167,3 +167,34 @@ pub(super) fn one_holds_both(a: &str, b: &str) -> bool {
 pub fn is_right(named: &str, truth: &str) -> bool {
     exact_class(truth).contains(named)
 }
+
+/// [`rig_diagnose::evidence::find`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Evidence;
+
+impl Method for Evidence {
+    fn name(&self) -> &'static str {
+        "evidence"
+    }
+
+    fn answer(&self, made: &Made, without: &[Kind]) -> Result<Answer, BenchError> {
+        let options = rig_diagnose::Options {
+            without: without.to_vec(),
+            threads: 1,
+            ..rig_diagnose::Options::default()
+        };
+        let finding = made.with_recordings(|training, _| {
+            rig_diagnose::evidence::find(&made.robot, training, &options)
+        })?;
+        let named = finding.found.iter().map(|found| Named {
+            effect: found.name.into(),
+            set: found.set.iter().map(|name| (*name).into()).collect(),
+            parameters: BTreeMap::new(),
+        });
+        Ok(Answer {
+            named: named.collect(),
+            remainder: !finding.unknown.is_empty() || !finding.doubtful.is_empty(),
+            ..Answer::default()
+        })
+    }
+}

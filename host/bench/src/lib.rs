@@ -20,7 +20,7 @@ mod tests;
 mod trial;
 mod wilson;
 
-pub use answer::{Answer, Diagnose, Method, Named, Proposed, exact_class, is_right};
+pub use answer::{Answer, Diagnose, Evidence, Method, Named, Proposed, exact_class, is_right};
 pub use arms::{ArmCase, ArmOutcome, arm_cases, arm_table, run_arms};
 pub use cases::{Case, Group, Plan};
 pub use error::BenchError;

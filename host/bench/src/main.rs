@@ -23,6 +23,8 @@ enum Judged {
     Stlsq,
     /// Forward regression with orthogonal least squares and BIC.
     Frols,
+    /// The model with the largest evidence.
+    Evidence,
 }
 
 /// Hides effects in recordings of the emulated rig and counts how often they are found.
@@ -273,6 +275,7 @@ fn judge(args: &Args, cases: &[Case], arms: &[ArmCase]) -> Result<(), BenchError
                 Judged::Diagnose => &Diagnose,
                 Judged::Stlsq => &Stlsq,
                 Judged::Frols => &Frols,
+                Judged::Evidence => &rig_bench::Evidence,
             }
         })
         .collect();

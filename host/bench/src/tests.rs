@@ -199,3 +199,63 @@ fn a_constant_that_the_library_lacks_is_not_passed_off_as_a_tilt() {
     // A spring with negative stiffness, or with a preload only, is no spring.
     assert!(unknown.named.iter().all(|named| named.effect != "spring"));
 }
+
+/// Effects with the laws of the emulated rig, which differ in form from those of the library.
+fn hidden_pair() -> [Effect; 2] {
+    let presliding = Effect::Presliding { stroke: 4.0e-3 };
+    let cogging = Effect::Cogging {
+        amplitude: 0.2,
+        order: 12.0,
+        phase: 1.0,
+    };
+    [presliding, cogging]
+}
+
+#[test]
+fn the_evidence_names_what_is_hidden_and_nothing_else() {
+    let nothing = Scenario::short([], 11).make().unwrap();
+    let none = Evidence.answer(&nothing, &[]).unwrap();
+    assert!(none.named.is_empty() && !none.remainder, "{none:?}");
+    let made = Scenario::short(hidden_pair(), 12).make().unwrap();
+    let both = Evidence.answer(&made, &[]).unwrap();
+    let names: BTreeSet<&str> = both.named.iter().map(|n| n.effect.as_str()).collect();
+    assert_eq!(names, BTreeSet::from(["cogging", "presliding"]), "{both:?}");
+    assert!(!both.remainder, "{both:?}");
+}
+
+#[test]
+fn the_evidence_needs_no_repeated_run() {
+    let alone = |effects: &[Effect], seed| Made {
+        repeat: None,
+        ..Scenario::short(effects.iter().copied(), seed)
+            .make()
+            .unwrap()
+    };
+    let none = Evidence.answer(&alone(&[], 13), &[]).unwrap();
+    assert!(none.named.is_empty() && !none.remainder, "{none:?}");
+    let both = Evidence.answer(&alone(&hidden_pair(), 14), &[]).unwrap();
+    let names: BTreeSet<&str> = both.named.iter().map(|n| n.effect.as_str()).collect();
+    assert_eq!(names, BTreeSet::from(["cogging", "presliding"]), "{both:?}");
+}
+
+#[test]
+fn the_evidence_says_along_what_an_unknown_torque_acts() {
+    let effect = Effect::PositionFriction {
+        amplitude: 0.2,
+        order: 3.0,
+        phase: 1.0,
+    };
+    let made = Scenario::short([effect], 15).make().unwrap();
+    let options = rig_diagnose::Options {
+        without: vec![Kind::PositionFriction],
+        ..rig_diagnose::Options::default()
+    };
+    let finding = made
+        .with_recordings(|training, _| {
+            rig_diagnose::evidence::find(&made.robot, training, &options)
+        })
+        .unwrap();
+    assert!(finding.found.is_empty(), "{finding:?}");
+    let along: Vec<&str> = finding.unknown.iter().map(|u| u.along).collect();
+    assert_eq!(along, ["position, by direction"], "{finding:?}");
+}

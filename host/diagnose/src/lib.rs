@@ -24,6 +24,7 @@ mod acceptance;
 mod columns;
 mod description;
 mod engine;
+pub mod evidence;
 pub mod experiment;
 pub mod faults;
 mod fit;

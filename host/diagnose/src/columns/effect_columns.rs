@@ -346,7 +346,7 @@ impl Source<'_> {
     }
 
     /// Returns the identified viscous and Coulomb friction of a joint.
-    fn friction(&self, joint: usize) -> [f64; 2] {
+    pub(crate) fn friction(&self, joint: usize) -> [f64; 2] {
         [column::VISCOUS, column::COULOMB].map(|place| {
             let c = joint * COLUMNS + place;
             let k = self.nominal.base.columns.iter().position(|b| *b == c);

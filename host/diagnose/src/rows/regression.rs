@@ -109,7 +109,7 @@ fn push_nominal(
 }
 
 /// Returns 1 for the samples of a joint that stand still or saturate, and 0 for the others.
-fn spoilt(joint: &JointRun, j: usize, treatment: &PreprocessingPlan) -> Vec<f64> {
+pub(crate) fn spoilt(joint: &JointRun, j: usize, treatment: &PreprocessingPlan) -> Vec<f64> {
     let threshold = treatment.speed_threshold.get(j).copied().unwrap_or(0.0);
     let [low, high] = treatment.saturation.get(j).copied().unwrap_or_default();
     (joint.qd.iter().zip(joint.recorded().iter()))
