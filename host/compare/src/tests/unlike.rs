@@ -107,7 +107,7 @@ pub(super) fn robot(name: &str) -> Robot {
     };
     let mut robot = Robot::from_toml(text, Path::new("robot.toml")).unwrap();
     if name == "tx40" {
-        // The published friction is that of joints and motors together; the description has none.
+        // Friction of joints alone and equal rotors, as the figures of docs/compare.md were measured.
         let friction = [
             (6.0, 8.0),
             (8.0, 6.0),
@@ -122,9 +122,9 @@ pub(super) fn robot(name: &str) -> Robot {
                 viscous,
                 offset: 0.2,
             });
-            // Not published.
             if let Some(drive) = &mut joint.drive {
                 drive.rotor_inertia = 5e-5;
+                (drive.coulomb, drive.viscous) = (0.0, 0.0);
             }
         }
     }

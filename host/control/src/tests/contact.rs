@@ -56,7 +56,7 @@ fn choose(robot: &Robot, options: &ContactOptions, settings: &Settings) -> Conta
 
 #[test]
 fn force_settles_without_overshoot_on_soft_and_stiff_surfaces() {
-    for name in ["one-link.toml", "edda.toml", "irp6.toml"] {
+    for name in ["one-link.toml", "edda.toml", "irp6.toml", "tx40.toml"] {
         for stiffness in [1e3, 1e4, 1e5] {
             let rough = robot(name);
             let mut settings = Settings::default();

@@ -19,7 +19,7 @@ const PLACE: [f64; 3] = [0.03, -0.02, 0.1];
 /// Moment of inertia of the payload about its centre of mass, kg·m².
 const OWN: f64 = 0.006;
 
-/// Returns an arm that moves: a template, with rotors and friction where it states none.
+/// Returns an arm that moves: a template without dry friction, with rotors where it states none.
 fn arm(name: &str) -> Robot {
     let text = template(name).unwrap();
     let mut robot = Robot::from_toml(text, Path::new("arm.toml")).unwrap();
@@ -28,6 +28,7 @@ fn arm(name: &str) -> Robot {
         if drive.rotor_inertia == 0.0 {
             drive.rotor_inertia = 0.05 / drive.gear_ratio.powi(2);
         }
+        drive.coulomb = 0.0;
         if let Some(friction) = &mut joint.friction {
             (friction.coulomb, friction.viscous) = (0.0, 1.0);
         }

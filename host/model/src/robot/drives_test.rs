@@ -132,7 +132,7 @@ fn wrong_drives_are_named_by_line_and_mend() {
         ),
         (
             "gear_ratio = 45.0 ",
-            "rotor_inertia = 0.1 ",
+            "encoder_counts_per_rev = 4096.0 ",
             &["missing field `gear_ratio`", "[joint.drive.screw]"],
         ),
         (
@@ -209,12 +209,11 @@ fn wrong_drives_are_named_by_line_and_mend() {
 #[test]
 fn motors_that_turn_alike_are_refused_with_the_joint_at_fault() {
     // Motor 5 like motor 6: 32·q5 + 32·q6 for both.
-    let text = TX40.replacen(
-        "gear_ratio = 45.0                      # motor turns per joint turn\n\n[[joint]]\nname = \"joint_6\"",
-        "gear_ratio = 32.0\ncouples = { joint_6 = 32.0 }\n\n[[joint]]\nname = \"joint_6\"",
-        1,
-    );
-    let message = error_of(&text);
+    let mut robot = load(TX40).unwrap();
+    let drive = robot.joints[4].drive.as_mut().unwrap();
+    drive.gear_ratio = 32.0;
+    drive.couples.insert("joint_6".to_owned(), 32.0);
+    let message = error_of(&robot.to_toml().unwrap());
     assert!(
         message.contains("drive of joint `joint_6` is singular"),
         "{message}"

@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
+use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{column, kinetic_energy, potential_energy};
 
 use super::*;
@@ -310,10 +311,55 @@ fn model_and_simulation_agree_on_the_irp6_with_all_its_friction() {
     }
 }
 
+/// The rotors' kinetic energy is ½·J·ψ̇² with the motor speeds ψ̇ = R·q̇ of the published ratios, so they add Rᵀ·J·R to the
+/// inertia matrix, in every pose.
+#[test]
+fn rotors_of_the_tx40_move_by_the_published_ratios() {
+    let path = std::path::Path::new("tx40.toml");
+    let robot = Robot::from_toml(crate::robot::TX40, path).unwrap();
+    let mut bare = robot.clone();
+    for joint in &mut bare.joints {
+        joint.drive.as_mut().unwrap().rotor_inertia = 0.0;
+    }
+    let mut ratios = DMatrix::from_diagonal(&DVector::from_vec(vec![
+        32.0, 32.0, 45.0, -48.0, 45.0, 32.0,
+    ]));
+    ratios[(5, 4)] = 32.0;
+    let rotors = DVector::from_iterator(
+        6,
+        robot
+            .joints
+            .iter()
+            .map(|joint| joint.drive.as_ref().unwrap().rotor_inertia),
+    );
+    let wanted = ratios.transpose() * DMatrix::from_diagonal(&rotors) * &ratios;
+    let matrix = |robot: &Robot, q: &[f64]| {
+        let mut out = vec![0.0; 36];
+        let model = Model::from_robot(robot).unwrap();
+        model.inertia_matrix(q, &mut out).unwrap();
+        DMatrix::from_row_slice(6, 6, &out)
+    };
+    for k in 0..5 {
+        let q: Vec<f64> = (0..6)
+            .map(|j| (1.7 * f64::from(k) + 0.9 * f64::from(j)).sin())
+            .collect();
+        let all = matrix(&robot, &q);
+        assert!((&all - matrix(&bare, &q) - &wanted).amax() < 1e-12);
+        // Every direction has inertia: an integrator can step the arm.
+        let least = all.symmetric_eigen().eigenvalues.min();
+        assert!(least > 0.5 * rotors[5] * 32.0 * 32.0, "{least}");
+    }
+    Stepper::new(&Model::from_robot(&robot).unwrap()).unwrap();
+}
+
 #[test]
 fn coupled_friction_that_would_drive_is_refused() {
     let path = std::path::Path::new("tx40.toml");
-    let robot = Robot::from_toml(crate::robot::TX40, path).unwrap();
+    let mut robot = Robot::from_toml(crate::robot::TX40, path).unwrap();
+    for joint in &mut robot.joints {
+        joint.friction = None;
+        joint.drive.as_mut().unwrap().viscous = 0.0;
+    }
     let mut model = Model::from_robot(&robot).unwrap();
     // Cross damping of the wrist without the diagonal terms that belong to it.
     model.motors.as_mut().unwrap().parameters[5][1] = 0.5;
