@@ -110,4 +110,6 @@ pub use uncertainty::torque_residuals::torque_residuals;
 pub use unmodelled::field_torque::FieldTorque;
 pub use unmodelled::position::PositionTorque;
 pub use unmodelled::tilt::BaseTilt;
-pub use warning::{AtJoint, JointFinding, OwnCutoff, Part, Unsettled, Warning, WarningKind};
+pub use warning::{
+    AtJoint, JointFinding, OwnCutoff, Part, TorqueScale, Unsettled, Warning, WarningKind,
+};

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::mem::{Discriminant, discriminant};
 
-use rig_output::{format_significant, format_unit, listed};
+use rig_output::{format_significant, format_unit, format_value, listed};
 use serde::{Serialize, Serializer};
 
 use crate::estimator::Estimator;
@@ -87,8 +87,49 @@ pub enum Warning {
     Inconsistent(String),
     /// Described effects that the torque for a given motion does not show; a sentence.
     EffectsLeftOut(String),
+    /// The torques of joints are the described gravity times a factor.
+    TorqueScale(Vec<TorqueScale>),
     /// A sentence of the program that read the recordings or judged the values.
     Other(String),
+}
+
+/// The torque of a joint over that of the described gravity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueScale {
+    /// The joint.
+    pub joint: String,
+    /// The factor, 1.
+    pub factor: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// True if the torque of a joint before it shows the described masses, and refutes heavier ones.
+    pub masses_confirmed: bool,
+}
+
+impl TorqueScale {
+    /// Says what the torques of some joints are.
+    fn of_joints(list: &[Self]) -> String {
+        let said = |confirmed: bool| -> Vec<String> {
+            let own = list.iter().filter(|own| own.masses_confirmed == confirmed);
+            own.map(|own| format!("{} of {}", format_value(own.factor, own.std), own.joint))
+                .collect()
+        };
+        let (certain, open) = (said(true), said(false));
+        let mut text = Vec::new();
+        if !certain.is_empty() {
+            text.push(format!(
+                "The torque over that of the described gravity is {} (± one standard deviation), while a joint before it shows the described masses: the torque constant or gear ratio is off by this factor.",
+                listed(&certain)
+            ));
+        }
+        if !open.is_empty() {
+            text.push(format!(
+                "The torque over that of the described gravity is {} (± one standard deviation): if the described masses are right, the torque constant is off by this factor.",
+                listed(&open)
+            ));
+        }
+        text.join(" ")
+    }
 }
 
 /// A cut-off that explains the torque of one joint best.
@@ -439,6 +480,7 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Joints(list) => f.write_str(&of_joints(list)),
+            Self::TorqueScale(list) => f.write_str(&TorqueScale::of_joints(list)),
             Self::Interpolated(text) | Self::EffectsLeftOut(text) | Self::Other(text) => {
                 f.write_str(text)
             }

@@ -17,5 +17,6 @@ pub(crate) mod robot_model;
 pub(crate) mod settled;
 pub(crate) mod solve;
 pub(crate) mod task;
+pub(crate) mod torque_scale;
 pub(crate) mod treated;
 pub(crate) mod warnings;

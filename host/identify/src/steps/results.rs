@@ -6,6 +6,7 @@ use super::further::{Further, further};
 use super::named::Named;
 use super::outcome::Outcome;
 use super::own::Own;
+use super::torque_scale::torque_scale;
 use super::treated::Treated;
 use super::warnings::Heard;
 use crate::error::IdentifyError;
@@ -88,6 +89,10 @@ impl Results<'_> {
         not_excited.append(&mut beyond.hardly_excited);
         let mut warnings = std::mem::take(&mut beyond.warnings);
         warnings.extend(self.warnings(&estimate, lag));
+        // A base that leans changes gravity itself.
+        if self.known.tilt.is_none() {
+            warnings.extend(torque_scale(problem, described, &outcome)?);
+        }
         let stated =
             Effects::of(self.described).map_err(|e| IdentifyError::Model(e.to_string()))?;
         let [taken, left] = stated.uncompensated();

@@ -13,6 +13,7 @@ mod made;
 mod position;
 mod rate;
 mod still;
+mod torque_scale;
 mod tx40;
 
 use super::*;

@@ -1,0 +1,215 @@
+//! Gravity by the torques of each joint against that of the described masses: a scale of a torque, as of a wrong torque
+//! constant.
+//!
+//! A factor in a joint's torques multiplies all its parameters, so the fit itself is as good with it. Gravity is the part
+//! that the description knows: masses are weighed or come from a drawing. For each joint alone, the described gravity
+//! torque enters as one column, its factor unknown; inertias, friction and constants stay free. The gravity columns of the
+//! base parameters then tell whether the described *pattern* over the poses holds (χ² of what they take beyond the factor).
+//! If it does not, the masses are wrong, and nothing is said about the torques.
+//!
+//! A wrong mass beyond the joint in the same proportion looks alike. The joints before it carry that mass as well: if their
+//! gravity is as described, the torque is wrong.
+//!
+//! Leaves out: friction that grows with load unequally in both directions.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use super::outcome::Outcome;
+use crate::error::IdentifyError;
+use crate::estimators::problem::Problem;
+use crate::structure::chain::chain_of;
+use crate::uncertainty::residual::LEAST_ERROR;
+use crate::warning::{TorqueScale, Warning};
+use rig_model::robot::{CONTRADICTED, Robot};
+use rig_numerics::svd::Svd;
+use rig_shared::multibody::{COLUMNS, column, inverse_dynamics};
+
+/// Poses at which gravity is looked for.
+const POSES: usize = 8;
+/// Relative singular value below which a direction is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Gravity in the torques of a joint beside inertias, friction and constants.
+struct Gravity {
+    /// Joint, counted from 0.
+    joint: usize,
+    /// Columns of the base parameters that weigh.
+    columns: DMatrix<f64>,
+    torque: DVector<f64>,
+    /// Standard deviation of the torque's noise, with its memory.
+    std: f64,
+}
+
+/// A joint's torque over that of the described gravity.
+#[derive(Clone, Copy)]
+struct Scale {
+    factor: f64,
+    std: f64,
+}
+
+impl Scale {
+    /// Returns true if the torque is not that of the described gravity.
+    fn contradicts(&self) -> bool {
+        (self.factor - 1.0).abs() > CONTRADICTED * self.std
+    }
+}
+
+/// Says which joints' torques are the described gravity times a factor.
+///
+/// # Errors
+/// [`IdentifyError::Model`]: a chain without a model.
+pub(crate) fn torque_scale(
+    problem: &Problem,
+    described: &Robot,
+    result: &Outcome,
+) -> Result<Option<Warning>, IdentifyError> {
+    let columns = gravity_columns(problem, described)?;
+    if columns.is_empty() {
+        return Ok(None);
+    }
+    let weights = |robot: &Robot| {
+        let all = stated(problem, robot);
+        DVector::from_iterator(columns.len(), columns.iter().map(|c| all[*c]))
+    };
+    let own = weights(described);
+    let scales: Vec<(Gravity, Scale)> = (0..described.joints.len())
+        .filter_map(|joint| Gravity::of(problem, result, joint, &columns))
+        .filter_map(|gravity| gravity.scale(&own).map(|scale| (gravity, scale)))
+        .collect();
+    let mut found = Vec::new();
+    for (gravity, scale) in scales.iter().filter(|(_, scale)| scale.contradicts()) {
+        let heavier = weights(&with_masses(described, gravity.joint, scale.factor));
+        let masses_confirmed = scales.iter().any(|(before, other)| {
+            before.joint < gravity.joint && !other.contradicts() && before.refutes(&heavier)
+        });
+        found.push(TorqueScale {
+            joint: described.joints[gravity.joint].name.clone(),
+            factor: scale.factor,
+            std: scale.std,
+            masses_confirmed,
+        });
+    }
+    Ok((!found.is_empty()).then_some(Warning::TorqueScale(found)))
+}
+
+/// Returns the robot whose links from a joint on are heavier by a factor.
+fn with_masses(described: &Robot, joint: usize, factor: f64) -> Robot {
+    let mut robot = described.clone();
+    for own in robot.joints.iter_mut().skip(joint) {
+        if let Some(body) = &mut own.inertial {
+            body.mass *= factor;
+            body.first_moment = body.first_moment.map(|v| factor * v);
+        }
+    }
+    robot
+}
+
+/// Returns the base columns on which the torque at rest depends.
+fn gravity_columns(problem: &Problem, described: &Robot) -> Result<Vec<usize>, IdentifyError> {
+    let chain = chain_of(described).map_err(|e| IdentifyError::Model(e.to_string()))?;
+    let n = described.joints.len();
+    let still = vec![0.0; n];
+    let mut shown = Vec::new();
+    for (k, &c) in problem.base.columns.iter().enumerate() {
+        if c >= n * COLUMNS || !(column::MASS..column::INERTIA).contains(&(c % COLUMNS)) {
+            continue;
+        }
+        let mut rows = vec![[0.0; COLUMNS]; n];
+        rows[c / COLUMNS][c % COLUMNS] = 1.0;
+        let mut weighs = false;
+        for pose in 0..POSES {
+            // Poses in general position: no two angles are multiples of each other.
+            let q: Vec<f64> = (0..n)
+                .map(|j| 0.7 + 1.3 * pose as f64 + 0.37 * (j * (pose + 1)) as f64)
+                .collect();
+            let mut torque = vec![0.0; n];
+            inverse_dynamics(&chain, &rows, &q, &still, &still, &mut torque)
+                .map_err(|e| IdentifyError::Model(e.to_string()))?;
+            weighs |= torque.iter().any(|t| t.abs() > ROUNDING);
+        }
+        if weighs {
+            shown.push(k);
+        }
+    }
+    Ok(shown)
+}
+
+/// Returns the described values of all base columns.
+fn stated(problem: &Problem, described: &Robot) -> DVector<f64> {
+    let mut standard = described.standard_parameters().as_flattened().to_vec();
+    standard.extend(described.motor_parameters().as_flattened());
+    standard.resize(problem.base.combination.ncols(), 0.0);
+    &problem.base.combination * DVector::from_vec(standard)
+}
+
+impl Gravity {
+    /// Takes the equation of a joint; `None` if it has none.
+    fn of(problem: &Problem, result: &Outcome, joint: usize, columns: &[usize]) -> Option<Self> {
+        let equation = result.factors.get(joint)?;
+        let (r, z) = equation.system();
+        let rms = (equation.right_side_squares() / equation.rows().max(1) as f64).sqrt();
+        let noise = (1.0 / problem.weights.get(joint)?).max(LEAST_ERROR * rms);
+        let memory = result.memory.get(joint).copied();
+        let memory = memory.unwrap_or(result.estimate.memory_rows).max(1.0);
+        let others: Vec<usize> = (0..r.ncols()).filter(|c| !columns.contains(c)).collect();
+        let beside = directions(r.select_columns(&others));
+        let columns = r.select_columns(columns);
+        Some(Self {
+            joint,
+            columns: &columns - &beside * beside.tr_mul(&columns),
+            torque: &z - &beside * beside.tr_mul(&z),
+            std: noise * memory.sqrt(),
+        })
+    }
+
+    /// Compares the torque with the described gravity; `None` if the data do not show it, or if the described pattern over
+    /// the poses does not hold.
+    fn scale(&self, stated: &DVector<f64>) -> Option<Scale> {
+        let gravity = &self.columns * stated;
+        let size = gravity.norm();
+        if !(size > CONTRADICTED * self.std) {
+            return None;
+        }
+        let factor = gravity.dot(&self.torque) / (size * size);
+        let left = &self.torque - &gravity * factor;
+        let along = gravity / size;
+        let pattern = directions(&self.columns - &along * along.tr_mul(&self.columns));
+        let holds = pattern.ncols() > 0 && !self.contradicted(&pattern, &left);
+        holds.then(|| Scale {
+            factor,
+            std: self.std / size,
+        })
+    }
+
+    /// Returns true if the torque contradicts a gravity.
+    fn refutes(&self, stated: &DVector<f64>) -> bool {
+        let left = &self.torque - &self.columns * stated;
+        self.contradicted(&directions(self.columns.clone()), &left)
+    }
+
+    /// Returns true if a torque along some directions is farther from zero than a value that counts as contradicted.
+    fn contradicted(&self, directions: &DMatrix<f64>, torque: &DVector<f64>) -> bool {
+        let squares = directions.tr_mul(torque).norm_squared() / (self.std * self.std);
+        let chance = 2.0 * Normal::standard().sf(CONTRADICTED);
+        ChiSquared::new(directions.ncols() as f64).is_ok_and(|d| d.sf(squares) < chance)
+    }
+}
+
+/// Returns orthonormal directions that span columns, whatever their sizes.
+fn directions(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let largest = matrix.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+    let columns: Vec<DVector<f64>> = (matrix.column_iter())
+        .filter(|c| c.norm() > ROUNDING * largest)
+        .map(|c| c.normalize())
+        .collect();
+    if columns.is_empty() {
+        return DMatrix::zeros(matrix.nrows(), 0);
+    }
+    let svd = Svd::of(DMatrix::from_columns(&columns));
+    let most = svd.singular_values.max();
+    let kept: Vec<usize> = (0..svd.singular_values.len())
+        .filter(|k| svd.singular_values[*k] > ROUNDING.sqrt() * most)
+        .collect();
+    svd.u.select_columns(&kept)
+}
