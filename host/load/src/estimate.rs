@@ -12,6 +12,9 @@ pub(crate) const PLAUSIBLE_DISTANCE: f64 = 0.1;
 const ROUNDING: f64 = 1e-9;
 /// Standard deviations by which a mass differs certainly from none.
 pub(crate) const CERTAIN: f64 = 5.0;
+/// Probability by chance below which two values of the same thing contradict each other: the load by sensor and by torques,
+/// and its mass and a known one.
+pub(crate) const CONTRADICTS: f64 = 1e-3;
 /// A parameter is shown if its standard deviation is below this share of its plausible size.
 const SHOWN: f64 = 0.5;
 
@@ -77,6 +80,18 @@ impl Estimate {
             self.values[k] = 0.0;
             self.beyond[(k, k)] = self.sizes[k].powi(2);
         }
+    }
+
+    /// Adds independent errors to the covariance, one column each, with the change of the parameters that one standard
+    /// deviation of it makes. Directions that the data do not show stay hidden.
+    pub(crate) fn widen<const N: usize>(&mut self, errors: &SMatrix<f64, INERTIAL_PARAMETERS, N>) {
+        self.covariance += errors * errors.transpose();
+        // Woodbury: (C + L·Lᵀ)⁻¹ = I − I·L·(1 + Lᵀ·I·L)⁻¹·Lᵀ·I, on the directions of the information I alone.
+        let weighed = self.information * errors;
+        let inner = SMatrix::<f64, N, N>::identity() + errors.transpose() * weighed;
+        let inner = symmetric_inverse(&DMatrix::from_column_slice(N, N, inner.as_slice()));
+        let inner = SMatrix::<f64, N, N>::from_iterator(inner.iter().copied());
+        self.information -= weighed * inner * weighed.transpose();
     }
 
     /// Returns for each parameter if the data show it.

@@ -9,6 +9,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::error::LoadError;
 use crate::estimate::Estimate;
+use crate::gain_error::GainError;
 use crate::mounting::Channels;
 use crate::pose_noise::Scatter;
 use crate::statistics::{Recorded, noise_floor};
@@ -68,6 +69,8 @@ pub struct SensorFindings {
     /// RMS that noise of the forces, N, and of the moments, N·m, leaves in the band of the fit, inferred from the readings
     /// above the band; `None` for poses.
     pub noise: Option<[f64; 2]>,
+    /// What gains of the channels that are off at random mean for the load.
+    pub gain_error: GainError,
     /// Bias by recording.
     pub biases: Vec<Bias>,
     /// Change of the bias per °C, if the data show one.
@@ -100,6 +103,8 @@ pub(crate) struct Told<'a> {
     pub delay: f64,
     /// True if the fit leaves about the noise. Otherwise properties that it found may stand for something else.
     pub explains: bool,
+    /// What errors of the gains mean.
+    pub gain_error: GainError,
 }
 
 impl Told<'_> {
@@ -178,6 +183,7 @@ impl Told<'_> {
             share: self.sensed.share(self.fit),
             noise: noise_floor(self.sensed.recordings)
                 .or_else(|| self.scatter().noise().map(|(noise, _)| noise)),
+            gain_error: self.gain_error,
             biases,
             warming: self.sensed.warming(self.fit),
             traces: self.traces(),

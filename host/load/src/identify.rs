@@ -5,15 +5,18 @@ use rig_data::prepare::Recording;
 use rig_identify::{chain_of, least_eigenvalue};
 use rig_model::robot::{Joint, Load, Robot};
 use rig_output::{format_significant, format_unit, listed};
-use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
+use rig_shared::multibody::{COLUMN_NAMES, Chain, INERTIAL_PARAMETERS};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::axes::parameters_from;
 use crate::body::body;
 use crate::error::LoadError;
-use crate::estimate::{CERTAIN, Estimate, Parameters, Spread, Square, estimate, sizes_of};
+use crate::estimate::{
+    CERTAIN, CONTRADICTS, Estimate, Parameters, Spread, Square, estimate, sizes_of,
+};
 use crate::findings::SensorFindings;
 use crate::intake::Sensing;
+use crate::known_mass::MassCheck;
 use crate::limits::too_heavy;
 use crate::load_friction;
 use crate::missing::missing;
@@ -22,8 +25,6 @@ use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, num
 use crate::sensor::by_sensor;
 use crate::torque::{Driven, Equations, equations};
 
-/// Probability by chance below which sensor and torques contradict each other.
-const CONTRADICTS: f64 = 1e-3;
 /// Standard deviation along a direction, relative to the plausible size, up to which two estimates are compared.
 const COMPARED: f64 = 0.5;
 
@@ -49,25 +50,7 @@ pub fn identify_load(
     let to_joint = parameters_from(&robot.flange_pose());
     let chain = chain_of(robot)?;
     let mut warnings = Vec::new();
-    let sensed = match options.by {
-        By::Torque => None,
-        By::Sensor | By::Both => {
-            let loaded = with.iter().map(|r| (*r, true));
-            let all: Vec<(&dyn Recording, bool)> =
-                loaded.chain(without.iter().map(|r| (*r, false))).collect();
-            Some(by_sensor(
-                &Sensing {
-                    robot,
-                    chain: &chain,
-                    recordings: &all,
-                    prepare: &options.prepare,
-                    poses: options.poses,
-                    even_if_wrong: options.even_if_wrong,
-                },
-                &mut warnings,
-            )?)
-        }
-    };
+    let sensed = sensed(robot, &chain, [with, without], options, &mut warnings)?;
     let driven = match options.by {
         By::Sensor => None,
         By::Torque | By::Both => Some(by_torque(
@@ -84,6 +67,12 @@ pub fn identify_load(
     };
     let (sensed, sensor) = sensed.unzip();
     let (driven, torque) = driven.unzip();
+    let mass_checks = mass_checks(
+        robot,
+        [(sensed.as_ref(), By::Sensor), (driven.as_ref(), By::Torque)],
+        options,
+        &mut warnings,
+    )?;
     if torque.as_ref().is_some_and(|torque| !torque.with_unloaded) {
         warnings.push(by_description(robot)?);
     }
@@ -115,10 +104,70 @@ pub fn identify_load(
             sensor,
             torque,
             agreement,
+            mass_checks,
             not_shown,
             warnings,
         },
     )
+}
+
+/// Compares the masses by sensor and by torques with the known one, if there is one.
+///
+/// # Errors
+/// [`LoadError::Fault`] if the forces look like another unit, unless the user goes on.
+fn mass_checks(
+    robot: &Robot,
+    estimates: [(Option<&Estimate>, By); 2],
+    options: &LoadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<MassCheck>, LoadError> {
+    let Some(known) = options.known_mass else {
+        return Ok(Vec::new());
+    };
+    let beside = options.tool.as_ref().map_or(0.0, |tool| tool.mass);
+    let mut checks = Vec::new();
+    let sensor = robot.wrist_sensor.clone().unwrap_or_default();
+    for (found, by) in estimates {
+        let Some(found) = found else { continue };
+        let Some(check) = MassCheck::of(found, by, known, beside) else {
+            continue;
+        };
+        let centre = [1, 2, 3].map(|k| found.values[k] / found.values[0]);
+        match check.words([centre, sensor.position], found.degrees_of_freedom) {
+            Err(LoadError::Fault(text)) if options.even_if_wrong => warnings.push(text),
+            other => warnings.extend(other?),
+        }
+        checks.push(check);
+    }
+    Ok(checks)
+}
+
+/// Identifies the load by the sensor, if it is wanted.
+///
+/// # Errors
+/// [`LoadError`].
+fn sensed(
+    robot: &Robot,
+    chain: &Chain<f64>,
+    [with, without]: [&[&dyn Recording]; 2],
+    options: &LoadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Option<(Estimate, SensorFindings)>, LoadError> {
+    if options.by == By::Torque {
+        return Ok(None);
+    }
+    let loaded = with.iter().map(|r| (*r, true));
+    let all: Vec<(&dyn Recording, bool)> =
+        loaded.chain(without.iter().map(|r| (*r, false))).collect();
+    let sensing = Sensing {
+        robot,
+        chain,
+        recordings: &all,
+        prepare: &options.prepare,
+        poses: options.poses,
+        even_if_wrong: options.even_if_wrong,
+    };
+    by_sensor(&sensing, warnings).map(Some)
 }
 
 /// What is told beside the load.
@@ -126,6 +175,7 @@ struct Parts {
     sensor: Option<SensorFindings>,
     torque: Option<TorqueFindings>,
     agreement: Option<Agreement>,
+    mass_checks: Vec<MassCheck>,
     not_shown: Vec<NotShown>,
     warnings: Vec<String>,
 }
@@ -141,6 +191,7 @@ fn described(
         sensor,
         torque,
         agreement,
+        mass_checks,
         not_shown,
         mut warnings,
     } = parts;
@@ -182,6 +233,7 @@ fn described(
         sensor,
         torque,
         agreement,
+        mass_checks,
         not_shown,
         warnings,
     })

@@ -17,6 +17,15 @@ pub enum By {
     Both,
 }
 
+/// A mass that is known otherwise, as by scales.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct KnownMass {
+    /// kg
+    pub mass: f64,
+    /// Its standard deviation, kg.
+    pub std: f64,
+}
+
 /// Settings.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
@@ -26,6 +35,8 @@ pub struct LoadOptions {
     pub poses: bool,
     /// What is mounted beyond the sensor beside the load, in the flange frame: it is subtracted.
     pub tool: Option<Load>,
+    /// Mass of the load as weighed; it is compared with the identified one, and enters no fit.
+    pub known_mass: Option<KnownMass>,
     /// How the recordings are prepared.
     pub prepare: PrepareOptions,
     /// True to go on with the best explanation if the readings look wrong.

@@ -1,14 +1,16 @@
 //! The identified load.
 
-use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rig_data::prepare::PreprocessingPlan;
 use rig_identify::{t_quantile, unit};
 use rig_model::robot::{JointKind, Load};
 use rig_shared::multibody::{COLUMN_NAMES, INERTIAL_PARAMETERS};
 use serde::Serialize;
 
-use crate::estimate::{Estimate, Parameters};
+use crate::central::{central, central_slopes};
+use crate::estimate::Estimate;
 use crate::findings::SensorFindings;
+use crate::known_mass::MassCheck;
 use crate::load_friction::LoadFriction;
 use crate::options::By;
 use crate::torque::TorqueTrace;
@@ -117,6 +119,9 @@ pub struct LoadIdentification {
     /// Comparison of both.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
+    /// Comparison of the masses by sensor and by torques with a known one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mass_checks: Vec<MassCheck>,
     /// What the data do not show, and what would.
     pub not_shown: Vec<NotShown>,
     /// Warnings, the most important first.
@@ -145,43 +150,6 @@ pub struct NotShown {
     pub experiment: String,
     /// A pose that would help most, rad or m a joint, if poses help.
     pub pose: Option<Vec<f64>>,
-}
-
-/// Mass, centre of mass and inertia about it.
-type Central = SVector<f64, INERTIAL_PARAMETERS>;
-
-/// Returns mass, centre of mass and Ixx Ixy Ixz Iyy Iyz Izz about it.
-fn central(p: &Parameters) -> Central {
-    let mass = p[0];
-    let [x, y, z] = [p[1] / mass, p[2] / mass, p[3] / mass];
-    Central::from([
-        mass,
-        x,
-        y,
-        z,
-        p[4] - mass * (y * y + z * z),
-        p[5] + mass * x * y,
-        p[6] + mass * x * z,
-        p[7] - mass * (x * x + z * z),
-        p[8] + mass * y * z,
-        p[9] - mass * (x * x + y * y),
-    ])
-}
-
-/// Returns the derivatives of [`central`], by differences of a thousandth of the plausible sizes.
-fn slopes(found: &Estimate) -> DMatrix<f64> {
-    let mut slopes = DMatrix::zeros(INERTIAL_PARAMETERS, INERTIAL_PARAMETERS);
-    for k in 0..INERTIAL_PARAMETERS {
-        let step = 1e-3 * found.sizes[k];
-        let moved = |by: f64| {
-            let mut p = found.values;
-            p[k] += by;
-            central(&p)
-        };
-        let slope = (moved(step) - moved(-step)) / (2.0 * step);
-        slopes.column_mut(k).copy_from(&slope);
-    }
-    slopes
 }
 
 /// The numbers of a load.
@@ -215,8 +183,8 @@ pub(crate) fn numbers(found: &Estimate) -> Numbers {
         shown: shown[k],
     });
     let middle = central(&found.values);
-    let slopes = slopes(found);
-    let spread = &slopes * all * slopes.transpose();
+    let slopes = central_slopes(found);
+    let spread = slopes * all * slopes.transpose();
     let of = |k: usize| value(middle[k], spread[(k, k)].max(0.0).sqrt());
     let [xx, xy, xz, yy, yz, zz] = [4, 5, 6, 7, 8, 9].map(|k| middle[k]);
     let (principal_moments, principal_axes) =

@@ -12,6 +12,7 @@ use crate::error::LoadError;
 use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
 use crate::faulty_rows::FaultyRows;
 use crate::findings::{SensorFindings, Told};
+use crate::gain_error::{self, ACCURACY};
 use crate::intake::{Intake, Sensing, judged, moving};
 use crate::mounting::Channels;
 use crate::position_columns::changed_positions;
@@ -22,8 +23,6 @@ use crate::units::{alternatives, named};
 
 /// Most times that the readings are shifted by the delay found.
 const MOST_SHIFTS: usize = 8;
-/// Error of a channel's gain that a sound sensor may have: its makers state an accuracy of 0.25 to 1.5 % of the range.
-const ACCURACY: f64 = 0.01;
 
 /// Identifies the load from the wrist sensor; adds sentences to `warnings`.
 ///
@@ -249,7 +248,9 @@ fn finished(
         true => Spread::Residuals(fit.freedom().max(1.0) as usize),
         false => Spread::Segments,
     };
-    let found = estimate(&segments, sensed_mass(&fit), spread);
+    let mut found = estimate(&segments, sensed_mass(&fit), spread);
+    let slopes = gain_error::slopes(sensed, &fit, sensed_mass(&fit));
+    let gain_error = gain_error::count(&mut found, &slopes, sensor.gain_std);
     let findings = Told {
         sensed,
         fit: &fit,
@@ -261,6 +262,7 @@ fn finished(
         scale: fitted.scale,
         delay,
         explains,
+        gain_error,
     };
     let pose = sensing.robot.flange_pose() * sensor.pose();
     warnings.extend(findings.implausible(&found, &pose, sensing.even_if_wrong)?);

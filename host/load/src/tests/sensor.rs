@@ -1,7 +1,7 @@
 //! The load by the wrist sensor: accuracy, flaws of sensors that are found, and what the data do not show.
 
 use super::made::{Moving, Points, Sensor, interpolated, parameters, poses, recorded, tool};
-use crate::{LoadError, LoadIdentification, LoadOptions, identify_load};
+use crate::{KnownMass, LoadError, LoadIdentification, LoadOptions, identify_load};
 use rand::{RngExt, SeedableRng};
 use rig_data::prepare::InMemory;
 use rig_model::robot::{IRP6_TEMPLATE, Reads, Robot, TX40, WristSensor};
@@ -1209,4 +1209,156 @@ fn readings_of_another_motion_are_refused() {
     let refused = identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default());
     let said = refused.expect_err("refused").to_string();
     println!("{said}");
+}
+
+/// Each channel of a sound sensor has a gain of its own that is a third of a per cent off. The noise hides it, and the intervals hold
+/// the truth only if they count it.
+#[test]
+fn intervals_hold_the_truth_beside_gains_that_the_noise_hides() {
+    const LOADS: usize = 60;
+    const GAIN_STD: f64 = 0.003;
+    let mut random = rand_pcg::Pcg64::seed_from_u64(29);
+    let normal = |random: &mut rand_pcg::Pcg64| -> f64 {
+        (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
+    };
+    let sensor = Sensor {
+        noise: [0.4, 0.04],
+        ..Sensor::default()
+    };
+    let points = tool();
+    let truth = parameters(&points);
+    // Mass and the three of the centre; gains counted, and taken as exact.
+    let mut inside = [[0usize; 4]; 2];
+    for load in 0..LOADS {
+        let gains: [f64; 6] = std::array::from_fn(|_| 1.0 + GAIN_STD * normal(&mut random));
+        let flawed = move |_: f64, read: [f64; 6]| std::array::from_fn(|k| gains[k] * read[k]);
+        let moving = Moving::new(tx40(), 0.7, load as u64);
+        let motion = recorded(
+            &moving,
+            &points,
+            &sensor,
+            [12.0, 100.0],
+            load as u64,
+            &flawed,
+        );
+        for (counts, gain_std) in inside.iter_mut().zip([Some(GAIN_STD), None]) {
+            let mut robot = moving.robot.clone();
+            robot.wrist_sensor.as_mut().unwrap().gain_std = gain_std;
+            let found = identify_load(&robot, &[&motion], &[], &LoadOptions::default()).unwrap();
+            let off = (found.mass.value - truth[0]).abs();
+            counts[0] += usize::from(off <= found.mass.half_interval);
+            for k in 0..3 {
+                let off = (found.centre[k].value - truth[k + 1] / truth[0]).abs();
+                counts[k + 1] += usize::from(off <= found.centre[k].half_interval);
+            }
+        }
+    }
+    println!("of {LOADS} intervals {inside:?} contain mass and centre");
+    let [counted, exact] = inside.map(|counts| counts.map(|c| c as f64 / LOADS as f64));
+    // 95 % less three deviations of a binomial of 60.
+    assert!(counted.iter().all(|share| *share >= 0.86), "{inside:?}");
+    assert!(exact[0] < 0.8, "{inside:?}");
+}
+
+/// The effect that is stated is that of a gain: the mass moves by it where a channel is scaled.
+#[test]
+fn the_stated_effect_of_gains_is_that_of_a_scaled_channel() {
+    let points = tool();
+    let sensor = Sensor::default();
+    let moving = Moving::new(irp6(), 0.8, 3);
+    let mass = |gains: [f64; 6]| {
+        let flawed = move |_: f64, read: [f64; 6]| std::array::from_fn(|k| gains[k] * read[k]);
+        let motion = recorded(&moving, &points, &sensor, [20.0, 100.0], 3, &flawed);
+        identify_load(&moving.robot, &[&motion], &[], &LoadOptions::default()).unwrap()
+    };
+    let plain = mass([1.0; 6]);
+    let stated = plain.sensor.as_ref().unwrap().gain_error;
+    assert_eq!(stated.counted, 0.0);
+    let mut squares = 0.0;
+    for channel in 0..6 {
+        let mut gains = [1.0; 6];
+        // So small that it is not told from the noise.
+        gains[channel] += 1e-3;
+        let found = mass(gains);
+        squares += ((found.mass.value - plain.mass.value) * stated.example / 1e-3).powi(2);
+    }
+    assert!(
+        (squares.sqrt() / stated.mass - 1.0).abs() < 0.02,
+        "{} {stated:?}",
+        squares.sqrt()
+    );
+}
+
+/// No recording shows a factor in all readings; a weighed load does.
+#[test]
+fn a_known_mass_tells_kgf_at_rest() {
+    let points = tool();
+    let weighed = |mass: f64| LoadOptions {
+        known_mass: Some(KnownMass { mass, std: 0.002 }),
+        ..LoadOptions::default()
+    };
+    let truth = parameters(&points)[0];
+    let moving = Moving::new(irp6(), 0.8, 5);
+    let list: Vec<Vec<f64>> = (0..10)
+        .map(|k| moving.position(3.1 * f64::from(k)))
+        .collect();
+    let still = poses(&moving, &points, &Sensor::default(), &list, 5);
+    let found = identify_load(&moving.robot, &[&still], &[], &weighed(truth)).unwrap();
+    assert!(
+        found.mass_checks[0].chance > 1e-3,
+        "{:?}",
+        found.mass_checks
+    );
+    let contradicts = |w: &String| w.contains("known mass");
+    assert!(
+        !found.warnings.iter().any(contradicts),
+        "{:?}",
+        found.warnings
+    );
+    for (channels, in_newton_metres) in [(3, true), (6, false)] {
+        let mut other = still.clone();
+        for (_, column) in other.blocks[0].extra.iter_mut().take(channels) {
+            column.iter_mut().for_each(|value| *value /= 9.80665);
+        }
+        let silent = identify_load(&moving.robot, &[&other], &[], &LoadOptions::default()).unwrap();
+        assert!((silent.mass.value * 9.80665 / truth - 1.0).abs() < 0.01);
+        let refused = identify_load(&moving.robot, &[&other], &[], &weighed(truth));
+        let text = refused.unwrap_err().to_string();
+        assert!(
+            text.contains("forces look like kgf") && text.contains("--unit fx=kgf"),
+            "{text}"
+        );
+        // The centre of mass of the readings' true units is one of the two that it gives.
+        let height = parameters(&points)[3] / truth;
+        let (_, places) = text.split_once("if the centre of mass is at ").unwrap();
+        let [both, forces_alone] = [0, 1].map(|k| {
+            let place = places
+                .split(" m in the flange frame; with the moments in N·m it is at ")
+                .nth(k)
+                .unwrap();
+            let last = place
+                .split(" m")
+                .next()
+                .unwrap()
+                .rsplit(", ")
+                .next()
+                .unwrap();
+            last.parse::<f64>().unwrap()
+        });
+        let right = if in_newton_metres { forces_alone } else { both };
+        assert!((right - height).abs() < 0.005, "{text}");
+    }
+    // A factor of no unit.
+    let mut off = still.clone();
+    for (_, column) in &mut off.blocks[0].extra {
+        column.iter_mut().for_each(|value| *value *= 1.12);
+    }
+    let found = identify_load(&moving.robot, &[&off], &[], &weighed(truth)).unwrap();
+    let check = found.mass_checks[0];
+    assert!((check.factor - 1.12).abs() < 4.0 * check.std, "{check:?}");
+    assert!(
+        (found.warnings.iter()).any(|w| w.starts_with("The sensor shows 1.1")),
+        "{:?}",
+        found.warnings
+    );
 }

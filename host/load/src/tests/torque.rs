@@ -1,7 +1,7 @@
 //! The load by joint torques: with and without it, and together with the sensor.
 
 use super::made::{Moving, Points, Sensor, parameters, recorded, tool};
-use crate::{By, LoadOptions, identify_load};
+use crate::{By, KnownMass, LoadOptions, identify_load};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rig_data::prepare::InMemory;
@@ -236,4 +236,42 @@ fn a_residual_of_the_torques_above_their_noise_is_told_with_its_joint() {
     for joint in others {
         assert!(!said.contains(&format!("RMS of {},", joint.name)), "{said}");
     }
+}
+
+/// Torque constants that are 12 % off make a load that is 12 % too heavy and fits as well: a weighed load tells it.
+#[test]
+fn a_known_mass_tells_a_torque_scale() {
+    let moving = Moving::new(arm(), 0.7, 21);
+    let part = tool();
+    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
+    let truth = parameters(&part)[0];
+    let options = LoadOptions {
+        by: By::Torque,
+        known_mass: Some(KnownMass {
+            mass: truth,
+            std: 0.002,
+        }),
+        ..LoadOptions::default()
+    };
+    let [without, with] = [(hand(), 1), (both, 2)].map(|(points, seed)| {
+        let right = driven(&moving, &points, 0.8, seed);
+        let mut wrong = right.clone();
+        for joint in &mut wrong.blocks[0].joints {
+            joint.tau.iter_mut().for_each(|tau| *tau *= 1.12);
+        }
+        [right, wrong]
+    });
+    let found = identify_load(&moving.robot, &[&with[0]], &[&without[0]], &options).unwrap();
+    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    let found = identify_load(&moving.robot, &[&with[1]], &[&without[1]], &options).unwrap();
+    let check = found.mass_checks[0];
+    assert!(
+        (check.factor - 1.12).abs() < 3.0 * check.std && check.std < 0.03,
+        "{check:?}"
+    );
+    assert!(
+        (found.warnings.iter()).any(|w| w.contains("the torque constants of the joints")),
+        "{:?}",
+        found.warnings
+    );
 }

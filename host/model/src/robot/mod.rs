@@ -77,7 +77,7 @@ pub use urdf::{
 pub use voltage_controller::{AntiWindup, Demand, VoltageController};
 pub use workspace::Region;
 pub use worth::{CONTRADICTED, DESCRIBED, Origin, Quantity, STAND_IN, Worth, worth};
-pub use wrist_sensor::{Reads, WristSensor};
+pub use wrist_sensor::{LARGEST_GAIN_STD, Reads, WristSensor};
 
 #[cfg(test)]
 mod drives_test;

@@ -10,6 +10,8 @@ use super::fault::{Fault, Step, written};
 /// Distance from the flange at which no wrist sensor is, m. By judgement: sensors lie within 0.3 m, and a millimetre that counts
 /// as a metre is beyond.
 const FARTHEST: f64 = 1.0;
+/// Largest standard deviation of a gain, relative. Data sheets state 0.25 to 2 %; 0.5 is 0.5 % in per cent.
+pub const LARGEST_GAIN_STD: f64 = 0.1;
 
 /// The sensor at the wrist; [`Flange`](super::Flange) has the flange frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -30,6 +32,9 @@ pub struct WristSensor {
     /// Largest moment that an axis reads, N·m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moment_range: Option<f64>,
+    /// Standard deviation of the gain of a channel, relative: 0.005 for 0.5 %.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_std: Option<f64>,
 }
 
 /// The wrench that a sensor reads.
@@ -114,6 +119,15 @@ impl WristSensor {
                 ));
             }
         }
+        if let Some(found) = self
+            .gain_std
+            .filter(|s| !(0.0..=LARGEST_GAIN_STD).contains(s))
+        {
+            let advice = format!(
+                "it must be at least 0 and at most {LARGEST_GAIN_STD}, a share of 1, not %"
+            );
+            return Err(fault("gain_std", found, &advice));
+        }
         Ok(())
     }
 }
@@ -136,7 +150,7 @@ mod tests {
 
     #[test]
     fn sensor_survives_the_file() {
-        let table = "position = [0.0, 0.01, 0.05]\nrotation = [0.0, 0.0, 0.785]\nreads = \"load\"\nforce_range = 100.0";
+        let table = "position = [0.0, 0.01, 0.05]\nrotation = [0.0, 0.0, 0.785]\nreads = \"load\"\nforce_range = 100.0\ngain_std = 0.005";
         let robot = read(table).unwrap();
         let sensor = robot.wrist_sensor.as_ref().unwrap();
         assert_eq!(sensor.reads, Some(Reads::Load));
@@ -159,6 +173,7 @@ mod tests {
             ("rotation = [0.0, 0.0, 90.0]", "in rad"),
             ("force_range = -1.0", "greater than 0, in N"),
             ("moment_range = nan", "NaN"),
+            ("gain_std = 0.5", "a share of 1, not %"),
             ("reads = \"up\"", "load"),
             ("rotaton = [0.0, 0.0, 0.0]", "rotaton"),
             ("position = [0.0, 0.0]", "3 numbers"),

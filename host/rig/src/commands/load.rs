@@ -16,10 +16,10 @@ use crate::pages::Context;
 use rig_data::EffortNeed;
 use rig_data::prepare::{Choice, PrepareOptions};
 use rig_load::{
-    By, ControllerNumbers, FEWEST_ROWS, LoadIdentification, LoadOptions, Value, controller_numbers,
-    identify_load, urdf_link,
+    By, ControllerNumbers, FEWEST_ROWS, KnownMass, LoadIdentification, LoadOptions, Value,
+    controller_numbers, identify_load, urdf_link,
 };
-use rig_model::robot::{Description, Load, Original, Reads, Robot, WristSensor};
+use rig_model::robot::{Description, LARGEST_GAIN_STD, Load, Original, Reads, Robot, WristSensor};
 use rig_output::{can_take, folder, format_significant, format_value, write_whole};
 
 /// Files that the command writes.
@@ -57,6 +57,17 @@ pub(crate) struct Args {
     /// A known load (load.toml) that is mounted as well, and is subtracted
     #[arg(long, value_name = "FILE", conflicts_with = "without")]
     tool: Option<PathBuf>,
+    /// Mass of the load as weighed, kg: a contradiction to the identified mass tells a wrong unit of the forces, or a wrong
+    /// scale of forces or torques. It enters no fit
+    #[arg(long, value_name = "KG")]
+    mass: Option<f64>,
+    /// Standard deviation of --mass, kg
+    #[arg(long, value_name = "KG", requires = "mass", default_value_t = 0.0)]
+    mass_std: f64,
+    /// Standard deviation of the gain of a channel of the sensor, relative (0.005 for 0.5 %): it is counted in the standard
+    /// deviations of the load [default: gain_std of [wrist_sensor]; without it gains count as exact]
+    #[arg(long, value_name = "SHARE")]
+    gain_std: Option<f64>,
     /// Origin of the sensor in the flange frame, m
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     sensor_position: Option<Vec<f64>>,
@@ -281,6 +292,14 @@ fn sensor(args: &Args, robot: &mut Robot) -> Result<(), CommandError> {
             ReadsArg::Robot => Reads::Robot,
         });
     }
+    if let Some(std) = args.gain_std {
+        if !(0.0..=LARGEST_GAIN_STD).contains(&std) {
+            return Err(CommandError::Sentence(format!(
+                "--gain-std {std} is not possible: give a share of 1 from 0 to {LARGEST_GAIN_STD} (0.005 for 0.5 %)."
+            )));
+        }
+        sensor.gain_std = Some(std);
+    }
     if args.by != Measured::Torque || sensor != WristSensor::default() {
         robot.wrist_sensor = Some(sensor);
     }
@@ -319,6 +338,20 @@ fn write(
     Ok(())
 }
 
+/// Returns the mass that the user knows.
+fn known_mass(args: &Args) -> Result<Option<KnownMass>, CommandError> {
+    let Some(mass) = args.mass else {
+        return Ok(None);
+    };
+    let std = args.mass_std;
+    if !(mass > 0.0 && mass.is_finite() && (0.0..mass).contains(&std)) {
+        return Err(CommandError::Sentence(format!(
+            "--mass {mass} with --mass-std {std} is not possible: give a mass greater than 0 and a standard deviation below it, in kg."
+        )));
+    }
+    Ok(Some(KnownMass { mass, std }))
+}
+
 /// Returns the options of the identification.
 fn options(args: &Args) -> Result<LoadOptions, CommandError> {
     Ok(LoadOptions {
@@ -329,6 +362,7 @@ fn options(args: &Args) -> Result<LoadOptions, CommandError> {
         },
         poses: args.poses,
         tool: args.tool.as_deref().map(Load::read).transpose()?,
+        known_mass: known_mass(args)?,
         prepare: PrepareOptions {
             cutoff: args.cutoff.map_or(Choice::Auto, Choice::Fixed),
             ..PrepareOptions::default()
@@ -369,7 +403,18 @@ fn lines(
             format_significant(sensor.residual[0], 3),
             format_significant(sensor.residual[1], 3)
         ));
+        lines.push(sensor.gain_error.words());
     }
+    lines.extend(found.mass_checks.iter().map(|check| {
+        let whose = match check.by {
+            By::Torque => "torques",
+            By::Sensor | By::Both => "sensor",
+        };
+        format!(
+            "mass by the {whose} over the known mass: {}",
+            format_value(check.factor, check.std)
+        )
+    }));
     for missing in &found.not_shown {
         let mut line = format!(
             "not shown by these data: {}. {}",

@@ -202,6 +202,10 @@ fn readings(sensor: &SensorFindings) -> Section {
             format_significant(moment, 3)
         )),
     )))
+    .with(Block::Text(format!(
+        "Gains of the sensor, one standard deviation: {}.",
+        sensor.gain_error.words()
+    )))
 }
 
 /// Draws one kind of readings with the fit; poses (`still`) are not joined by lines, because nothing was recorded between.

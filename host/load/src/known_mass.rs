@@ -1,0 +1,157 @@
+//! The mass of a weighed load against the identified one: the one thing that a factor in all readings changes.
+//!
+//! A factor in all forces and moments, or in all torques, gives a load that weighs so much more and fits as well. So neither
+//! poses nor a motion show it: only a mass that is known otherwise does.
+
+use rig_data::{Unit, WRENCH_COLUMNS};
+use rig_output::{format_significant, format_value};
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::error::LoadError;
+use crate::estimate::{CONTRADICTS, Estimate};
+use crate::gain_error::ACCURACY;
+use crate::options::{By, KnownMass};
+
+/// Units of forces that a driver may give instead of N, with the unit of the moments that goes with each.
+const UNITS: [[&str; 2]; 3] = [["kgf", "kgfm"], ["lbf", "lbfft"], ["mN", "mNm"]];
+
+/// Comparison of the identified mass with a known one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MassCheck {
+    /// What the load was measured by: the sensor or the torques.
+    pub by: By,
+    /// The known mass.
+    pub known: KnownMass,
+    /// Identified mass over the known one.
+    pub factor: f64,
+    /// Standard deviation of the factor.
+    pub std: f64,
+    /// Probability that both differ by chance as much as they do (Student's t).
+    pub chance: f64,
+}
+
+impl MassCheck {
+    /// Compares an estimate of the load with what is known of its mass. `beside` is the mass of a known tool that the
+    /// estimate contains, kg. `None` if the data do not show the mass.
+    pub(crate) fn of(found: &Estimate, by: By, known: KnownMass, beside: f64) -> Option<Self> {
+        if !found.shown()[0] {
+            return None;
+        }
+        let (all, own) = (known.mass + beside, found.std()[0]);
+        let factor = found.values[0] / all;
+        let std = own.hypot(factor * known.std) / all;
+        let mut check = Self {
+            by,
+            known,
+            factor,
+            std,
+            chance: 1.0,
+        };
+        check.chance = chance((factor - 1.0) / std, found.degrees_of_freedom);
+        Some(check)
+    }
+
+    /// Returns true if the identified mass contradicts the known one.
+    pub(crate) fn contradicts(&self) -> bool {
+        self.chance < CONTRADICTS
+    }
+
+    /// Says how the masses differ; `None` if by no more than chance.
+    ///
+    /// # Errors
+    /// [`LoadError::Fault`] with the unit that the forces look like. `places` are the identified centre of mass and the
+    /// origin of the sensor in the flange frame, m.
+    pub(crate) fn words(
+        &self,
+        places: [[f64; 3]; 2],
+        degrees_of_freedom: usize,
+    ) -> Result<Option<String>, LoadError> {
+        if !self.contradicts() {
+            return Ok(None);
+        }
+        let factor = format_value(self.factor, self.std);
+        let known = format_significant(self.known.mass, 4);
+        match self.by {
+            By::Torque => Ok(Some(format!(
+                "The joint torques show {factor} times the known mass of {known} kg (± one standard deviation): the torque constants of the joints that carry it look off by this factor, or the known mass is."
+            ))),
+            By::Sensor | By::Both => match self.unit(degrees_of_freedom) {
+                Some(units) => Err(LoadError::Fault(unit_words(units, &factor, &known, places))),
+                None => Ok(Some(format!(
+                    "The sensor shows {factor} times the known mass of {known} kg (± one standard deviation): the gains of the forces look off by this factor, or the known mass is."
+                ))),
+            },
+        }
+    }
+
+    /// Returns the units of forces and moments that the factor is that of, within the accuracy of a sound sensor.
+    fn unit(&self, degrees_of_freedom: usize) -> Option<[&'static str; 2]> {
+        UNITS.into_iter().find(|[force, _]| {
+            // A reading in a larger unit is a smaller number.
+            let is = self.factor * Unit::named(force).map_or(f64::NAN, |unit| unit.factor);
+            let std = (self.std / self.factor).hypot(ACCURACY);
+            chance((is - 1.0) / std, degrees_of_freedom) >= CONTRADICTS
+        })
+    }
+}
+
+/// Probability by chance of a deviation of either sign, in standard deviations.
+fn chance(deviations: f64, degrees_of_freedom: usize) -> f64 {
+    let freedom = degrees_of_freedom.max(1) as f64;
+    match StudentsT::new(0.0, 1.0, freedom) {
+        Ok(t) if deviations.is_finite() => 2.0 * t.sf(deviations.abs()),
+        _ => 0.0,
+    }
+}
+
+fn unit_words(
+    [force, moment]: [&str; 2],
+    factor: &str,
+    known: &str,
+    [centre, origin]: [[f64; 3]; 2],
+) -> String {
+    let [forces, moments] = [(0, force), (3, moment)].map(|(first, unit)| {
+        let columns = &WRENCH_COLUMNS[first..first + 3];
+        let all: Vec<String> = (columns.iter().map(|c| format!("--unit {c}={unit}"))).collect();
+        all.join(" ")
+    });
+    let shorter = Unit::named(force).map_or(1.0, |unit| unit.factor);
+    // The lever arm of the moments begins at the origin of the sensor.
+    let place = |by: f64| -> String {
+        let at = |k: usize| origin[k] + (centre[k] - origin[k]) / by;
+        [0, 1, 2].map(|k| format_significant(at(k), 3)).join(", ")
+    };
+    format!(
+        "The sensor shows {factor} times the known mass of {known} kg: the forces look like {force}. Give {forces}, and {moments} as well if the centre of mass is at {} m in the flange frame; with the moments in N·m it is at {} m.",
+        place(1.0),
+        place(shorter)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_factor_is_judged_by_its_standard_deviation() {
+        let known = KnownMass {
+            mass: 2.0,
+            std: 0.0,
+        };
+        let check = |factor: f64, std: f64| MassCheck {
+            by: By::Torque,
+            known,
+            factor,
+            std,
+            chance: chance((factor - 1.0) / std, 19),
+        };
+        let said = |factor, std| check(factor, std).words([[0.0; 3]; 2], 19).unwrap();
+        assert_eq!(said(1.12, 0.05), None);
+        let text = said(1.12, 0.01).unwrap();
+        assert!(text.contains("1.120 ± 0.010 times"), "{text}");
+        // Student's t of 19 degrees of freedom: 3.883 has two tails of 0.001.
+        assert!(!check(1.0387, 0.01).contradicts() && check(1.0390, 0.01).contradicts());
+    }
+}
