@@ -415,15 +415,23 @@ impl ContactTask {
         }
         let since = t - self.slide_start;
         if self.slide > 0.0 && (0.0..SETTLE).contains(&since) {
-            let w = core::f64::consts::TAU / SETTLE;
-            let half = 0.5 * self.slide;
-            out[1] = Reference {
-                position: half * (1.0 - (w * since).cos()),
-                velocity: half * w * (w * since).sin(),
-                acceleration: half * w * w * (w * since).cos(),
+            // There and back. Without a step of the acceleration the friction changes its direction while the force loop can
+            // still follow.
+            let half = 0.5 * SETTLE;
+            out[1] = match since < half {
+                true => quintic(self.slide, half, since),
+                false => reversed(quintic(self.slide, half, SETTLE - since)),
             };
         }
         out
+    }
+}
+
+/// Returns a motion that runs backwards in time.
+fn reversed(motion: Reference<f64>) -> Reference<f64> {
+    Reference {
+        velocity: -motion.velocity,
+        ..motion
     }
 }
 

@@ -235,7 +235,7 @@ fn the_rate_that_a_warning_names_cures_the_peak_of_the_slide() {
 /// does not grow with the force. So a larger force has a smaller overshoot, and a faster loop a smaller peak.
 #[test]
 fn the_force_and_the_rate_that_a_warning_names_cure_a_small_force() {
-    for (name, force) in [("edda.toml", 1.0), ("irp6.toml", 2.0), ("irp6.toml", 5.0)] {
+    for (name, force) in [("tx40.toml", 2.0), ("irp6.toml", 2.0), ("irp6.toml", 5.0)] {
         let robot = robot(name);
         let run = |force: f64, rate: f64| {
             let settings = Settings {
@@ -598,4 +598,59 @@ fn a_tool_that_is_free_along_the_surface_is_lighter() {
 
 fn unit(n: usize, j: usize) -> Vec<f64> {
     (0..n).map(|k| f64::from(u8::from(k == j))).collect()
+}
+
+/// The friction of the joints changes its direction when the slide begins, one joint after the other. Which joint begins depends
+/// on the last digits, so the parameters are wrong by 0.01 %.
+#[test]
+fn a_small_force_hardly_peaks_when_the_slide_begins() {
+    for (name, force, most) in [
+        ("edda.toml", 5.0, 0.05),
+        ("tx40.toml", 5.0, 0.05),
+        ("irp6.toml", 5.0, 0.11),
+        ("irp6.toml", 10.0, 0.05),
+    ] {
+        let robot = robot(name);
+        let settings = Settings::default();
+        let own = ContactOptions {
+            force: Some(force),
+            ..options(1e4)
+        };
+        let task = choose(&robot, &own, &settings);
+        let run = press_wrong(&robot, LawKind::Hybrid, &task, settings, Some((1e-4, 3)));
+        let worst = run.measures.robustness.unwrap().worst;
+        assert!(
+            worst.max(run.measures.overshoot) <= most,
+            "{name} {force} N: {worst}"
+        );
+        let error = run.measures.slide_error.unwrap();
+        assert!(error < 4e-4, "{name}: {error}");
+    }
+}
+
+/// The reference of the slide by differences: no step of the acceleration, there and back.
+#[test]
+fn a_slide_begins_turns_and_ends_at_rest() {
+    let task = choose(&robot("irp6.toml"), &options(1e4), &Settings::default());
+    let at = |t: f64| task.reference(LawKind::Hybrid, task.slide_start + t)[1];
+    let step = 1e-4;
+    let mut last = at(-step);
+    for k in 0..30_002 {
+        let t = k as f64 * step;
+        let now = at(t);
+        let mean = (now.position - last.position) / step;
+        assert!(
+            (mean - 0.5 * (now.velocity + last.velocity)).abs() < 1e-6,
+            "{t}"
+        );
+        let mean = (now.velocity - last.velocity) / step;
+        assert!(
+            (mean - 0.5 * (now.acceleration + last.acceleration)).abs() < 1e-3,
+            "{t}"
+        );
+        assert!((now.acceleration - last.acceleration).abs() < 1e-3, "{t}");
+        last = now;
+    }
+    assert!((at(1.5).position - 0.05).abs() < 1e-12);
+    assert_eq!(at(3.001).position, 0.0);
 }
