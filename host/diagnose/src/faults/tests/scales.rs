@@ -11,9 +11,6 @@ fn torques_that_are_all_a_thousand_times_too_large_or_small_are_refused_at_once(
         for joint in &mut robot.joints {
             joint.limits = None;
             joint.friction = None;
-            if let Some(drive) = &mut joint.drive {
-                (drive.coulomb, drive.viscous) = (0.0, 0.0);
-            }
         }
         assert_eq!(faults(&robot, &runs).unwrap(), []);
         for (factor, words) in [(1000.0, "as mN·m for N·m"), (1e-3, "as kN·m for N·m")] {

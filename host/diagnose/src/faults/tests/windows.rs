@@ -25,7 +25,13 @@ pub(crate) fn changed_wrist(
     seed: u64,
     change: impl FnOnce(&mut Robot),
 ) -> (Robot, Vec<Run>) {
-    let described = text("tx40.toml", TX40);
+    let mut described = text("tx40.toml", TX40);
+    // A description from a URDF states neither friction nor rotors.
+    for joint in &mut described.joints {
+        joint.friction = None;
+        let drive = joint.drive.as_mut().unwrap();
+        (drive.rotor_inertia, drive.coulomb, drive.viscous) = (0.0, 0.0, 0.0);
+    }
     let mut robot = described.clone();
     for (k, joint) in robot.joints.iter_mut().enumerate() {
         let size = [12.0, 12.0, 8.0, 4.0, 3.0, 2.0][k];
