@@ -187,7 +187,7 @@ fn attempt(
 
 /// Returns the torque lead of each joint, s: the time by which its torque was recorded before it acts. Estimated with
 /// the nominal model.
-fn first_lead(
+pub(crate) fn first_lead(
     context: &DiagnosisContext,
     prepared: &PreparedData,
 ) -> Result<Vec<f64>, DiagnoseError> {

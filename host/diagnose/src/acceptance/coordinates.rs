@@ -204,7 +204,7 @@ pub(crate) fn velocity_of(joint: &str) -> String {
 }
 
 /// Returns travel and time since reversal, with the sign of the direction.
-fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
     let j = &run.joints[joint];
     let (mut from, mut at, mut sign) = (0.0, 0.0, 0.0);
     let mut lists = (Vec::with_capacity(run.len()), Vec::with_capacity(run.len()));

@@ -11,6 +11,9 @@ use rig_data::runs::Run;
 use rig_model::robot::Robot;
 use rig_numerics::statistics::mean_square;
 
+use crate::acceptance::coordinates::{
+    ACCELERATION, DRIVE, DRIVE_CHANGE, POSITION, SINCE_START, VELOCITY, WAY, since_reversal,
+};
 use crate::rows::nominal_torque::Predicted;
 use crate::rows::thinning::Thinning;
 
@@ -110,21 +113,21 @@ impl Along {
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Constant => "nothing: a constant",
-            Self::Velocity => "velocity",
-            Self::Position => "position",
+            Self::Velocity => VELOCITY,
+            Self::Position => POSITION,
             Self::PositionByDirection => "position, by direction",
-            Self::Acceleration => "acceleration",
+            Self::Acceleration => ACCELERATION,
             Self::LoadByDirection => "size of the torque on the gear, by direction",
             Self::LoadAlongMotion => "torque on the gear along the motion, by direction",
-            Self::Drive => "torque of the drive",
-            Self::DriveChange => "change of the drive's torque",
-            Self::Travel => "way since the last reversal, by direction",
+            Self::Drive => DRIVE,
+            Self::DriveChange => DRIVE_CHANGE,
+            Self::Travel => WAY,
             Self::Reversal => "time about a reversal",
             Self::SlowReversal => "time about a slow reversal",
             Self::FastReversal => "time about a fast reversal",
             Self::ReversalUnderLoad => "time about a reversal, by the drive's torque",
             Self::Time => "time since the start",
-            Self::TimeByDirection => "time since the start, by direction",
+            Self::TimeByDirection => SINCE_START,
             Self::TimeTimesVelocity => "time since the start, times the velocity",
             Self::MotorAngle => "motor angle within a turn",
             Self::Filters => "derivatives of torque and acceleration",
@@ -223,7 +226,7 @@ fn signal(along: Along, run: &Run, predicted: &Predicted, joint: usize, ratio: f
             central_difference(&predicted.torque[joint], 1.0 / run.rate),
             ones(),
         ),
-        Along::Travel => of(travel(&j.q, &j.qd), ones()),
+        Along::Travel => of(since_reversal(run, joint).0, ones()),
         Along::Reversal | Along::SlowReversal | Along::FastReversal => {
             let own = Reversals::of(run, joint);
             let factor = own.after_some(along);
@@ -239,19 +242,6 @@ fn signal(along: Along, run: &Run, predicted: &Predicted, joint: usize, ratio: f
         Along::Filters => of(Vec::new(), Vec::new()),
         Along::MotorAngle => of(j.q.iter().map(|q| ratio * q).collect(), ones()),
     }
-}
-
-/// Returns the travel since the last reversal.
-pub(crate) fn travel(positions: &[f64], velocities: &[f64]) -> Vec<f64> {
-    let (mut from, mut sign) = (0.0, 0.0);
-    (positions.iter().zip(velocities))
-        .map(|(q, v)| {
-            if v.signum() != sign {
-                (from, sign) = (*q, v.signum());
-            }
-            q - from
-        })
-        .collect()
 }
 
 /// Knots at quantiles of a coordinate.

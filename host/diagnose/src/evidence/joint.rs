@@ -1,20 +1,17 @@
 //! Columns of one joint: nominal model, effects of the library, discrepancy.
 
-use std::sync::Arc;
-
 use rig_numerics::statistics::mean_square;
 use rig_numerics::vector::axpy;
 use rig_shared::effects::{Kind, SHAPES, Scale};
 
-use super::discrepancy::{Along, Motion, travel};
+use super::discrepancy::{Along, Motion};
 use super::noise::{Averaging, Noise};
 use super::posterior::Posterior;
 use super::products::Products;
 use crate::DiagnoseError;
+use crate::acceptance::coordinates::since_reversal;
 use crate::columns::candidate::Candidate;
-use crate::fit::evidence::Evidence;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
-use crate::recordings::sampling::sampling_jitter;
 use crate::rows::nominal_torque::Predicted;
 use crate::rows::regression::{Column, Rows, spoilt};
 use crate::search::fitted_candidate::FittedCandidate;
@@ -47,6 +44,13 @@ pub(crate) struct Entry {
     pub(crate) grid: usize,
     /// True if a shape lies at the end of its range, where the law has no effect.
     pub(crate) vanishes: bool,
+}
+
+impl Entry {
+    /// Returns true if gains are within their physical bounds.
+    pub(crate) fn allows(&self, gains: &[f64]) -> bool {
+        (gains.iter().zip(&self.bounds)).all(|(gain, [low, high])| gain >= low && gain <= high)
+    }
 }
 
 /// A discrepancy along one coordinate.
@@ -94,7 +98,8 @@ impl<'a> JointColumns<'a> {
         let rows = &prepared.rows;
         let averaging = Averaging::of(rows, &prepared.runs);
         let recorded = without_standstill(prepared, &search.source.predicted, joint);
-        let residual = residual_of(context, prepared, &recorded, joint);
+        let nominal = nominal_columns(context, rows, joint);
+        let residual = residual_of(&nominal, &recorded, &rows.keep[joint]);
         let left = left.unwrap_or_else(|| averaging.averaged(&residual));
         let noise = Noise::of(&averaging, &residual, &rows.keep[joint], &left);
         let torque = noise.whitened(&averaging.averaged(&recorded));
@@ -115,7 +120,7 @@ impl<'a> JointColumns<'a> {
             families: Vec::new(),
             torque: size,
         };
-        own.read_nominal(context, rows);
+        own.read_nominal(&nominal);
         own.read_discrepancy(context, prepared);
         own.read_library()?;
         Ok(own)
@@ -133,14 +138,12 @@ impl<'a> JointColumns<'a> {
         self.products.push(whitened)
     }
 
-    fn read_nominal(&mut self, context: &DiagnosisContext, rows: &Rows) {
-        for (direction, column) in context.anchor.columns(rows).iter().enumerate() {
-            if let Some(values) = &column[self.joint] {
-                let variance = self.variance(values, NOMINAL);
-                let number = self.push(values);
-                self.nominal.push((number, variance));
-                self.directions.push(direction);
-            }
+    fn read_nominal(&mut self, columns: &[(usize, Vec<f64>)]) {
+        for (direction, values) in columns {
+            let variance = self.variance(values, NOMINAL);
+            let number = self.push(values);
+            self.nominal.push((number, variance));
+            self.directions.push(*direction);
         }
     }
 
@@ -161,20 +164,14 @@ impl<'a> JointColumns<'a> {
     }
 
     fn read_library(&mut self) -> Result<(), DiagnoseError> {
-        let library = self.search.library.clone();
-        for (c, candidate) in library.iter().enumerate() {
-            if candidate.joint != self.joint {
-                continue;
-            }
-            let mut points = self.search.grid(candidate);
-            points.retain(|point| self.search.shows(candidate, point));
-            let columns = self
-                .search
-                .source
-                .columns_of(self.search.threads, candidate, &points)?;
+        for candidate in self.search.library.clone() {
+            let mut points = self.search.grid(&candidate);
+            points.retain(|point| self.search.shows(&candidate, point));
+            let threads = self.search.threads;
+            let columns = (self.search.source).columns_of(threads, &candidate, &points)?;
             let count = points.len();
             for (point, columns) in points.into_iter().zip(columns) {
-                self.add(&library[c], point, &columns, count);
+                self.add(&candidate, point, &columns, count);
             }
         }
         Ok(())
@@ -197,7 +194,7 @@ impl<'a> JointColumns<'a> {
             shapes,
             columns: numbers,
             variances,
-            bounds: self.bounds(candidate),
+            bounds: self.search.bounds(candidate),
             grid,
             vanishes: self.vanishes(candidate, &shapes),
         });
@@ -226,18 +223,9 @@ impl<'a> JointColumns<'a> {
     /// Returns an entry as the stages that predict loads take it.
     pub(crate) fn fitted_candidate(&self, entry: usize) -> FittedCandidate {
         let entry = &self.entries[entry];
-        FittedCandidate {
-            candidate: entry.candidate,
-            shapes: entry.shapes,
-            // One per gain; the predictions compute them at the full rate.
-            columns: Arc::new(vec![Column::new(); entry.columns.len()]),
-            evidence: Evidence::default(),
-            at_bound: None,
-            followed: None,
-            otherwise: None,
-            accepted_by_observer: false,
-            near_collinear: false,
-        }
+        // One column per gain; the predictions compute them at the full rate.
+        let columns = vec![Column::new(); entry.columns.len()];
+        FittedCandidate::unjudged(entry.candidate, entry.shapes, columns)
     }
 
     /// Returns the whitened columns of an effect with these shapes, and the prior variances.
@@ -258,15 +246,6 @@ impl<'a> JointColumns<'a> {
             let variances = own.iter().map(|c| self.variance(c, EFFECT));
             (whitened.collect(), variances.collect())
         }))
-    }
-
-    fn bounds(&self, candidate: &Candidate) -> Vec<[f64; 2]> {
-        if candidate.kind == Kind::MeasurementDelay {
-            return vec![[sampling_jitter(self.search.source.runs), f64::INFINITY]];
-        }
-        (self.search.source.gains(candidate).iter())
-            .map(|g| g.bounds)
-            .collect()
     }
 
     /// Returns the range of each shape that these recordings can show.
@@ -318,34 +297,34 @@ fn without_standstill(prepared: &PreparedData, predicted: &[Predicted], joint: u
     torque
 }
 
-/// Returns the residual of the nominal model on all rows.
-fn residual_of(
+/// Returns the free directions of the nominal model that a joint shows, with their columns.
+fn nominal_columns(
     context: &DiagnosisContext,
-    prepared: &PreparedData,
-    torque: &[f64],
+    rows: &Rows,
     joint: usize,
-) -> Vec<f64> {
-    let rows = &prepared.rows;
-    let keep = &rows.keep[joint];
+) -> Vec<(usize, Vec<f64>)> {
+    (context.anchor.columns(rows).into_iter().enumerate())
+        .filter_map(|(direction, mut column)| Some((direction, column[joint].take()?)))
+        .collect()
+}
+
+/// Returns the residual of the nominal model on all rows.
+fn residual_of(nominal: &[(usize, Vec<f64>)], torque: &[f64], keep: &[bool]) -> Vec<f64> {
     let kept = |values: &[f64]| -> Vec<f64> {
-        values
-            .iter()
-            .zip(keep)
-            .map(|(x, k)| if *k { *x } else { 0.0 })
-            .collect()
+        let pairs = values.iter().zip(keep);
+        pairs.map(|(x, k)| if *k { *x } else { 0.0 }).collect()
     };
-    let columns: Vec<Vec<f64>> = (context.anchor.columns(rows).into_iter())
-        .filter_map(|mut column| column[joint].take())
-        .collect();
     let mut products = Products::new(kept(torque));
-    let numbers: Vec<usize> = columns.iter().map(|c| products.push(kept(c))).collect();
-    let wide: Vec<f64> = numbers
+    let numbers: Vec<usize> = nominal
         .iter()
+        .map(|(_, c)| products.push(kept(c)))
+        .collect();
+    let wide: Vec<f64> = (numbers.iter())
         .map(|n| 1e12 / products.of(*n, *n).max(f64::MIN_POSITIVE))
         .collect();
     let mut residual = torque.to_vec();
     if let Some(posterior) = Posterior::of(&products, numbers, &wide) {
-        for (column, value) in columns.iter().zip(&posterior.means) {
+        for ((_, column), value) in nominal.iter().zip(&posterior.means) {
             axpy(-value, column, &mut residual);
         }
     }
@@ -357,8 +336,8 @@ fn least_travel(prepared: &PreparedData, averaging: &Averaging, joint: usize) ->
     let rows = &prepared.rows;
     let mut travels = Vec::with_capacity(rows.count);
     for run in &prepared.runs {
-        let own = &run.joints[joint];
-        rows.thinning.pick(&travel(&own.q, &own.qd), &mut travels);
+        rows.thinning
+            .pick(&since_reversal(run, joint).0, &mut travels);
     }
     let used: Vec<bool> = averaging.kept(&rows.keep[joint]);
     let mut sizes: Vec<f64> = (averaging.averaged(&travels).iter().zip(used))

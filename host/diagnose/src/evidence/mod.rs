@@ -26,10 +26,11 @@ use self::joint::JointColumns;
 use self::model::Model;
 use crate::columns::candidate::Candidate;
 use crate::description::described_effects::DescribedEffects;
+use crate::engine::first_lead;
 use crate::fit::refit::Refit;
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
 use crate::recordings::intake::{Intake, intake};
-use crate::recordings::torque_lead::{leads, moved};
+use crate::recordings::torque_lead::moved;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::stepwise::Search;
 use crate::{DiagnoseError, Options};
@@ -50,9 +51,9 @@ pub struct Found {
     pub name: &'static str,
     /// All names that explain the recordings as well, this one first.
     pub set: Vec<&'static str>,
-    /// Gains and shapes by name.
+    /// Gains and shapes by name, in the units of the effect's `About`.
     pub parameters: Vec<(&'static str, f64)>,
-    /// Log odds of the best model against the best one without the effect.
+    /// Log odds of the best model against the one without the effect, also with another coordinate open in its place.
     pub log_odds: f64,
     /// Root of the mean square of its torque over the noise.
     pub over_noise: f64,
@@ -100,31 +101,34 @@ pub fn find(
         }
     };
     let context = material.context;
-    let lead = {
-        let refit = Refit::of(&context, &material.prepared.rows)?;
-        let source = context.source(
-            &material.prepared,
-            &context.anchor.values(&refit.before.values),
-        )?;
-        leads(&source, &refit.base, &vec![0.0; robot.joints.len()])?
-    };
+    let lead = first_lead(&context, &material.prepared)?;
     let prepared = moved(&context, material.prepared, &lead)?;
+    let nominal = {
+        let refit = Refit::of(&context, &prepared.rows)?;
+        refit.before.values[..refit.free.len()].to_vec()
+    };
     let mut finding = Finding::default();
     for joint in 0..robot.joints.len() {
-        find_at(&context, &prepared, options, joint, &mut finding)?;
+        find_at(
+            (&context, &prepared),
+            options,
+            joint,
+            &nominal,
+            &mut finding,
+        )?;
     }
     Ok(finding)
 }
 
+/// Finds the model of one joint. `nominal` are the coefficients of the refitted nominal model.
 fn find_at(
-    context: &DiagnosisContext,
-    prepared: &PreparedData,
+    (context, prepared): (&DiagnosisContext, &PreparedData),
     options: &Options,
     joint: usize,
+    nominal: &[f64],
     finding: &mut Finding,
 ) -> Result<(), DiagnoseError> {
-    let refit = Refit::of(context, &prepared.rows)?;
-    let mut coefficients = refit.before.values[..refit.free.len()].to_vec();
+    let mut coefficients = nominal.to_vec();
     let library: Vec<Candidate> = (library(context.robot, &prepared.runs, &options.without))
         .into_iter()
         .filter(|c| c.joint == joint)

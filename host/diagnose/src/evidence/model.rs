@@ -1,12 +1,10 @@
 //! A model of one joint: effects, and coordinates along which an unknown torque is allowed.
 
-use rig_numerics::statistics::mean_square;
 use rig_numerics::vector::axpy;
 
 use super::discrepancy::Along;
 use super::joint::JointColumns;
 use super::posterior::Posterior;
-use super::products::Products;
 
 /// Prior log odds against an effect of the library: 150 to 1.
 const AGAINST_EFFECT: f64 = 5.0;
@@ -153,7 +151,8 @@ impl JointColumns<'_> {
             .iter()
             .map(|f| take(f.columns.len()))
             .collect();
-        let possible = (effects.iter().zip(&gains)).all(|(e, gains)| self.is_possible(*e, gains));
+        let possible = (effects.iter().zip(&gains))
+            .all(|(e, gains)| !self.entries[*e].vanishes && self.entries[*e].allows(gains));
         let against: f64 = (effects.iter())
             .map(|e| AGAINST_EFFECT + (self.entries[*e].grid.max(1) as f64).ln())
             .sum();
@@ -169,13 +168,6 @@ impl JointColumns<'_> {
         }
     }
 
-    /// Returns true if gains are within the bounds of an effect that does not vanish.
-    pub(crate) fn is_possible(&self, entry: usize, gains: &[f64]) -> bool {
-        let entry = &self.entries[entry];
-        let mut pairs = gains.iter().zip(&entry.bounds);
-        !entry.vanishes && pairs.all(|(gain, [low, high])| gain >= low && gain <= high)
-    }
-
     /// Returns true if the torque of each effect is more than the discrepancy that every model may have.
     pub(crate) fn is_large(&self, model: &Model) -> bool {
         let sizes = self.sizes(model);
@@ -186,7 +178,7 @@ impl JointColumns<'_> {
     /// Returns the torque over the noise that a model leaves beyond the noise of repeated runs, along no coordinate. None
     /// without a repeated run, and if it is no more than the discrepancy that every model may have.
     pub(crate) fn left(&self, model: &Model) -> Option<f64> {
-        let over = mean_square(&self.innovations(model)) - self.noise.floor?;
+        let over = self.noise.beyond_repeats(&self.innovations(model))?;
         let left = over.max(0.0).sqrt();
         let squares = self.sizes(model).iter().map(|s| s * s).sum();
         (left > least_beside(squares)).then_some(left)
@@ -230,25 +222,18 @@ impl JointColumns<'_> {
     }
 
     fn size_of(&self, columns: &[usize], gains: &[f64]) -> f64 {
-        let rows = self.products.rows();
-        let mut torque = vec![0.0; rows];
-        for (c, gain) in columns.iter().zip(gains) {
-            axpy(*gain, self.products.column(*c), &mut torque);
-        }
-        // What the nominal columns could take over is not the effect's own.
-        let mut products = Products::new(torque);
-        let numbers: Vec<usize> = (self.nominal.iter())
-            .map(|(c, _)| products.push(self.products.column(*c).to_vec()))
-            .collect();
-        let variances: Vec<f64> = self.nominal.iter().map(|(_, v)| *v).collect();
-        let whole = products.squares();
-        let taken = Posterior::of(&products, numbers.clone(), &variances).map_or(0.0, |p| {
-            p.means
-                .iter()
-                .zip(&numbers)
-                .map(|(m, c)| m * products.torque(*c))
+        let with = |column: usize| -> f64 {
+            (columns.iter().zip(gains))
+                .map(|(own, gain)| gain * self.products.of(*own, column))
                 .sum()
-        });
-        ((whole - taken).max(0.0) / rows as f64).sqrt()
+        };
+        let whole: f64 = (columns.iter().zip(gains))
+            .map(|(own, gain)| gain * with(*own))
+            .sum();
+        // What the nominal columns could take over is not the effect's own.
+        let taken = self
+            .posterior(&[], &[])
+            .map_or(0.0, |nominal| nominal.explained(with));
+        ((whole - taken).max(0.0) / self.products.rows() as f64).sqrt()
     }
 }

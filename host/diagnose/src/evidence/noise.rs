@@ -16,6 +16,7 @@ const ORDER: usize = 10;
 /// Share of white noise assumed in the variance. At the band edge of the filters the torque has hardly any noise left,
 /// and their errors are larger than it.
 const WHITE_SHARE: f64 = 0.2;
+
 /// Rows that are averaged, because their runs repeat one motion.
 pub(crate) struct Averaging {
     /// For each averaged row, the rows of the runs.
@@ -72,26 +73,22 @@ impl Averaging {
             .collect()
     }
 
-    /// Returns the deviations of repeated runs from their mean, scaled to the noise of the mean; zero on other rows.
-    /// None without a repeated run.
-    fn deviations(&self, residual: &[f64]) -> Option<Vec<Vec<f64>>> {
-        let most = self.sources.iter().map(Vec::len).max().unwrap_or(0);
-        (most > 1).then(|| {
-            (0..most)
-                .map(|member| {
-                    (self.sources.iter())
-                        .map(|rows| match rows.get(member) {
-                            Some(row) if rows.len() > 1 => {
-                                let count = rows.len() as f64;
-                                let mean = rows.iter().map(|r| residual[*r]).sum::<f64>() / count;
-                                (residual[*row] - mean) / (count - 1.0).sqrt()
-                            }
-                            _ => 0.0,
-                        })
-                        .collect()
-                })
-                .collect()
-        })
+    /// Returns the largest number of runs of one motion.
+    fn most(&self) -> usize {
+        self.sources.iter().map(Vec::len).max().unwrap_or(0)
+    }
+
+    /// Returns the deviation of one run of each motion from the mean of its runs, scaled to the noise of the mean; None
+    /// on rows without such a run or without a repeated one.
+    fn deviation(&self, member: usize, residual: &[f64]) -> Vec<Option<f64>> {
+        (self.sources.iter())
+            .map(|rows| {
+                let row = rows.get(member).filter(|_| rows.len() > 1)?;
+                let count = rows.len() as f64;
+                let mean = rows.iter().map(|r| residual[*r]).sum::<f64>() / count;
+                Some((residual[*row] - mean) / (count - 1.0).sqrt())
+            })
+            .collect()
     }
 }
 
@@ -99,11 +96,45 @@ impl Averaging {
 pub(crate) struct Noise {
     /// Number of preceding kept rows without a gap, up to the order; None for a row that is not used.
     preceding: Vec<Option<usize>>,
+    /// Weight of each row: the mean of fewer runs is noisier.
+    weights: Vec<f64>,
     predictors: Predictors,
-    /// Standard deviation of a row.
+    /// Standard deviation of a row of weight 1.
     pub(crate) deviation: f64,
     /// Mean square of the whitened differences of repeated runs; None without a repeated run.
-    pub(crate) floor: Option<f64>,
+    floor: Option<f64>,
+    /// True for used rows of a motion that was recorded more than once.
+    repeated: Vec<bool>,
+}
+
+/// Autocovariance of series on the `keep` rows in the parts between `starts`, up to [`ORDER`], and the number of products
+/// at lag 0.
+fn autocovariance(
+    series: &[Vec<Option<f64>>],
+    keep: &[bool],
+    starts: &[usize],
+) -> ([f64; ORDER + 1], u64) {
+    let mut sums = [0.0; ORDER + 1];
+    let mut counts = [0u64; ORDER + 1];
+    for own in series {
+        let at = |k: usize| own[k].filter(|_| keep[k]);
+        for part in starts.windows(2) {
+            for lag in 0..=ORDER {
+                for k in part[0] + lag..part[1] {
+                    if let Some((a, b)) = at(k).zip(at(k - lag)) {
+                        sums[lag] += a * b;
+                        counts[lag] += 1;
+                    }
+                }
+            }
+        }
+    }
+    for (c, (count, lag)) in sums.iter_mut().zip(counts.iter().zip(0..)) {
+        // A taper keeps the sequence positive definite in spite of the gaps.
+        let taper = 1.0 - f64::from(lag) / (10.0 * ORDER as f64);
+        *c *= taper / (*count).max(1) as f64;
+    }
+    (sums, counts[0])
 }
 
 impl Noise {
@@ -111,31 +142,23 @@ impl Noise {
     /// the averaged residual `left` of a model.
     pub(crate) fn of(averaging: &Averaging, residual: &[f64], keep: &[bool], left: &[f64]) -> Self {
         let keep = averaging.kept(keep);
-        let series = averaging
-            .deviations(residual)
-            .unwrap_or_else(|| vec![left.to_vec()]);
-        let mut covariance = [0.0; ORDER + 1];
-        let mut counts = [0u64; ORDER + 1];
-        for own in &series {
-            for part in averaging.starts.windows(2) {
-                for lag in 0..=ORDER {
-                    for k in part[0] + lag..part[1] {
-                        let [a, b] = [k, k - lag];
-                        if keep[a] && keep[b] && own[a] != 0.0 && own[b] != 0.0 {
-                            covariance[lag] += own[a] * own[b];
-                            counts[lag] += 1;
-                        }
-                    }
-                }
-            }
-        }
-        for (c, (count, lag)) in covariance.iter_mut().zip(counts.iter().zip(0..)) {
-            // A taper keeps the sequence positive definite in spite of the gaps.
-            let taper = 1.0 - f64::from(lag) / (10.0 * ORDER as f64);
-            *c *= taper / (*count).max(1) as f64;
-        }
+        let most = averaging.most();
+        let weights: Vec<f64> = (averaging.sources.iter())
+            .map(|rows| (rows.len() as f64 / most as f64).sqrt())
+            .collect();
+        let weighed = |series: Vec<Option<f64>>| -> Vec<Option<f64>> {
+            let pairs = series.into_iter().zip(&weights);
+            pairs.map(|(x, weight)| Some(weight * x?)).collect()
+        };
+        let series: Vec<Vec<Option<f64>>> = match averaging.repeats() {
+            true => (0..most)
+                .map(|member| weighed(averaging.deviation(member, residual)))
+                .collect(),
+            false => vec![left.iter().copied().map(Some).collect()],
+        };
+        let (mut covariance, count) = autocovariance(&series, &keep, &averaging.starts);
         covariance[0] *= 1.0 + WHITE_SHARE;
-        let predictors = Predictors::of(&covariance, counts[0]);
+        let predictors = Predictors::of(&covariance, count);
         let mut preceding = vec![None; keep.len()];
         for part in averaging.starts.windows(2) {
             let mut run = 0;
@@ -148,17 +171,46 @@ impl Noise {
                 };
             }
         }
+        let repeated = (averaging.sources.iter().zip(&keep))
+            .filter(|(_, keep)| **keep)
+            .map(|(rows, _)| rows.len() > 1)
+            .collect();
         let mut own = Self {
             preceding,
+            weights,
             deviation: covariance[0].sqrt(),
             predictors,
             floor: None,
+            repeated,
         };
         if averaging.repeats() {
-            let all: Vec<f64> = series.iter().flat_map(|s| own.whitened(s)).collect();
-            own.floor = Some(mean_square(&all));
+            let squares: Vec<f64> = series.iter().flat_map(|s| own.innovations_of(s)).collect();
+            own.floor = Some(mean_square(&squares));
         }
         own
+    }
+
+    /// Returns the innovations of a weighted series on the used rows that have a value.
+    fn innovations_of(&self, series: &[Option<f64>]) -> Vec<f64> {
+        let rows: Vec<f64> = series.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let used = (series.iter().zip(&self.preceding)).filter(|(_, order)| order.is_some());
+        (self.innovations(&rows).iter().zip(used))
+            .filter_map(|(innovation, (value, _))| value.map(|_| *innovation))
+            .collect()
+    }
+
+    /// Returns the mean square of whitened rows of motions that were recorded more than once.
+    fn squares_of_repeats(&self, whitened: &[f64]) -> f64 {
+        let own: Vec<f64> = (whitened.iter().zip(&self.repeated))
+            .filter_map(|(x, repeated)| repeated.then_some(*x))
+            .collect();
+        mean_square(&own)
+    }
+
+    /// Returns the mean square of whitened innovations beyond that of the differences of repeated runs; None without a
+    /// repeated run.
+    pub(crate) fn beyond_repeats(&self, innovations: &[f64]) -> Option<f64> {
+        Some(self.squares_of_repeats(innovations) - self.floor?)
     }
 
     /// Returns the averaged rows of which these are the whitened used ones; zero on the others.
@@ -174,17 +226,28 @@ impl Noise {
                 rows[k] = predicted + innovation * self.predictors.sigma(order);
             }
         }
+        rows.iter_mut()
+            .zip(&self.weights)
+            .for_each(|(x, weight)| *x /= weight);
         rows
     }
 
     /// Returns the used rows of an averaged column, whitened: noise has the standard deviation 1.
     pub(crate) fn whitened(&self, column: &[f64]) -> Vec<f64> {
+        let rows: Vec<f64> = (column.iter().zip(&self.weights))
+            .map(|(x, w)| w * x)
+            .collect();
+        self.innovations(&rows)
+    }
+
+    /// Returns the used ones of weighted rows, less their prediction, over the standard deviation of the innovation.
+    fn innovations(&self, rows: &[f64]) -> Vec<f64> {
         (self.preceding.iter().enumerate())
             .filter_map(|(k, order)| {
                 let order = (*order)?;
                 let past = self.predictors.coefficients(order).iter();
-                let predicted: f64 = past.enumerate().map(|(l, a)| a * column[k - 1 - l]).sum();
-                Some((column[k] - predicted) / self.predictors.sigma(order))
+                let predicted: f64 = past.enumerate().map(|(l, a)| a * rows[k - 1 - l]).sum();
+                Some((rows[k] - predicted) / self.predictors.sigma(order))
             })
             .collect()
     }
@@ -275,5 +338,26 @@ mod tests {
             "{}",
             own.deviation
         );
+    }
+
+    /// Two runs of one motion and one of another: the noise of the single run is √2 times that of the mean of the two.
+    #[test]
+    fn a_motion_that_was_recorded_once_weighs_less_than_the_mean_of_two_runs() {
+        let (length, count) = (6000, 3 * 6000);
+        let noise = coloured(count, 4);
+        let averaging = Averaging {
+            sources: (0..length)
+                .map(|k| vec![k, length + k])
+                .chain((0..length).map(|k| vec![2 * length + k]))
+                .collect(),
+            starts: vec![0, length, 2 * length],
+        };
+        let own = Noise::of(&averaging, &noise, &vec![true; count], &[]);
+        let innovations = own.whitened(&averaging.averaged(&noise));
+        let [mean, single] = [&innovations[..length], &innovations[length..]].map(mean_square);
+        assert!((single / mean - 1.0).abs() < 0.1, "{single} {mean}");
+        // Noise alone is not beyond the differences of the runs.
+        let beyond = own.beyond_repeats(&innovations).unwrap_or(f64::NAN);
+        assert!(beyond.abs() < 0.1 * mean, "{beyond} of {mean}");
     }
 }

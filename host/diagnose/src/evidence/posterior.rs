@@ -103,24 +103,19 @@ impl Posterior {
         self.roots[place].powi(2) * dot(&column, &column)
     }
 
-    /// Returns the gain in log marginal likelihood by more columns, and their coefficients. `with` has the inner
-    /// products of each with all columns and the torque; `among` theirs with each other.
+    /// Returns the gain in log marginal likelihood by more columns with these prior variances, and their coefficients.
+    /// `with` is the inner product of one of them with a column (0: the torque), `among` that of two of them.
     pub(crate) fn beside(
         &self,
-        with: &[&dyn Fn(usize) -> f64],
-        among: &dyn Fn(usize, usize) -> f64,
+        with: impl Fn(usize, usize) -> f64,
+        among: impl Fn(usize, usize) -> f64,
         variances: &[f64],
     ) -> Option<(f64, Vec<f64>)> {
         let roots: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
-        let along: Vec<Vec<f64>> = (with.iter())
-            .map(|with| {
-                let right = (self.columns.iter().zip(&self.roots))
-                    .map(|(c, root)| root * with(*c))
-                    .collect();
-                forward(&self.factor, right)
-            })
+        let along: Vec<Vec<f64>> = (0..roots.len())
+            .map(|i| self.along(|column| with(i, column)))
             .collect();
-        let matrix = (0..with.len())
+        let matrix = (0..roots.len())
             .map(|i| {
                 (0..=i)
                     .map(|j| {
@@ -131,8 +126,8 @@ impl Posterior {
             })
             .collect();
         let own = factor(matrix)?;
-        let right = (0..with.len())
-            .map(|i| roots[i] * (with[i](0) - dot(&along[i], &self.forward)))
+        let right = (0..roots.len())
+            .map(|i| roots[i] * (with(i, 0) - dot(&along[i], &self.forward)))
             .collect();
         let solved = forward(&own, right);
         let log = 0.5 * dot(&solved, &solved) - log_of_diagonal(&own);
@@ -140,6 +135,19 @@ impl Posterior {
             .map(|(x, root)| x * root)
             .collect();
         Some((log, means))
+    }
+
+    /// Returns the squares that the model would explain of a signal, from its inner products with the columns.
+    pub(crate) fn explained(&self, with: impl Fn(usize) -> f64) -> f64 {
+        let along = self.along(with);
+        dot(&along, &along)
+    }
+
+    fn along(&self, with: impl Fn(usize) -> f64) -> Vec<f64> {
+        let right = (self.columns.iter().zip(&self.roots))
+            .map(|(column, root)| root * with(*column))
+            .collect();
+        forward(&self.factor, right)
     }
 }
 
@@ -179,9 +187,9 @@ mod tests {
         };
         let two = Posterior::of(&products, numbers[..2].to_vec(), &variances[..2]).unwrap();
         assert!((two.log - (whole(2) - whole(0))).abs() < 1e-9);
-        let with = |c: usize| products.of(numbers[2], c);
+        let with = |_: usize, c: usize| products.of(numbers[2], c);
         let among = |_: usize, _: usize| products.of(numbers[2], numbers[2]);
-        let (more, _) = two.beside(&[&with], &among, &variances[2..]).unwrap();
+        let (more, _) = two.beside(with, among, &variances[2..]).unwrap();
         assert!((more - (whole(3) - whole(2))).abs() < 1e-9);
     }
 }

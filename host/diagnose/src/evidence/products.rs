@@ -45,11 +45,6 @@ impl Products {
         self.gram[a][0]
     }
 
-    /// Returns the squares of the torque.
-    pub(crate) fn squares(&self) -> f64 {
-        self.gram[0][0]
-    }
-
     /// Returns the number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.columns[0].len()

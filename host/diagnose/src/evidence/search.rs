@@ -1,6 +1,7 @@
 //! Search for the model with the largest evidence: add, drop, replace, reshape.
 
 use rig_numerics::optimise::golden_section::golden_section;
+use rig_numerics::vector::dot;
 use rig_shared::effects::{SHAPES, Scale};
 
 use super::joint::JointColumns;
@@ -159,17 +160,12 @@ impl JointColumns<'_> {
             if own.vanishes || present.iter().any(|p| rivals(p, &candidate)) {
                 continue;
             }
-            let with: Vec<Box<dyn Fn(usize) -> f64>> = (own.columns.iter())
-                .map(|&a| {
-                    Box::new(move |b: usize| self.products.of(a, b)) as Box<dyn Fn(usize) -> f64>
-                })
-                .collect();
-            let with: Vec<&dyn Fn(usize) -> f64> = with.iter().map(|f| f.as_ref()).collect();
-            let among = |i: usize, j: usize| self.products.of(own.columns[i], own.columns[j]);
-            let Some((gain, means)) = posterior.beside(&with, &among, &own.variances) else {
+            let with = |i: usize, column: usize| self.products.of(own.columns[i], column);
+            let among = |i: usize, j: usize| with(i, own.columns[j]);
+            let Some((gain, means)) = posterior.beside(with, among, &own.variances) else {
                 continue;
             };
-            if !self.is_possible(entry, &means) {
+            if !own.allows(&means) {
                 continue;
             }
             let beside = Beside { entry, gain };
@@ -229,15 +225,10 @@ impl JointColumns<'_> {
             };
             let products: Vec<Vec<f64>> =
                 columns.iter().map(|c| self.products.with_all(c)).collect();
-            let with: Vec<Box<dyn Fn(usize) -> f64>> = (products.iter())
-                .map(|p| Box::new(move |b: usize| p[b]) as Box<dyn Fn(usize) -> f64>)
-                .collect();
-            let with: Vec<&dyn Fn(usize) -> f64> = with.iter().map(|f| f.as_ref()).collect();
-            let among = |i: usize, j: usize| rig_numerics::vector::dot(&columns[i], &columns[j]);
-            Ok((posterior.beside(&with, &among, &variances))
-                .filter(|(_, means)| {
-                    (means.iter().zip(&own.bounds)).all(|(g, [low, high])| g >= low && g <= high)
-                })
+            let with = |i: usize, column: usize| products[i][column];
+            let among = |i: usize, j: usize| dot(&columns[i], &columns[j]);
+            Ok((posterior.beside(with, among, &variances))
+                .filter(|(_, means)| own.allows(means))
                 .map_or(f64::NEG_INFINITY, |(gain, _)| gain))
         };
         let mut best = (gain_at(&own.shapes)?, own.shapes);

@@ -1,7 +1,7 @@
 //! Constants of a diagnosis: the robot, its nominal model, the treatment of recordings.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 
 use rig_shared::effects::{Channel, Instant, Kind, Memory};
 use rig_shared::multibody::Chain;
@@ -12,7 +12,6 @@ use crate::columns::effect_columns::{DELAY, Source};
 use crate::description::described_effects::{DescribedEffects, candidate, gains};
 use crate::description::parameter_prior::ParameterPrior;
 use crate::faults::moves;
-use crate::fit::evidence::Evidence;
 use crate::recordings::coherence;
 use crate::rows::nominal::Nominal;
 use crate::rows::nominal_torque::{Predicted, predict};
@@ -264,18 +263,12 @@ impl<'a> DiagnosisContext<'a> {
         let (mut all, mut effects) = (Vec::new(), Vec::new());
         for placed in self.stated.free() {
             let gains = gains(&placed);
-            effects.push(FittedCandidate {
-                candidate: candidate(&placed),
-                shapes: placed.effect.shapes,
-                // One per gain; computed along these recordings later.
-                columns: Arc::new(vec![Column::new(); gains.len()]),
-                evidence: Evidence::default(),
-                at_bound: None,
-                followed: None,
-                otherwise: None,
-                accepted_by_observer: false,
-                near_collinear: false,
-            });
+            // One column per gain; computed along these recordings later.
+            effects.push(FittedCandidate::unjudged(
+                candidate(&placed),
+                placed.effect.shapes,
+                vec![Column::new(); gains.len()],
+            ));
             all.extend(gains);
         }
         let mut residual = self.remaining(prepared, [&self.anchor.prior, &all], &effects)?;

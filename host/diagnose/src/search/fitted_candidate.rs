@@ -72,6 +72,25 @@ pub(crate) struct Followed {
 }
 
 impl FittedCandidate {
+    /// Creates a candidate with given shapes and columns that no test has judged.
+    pub(crate) fn unjudged(
+        candidate: Candidate,
+        shapes: [f64; SHAPES],
+        columns: Vec<Column>,
+    ) -> Self {
+        Self {
+            candidate,
+            shapes,
+            columns: Arc::new(columns),
+            evidence: Evidence::default(),
+            at_bound: None,
+            accepted_by_observer: false,
+            near_collinear: false,
+            followed: None,
+            otherwise: None,
+        }
+    }
+
     /// Returns the reason for refusal at a p-value corrected for `tried` trials; None if the candidate passes.
     pub(crate) fn refused(&self, tried: usize) -> Option<Refusal> {
         let e = &self.evidence;

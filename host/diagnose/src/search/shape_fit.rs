@@ -393,7 +393,7 @@ impl Search<'_> {
     }
 
     /// Returns the physical bounds of the gains. A delay within the sampling jitter is no effect.
-    fn bounds(&self, candidate: &Candidate) -> Vec<[f64; 2]> {
+    pub(crate) fn bounds(&self, candidate: &Candidate) -> Vec<[f64; 2]> {
         if candidate.kind == Kind::MeasurementDelay {
             return vec![[sampling_jitter(self.source.runs), f64::INFINITY]];
         }

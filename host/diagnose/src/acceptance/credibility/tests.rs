@@ -3,13 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::tests::made::Diagnosed as _;
-use std::sync::Arc;
 
 use crate::Options;
 use crate::acceptance::credibility::*;
 use crate::columns::candidate::Candidate;
 use crate::description::described_effects::DescribedEffects;
-use crate::fit::evidence::Evidence;
 use crate::models::observer_models::ObserverModels;
 use crate::outcome::{Tried, Verdict};
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
@@ -73,17 +71,7 @@ fn said(stiffness: f64, times: f64) -> Option<Refusal> {
         for value in columns.iter_mut().flatten().flatten().flatten() {
             *value *= times;
         }
-        let gear = FittedCandidate {
-            candidate: GEAR,
-            shapes,
-            columns: Arc::new(columns),
-            evidence: Evidence::default(),
-            at_bound: None,
-            followed: None,
-            otherwise: None,
-            accepted_by_observer: false,
-            near_collinear: false,
-        };
+        let gear = FittedCandidate::unjudged(GEAR, shapes, columns);
         let fallen = unbelieved(refit, search, &judge, &[gear]).unwrap();
         fallen.map(|(_, why)| why)
     })
@@ -173,17 +161,7 @@ fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<Refu
     };
     let mut own = search.source.columns(&candidate, &shapes).unwrap();
     own.truncate(columns);
-    let profile = FittedCandidate {
-        candidate,
-        shapes,
-        columns: Arc::new(own),
-        evidence: Evidence::default(),
-        at_bound: None,
-        followed: None,
-        otherwise: None,
-        accepted_by_observer: false,
-        near_collinear: false,
-    };
+    let profile = FittedCandidate::unjudged(candidate, shapes, own);
     // A gear too soft to simulate has no column.
     let fallen = unbelieved(&refit, &search, &judge, &[profile]).ok()?;
     fallen.map(|(_, why)| why)
@@ -226,17 +204,11 @@ fn a_gap_that_may_be_none_is_none() {
             base: &refit.base,
             seed: 1,
         };
-        let play = FittedCandidate {
+        let play = FittedCandidate::unjudged(
             candidate,
             shapes,
-            columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
-            evidence: Evidence::default(),
-            at_bound: None,
-            followed: None,
-            otherwise: None,
-            accepted_by_observer: false,
-            near_collinear: false,
-        };
+            search.source.columns(&candidate, &shapes).unwrap(),
+        );
         let fallen = unbelieved(refit, search, &judge, &[play]).unwrap();
         let why = fallen.map(|(_, why)| why);
         assert_eq!(why, Some(Refusal::NoGap));

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
-use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rig_shared::effects::{GAINS, Kind};
@@ -11,7 +10,6 @@ use rig_shared::effects::{GAINS, Kind};
 use crate::acceptance::coordinates::coordinates;
 use crate::columns::candidate::Candidate;
 use crate::description::described_effects::DescribedEffects;
-use crate::fit::evidence::Evidence;
 use crate::fit::refit::*;
 use rig_data::prepare::{InMemory, Recording};
 use rig_data::{Block, JointColumns};
@@ -90,17 +88,11 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
     let source = (context.source(&prepared, &context.anchor.values(&refit.before.values))).unwrap();
     let profile = |kind, shapes: [f64; SHAPES]| {
         let candidate = Candidate::on(kind, 0);
-        FittedCandidate {
+        FittedCandidate::unjudged(
             candidate,
             shapes,
-            columns: Arc::new(source.columns(&candidate, &shapes).unwrap()),
-            evidence: Evidence::default(),
-            at_bound: None,
-            followed: None,
-            otherwise: None,
-            accepted_by_observer: false,
-            near_collinear: false,
-        }
+            source.columns(&candidate, &shapes).unwrap(),
+        )
     };
     let mut third = [0.0; SHAPES];
     third[0] = 3.0;

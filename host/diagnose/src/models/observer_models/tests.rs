@@ -5,7 +5,6 @@
 use crate::Options;
 use crate::columns::candidate::Candidate;
 use crate::description::described_effects::DescribedEffects;
-use crate::fit::evidence::Evidence;
 use crate::models::observer_models::*;
 use crate::outcome::Verdict;
 use crate::recordings::context::library;
@@ -103,17 +102,11 @@ fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f
         shapes[..made_of.len()].copy_from_slice(made_of);
         shapes
     };
-    let made_up = FittedCandidate {
+    let made_up = FittedCandidate::unjudged(
         candidate,
         shapes,
-        columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
-        evidence: Evidence::default(),
-        at_bound: None,
-        followed: None,
-        otherwise: None,
-        accepted_by_observer: false,
-        near_collinear: false,
-    };
+        search.source.columns(&candidate, &shapes).unwrap(),
+    );
     let rigid = refit.base.rms(0);
     let follower = ObserverModels::new(&context, &prepared, &refit, &search);
     let chosen = follower.followed(&[made_up], &[rigid]).unwrap().unwrap();

@@ -8,7 +8,6 @@ use crate::DiagnoseError;
 use crate::columns::candidate::Candidate;
 use crate::columns::kinds::is_gear;
 use crate::description::described_effects::{candidate, is_one};
-use crate::fit::evidence::Evidence;
 use crate::fit::least_squares::Fit;
 use crate::levels::LEAST_GAIN;
 use crate::search::chosen::with;
@@ -121,17 +120,11 @@ impl<'a> Search<'a> {
         });
         let measured = (self.measured.iter().copied()).filter(|(c, _)| !self.is_described(c));
         for (candidate, shapes) in described.chain(measured) {
-            chosen.push(FittedCandidate {
-                columns: Arc::new(self.source.columns(&candidate, &shapes)?),
+            chosen.push(FittedCandidate::unjudged(
                 candidate,
                 shapes,
-                evidence: Evidence::default(),
-                at_bound: None,
-                followed: None,
-                otherwise: None,
-                accepted_by_observer: false,
-                near_collinear: false,
-            });
+                self.source.columns(&candidate, &shapes)?,
+            ));
         }
         if chosen.is_empty() {
             return Ok(chosen);
