@@ -278,7 +278,7 @@ fn running_count(list: &[bool]) -> Vec<u32> {
 }
 
 /// Rows on each side of a marked one that the low-pass before the decimation spreads it over, in kept rows.
-const RESPONSE: usize = 3;
+pub(crate) const RESPONSE: usize = 3;
 
 /// Decides for each kept row of joint `j` if it is used.
 fn kept(

@@ -8,17 +8,17 @@ use rig_model::simulate::{Inputs, Model, closed_loop, controllers};
 /// Duration, s, and rate, Hz.
 const LENGTH: (f64, f64) = (25.0, 400.0);
 
-fn shipped(file: &str) -> Robot {
+pub(super) fn shipped(file: &str) -> Robot {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots");
     Robot::load(&folder.join(file)).unwrap()
 }
 
 /// Four sines per joint within half of its limits.
-fn reference(limits: &JointLimits, chance: &mut Chance) -> Vec<f64> {
+fn reference(limits: &JointLimits, chance: &mut Chance, pace: f64) -> Vec<f64> {
     let [lower, upper] = limits.position;
     let waves: Vec<[f64; 3]> = (1..5)
         .map(|k| {
-            let w = 0.7 * (f64::from(k) + 0.3 * chance.even());
+            let w = 0.7 * pace * (f64::from(k) + 0.3 * chance.even());
             let mut size = (0.5 * (upper - lower)).min(limits.velocity / w);
             if let Some(acceleration) = limits.acceleration {
                 size = size.min(acceleration / (w * w));
@@ -27,7 +27,7 @@ fn reference(limits: &JointLimits, chance: &mut Chance) -> Vec<f64> {
         })
         .collect();
     let (seconds, rate) = LENGTH;
-    let instants = (0..(seconds * rate) as usize).map(|i| i as f64 / rate);
+    let instants = (0..(seconds / pace * rate) as usize).map(|i| i as f64 / rate);
     instants
         .map(|t| {
             let moved = waves.iter().map(|[a, w, p]| a * (w * t + p).sin());
@@ -36,15 +36,32 @@ fn reference(limits: &JointLimits, chance: &mut Chance) -> Vec<f64> {
         .collect()
 }
 
-/// The robot with its controllers, and a recording of it with noise: `position` in rad, `torque` as a share of each
-/// joint's limit.
-fn driven(mut robot: Robot, seed: u64, position: f64, torque: f64) -> (Robot, InMemory) {
+/// Conditions of a recording.
+pub(super) struct Drive {
+    /// Speed, 1 for [`LENGTH`].
+    pub pace: f64,
+    /// Noise of the position, rad.
+    pub position: f64,
+    /// Noise of the torque, as a share of each joint's limit.
+    pub torque: f64,
+    /// True if the controllers hold their torque between samples.
+    pub held: bool,
+}
+
+/// The robot with its controllers, and a recording of it.
+pub(super) fn driven(mut robot: Robot, seed: u64, drive: &Drive) -> (Robot, InMemory) {
+    let &Drive {
+        pace,
+        position,
+        torque,
+        held,
+    } = drive;
     let mut chance = Chance::new(seed);
     let limits: Vec<JointLimits> = (robot.joints.iter())
         .map(|joint| joint.limits.clone().unwrap())
         .collect();
     let reference: Vec<Vec<f64>> = (limits.iter())
-        .map(|limits| reference(limits, &mut chance))
+        .map(|limits| reference(limits, &mut chance, pace))
         .collect();
     let model = Model::from_robot(&robot).unwrap();
     let q: Vec<f64> = reference.iter().map(|joint| joint[0]).collect();
@@ -61,7 +78,7 @@ fn driven(mut robot: Robot, seed: u64, position: f64, torque: f64) -> (Robot, In
         q: &q,
         v: &v,
         substeps: 2,
-        held: true,
+        held,
     };
     let mut motion = closed_loop(&robot, &model, &list, &inputs, |_| ()).unwrap();
     let mut disturb = |list: &mut [f64], size: f64| {
@@ -102,7 +119,16 @@ fn exact_positions_bias_nothing() {
     for (file, seeds) in [("edda.toml", 6), ("irp6.toml", 3)] {
         for seed in 0..seeds {
             for torque in [4e-3, 1e-5] {
-                let (mut robot, recording) = driven(shipped(file), seed, 0.0, torque);
+                let (mut robot, recording) = driven(
+                    shipped(file),
+                    seed,
+                    &Drive {
+                        pace: 1.0,
+                        position: 0.0,
+                        torque,
+                        held: true,
+                    },
+                );
                 let found = compared(&robot, &recording, PrepareOptions::default());
                 let verdict = found.endogeneity.unwrap().verdict;
                 assert_ne!(verdict, Verdict::Biased, "{file} {seed} {torque}");

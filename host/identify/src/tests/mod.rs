@@ -12,6 +12,7 @@ mod lwr4;
 mod made;
 mod position;
 mod rate;
+mod sticking;
 mod still;
 mod torque_scale;
 mod tx40;

@@ -8,21 +8,26 @@
 //! better by [`BETTER`]. A lower one also needs a spectrum that is flat above it, as noise is and motion is not,
 //! because a low cut-off also hides unmodelled friction.
 //!
+//! All trials are judged on the same rows, far enough from every reversal. A joint that sticks when it reverses has
+//! friction between its two signs. A low cut-off turns that stay into a smooth passage through zero, which comes nearer
+//! to the torque of the stay although it bends the motion; the low-pass spreads the difference over its response.
+//!
 //! Limits: one cut-off for all joints, because the regressor couples them. Noise that the controller feeds back into
 //! the torque is explained together with the position noise.
 
 use rig_shared::multibody::Chain;
 use rig_shared::transmission::Transmission;
 
+use super::clear_rows::{ClearRows, with_margin};
 use super::trial_rows::beginnings;
 use super::trial_rows::factors_of;
-use super::trial_rows::kept;
 use crate::error::IdentifyError;
 use crate::estimators::linear::by_noise;
 use crate::rows::cache::RowCache;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
 use crate::warning::{OwnCutoff, Warning};
+use rig_data::prepare::Beginning;
 use rig_data::prepare::Choice;
 use rig_data::prepare::CutoffTrial;
 use rig_data::prepare::MAX_CUTOFF_SHARE;
@@ -48,6 +53,8 @@ const LEAST_PERIODS: f64 = 30.0;
 const HEADROOM: f64 = 10.0;
 /// Share of the RMS speed below which rows are excluded from the comparison: the sign of their speed is noise.
 const SLOW: f64 = 0.05;
+/// Least number of judged rows of all joints per parameter. With fewer, the fit follows any cut-off's rows.
+const ROWS_A_PARAMETER: usize = 2;
 
 /// The model behind the rows of a trial.
 #[derive(Clone, Copy)]
@@ -211,7 +218,13 @@ impl Comparison<'_> {
         if least >= most || shortest < (50 * decimation + 2 * trimmed) as u64 {
             return Ok(None);
         }
-        let trial = |cutoff: f64| self.trial(cutoff, decimation, trimmed, &fastest);
+        let band = (0.4 * rate / decimation as f64).min(most);
+        let treated = |cutoff: f64| self.treated(cutoff, decimation, trimmed);
+        let judged = self.judged(with_margin(treated(band)?), &fastest)?;
+        if !judged.are_enough(self.equations.columns.len()) {
+            return Ok(None);
+        }
+        let trial = |cutoff: f64| judged.trial(&treated(cutoff)?, &self.equations);
         let mut trials = vec![trial(self.first.cutoff)?];
         let mut cutoff = least;
         while cutoff < most {
@@ -250,13 +263,13 @@ impl Comparison<'_> {
         chosen.iter().map(|&k| self.recordings[k]).collect()
     }
 
-    fn trial(
+    /// Returns the treatment of a trial.
+    fn treated(
         &self,
         cutoff: f64,
         decimation: usize,
         trimmed: usize,
-        recordings: &[&dyn Recording],
-    ) -> Result<CutoffTrial, IdentifyError> {
+    ) -> Result<PreprocessingPlan, IdentifyError> {
         let options = PrepareOptions {
             cutoff: Choice::Fixed(cutoff),
             decimation: Choice::Fixed(decimation),
@@ -268,23 +281,66 @@ impl Comparison<'_> {
         for (slow, spectrum) in (treatment.speed_threshold.iter_mut()).zip(&self.first.spectra) {
             *slow = slow.min(SLOW * spectrum.velocity_rms_below(band));
         }
-        let joints = treatment.spectra.len();
-        let plan = Plan {
-            chain: self.equations.chain,
-            transmission: self.equations.transmission,
-            columns: self.equations.columns,
-            treatment: &treatment,
-            window: 1,
-            stride: 1,
-            loudness: vec![1.0; joints],
-            one_way: Vec::new(),
-            cache: RowCache::default(),
-        };
-        let beginnings = beginnings(recordings, &treatment);
-        let beginnings: Vec<&dyn Recording> = beginnings.iter().map(|b| b as _).collect();
-        let factors = factors_of(&beginnings, &plan, &kept)?;
+        Ok(treatment)
+    }
+
+    /// Returns the rows on which trials are judged: those that `treatment` uses.
+    fn judged<'r>(
+        &self,
+        treatment: PreprocessingPlan,
+        recordings: &[&'r dyn Recording],
+    ) -> Result<Judged<'r>, IdentifyError> {
+        let plan = plan_of(&self.equations, &treatment);
+        let parts = (beginnings(recordings, &treatment).into_iter())
+            .map(|beginning| {
+                let clear = ClearRows::of(&beginning, &plan)?;
+                Ok((beginning, clear))
+            })
+            .collect::<Result<_, IdentifyError>>()?;
+        Ok(Judged(parts))
+    }
+}
+
+/// Returns the plan of a trial with `treatment`.
+fn plan_of<'a>(equations: &Equations<'a>, treatment: &'a PreprocessingPlan) -> Plan<'a> {
+    Plan {
+        chain: equations.chain,
+        transmission: equations.transmission,
+        columns: equations.columns,
+        treatment,
+        window: 1,
+        stride: 1,
+        loudness: vec![1.0; treatment.spectra.len()],
+        one_way: Vec::new(),
+        cache: RowCache::default(),
+    }
+}
+
+/// The beginnings of recordings, and the rows there on which trials are judged.
+struct Judged<'a>(Vec<(Beginning<'a>, ClearRows)>);
+
+impl Judged<'_> {
+    /// Returns true if the rows are more than `parameters`, so that a fit leaves a residual.
+    fn are_enough(&self, parameters: usize) -> bool {
+        let rows: usize = self.0.iter().map(|(_, clear)| clear.count()).sum();
+        rows >= ROWS_A_PARAMETER * parameters
+    }
+
+    fn trial(
+        &self,
+        treatment: &PreprocessingPlan,
+        equations: &Equations,
+    ) -> Result<CutoffTrial, IdentifyError> {
+        let plan = plan_of(equations, treatment);
+        let mut factors = vec![TriangularFactor::new(plan.columns.len()); plan.loudness.len()];
+        for (beginning, clear) in &self.0 {
+            let own = factors_of(&[beginning], &plan, &|rows, j, i| clear.has(rows, j, i))?;
+            for (factor, own) in factors.iter_mut().zip(&own) {
+                factor.merge(own, 1.0);
+            }
+        }
         Ok(CutoffTrial {
-            cutoff,
+            cutoff: treatment.cutoff,
             relative_error: relative_errors(&factors),
         })
     }

@@ -1,6 +1,7 @@
 //! Treatment of the recordings, as decided from their data.
 
 pub(crate) mod band;
+pub(crate) mod clear_rows;
 pub(crate) mod cutoff;
 pub(crate) mod decide;
 pub(crate) mod decimation;

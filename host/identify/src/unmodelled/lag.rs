@@ -3,8 +3,10 @@
 //! A controller holds its torque until its next sample. So the torque recorded with a position acts, on average, half a
 //! period later (Franklin, Powell and Workman 1998, section 4.3). With a lead l the torque differs by l·τ̇. Friction
 //! and inertia absorb this, and their errors exceed their intervals. So the torque rate is fitted as a regressor beside
-//! all parameters. Rows near a reversal are excluded, because torque and friction error jump together there. The rate
-//! is a symmetric difference, so noise of the torque does not bias it.
+//! all parameters. Rows near a reversal are excluded, because torque and friction error jump together there: those with
+//! a slow row among the neighbours, and those that the low-pass spreads a reversal of the joint, or of a motor that moves
+//! it, over. A fast reversal may fall between two rows. The rate is a symmetric difference, so noise of the torque does
+//! not bias it.
 //!
 //! Limits: one lead for all joints; a lead of more than a few samples is detected but not measured. Position noise that
 //! a controller feeds back into the torque can make a lead look several times longer.
@@ -12,10 +14,13 @@
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-use crate::error::IdentifyError;
+use crate::error::{IdentifyError, failed};
 use crate::estimators::problem::Problem;
+use crate::rows::differential::RESPONSE;
 use crate::rows::equation::Rows;
 use crate::rows::factor::TriangularFactor;
+use crate::rows::plan::Plan;
+use rig_data::prepare::PrepareError;
 
 /// Number of standard deviations above which a lead is significant.
 const SEEN: f64 = 5.0;
@@ -56,10 +61,11 @@ impl Lag {
             let Some(about) = neighbours(rows, i, period) else {
                 return Ok(());
             };
-            let equations = rows.equations.iter().zip(&mut factors);
-            for (equation, factor) in
-                equations.filter(|(e, _)| e.keep[about.clone()].iter().all(|k| *k))
-            {
+            let reverses = reversing(problem.plan, rows, i)?;
+            let equations = rows.equations.iter().zip(&mut factors).zip(&reverses);
+            for ((equation, factor), _) in equations.filter(|((e, _), reverses)| {
+                !**reverses && e.keep[about.clone()].iter().all(|k| *k)
+            }) {
                 row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
                 row[p] = rate(&equation.y, i) / period;
                 factor.push(&row, equation.y[i], weight);
@@ -80,6 +86,41 @@ fn neighbours(rows: &Rows, i: usize, period: f64) -> Option<RangeInclusive<usize
     let last = i + NEIGHBOURS;
     let span = rows.t.get(last)? - rows.t[first];
     (span < (2.0 * NEIGHBOURS as f64 + 0.5) * period).then_some(first..=last)
+}
+
+/// Returns, per joint, true if it or a motor that moves it reverses so near to row `i` that the low-pass spreads the
+/// reversal over the row.
+fn reversing(plan: &Plan, rows: &Rows, i: usize) -> Result<Vec<bool>, PrepareError> {
+    let n = rows.qd.len();
+    let near = i.saturating_sub(RESPONSE)..(i + RESPONSE + 1).min(rows.t.len());
+    let turns = |speeds: &[f64]| speeds.iter().any(|v| v * speeds[0] <= 0.0);
+    let mut reverses: Vec<bool> = (rows.qd.iter())
+        .map(|speeds| turns(&speeds[near.clone()]))
+        .collect();
+    if plan.transmission.is_simple() {
+        return Ok(reverses);
+    }
+    let mut directions = vec![0.0; n * n];
+    let mut speeds = vec![Vec::new(); n];
+    let mut moved = vec![false; n * n];
+    for row in near {
+        let q: Vec<f64> = rows.q.iter().map(|q| q[row]).collect();
+        (plan.transmission.motor_directions(&q, &mut directions)).map_err(failed)?;
+        for (motor, along) in directions.chunks_exact(n).enumerate() {
+            let each = along.iter().zip(&rows.qd);
+            speeds[motor].push(each.map(|(a, qd)| a * qd[row]).sum());
+            for (moved, a) in moved[motor * n..].iter_mut().zip(along) {
+                *moved |= *a != 0.0;
+            }
+        }
+    }
+    for (speeds, moved) in speeds.iter().zip(moved.chunks_exact(n)) {
+        // A simple drive moves nothing here: its friction is the joint's.
+        for (reverses, _) in (reverses.iter_mut().zip(moved)).filter(|(_, moved)| **moved) {
+            *reverses |= turns(speeds);
+        }
+    }
+    Ok(reverses)
 }
 
 /// Returns the rate of change at row `i`, per row.
