@@ -1,7 +1,7 @@
 //! The pooled values as a description.
 
 use rig_identify::{Combinations, Sizes, as_bodies, redistributed};
-use rig_model::robot::{IdentifiedBand, Robot};
+use rig_model::robot::{IdentifiedBand, Robot, Uncertainty};
 
 use crate::matrices::inverse;
 use crate::result::Comparison;
@@ -17,6 +17,7 @@ pub fn pooled_robot(robot: &Robot, comparison: &Comparison) -> (Robot, Vec<Strin
     };
     let mut robot = robot.clone();
     robot.identified = common_band(&pooled.bands);
+    robot.uncertainty = Uncertainty::default();
     let mut failed = Vec::new();
     if robot.identified.is_none() {
         failed.push(

@@ -34,6 +34,8 @@ pub(crate) struct ParameterPrior {
     /// Free base parameters without a described value: constant torques if the format has none, friction and drive
     /// inertia with worthless values ([`worth`]). No estimate contradicts them.
     unstated: Vec<usize>,
+    /// Per base parameter, standard deviations of the described value along independent directions; empty without any.
+    uncertainty: Vec<Vec<f64>>,
 }
 
 impl ParameterPrior {
@@ -102,7 +104,41 @@ impl ParameterPrior {
             stated: inertial,
             gravity_held,
             unstated,
+            uncertainty: (0..nominal.base.len())
+                .map(|k| {
+                    robot
+                        .uncertainty
+                        .along(&nominal.base.expression(k))
+                        .to_vec()
+                })
+                .collect(),
         }
+    }
+
+    /// Returns the standard deviation of a free direction's described coefficient.
+    pub(crate) fn described_std(&self, direction: usize) -> f64 {
+        let terms = &self.free[direction];
+        let along = |d: usize| {
+            let own = |&(k, f): &(usize, f64)| f * self.uncertainty[k].get(d).unwrap_or(&0.0);
+            terms.iter().map(own).sum::<f64>()
+        };
+        let directions = self.uncertainty.iter().map(Vec::len).max().unwrap_or(0);
+        (0..directions)
+            .map(|d| along(d).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    }
+
+    /// Returns the torque of one standard deviation of the described values along each independent direction.
+    pub(crate) fn uncertain_torques(&self, rows: &Rows) -> Vec<Column> {
+        let directions = self.uncertainty.iter().map(Vec::len).max().unwrap_or(0);
+        (0..directions)
+            .map(|d| {
+                let terms = self.uncertainty.iter().zip(&rows.nominal);
+                let own = terms.filter_map(|(list, column)| Some((column, *list.get(d)?)));
+                combined(rows.joints(), own)
+            })
+            .collect()
     }
 
     /// Holds free single base parameters at their described values.

@@ -13,7 +13,7 @@ use crate::models::tilt::turn;
 use crate::rows::nominal::Nominal;
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_identify::{Combinations, described as standard, redistributed};
-use rig_model::robot::{Origin, Robot, RobotEffect, plausible_range};
+use rig_model::robot::{Origin, Robot, RobotEffect, Uncertainty, plausible_range};
 
 /// Least weight of a standard parameter, as a share of the largest value of its kind.
 const LEAST_WEIGHT: f64 = 0.1;
@@ -78,6 +78,7 @@ pub(crate) fn completed(
     model.gravity = gravity;
     // The identification record describes the old values.
     model.identified = None;
+    model.uncertainty = Uncertainty::default();
     model.origin = Origin::Own;
     for fitted in effects {
         let kind = fitted.candidate.kind;

@@ -17,6 +17,8 @@ use crate::recordings::context::DiagnosisContext;
 use crate::rows::regression::{Column, Rows, combined};
 use crate::search::fitted_candidate::FittedCandidate;
 use rig_numerics::statistics::rms;
+use rig_numerics::vector::dot;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Share of the whole change's gain that some parameters must reach to explain it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
@@ -182,22 +184,45 @@ impl<'r> DescribedFit<'r> {
         (self.residuals(free).iter()).any(|[described, refitted]| *described > GAP * refitted)
     }
 
-    /// Returns true if the difference between both residuals is more than the error that a right description of an arm has,
-    /// [`LINK`] of the described torque, at some joint. Always true for a single joint.
+    /// Returns true if the difference between both residuals is more than the error that a right description has, at some
+    /// joint: [`LINK`] of the described torque of an arm, and what the described values' own uncertainty explains.
     fn is_beyond_description(&self, refitted: &RefitData, free: &[Column]) -> bool {
-        let (rows, prior) = (refitted.rows, &refitted.context.anchor.prior);
-        if rows.joints() < 2 {
+        let (rows, anchor) = (refitted.rows, &refitted.context.anchor);
+        let uncertain = anchor.uncertain_torques(rows);
+        if rows.joints() < 2 && uncertain.is_empty() {
             return true;
         }
+        let link = if rows.joints() < 2 { 0.0 } else { LINK };
         let torque = combined(
             rows.joints(),
-            rows.nominal.iter().zip(prior.iter().copied()),
+            rows.nominal.iter().zip(anchor.prior.iter().copied()),
         );
-        (self.residuals(free).iter().zip(&torque)).any(|([before, after], torque)| {
-            let own = torque.as_ref().map_or(0.0, |torque| rms(torque));
-            before.powi(2) - after.powi(2) > (LINK * own).powi(2)
+        let level = SIGNIFICANT / rows.joints() as f64;
+        let residuals = self.residuals(free);
+        (residuals.iter().enumerate()).any(|(j, [before, after])| {
+            let own = torque[j].as_ref().map_or(0.0, |torque| rms(torque));
+            let beyond = before.powi(2) - after.powi(2) - (link * own).powi(2);
+            beyond > 0.0 && probability_of(beyond, &uncertain, j) < level
         })
     }
+}
+
+/// Returns the probability that the uncertainty of the values of a right description makes a mean square torque of more
+/// than `square` at joint `j`; `torques` are those of one standard deviation along independent directions. The mean square is
+/// a quadratic form of normal variables, G, and has the distribution of a multiple of χ² with the same mean tr G and variance
+/// 2·tr G² (Satterthwaite 1946).
+fn probability_of(square: f64, torques: &[Column], j: usize) -> f64 {
+    let own: Vec<&Vec<f64>> = torques.iter().filter_map(|c| c[j].as_ref()).collect();
+    let rows = own.first().map_or(1, |c| c.len().max(1)) as f64;
+    let (mut trace, mut squares) = (0.0, 0.0);
+    for (a, x) in own.iter().enumerate() {
+        trace += dot(x, x) / rows;
+        for (b, y) in own[..=a].iter().enumerate() {
+            let twice = if a == b { 1.0 } else { 2.0 };
+            squares += twice * (dot(x, y) / rows).powi(2);
+        }
+    }
+    ChiSquared::new(trace * trace / squares).map_or(0.0, |d| d.sf(square * trace / squares))
 }
 
 /// The description beside a refit, with a significant difference.
@@ -346,7 +371,10 @@ impl<'c, 'r> Comparison<'c, 'r> {
     fn several(&self) -> Option<Change> {
         let (after, prior) = (self.refitted.after, &self.prior);
         let moved: Vec<ChangedValue> = (self.all.iter().copied())
-            .filter(|&k| (after.values[k] - prior[k]).abs() > 4.0 * after.std(k))
+            .filter(|&k| {
+                let described = self.refitted.context.anchor.described_std(k);
+                (after.values[k] - prior[k]).abs() > 4.0 * after.std(k).hypot(described)
+            })
             .map(|k| self.value(k))
             .collect();
         (!moved.is_empty()).then(|| self.nameless(ChangeCause::Several(moved), &self.whole))

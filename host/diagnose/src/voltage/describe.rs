@@ -13,7 +13,7 @@ use crate::voltage::free_run::FreeRun;
 use crate::voltage::plant::{NAMES, NOMINAL, Plant};
 use crate::voltage::search::{EQUAL, Model, Trial, on_the_voltage};
 use crate::voltage::sentences;
-use rig_model::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
+use rig_model::robot::{Drive, JointFriction, Robot, RobotEffect, Uncertainty, title_of};
 use rig_shared::effects::Effect;
 
 /// Multiple of the noise floor above which a residual is unexplained.
@@ -304,6 +304,7 @@ impl Told<'_> {
         robot.effects = self.stated.undriven();
         // The identification record describes the old values.
         robot.identified = None;
+        robot.uncertainty = Uncertainty::default();
         let (Some(model), Some(joint)) = (self.models.last(), robot.joints.first_mut()) else {
             return robot;
         };

@@ -6,7 +6,7 @@ use super::written::written;
 use crate::bodies::prior::described;
 use crate::identification::Identification;
 use crate::unmodelled::beyond::with_beyond;
-use rig_model::robot::Robot;
+use rig_model::robot::{Robot, Uncertainty};
 
 /// Returns `robot` with the identified values and the dynamics of the base parameters, and a list of remarks.
 ///
@@ -22,6 +22,11 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
         identification.base_tilt.as_ref(),
     );
     robot.identified = Some(details.treatment.band());
+    let parameters = identification.base_parameters.iter();
+    robot.uncertainty = Uncertainty::of(
+        parameters.map(|parameter| parameter.expression.clone()),
+        &details.estimate.covariance,
+    );
     let robot = &robot;
     if let Some(set) = &identification.standard_parameters {
         let mut pi = described(robot, details.combination.ncols());

@@ -94,5 +94,6 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
     if let Some(band) = &robot.identified {
         band.check(robot.joints.len())?;
     }
+    robot.uncertainty.check()?;
     check_effects(robot)
 }

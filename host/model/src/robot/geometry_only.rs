@@ -4,6 +4,7 @@ use super::flange::Flange;
 use super::frame::GRAVITY;
 use super::joint::{Joint, JointKind};
 use super::serial_robot::Robot;
+use super::uncertainty::Uncertainty;
 use super::worth::Origin;
 
 impl Joint {
@@ -38,6 +39,7 @@ impl Robot {
             workspace: Vec::new(),
             effects: Vec::new(),
             identified: None,
+            uncertainty: Uncertainty::default(),
             origin: Origin::Own,
         }
     }

@@ -44,6 +44,7 @@ mod serial_robot;
 mod templates;
 mod text;
 mod toml_message;
+mod uncertainty;
 mod unit_check;
 mod unlikely;
 mod urdf;
@@ -71,6 +72,7 @@ pub use templates::{
     DOUBLE_PENDULUM, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, TX40, XL330, template,
 };
 pub use text::joint_place;
+pub use uncertainty::Uncertainty;
 pub use urdf::{
     Audit, AuditCheck, AuditFinding, ChainChoice, Original, Urdf, audit, is_placeholder,
 };

@@ -7,6 +7,7 @@ use super::band::IdentifiedBand;
 use super::effects::RobotEffect;
 use super::flange::Flange;
 use super::joint::Joint;
+use super::uncertainty::Uncertainty;
 use super::workspace::Region;
 use super::worth::Origin;
 use super::wrist_sensor::WristSensor;
@@ -38,6 +39,9 @@ pub struct Robot {
     /// Band of the identification, if the values were identified.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified: Option<IdentifiedBand>,
+    /// Joint uncertainty of the base parameters, if the values were identified.
+    #[serde(default, skip_serializing_if = "Uncertainty::is_empty")]
+    pub uncertainty: Uncertainty,
     /// Source of the values. It decides how far they are trusted ([`worth`](fn@super::worth)). Not stored in the file.
     #[serde(skip)]
     pub origin: Origin,

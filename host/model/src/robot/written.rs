@@ -39,6 +39,12 @@ const LEFT_OUT: [(&str, &[&str]); 3] = [
     ("identified", &["torque_lead"]),
 ];
 
+/// Comment above the table of uncertainties.
+const ABOUT_UNCERTAINTY: &str = "
+# Standard deviations of the base parameters along independent directions, SI: two of them have the sum of the products of
+# their lists as covariance. Remove the table if you change the values above.
+";
+
 pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     let refused = |message| RobotError::Write {
         robot: robot.name.clone(),
@@ -53,6 +59,9 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     let mut document = toml_document(robot, &BY_JOINT).map_err(|e| refused(e.to_string()))?;
     leave_out(&mut document);
     comment_toml(&mut document, &comments(JointKind::Revolute));
+    if let Some(Item::Table(table)) = document.get_mut("uncertainty") {
+        table.decor_mut().set_prefix(ABOUT_UNCERTAINTY);
+    }
     for (table, joint) in toml_tables(&mut document, "joint").zip(&robot.joints) {
         leave_out(table);
         if let Item::Table(comments) = &comments(joint.kind)["joint"] {
