@@ -429,3 +429,43 @@ pub(crate) fn is_loaded(
     let grown = |after| on_single_link(context, &after, &prior, LEAST_OF_BOTH_BESIDE).is_some();
     refit.solution(chosen).is_ok_and(grown)
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    /// Mean squares that drawn errors of a right description make, beside the probability that is told for them.
+    #[test]
+    fn errors_of_a_right_description_exceed_a_square_as_often_as_told() {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        // Directions of very different size, as a motion shows some combinations far better than others.
+        let torques: Vec<Column> = [2.0, 1.0, 0.5, 0.1, 0.1]
+            .map(|size| vec![Some((0..40).map(|_| size * normal()).collect())])
+            .to_vec();
+        let mut squares: Vec<f64> = (0..4000)
+            .map(|_| {
+                let drawn: Vec<f64> = torques.iter().map(|_| normal()).collect();
+                let torque = combined(1, torques.iter().zip(drawn));
+                torque[0].as_ref().map_or(0.0, |t| dot(t, t) / 40.0)
+            })
+            .collect();
+        squares.sort_by(f64::total_cmp);
+        for share in [0.5, 0.9, 0.99] {
+            let told = probability_of(squares[(share * 4000.0) as usize], &torques, 0);
+            println!("{share}: {told:.4}");
+            assert!(
+                (0.5..2.0).contains(&(told / (1.0 - share))),
+                "{share}: {told}"
+            );
+        }
+    }
+
+    #[test]
+    fn without_an_uncertainty_every_difference_is_beyond_it() {
+        assert_eq!(probability_of(1e-9, &[], 0), 0.0);
+    }
+}

@@ -90,9 +90,9 @@ mod tests {
     #[test]
     fn lists_hold_the_covariance_of_combinations() {
         let covariance = vec![
-            vec![4.0, 1.999, 0.3],
+            vec![4.0, 1.999, 0.2],
             vec![1.999, 1.0, 0.1],
-            vec![0.3, 0.1, 9e-2],
+            vec![0.2, 0.1, 9e-2],
         ];
         let names = ["a + b", "c", "d"];
         let found = Uncertainty::of(names.map(String::from), &covariance);
