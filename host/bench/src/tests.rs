@@ -259,3 +259,39 @@ fn the_evidence_says_along_what_an_unknown_torque_acts() {
     let along: Vec<&str> = finding.unknown.iter().map(|u| u.along).collect();
     assert_eq!(along, ["position, by direction"], "{finding:?}");
 }
+
+/// The motor's motion alone leads a lightly damped gear astray: its share would be a half, beside a delay or presliding
+/// that is not there.
+#[test]
+fn the_evidence_finds_a_gear_by_an_observer_of_its_link() {
+    let gears = [
+        (
+            Effect::JointElasticity {
+                stiffness: 900.0,
+                damping: 0.35,
+            },
+            ("joint_elasticity", "stiffness", 900.0, 0.03),
+        ),
+        (
+            Effect::Backlash { gap: 7e-3 },
+            ("backlash", "gap", 7e-3, 0.1),
+        ),
+    ];
+    for (effect, (name, parameter, truth, share)) in gears {
+        let made = Scenario::short([effect], 16).make().unwrap();
+        let options = rig_diagnose::Options::default();
+        let finding = made
+            .with_recordings(|training, _| {
+                rig_diagnose::evidence::find(&made.robot, training, &options)
+            })
+            .unwrap();
+        let names: Vec<&str> = finding.found.iter().map(|found| found.name).collect();
+        assert_eq!(names, [name], "{finding:?}");
+        let own = finding.found[0].parameters.iter();
+        let value = own.copied().find(|(name, _)| *name == parameter).unwrap().1;
+        assert!(
+            (value / truth - 1.0).abs() < share,
+            "{name}: {value} for {truth}"
+        );
+    }
+}

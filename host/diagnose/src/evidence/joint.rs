@@ -44,6 +44,8 @@ pub(crate) struct Entry {
     pub(crate) grid: usize,
     /// True if a shape lies at the end of its range, where the law has no effect.
     pub(crate) vanishes: bool,
+    /// True if the shapes stay as they are: an observer has fitted them.
+    pub(crate) fixed: bool,
 }
 
 impl Entry {
@@ -197,6 +199,7 @@ impl<'a> JointColumns<'a> {
             bounds: self.search.bounds(candidate),
             grid,
             vanishes: self.vanishes(candidate, &shapes),
+            fixed: false,
         });
         Some(self.entries.len() - 1)
     }
@@ -220,12 +223,23 @@ impl<'a> JointColumns<'a> {
         Ok(self.add(candidate, shapes, &columns, grid))
     }
 
-    /// Returns an entry as the stages that predict loads take it.
-    pub(crate) fn fitted_candidate(&self, entry: usize) -> FittedCandidate {
-        let entry = &self.entries[entry];
-        // One column per gain; the predictions compute them at the full rate.
-        let columns = vec![Column::new(); entry.columns.len()];
-        FittedCandidate::unjudged(entry.candidate, entry.shapes, columns)
+    /// Adds an effect of an earlier search; returns its number, or None if the joint does not show it.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn add_fitted(
+        &mut self,
+        own: &FittedCandidate,
+    ) -> Result<Option<usize>, DiagnoseError> {
+        if own.followed.is_none() {
+            return self.add_at(&own.candidate, own.shapes);
+        }
+        let grid = self.search.grid(&own.candidate).len();
+        let entry = self.add(&own.candidate, own.shapes, &own.columns, grid);
+        if let Some(entry) = entry {
+            self.entries[entry].fixed = true;
+        }
+        Ok(entry)
     }
 
     /// Returns the whitened columns of an effect with these shapes, and the prior variances.

@@ -19,15 +19,20 @@ mod posterior;
 mod products;
 mod search;
 
+use std::sync::Arc;
+
 use rig_data::prepare::Recording;
 use rig_model::robot::Robot;
 
 use self::joint::JointColumns;
 use self::model::Model;
+use self::search::Odds;
 use crate::columns::candidate::Candidate;
+use crate::columns::kinds::is_gear;
 use crate::description::described_effects::DescribedEffects;
 use crate::engine::first_lead;
 use crate::fit::refit::Refit;
+use crate::models::observer_models::ObserverModels;
 use crate::recordings::context::{DiagnosisContext, PreparedData, library};
 use crate::recordings::intake::{Intake, intake};
 use crate::recordings::torque_lead::moved;
@@ -103,33 +108,23 @@ pub fn find(
     let context = material.context;
     let lead = first_lead(&context, &material.prepared)?;
     let prepared = moved(&context, material.prepared, &lead)?;
-    let nominal = {
-        let refit = Refit::of(&context, &prepared.rows)?;
-        refit.before.values[..refit.free.len()].to_vec()
-    };
+    let refit = Refit::of(&context, &prepared.rows)?;
     let mut finding = Finding::default();
     for joint in 0..robot.joints.len() {
-        find_at(
-            (&context, &prepared),
-            options,
-            joint,
-            &nominal,
-            &mut finding,
-        )?;
+        find_at((&context, &prepared, &refit), options, joint, &mut finding)?;
     }
     Ok(finding)
 }
 
-/// Finds the model of one joint. `nominal` are the coefficients of the refitted nominal model.
+/// Finds the model of one joint.
 fn find_at(
-    (context, prepared): (&DiagnosisContext, &PreparedData),
+    (context, prepared, refit): (&DiagnosisContext, &PreparedData, &Refit),
     options: &Options,
     joint: usize,
-    nominal: &[f64],
     finding: &mut Finding,
 ) -> Result<(), DiagnoseError> {
-    let mut coefficients = nominal.to_vec();
-    let library: Vec<Candidate> = (library(context.robot, &prepared.runs, &options.without))
+    let mut coefficients = refit.before.values[..refit.free.len()].to_vec();
+    let mut library: Vec<Candidate> = (library(context.robot, &prepared.runs, &options.without))
         .into_iter()
         .filter(|c| c.joint == joint)
         .collect();
@@ -137,41 +132,89 @@ fn find_at(
     let mut chosen: Vec<FittedCandidate> = Vec::new();
     let mut gains: Vec<f64> = Vec::new();
     let mut left = None;
+    let mut by_motion = None;
     // The effects found change the predicted load and the contact, on which columns of other effects depend.
-    for pass in 1..=PASSES {
+    for pass in 1.. {
         let source = context.source(prepared, &context.anchor.values(&coefficients))?;
-        let source = source.loaded_by(&chosen, &gains)?;
+        let source =
+            source
+                .loaded_by(&chosen, &gains)?
+                .following(&prepared.rows, &chosen, &gains)?;
         let search = Search::new(source, library.clone(), Vec::new(), threads);
         let mut columns = JointColumns::of(context, prepared, search, joint, left)?;
         let mut start = Vec::new();
         for own in &chosen {
-            start.extend(columns.add_at(&own.candidate, own.shapes)?);
+            start.extend(columns.add_fitted(own)?);
         }
         let model = columns.best(&start)?;
-        if pass == PASSES || model.effects.is_empty() && columns.averaging.repeats() {
-            return told(&mut columns, &model, finding);
+        let gear = columns.gear(&model);
+        if pass == PASSES + usize::from(gear.is_some())
+            || model.effects.is_empty() && columns.averaging.repeats()
+        {
+            return told(&mut columns, &model, by_motion, finding);
         }
         for (direction, value) in columns.directions.iter().zip(&model.nominal) {
             coefficients[*direction] = *value;
         }
-        chosen = model
-            .effects
-            .iter()
-            .map(|e| columns.fitted_candidate(*e))
-            .collect();
-        gains = model.gains.concat();
         left = Some(columns.residual(&model));
+        let mut kept = columns.fitted_candidates(&model)?;
+        if let Some(gear) = gear
+            && by_motion.is_none()
+        {
+            by_motion = Some(columns.odds(&model, EQUAL)?.swap_remove(gear))
+                .filter(|(log_odds, _)| *log_odds > CERTAIN);
+            if by_motion.is_some() {
+                // In what a gear leaves without feedback of the torque the search finds other effects.
+                kept = vec![kept.swap_remove(gear)];
+                library.retain(|own| !is_gear(own.kind));
+            }
+        }
+        if by_motion.is_some() {
+            kept = followed((context, prepared, refit), &columns, kept)?;
+        }
+        let of_each: Vec<Vec<f64>>;
+        (chosen, of_each) = kept.into_iter().unzip();
+        gains = of_each.concat();
     }
     Ok(())
 }
 
-/// Adds the effects and unknown torques of a model to the finding.
+/// Returns effects and their gains with the link behind a gear as an observer estimates it.
+fn followed(
+    (context, prepared, refit): (&DiagnosisContext, &PreparedData, &Refit),
+    columns: &JointColumns,
+    effects: Vec<(FittedCandidate, Vec<f64>)>,
+) -> Result<Vec<(FittedCandidate, Vec<f64>)>, DiagnoseError> {
+    let (mut chosen, gains): (Vec<FittedCandidate>, Vec<_>) = effects.into_iter().unzip();
+    // An observer has to predict better than the motor's motion alone.
+    let driven = (context.source(prepared, &columns.search.source.values)?)
+        .loaded_by(&chosen, &gains.concat())?;
+    for own in chosen.iter_mut().filter(|own| is_gear(own.candidate.kind)) {
+        own.columns = Arc::new(driven.columns(&own.candidate, &own.shapes)?);
+    }
+    let noise = vec![columns.noise.deviation; context.robot.joints.len()];
+    let observers = ObserverModels::new(context, prepared, refit, &columns.search);
+    let chosen = observers.followed(&chosen, &noise)?.unwrap_or(chosen);
+    // The torque of a gear that an observer predicts is known.
+    let gain = |(own, gains): (FittedCandidate, Vec<f64>)| match own.followed {
+        Some(_) => (own, vec![1.0]),
+        None => (own, gains),
+    };
+    Ok(chosen.into_iter().zip(gains).map(gain).collect())
+}
+
+/// Adds the effects and unknown torques of a model to the finding. `by_motion` are the odds of a gear that an observer
+/// follows: those without feedback of the torque, because an observer makes almost any gear fit.
 fn told(
     columns: &mut JointColumns,
     model: &Model,
+    by_motion: Option<Odds>,
     finding: &mut Finding,
 ) -> Result<(), DiagnoseError> {
-    let odds = columns.odds(model, EQUAL)?;
+    let mut odds = columns.odds(model, EQUAL)?;
+    if let Some((gear, known)) = columns.gear(model).zip(by_motion) {
+        odds[gear] = known;
+    }
     for ((effect, gains), (log_odds, set)) in model.effects.iter().zip(&model.gains).zip(odds) {
         let entry = &columns.entries[*effect];
         let about = entry.candidate.kind.about();

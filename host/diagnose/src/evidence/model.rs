@@ -3,8 +3,11 @@
 use rig_numerics::vector::axpy;
 
 use super::discrepancy::Along;
-use super::joint::JointColumns;
+use super::joint::{Entry, JointColumns};
 use super::posterior::Posterior;
+use crate::DiagnoseError;
+use crate::columns::kinds::is_gear;
+use crate::search::fitted_candidate::FittedCandidate;
 
 /// Prior log odds against an effect of the library: 150 to 1.
 const AGAINST_EFFECT: f64 = 5.0;
@@ -75,6 +78,30 @@ impl JointColumns<'_> {
             variances.extend(family.columns.iter().map(|_| spread));
         }
         (columns, variances, first)
+    }
+
+    /// Returns the place of the gear among the effects of a model.
+    pub(crate) fn gear(&self, model: &Model) -> Option<usize> {
+        (model.effects.iter()).position(|e| is_gear(self.entries[*e].candidate.kind))
+    }
+
+    /// Returns the effects of a model as other stages take them, with their gains.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn fitted_candidates(
+        &self,
+        model: &Model,
+    ) -> Result<Vec<(FittedCandidate, Vec<f64>)>, DiagnoseError> {
+        let of = |(entry, gains): (&usize, &Vec<f64>)| {
+            let Entry {
+                candidate, shapes, ..
+            } = self.entries[*entry];
+            let columns = self.search.source.columns(&candidate, &shapes)?;
+            let own = FittedCandidate::unjudged(candidate, shapes, columns);
+            Ok((own, gains.clone()))
+        };
+        model.effects.iter().zip(&model.gains).map(of).collect()
     }
 
     /// Returns the posterior of a model.

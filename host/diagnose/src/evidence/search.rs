@@ -21,6 +21,9 @@ const REFINEMENTS: usize = 10;
 /// Most effects of a joint.
 const MOST: usize = 8;
 
+/// Log odds of an effect against the best model without it, and the names of effects that could replace it.
+pub(crate) type Odds = (f64, Vec<&'static str>);
+
 /// An effect beside a model, with its gain in log evidence at the model's spreads.
 struct Beside {
     entry: usize,
@@ -185,6 +188,9 @@ impl JointColumns<'_> {
     fn reshaped(&mut self, mut model: Model) -> Result<Model, DiagnoseError> {
         for k in (0..model.effects.len()).rev() {
             let entry = model.effects[k];
+            if self.entries[entry].fixed {
+                continue;
+            }
             let mut rest = model.effects.clone();
             rest.remove(k);
             let Some(shapes) = self.better_shapes(&rest, &model.spread, entry)? else {
@@ -258,16 +264,11 @@ impl JointColumns<'_> {
         Ok((best.0 > first).then_some(best.1))
     }
 
-    /// Returns, for each effect of a model, the log odds against the best model without it, and the names of effects
-    /// that could replace it within `equal`.
+    /// Returns the odds of each effect of a model; names count as equal within the log odds `equal`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn odds(
-        &mut self,
-        model: &Model,
-        equal: f64,
-    ) -> Result<Vec<(f64, Vec<&'static str>)>, DiagnoseError> {
+    pub(crate) fn odds(&mut self, model: &Model, equal: f64) -> Result<Vec<Odds>, DiagnoseError> {
         let mut list = Vec::new();
         for k in 0..model.effects.len() {
             let mut effects = model.effects.clone();

@@ -456,7 +456,6 @@ mod tests {
         squares.sort_by(f64::total_cmp);
         for share in [0.5, 0.9, 0.99] {
             let told = probability_of(squares[(share * 4000.0) as usize], &torques, 0);
-            println!("{share}: {told:.4}");
             assert!(
                 (0.5..2.0).contains(&(told / (1.0 - share))),
                 "{share}: {told}"

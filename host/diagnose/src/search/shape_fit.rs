@@ -343,11 +343,7 @@ impl Search<'_> {
                 shapes[place] = value_at(shape, x).max(least[place]).min(most[place]);
             }
             let columns = source.columns_by(self.threads, candidate, &shapes)?;
-            let mut left = fit.clone();
-            for column in &columns {
-                left.subtract(column);
-            }
-            let squares = norm_squared(left.left());
+            let squares = left_as_known(fit, &columns);
             simplex.report(squares);
             if best.as_ref().is_none_or(|b| squares < b.0) {
                 best = Some((squares, shapes, columns));
@@ -406,4 +402,13 @@ impl Search<'_> {
 fn damping_ratio(shapes: &[f64; SHAPES], mass: f64) -> f64 {
     let [stiffness, damping, ..] = *shapes;
     0.5 * damping / (stiffness * mass).sqrt()
+}
+
+/// Returns the sum of squares that a fit leaves after these columns as known torques.
+pub(crate) fn left_as_known(fit: &Fit, columns: &[Column]) -> f64 {
+    let mut left = fit.clone();
+    for column in columns {
+        left.subtract(column);
+    }
+    norm_squared(left.left())
 }

@@ -22,10 +22,6 @@ fn stays_at_reversals_change_neither_the_cut_off_nor_the_instant() {
             };
             let found = identify(&robot, &[&recording], &[], &options).unwrap();
             let treatment = &found.details.treatment;
-            println!("{file} {seed}: {:.2} Hz", treatment.cutoff);
-            for trial in &treatment.trials {
-                println!("   {:.2} Hz: {:.5?}", trial.cutoff, trial.relative_error);
-            }
             let lower = treatment
                 .spectral_cutoff
                 .is_some_and(|s| treatment.cutoff < s);
@@ -41,7 +37,6 @@ fn stays_at_reversals_change_neither_the_cut_off_nor_the_instant() {
             let constants =
                 (found.base_parameters.iter()).filter(|b| b.expression.starts_with("off"));
             for own in constants {
-                println!("   {} {:.3} ± {:.3}", own.expression, own.value, own.std);
                 assert!(
                     own.value.abs() < 4.0 * own.std,
                     "{file} {seed}: {}",
