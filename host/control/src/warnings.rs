@@ -103,12 +103,13 @@ fn in_slide(
         Some(rate) => format!("--rate {rate:.0}"),
         None => "a better model, a higher --bandwidth and --rate".to_owned(),
     };
-    // Friction of the joints makes the peak, so it hardly grows with the force. On a surface with damping this was not measured.
+    // Friction of the joints makes the peak, so it hardly grows with the force, but for the smallest forces. On a surface with
+    // damping this was not measured.
     let peak = during * task.force;
     let larger = match task.surface.damping > 0.0 {
         true => String::new(),
         false => format!(
-            " With a larger force the peak of {} N hardly grows: it is less than {:.0} % from --press {:.0} on.",
+            " If the peak of {} N does not grow with the force, it is less than {:.0} % from --press {:.0} on.",
             format_significant(peak, 2),
             100.0 * OVERSHOOT,
             (MARGIN * peak / OVERSHOOT).ceil(),

@@ -116,16 +116,22 @@ impl TorqueScale {
         };
         let (certain, open) = (said(true), said(false));
         let mut text = Vec::new();
+        let off = |list: &[String], what: &str| match list.len() {
+            1 => format!("the {what} is off by this factor"),
+            _ => format!("the {what} of each is off by its factor"),
+        };
         if !certain.is_empty() {
             text.push(format!(
-                "The torque over that of the described gravity is {} (± one standard deviation), while a joint before it shows the described masses: the torque constant or gear ratio is off by this factor.",
-                listed(&certain)
+                "The torque over that of the described gravity is {} (± one standard deviation), while a joint before it shows the described masses: {}.",
+                listed(&certain),
+                off(&certain, "torque constant or gear ratio")
             ));
         }
         if !open.is_empty() {
             text.push(format!(
-                "The torque over that of the described gravity is {} (± one standard deviation): if the described masses are right, the torque constant is off by this factor.",
-                listed(&open)
+                "The torque over that of the described gravity is {} (± one standard deviation): if the described masses and gravity are right, {}.",
+                listed(&open),
+                off(&open, "torque constant")
             ));
         }
         text.join(" ")

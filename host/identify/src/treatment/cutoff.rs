@@ -8,9 +8,10 @@
 //! better by [`BETTER`]. A lower one also needs a spectrum that is flat above it, as noise is and motion is not,
 //! because a low cut-off also hides unmodelled friction.
 //!
-//! All trials are judged on the same rows, far enough from every reversal. A joint that sticks when it reverses has
-//! friction between its two signs. A low cut-off turns that stay into a smooth passage through zero, which comes nearer
-//! to the torque of the stay although it bends the motion; the low-pass spreads the difference over its response.
+//! A lower one must also explain the torque better by [`BETTER`] on the rows far enough from every reversal. A joint that
+//! sticks when it reverses has friction between its two signs; a low cut-off turns that stay into a smooth passage
+//! through zero, which comes nearer to the torque of the stay although it bends the motion. Those rows alone would not
+//! do: starts and stops, which a low cut-off distorts most, lie near standstill.
 //!
 //! Limits: one cut-off for all joints, because the regressor couples them. Noise that the controller feeds back into
 //! the torque is explained together with the position noise.
@@ -21,13 +22,13 @@ use rig_shared::transmission::Transmission;
 use super::clear_rows::{ClearRows, with_margin};
 use super::trial_rows::beginnings;
 use super::trial_rows::factors_of;
+use super::trial_rows::kept;
 use crate::error::IdentifyError;
 use crate::estimators::linear::by_noise;
 use crate::rows::cache::RowCache;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::plan::Plan;
 use crate::warning::{OwnCutoff, Warning};
-use rig_data::prepare::Beginning;
 use rig_data::prepare::Choice;
 use rig_data::prepare::CutoffTrial;
 use rig_data::prepare::MAX_CUTOFF_SHARE;
@@ -53,7 +54,7 @@ const LEAST_PERIODS: f64 = 30.0;
 const HEADROOM: f64 = 10.0;
 /// Share of the RMS speed below which rows are excluded from the comparison: the sign of their speed is noise.
 const SLOW: f64 = 0.05;
-/// Least number of judged rows of all joints per parameter. With fewer, the fit follows any cut-off's rows.
+/// Least number of rows of all joints per parameter far from every reversal. With fewer, the fit follows any cut-off's rows.
 const ROWS_A_PARAMETER: usize = 2;
 
 /// The model behind the rows of a trial.
@@ -94,7 +95,7 @@ pub(crate) fn decided(
         limits,
         first: &first,
     };
-    let Some(trials) = comparison.trials()? else {
+    let Some(trials) = comparison.trials(false)? else {
         return Ok((surveys, first));
     };
     let score = |t: &CutoffTrial| mean_logarithm(&t.relative_error, &trials);
@@ -116,8 +117,15 @@ pub(crate) fn decided(
             .map(|(a, b)| (a.relative_error[j] / b.relative_error[j]).ln());
         gain.is_some_and(|g| g > BETTER) && first.spectra[j].flattens(cutoff, first.cutoff)
     };
-    if cutoff < first.cutoff && !(0..first.spectra.len()).any(noisy) {
-        return Ok((surveys, PreprocessingPlan { trials, ..first }));
+    if cutoff < first.cutoff {
+        if !(0..first.spectra.len()).any(noisy) {
+            return Ok((surveys, PreprocessingPlan { trials, ..first }));
+        }
+        if !comparison.holds_away_from_reversals(cutoff)? {
+            // The figure and the warnings show what holds.
+            let trials = comparison.trials(true)?.unwrap_or_default();
+            return Ok((surveys, PreprocessingPlan { trials, ..first }));
+        }
     }
     let ends: Vec<f64> = (0..first.spectra.len())
         .map(|j| own_cutoff(&trials, j).max(cutoff))
@@ -200,9 +208,8 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Runs trials with the spectrum's cut-off, with others an octave apart, and with half-octave neighbours of the
-    /// best. Returns none if the recordings are too short.
-    fn trials(&self) -> Result<Option<Vec<CutoffTrial>>, IdentifyError> {
+    /// Returns the raster of the trials; none if the recordings are too short.
+    fn raster(&self) -> Option<Raster> {
         let rate = self.first.sample_rate;
         let shortest = self.surveys.iter().map(|s| s.longest).min().unwrap_or(0);
         let most = MAX_CUTOFF_SHARE * rate / 2.0;
@@ -214,17 +221,24 @@ impl Comparison<'_> {
         // Without decimation the torque would pass the position filter, which differs between trials.
         let decimation = ((0.4 * rate / (HEADROOM * swing)).floor() as usize).max(2);
         let trimmed = trimmed_rows(least.min(self.first.cutoff), decimation, rate);
-        let fastest = self.fastest(0.4 * rate / decimation as f64);
-        if least >= most || shortest < (50 * decimation + 2 * trimmed) as u64 {
+        let enough = least < most && shortest >= (50 * decimation + 2 * trimmed) as u64;
+        enough.then_some(Raster {
+            cutoffs: [least, most],
+            decimation,
+            trimmed,
+            band: 0.4 * rate / decimation as f64,
+        })
+    }
+
+    /// Runs trials with the spectrum's cut-off, with others an octave apart, and with half-octave neighbours of the
+    /// best; on all rows or on those far from reversals (`away`). Returns none if the recordings are too short.
+    fn trials(&self, away: bool) -> Result<Option<Vec<CutoffTrial>>, IdentifyError> {
+        let Some(raster) = self.raster() else {
             return Ok(None);
-        }
-        let band = (0.4 * rate / decimation as f64).min(most);
-        let treated = |cutoff: f64| self.treated(cutoff, decimation, trimmed);
-        let judged = self.judged(with_margin(treated(band)?), &fastest)?;
-        if !judged.are_enough(self.equations.columns.len()) {
-            return Ok(None);
-        }
-        let trial = |cutoff: f64| judged.trial(&treated(cutoff)?, &self.equations);
+        };
+        let clear = if away { self.clear(&raster)? } else { None };
+        let [least, most] = raster.cutoffs;
+        let trial = |cutoff: f64| self.trial(cutoff, &raster, clear.as_deref());
         let mut trials = vec![trial(self.first.cutoff)?];
         let mut cutoff = least;
         while cutoff < most {
@@ -248,6 +262,36 @@ impl Comparison<'_> {
         Ok(Some(trials))
     }
 
+    /// Returns true if a cut-off also explains the torque better than that of the spectrum on the rows far enough from
+    /// every reversal.
+    fn holds_away_from_reversals(&self, cutoff: f64) -> Result<bool, IdentifyError> {
+        let Some(raster) = self.raster() else {
+            return Ok(false);
+        };
+        let Some(clear) = self.clear(&raster)? else {
+            return Ok(false);
+        };
+        let [before, after] =
+            [self.first.cutoff, cutoff].map(|cutoff| self.trial(cutoff, &raster, Some(&clear)));
+        let both = [before?, after?];
+        let [before, after] = [0, 1].map(|k| mean_logarithm(&both[k].relative_error, &both));
+        Ok(before > after + BETTER)
+    }
+
+    /// Returns the rows of each recording far enough from every reversal; none if they are too few.
+    fn clear(&self, raster: &Raster) -> Result<Option<Vec<ClearRows>>, IdentifyError> {
+        // The highest cut-off shows the reversals best.
+        let treatment = self.treated(raster.band.min(raster.cutoffs[1]), raster)?;
+        let treatment = with_margin(treatment);
+        let plan = self.plan(&treatment);
+        let clear = (beginnings(&self.fastest(raster.band), &treatment).iter())
+            .map(|beginning| ClearRows::of(beginning, &plan))
+            .collect::<Result<Vec<ClearRows>, IdentifyError>>()?;
+        let rows: usize = clear.iter().map(ClearRows::count).sum();
+        let enough = rows >= ROWS_A_PARAMETER * self.equations.columns.len();
+        Ok(enough.then_some(clear))
+    }
+
     /// Returns, for each joint, the recording in which its speed below `band` Hz is highest. Slow reversals are
     /// unsuitable: unmodelled friction near standstill dominates their residual, and a low cut-off hides it.
     fn fastest(&self, band: f64) -> Vec<&dyn Recording> {
@@ -264,19 +308,14 @@ impl Comparison<'_> {
     }
 
     /// Returns the treatment of a trial.
-    fn treated(
-        &self,
-        cutoff: f64,
-        decimation: usize,
-        trimmed: usize,
-    ) -> Result<PreprocessingPlan, IdentifyError> {
+    fn treated(&self, cutoff: f64, raster: &Raster) -> Result<PreprocessingPlan, IdentifyError> {
         let options = PrepareOptions {
             cutoff: Choice::Fixed(cutoff),
-            decimation: Choice::Fixed(decimation),
+            decimation: Choice::Fixed(raster.decimation),
             ..self.options.clone()
         };
         let mut treatment = PreprocessingPlan::decide(self.surveys, &options, self.limits)?;
-        treatment.trimmed = trimmed;
+        treatment.trimmed = raster.trimmed;
         let band = treatment.parallel_edge;
         for (slow, spectrum) in (treatment.speed_threshold.iter_mut()).zip(&self.first.spectra) {
             *slow = slow.min(SLOW * spectrum.velocity_rms_below(band));
@@ -284,66 +323,56 @@ impl Comparison<'_> {
         Ok(treatment)
     }
 
-    /// Returns the rows on which trials are judged: those that `treatment` uses.
-    fn judged<'r>(
-        &self,
-        treatment: PreprocessingPlan,
-        recordings: &[&'r dyn Recording],
-    ) -> Result<Judged<'r>, IdentifyError> {
-        let plan = plan_of(&self.equations, &treatment);
-        let parts = (beginnings(recordings, &treatment).into_iter())
-            .map(|beginning| {
-                let clear = ClearRows::of(&beginning, &plan)?;
-                Ok((beginning, clear))
-            })
-            .collect::<Result<_, IdentifyError>>()?;
-        Ok(Judged(parts))
-    }
-}
-
-/// Returns the plan of a trial with `treatment`.
-fn plan_of<'a>(equations: &Equations<'a>, treatment: &'a PreprocessingPlan) -> Plan<'a> {
-    Plan {
-        chain: equations.chain,
-        transmission: equations.transmission,
-        columns: equations.columns,
-        treatment,
-        window: 1,
-        stride: 1,
-        loudness: vec![1.0; treatment.spectra.len()],
-        one_way: Vec::new(),
-        cache: RowCache::default(),
-    }
-}
-
-/// The beginnings of recordings, and the rows there on which trials are judged.
-struct Judged<'a>(Vec<(Beginning<'a>, ClearRows)>);
-
-impl Judged<'_> {
-    /// Returns true if the rows are more than `parameters`, so that a fit leaves a residual.
-    fn are_enough(&self, parameters: usize) -> bool {
-        let rows: usize = self.0.iter().map(|(_, clear)| clear.count()).sum();
-        rows >= ROWS_A_PARAMETER * parameters
+    /// Returns the plan of the rows of a treatment.
+    fn plan<'p>(&'p self, treatment: &'p PreprocessingPlan) -> Plan<'p> {
+        Plan {
+            chain: self.equations.chain,
+            transmission: self.equations.transmission,
+            columns: self.equations.columns,
+            treatment,
+            window: 1,
+            stride: 1,
+            loudness: vec![1.0; treatment.spectra.len()],
+            one_way: Vec::new(),
+            cache: RowCache::default(),
+        }
     }
 
+    /// Fits the model with a cut-off, on all rows or on `clear` ones.
     fn trial(
         &self,
-        treatment: &PreprocessingPlan,
-        equations: &Equations,
+        cutoff: f64,
+        raster: &Raster,
+        clear: Option<&[ClearRows]>,
     ) -> Result<CutoffTrial, IdentifyError> {
-        let plan = plan_of(equations, treatment);
+        let treatment = self.treated(cutoff, raster)?;
+        let plan = self.plan(&treatment);
         let mut factors = vec![TriangularFactor::new(plan.columns.len()); plan.loudness.len()];
-        for (beginning, clear) in &self.0 {
-            let own = factors_of(&[beginning], &plan, &|rows, j, i| clear.has(rows, j, i))?;
+        let beginnings = beginnings(&self.fastest(raster.band), &treatment);
+        for (k, beginning) in beginnings.iter().enumerate() {
+            let own = factors_of(&[beginning], &plan, &|rows, j, i| match clear {
+                Some(clear) => clear[k].has(rows, j, i),
+                None => kept(rows, j, i),
+            })?;
             for (factor, own) in factors.iter_mut().zip(&own) {
                 factor.merge(own, 1.0);
             }
         }
         Ok(CutoffTrial {
-            cutoff: treatment.cutoff,
+            cutoff,
             relative_error: relative_errors(&factors),
         })
     }
+}
+
+/// Common settings of the trials.
+struct Raster {
+    /// Lowest and highest cut-off, Hz.
+    cutoffs: [f64; 2],
+    decimation: usize,
+    trimmed: usize,
+    /// Band of the decimated rows, Hz.
+    band: f64,
 }
 
 /// Returns the RMS residual of each joint over its RMS torque. The least-squares fit covers all joints and weights them

@@ -10,6 +10,8 @@ use super::fault::{Fault, Step};
 /// Digits that a number of the file keeps. The torque of the parameters together is known to the same digits, because a
 /// root of the covariance is rounded and not the covariance itself.
 const DIGITS: usize = 6;
+/// Largest standard deviation: the torque that it makes has a square that is a number.
+const LARGEST: f64 = 1e100;
 
 /// Joint uncertainty of base parameters: per parameter, by its expression, its standard deviations along independent
 /// directions, SI. Two parameters have the sum of the products of their lists as covariance; a shorter list ends in zeros.
@@ -60,20 +62,27 @@ impl Uncertainty {
     }
 
     pub(super) fn check(&self) -> Result<(), Fault> {
-        let wrong = self.0.iter().find_map(|(name, list)| {
-            let wrong = list.iter().find(|x| !x.is_finite())?;
-            Some((name, wrong))
-        });
-        match wrong {
-            None => Ok(()),
-            Some((name, x)) => Err(Fault {
-                key_path: vec![Step::Key("uncertainty")],
-                what: format!("the uncertainty of `{name}`"),
-                found: x.to_string(),
-                advice: "standard deviations must be finite numbers; leave out the table if they are not known"
-                    .to_owned(),
-            }),
+        let most = self.0.len();
+        for (name, list) in &self.0 {
+            let fault = |found: String, advice: &str| {
+                Err(Fault {
+                    key_path: vec![Step::Key("uncertainty"), Step::Name(name.clone())],
+                    what: format!("the uncertainty of `{name}`"),
+                    found,
+                    advice: format!("{advice}; leave out the table if they are not known"),
+                })
+            };
+            if let Some(x) = list.iter().find(|x| !(x.abs() <= LARGEST)) {
+                return fault(x.to_string(), "standard deviations must be finite numbers");
+            }
+            if list.len() > most {
+                return fault(
+                    format!("{} numbers", list.len()),
+                    &format!("{most} parameters have at most {most} independent directions"),
+                );
+            }
         }
+        Ok(())
     }
 }
 
@@ -109,5 +118,15 @@ mod tests {
         assert!((across - 0.004).abs() < 1e-4, "{across}");
         assert!(found.along("unknown").is_empty());
         assert!(Uncertainty::of(["x".to_owned()], &[vec![f64::NAN]]).is_empty());
+    }
+
+    /// A value whose square is no number, and more directions than parameters.
+    #[test]
+    fn impossible_lists_are_refused_by_name() {
+        let check = |list: Vec<f64>| Uncertainty(BTreeMap::from([("m1".to_owned(), list)])).check();
+        assert!(check(vec![0.1]).is_ok() && check(Vec::new()).is_ok());
+        for list in [vec![f64::NAN], vec![1e200], vec![0.1, 0.2]] {
+            assert!(check(list).is_err_and(|fault| fault.what.contains("m1")));
+        }
     }
 }
