@@ -387,7 +387,7 @@ fn adapting(
 /// Returns the compensation of friction while the tool presses: as much at rest as in motion. What it leaves at rest, the
 /// disturbance observer adds there, and that is wrong as soon as the joints move. Together with a slide without a step of the
 /// acceleration it reduced the overshoot of 5 N on 10⁴ N/m from 15.3 to 9.3 % (IRp-6, 1000 ticks a second; median of 6
-/// motions, 29 November 2026); the slide alone to 12.5 %.
+/// motions); the slide alone to 12.5 %.
 fn pressing(friction: PrecompensationSettings<f64>) -> PrecompensationSettings<f64> {
     PrecompensationSettings {
         gain_at_rest: friction.gain,

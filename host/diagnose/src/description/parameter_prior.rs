@@ -115,6 +115,11 @@ impl ParameterPrior {
         }
     }
 
+    /// Returns the number of independent directions of the described values' uncertainty.
+    fn directions(&self) -> usize {
+        self.uncertainty.iter().map(Vec::len).max().unwrap_or(0)
+    }
+
     /// Returns the standard deviation of a free direction's described coefficient.
     pub(crate) fn described_std(&self, direction: usize) -> f64 {
         let terms = &self.free[direction];
@@ -122,8 +127,7 @@ impl ParameterPrior {
             let own = |&(k, f): &(usize, f64)| f * self.uncertainty[k].get(d).unwrap_or(&0.0);
             terms.iter().map(own).sum::<f64>()
         };
-        let directions = self.uncertainty.iter().map(Vec::len).max().unwrap_or(0);
-        (0..directions)
+        (0..self.directions())
             .map(|d| along(d).powi(2))
             .sum::<f64>()
             .sqrt()
@@ -131,8 +135,7 @@ impl ParameterPrior {
 
     /// Returns the torque of one standard deviation of the described values along each independent direction.
     pub(crate) fn uncertain_torques(&self, rows: &Rows) -> Vec<Column> {
-        let directions = self.uncertainty.iter().map(Vec::len).max().unwrap_or(0);
-        (0..directions)
+        (0..self.directions())
             .map(|d| {
                 let terms = self.uncertainty.iter().zip(&rows.nominal);
                 let own = terms.filter_map(|(list, column)| Some((column, *list.get(d)?)));

@@ -148,7 +148,8 @@ fn find_at(
         }
         let model = columns.best(&start)?;
         let gear = columns.gear(&model);
-        if pass == PASSES + usize::from(gear.is_some())
+        // A later search may drop the gear of an earlier one.
+        if pass >= PASSES + usize::from(gear.is_some())
             || model.effects.is_empty() && columns.averaging.repeats()
         {
             return told(&mut columns, &model, by_motion, finding);

@@ -95,9 +95,10 @@ pub(crate) fn decided(
         limits,
         first: &first,
     };
-    let Some(trials) = comparison.trials(false)? else {
+    let Some(raster) = comparison.raster() else {
         return Ok((surveys, first));
     };
+    let trials = comparison.trials(&raster, None)?;
     let score = |t: &CutoffTrial| mean_logarithm(&t.relative_error, &trials);
     let by_spectrum = trials
         .iter()
@@ -121,9 +122,12 @@ pub(crate) fn decided(
         if !(0..first.spectra.len()).any(noisy) {
             return Ok((surveys, PreprocessingPlan { trials, ..first }));
         }
-        if !comparison.holds_away_from_reversals(cutoff)? {
+        let Some(clear) = comparison.clear(&raster)? else {
+            return Ok((surveys, PreprocessingPlan { trials, ..first }));
+        };
+        if !comparison.is_better(cutoff, &raster, &clear)? {
             // The figure and the warnings show what holds.
-            let trials = comparison.trials(true)?.unwrap_or_default();
+            let trials = comparison.trials(&raster, Some(&clear))?;
             return Ok((surveys, PreprocessingPlan { trials, ..first }));
         }
     }
@@ -207,9 +211,9 @@ struct Comparison<'a> {
     first: &'a PreprocessingPlan,
 }
 
-impl Comparison<'_> {
+impl<'a> Comparison<'a> {
     /// Returns the raster of the trials; none if the recordings are too short.
-    fn raster(&self) -> Option<Raster> {
+    fn raster(&self) -> Option<Raster<'a>> {
         let rate = self.first.sample_rate;
         let shortest = self.surveys.iter().map(|s| s.longest).min().unwrap_or(0);
         let most = MAX_CUTOFF_SHARE * rate / 2.0;
@@ -221,24 +225,26 @@ impl Comparison<'_> {
         // Without decimation the torque would pass the position filter, which differs between trials.
         let decimation = ((0.4 * rate / (HEADROOM * swing)).floor() as usize).max(2);
         let trimmed = trimmed_rows(least.min(self.first.cutoff), decimation, rate);
+        let band = 0.4 * rate / decimation as f64;
         let enough = least < most && shortest >= (50 * decimation + 2 * trimmed) as u64;
-        enough.then_some(Raster {
+        enough.then(|| Raster {
             cutoffs: [least, most],
             decimation,
             trimmed,
-            band: 0.4 * rate / decimation as f64,
+            band,
+            recordings: self.fastest(band),
         })
     }
 
     /// Runs trials with the spectrum's cut-off, with others an octave apart, and with half-octave neighbours of the
-    /// best; on all rows or on those far from reversals (`away`). Returns none if the recordings are too short.
-    fn trials(&self, away: bool) -> Result<Option<Vec<CutoffTrial>>, IdentifyError> {
-        let Some(raster) = self.raster() else {
-            return Ok(None);
-        };
-        let clear = if away { self.clear(&raster)? } else { None };
+    /// best; on all rows or on `clear` ones.
+    fn trials(
+        &self,
+        raster: &Raster,
+        clear: Option<&[ClearRows]>,
+    ) -> Result<Vec<CutoffTrial>, IdentifyError> {
         let [least, most] = raster.cutoffs;
-        let trial = |cutoff: f64| self.trial(cutoff, &raster, clear.as_deref());
+        let trial = |cutoff: f64| self.trial(cutoff, raster, clear);
         let mut trials = vec![trial(self.first.cutoff)?];
         let mut cutoff = least;
         while cutoff < most {
@@ -259,21 +265,20 @@ impl Comparison<'_> {
             }
         }
         trials.sort_by(|a, b| a.cutoff.total_cmp(&b.cutoff));
-        Ok(Some(trials))
+        Ok(trials)
     }
 
-    /// Returns true if a cut-off also explains the torque better than that of the spectrum on the rows far enough from
-    /// every reversal.
-    fn holds_away_from_reversals(&self, cutoff: f64) -> Result<bool, IdentifyError> {
-        let Some(raster) = self.raster() else {
-            return Ok(false);
-        };
-        let Some(clear) = self.clear(&raster)? else {
-            return Ok(false);
-        };
-        let [before, after] =
-            [self.first.cutoff, cutoff].map(|cutoff| self.trial(cutoff, &raster, Some(&clear)));
-        let both = [before?, after?];
+    /// Returns true if a cut-off explains the torque better than that of the spectrum on `clear` rows.
+    fn is_better(
+        &self,
+        cutoff: f64,
+        raster: &Raster,
+        clear: &[ClearRows],
+    ) -> Result<bool, IdentifyError> {
+        let both = [
+            self.trial(self.first.cutoff, raster, Some(clear))?,
+            self.trial(cutoff, raster, Some(clear))?,
+        ];
         let [before, after] = [0, 1].map(|k| mean_logarithm(&both[k].relative_error, &both));
         Ok(before > after + BETTER)
     }
@@ -284,7 +289,7 @@ impl Comparison<'_> {
         let treatment = self.treated(raster.band.min(raster.cutoffs[1]), raster)?;
         let treatment = with_margin(treatment);
         let plan = self.plan(&treatment);
-        let clear = (beginnings(&self.fastest(raster.band), &treatment).iter())
+        let clear = (beginnings(&raster.recordings, &treatment).iter())
             .map(|beginning| ClearRows::of(beginning, &plan))
             .collect::<Result<Vec<ClearRows>, IdentifyError>>()?;
         let rows: usize = clear.iter().map(ClearRows::count).sum();
@@ -294,7 +299,7 @@ impl Comparison<'_> {
 
     /// Returns, for each joint, the recording in which its speed below `band` Hz is highest. Slow reversals are
     /// unsuitable: unmodelled friction near standstill dominates their residual, and a low cut-off hides it.
-    fn fastest(&self, band: f64) -> Vec<&dyn Recording> {
+    fn fastest(&self, band: f64) -> Vec<&'a dyn Recording> {
         let speed = |s: &Survey, j: usize| s.joints[j].spectrum.velocity_rms_below(band);
         let of = |j: usize| {
             let numbered = self.surveys.iter().enumerate();
@@ -348,7 +353,7 @@ impl Comparison<'_> {
         let treatment = self.treated(cutoff, raster)?;
         let plan = self.plan(&treatment);
         let mut factors = vec![TriangularFactor::new(plan.columns.len()); plan.loudness.len()];
-        let beginnings = beginnings(&self.fastest(raster.band), &treatment);
+        let beginnings = beginnings(&raster.recordings, &treatment);
         for (k, beginning) in beginnings.iter().enumerate() {
             let own = factors_of(&[beginning], &plan, &|rows, j, i| match clear {
                 Some(clear) => clear[k].has(rows, j, i),
@@ -366,7 +371,9 @@ impl Comparison<'_> {
 }
 
 /// Common settings of the trials.
-struct Raster {
+struct Raster<'a> {
+    /// The recordings.
+    recordings: Vec<&'a dyn Recording>,
     /// Lowest and highest cut-off, Hz.
     cutoffs: [f64; 2],
     decimation: usize,

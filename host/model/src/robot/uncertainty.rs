@@ -56,11 +56,6 @@ impl Uncertainty {
         self.0.get(expression).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns the number of independent directions.
-    pub fn directions(&self) -> usize {
-        self.0.values().map(Vec::len).max().unwrap_or(0)
-    }
-
     pub(super) fn check(&self) -> Result<(), Fault> {
         let most = self.0.len();
         for (name, list) in &self.0 {
