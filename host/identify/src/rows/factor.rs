@@ -65,8 +65,11 @@ impl TriangularFactor {
         other.reduce();
         let rows = self.rows + other.rows;
         let width = self.width;
+        let mut row = vec![0.0; width];
         for i in 0..width {
-            let row: Vec<f64> = (0..width).map(|j| other.r[j * width + i]).collect();
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = other.r[j * width + i];
+            }
             self.push(&row[..width - 1], row[width - 1], weight);
         }
         self.rows = rows;

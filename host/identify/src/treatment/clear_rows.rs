@@ -18,12 +18,11 @@ pub(crate) fn with_margin(treatment: PreprocessingPlan) -> PreprocessingPlan {
     }
 }
 
-/// The rows of a recording that are used, by their time.
+/// The rows of a recording that are used, as stretches of time: memory grows with the reversals, not with the rows.
 pub(crate) struct ClearRows {
-    /// s, rising.
-    t: Vec<f64>,
-    /// Per row, one flag a joint.
-    used: Vec<Vec<bool>>,
+    /// Per joint, first and last time of each stretch of used rows, s, rising.
+    stretches: Vec<Vec<[f64; 2]>>,
+    count: usize,
 }
 
 impl ClearRows {
@@ -32,29 +31,45 @@ impl ClearRows {
     /// # Errors
     /// [`IdentifyError`]: a recording that cannot be read.
     pub(crate) fn of(recording: &dyn Recording, plan: &Plan) -> Result<Self, IdentifyError> {
-        let (mut t, mut used) = (Vec::new(), Vec::new());
+        let joints = plan.loudness.len();
+        let mut clear = Self {
+            stretches: vec![Vec::new(); joints],
+            count: 0,
+        };
+        let mut before = vec![false; joints];
         each_rows(recording, plan, ModelKind::Differential, &mut |rows| {
-            for (i, time) in rows.t.iter().enumerate() {
-                t.push(*time);
-                used.push(
-                    (0..rows.equations.len())
-                        .map(|j| kept(rows, j, i))
-                        .collect(),
-                );
+            for (i, &time) in rows.t.iter().enumerate() {
+                for (j, before) in before.iter_mut().enumerate() {
+                    let used = kept(rows, j, i);
+                    if used {
+                        clear.add(j, time, *before);
+                    }
+                    *before = used;
+                }
             }
             Ok(())
         })?;
-        Ok(Self { t, used })
+        Ok(clear)
+    }
+
+    /// Adds a used row, to the last stretch if the row before it is used as well.
+    fn add(&mut self, joint: usize, time: f64, continued: bool) {
+        self.count += 1;
+        match self.stretches[joint].last_mut() {
+            Some(last) if continued => last[1] = time,
+            _ => self.stretches[joint].push([time; 2]),
+        }
     }
 
     /// Returns true if the row is used in the equation of `joint`.
     pub(crate) fn has(&self, rows: &Rows, joint: usize, row: usize) -> bool {
-        let place = self.t.binary_search_by(|t| t.total_cmp(&rows.t[row]));
-        place.is_ok_and(|k| self.used[k][joint])
+        let (own, t) = (&self.stretches[joint], rows.t[row]);
+        let begun = own.partition_point(|[first, _]| *first <= t);
+        begun > 0 && t <= own[begun - 1][1]
     }
 
     /// Returns the number of used rows of all joints.
     pub(crate) fn count(&self) -> usize {
-        self.used.iter().flatten().filter(|used| **used).count()
+        self.count
     }
 }

@@ -57,12 +57,13 @@ impl Lag {
         let treatment = problem.plan.treatment;
         let period = treatment.decimation as f64 * treatment.dt();
         let mut row = vec![0.0; p + 1];
+        let mut reversals = Reversals::of(problem.plan);
         problem.each_instant(step, &mut |rows, i, weight| {
             let Some(about) = neighbours(rows, i, period) else {
                 return Ok(());
             };
-            let reverses = reversing(problem.plan, rows, i)?;
-            let equations = rows.equations.iter().zip(&mut factors).zip(&reverses);
+            let reverses = reversals.near(rows, i)?;
+            let equations = rows.equations.iter().zip(&mut factors).zip(reverses);
             for ((equation, factor), _) in equations.filter(|((e, _), reverses)| {
                 !**reverses && e.keep[about.clone()].iter().all(|k| *k)
             }) {
@@ -88,39 +89,70 @@ fn neighbours(rows: &Rows, i: usize, period: f64) -> Option<RangeInclusive<usize
     (span < (2.0 * NEIGHBOURS as f64 + 0.5) * period).then_some(first..=last)
 }
 
-/// Returns, per joint, true if it or a motor that moves it reverses so near to row `i` that the low-pass spreads the
-/// reversal over the row.
-fn reversing(plan: &Plan, rows: &Rows, i: usize) -> Result<Vec<bool>, PrepareError> {
-    let n = rows.qd.len();
-    let near = i.saturating_sub(RESPONSE)..(i + RESPONSE + 1).min(rows.t.len());
-    let turns = |speeds: &[f64]| speeds.iter().any(|v| v * speeds[0] <= 0.0);
-    let mut reverses: Vec<bool> = (rows.qd.iter())
-        .map(|speeds| turns(&speeds[near.clone()]))
-        .collect();
-    if plan.transmission.is_simple() {
-        return Ok(reverses);
+/// Finds the joints that reverse, or that a reversing motor moves, so near to a row that the low-pass spreads the reversal
+/// over it.
+struct Reversals<'a> {
+    plan: &'a Plan<'a>,
+    /// Per joint.
+    found: Vec<bool>,
+    q: Vec<f64>,
+    /// Per motor, its speed by the speeds of the joints.
+    directions: Vec<f64>,
+    /// Speed of each motor in the first of the rows.
+    first: Vec<f64>,
+}
+
+impl<'a> Reversals<'a> {
+    fn of(plan: &'a Plan) -> Self {
+        let n = plan.loudness.len();
+        Self {
+            plan,
+            found: vec![false; n],
+            q: vec![0.0; n],
+            directions: vec![0.0; n * n],
+            first: vec![0.0; n],
+        }
     }
-    let mut directions = vec![0.0; n * n];
-    let mut speeds = vec![Vec::new(); n];
-    let mut moved = vec![false; n * n];
-    for row in near {
-        let q: Vec<f64> = rows.q.iter().map(|q| q[row]).collect();
-        (plan.transmission.motor_directions(&q, &mut directions)).map_err(failed)?;
-        for (motor, along) in directions.chunks_exact(n).enumerate() {
-            let each = along.iter().zip(&rows.qd);
-            speeds[motor].push(each.map(|(a, qd)| a * qd[row]).sum());
-            for (moved, a) in moved[motor * n..].iter_mut().zip(along) {
-                *moved |= *a != 0.0;
+
+    /// Returns, per joint, true if row `i` is near a reversal.
+    fn near(&mut self, rows: &Rows, i: usize) -> Result<&[bool], PrepareError> {
+        let near = i.saturating_sub(RESPONSE)..(i + RESPONSE + 1).min(rows.t.len());
+        for (found, speeds) in self.found.iter_mut().zip(&rows.qd) {
+            let speeds = &speeds[near.clone()];
+            *found = speeds.iter().any(|v| v * speeds[0] <= 0.0);
+        }
+        if !self.plan.transmission.is_simple() {
+            for row in near.clone() {
+                self.add_motors(rows, row, row == near.start)?;
             }
         }
+        Ok(&self.found)
     }
-    for (speeds, moved) in speeds.iter().zip(moved.chunks_exact(n)) {
-        // A simple drive moves nothing here: its friction is the joint's.
-        for (reverses, _) in (reverses.iter_mut().zip(moved)).filter(|(_, moved)| **moved) {
-            *reverses |= turns(speeds);
+
+    /// Adds the joints whose motors turn against the `first` row.
+    fn add_motors(&mut self, rows: &Rows, row: usize, first: bool) -> Result<(), PrepareError> {
+        let n = self.q.len();
+        for (to, q) in self.q.iter_mut().zip(&rows.q) {
+            *to = q[row];
         }
+        (self.plan.transmission)
+            .motor_directions(&self.q, &mut self.directions)
+            .map_err(failed)?;
+        for (along, start) in self.directions.chunks_exact(n).zip(&mut self.first) {
+            let each = along.iter().zip(&rows.qd);
+            let speed: f64 = each.map(|(a, qd)| a * qd[row]).sum();
+            if first {
+                *start = speed;
+            }
+            if speed * *start <= 0.0 {
+                // A simple drive moves nothing here: its friction is the joint's.
+                for (found, a) in self.found.iter_mut().zip(along) {
+                    *found |= *a != 0.0;
+                }
+            }
+        }
+        Ok(())
     }
-    Ok(reverses)
 }
 
 /// Returns the rate of change at row `i`, per row.
