@@ -5,7 +5,8 @@
 //! that the description knows: masses are weighed or come from a drawing. For each joint alone, the described gravity
 //! torque enters as one column, its factor unknown; inertias, friction and constants stay free. The gravity columns of the
 //! base parameters then tell whether the described *pattern* over the poses holds (χ² of what they take beyond the factor).
-//! If it does not, the masses are wrong, and nothing is said about the torques.
+//! If it does not, the masses are wrong, and nothing is said about the torques. The noise is what the joint's own fit leaves:
+//! a wrong factor stays in the residual of the common fit.
 //!
 //! A wrong mass beyond the joint in the same proportion looks alike. The joints before it carry that mass as well: if their
 //! gravity is as described, the torque is wrong.
@@ -18,11 +19,15 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use super::outcome::Outcome;
 use crate::error::IdentifyError;
 use crate::estimators::problem::Problem;
+use crate::rows::factor::TriangularFactor;
+use crate::rows::stream::each_rows;
 use crate::structure::chain::chain_of;
 use crate::uncertainty::residual::LEAST_ERROR;
 use crate::warning::{TorqueScale, Warning};
 use rig_model::robot::{CONTRADICTED, Robot};
+use rig_numerics::autocorrelation::Autocorrelation;
 use rig_numerics::svd::Svd;
+use rig_numerics::vector::dot_in_order;
 use rig_shared::multibody::{COLUMNS, column, inverse_dynamics};
 
 /// Poses at which gravity is looked for.
@@ -73,8 +78,13 @@ pub(crate) fn torque_scale(
         DVector::from_iterator(columns.len(), columns.iter().map(|c| all[*c]))
     };
     let own = weights(described);
-    let scales: Vec<(Gravity, Scale)> = (0..described.joints.len())
-        .filter_map(|joint| Gravity::of(problem, result, joint, &columns))
+    if own.amax() == 0.0 {
+        return Ok(None);
+    }
+    let fits: Vec<OwnFit> = result.factors.iter().map(OwnFit::of).collect();
+    let memories = memories(problem, &fits)?;
+    let scales: Vec<(Gravity, Scale)> = (fits.iter().zip(&memories).enumerate())
+        .filter_map(|(joint, (fit, memory))| fit.gravity(joint, &columns, *memory))
         .filter_map(|gravity| gravity.scale(&own).map(|scale| (gravity, scale)))
         .collect();
     let mut found = Vec::new();
@@ -143,26 +153,87 @@ fn stated(problem: &Problem, described: &Robot) -> DVector<f64> {
     &problem.base.combination * DVector::from_vec(standard)
 }
 
-impl Gravity {
-    /// Takes the equation of a joint; `None` if it has none.
-    fn of(problem: &Problem, result: &Outcome, joint: usize, columns: &[usize]) -> Option<Self> {
-        let equation = result.factors.get(joint)?;
+/// The fit of a joint's torque alone. A factor in its torques leaves this one's residual as it is, while it stays in the
+/// residual of the common fit.
+struct OwnFit<'a> {
+    equation: &'a TriangularFactor,
+    values: Vec<f64>,
+    /// Standard deviation of the residual.
+    std: f64,
+}
+
+impl<'a> OwnFit<'a> {
+    /// Fits a joint's equation. Pseudo-inverse: one joint need not excite every parameter.
+    fn of(equation: &'a TriangularFactor) -> Self {
         let (r, z) = equation.system();
-        let rms = (equation.right_side_squares() / equation.rows().max(1) as f64).sqrt();
-        let noise = (1.0 / problem.weights.get(joint)?).max(LEAST_ERROR * rms);
-        let memory = result.memory.get(joint).copied();
-        let memory = memory.unwrap_or(result.estimate.memory_rows).max(1.0);
+        let svd = Svd::of(r);
+        let smallest = ROUNDING * svd.singular_values.max();
+        let rank = svd
+            .singular_values
+            .iter()
+            .filter(|s| **s > smallest)
+            .count();
+        let values = svd.solve(&z, smallest).as_slice().to_vec();
+        let rows = equation.rows() as f64;
+        let squares = equation.residual_squares(&values) / (rows - rank as f64).max(1.0);
+        let rms = (equation.right_side_squares() / rows.max(1.0)).sqrt();
+        Self {
+            equation,
+            values,
+            std: squares.sqrt().max(LEAST_ERROR * rms),
+        }
+    }
+
+    /// Returns the equation without what inertias, friction and constants explain; `columns` are those that weigh, `memory`
+    /// is the correlation time of the residual, rows. `None` without rows.
+    fn gravity(&self, joint: usize, columns: &[usize], memory: f64) -> Option<Gravity> {
+        if self.equation.rows() == 0 {
+            return None;
+        }
+        let (r, z) = self.equation.system();
         let others: Vec<usize> = (0..r.ncols()).filter(|c| !columns.contains(c)).collect();
         let beside = directions(r.select_columns(&others));
         let columns = r.select_columns(columns);
-        Some(Self {
+        Some(Gravity {
             joint,
             columns: &columns - &beside * beside.tr_mul(&columns),
             torque: &z - &beside * beside.tr_mul(&z),
-            std: noise * memory.sqrt(),
+            std: self.std * memory.max(1.0).sqrt(),
         })
     }
+}
 
+/// Returns the correlation time of the residual of each joint's own fit, rows.
+///
+/// # Errors
+/// [`IdentifyError`]: a recording that cannot be read.
+fn memories(problem: &Problem, fits: &[OwnFit]) -> Result<Vec<f64>, IdentifyError> {
+    let mut memories = vec![Autocorrelation::default(); fits.len()];
+    for recording in problem.training {
+        each_rows(
+            *recording,
+            problem.plan,
+            problem.options.model,
+            &mut |rows| {
+                let joints = rows.equations.iter().zip(fits).zip(&mut memories);
+                for ((equation, fit), memory) in joints {
+                    let p = fit.values.len();
+                    for i in (0..equation.y.len()).filter(|i| equation.keep[*i]) {
+                        let x = &equation.x[i * p..(i + 1) * p];
+                        memory.push(equation.y[i] - dot_in_order(x, &fit.values));
+                    }
+                }
+                Ok(())
+            },
+        )?;
+    }
+    Ok(memories
+        .iter()
+        .map(Autocorrelation::correlation_time)
+        .collect())
+}
+
+impl Gravity {
     /// Compares the torque with the described gravity; `None` if the data do not show it, or if the described pattern over
     /// the poses does not hold.
     fn scale(&self, stated: &DVector<f64>) -> Option<Scale> {
