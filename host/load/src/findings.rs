@@ -52,6 +52,8 @@ pub struct Trace {
 pub struct SensorFindings {
     /// Which of the two opposite wrenches is read.
     pub reads: Reads,
+    /// Says how `reads` was found; `None` if the description states it.
+    pub reads_found: Option<String>,
     /// Roll, pitch and yaw of the sensor in the flange frame, rad: estimated, or as described.
     pub rotation: [f64; 3],
     /// Angle between described and estimated axes, rad; `None` if the data show no difference.
@@ -150,15 +152,15 @@ impl Told<'_> {
         let delay = self.delay(warnings);
         let position = self.position(warnings);
         warnings.extend(self.alternative_words());
-        if self.sensor.reads.is_none() {
+        let reads_found = self.sensor.reads.is_none().then(|| {
             let [whose, key] = match reads {
                 Reads::Load => ["load on the robot", "load"],
                 Reads::Robot => ["robot on the load", "robot"],
             };
-            warnings.push(format!(
+            format!(
                 "The readings are the wrench of the {whose}, because the mass must be positive; write reads = \"{key}\" into [wrist_sensor] to have this checked."
-            ));
-        }
+            )
+        });
         let biases = self.biases();
         for bias in &biases {
             let told = [jump_words(bias), drift_words(bias, self.fit.noise)];
@@ -171,6 +173,7 @@ impl Told<'_> {
         }
         SensorFindings {
             reads,
+            reads_found,
             rotation: match is_turned {
                 true => [roll, pitch, yaw],
                 false => self.sensor.rotation,

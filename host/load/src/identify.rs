@@ -125,19 +125,30 @@ fn mass_checks(
         return Ok(Vec::new());
     };
     let beside = options.tool.as_ref().map_or(0.0, |tool| tool.mass);
-    let mut checks = Vec::new();
     let sensor = robot.wrist_sensor.clone().unwrap_or_default();
-    for (found, by) in estimates {
-        let Some(found) = found else { continue };
-        let Some(check) = MassCheck::of(found, by, known, beside) else {
-            continue;
-        };
+    let checked: Vec<(&Estimate, MassCheck)> = (estimates.into_iter())
+        .filter_map(|(found, by)| {
+            let found = found?;
+            Some((found, MassCheck::of(found, by, known, beside)?))
+        })
+        .collect();
+    let checks: Vec<MassCheck> = checked.iter().map(|(_, check)| *check).collect();
+    if let [(a, sensor), (b, torque)] = &checked[..] {
+        let freedom = a.degrees_of_freedom.min(b.degrees_of_freedom);
+        if let Some(text) = MassCheck::both(sensor, torque, freedom) {
+            warnings.push(text);
+            return Ok(checks);
+        }
+    }
+    for (found, check) in &checked {
         let centre = [1, 2, 3].map(|k| found.values[k] / found.values[0]);
-        match check.words([centre, sensor.position], found.degrees_of_freedom) {
+        let refutes = |other| check.is_refuted_by(other, found.degrees_of_freedom);
+        let confirmed = checks.iter().any(refutes);
+        let places = [centre, sensor.position];
+        match check.words(confirmed, places, found.degrees_of_freedom) {
             Err(LoadError::Fault(text)) if options.even_if_wrong => warnings.push(text),
             other => warnings.extend(other?),
         }
-        checks.push(check);
     }
     Ok(checks)
 }

@@ -57,13 +57,15 @@ impl MassCheck {
         self.chance < CONTRADICTS
     }
 
-    /// Says how the masses differ; `None` if by no more than chance.
+    /// Says how the masses differ; `None` if by no more than chance. `confirmed` if the other measurement, torques or sensor,
+    /// shows the known mass and not this one.
     ///
     /// # Errors
     /// [`LoadError::Fault`] with the unit that the forces look like. `places` are the identified centre of mass and the
     /// origin of the sensor in the flange frame, m.
     pub(crate) fn words(
         &self,
+        confirmed: bool,
         places: [[f64; 3]; 2],
         degrees_of_freedom: usize,
     ) -> Result<Option<String>, LoadError> {
@@ -72,17 +74,52 @@ impl MassCheck {
         }
         let factor = format_value(self.factor, self.std);
         let known = format_significant(self.known.mass, 4);
-        match self.by {
-            By::Torque => Ok(Some(format!(
-                "The joint torques show {factor} times the known mass of {known} kg (± one standard deviation): the torque constants of the joints that carry it look off by this factor, or the known mass is."
-            ))),
+        let [shown, other, cause] = match self.by {
+            By::Torque => [
+                "The joint torques show",
+                "the sensor confirms",
+                "the torque constants of the joints that carry it look",
+            ],
             By::Sensor | By::Both => match self.unit(degrees_of_freedom) {
-                Some(units) => Err(LoadError::Fault(unit_words(units, &factor, &known, places))),
-                None => Ok(Some(format!(
-                    "The sensor shows {factor} times the known mass of {known} kg (± one standard deviation): the gains of the forces look off by this factor, or the known mass is."
-                ))),
+                Some(units) => {
+                    return Err(LoadError::Fault(unit_words(units, &factor, &known, places)));
+                }
+                None => [
+                    "The sensor shows",
+                    "the joint torques confirm",
+                    "the gains of the forces look",
+                ],
             },
-        }
+        };
+        let end = match confirmed {
+            true => format!("; {other} the known mass."),
+            false => ", or the known mass is.".to_owned(),
+        };
+        Ok(Some(format!(
+            "{shown} {factor} times the known mass of {known} kg (± one standard deviation): {cause} off by this factor{end}"
+        )))
+    }
+
+    /// Returns true if another measurement shows the known mass, and not that of this one.
+    pub(crate) fn is_refuted_by(&self, other: &Self, degrees_of_freedom: usize) -> bool {
+        !other.contradicts() && self.differs_from(other, degrees_of_freedom)
+    }
+
+    fn differs_from(&self, other: &Self, degrees_of_freedom: usize) -> bool {
+        let deviations = (self.factor - other.factor) / self.std.hypot(other.std);
+        chance(deviations, degrees_of_freedom) < CONTRADICTS
+    }
+
+    /// Says that sensor and torques show the same mass, and that it is not the known one; `None` if this is not so.
+    pub(crate) fn both(sensor: &Self, torque: &Self, degrees_of_freedom: usize) -> Option<String> {
+        let same = !sensor.differs_from(torque, degrees_of_freedom);
+        (same && sensor.contradicts() && torque.contradicts()).then(|| {
+            let [a, b] = [sensor, torque].map(|c| format_value(c.factor, c.std));
+            format!(
+                "The sensor shows {a} times the known mass of {} kg, and the joint torques show {b} times (± one standard deviation): two measurements agree, so the known mass looks wrong. Check its unit (--mass is in kg), what was weighed, and what else is mounted at the flange (--tool).",
+                format_significant(sensor.known.mass, 4)
+            )
+        })
     }
 
     /// Returns the units of forces and moments that the factor is that of, within the accuracy of a sound sensor.
@@ -147,11 +184,40 @@ mod tests {
             std,
             chance: chance((factor - 1.0) / std, 19),
         };
-        let said = |factor, std| check(factor, std).words([[0.0; 3]; 2], 19).unwrap();
+        let said = |factor, std| check(factor, std).words(false, [[0.0; 3]; 2], 19).unwrap();
         assert_eq!(said(1.12, 0.05), None);
         let text = said(1.12, 0.01).unwrap();
         assert!(text.contains("1.120 ± 0.010 times"), "{text}");
         // Student's t of 19 degrees of freedom: 3.883 has two tails of 0.001.
         assert!(!check(1.0387, 0.01).contradicts() && check(1.0390, 0.01).contradicts());
+    }
+
+    #[test]
+    fn two_measurements_that_agree_blame_the_known_mass() {
+        let known = KnownMass {
+            mass: 2.0,
+            std: 0.0,
+        };
+        let check = |by: By, factor: f64, std: f64| MassCheck {
+            by,
+            known,
+            factor,
+            std,
+            chance: chance((factor - 1.0) / std, 19),
+        };
+        let sensor = check(By::Sensor, 1.12, 0.001);
+        let torque = |factor, std| check(By::Torque, factor, std);
+        let both = |torque: &MassCheck| MassCheck::both(&sensor, torque, 19);
+        let text = both(&torque(1.10, 0.01)).unwrap();
+        assert!(text.contains("the known mass looks wrong"), "{text}");
+        // One that differs, and one that cannot tell.
+        assert_eq!(both(&torque(1.01, 0.01)), None);
+        assert_eq!(both(&torque(1.05, 0.08)), None);
+        let words = |other: &MassCheck| {
+            let confirmed = sensor.is_refuted_by(other, 19);
+            sensor.words(confirmed, [[0.0; 3]; 2], 19).unwrap().unwrap()
+        };
+        assert!(words(&torque(1.01, 0.01)).contains("the joint torques confirm the known mass"));
+        assert!(words(&torque(1.05, 0.08)).contains("or the known mass is"));
     }
 }

@@ -94,6 +94,19 @@ fn load_is_what_the_torques_with_it_show_beyond_those_without_it() {
     assert!(fused.mass.std <= agreement.by_sensor_std[0]);
     assert!(fused.mass.std <= agreement.by_torque_std[0]);
     assert!((fused.mass.value / truth[0] - 1.0).abs() < 0.01);
+    // Weighed wrong: both say so.
+    let options = LoadOptions {
+        known_mass: Some(KnownMass {
+            mass: truth[0] / 1.3,
+            std: 0.002,
+        }),
+        ..options
+    };
+    let found = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+    let [said] = &found.warnings[..] else {
+        panic!("{:?}", found.warnings);
+    };
+    assert!(said.contains("the known mass looks wrong"), "{said}");
 }
 
 /// The description gives the torque of the unloaded arm; the position is noisy, and heavy rotors multiply its noise.

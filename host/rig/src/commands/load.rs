@@ -225,12 +225,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     let flange = urdf.as_ref().map(Original::tip);
     write(args, &found, (flange, numbers.as_ref()), &context)?;
-    for warning in &found.warnings {
-        ui.warn(warning);
-    }
-    for line in lines(&robot, &found, numbers.as_ref()) {
-        ui.answer(&line);
-    }
+    told(&robot, &found, numbers.as_ref(), ui);
     if let Some(link) = flange {
         ui.answer(&format!("flange frame: that of link {link}"));
     }
@@ -239,6 +234,20 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         args.out.join("report.html").display()
     ));
     Ok(())
+}
+
+/// Prints warnings, notes and the load.
+fn told(robot: &Robot, found: &LoadIdentification, numbers: Option<&ControllerNumbers>, ui: &Ui) {
+    for warning in &found.warnings {
+        ui.warn(warning);
+    }
+    let sensor = found.sensor.as_ref();
+    if let Some(note) = sensor.and_then(|own| own.reads_found.as_ref()) {
+        ui.note(note);
+    }
+    for line in lines(robot, found, numbers) {
+        ui.answer(&line);
+    }
 }
 
 /// Refuses a recording that is given both with and without the load, by one name or as a copy.

@@ -298,7 +298,7 @@ fn biases(sensor: &SensorFindings) -> Section {
         )))
 }
 
-/// Says what else differs from the description.
+/// Says what else differs from the description, or was not in it.
 fn setting(sensor: &SensorFindings) -> String {
     let vector = |v: [f64; 3]| v.map(|v| format!("{v:.4}")).join(", ");
     let parts = [
@@ -308,6 +308,7 @@ fn setting(sensor: &SensorFindings) -> String {
             let ms = format_significant(1e3 * delay, 3);
             format!(" Delay of the readings against the positions: {ms} ms.")
         }),
+        (sensor.reads_found.as_ref()).map(|found| format!(" {found}")),
     ];
     parts.into_iter().flatten().collect()
 }
