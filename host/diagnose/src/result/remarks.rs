@@ -13,7 +13,7 @@ use crate::recordings::disturbance::Touch;
 use crate::recordings::encoder_zero::Shift;
 use crate::result::sentences::model::{change, remark};
 use crate::result::sentences::parameters::{
-    alike, contradicted, held, light_link, offsets, one_way,
+    alike, contradicted, exact, held, light_link, offsets, one_way, unknown_uncertainty,
 };
 use crate::result::sentences::recordings::{
     another_zero, lifted, no_other_motion, own_rate, read_off, touch,
@@ -77,6 +77,7 @@ pub(crate) fn remarks(on: &Remarked) -> Vec<String> {
     words.extend(zero.map(|(shift, joint)| another_zero(joint, shift)));
     words.extend(on.held_out.and_then(|held_out| own_rate(context, held_out)));
     words.extend(read_off(robot, on.sensor_zeros));
+    words.extend(uncertainty(context));
     words.extend(offsets(context, last));
     words.extend(contradicted(context, &on.open.contradicted));
     words.extend(held(context, &on.open.held));
@@ -85,6 +86,27 @@ pub(crate) fn remarks(on: &Remarked) -> Vec<String> {
     words.extend((on.change.as_ref()).map(|own| change(robot, &own.cause)));
     words.extend(weight_of_a_spring(context, on.chosen, last));
     words
+}
+
+/// Warns if `[uncertainty]` of the description and the robot's base parameters do not match, as after a change of the
+/// geometry: what does not match counts as exact.
+fn uncertainty(context: &DiagnosisContext) -> Vec<String> {
+    let stated = &context.robot.uncertainty;
+    if stated.is_empty() {
+        return Vec::new();
+    }
+    let base = &context.nominal.base;
+    let own: Vec<String> = (0..base.len()).map(|k| base.expression(k)).collect();
+    let unknown: Vec<&str> = stated
+        .names()
+        .filter(|name| !own.iter().any(|o| o == name))
+        .collect();
+    let missing = own.iter().filter(|name| stated.along(name).is_empty());
+    let missing: Vec<&str> = missing.map(String::as_str).collect();
+    [unknown_uncertainty(&unknown), exact(&missing)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// Warns if a spring took part of a link's weight: a stiffening spring is like a linear one with less weight.

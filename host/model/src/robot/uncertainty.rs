@@ -51,6 +51,11 @@ impl Uncertainty {
         self.0.is_empty()
     }
 
+    /// Returns the expressions of the parameters that have one.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
     /// Returns the standard deviations of the parameter along the independent directions; empty if it has none.
     pub fn along(&self, expression: &str) -> &[f64] {
         self.0.get(expression).map_or(&[], Vec::as_slice)

@@ -129,6 +129,34 @@ pub(crate) fn offsets(context: &DiagnosisContext, after: &Solution) -> Option<St
     })
 }
 
+/// Warns of names in `[uncertainty]` that are no base parameters; `None` without any.
+pub(crate) fn unknown_uncertainty(names: &[&str]) -> Option<String> {
+    let [first, rest @ ..] = names else {
+        return None;
+    };
+    let more = match rest.len() {
+        0 => String::new(),
+        count => format!(" and {count} more"),
+    };
+    Some(format!(
+        "[uncertainty] of the description has `{first}`{more}, which this robot does not have as a base parameter: it was not used. If the joints, the geometry or the drives were changed by hand, remove the table or identify again (`rig identify`)."
+    ))
+}
+
+/// Warns of base parameters that `[uncertainty]` leaves out; `None` without any.
+pub(crate) fn exact(names: &[&str]) -> Option<String> {
+    let [first, rest @ ..] = names else {
+        return None;
+    };
+    let more = match rest.len() {
+        0 => String::new(),
+        count => format!(" and {count} more base parameters"),
+    };
+    Some(format!(
+        "[uncertainty] of the description has nothing for `{first}`{more}: the described value counts as exact, so a small difference is told as a change."
+    ))
+}
+
 /// Warns that a spring may have taken part of a link's weight: the fitted first moment `now` and its standard deviation
 /// `std` are far below the described one, kg·m.
 pub(crate) fn light_link(now: f64, std: f64, described: f64) -> String {
