@@ -9,6 +9,6 @@ pub mod upload;
 
 pub use demand::{other_link, shortfalls};
 pub use description::description_of;
-pub use nameplate::{Nameplate, NameplateError, hardware_of, link_parameters};
+pub use nameplate::{Nameplate, NameplateError, check_hardware, hardware_of, link_parameters};
 pub use rig::EmulatedRig;
 pub use sweep::friction_sweep;

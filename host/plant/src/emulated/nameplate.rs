@@ -13,6 +13,7 @@ use rig_shared::link::LinkParameters;
 use rig_shared::multibody::{gravity_vector, inertia_matrix};
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
+use rig_shared::wire::message::Greeting;
 use thiserror::Error;
 
 use crate::Hardware;
@@ -94,6 +95,20 @@ pub enum NameplateError {
         joint: String,
         /// Name and key of the missing value.
         what: &'static str,
+    },
+    /// Hardware other than that the rig's firmware was built for.
+    #[error(
+        "the firmware of the rig was built for {what} = {rig}, but joint \"{joint}\" of the description has {described}: every position or torque would be wrong by this ratio. Correct the description if the rig is right; otherwise build the firmware for this drive (docs/firmware.md)."
+    )]
+    OtherHardware {
+        /// Name of the joint.
+        joint: String,
+        /// Key of the value.
+        what: &'static str,
+        /// The rig's value.
+        rig: f32,
+        /// The described value.
+        described: f32,
     },
     /// An error of the feed-forward model.
     #[error(transparent)]
@@ -184,6 +199,42 @@ impl Nameplate {
             estimator: estimator(&model, &limits),
         };
         Ok(Self { config, settings })
+    }
+}
+
+/// Compares a description with the hardware that a rig's firmware was built for.
+///
+/// # Errors
+/// [`NameplateError::OtherHardware`], or as [`Nameplate::from_robot`].
+pub fn check_hardware(robot: &Robot, greeting: &Greeting) -> Result<(), NameplateError> {
+    let config = Nameplate::from_robot(robot)?.config;
+    let pairs = [
+        (
+            "encoder_counts_per_rev",
+            greeting.counts_per_motor_turn as f32,
+            config.encoder.counts_per_motor_turn as f32,
+        ),
+        ("gear_ratio", greeting.gear_ratio, config.drive.gear_ratio),
+        (
+            "torque_constant",
+            greeting.torque_constant,
+            config.drive.torque_constant,
+        ),
+    ];
+    // The firmware's build reads the same text to the same digits.
+    let differ =
+        |(_, rig, described): &(_, f32, f32)| !((rig - described).abs() <= 1e-6 * rig.abs());
+    match pairs.into_iter().find(differ) {
+        None => Ok(()),
+        Some((what, rig, described)) => Err(NameplateError::OtherHardware {
+            joint: robot
+                .joints
+                .first()
+                .map_or_else(String::new, |j| j.name.clone()),
+            what,
+            rig,
+            described,
+        }),
     }
 }
 
@@ -361,6 +412,38 @@ mod tests {
         );
         let by_ratio = refused(&|d| d.gear_ratio = 0.0);
         assert!(by_ratio.contains("gear_ratio = 0"), "{by_ratio}");
+    }
+
+    /// The firmware counts with its own drive: another description makes wrong positions or torques.
+    #[test]
+    fn a_description_of_another_drive_is_refused_by_value() {
+        let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
+        let (config, _) = one_link();
+        let greeting = Greeting {
+            protocol: 0,
+            schema: 0,
+            firmware: Default::default(),
+            control_rate_hz: config.rates.control_hz,
+            telemetry_decimation: config.rates.telemetry_decimation,
+            estimator_decimation: config.rates.estimator_decimation,
+            counts_per_motor_turn: config.encoder.counts_per_motor_turn,
+            gear_ratio: config.drive.gear_ratio,
+            torque_constant: config.drive.torque_constant,
+        };
+        check_hardware(&robot, &greeting).unwrap();
+        let refused = |change: &dyn Fn(&mut rig_model::robot::Drive)| {
+            let mut robot = robot.clone();
+            change(robot.joints[0].drive.as_mut().unwrap());
+            check_hardware(&robot, &greeting).unwrap_err().to_string()
+        };
+        let gear = refused(&|d| d.gear_ratio = 100.0);
+        assert!(
+            gear.contains("gear_ratio = 50") && gear.contains("has 100"),
+            "{gear}"
+        );
+        assert!(refused(&|d| d.gear_ratio = -50.0).contains("has -50"));
+        assert!(refused(&|d| d.encoder_counts_per_rev = Some(4096.0)).contains("has 4096"));
+        assert!(refused(&|d| d.torque_constant *= 1.01).contains("torque_constant = 0.05"));
     }
 
     /// With the template, the emulated rig equals that of the documentation bit by bit.

@@ -12,13 +12,11 @@ use rig_shared::wire::message::{Refusal, Report, RequestBody};
 use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
-use super::record::{emulated, open_probe, uploaded};
+use super::record::{emulated, open, open_probe, uploaded};
 use super::ui::Ui;
 use rig_link::experiment::when_calibrated;
 use rig_link::serial::DEFAULT_BAUD;
-use rig_link::{
-    EmulatedPort, LinkError, Port, SerialLine, Session, SessionSettings, describe_fault,
-};
+use rig_link::{EmulatedPort, LinkError, Port, SerialLine, Session, describe_fault};
 
 /// Reads health, faults and single control ticks from the rig's board, and changes its stored settings.
 #[derive(Debug, ClapArgs)]
@@ -102,14 +100,15 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
                 .to_owned(),
         ));
     }
-    let sent = match &args.action {
+    let (mut robot, mut sent) = (None, Vec::new());
+    match &args.action {
         Action::Upload {
             model, leave_out, ..
-        } => uploaded(
-            &described(model, &ChainArg::default(), ui)?.robot,
-            *leave_out,
-            ui,
-        )?,
+        } => {
+            let described = described(model, &ChainArg::default(), ui)?.robot;
+            sent = uploaded(&described, *leave_out, ui)?;
+            robot = Some(described);
+        }
         Action::Capture { out, force, .. }
         | Action::Fault {
             out: Some(out),
@@ -117,24 +116,25 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         } if out.exists() && !force => {
             return Err(CommandError::Exists { path: out.clone() });
         }
-        _ => Vec::new(),
-    };
+        _ => {}
+    }
     if let Some(name) = &args.port {
-        act(SerialLine::open(name, args.baud)?, args, sent, ui)
+        let port = SerialLine::open(name, args.baud)?;
+        act(open(port, robot.as_ref())?, args, sent, ui)
     } else if args.probe {
-        act(open_probe()?, args, sent, ui)
+        act(open(open_probe()?, robot.as_ref())?, args, sent, ui)
     } else {
-        act(
-            EmulatedPort::new(emulated(None, args.seed)?),
-            args,
-            sent,
-            ui,
-        )
+        let port = EmulatedPort::new(emulated(robot, args.seed)?);
+        act(open(port, None)?, args, sent, ui)
     }
 }
 
-fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result<(), CommandError> {
-    let mut session = Session::open(port, SessionSettings::default())?;
+fn act<P: Port>(
+    mut session: Session<P>,
+    args: &Args,
+    sent: Vec<RequestBody>,
+    ui: &Ui,
+) -> Result<(), CommandError> {
     match &args.action {
         Action::Health => {
             let health = health::fetch(&mut session)?;

@@ -12,11 +12,11 @@ use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
 use super::interrupts;
-use super::record::{described_or_template, doubt, emulated_at, open_probe, uploaded};
+use super::record::{described_or_template, doubt, emulated_at, open, open_probe, uploaded};
 use super::ui::Ui;
 use rig_excite::TrajectoryFile;
 use rig_link::serial::DEFAULT_BAUD;
-use rig_link::{EmulatedPort, Paced, Port, SerialLine, Session, SessionSettings};
+use rig_link::{EmulatedPort, Paced, Port, SerialLine};
 use rig_live::{Addresses, Listeners, Motion, RigSettings, Surroundings};
 use rig_plant::emulated::{Nameplate, upload};
 
@@ -159,7 +159,7 @@ fn show<P: Port>(
     listeners: Listeners,
     ui: &Ui,
 ) -> Result<(), CommandError> {
-    let mut session = Session::open(port, SessionSettings::default())?;
+    let mut session = open(port, settings.robot.as_ref())?;
     interrupts::listen(None)?;
     for line in lines(listeners.addresses(), &settings.source) {
         ui.say(&line);

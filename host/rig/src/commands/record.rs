@@ -25,7 +25,9 @@ use rig_link::{
 };
 use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
 use rig_plant::PlantConfig;
-use rig_plant::emulated::{EmulatedRig, Nameplate, hardware_of, other_link, shortfalls, upload};
+use rig_plant::emulated::{
+    EmulatedRig, Nameplate, check_hardware, hardware_of, other_link, shortfalls, upload,
+};
 
 /// Records the rig's telemetry, at rest or while it runs a trajectory.
 #[derive(Debug, ClapArgs)]
@@ -120,19 +122,21 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     let losses = if let Some(name) = &args.port {
         record(
-            SerialLine::open(name, args.baud)?,
+            open(SerialLine::open(name, args.baud)?, robot.as_ref())?,
             &experiment,
             &args.out,
             ON_BOARD,
             ui,
         )?
     } else if args.probe {
-        record(open_probe()?, &experiment, &args.out, ON_BOARD, ui)?
+        let session = open(open_probe()?, robot.as_ref())?;
+        record(session, &experiment, &args.out, ON_BOARD, ui)?
     } else {
         let robot = described_or_template(robot)?;
         let rig = emulated_at(&robot, [args.seed, args.run.into()], args.home)?;
         doubt(&rig, &robot, motion.as_ref(), ui)?;
-        record(EmulatedPort::new(rig), &experiment, &args.out, "", ui)?
+        let session = open(EmulatedPort::new(rig), Some(&robot))?;
+        record(session, &experiment, &args.out, "", ui)?
     };
     ui.answer(&format!("{}: {losses}", args.out.display()));
     Ok(())
@@ -217,6 +221,18 @@ pub(crate) fn doubt(
     Ok(())
 }
 
+/// Opens the connection to a rig, and compares its hardware with that of a description.
+///
+/// # Errors
+/// A sentence about the port, or about the value that differs.
+pub(crate) fn open<P: Port>(port: P, robot: Option<&Robot>) -> Result<Session<P>, CommandError> {
+    let session = Session::open(port, SessionSettings::default())?;
+    if let Some(robot) = robot {
+        check_hardware(robot, session.greeting())?;
+    }
+    Ok(session)
+}
+
 /// Opens the connection to the rig through the debug probe.
 #[cfg(feature = "probe")]
 pub(crate) fn open_probe() -> Result<rig_link::ProbeLine, CommandError> {
@@ -282,13 +298,12 @@ fn metadata(firmware: &str) -> BTreeMap<String, String> {
 
 /// Records an experiment to a file. `more` is added to the sentence about a fault.
 fn record<P: Port>(
-    port: P,
+    mut session: Session<P>,
     experiment: &Experiment,
     out: &Path,
     more: &str,
     ui: &Ui,
 ) -> Result<LossReport, CommandError> {
-    let mut session = Session::open(port, SessionSettings::default())?;
     let greeting = session.greeting().clone();
     let converter = Converter::new(&greeting);
     let columns: Vec<Column> = COLUMNS
