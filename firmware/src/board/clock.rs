@@ -43,7 +43,8 @@ const R1MODE: u32 = 1 << 8;
 
 /// Raises the core voltage for clocks above 150 MHz (range 1 boost mode, RM0440 section 6.1.5).
 ///
-/// Call it after [`embassy_stm32::init`], which resets the power control (RCC_APB1RSTR1.PWRRST) and so its mode.
+/// Call it after [`embassy_stm32::init`], which resets the power control (RCC_APB1RSTR1.PWRRST). RM0440 says of CR5 that
+/// only a power-on reset resets it (section 6.4.22); this order does not depend on that.
 fn boost() {
     PWR.cr5().modify(|w| w.0 &= !R1MODE);
 }
@@ -56,8 +57,8 @@ pub(crate) fn is_boosted() -> bool {
 
 /// Initialises the chip, then raises core voltage and clock. Returns also true if the crystal runs.
 ///
-/// The first step stays at the 16 MHz of a reset: it resets the power control, so a voltage that was raised before it
-/// would be lost, and 170 MHz would run in the range for 150 MHz.
+/// The first step stays at the 16 MHz of a reset: it resets the power control. If that took back a voltage that was raised
+/// before it, 170 MHz would run in the range for 150 MHz.
 pub(crate) fn start() -> (Peripherals, bool) {
     let mut plain = Config::default();
     plain.rcc.hsi48 = None;

@@ -45,6 +45,8 @@ impl Pwr {
     }
 
     /// Handles APB1RSTR1.PWRRST: every register returns to its value after reset, except CR3 and CR4 (section 6.4).
+    /// Stricter than the manual: section 6.4.22 says of CR5 that only a power-on reset resets it. Here it loses the boost
+    /// mode as well, so that the firmware's order of start is right on either chip.
     pub fn reset(&mut self) {
         let kept = [0x08, 0x0C].map(|offset| (offset, self.0.get(offset)));
         self.0 = Bank::new(REGISTERS);
