@@ -9,7 +9,6 @@
 mod files;
 mod finding;
 mod format;
-mod spelling;
 mod toml_text;
 
 pub use files::{WriteError, can_take, data_dir, folder, persist, temporary, write_whole};
@@ -18,5 +17,4 @@ pub use format::{
     capital, fixed, format_interval, format_p_value, format_short, format_significant, format_time,
     format_trimmed, format_unit, format_value, listed, power_of_ten,
 };
-pub use spelling::edit_distance;
 pub use toml_text::{comment_toml, toml_document, toml_tables};

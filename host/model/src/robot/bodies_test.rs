@@ -98,7 +98,7 @@ fn placeholders_of_exporters_are_no_limits() {
     let path = folder.path().join("arm.urdf");
     let load = |limit: &str| {
         let text = format!(
-            "<robot name='r'><link name='base'/><link name='arm'><inertial><mass value='1'/><inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/></inertial></link><joint name='one' type='revolute'><parent link='base'/><child link='arm'/><limit {limit}/></joint></robot>"
+            "<robot name='r'><link name='base'/><link name='arm'><inertial><mass value='1'/><inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/></inertial></link><joint name='one' type='revolute'><parent link='base'/><child link='arm'/><axis xyz='0 0 1'/><limit {limit}/></joint></robot>"
         );
         std::fs::write(&path, text).unwrap();
         Description::load(&path)

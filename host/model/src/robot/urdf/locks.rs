@@ -160,7 +160,13 @@ impl<'a> Reader<'a> {
             // The default of the URDF definition.
             return Ok(Vector3::x_axis());
         };
-        let axis = self.vector(node, "xyz")?.unwrap_or_else(Vector3::x);
+        let axis = self.vector(node, "xyz")?.ok_or_else(|| {
+            let text = format!(
+                "<axis> of joint `{}` has no `xyz`; give the direction, such as xyz=\"0 0 1\"",
+                joint.name
+            );
+            self.error(node, text)
+        })?;
         Unit::try_new(axis, 1e-9).ok_or_else(|| self.error(node, format!("the axis of joint `{}` is the zero vector, but it must be a direction such as \"0 0 1\"", joint.name)))
     }
 

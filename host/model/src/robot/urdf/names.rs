@@ -1,8 +1,9 @@
 //! Similar names: what a misspelt word was meant to be.
 
-use rig_output::edit_distance;
+use strsim::osa_distance;
 
-/// Returns the known name within two typing errors of `written`: missing, added or exchanged letters, or another case.
+/// Returns the known name within two typing errors of `written`: missing, added or wrong letters, two that changed places,
+/// or another case.
 /// Names of up to four letters allow one error.
 pub(super) fn nearest<'n>(written: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
     let most = if written.len() <= 4 { 1 } else { 2 };
@@ -19,7 +20,7 @@ pub(super) fn nearest_long<'n>(
 
 fn within<'n>(written: &str, names: impl Iterator<Item = &'n str>, most: usize) -> Option<&'n str> {
     let written = written.to_lowercase();
-    let near = names.map(|name| (edit_distance(&written, &name.to_lowercase()), name));
+    let near = names.map(|name| (osa_distance(&written, &name.to_lowercase()), name));
     near.filter(|(slips, _)| *slips <= most)
         .min_by_key(|(slips, _)| *slips)
         .map(|(_, name)| name)

@@ -9,7 +9,7 @@ use rig_shared::multibody::MAX_JOINTS;
 use super::chain::{Body, Chain};
 use super::choice::ChainChoice;
 use super::locks::Held;
-use super::reader::{Reader, Xml, parsed};
+use super::reader::{Reader, Xml, child, parsed};
 use super::selection::Selection;
 use super::spatial::SpatialInertia;
 use super::transmissions::Motors;
@@ -184,6 +184,13 @@ impl<'a> Selected<'_, 'a> {
             Motion::Prismatic => JointKind::Prismatic,
             _ => JointKind::Revolute,
         };
+        if child(node, "axis").is_none() {
+            reader.remarks.borrow_mut().push(format!(
+                "{}:{}: joint `{name}` has no <axis>, so it moves along x of its own frame, as URDF defines.",
+                reader.path.display(),
+                reader.place(node)
+            ));
+        }
         let rigid = self.rigid_body(reader, joint.child)?;
         let motor = motors.get(name);
         let body = Body {

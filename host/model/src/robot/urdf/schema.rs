@@ -154,6 +154,10 @@ impl<'a> Reader<'a> {
             }
             let names = known.once.iter().chain(known.often);
             let is_known = names.clone().any(|other| *other == tag);
+            // Of a robot's own children other tools read more, and none of them enters the dynamics.
+            if !is_known && name != "robot" && ELEMENTS.iter().any(|own| own.name == tag) {
+                return Err(self.error(*child, self.misplaced(node, tag)));
+            }
             let missing = (names.copied()).filter(|other| {
                 known.often.contains(other) || !children.iter().any(|own| own.has_tag_name(*other))
             });
@@ -195,6 +199,19 @@ impl<'a> Reader<'a> {
             counted = true;
         }
         Ok(())
+    }
+
+    /// Says where an element belongs that stands in another one.
+    fn misplaced(&self, node: Xml<'a>, tag: &str) -> String {
+        let places: Vec<String> = (ELEMENTS.iter())
+            .filter(|own| own.once.contains(&tag) || own.often.contains(&tag))
+            .map(|own| format!("<{}>", own.name))
+            .collect();
+        format!(
+            "<{tag}> stands in {}, where URDF does not have it, so it would not be read; it belongs in {}",
+            self.called(node),
+            places.join(" or ")
+        )
     }
 
     /// Returns the element as "joint `elbow`", or as "<inertial>" if it has no name.
@@ -252,6 +269,23 @@ mod tests {
         assert!(read(&format!("{INERTIAL}{drawn}"), LIMIT).is_ok());
     }
 
+    /// An origin beside its <inertial> would leave the centre of mass at the joint.
+    #[test]
+    fn elements_in_the_wrong_place_are_refused() {
+        let refused = |link: &str, joint: &str, words: &str| {
+            let message = read(link, joint).unwrap_err();
+            assert!(message.contains(words), "{message}");
+        };
+        let beside = format!("<origin xyz='0 0 0.1'/>{INERTIAL}");
+        refused(&beside, LIMIT, "belongs in <inertial> or <joint>");
+        let beside = INERTIAL
+            .replace("<inertial>", "")
+            .replace("</inertial>", "");
+        refused(&beside, LIMIT, "<mass> stands in link `arm`");
+        let damped = format!("{LIMIT}<dynamics damping='1'><limit effort='3'/></dynamics>");
+        refused(INERTIAL, &damped, "<limit> stands in <dynamics>");
+    }
+
     /// The stand of a published arm has two origins.
     #[test]
     fn the_first_counts_at_a_fixed_joint() {
@@ -302,6 +336,13 @@ mod tests {
             &LIMIT.replace("upper", "uper"),
             "is `upper` meant?",
         );
+        // Exchanged letters are one error, also in a short name.
+        suggestion(
+            INERTIAL,
+            &format!("{LIMIT}<axis xzy='0 0 1'/>"),
+            "is `xyz` meant?",
+        );
+        suggestion(INERTIAL, &format!("{LIMIT}<axis/>"), "has no `xyz`");
         suggestion(
             INERTIAL,
             &LIMIT.replace("velocity", "Velocity"),

@@ -7,7 +7,7 @@ use toml_edit::{Document, InlineTable, Item, Table, Value};
 
 use super::super::work::Words;
 use crate::commands::error::CommandError;
-use rig_output::edit_distance;
+use strsim::osa_distance;
 
 /// Key of the command of a step.
 const COMMAND: &str = "command";
@@ -262,7 +262,7 @@ fn unknown(command: &clap::Command, key: &str) -> String {
         .filter(|own| NOT_IN_A_STEP.iter().all(|(not, _)| not != own))
         .collect();
     let near = (names.iter())
-        .map(|own| (edit_distance(own, key), own))
+        .map(|own| (osa_distance(own, key), own))
         .min()
         .filter(|(distance, own)| 2 * distance <= own.chars().count());
     match near {
