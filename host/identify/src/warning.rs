@@ -89,6 +89,8 @@ pub enum Warning {
     EffectsLeftOut(String),
     /// The torques of joints are the described gravity times a factor.
     TorqueScale(Vec<TorqueScale>),
+    /// The torques of the joints contradict each other, which one of these factors explains.
+    TorqueDisagrees(Vec<TorqueFactor>),
     /// A sentence of the program that read the recordings or judged the values.
     Other(String),
 }
@@ -135,6 +137,42 @@ impl TorqueScale {
             ));
         }
         text.join(" ")
+    }
+}
+
+/// The torque of a joint over what the torques of the other joints show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueFactor {
+    /// The joint.
+    pub joint: String,
+    /// The factor, 1.
+    pub factor: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+impl TorqueFactor {
+    /// Says which of some joints may be off.
+    fn of_joints(list: &[Self]) -> String {
+        let each: Vec<String> = (list.iter())
+            .map(|own| {
+                format!(
+                    "that of {} {} times",
+                    own.joint,
+                    format_value(own.factor, own.std)
+                )
+            })
+            .collect();
+        let which = match list.len() {
+            1 => "its torque constant or gear ratio is off by this factor",
+            _ => {
+                "the torque constant or gear ratio of one of them is off by its factor, and these data do not tell which"
+            }
+        };
+        format!(
+            "The torques of the joints contradict each other. One factor explains it: {} what the others show (± one standard deviation); {which}.",
+            each.join(", or ")
+        )
     }
 }
 
@@ -487,6 +525,7 @@ impl fmt::Display for Warning {
         match self {
             Self::Joints(list) => f.write_str(&of_joints(list)),
             Self::TorqueScale(list) => f.write_str(&TorqueScale::of_joints(list)),
+            Self::TorqueDisagrees(list) => f.write_str(&TorqueFactor::of_joints(list)),
             Self::Interpolated(text) | Self::EffectsLeftOut(text) | Self::Other(text) => {
                 f.write_str(text)
             }

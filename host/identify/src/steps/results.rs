@@ -6,6 +6,8 @@ use super::further::{Further, further};
 use super::named::Named;
 use super::outcome::Outcome;
 use super::own::Own;
+use super::own_fit::own_fits;
+use super::torque_agreement::torque_agreement;
 use super::torque_scale::torque_scale;
 use super::treated::Treated;
 use super::warnings::Heard;
@@ -91,7 +93,9 @@ impl Results<'_> {
         warnings.extend(self.warnings(&estimate, lag));
         // A base that leans changes gravity itself.
         if self.known.tilt.is_none() {
-            warnings.extend(torque_scale(problem, described, &outcome)?);
+            let fits = own_fits(problem, outcome.factors)?;
+            let by_gravity = torque_scale(problem, described, &fits)?;
+            warnings.extend(by_gravity.or_else(|| torque_agreement(&fits, described)));
         }
         let stated =
             Effects::of(self.described).map_err(|e| IdentifyError::Model(e.to_string()))?;

@@ -16,18 +16,13 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::outcome::Outcome;
+use super::own_fit::OwnFit;
 use crate::error::IdentifyError;
 use crate::estimators::problem::Problem;
-use crate::rows::factor::TriangularFactor;
-use crate::rows::stream::each_rows;
 use crate::structure::chain::chain_of;
-use crate::uncertainty::residual::LEAST_ERROR;
 use crate::warning::{TorqueScale, Warning};
 use rig_model::robot::{CONTRADICTED, Robot};
-use rig_numerics::autocorrelation::Autocorrelation;
 use rig_numerics::svd::Svd;
-use rig_numerics::vector::dot_in_order;
 use rig_shared::multibody::{COLUMNS, column, inverse_dynamics};
 
 /// Poses at which gravity is looked for.
@@ -67,7 +62,7 @@ impl Scale {
 pub(crate) fn torque_scale(
     problem: &Problem,
     described: &Robot,
-    result: &Outcome,
+    fits: &[OwnFit],
 ) -> Result<Option<Warning>, IdentifyError> {
     let columns = gravity_columns(problem, described)?;
     if columns.is_empty() {
@@ -81,10 +76,8 @@ pub(crate) fn torque_scale(
     if own.amax() == 0.0 {
         return Ok(None);
     }
-    let fits: Vec<OwnFit> = result.factors.iter().map(OwnFit::of).collect();
-    let memories = memories(problem, &fits)?;
-    let scales: Vec<(Gravity, Scale)> = (fits.iter().zip(&memories).enumerate())
-        .filter_map(|(joint, (fit, memory))| fit.gravity(joint, &columns, *memory))
+    let scales: Vec<(Gravity, Scale)> = (fits.iter().enumerate())
+        .filter_map(|(joint, fit)| Gravity::of(joint, fit, &columns))
         .filter_map(|gravity| gravity.scale(&own).map(|scale| (gravity, scale)))
         .collect();
     let mut found = Vec::new();
@@ -153,87 +146,25 @@ fn stated(problem: &Problem, described: &Robot) -> DVector<f64> {
     &problem.base.combination * DVector::from_vec(standard)
 }
 
-/// The fit of a joint's torque alone. A factor in its torques leaves this one's residual as it is, while it stays in the
-/// residual of the common fit.
-struct OwnFit<'a> {
-    equation: &'a TriangularFactor,
-    values: Vec<f64>,
-    /// Standard deviation of the residual.
-    std: f64,
-}
-
-impl<'a> OwnFit<'a> {
-    /// Fits a joint's equation. Pseudo-inverse: one joint need not excite every parameter.
-    fn of(equation: &'a TriangularFactor) -> Self {
-        let (r, z) = equation.system();
-        let svd = Svd::of(r);
-        let smallest = ROUNDING * svd.singular_values.max();
-        let rank = svd
-            .singular_values
-            .iter()
-            .filter(|s| **s > smallest)
-            .count();
-        let values = svd.solve(&z, smallest).as_slice().to_vec();
-        let rows = equation.rows() as f64;
-        let squares = equation.residual_squares(&values) / (rows - rank as f64).max(1.0);
-        let rms = (equation.right_side_squares() / rows.max(1.0)).sqrt();
-        Self {
-            equation,
-            values,
-            std: squares.sqrt().max(LEAST_ERROR * rms),
-        }
-    }
-
-    /// Returns the equation without what inertias, friction and constants explain; `columns` are those that weigh, `memory`
-    /// is the correlation time of the residual, rows. `None` without rows.
-    fn gravity(&self, joint: usize, columns: &[usize], memory: f64) -> Option<Gravity> {
-        if self.equation.rows() == 0 {
+impl Gravity {
+    /// Returns what a joint's own fit leaves of its torque without inertias, friction and constants; `columns` are those that
+    /// weigh. `None` without rows.
+    fn of(joint: usize, fit: &OwnFit, columns: &[usize]) -> Option<Self> {
+        if fit.equation.rows() == 0 {
             return None;
         }
-        let (r, z) = self.equation.system();
+        let (r, z) = fit.equation.system();
         let others: Vec<usize> = (0..r.ncols()).filter(|c| !columns.contains(c)).collect();
         let beside = directions(r.select_columns(&others));
         let columns = r.select_columns(columns);
-        Some(Gravity {
+        Some(Self {
             joint,
             columns: &columns - &beside * beside.tr_mul(&columns),
             torque: &z - &beside * beside.tr_mul(&z),
-            std: self.std * memory.max(1.0).sqrt(),
+            std: fit.std,
         })
     }
-}
 
-/// Returns the correlation time of the residual of each joint's own fit, rows.
-///
-/// # Errors
-/// [`IdentifyError`]: a recording that cannot be read.
-fn memories(problem: &Problem, fits: &[OwnFit]) -> Result<Vec<f64>, IdentifyError> {
-    let mut memories = vec![Autocorrelation::default(); fits.len()];
-    for recording in problem.training {
-        each_rows(
-            *recording,
-            problem.plan,
-            problem.options.model,
-            &mut |rows| {
-                let joints = rows.equations.iter().zip(fits).zip(&mut memories);
-                for ((equation, fit), memory) in joints {
-                    let p = fit.values.len();
-                    for i in (0..equation.y.len()).filter(|i| equation.keep[*i]) {
-                        let x = &equation.x[i * p..(i + 1) * p];
-                        memory.push(equation.y[i] - dot_in_order(x, &fit.values));
-                    }
-                }
-                Ok(())
-            },
-        )?;
-    }
-    Ok(memories
-        .iter()
-        .map(Autocorrelation::correlation_time)
-        .collect())
-}
-
-impl Gravity {
     /// Compares the torque with the described gravity; `None` if the data do not show it, or if the described pattern over
     /// the poses does not hold.
     fn scale(&self, stated: &DVector<f64>) -> Option<Scale> {
@@ -268,7 +199,7 @@ impl Gravity {
 }
 
 /// Returns orthonormal directions that span columns, whatever their sizes.
-fn directions(matrix: DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn directions(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let largest = matrix.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
     let columns: Vec<DVector<f64>> = (matrix.column_iter())
         .filter(|c| c.norm() > ROUNDING * largest)

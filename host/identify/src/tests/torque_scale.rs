@@ -138,3 +138,37 @@ fn wrong_masses_are_no_wrong_torque_constant() {
     let (found, text) = said(&robot, [1.0, 1.0]);
     assert_eq!(found, [], "{text}");
 }
+
+/// Without described masses the joints still share the outer link: either factor makes them agree.
+#[test]
+fn a_torque_constant_of_one_joint_contradicts_the_other_joint() {
+    let mut robot = arm();
+    for joint in &mut robot.joints {
+        joint.inertial = None;
+    }
+    let found = |scale: [f64; 2]| {
+        let recording = recorded(scale);
+        let found = identify(&robot, &[&recording], &[], &Options::default()).unwrap();
+        let own = found.warnings.iter().find_map(|warning| match warning {
+            Warning::TorqueDisagrees(list) => Some((list.clone(), warning.to_string())),
+            _ => None,
+        });
+        own.unwrap_or_default()
+    };
+    // Alike, a factor in both is that of all masses.
+    for alike in [[1.0, 1.0], [1.12, 1.12]] {
+        assert_eq!(found(alike).0, []);
+    }
+    let (list, text) = found([1.0, 1.12]);
+    let [first, second] = &list[..] else {
+        panic!("{list:?}");
+    };
+    for (own, name, factor) in [(first, "first", 1.0 / 1.12), (second, "second", 1.12)] {
+        assert_eq!(own.joint, name);
+        assert!(
+            (own.factor - factor).abs() < 4.0 * own.std && own.std < 0.02,
+            "{own:?}"
+        );
+    }
+    assert!(text.contains("do not tell which"), "{text}");
+}

@@ -591,11 +591,15 @@ fn speed_up(effort: &Effort) -> String {
     } else {
         "elapsed time, waiting for a processor included,"
     };
+    let gain = match (effort.threads, effort.speed_up()) {
+        (1, _) => ".".to_owned(),
+        (_, gain) if gain > 1.0 => format!(": {gain:.2} times as fast as one thread."),
+        _ => ": other programs used the processors, so the threads saved no time.".to_owned(),
+    };
     format!(
-        "Search: {:.1} s of {kind} by {threads} in {:.1} s: {:.2} times as fast as one thread.",
+        "Search: {:.1} s of {kind} by {threads} in {:.1} s{gain}",
         effort.work.as_secs_f64(),
         effort.wall.as_secs_f64(),
-        effort.speed_up()
     )
 }
 

@@ -1,0 +1,115 @@
+//! Torques of joints against each other: a factor in one joint's torques alone.
+//!
+//! The equations of several joints share parameters: inertias and first moments of the outer links act on the inner joints.
+//! A factor in the torques of one joint makes their equations contradict each other, whatever the parameters are. No
+//! described mass is needed, and no gravity. Three fits are compared (χ² of what is left beyond each joint's own fit, in
+//! units of its noise): common parameters; common parameters and one factor at one joint; own parameters for each joint. If
+//! the first one is contradicted and the second one is not, the factor explains all of the contradiction.
+//!
+//! Of two joints either one may be off. Of more joints, all others off by the inverse factor look alike.
+//!
+//! Leaves out: factors of several joints; other errors beside the factor, such as friction that the model lacks: then
+//! nothing is said.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use super::own_fit::OwnFit;
+use super::torque_scale::directions;
+use crate::warning::{TorqueFactor, Warning};
+use rig_model::robot::{CONTRADICTED, Robot};
+use rig_numerics::svd::Svd;
+
+/// Relative singular value below which a direction is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// What a joint's torque shows, one row per independent direction of its own parameters, in units of its noise.
+struct Shown {
+    regressor: DMatrix<f64>,
+    torque: DVector<f64>,
+}
+
+impl Shown {
+    fn of(fit: &OwnFit) -> Self {
+        let (r, z) = fit.equation.system();
+        let shown = directions(r.clone());
+        Self {
+            regressor: shown.tr_mul(&r) / fit.std,
+            torque: shown.tr_mul(&z) / fit.std,
+        }
+    }
+}
+
+/// A fit of all joints with common parameters.
+struct CommonFit {
+    /// Probability of what it leaves beyond the joints' own fits.
+    chance: f64,
+    /// Value and standard deviation of the last column's coefficient.
+    last: [f64; 2],
+}
+
+impl CommonFit {
+    /// Fits the joints; the torque of `scaled` has a free factor. `None` if the data do not show every column.
+    fn of(joints: &[Shown], scaled: Option<usize>) -> Option<Self> {
+        let rows: usize = joints.iter().map(|own| own.torque.len()).sum();
+        let p = joints.first()?.regressor.ncols();
+        let width = p + usize::from(scaled.is_some());
+        let mut x = DMatrix::zeros(rows, width);
+        let mut y = DVector::zeros(rows);
+        let mut at = 0;
+        for (j, own) in joints.iter().enumerate() {
+            let n = own.torque.len();
+            x.view_mut((at, 0), (n, p)).copy_from(&own.regressor);
+            y.rows_mut(at, n).copy_from(&own.torque);
+            if scaled == Some(j) {
+                // (1 + u)·y = x·β
+                x.view_mut((at, p), (n, 1)).copy_from(&-&own.torque);
+            }
+            at += n;
+        }
+        let sizes: Vec<f64> = x.column_iter().map(|c| c.norm()).collect();
+        for (mut column, size) in x.column_iter_mut().zip(&sizes) {
+            if *size > 0.0 {
+                column /= *size;
+            }
+        }
+        let svd = Svd::of(x.clone());
+        let least = ROUNDING.sqrt() * svd.singular_values.max();
+        let rank = (svd.singular_values.iter().filter(|s| **s > least)).count();
+        let freedom = rows.checked_sub(rank).filter(|n| *n > 0)?;
+        let values = svd.solve(&y, least);
+        let squares = (y - x * &values).norm_squared();
+        let inverse = svd.pseudo_inverse(least);
+        let last = width - 1;
+        Some(Self {
+            chance: ChiSquared::new(freedom as f64).map_or(1.0, |d| d.sf(squares)),
+            last: [values[last], inverse.row(last).norm()].map(|v| v / sizes[last]),
+        })
+    }
+}
+
+/// Says which joint's torque is that of the others times a factor.
+pub(crate) fn torque_agreement(fits: &[OwnFit], robot: &Robot) -> Option<Warning> {
+    if fits.len() < 2 || fits.iter().any(|fit| fit.equation.rows() == 0) {
+        return None;
+    }
+    let joints: Vec<Shown> = fits.iter().map(Shown::of).collect();
+    let chance = 2.0 * Normal::standard().sf(CONTRADICTED);
+    if CommonFit::of(&joints, None)?.chance >= chance {
+        return None;
+    }
+    let found: Vec<TorqueFactor> = (0..joints.len())
+        .filter_map(|j| {
+            let fit = CommonFit::of(&joints, Some(j)).filter(|fit| fit.chance >= chance)?;
+            let [u, std] = fit.last;
+            let factor = 1.0 / (1.0 + u);
+            Some(TorqueFactor {
+                joint: robot.joints[j].name.clone(),
+                factor,
+                std: std * factor * factor,
+            })
+        })
+        .filter(|own| (own.factor - 1.0).abs() > CONTRADICTED * own.std)
+        .collect();
+    (!found.is_empty()).then_some(Warning::TorqueDisagrees(found))
+}
