@@ -24,7 +24,7 @@ use crate::significance::{FAMILY_LEVEL, TEST_LEVEL, holm};
 use crate::single::{Single, Spread, spread};
 use crate::torque::torque_matrix;
 use crate::trades::trades;
-use crate::warnings::{brief_warnings, drifting, warnings};
+use crate::warnings::{brief_warnings, contradicting, drifting, warnings};
 use crate::zero_shift::Zeros;
 
 /// Compares the parameters that several sets of recordings of one robot give. Memory does not grow with the recordings.
@@ -106,6 +106,7 @@ fn compared(
         joint: joint_test.as_ref(),
         without: &without,
         drifting: &drifting(sets, robot, options.tolerance),
+        contradicting: &contradicting(sets),
         torque: &torque,
         causes: causes.as_ref(),
         tolerance: options.tolerance,

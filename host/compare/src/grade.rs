@@ -15,6 +15,8 @@ pub(crate) struct Graded<'a> {
     pub without: &'a [JointTest],
     /// Sentences on friction that changes during the recordings.
     pub drifting: &'a [String],
+    /// Sets whose joints' torques contradict each other.
+    pub contradicting: &'a [&'a str],
     /// Torque residuals.
     pub torque: &'a TorqueMatrix,
     /// Tested causes.
@@ -87,7 +89,12 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
         (true, false) => Grade::DifferWithoutEffect,
         (true, true) => Grade::DifferAndMatter,
     };
-    if grade == Grade::Undecided && of.drifting.is_empty() {
+    if grade == Grade::Undecided && !of.contradicting.is_empty() {
+        reasons.push(format!(
+            "The torques of the joints of {} contradict each other (see the warnings), which makes the errors of its parameters large: correct the torques, or leave out the set.",
+            of.contradicting.join(" and of ")
+        ));
+    } else if grade == Grade::Undecided && of.drifting.is_empty() {
         reasons.push("The errors of the parameters are too large to tell whether the sets differ: longer or livelier recordings would decide it.".into());
     }
     (grade, reasons)

@@ -62,6 +62,18 @@ fn line(own: &[SetWarning]) -> String {
     format!("Set {}: {}{rest}", first.set, first.warning)
 }
 
+/// Returns the names of the sets whose joints' torques contradict each other, which one factor at one joint explains.
+pub(crate) fn contradicting(sets: &[IdentifiedSet]) -> Vec<&str> {
+    let is = |set: &&IdentifiedSet| {
+        let mut own = set.found.warnings.iter();
+        own.any(|warning| matches!(warning, Warning::TorqueDisagrees(_)))
+    };
+    sets.iter()
+        .filter(is)
+        .map(|set| set.name.as_str())
+        .collect()
+}
+
 /// Returns a sentence for each set and joint whose friction changes. `tolerance` is the share of the torque from which on
 /// the change matters.
 pub(crate) fn drifting(sets: &[IdentifiedSet], robot: &Robot, tolerance: f64) -> Vec<String> {

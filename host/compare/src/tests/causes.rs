@@ -63,6 +63,37 @@ fn a_torque_constant_that_changed_by_three_per_cent_is_named_scale() {
     );
 }
 
+/// A factor at one joint makes the set's own equations contradict each other, and its errors large.
+#[test]
+fn a_torque_constant_of_one_joint_is_told_with_its_set() {
+    for draw in 0..DRAWS {
+        let mut list: Vec<_> = (0..3)
+            .map(|s| (Made::new(30_000 + 10 * draw + s), Truth::default()))
+            .collect();
+        let told = |list: &[(Made, Truth)]| {
+            let found = compared(list);
+            let all = found.warnings.into_iter();
+            all.filter(|own| own.contains("contradict each other"))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(told(&list), Vec::<String>::new(), "draw {draw}");
+        list[2].0.reads[1] = 1.10;
+        let said = told(&list);
+        let [said] = &said[..] else {
+            panic!("draw {draw}: {said:?}");
+        };
+        assert!(said.starts_with("Set set 2: "), "{said}");
+        let (_, size) = said.split_once("that of second ").unwrap();
+        let numbers: Vec<f64> = (size.split(' ').take(3))
+            .filter_map(|word| word.parse().ok())
+            .collect();
+        let [factor, std] = numbers[..] else {
+            panic!("{said}");
+        };
+        assert!((factor - 1.10).abs() < 4.0 * std && std < 0.01, "{said}");
+    }
+}
+
 #[test]
 fn friction_that_rose_by_a_fifth_is_named_friction() {
     let mut third = Truth::default();

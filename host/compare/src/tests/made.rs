@@ -130,6 +130,8 @@ pub(super) struct Made {
     pub noise: f64,
     /// What each joint's recorded position is too large by, rad.
     pub zero: [f64; 2],
+    /// What each joint's recorded torque is multiplied by.
+    pub reads: [f64; 2],
 }
 
 impl Made {
@@ -141,6 +143,7 @@ impl Made {
             pure: false,
             noise: 0.05,
             zero: [0.0; 2],
+            reads: [1.0; 2],
         }
     }
 
@@ -182,7 +185,7 @@ impl Made {
             for j in 0..2 {
                 coloured[j] = rho * coloured[j] + (1.0 - rho * rho).sqrt() * self.noise * normal();
                 joints[j].q.push(q[j] + self.zero[j] + 1e-5 * normal());
-                joints[j].tau.push(tau[j] + coloured[j]);
+                joints[j].tau.push(self.reads[j] * (tau[j] + coloured[j]));
             }
             t.push(time);
         }
