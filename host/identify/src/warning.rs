@@ -118,22 +118,24 @@ impl TorqueScale {
         };
         let (certain, open) = (said(true), said(false));
         let mut text = Vec::new();
-        let off = |list: &[String], what: &str| match list.len() {
-            1 => format!("the {what} is off by this factor"),
-            _ => format!("the {what} of each is off by its factor"),
-        };
         if !certain.is_empty() {
             text.push(format!(
-                "The torque over that of the described gravity is {} (± one standard deviation), while a joint before it shows the described masses: {}.",
+                "The torque over that of the described gravity is {} (± one standard deviation), while a joint before it shows the described masses: the torque constant or gear ratio {}.",
                 listed(&certain),
-                off(&certain, "torque constant or gear ratio")
+                match certain.len() {
+                    1 => "is off by this factor",
+                    _ => "of each is off by its factor",
+                }
             ));
         }
         if !open.is_empty() {
             text.push(format!(
-                "The torque over that of the described gravity is {} (± one standard deviation): if the described masses and gravity are right, {}.",
+                "The torque over that of the described gravity is {} (± one standard deviation): either the described masses are off by {}. These data do not tell which; weigh the links.",
                 listed(&open),
-                off(&open, "torque constant")
+                match open.len() {
+                    1 => "this factor, or the torque constant is",
+                    _ => "these factors, or the torque constants are",
+                }
             ));
         }
         text.join(" ")

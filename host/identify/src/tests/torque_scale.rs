@@ -118,7 +118,7 @@ fn a_torque_constant_that_is_off_is_told_by_the_described_masses() {
     assert_eq!(found.len(), 2, "{found:?}");
     assert!(
         found.iter().all(|own| !own.masses_confirmed)
-            && text.contains("if the described masses and gravity are right"),
+            && text.contains("either the described masses are off"),
         "{text}"
     );
 }
