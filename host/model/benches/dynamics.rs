@@ -6,7 +6,7 @@ mod arms;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use rig_model::batch::{BLOCK, BatchError, ChainBatch, ModelBatch, lower};
+use rig_model::batch::{BLOCK, BatchError, ChainBatch, ModelBatch, Number, lower};
 use rig_shared::multibody::{
     COLUMNS, articulated_forward_dynamics, coriolis_matrix, differential_regressor,
     energy_regressor, forward_dynamics, gravity_vector, inertia_matrix, inverse_dynamics,
@@ -57,14 +57,17 @@ fn scalar(criterion: &mut Criterion) {
     }
 }
 
-fn batch(criterion: &mut Criterion) {
+/// Batches of one number: `f64` or `f32`.
+fn batch<T: Number>(criterion: &mut Criterion) {
+    let number = std::any::type_name::<T>();
     for arm in [arms::ur5e(), arms::panda()] {
         let n = arm.joints();
-        let model = ModelBatch::new(&arm.chain(), &arm.parameters).unwrap();
-        let chain = ChainBatch::new(&arm.chain());
-        let [q, qd, qdd] = arms::motion(n, SAMPLES);
-        let mut out = vec![0.0; n * COLUMNS * SAMPLES];
-        let mut group = criterion.benchmark_group(format!("{SAMPLES} samples, {}", arm.name));
+        let model = ModelBatch::<T>::new(&arm.chain(), &arm.parameters).unwrap();
+        let chain = ChainBatch::<T>::new(&arm.chain());
+        let [q, qd, qdd] = arms::motion(n, SAMPLES).map(arms::rounded::<T>);
+        let mut out = vec![T::ZERO; n * COLUMNS * SAMPLES];
+        let mut group =
+            criterion.benchmark_group(format!("{SAMPLES} samples, {}, {number}", arm.name));
         group.throughput(Throughput::Elements(SAMPLES as u64));
         group.bench_function("inverse dynamics", |b| {
             let out = &mut out[..n * SAMPLES];
@@ -120,5 +123,5 @@ fn batch(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(all, scalar, batch);
+criterion_group!(all, scalar, batch::<f64>, batch::<f32>);
 criterion_main!(all);

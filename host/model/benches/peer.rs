@@ -2,6 +2,9 @@
 //!
 //! `cargo bench --bench peer -- write FOLDER` writes the arms, a motion and its results for the other side to check;
 //! `cargo bench --bench peer -- times` prints one line a function: arm, function, nanoseconds a sample.
+//! `tests/compare_generated` uses the same two.
+//!
+//! `cargo bench --bench peer -- rates [THREADS]` prints millions of inverse dynamics a second, in `f64` and `f32`.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod arms;
@@ -9,9 +12,12 @@ mod arms;
 use std::fmt::Write;
 use std::hint::black_box;
 use std::path::Path;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use rig_model::batch::{BLOCK, BatchError, ChainBatch, Derivatives, ModelBatch, lower};
+use rig_model::batch::{
+    BLOCK, BatchError, ChainBatch, Derivatives, ModelBatch, Number, each_by, lower, over_threads,
+};
 use rig_shared::multibody::{COLUMNS, column};
 
 /// Samples of a call; the other side walks through as many. Results stay in the cache on both sides.
@@ -38,15 +44,16 @@ fn nanoseconds(samples: usize, mut call: impl FnMut()) -> f64 {
     least
 }
 
-fn times() {
+/// Least time of each function over `T`, whose name ends with `suffix`.
+fn times<T: Number>(suffix: &str) {
     for arm in [arms::ur5e(), arms::panda()] {
         let n = arm.joints();
-        let model = ModelBatch::new(&arm.chain(), &arm.parameters).unwrap();
-        let chain = ChainBatch::new(&arm.chain());
-        let [q, qd, qdd] = arms::motion(n, SAMPLES);
-        let mut out = vec![0.0; n * n * SAMPLES];
+        let model = ModelBatch::<T>::new(&arm.chain(), &arm.parameters).unwrap();
+        let chain = ChainBatch::<T>::new(&arm.chain());
+        let [q, qd, qdd] = arms::motion(n, SAMPLES).map(arms::rounded::<T>);
+        let mut out = vec![T::ZERO; n * n * SAMPLES];
         let small = n * SAMPLES;
-        let print = |function: &str, ns: f64| println!("{} {function} {ns:.1}", arm.name);
+        let print = |function: &str, ns: f64| println!("{} {function}{suffix} {ns:.1}", arm.name);
         let inverse = nanoseconds(SAMPLES, || {
             model
                 .inverse_dynamics(black_box(&q), &qd, &qdd, &mut out[..small])
@@ -64,8 +71,8 @@ fn times() {
                 .unwrap();
         });
         print("forward_dynamics", forward);
-        let [mut position, mut velocity] = [(); 2].map(|()| vec![0.0; n * n * SAMPLES]);
-        let mut input = vec![0.0; lower(n, 0) * SAMPLES];
+        let [mut position, mut velocity] = [(); 2].map(|()| vec![T::ZERO; n * n * SAMPLES]);
+        let mut input = vec![T::ZERO; lower(n, 0) * SAMPLES];
         let mut derivatives = Derivatives {
             position: &mut position,
             velocity: &mut velocity,
@@ -93,14 +100,14 @@ fn times() {
                 .unwrap();
         });
         print("regressor", regressor);
-        let mut energy = vec![0.0; n * COLUMNS * SAMPLES];
+        let mut energy = vec![T::ZERO; n * COLUMNS * SAMPLES];
         let rows = nanoseconds(SAMPLES, || {
             chain
                 .energy_regressor(black_box(&q), &qd, &mut energy)
                 .unwrap();
         });
         print("energy_regressor", rows);
-        let [q, qd, qdd] = arms::motion(n, RECORDING);
+        let [q, qd, qdd] = arms::motion(n, RECORDING).map(arms::rounded::<T>);
         let mut stored = chain.block(RECORDING);
         let regressor = nanoseconds(RECORDING, || {
             chain
@@ -108,6 +115,51 @@ fn times() {
                 .unwrap();
         });
         print("regressor_stored", regressor);
+    }
+}
+
+/// Millions of inverse dynamics a second on `threads` threads.
+///
+/// Each thread walks through a recording of its own again and again, which stays in its cache; the last column is one
+/// recording of a million samples, which comes from memory and goes there.
+fn rates<T: Number>(threads: usize) {
+    const ROUNDS: usize = 50;
+    const LONG: usize = 1_000_000;
+    for arm in [arms::ur5e(), arms::panda()] {
+        let n = arm.joints();
+        let model = ModelBatch::<T>::new(&arm.chain(), &arm.parameters).unwrap();
+        let [q, qd, qdd] = arms::motion(n, SAMPLES).map(arms::rounded::<T>);
+        let near = nanoseconds(threads * ROUNDS * SAMPLES, || {
+            over_threads(threads * BLOCK, threads, |_| {
+                let mut out = vec![T::ZERO; n * SAMPLES];
+                for _ in 0..ROUNDS {
+                    let q = black_box(&q);
+                    model.inverse_dynamics(q, &qd, &qdd, &mut out).unwrap();
+                }
+            });
+        });
+        let [q, qd, qdd] = arms::motion(n, LONG).map(arms::rounded::<T>);
+        let outs: Vec<_> = over_threads(LONG, threads, |range| {
+            let columns = range.len();
+            (range, Mutex::new(vec![T::ZERO; n * columns]))
+        });
+        let far = nanoseconds(LONG, || {
+            each_by(outs.len(), threads, |part| {
+                let (range, out) = &outs[part];
+                let [q, qd, qdd] = [&q, &qd, &qdd].map(|signal| {
+                    let columns = signal.iter();
+                    columns.map(|c| &c[range.clone()]).collect::<Vec<_>>()
+                });
+                let out = &mut out.lock().unwrap();
+                model.inverse_dynamics(&q, &qd, &qdd, out).unwrap();
+            });
+        });
+        let number = std::any::type_name::<T>();
+        let [near, far] = [near, far].map(|ns| 1e3 / ns);
+        println!(
+            "{} {number} {threads} threads: {near:.0} million a second, {far:.0} from memory",
+            arm.name
+        );
     }
 }
 
@@ -182,6 +234,11 @@ fn write(folder: &Path) {
     }
 }
 
+fn rates_of(threads: usize) {
+    rates::<f64>(threads);
+    rates::<f32>(threads);
+}
+
 fn main() {
     // Cargo adds `--bench`.
     let arguments: Vec<String> = std::env::args()
@@ -190,9 +247,16 @@ fn main() {
         .collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["write", folder] => write(Path::new(folder)),
-        ["times"] | [] => times(),
+        ["times"] | [] => {
+            times::<f64>("");
+            times::<f32>("_f32");
+        }
+        ["rates"] => rates_of(2),
+        ["rates", threads] => rates_of(threads.parse().unwrap()),
         _ => {
-            eprintln!("peer: expected 'times' or 'write FOLDER', found {arguments:?}");
+            eprintln!(
+                "peer: expected 'times', 'rates [THREADS]' or 'write FOLDER', found {arguments:?}"
+            );
             std::process::exit(2);
         }
     }

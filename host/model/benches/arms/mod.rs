@@ -4,6 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use rig_shared::multibody::{COLUMNS, Chain, JointGeometry, JointKind};
+use rig_shared::scalar::Real;
 
 /// An arm and what is known of it.
 pub(crate) struct Arm {
@@ -172,4 +173,11 @@ pub(crate) fn motion(joints: usize, samples: usize) -> [Vec<Vec<f64>>; 3] {
         }
     }
     signals
+}
+
+/// The same motion in another number.
+pub(crate) fn rounded<T: Real>(columns: Vec<Vec<f64>>) -> Vec<Vec<T>> {
+    (columns.into_iter())
+        .map(|column| column.into_iter().map(T::from_f64).collect())
+        .collect()
 }

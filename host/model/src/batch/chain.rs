@@ -5,17 +5,18 @@ use std::ops::Range;
 use rig_shared::multibody::block::{AxisBlock, Frame, LANES, Lane};
 use rig_shared::multibody::{COLUMNS, Chain, column};
 
+use super::BatchError;
+use super::dispatch::Number;
 use super::signals::{in_place, lanes, load, output, samples, stretches};
-use super::{BatchError, dispatch};
 
-/// Numbers in a cache line.
-const LINE: usize = 8;
+/// Bytes in a cache line.
+const LINE: usize = 64;
 
 /// Geometry and gravity of a chain, prepared for batches of regressors.
 #[derive(Clone, Debug)]
-pub struct ChainBatch {
-    frames: Vec<Frame>,
-    gravity: [f64; 3],
+pub struct ChainBatch<T = f64> {
+    frames: Vec<Frame<T>>,
+    gravity: [T; 3],
 }
 
 /// The differential regressor of several samples, column by column: [`Self::column`].
@@ -24,21 +25,21 @@ pub struct ChainBatch {
 /// without a new allocation. More than half of the columns are zero by structure. They can be read but are never
 /// written, so the operating system need not assign memory for them.
 #[derive(Clone, Debug)]
-pub struct RegressorBlock {
+pub struct RegressorBlock<T = f64> {
     joints: usize,
     room: usize,
     start: usize,
     len: usize,
     /// Column (joint, c) begins at `first + (joint * 14 * joints + c) * stride`.
-    data: Vec<f64>,
+    data: Vec<T>,
     /// Numbers skipped so that columns begin at a cache line.
     first: usize,
     stride: usize,
-    signals: [Vec<Lane>; 3],
-    axes: Vec<AxisBlock>,
+    signals: [Vec<Lane<T>>; 3],
+    axes: Vec<AxisBlock<T>>,
 }
 
-impl RegressorBlock {
+impl<T> RegressorBlock<T> {
     /// Returns the number of the first sample in the recording.
     pub fn start(&self) -> usize {
         self.start
@@ -63,14 +64,17 @@ impl RegressorBlock {
     ///
     /// # Panics
     /// If `joint` or `c` is past the end.
-    pub fn column(&self, joint: usize, c: usize) -> &[f64] {
+    pub fn column(&self, joint: usize, c: usize) -> &[T] {
         let width = self.joints * COLUMNS;
         assert!(c < width, "column {c} of {width}");
         let at = self.first + (joint * width + c) * self.stride;
         &self.data[at..at + self.len]
     }
+}
 
-    /// Returns true if that column is 0 for every motion. A link does not load the joints beyond it. Drive inertia,
+// The same for every number: a caller need not name one.
+impl RegressorBlock {
+    /// Returns true if [`Self::column`] is 0 for every motion. A link does not load the joints beyond it. Drive inertia,
     /// friction and offset of a joint load only that joint.
     pub fn is_zero(joint: usize, c: usize) -> bool {
         let owner = c / COLUMNS;
@@ -78,12 +82,12 @@ impl RegressorBlock {
     }
 }
 
-impl ChainBatch {
+impl<T: Number> ChainBatch<T> {
     /// Prepares a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
         Self {
             frames: Frame::of(chain).collect(),
-            gravity: chain.gravity(),
+            gravity: chain.gravity().map(T::from_f64),
         }
     }
 
@@ -93,19 +97,17 @@ impl ChainBatch {
     }
 
     /// Returns an empty block with room for `samples`, to be reused with this chain.
-    pub fn block(&self, samples: usize) -> RegressorBlock {
+    pub fn block(&self, samples: usize) -> RegressorBlock<T> {
         let n = self.joint_count();
         let width = n * COLUMNS;
         // An odd number of stretches: columns a power of two apart would share a few places in the cache.
         let stride = (samples.div_ceil(LANES) | 1) * LANES;
-        let mut data = vec![0.0; n * width * stride + LINE - 1];
-        let first = data
-            .as_ptr()
-            .align_offset(LINE * size_of::<f64>())
-            .min(LINE - 1);
+        let line = LINE / size_of::<T>();
+        let mut data = vec![T::ZERO; n * width * stride + line - 1];
+        let first = data.as_ptr().align_offset(LINE).min(line - 1);
         for joint in 0..n {
             let offset = joint * (width + COLUMNS) + column::OFFSET;
-            data[first + offset * stride..][..stride].fill(1.0);
+            data[first + offset * stride..][..stride].fill(T::ONE);
         }
         RegressorBlock {
             joints: n,
@@ -126,13 +128,13 @@ impl ChainBatch {
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong; an error of `visit` ends the loop.
-    pub fn each_differential_block<S: AsRef<[f64]>, E: From<BatchError>>(
+    pub fn each_differential_block<S: AsRef<[T]>, E: From<BatchError>>(
         &self,
         q: &[S],
         qd: &[S],
         qdd: &[S],
-        block: &mut RegressorBlock,
-        mut visit: impl FnMut(&RegressorBlock) -> Result<(), E>,
+        block: &mut RegressorBlock<T>,
+        mut visit: impl FnMut(&RegressorBlock<T>) -> Result<(), E>,
     ) -> Result<(), E> {
         let count = self.fitting(q, qd, qdd, block)?;
         if count > 0 && block.room == 0 {
@@ -154,12 +156,12 @@ impl ChainBatch {
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong, or `block` has no room for all samples.
-    pub fn differential_regressor<S: AsRef<[f64]>>(
+    pub fn differential_regressor<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
         qdd: &[S],
-        block: &mut RegressorBlock,
+        block: &mut RegressorBlock<T>,
     ) -> Result<(), BatchError> {
         let samples = self.fitting(q, qd, qdd, block)?;
         if samples > block.room {
@@ -173,12 +175,12 @@ impl ChainBatch {
     }
 
     /// Checks lengths and returns the number of samples.
-    fn fitting<S: AsRef<[f64]>>(
+    fn fitting<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
         qdd: &[S],
-        block: &RegressorBlock,
+        block: &RegressorBlock<T>,
     ) -> Result<usize, BatchError> {
         let expected = self.joint_count();
         if block.joints != expected {
@@ -191,13 +193,13 @@ impl ChainBatch {
     }
 
     /// Computes the samples `range` into the block, which has room for them.
-    fn fill<S: AsRef<[f64]>>(
+    fn fill<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
         qdd: &[S],
         range: Range<usize>,
-        block: &mut RegressorBlock,
+        block: &mut RegressorBlock<T>,
     ) {
         let start = range.start;
         (block.start, block.len) = (start, range.len());
@@ -206,7 +208,7 @@ impl ChainBatch {
             load(q, &part, a);
             load(qd, &part, b);
             load(qdd, &part, c);
-            dispatch::differential_regressor(
+            T::differential_regressor(
                 &self.frames,
                 self.gravity,
                 a,
@@ -226,11 +228,11 @@ impl ChainBatch {
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong.
-    pub fn energy_regressor<S: AsRef<[f64]>>(
+    pub fn energy_regressor<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
-        out: &mut [f64],
+        out: &mut [T],
     ) -> Result<(), BatchError> {
         let n = self.joint_count();
         let width = n * COLUMNS;
@@ -241,7 +243,7 @@ impl ChainBatch {
         }
         for (c, column) in out.chunks_exact_mut(count).enumerate() {
             if c % COLUMNS > column::DRIVE_INERTIA {
-                column.fill(0.0);
+                column.fill(T::ZERO);
             }
         }
         let (mut a, mut b) = (lanes(n), lanes(n));
@@ -250,7 +252,7 @@ impl ChainBatch {
             load(qd, &range, &mut b);
             in_place(&range, count, [&mut *out], |[out], stride, at| {
                 let (frames, gravity) = (&self.frames, self.gravity);
-                dispatch::energy_regressor(frames, gravity, &a, &b, out, stride, at);
+                T::energy_regressor(frames, gravity, &a, &b, out, stride, at);
             });
         }
         Ok(())

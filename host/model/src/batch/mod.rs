@@ -9,6 +9,9 @@
 //! [`RegressorBlock`]. A block can hold a whole recording. To filter, accumulate or multiply the regressor,
 //! [`ChainBatch::each_differential_block`] delivers it in pieces; pieces of [`BLOCK`] samples are still in the cache.
 //!
+//! All of this exists for `f64` and for `f32`: the type of the signals and results decides. With `f32` twice as many
+//! samples fill a vector register. Descriptions stay in `f64`; what depends on them alone is computed in it.
+//!
 //! The caller starts the threads; [`over_threads`] cuts a recording into stretches.
 
 mod chain;
@@ -17,10 +20,13 @@ mod error;
 mod model;
 mod signals;
 #[cfg(test)]
+mod single_tests;
+#[cfg(test)]
 mod tests;
 mod threads;
 
 pub use chain::{ChainBatch, RegressorBlock};
+pub use dispatch::Number;
 pub use error::BatchError;
 pub use model::{Derivatives, ModelBatch};
 pub use rig_shared::multibody::block::lower;

@@ -8,22 +8,23 @@ use rig_shared::multibody::{COLUMNS, Chain, MultibodyError, column};
 
 use std::ops::Range;
 
+use super::BatchError;
+use super::dispatch::Number;
 use super::signals::{in_place, lanes, load, output, samples, store, stretches};
-use super::{BatchError, dispatch};
 
 /// Derivatives of a result with n entries: the outputs of a batch.
 #[derive(Debug)]
-pub struct Derivatives<'a> {
+pub struct Derivatives<'a, T = f64> {
     /// By position: n² columns; column i·n + j is that of entry i by q_j.
-    pub position: &'a mut [f64],
+    pub position: &'a mut [T],
     /// By velocity, likewise.
-    pub velocity: &'a mut [f64],
+    pub velocity: &'a mut [T],
     /// By acceleration or torque: the n(n + 1)/2 columns of the lower triangle of a symmetric matrix. Column
     /// [`lower(i, j)`](lower) is the entry (i, j) with j ≤ i.
-    pub input: &'a mut [f64],
+    pub input: &'a mut [T],
 }
 
-impl Derivatives<'_> {
+impl<T> Derivatives<'_, T> {
     /// Checks the lengths for `n` joints.
     fn check(&self, n: usize, samples: usize) -> Result<(), BatchError> {
         output(n * n, samples, self.position)?;
@@ -32,17 +33,17 @@ impl Derivatives<'_> {
     }
 }
 
-/// A chain with its parameters, prepared for batches.
+/// A chain with its parameters, prepared for batches of `f64` or `f32`.
 #[derive(Clone, Debug)]
-pub struct ModelBatch {
-    frames: Vec<Frame>,
-    gravity: [f64; 3],
-    bodies: Vec<Body>,
+pub struct ModelBatch<T = f64> {
+    frames: Vec<Frame<T>>,
+    gravity: [T; 3],
+    bodies: Vec<Body<T>>,
     /// The same bodies without drives, friction and offsets.
-    links: Vec<Body>,
+    links: Vec<Body<T>>,
 }
 
-impl ModelBatch {
+impl<T: Number> ModelBatch<T> {
     /// Prepares a chain with one row of parameters a joint, in the order of
     /// [`COLUMN_NAMES`](rig_shared::multibody::COLUMN_NAMES).
     ///
@@ -68,7 +69,7 @@ impl ModelBatch {
         Body::gather(chain, &bare, &mut links);
         Ok(Self {
             frames: Frame::of(chain).collect(),
-            gravity: chain.gravity(),
+            gravity: chain.gravity().map(T::from_f64),
             bodies,
             links,
         })
@@ -84,12 +85,12 @@ impl ModelBatch {
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong.
-    pub fn inverse_dynamics<S: AsRef<[f64]>>(
+    pub fn inverse_dynamics<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
         qdd: &[S],
-        tau: &mut [f64],
+        tau: &mut [T],
     ) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
@@ -101,7 +102,7 @@ impl ModelBatch {
             load(qd, &range, &mut b);
             load(qdd, &range, &mut c);
             let (frames, bodies) = (&self.frames, &self.bodies);
-            dispatch::inverse_dynamics(
+            T::inverse_dynamics(
                 frames,
                 self.gravity,
                 bodies,
@@ -121,7 +122,7 @@ impl ModelBatch {
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong.
-    pub fn gravity<S: AsRef<[f64]>>(&self, q: &[S], out: &mut [f64]) -> Result<(), BatchError> {
+    pub fn gravity<S: AsRef<[T]>>(&self, q: &[S], out: &mut [T]) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q)])?;
         output(n, count, out)?;
@@ -130,7 +131,7 @@ impl ModelBatch {
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             let (frames, links) = (&self.frames, &self.links);
-            dispatch::inverse_dynamics(
+            T::inverse_dynamics(
                 frames,
                 self.gravity,
                 links,
@@ -151,11 +152,7 @@ impl ModelBatch {
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong.
-    pub fn inertia_matrix<S: AsRef<[f64]>>(
-        &self,
-        q: &[S],
-        out: &mut [f64],
-    ) -> Result<(), BatchError> {
+    pub fn inertia_matrix<S: AsRef<[T]>>(&self, q: &[S], out: &mut [T]) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q)])?;
         output(lower(n, 0), count, out)?;
@@ -167,7 +164,7 @@ impl ModelBatch {
             let (frames, bodies) = (&self.frames, &self.bodies);
             let (work, composite) = (&mut work, &mut composite);
             in_place(&range, count, [&mut *out], |[out], stride, at| {
-                dispatch::inertia_matrix(frames, bodies, &a, work, composite, out, stride, at);
+                T::inertia_matrix(frames, bodies, &a, work, composite, out, stride, at);
             });
         }
         Ok(())
@@ -178,12 +175,12 @@ impl ModelBatch {
     ///
     /// # Errors
     /// [`BatchError::NotPositiveDefinite`] with the first such sample; other errors if a length is wrong.
-    pub fn forward_dynamics<S: AsRef<[f64]>>(
+    pub fn forward_dynamics<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
         tau: &[S],
-        qdd: &mut [f64],
+        qdd: &mut [T],
     ) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q), ("qd", qd), ("tau", tau)])?;
@@ -197,7 +194,7 @@ impl ModelBatch {
             load(qd, &range, &mut b);
             load(tau, &range, &mut c);
             let (frames, bodies) = (&self.frames, &self.bodies);
-            dispatch::forward_dynamics(
+            T::forward_dynamics(
                 frames,
                 self.gravity,
                 bodies,
@@ -220,12 +217,12 @@ impl ModelBatch {
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong.
-    pub fn inverse_dynamics_derivatives<S: AsRef<[f64]>>(
+    pub fn inverse_dynamics_derivatives<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
         qdd: &[S],
-        out: &mut Derivatives<'_>,
+        out: &mut Derivatives<'_, T>,
     ) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
@@ -239,7 +236,7 @@ impl ModelBatch {
             let (frames, bodies) = (&self.frames, &self.bodies);
             let outs = [&mut *out.position, &mut *out.velocity, &mut *out.input];
             in_place(&range, count, outs, |outs, stride, at| {
-                dispatch::inverse_dynamics_derivatives(
+                T::inverse_dynamics_derivatives(
                     frames,
                     self.gravity,
                     bodies,
@@ -259,12 +256,12 @@ impl ModelBatch {
     ///
     /// # Errors
     /// As [`Self::forward_dynamics`].
-    pub fn forward_dynamics_derivatives<S: AsRef<[f64]>>(
+    pub fn forward_dynamics_derivatives<S: AsRef<[T]>>(
         &self,
         q: &[S],
         qd: &[S],
         tau: &[S],
-        out: &mut Derivatives<'_>,
+        out: &mut Derivatives<'_, T>,
     ) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q), ("qd", qd), ("tau", tau)])?;
@@ -281,7 +278,7 @@ impl ModelBatch {
             let (frames, bodies) = (&self.frames, &self.bodies);
             let outs = [&mut *out.position, &mut *out.velocity, &mut *out.input];
             in_place(&range, count, outs, |outs, stride, at| {
-                dispatch::forward_dynamics_derivatives(
+                T::forward_dynamics_derivatives(
                     frames,
                     self.gravity,
                     bodies,

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use rig_shared::lanes::Element;
 use rig_shared::multibody::block::{LANES, Lane};
 
 use super::BatchError;
 
 /// Checks that every signal has one column a joint, all of the same length, and returns that length.
-pub(super) fn samples<S: AsRef<[f64]>>(
+pub(super) fn samples<T, S: AsRef<[T]>>(
     joints: usize,
     signals: &[(&'static str, &[S])],
 ) -> Result<usize, BatchError> {
@@ -37,7 +38,7 @@ pub(super) fn samples<S: AsRef<[f64]>>(
 }
 
 /// Checks that `out` holds `columns` columns of `samples`.
-pub(super) fn output(columns: usize, samples: usize, out: &[f64]) -> Result<(), BatchError> {
+pub(super) fn output<T>(columns: usize, samples: usize, out: &[T]) -> Result<(), BatchError> {
     if out.len() == columns * samples {
         Ok(())
     } else {
@@ -58,24 +59,28 @@ pub(super) fn stretches(range: Range<usize>) -> impl Iterator<Item = Range<usize
 }
 
 /// Loads samples `range` (at most [`LANES`]) of every column. A shorter stretch is padded with its last sample.
-pub(super) fn load<S: AsRef<[f64]>>(columns: &[S], range: &Range<usize>, lanes: &mut [Lane]) {
+pub(super) fn load<T: Element, S: AsRef<[T]>>(
+    columns: &[S],
+    range: &Range<usize>,
+    lanes: &mut [Lane<T>],
+) {
     for (lane, column) in lanes.iter_mut().zip(columns) {
         let part = &column.as_ref()[range.clone()];
         if let Ok(full) = part.try_into() {
             lane.0 = full;
         } else {
-            lane.fill(part.last().copied().unwrap_or(0.0));
+            lane.fill(part.last().copied().unwrap_or(T::ZERO));
             lane[..part.len()].copy_from_slice(part);
         }
     }
 }
 
 /// Writes lanes to columns of `samples` samples, at `range`.
-pub(super) fn store<'a>(
-    lanes: impl Iterator<Item = &'a [f64; LANES]>,
+pub(super) fn store<'a, T: Element>(
+    lanes: impl Iterator<Item = &'a [T; LANES]>,
     range: &Range<usize>,
     samples: usize,
-    out: &mut [f64],
+    out: &mut [T],
 ) {
     for (column, lane) in out.chunks_exact_mut(samples).zip(lanes) {
         column[range.clone()].copy_from_slice(&lane[..range.len()]);
@@ -84,18 +89,18 @@ pub(super) fn store<'a>(
 
 /// Lets `compute(columns, stride, at)` write [`LANES`] entries of every column of `samples` samples of each output, at
 /// `range`. A shorter range is written to temporary columns and copied.
-pub(super) fn in_place<const N: usize, R>(
+pub(super) fn in_place<T: Element, const N: usize, R>(
     range: &Range<usize>,
     samples: usize,
-    outs: [&mut [f64]; N],
-    compute: impl FnOnce([&mut [f64]; N], usize, usize) -> R,
+    outs: [&mut [T]; N],
+    compute: impl FnOnce([&mut [T]; N], usize, usize) -> R,
 ) -> R {
     if range.len() == LANES {
         return compute(outs, samples, range.start);
     }
     let mut short = outs
         .each_ref()
-        .map(|out| vec![0.0; out.len() / samples * LANES]);
+        .map(|out| vec![T::ZERO; out.len() / samples * LANES]);
     let done = compute(short.each_mut().map(Vec::as_mut_slice), LANES, 0);
     for (out, short) in outs.into_iter().zip(&short) {
         store(short.as_chunks().0.iter(), range, samples, out);
@@ -104,6 +109,6 @@ pub(super) fn in_place<const N: usize, R>(
 }
 
 /// Returns one lane a joint, all zero.
-pub(super) fn lanes(count: usize) -> Vec<Lane> {
+pub(super) fn lanes<T: Element>(count: usize) -> Vec<Lane<T>> {
     vec![Lane::ZERO; count]
 }

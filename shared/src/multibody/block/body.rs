@@ -3,6 +3,7 @@
 use super::super::chain::Chain;
 use super::super::parameters::{COLUMNS, column, inertia};
 use super::super::spatial::{Inertia, Symmetric3, Vector3};
+use crate::lanes::Element;
 
 /// The parameters of a joint after grouping, and those of its drive and friction.
 ///
@@ -13,21 +14,22 @@ use super::super::spatial::{Inertia, Symmetric3, Vector3};
 /// Khalil 1990; the grouping of customised Newton–Euler, Khalil & Kleinfinger 1987). The parts that reach the base act
 /// on no joint.
 #[derive(Clone, Copy, Debug)]
-pub struct Body {
+pub struct Body<T> {
     /// Zero if revolute.
-    pub(super) mass: f64,
+    pub(super) mass: T,
     /// z component zero if revolute.
-    pub(super) first_moment: [f64; 3],
+    pub(super) first_moment: [T; 3],
     /// Zero if prismatic; `yy` zero if revolute.
-    pub(super) inertia: Symmetric3<f64>,
-    pub(super) drive: f64,
-    pub(super) viscous: f64,
-    pub(super) coulomb: f64,
-    pub(super) offset: f64,
+    pub(super) inertia: Symmetric3<T>,
+    pub(super) drive: T,
+    pub(super) viscous: T,
+    pub(super) coulomb: T,
+    pub(super) offset: T,
 }
 
-impl Body {
-    /// Groups the `parameters`, one row per joint of `chain`, into `bodies` (both of the chain's length).
+impl<T: Element> Body<T> {
+    /// Groups the `parameters`, one row per joint of `chain`, into `bodies` (both of the chain's
+    /// length), in `f64` before they are rounded.
     pub fn gather(chain: &Chain<f64>, parameters: &[[f64; COLUMNS]], bodies: &mut [Self]) {
         let nothing = Inertia {
             mass: 0.0,
@@ -79,13 +81,20 @@ impl Body {
                 ),
             };
             *body = Self {
-                mass: kept.mass,
-                first_moment: kept.first_moment.0,
-                inertia: kept.inertia,
-                drive: row[column::DRIVE_INERTIA],
-                viscous: row[column::VISCOUS],
-                coulomb: row[column::COULOMB],
-                offset: row[column::OFFSET],
+                mass: T::from_f64(kept.mass),
+                first_moment: kept.first_moment.0.map(T::from_f64),
+                inertia: Symmetric3 {
+                    xx: T::from_f64(kept.inertia.xx),
+                    xy: T::from_f64(kept.inertia.xy),
+                    xz: T::from_f64(kept.inertia.xz),
+                    yy: T::from_f64(kept.inertia.yy),
+                    yz: T::from_f64(kept.inertia.yz),
+                    zz: T::from_f64(kept.inertia.zz),
+                },
+                drive: T::from_f64(row[column::DRIVE_INERTIA]),
+                viscous: T::from_f64(row[column::VISCOUS]),
+                coulomb: T::from_f64(row[column::COULOMB]),
+                offset: T::from_f64(row[column::OFFSET]),
             };
             // The joint's position does not affect the parts that are passed on.
             handed = joint.transform(0.0).inertia_to_parent(handed_down);
@@ -94,19 +103,12 @@ impl Body {
 
     /// An empty body, to be overwritten.
     pub const NOTHING: Self = Self {
-        mass: 0.0,
-        first_moment: [0.0; 3],
-        inertia: Symmetric3 {
-            xx: 0.0,
-            xy: 0.0,
-            xz: 0.0,
-            yy: 0.0,
-            yz: 0.0,
-            zz: 0.0,
-        },
-        drive: 0.0,
-        viscous: 0.0,
-        coulomb: 0.0,
-        offset: 0.0,
+        mass: T::ZERO,
+        first_moment: [T::ZERO; 3],
+        inertia: Symmetric3::ZERO,
+        drive: T::ZERO,
+        viscous: T::ZERO,
+        coulomb: T::ZERO,
+        offset: T::ZERO,
     };
 }

@@ -23,60 +23,63 @@ use super::body::Body;
 use super::columns::{Columns, Section};
 use super::frame::{Frame, LinkTransform, at_each_lane, rotate_z};
 use super::inertia::lower;
-use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
-use crate::lanes::MulAdd;
+use super::lane::{LANES, Lane, Lane3, get, set};
+use crate::lanes::{Element, MulAdd};
 
-type Vector = Vector3<f64>;
+// No closures over products here: one that the compiler leaves in a function of its own is not compiled for the caller's
+// instruction set.
+
+type Vector<T> = Vector3<T>;
 
 /// Buffer for a joint: its axis with both rates, and the links from it outwards.
 #[derive(Clone, Copy, Debug)]
-pub struct DerivativeBlock {
+pub struct DerivativeBlock<T> {
     /// S
-    axis: MotionLanes,
+    axis: MotionLanes<T>,
     /// 2·Ψ̇
-    rate: MotionLanes,
+    rate: MotionLanes<T>,
     /// Ψ̈
-    second_rate: MotionLanes,
-    links: LinksBlock,
+    second_rate: MotionLanes<T>,
+    links: LinksBlock<T>,
 }
 
-impl DerivativeBlock {
+impl<T: Element> DerivativeBlock<T> {
     /// All zero.
     pub const ZERO: Self = Self {
         axis: MotionLanes::ZERO,
         rate: MotionLanes::ZERO,
         second_rate: MotionLanes::ZERO,
         links: LinksBlock {
-            first_moment: ZERO3,
-            second_moment: [ZERO; 6],
-            turned: [ZERO3; 3],
-            momentum: ZERO3,
-            force: ZERO3,
-            moment: ZERO3,
+            first_moment: [Lane::ZERO; 3],
+            second_moment: [Lane::ZERO; 6],
+            turned: [[Lane::ZERO; 3]; 3],
+            momentum: [Lane::ZERO; 3],
+            force: [Lane::ZERO; 3],
+            moment: [Lane::ZERO; 3],
         },
     };
 }
 
 /// Angular and linear part of a motion.
 #[derive(Clone, Copy, Debug)]
-struct MotionLanes {
-    angular: Lane3,
-    linear: Lane3,
+struct MotionLanes<T> {
+    angular: Lane3<T>,
+    linear: Lane3<T>,
 }
 
-impl MotionLanes {
+impl<T: Element> MotionLanes<T> {
     const ZERO: Self = Self {
-        angular: ZERO3,
-        linear: ZERO3,
+        angular: [Lane::ZERO; 3],
+        linear: [Lane::ZERO; 3],
     };
 
     #[inline(always)]
-    fn at(&self, k: usize) -> [Vector; 2] {
+    fn at(&self, k: usize) -> [Vector<T>; 2] {
         [get(&self.angular, k), get(&self.linear, k)]
     }
 
     #[inline(always)]
-    fn put(&mut self, k: usize, [angular, linear]: [Vector; 2]) {
+    fn put(&mut self, k: usize, [angular, linear]: [Vector<T>; 2]) {
         set(&mut self.angular, k, angular);
         set(&mut self.linear, k, linear);
     }
@@ -84,27 +87,27 @@ impl MotionLanes {
 
 /// Sums over links.
 #[derive(Clone, Copy, Debug)]
-struct LinksBlock {
+struct LinksBlock<T> {
     /// h
-    first_moment: Lane3,
+    first_moment: Lane3<T>,
     /// Σ: xx xy xz yy yz zz
-    second_moment: [Lane; 6],
+    second_moment: [Lane<T>; 6],
     /// Columns of D.
-    turned: [Lane3; 3],
+    turned: [Lane3<T>; 3],
     /// l
-    momentum: Lane3,
+    momentum: Lane3<T>,
     /// Wrench of the motion.
-    force: Lane3,
-    moment: Lane3,
+    force: Lane3<T>,
+    moment: Lane3<T>,
 }
 
 /// Pose and motion of a link.
-struct Link {
+struct Link<T> {
     /// Rows of its rotation: the directions of the base in its frame.
-    rows: [Lane3; 3],
-    origin: Lane3,
-    velocity: MotionLanes,
-    acceleration: MotionLanes,
+    rows: [Lane3<T>; 3],
+    origin: Lane3<T>,
+    velocity: MotionLanes<T>,
+    acceleration: MotionLanes<T>,
 }
 
 /// Computes the derivatives of the torques by position and velocity, and the inertia matrix.
@@ -112,17 +115,17 @@ struct Link {
 /// `frames`, `bodies`, `work` and the signals q, q̇, q̈ have one entry per joint. Column i·n + j of `by_position` and `by_velocity` is ∂τ_i/∂q_j and ∂τ_i/∂q̇_j; `inertia` has the lower triangle as
 /// [`super::inertia_matrix`] writes it. Coulomb friction counts as constant.
 #[inline(always)]
-pub fn inverse_dynamics_derivatives<F: MulAdd>(
-    frames: &[Frame],
-    gravity: [f64; 3],
-    bodies: &[Body],
-    signals: [&[Lane]; 3],
-    work: &mut [DerivativeBlock],
-    by_position: &mut Section,
-    by_velocity: &mut Section,
-    inertia: &mut Section,
+pub fn inverse_dynamics_derivatives<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    gravity: [T; 3],
+    bodies: &[Body<T>],
+    signals: [&[Lane<T>]; 3],
+    work: &mut [DerivativeBlock<T>],
+    by_position: &mut Section<T>,
+    by_velocity: &mut Section<T>,
+    inertia: &mut Section<T>,
 ) {
-    derivatives::<F>(
+    derivatives::<T, F>(
         frames,
         gravity,
         bodies,
@@ -136,36 +139,37 @@ pub fn inverse_dynamics_derivatives<F: MulAdd>(
 
 /// The same into any columns.
 #[inline(always)]
-pub(super) fn derivatives<F: MulAdd>(
-    frames: &[Frame],
-    gravity: [f64; 3],
-    bodies: &[Body],
-    [q, qd, qdd]: [&[Lane]; 3],
-    work: &mut [DerivativeBlock],
-    by_position: &mut (impl Columns + ?Sized),
-    by_velocity: &mut (impl Columns + ?Sized),
-    inertia: &mut (impl Columns + ?Sized),
+pub(super) fn derivatives<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    gravity: [T; 3],
+    bodies: &[Body<T>],
+    [q, qd, qdd]: [&[Lane<T>]; 3],
+    work: &mut [DerivativeBlock<T>],
+    by_position: &mut (impl Columns<T> + ?Sized),
+    by_velocity: &mut (impl Columns<T> + ?Sized),
+    inertia: &mut (impl Columns<T> + ?Sized),
 ) {
     let n = frames.len();
-    let row = |r: usize| core::array::from_fn(|c| Lane([f64::from(u8::from(r == c)); LANES]));
+    let row =
+        |r: usize| core::array::from_fn(|c| Lane([if r == c { T::ONE } else { T::ZERO }; LANES]));
     let mut link = Link {
         rows: [row(0), row(1), row(2)],
-        origin: ZERO3,
+        origin: [Lane::ZERO; 3],
         velocity: MotionLanes::ZERO,
         acceleration: MotionLanes {
-            angular: ZERO3,
+            angular: [Lane::ZERO; 3],
             linear: gravity.map(|g| Lane([-g; LANES])),
         },
     };
-    let (mut sin, mut cos) = (ZERO, ZERO);
+    let (mut sin, mut cos) = (Lane::ZERO, Lane::ZERO);
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
-        at_each_lane!(F, frame, &q[i], transform => place(transform, &sin, &cos, &mut link));
-        move_link::<F>(frame.prismatic, &qd[i], &qdd[i], &mut link, &mut work[i]);
-        mass_moments::<F>(&bodies[i], &link, &mut work[i].links);
-        momenta::<F>(&bodies[i], &link, &mut work[i].links);
+        at_each_lane!(T, F, frame, &q[i], transform => place(transform, &sin, &cos, &mut link));
+        move_link::<T, F>(frame.prismatic, &qd[i], &qdd[i], &mut link, &mut work[i]);
+        mass_moments::<T, F>(&bodies[i], &link, &mut work[i].links);
+        momenta::<T, F>(&bodies[i], &link, &mut work[i].links);
     }
-    let mut mass = 0.0;
+    let mut mass = T::ZERO;
     let mut row = RowBlock::ZERO;
     for i in (0..n).rev() {
         mass += bodies[i].mass;
@@ -174,16 +178,16 @@ pub(super) fn derivatives<F: MulAdd>(
         if let Some(next) = after.first() {
             own.links.add(&next.links);
         }
-        row_of::<F>(mass, own, &mut row);
+        row_of::<T, F>(mass, own, &mut row);
         if i > 0 {
-            column_of::<F>(mass, own, &mut row);
+            column_of::<T, F>(mass, own, &mut row);
         }
         for (j, other) in before.iter().enumerate() {
             let m = inertia.lane(lower(i, j));
             if j == i {
                 let (q, qd) = (by_position.lane(i * n + i), by_velocity.lane(i * n + i));
                 let body = &bodies[i];
-                along_row::<F>(&row, other, q, qd, m);
+                along_row::<T, F>(&row, other, q, qd, m);
                 for k in 0..LANES {
                     qd[k] += body.viscous;
                     m[k] += body.drive;
@@ -191,8 +195,8 @@ pub(super) fn derivatives<F: MulAdd>(
             } else {
                 let [q_above, q] = by_position.two(j * n + i, i * n + j);
                 let [qd_above, qd] = by_velocity.two(j * n + i, i * n + j);
-                along_row::<F>(&row, other, q, qd, m);
-                along_column::<F>(&row, other, q_above, qd_above);
+                along_row::<T, F>(&row, other, q, qd, m);
+                along_column::<T, F>(&row, other, q_above, qd_above);
             }
         }
     }
@@ -200,11 +204,11 @@ pub(super) fn derivatives<F: MulAdd>(
 
 /// Moves the pose across a joint.
 #[inline(always)]
-fn place<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    transform: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
-    sin: &Lane,
-    cos: &Lane,
-    link: &mut Link,
+fn place<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    transform: impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
+    sin: &Lane<T>,
+    cos: &Lane<T>,
+    link: &mut Link<T>,
 ) {
     for (row, origin) in link.rows.iter_mut().zip(&mut link.origin) {
         for k in 0..LANES {
@@ -217,50 +221,54 @@ fn place<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
             if D {
                 origin[k] = F::mul_add(transform.d, z, origin[k]);
             }
-            set(row, k, rotate_z::<F>(sin[k], cos[k], turned));
+            set(row, k, rotate_z::<T, F>(sin[k], cos[k], turned));
         }
     }
 }
 
 /// Sets the axis of a joint and its rates, and moves the motion across it.
 #[inline(always)]
-fn move_link<F: MulAdd>(
+fn move_link<T: Element, F: MulAdd<T>>(
     prismatic: bool,
-    qd: &Lane,
-    qdd: &Lane,
-    link: &mut Link,
-    joint: &mut DerivativeBlock,
+    qd: &Lane<T>,
+    qdd: &Lane<T>,
+    link: &mut Link<T>,
+    joint: &mut DerivativeBlock<T>,
 ) {
     for k in 0..LANES {
-        let along = Vector3(core::array::from_fn(|r| link.rows[r][2][k]));
+        let [x, y, z] = &link.rows;
+        let along = Vector3([x[2][k], y[2][k], z[2][k]]);
         let axis = if prismatic {
             [Vector::ZERO, along]
         } else {
-            [along, cross::<F>(get(&link.origin, k), along)]
+            [along, cross::<T, F>(get(&link.origin, k), along)]
         };
         let velocity = link.velocity.at(k);
         let acceleration = link.acceleration.at(k);
-        let rate = cross_motion::<F>(velocity, axis, [Vector::ZERO; 2]);
-        let second = cross_motion::<F>(velocity, rate, [Vector::ZERO; 2]);
-        let second = cross_motion::<F>(acceleration, axis, second);
+        let rate = cross_motion::<T, F>(velocity, axis, [Vector::ZERO; 2]);
+        let second = cross_motion::<T, F>(velocity, rate, [Vector::ZERO; 2]);
+        let second = cross_motion::<T, F>(acceleration, axis, second);
         joint.axis.put(k, axis);
-        joint.rate.put(k, rate.map(|part| part + part));
+        joint.rate.put(k, [rate[0] + rate[0], rate[1] + rate[1]]);
         joint.second_rate.put(k, second);
-        let moved = |start: [Vector; 2], change: [Vector; 2], by: f64| {
-            [0, 1].map(|part| scaled_add::<F>(by, change[part], start[part]))
-        };
-        link.velocity.put(k, moved(velocity, axis, qd[k]));
-        let acceleration = moved(acceleration, axis, qdd[k]);
-        link.acceleration.put(k, moved(acceleration, rate, qd[k]));
+        link.velocity
+            .put(k, scaled_motion::<T, F>(qd[k], axis, velocity));
+        let acceleration = scaled_motion::<T, F>(qdd[k], axis, acceleration);
+        link.acceleration
+            .put(k, scaled_motion::<T, F>(qd[k], rate, acceleration));
     }
 }
 
 /// Computes the mass moments of a link.
 #[inline(always)]
-fn mass_moments<F: MulAdd>(body: &Body, link: &Link, links: &mut LinksBlock) {
+fn mass_moments<T: Element, F: MulAdd<T>>(
+    body: &Body<T>,
+    link: &Link<T>,
+    links: &mut LinksBlock<T>,
+) {
     let i = body.inertia;
     // Σ = tr(J)/2·1 − J in the link's frame.
-    let half = 0.5 * (i.xx + i.yy + i.zz);
+    let half = T::HALF * (i.xx + i.yy + i.zz);
     let second = [
         Vector3([half - i.xx, -i.xy, -i.xz]),
         Vector3([-i.xy, half - i.yy, -i.yz]),
@@ -268,20 +276,25 @@ fn mass_moments<F: MulAdd>(body: &Body, link: &Link, links: &mut LinksBlock) {
     ];
     let first = Vector3(body.first_moment);
     for k in 0..LANES {
-        let rows = [0, 1, 2].map(|r| get(&link.rows[r], k));
+        let rows = three(&link.rows, k);
         let origin = get(&link.origin, k);
-        let turned = Vector3(rows.map(|row| dot::<F>(row, first, 0.0)));
+        let turned = times::<T, F>(rows, first);
         // Parallel axes: the mixed term of the origin with h + m·o/2.
-        let mixed = scaled_add::<F>(0.5 * body.mass, origin, turned);
+        let mixed = scaled_add::<T, F>(T::HALF * body.mass, origin, turned);
         set(
             &mut links.first_moment,
             k,
-            scaled_add::<F>(body.mass, origin, turned),
+            scaled_add::<T, F>(body.mass, origin, turned),
         );
-        let half_turned = rows.map(|row| Vector3(second.map(|line| dot::<F>(line, row, 0.0))));
+        let [x, y, z] = rows;
+        let half_turned = [
+            times::<T, F>(second, x),
+            times::<T, F>(second, y),
+            times::<T, F>(second, z),
+        ];
         for (entry, (r, c)) in ENTRIES.into_iter().enumerate() {
             let parallel = F::mul_add(origin.0[r], mixed.0[c], mixed.0[r] * origin.0[c]);
-            links.second_moment[entry][k] = dot::<F>(half_turned[r], rows[c], parallel);
+            links.second_moment[entry][k] = dot::<T, F>(half_turned[r], rows[c], parallel);
         }
     }
 }
@@ -291,33 +304,34 @@ const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2
 
 /// Computes D, momentum and wrench of a link from its mass moments.
 #[inline(always)]
-fn momenta<F: MulAdd>(body: &Body, link: &Link, links: &mut LinksBlock) {
+fn momenta<T: Element, F: MulAdd<T>>(body: &Body<T>, link: &Link<T>, links: &mut LinksBlock<T>) {
     for k in 0..LANES {
         let [w, v] = link.velocity.at(k);
         let [e, a] = link.acceleration.at(k);
         let h = get(&links.first_moment, k);
         let second = links.second_moment_at(k);
-        let momentum = cross_add::<F>(w, h, v.scaled(body.mass));
-        let along = dot::<F>(v, h, 0.0);
-        let mut moment = inertia_times::<F>(second, e, cross::<F>(h, a));
+        let momentum = cross_add::<T, F>(w, h, v.scaled(body.mass));
+        let along = dot::<T, F>(v, h, T::ZERO);
+        let mut moment = inertia_times::<T, F>(second, e, cross::<T, F>(h, a));
         for c in 0..3 {
-            let mut column = cross_add::<F>(second[c], w, v.scaled(-h.0[c]));
+            let mut column = cross_add::<T, F>(second[c], w, v.scaled(-h.0[c]));
             column.0[c] += along;
             set(&mut links.turned[c], k, column);
-            moment = scaled_add::<F>(w.0[c], column, moment);
+            moment = scaled_add::<T, F>(w.0[c], column, moment);
         }
-        let force = cross_add::<F>(e, h, a.scaled(body.mass));
+        let force = cross_add::<T, F>(e, h, a.scaled(body.mass));
         set(&mut links.momentum, k, momentum);
-        set(&mut links.force, k, cross_add::<F>(w, momentum, force));
+        set(&mut links.force, k, cross_add::<T, F>(w, momentum, force));
         set(&mut links.moment, k, moment);
     }
 }
 
-impl LinksBlock {
+impl<T: Element> LinksBlock<T> {
     /// Returns the rows of Σ.
     #[inline(always)]
-    fn second_moment_at(&self, k: usize) -> [Vector; 3] {
-        let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|c| self.second_moment[c][k]);
+    fn second_moment_at(&self, k: usize) -> [Vector<T>; 3] {
+        let [xx, xy, xz, yy, yz, zz] = &self.second_moment;
+        let (xx, xy, xz, yy, yz, zz) = (xx[k], xy[k], xz[k], yy[k], yz[k], zz[k]);
         [
             Vector3([xx, xy, xz]),
             Vector3([xy, yy, yz]),
@@ -327,30 +341,30 @@ impl LinksBlock {
 
     /// Returns I·motion + `plus` as moment and force.
     #[inline(always)]
-    fn inertia_times<F: MulAdd>(
+    fn inertia_times<F: MulAdd<T>>(
         &self,
-        mass: f64,
+        mass: T,
         k: usize,
-        [w, v]: [Vector; 2],
-        plus: [Vector; 2],
-    ) -> [Vector; 2] {
+        [w, v]: [Vector<T>; 2],
+        plus: [Vector<T>; 2],
+    ) -> [Vector<T>; 2] {
         let h = get(&self.first_moment, k);
         let second = self.second_moment_at(k);
         [
-            inertia_times::<F>(second, w, cross_add::<F>(h, v, plus[0])),
-            scaled_add::<F>(mass, v, cross_add::<F>(w, h, plus[1])),
+            inertia_times::<T, F>(second, w, cross_add::<T, F>(h, v, plus[0])),
+            scaled_add::<T, F>(mass, v, cross_add::<T, F>(w, h, plus[1])),
         ]
     }
 
     /// Returns B·(w, ·) as moment and force.
     #[inline(always)]
-    fn coriolis_times<F: MulAdd>(&self, k: usize, w: Vector) -> [Vector; 2] {
-        let [a, b, c] = [0, 1, 2].map(|c| get(&self.turned[c], k));
+    fn coriolis_times<F: MulAdd<T>>(&self, k: usize, w: Vector<T>) -> [Vector<T>; 2] {
+        let [a, b, c] = three(&self.turned, k);
         let [x, y, z] = w.0;
-        let moment = scaled_add::<F>(y, b, a.scaled(x));
+        let moment = scaled_add::<T, F>(y, b, a.scaled(x));
         [
-            scaled_add::<F>(z, c, moment),
-            cross::<F>(w, get(&self.momentum, k)),
+            scaled_add::<T, F>(z, c, moment),
+            cross::<T, F>(w, get(&self.momentum, k)),
         ]
     }
 
@@ -358,7 +372,7 @@ impl LinksBlock {
     #[inline(always)]
     fn add(&mut self, other: &Self) {
         #[inline(always)]
-        fn sum(a: &mut [Lane], b: &[Lane]) {
+        fn sum<T: Element>(a: &mut [Lane<T>], b: &[Lane<T>]) {
             for (a, b) in a.iter_mut().zip(b) {
                 for k in 0..LANES {
                     a[k] += b[k];
@@ -377,20 +391,20 @@ impl LinksBlock {
 }
 
 /// What the pairs with one joint i have in common.
-struct RowBlock {
+struct RowBlock<T> {
     /// Bᵀ·S_i, which is angular.
-    turned: Lane3,
+    turned: Lane3<T>,
     /// I·S_i as moment and force, in the order of a motion's parts.
-    inertial: MotionLanes,
+    inertial: MotionLanes<T>,
     /// 2·B·Ψ̇_i + I·Ψ̈_i + S_i ×* f, likewise.
-    by_position: MotionLanes,
+    by_position: MotionLanes<T>,
     /// 2·(B·S_i + I·Ψ̇_i), likewise.
-    by_velocity: MotionLanes,
+    by_velocity: MotionLanes<T>,
 }
 
-impl RowBlock {
+impl<T: Element> RowBlock<T> {
     const ZERO: Self = Self {
-        turned: ZERO3,
+        turned: [Lane::ZERO; 3],
         inertial: MotionLanes::ZERO,
         by_position: MotionLanes::ZERO,
         by_velocity: MotionLanes::ZERO,
@@ -399,13 +413,18 @@ impl RowBlock {
 
 /// Computes what the derivatives of the torque at joint i need; `mass` is that of the links from it outwards.
 #[inline(always)]
-fn row_of<F: MulAdd>(mass: f64, joint: &DerivativeBlock, row: &mut RowBlock) {
+fn row_of<T: Element, F: MulAdd<T>>(mass: T, joint: &DerivativeBlock<T>, row: &mut RowBlock<T>) {
     let links = &joint.links;
     for k in 0..LANES {
         let axis @ [z, arm] = joint.axis.at(k);
-        let side = cross::<F>(get(&links.momentum, k), arm).0;
-        let turned = core::array::from_fn(|c| dot::<F>(get(&links.turned[c], k), z, side[c]));
-        set(&mut row.turned, k, Vector3(turned));
+        let side = cross::<T, F>(get(&links.momentum, k), arm).0;
+        let [a, b, c] = three(&links.turned, k);
+        let turned = Vector3([
+            dot::<T, F>(a, z, side[0]),
+            dot::<T, F>(b, z, side[1]),
+            dot::<T, F>(c, z, side[2]),
+        ]);
+        set(&mut row.turned, k, turned);
         let inertial = links.inertia_times::<F>(mass, k, axis, [Vector::ZERO; 2]);
         row.inertial.put(k, inertial);
     }
@@ -413,7 +432,7 @@ fn row_of<F: MulAdd>(mass: f64, joint: &DerivativeBlock, row: &mut RowBlock) {
 
 /// Computes what the derivatives of the other torques by the motion of joint i need.
 #[inline(always)]
-fn column_of<F: MulAdd>(mass: f64, joint: &DerivativeBlock, row: &mut RowBlock) {
+fn column_of<T: Element, F: MulAdd<T>>(mass: T, joint: &DerivativeBlock<T>, row: &mut RowBlock<T>) {
     let links = &joint.links;
     for k in 0..LANES {
         let [z, arm] = joint.axis.at(k);
@@ -423,8 +442,8 @@ fn column_of<F: MulAdd>(mass: f64, joint: &DerivativeBlock, row: &mut RowBlock) 
         row.by_velocity.put(k, by_velocity);
         let [moment, force] = links.coriolis_times::<F>(k, rate[0]);
         let (carried, turning) = (get(&links.force, k), get(&links.moment, k));
-        let moment = cross_add::<F>(arm, carried, cross_add::<F>(z, turning, moment));
-        let force = cross_add::<F>(z, carried, force);
+        let moment = cross_add::<T, F>(arm, carried, cross_add::<T, F>(z, turning, moment));
+        let force = cross_add::<T, F>(z, carried, force);
         let second = joint.second_rate.at(k);
         let by_position = links.inertia_times::<F>(mass, k, second, [moment, force]);
         row.by_position.put(k, by_position);
@@ -433,55 +452,56 @@ fn column_of<F: MulAdd>(mass: f64, joint: &DerivativeBlock, row: &mut RowBlock) 
 
 /// Computes ∂τ_i/∂q_j, ∂τ_i/∂q̇_j and the entry (i, j) of the inertia matrix.
 #[inline(always)]
-fn along_row<F: MulAdd>(
-    row: &RowBlock,
-    other: &DerivativeBlock,
-    by_position: &mut [f64; LANES],
-    by_velocity: &mut [f64; LANES],
-    inertia: &mut [f64; LANES],
+fn along_row<T: Element, F: MulAdd<T>>(
+    row: &RowBlock<T>,
+    other: &DerivativeBlock<T>,
+    by_position: &mut [T; LANES],
+    by_velocity: &mut [T; LANES],
+    inertia: &mut [T; LANES],
 ) {
     for k in 0..LANES {
         let turned = get(&row.turned, k);
         let inertial = row.inertial.at(k);
-        let [axis, rate, second] = [&other.axis, &other.rate, &other.second_rate].map(|m| m.at(k));
+        let (axis, rate) = (other.axis.at(k), other.rate.at(k));
+        let second = other.second_rate.at(k);
         let doubled = turned + turned;
-        by_position[k] = power::<F>(inertial, second, dot::<F>(turned, rate[0], 0.0));
-        by_velocity[k] = power::<F>(inertial, rate, dot::<F>(doubled, axis[0], 0.0));
-        inertia[k] = power::<F>(inertial, axis, 0.0);
+        by_position[k] = power::<T, F>(inertial, second, dot::<T, F>(turned, rate[0], T::ZERO));
+        by_velocity[k] = power::<T, F>(inertial, rate, dot::<T, F>(doubled, axis[0], T::ZERO));
+        inertia[k] = power::<T, F>(inertial, axis, T::ZERO);
     }
 }
 
 /// Computes ∂τ_j/∂q_i and ∂τ_j/∂q̇_i.
 #[inline(always)]
-fn along_column<F: MulAdd>(
-    row: &RowBlock,
-    other: &DerivativeBlock,
-    by_position: &mut [f64; LANES],
-    by_velocity: &mut [f64; LANES],
+fn along_column<T: Element, F: MulAdd<T>>(
+    row: &RowBlock<T>,
+    other: &DerivativeBlock<T>,
+    by_position: &mut [T; LANES],
+    by_velocity: &mut [T; LANES],
 ) {
     for k in 0..LANES {
         let axis = other.axis.at(k);
-        by_position[k] = power::<F>(row.by_position.at(k), axis, 0.0);
-        by_velocity[k] = power::<F>(row.by_velocity.at(k), axis, 0.0);
+        by_position[k] = power::<T, F>(row.by_position.at(k), axis, T::ZERO);
+        by_velocity[k] = power::<T, F>(row.by_velocity.at(k), axis, T::ZERO);
     }
 }
 
 /// a·b + c
 #[inline(always)]
-fn dot<F: MulAdd>(a: Vector, b: Vector, c: f64) -> f64 {
+fn dot<T: Element, F: MulAdd<T>>(a: Vector<T>, b: Vector<T>, c: T) -> T {
     let ([x, y, z], [p, q, r]) = (a.0, b.0);
     F::mul_add(x, p, F::mul_add(y, q, F::mul_add(z, r, c)))
 }
 
 /// Moment and force along a motion, plus `c`.
 #[inline(always)]
-fn power<F: MulAdd>(wrench: [Vector; 2], motion: [Vector; 2], c: f64) -> f64 {
-    dot::<F>(wrench[0], motion[0], dot::<F>(wrench[1], motion[1], c))
+fn power<T: Element, F: MulAdd<T>>(wrench: [Vector<T>; 2], motion: [Vector<T>; 2], c: T) -> T {
+    dot::<T, F>(wrench[0], motion[0], dot::<T, F>(wrench[1], motion[1], c))
 }
 
 /// a × b
 #[inline(always)]
-fn cross<F: MulAdd>(a: Vector, b: Vector) -> Vector {
+fn cross<T: Element, F: MulAdd<T>>(a: Vector<T>, b: Vector<T>) -> Vector<T> {
     let ([x, y, z], [p, q, r]) = (a.0, b.0);
     Vector3([
         F::mul_add(y, r, -(z * q)),
@@ -492,7 +512,7 @@ fn cross<F: MulAdd>(a: Vector, b: Vector) -> Vector {
 
 /// a × b + c
 #[inline(always)]
-fn cross_add<F: MulAdd>(a: Vector, b: Vector, c: Vector) -> Vector {
+fn cross_add<T: Element, F: MulAdd<T>>(a: Vector<T>, b: Vector<T>, c: Vector<T>) -> Vector<T> {
     let ([x, y, z], [p, q, r], [cx, cy, cz]) = (a.0, b.0, c.0);
     Vector3([
         F::mul_add(y, r, F::mul_add(-z, q, cx)),
@@ -503,16 +523,20 @@ fn cross_add<F: MulAdd>(a: Vector, b: Vector, c: Vector) -> Vector {
 
 /// a × b + c of motions (Featherstone 2008, eq. 2.31).
 #[inline(always)]
-fn cross_motion<F: MulAdd>(a: [Vector; 2], b: [Vector; 2], c: [Vector; 2]) -> [Vector; 2] {
+fn cross_motion<T: Element, F: MulAdd<T>>(
+    a: [Vector<T>; 2],
+    b: [Vector<T>; 2],
+    c: [Vector<T>; 2],
+) -> [Vector<T>; 2] {
     [
-        cross_add::<F>(a[0], b[0], c[0]),
-        cross_add::<F>(a[0], b[1], cross_add::<F>(a[1], b[0], c[1])),
+        cross_add::<T, F>(a[0], b[0], c[0]),
+        cross_add::<T, F>(a[0], b[1], cross_add::<T, F>(a[1], b[0], c[1])),
     ]
 }
 
 /// factor·a + c
 #[inline(always)]
-fn scaled_add<F: MulAdd>(factor: f64, a: Vector, c: Vector) -> Vector {
+fn scaled_add<T: Element, F: MulAdd<T>>(factor: T, a: Vector<T>, c: Vector<T>) -> Vector<T> {
     let ([x, y, z], [cx, cy, cz]) = (a.0, c.0);
     Vector3([
         F::mul_add(factor, x, cx),
@@ -521,10 +545,50 @@ fn scaled_add<F: MulAdd>(factor: f64, a: Vector, c: Vector) -> Vector {
     ])
 }
 
+/// factor·a + c of motions.
+#[inline(always)]
+fn scaled_motion<T: Element, F: MulAdd<T>>(
+    factor: T,
+    a: [Vector<T>; 2],
+    c: [Vector<T>; 2],
+) -> [Vector<T>; 2] {
+    [
+        scaled_add::<T, F>(factor, a[0], c[0]),
+        scaled_add::<T, F>(factor, a[1], c[1]),
+    ]
+}
+
+/// Returns three vectors of one sample.
+#[inline(always)]
+fn three<T: Element>(vectors: &[Lane3<T>; 3], k: usize) -> [Vector<T>; 3] {
+    let [a, b, c] = vectors;
+    [get(a, k), get(b, k), get(c, k)]
+}
+
+/// The product of a matrix, given by its rows, and a vector.
+#[inline(always)]
+fn times<T: Element, F: MulAdd<T>>(rows: [Vector<T>; 3], v: Vector<T>) -> Vector<T> {
+    let [x, y, z] = rows;
+    Vector3([
+        dot::<T, F>(x, v, T::ZERO),
+        dot::<T, F>(y, v, T::ZERO),
+        dot::<T, F>(z, v, T::ZERO),
+    ])
+}
+
 /// J·w + c with J = tr(Σ)·1 − Σ, from the rows of Σ.
 #[inline(always)]
-fn inertia_times<F: MulAdd>(second: [Vector; 3], w: Vector, c: Vector) -> Vector {
+fn inertia_times<T: Element, F: MulAdd<T>>(
+    second: [Vector<T>; 3],
+    w: Vector<T>,
+    c: Vector<T>,
+) -> Vector<T> {
     let trace = second[0].0[0] + second[1].0[1] + second[2].0[2];
-    let start = scaled_add::<F>(trace, w, c).0;
-    Vector3(core::array::from_fn(|r| dot::<F>(-second[r], w, start[r])))
+    let start = scaled_add::<T, F>(trace, w, c).0;
+    let [x, y, z] = second;
+    Vector3([
+        dot::<T, F>(-x, w, start[0]),
+        dot::<T, F>(-y, w, start[1]),
+        dot::<T, F>(-z, w, start[2]),
+    ])
 }

@@ -4,8 +4,8 @@ use super::body::Body;
 use super::frame::Frame;
 use super::inertia::{CompositeBlock, composite_bodies, lower};
 use super::inverse::{JointBlock, inverse_dynamics};
-use super::lane::{LANES, Lane, ZERO};
-use crate::lanes::MulAdd;
+use super::lane::{LANES, Lane};
+use crate::lanes::{Element, MulAdd};
 
 /// First sample of a block with a pivot of the inertia matrix that is not positive, and the joint of that pivot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,52 +22,55 @@ pub struct NotPositive {
 /// `frames`, `bodies`, `work` and the signals have one entry per joint, `matrix` has n(n + 1)/2. Returns the first lane
 /// whose matrix is not positive definite (or holds a NaN); the accelerations of such lanes are invalid.
 #[inline(always)]
-pub fn forward_dynamics<F: MulAdd>(
-    frames: &[Frame],
-    gravity: [f64; 3],
-    bodies: &[Body],
-    q: &[Lane],
-    qd: &[Lane],
-    tau: &[Lane],
-    work: &mut [JointBlock],
-    composite: &mut CompositeBlock,
-    matrix: &mut [Lane],
-    qdd: &mut [Lane],
+pub fn forward_dynamics<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    gravity: [T; 3],
+    bodies: &[Body<T>],
+    q: &[Lane<T>],
+    qd: &[Lane<T>],
+    tau: &[Lane<T>],
+    work: &mut [JointBlock<T>],
+    composite: &mut CompositeBlock<T>,
+    matrix: &mut [Lane<T>],
+    qdd: &mut [Lane<T>],
 ) -> Result<(), NotPositive> {
     let n = frames.len();
-    inverse_dynamics::<F>(frames, gravity, bodies, q, qd, None, work, qdd);
-    composite_bodies::<F>(frames, bodies, q, work, composite, matrix);
+    inverse_dynamics::<T, F>(frames, gravity, bodies, q, qd, None, work, qdd);
+    composite_bodies::<T, F>(frames, bodies, q, work, composite, matrix);
     for (x, tau) in qdd.iter_mut().zip(tau) {
         for k in 0..LANES {
             x[k] = tau[k] - x[k];
         }
     }
-    let mut failed = [u64::MAX; LANES];
+    // The joint as a number of the same size as the lanes.
+    let none = -T::ONE;
+    let mut failed = [none; LANES];
     for j in 0..n {
-        let mut inverse = ZERO;
+        let mut inverse = Lane::ZERO;
+        let number = T::from_u32(j as u32);
         let pivot = &mut matrix[lower(j, j)];
         for k in 0..LANES {
             // NaN fails this comparison too.
-            let bad = !(pivot[k] > 0.0) & (failed[k] == u64::MAX);
-            failed[k] = if bad { j as u64 } else { failed[k] };
-            inverse[k] = 1.0 / pivot[k];
+            let bad = !(pivot[k] > T::ZERO) & (failed[k] == none);
+            failed[k] = if bad { number } else { failed[k] };
+            inverse[k] = T::ONE / pivot[k];
         }
         *pivot = inverse;
         for i in j + 1..n {
             let column = matrix[lower(i, j)];
-            let mut factor = ZERO;
+            let mut factor = Lane::ZERO;
             for k in 0..LANES {
                 factor[k] = column[k] * inverse[k];
             }
             // Rows up to i still hold the column without the division; below them it is no longer needed.
             for r in j + 1..i {
                 let above = matrix[lower(r, j)];
-                subtract::<F>(&mut matrix[lower(i, r)], &column, &above);
+                subtract::<T, F>(&mut matrix[lower(i, r)], &column, &above);
             }
-            subtract::<F>(&mut matrix[lower(i, i)], &column, &factor);
+            subtract::<T, F>(&mut matrix[lower(i, i)], &column, &factor);
             matrix[lower(i, j)] = factor;
             let (before, after) = qdd.split_at_mut(i);
-            subtract::<F>(&mut after[0], &before[j], &factor);
+            subtract::<T, F>(&mut after[0], &before[j], &factor);
         }
     }
     for j in (0..n).rev() {
@@ -77,21 +80,21 @@ pub fn forward_dynamics<F: MulAdd>(
             x[k] *= matrix[lower(j, j)][k];
         }
         for (i, later) in (j + 1..n).zip(after) {
-            subtract::<F>(x, later, &matrix[lower(i, j)]);
+            subtract::<T, F>(x, later, &matrix[lower(i, j)]);
         }
     }
-    match failed.iter().position(|joint| *joint != u64::MAX) {
+    match failed.iter().position(|joint| *joint != none) {
         None => Ok(()),
         Some(lane) => Err(NotPositive {
             lane,
-            joint: failed[lane] as usize,
+            joint: failed[lane].to_f64() as usize,
         }),
     }
 }
 
 /// x −= a·b
 #[inline(always)]
-pub(super) fn subtract<F: MulAdd>(x: &mut Lane, a: &Lane, b: &Lane) {
+pub(super) fn subtract<T: Element, F: MulAdd<T>>(x: &mut Lane<T>, a: &Lane<T>, b: &Lane<T>) {
     for k in 0..LANES {
         x[k] = F::mul_add(-a[k], b[k], x[k]);
     }

@@ -11,7 +11,7 @@ use super::frame::Frame;
 use super::inertia::{CompositeBlock, lower};
 use super::inverse::JointBlock;
 use super::lane::{LANES, Lane};
-use crate::lanes::MulAdd;
+use crate::lanes::{Element, MulAdd};
 
 /// Returns the number of buffers that the derivatives of the forward dynamics of `n` joints need.
 #[must_use]
@@ -25,18 +25,18 @@ pub const fn derivative_buffers(n: usize) -> usize {
 /// [`derivative_buffers`]. Column i·n + j of `by_position` and `by_velocity` is ∂q̈_i/∂q_j and ∂q̈_i/∂q̇_j; `by_torque` has the lower triangle of the
 /// inverse of the inertia matrix. Errors as [`forward_dynamics`].
 #[inline(always)]
-pub fn forward_dynamics_derivatives<F: MulAdd>(
-    frames: &[Frame],
-    gravity: [f64; 3],
-    bodies: &[Body],
-    [q, qd, tau]: [&[Lane]; 3],
-    joints: &mut [JointBlock],
-    composite: &mut CompositeBlock,
-    work: &mut [DerivativeBlock],
-    buffer: &mut [Lane],
-    by_position: &mut Section,
-    by_velocity: &mut Section,
-    by_torque: &mut Section,
+pub fn forward_dynamics_derivatives<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    gravity: [T; 3],
+    bodies: &[Body<T>],
+    [q, qd, tau]: [&[Lane<T>]; 3],
+    joints: &mut [JointBlock<T>],
+    composite: &mut CompositeBlock<T>,
+    work: &mut [DerivativeBlock<T>],
+    buffer: &mut [Lane<T>],
+    by_position: &mut Section<T>,
+    by_velocity: &mut Section<T>,
+    by_torque: &mut Section<T>,
 ) -> Result<(), NotPositive> {
     let n = frames.len();
     let (qdd, rest) = buffer.split_at_mut(n);
@@ -44,10 +44,10 @@ pub fn forward_dynamics_derivatives<F: MulAdd>(
     let (inertia, rest) = rest.split_at_mut(lower(n, 0));
     let (by_q, by_qd) = rest.split_at_mut(n * n);
     let by_qd = &mut by_qd[..n * n];
-    forward_dynamics::<F>(
+    forward_dynamics::<T, F>(
         frames, gravity, bodies, q, qd, tau, joints, composite, factor, qdd,
     )?;
-    derivatives::<F>(
+    derivatives::<T, F>(
         frames,
         gravity,
         bodies,
@@ -57,29 +57,37 @@ pub fn forward_dynamics_derivatives<F: MulAdd>(
         by_qd,
         inertia,
     );
-    invert::<F>(n, factor, inertia);
+    invert::<T, F>(n, factor, inertia);
     for (c, entry) in inertia.iter().enumerate() {
         *by_torque.lane(c) = entry.0;
     }
-    multiply_negative::<F>(n, inertia, by_q, by_position);
-    multiply_negative::<F>(n, inertia, by_qd, by_velocity);
+    // As many samples at once as keep their sums in registers.
+    if size_of::<T>() == size_of::<f64>() {
+        multiply_negative::<T, F, 8>(n, inertia, by_q, by_position);
+        multiply_negative::<T, F, 8>(n, inertia, by_qd, by_velocity);
+    } else {
+        multiply_negative::<T, F, 16>(n, inertia, by_q, by_position);
+        multiply_negative::<T, F, 16>(n, inertia, by_qd, by_velocity);
+    }
     Ok(())
 }
 
-/// Samples that a product takes at once: their sums stay in registers.
-const WIDTH: usize = 8;
-
-/// Writes −A⁻¹·X, row by row, from the lower triangle of A⁻¹ and the n×n matrix X.
+/// Writes −A⁻¹·X, row by row, from the lower triangle of A⁻¹ and the n×n matrix X, `WIDTH` samples at once.
 #[inline(always)]
-fn multiply_negative<F: MulAdd>(n: usize, inverse: &[Lane], x: &[Lane], out: &mut Section) {
+fn multiply_negative<T: Element, F: MulAdd<T>, const WIDTH: usize>(
+    n: usize,
+    inverse: &[Lane<T>],
+    x: &[Lane<T>],
+    out: &mut Section<T>,
+) {
     for i in 0..n {
         let mut c = 0;
         while c < n {
             c += match n - c {
-                1 => products::<F, 1>(n, i, c, inverse, x, out),
-                2 => products::<F, 2>(n, i, c, inverse, x, out),
-                3 => products::<F, 3>(n, i, c, inverse, x, out),
-                _ => products::<F, 4>(n, i, c, inverse, x, out),
+                1 => products::<T, F, WIDTH, 1>(n, i, c, inverse, x, out),
+                2 => products::<T, F, WIDTH, 2>(n, i, c, inverse, x, out),
+                3 => products::<T, F, WIDTH, 3>(n, i, c, inverse, x, out),
+                _ => products::<T, F, WIDTH, 4>(n, i, c, inverse, x, out),
             };
         }
     }
@@ -87,17 +95,17 @@ fn multiply_negative<F: MulAdd>(n: usize, inverse: &[Lane], x: &[Lane], out: &mu
 
 /// Writes the entries (i, first) to (i, first + N − 1); returns N.
 #[inline(always)]
-fn products<F: MulAdd, const N: usize>(
+fn products<T: Element, F: MulAdd<T>, const WIDTH: usize, const N: usize>(
     n: usize,
     i: usize,
     first: usize,
-    inverse: &[Lane],
-    x: &[Lane],
-    out: &mut Section,
+    inverse: &[Lane<T>],
+    x: &[Lane<T>],
+    out: &mut Section<T>,
 ) -> usize {
     let mut entries = out.lanes::<N>(i * n + first);
     for at in (0..LANES).step_by(WIDTH) {
-        let mut sums = [[0.0; WIDTH]; N];
+        let mut sums = [[T::ZERO; WIDTH]; N];
         for j in 0..n {
             let factor = &inverse[lower(i.max(j), i.min(j))].as_chunks::<WIDTH>().0[at / WIDTH];
             let row = &x[j * n + first..j * n + first + N];
@@ -117,16 +125,16 @@ fn products<F: MulAdd, const N: usize>(
 
 /// Writes the lower triangle of A⁻¹, from the factor of A.
 #[inline(always)]
-fn invert<F: MulAdd>(n: usize, factor: &[Lane], out: &mut [Lane]) {
+fn invert<T: Element, F: MulAdd<T>>(n: usize, factor: &[Lane<T>], out: &mut [Lane<T>]) {
     // Column c: L·y = e_c from row c on, then Lᵀ·x = y/D back to row c.
     for c in 0..n {
-        out[lower(c, c)].fill(1.0);
+        out[lower(c, c)].fill(T::ONE);
         for i in c + 1..n {
             let (before, entry) = out.split_at_mut(lower(i, c));
             let entry = &mut entry[0];
-            entry.fill(0.0);
+            entry.fill(T::ZERO);
             for j in c..i {
-                subtract::<F>(entry, &before[lower(j, c)], &factor[lower(i, j)]);
+                subtract::<T, F>(entry, &before[lower(j, c)], &factor[lower(i, j)]);
             }
         }
         for j in (c..n).rev() {
@@ -137,7 +145,7 @@ fn invert<F: MulAdd>(n: usize, factor: &[Lane], out: &mut [Lane]) {
             }
             for i in j + 1..n {
                 let later = &after[lower(i, c) - lower(j, c) - 1];
-                subtract::<F>(entry, later, &factor[lower(i, j)]);
+                subtract::<T, F>(entry, later, &factor[lower(i, j)]);
             }
         }
     }

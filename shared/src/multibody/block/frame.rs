@@ -3,21 +3,21 @@
 use super::super::chain::{Chain, JointKind};
 use super::super::spatial::Vector3;
 use super::lane::{LANES, Lane};
-use crate::lanes::{self, MulAdd};
+use crate::lanes::{Element, MulAdd, sin_cos};
 use core::marker::PhantomData;
 
 /// A joint of the chain with the values that are the same for all samples.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub struct Frame<T> {
     pub(super) prismatic: bool,
     pub(super) twist: Twist,
-    pub(super) sin_alpha: f64,
-    pub(super) cos_alpha: f64,
-    pub(super) a: f64,
-    pub(super) theta: f64,
-    pub(super) d: f64,
-    pub(super) sin_theta: f64,
-    pub(super) cos_theta: f64,
+    pub(super) sin_alpha: T,
+    pub(super) cos_alpha: T,
+    pub(super) a: T,
+    pub(super) theta: T,
+    pub(super) d: T,
+    pub(super) sin_theta: T,
+    pub(super) cos_theta: T,
 }
 
 /// Kinds of twist α with loop bodies of their own.
@@ -33,7 +33,7 @@ pub(super) enum Twist {
     General,
 }
 
-impl Frame {
+impl<T: Element> Frame<T> {
     /// Returns the joints of a chain, base first.
     pub fn of(chain: &Chain<f64>) -> impl Iterator<Item = Self> {
         chain.joints.iter().map(|joint| Self {
@@ -44,36 +44,32 @@ impl Frame {
                 (-1.0, 0.0) => Twist::MinusQuarter,
                 _ => Twist::General,
             },
-            sin_alpha: joint.sin_alpha,
-            cos_alpha: joint.cos_alpha,
-            a: joint.a,
-            theta: joint.theta,
-            d: joint.d,
-            sin_theta: joint.sin_theta,
-            cos_theta: joint.cos_theta,
+            sin_alpha: T::from_f64(joint.sin_alpha),
+            cos_alpha: T::from_f64(joint.cos_alpha),
+            a: T::from_f64(joint.a),
+            theta: T::from_f64(joint.theta),
+            d: T::from_f64(joint.d),
+            sin_theta: T::from_f64(joint.sin_theta),
+            cos_theta: T::from_f64(joint.cos_theta),
         })
     }
 
     /// Computes sine and cosine of the angle about z.
     #[inline(always)]
-    pub(super) fn angle<F: MulAdd>(&self, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
+    pub(super) fn angle<F: MulAdd<T>>(&self, q: &Lane<T>, sin: &mut Lane<T>, cos: &mut Lane<T>) {
         if self.prismatic {
             sin.fill(self.sin_theta);
             cos.fill(self.cos_theta);
             return;
         }
         // An integer, because a maximum of floats is no vector operation if NaN may occur.
-        let mut out_of_range = 0;
+        let mut out_of_range = T::Bits::default();
         for k in 0..LANES {
             let angle = self.theta + q[k];
-            out_of_range |= if angle.abs() > lanes::ANGLE_LIMIT {
-                !0_u64
-            } else {
-                0
-            };
-            (sin[k], cos[k]) = lanes::sin_cos::<F>(angle);
+            out_of_range = out_of_range | T::mask(angle.abs() > T::ANGLE_LIMIT);
+            (sin[k], cos[k]) = sin_cos::<T, F>(angle);
         }
-        if out_of_range != 0 {
+        if out_of_range != T::Bits::default() {
             large_angles(self.theta, q, sin, cos);
         }
     }
@@ -82,9 +78,10 @@ impl Frame {
 /// The same for large angles.
 #[cold]
 #[inline(never)]
-fn large_angles(theta: f64, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
+fn large_angles<T: Element>(theta: T, q: &Lane<T>, sin: &mut Lane<T>, cos: &mut Lane<T>) {
     for k in 0..LANES {
-        (sin[k], cos[k]) = libm::sincos(theta + q[k]);
+        let (s, c) = libm::sincos((theta + q[k]).to_f64());
+        (sin[k], cos[k]) = (T::from_f64(s), T::from_f64(c));
     }
 }
 
@@ -93,12 +90,12 @@ fn large_angles(theta: f64, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
 /// Between frames i − 1 and i lies the frame that is turned by α only. In it the origin of frame i has the coordinates
 /// (a, 0, d) for any twist, so offsets are applied there.
 #[derive(Clone, Copy)]
-pub(super) struct LinkTransform<F, const TWIST: u8, const A: bool, const D: bool> {
+pub(super) struct LinkTransform<T, F, const TWIST: u8, const A: bool, const D: bool> {
     arithmetic: PhantomData<F>,
-    pub(super) sin_alpha: f64,
-    pub(super) cos_alpha: f64,
-    pub(super) a: f64,
-    pub(super) d: f64,
+    pub(super) sin_alpha: T,
+    pub(super) cos_alpha: T,
+    pub(super) a: T,
+    pub(super) d: T,
 }
 
 pub(super) const NONE: u8 = 0;
@@ -106,9 +103,11 @@ pub(super) const QUARTER: u8 = 1;
 pub(super) const MINUS_QUARTER: u8 = 2;
 pub(super) const GENERAL: u8 = 3;
 
-impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, TWIST, A, D> {
+impl<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>
+    LinkTransform<T, F, TWIST, A, D>
+{
     #[inline(always)]
-    pub(super) fn new(frame: &Frame) -> Self {
+    pub(super) fn new(frame: &Frame<T>) -> Self {
         Self {
             arithmetic: PhantomData,
             sin_alpha: frame.sin_alpha,
@@ -120,7 +119,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, 
 
     /// Transforms a direction from frame i − 1 to the turned frame.
     #[inline(always)]
-    pub(super) fn rotate(&self, v: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn rotate(&self, v: Vector3<T>) -> Vector3<T> {
         let [x, y, z] = v.0;
         let (s, c) = (self.sin_alpha, self.cos_alpha);
         match TWIST {
@@ -133,7 +132,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, 
 
     /// Transforms a direction from the turned frame to frame i − 1.
     #[inline(always)]
-    pub(super) fn rotate_back(&self, v: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn rotate_back(&self, v: Vector3<T>) -> Vector3<T> {
         let [x, y, z] = v.0;
         let (s, c) = (self.sin_alpha, self.cos_alpha);
         match TWIST {
@@ -149,10 +148,10 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, 
     #[inline(always)]
     pub(super) fn shift_acceleration(
         &self,
-        v: Vector3<f64>,
-        w: Vector3<f64>,
-        e: Vector3<f64>,
-    ) -> Vector3<f64> {
+        v: Vector3<T>,
+        w: Vector3<T>,
+        e: Vector3<T>,
+    ) -> Vector3<T> {
         let ([mut x, mut y, mut z], [wx, wy, wz], [ex, ey, ez]) = (v.0, w.0, e.0);
         if A {
             x = F::mul_add(-self.a, F::mul_add(wy, wy, wz * wz), x);
@@ -169,7 +168,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, 
 
     /// Returns `v` plus the velocity of the origin of frame i against frame i − 1's at angular velocity `w`: w × p.
     #[inline(always)]
-    pub(super) fn shift_velocity(&self, v: Vector3<f64>, w: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn shift_velocity(&self, v: Vector3<T>, w: Vector3<T>) -> Vector3<T> {
         let ([mut x, mut y, mut z], [wx, wy, wz]) = (v.0, w.0);
         if A {
             y = F::mul_add(self.a, wz, y);
@@ -186,19 +185,19 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, 
     #[inline(always)]
     pub(super) fn wrench_back(
         &self,
-        s: f64,
-        c: f64,
-        force: Vector3<f64>,
-        moment: Vector3<f64>,
-    ) -> (Vector3<f64>, Vector3<f64>) {
-        let f = rotate_z_back::<F>(s, c, force);
-        let m = self.shift_moment(rotate_z_back::<F>(s, c, moment), f);
+        s: T,
+        c: T,
+        force: Vector3<T>,
+        moment: Vector3<T>,
+    ) -> (Vector3<T>, Vector3<T>) {
+        let f = rotate_z_back::<T, F>(s, c, force);
+        let m = self.shift_moment(rotate_z_back::<T, F>(s, c, moment), f);
         (self.rotate_back(f), self.rotate_back(m))
     }
 
     /// Returns `m` plus p × f with p = (a, 0, d).
     #[inline(always)]
-    pub(super) fn shift_moment(&self, m: Vector3<f64>, f: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn shift_moment(&self, m: Vector3<T>, f: Vector3<T>) -> Vector3<T> {
         let ([mut x, mut y, mut z], [fx, fy, fz]) = (m.0, f.0);
         if A {
             y = F::mul_add(-self.a, fz, y);
@@ -214,10 +213,10 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> LinkTransform<F, 
 
 /// Returns the constant part of a prismatic joint's pose at position `q`.
 #[inline(always)]
-pub(super) fn prismatic_transform<F: MulAdd>(
-    frame: &Frame,
-    q: f64,
-) -> LinkTransform<F, GENERAL, true, true> {
+pub(super) fn prismatic_transform<T: Element, F: MulAdd<T>>(
+    frame: &Frame<T>,
+    q: T,
+) -> LinkTransform<T, F, GENERAL, true, true> {
     LinkTransform {
         d: frame.d + q,
         ..LinkTransform::new(frame)
@@ -226,14 +225,14 @@ pub(super) fn prismatic_transform<F: MulAdd>(
 
 /// Transforms a direction by the turn about z, forwards.
 #[inline(always)]
-pub(super) fn rotate_z<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+pub(super) fn rotate_z<T: Element, F: MulAdd<T>>(s: T, c: T, v: Vector3<T>) -> Vector3<T> {
     let [x, y, z] = v.0;
     Vector3([F::mul_add(c, x, s * y), F::mul_add(c, y, -(s * x)), z])
 }
 
 /// Transforms a direction by the turn about z, backwards.
 #[inline(always)]
-pub(super) fn rotate_z_back<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+pub(super) fn rotate_z_back<T: Element, F: MulAdd<T>>(s: T, c: T, v: Vector3<T>) -> Vector3<T> {
     let [x, y, z] = v.0;
     Vector3([F::mul_add(c, x, -(s * y)), F::mul_add(c, y, s * x), z])
 }
@@ -242,14 +241,14 @@ pub(super) fn rotate_z_back<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vecto
 /// copy for each kind of revolute joint (twist and zeros known to the compiler), and one for prismatic joints at
 /// position `q`.
 macro_rules! at_each_lane {
-    ($arithmetic:ty, $frame:expr, $q:expr, $transform:ident => $body:expr) => {{
-        let frame: &$crate::multibody::block::Frame = $frame;
+    ($number:ty, $arithmetic:ty, $frame:expr, $q:expr, $transform:ident => $body:expr) => {{
+        let frame: &$crate::multibody::block::Frame<_> = $frame;
         if frame.prismatic {
-            let q: &$crate::multibody::block::Lane = $q;
-            let $transform = |k: usize| $crate::multibody::block::frame::prismatic_transform::<$arithmetic>(frame, q[k]);
+            let q: &$crate::multibody::block::Lane<_> = $q;
+            let $transform = |k: usize| $crate::multibody::block::frame::prismatic_transform::<$number, $arithmetic>(frame, q[k]);
             $body
         } else {
-            $crate::multibody::block::frame::with_link_transform!($arithmetic, frame, transform => {
+            $crate::multibody::block::frame::with_link_transform!($number, $arithmetic, frame, transform => {
                 let $transform = |_: usize| transform;
                 $body
             })
@@ -261,18 +260,18 @@ pub(super) use at_each_lane;
 /// Runs an expression with the [`LinkTransform`] of a revolute joint; the compiler knows its kind of twist and its
 /// zeros.
 macro_rules! with_link_transform {
-    ($arithmetic:ty, $frame:expr, $transform:ident => $body:expr) => {{
+    ($number:ty, $arithmetic:ty, $frame:expr, $transform:ident => $body:expr) => {{
         use $crate::multibody::block::frame::{
             GENERAL, LinkTransform, MINUS_QUARTER, NONE, QUARTER, Twist,
         };
-        let frame: &$crate::multibody::block::Frame = $frame;
+        let frame: &$crate::multibody::block::Frame<_> = $frame;
         macro_rules! run {
             ($twist:ident, $a:literal, $d:literal) => {{
-                let $transform = LinkTransform::<$arithmetic, $twist, $a, $d>::new(frame);
+                let $transform = LinkTransform::<$number, $arithmetic, $twist, $a, $d>::new(frame);
                 $body
             }};
         }
-        match (frame.twist, frame.a != 0.0, frame.d != 0.0) {
+        match (frame.twist, frame.a != T::ZERO, frame.d != T::ZERO) {
             (Twist::None, false, false) => run!(NONE, false, false),
             (Twist::None, false, true) => run!(NONE, false, true),
             (Twist::None, true, false) => run!(NONE, true, false),

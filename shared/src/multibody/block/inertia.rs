@@ -7,26 +7,26 @@ use super::frame::{
     Frame, LinkTransform, MINUS_QUARTER, NONE, QUARTER, at_each_lane, rotate_z_back,
 };
 use super::inverse::JointBlock;
-use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
-use crate::lanes::MulAdd;
+use super::lane::{LANES, Lane, Lane3, get, set};
+use crate::lanes::{Element, MulAdd};
 
 /// Buffer for the links from a joint outwards, as one body in its frame, and for its wrench at unit acceleration.
 #[derive(Clone, Copy, Debug)]
-pub struct CompositeBlock {
-    first_moment: Lane3,
+pub struct CompositeBlock<T> {
+    first_moment: Lane3<T>,
     /// xx xy xz yy yz zz
-    inertia: [Lane; 6],
-    force: Lane3,
-    moment: Lane3,
+    inertia: [Lane<T>; 6],
+    force: Lane3<T>,
+    moment: Lane3<T>,
 }
 
-impl CompositeBlock {
+impl<T: Element> CompositeBlock<T> {
     /// All zero.
     pub const ZERO: Self = Self {
-        first_moment: ZERO3,
-        inertia: [ZERO; 6],
-        force: ZERO3,
-        moment: ZERO3,
+        first_moment: [Lane::ZERO; 3],
+        inertia: [Lane::ZERO; 6],
+        force: [Lane::ZERO; 3],
+        moment: [Lane::ZERO; 3],
     };
 }
 
@@ -42,30 +42,30 @@ pub const fn lower(i: usize, j: usize) -> usize {
 /// `frames`, `bodies`, `q` and `work` have one entry per joint, `out` has n(n + 1)/2 columns, each written once. The
 /// initial content of `composite` does not matter.
 #[inline(always)]
-pub fn inertia_matrix<F: MulAdd>(
-    frames: &[Frame],
-    bodies: &[Body],
-    q: &[Lane],
-    work: &mut [JointBlock],
-    composite: &mut CompositeBlock,
-    out: &mut Section,
+pub fn inertia_matrix<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    bodies: &[Body<T>],
+    q: &[Lane<T>],
+    work: &mut [JointBlock<T>],
+    composite: &mut CompositeBlock<T>,
+    out: &mut Section<T>,
 ) {
     // The position of the first joint does not matter.
     for ((frame, q), joint) in frames.iter().zip(q).zip(&mut *work).skip(1) {
         frame.angle::<F>(q, &mut joint.sin, &mut joint.cos);
     }
-    composite_bodies::<F>(frames, bodies, q, work, composite, out);
+    composite_bodies::<T, F>(frames, bodies, q, work, composite, out);
 }
 
 /// The same with sines and cosines already in `work`.
 #[inline(always)]
-pub(super) fn composite_bodies<F: MulAdd>(
-    frames: &[Frame],
-    bodies: &[Body],
-    q: &[Lane],
-    work: &[JointBlock],
-    composite: &mut CompositeBlock,
-    out: &mut (impl Columns + ?Sized),
+pub(super) fn composite_bodies<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    bodies: &[Body<T>],
+    q: &[Lane<T>],
+    work: &[JointBlock<T>],
+    composite: &mut CompositeBlock<T>,
+    out: &mut (impl Columns<T> + ?Sized),
 ) {
     let (Some(tip), Some(last)) = (bodies.last(), frames.last()) else {
         return;
@@ -83,24 +83,24 @@ pub(super) fn composite_bodies<F: MulAdd>(
         let [diagonal, entry] = out.two(lower(i - 1, i - 1), lower(i, i - 1));
         let own = &bodies[i - 1];
         if i == 1 {
-            at_each_lane!(F, frame, &q[i], link => inwards::<_, _, _, _, false, true>(
+            at_each_lane!(T, F, frame, &q[i], link => inwards::<_, _, _, _, _, false, true>(
                 link, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         } else if i == n - 1 {
-            at_each_lane!(F, frame, &q[i], link => inwards::<_, _, _, _, true, false>(
+            at_each_lane!(T, F, frame, &q[i], link => inwards::<_, _, _, _, _, true, false>(
                 link, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         } else {
-            at_each_lane!(F, frame, &q[i], link => inwards::<_, _, _, _, false, false>(
+            at_each_lane!(T, F, frame, &q[i], link => inwards::<_, _, _, _, _, false, false>(
                 link, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         }
         for j in (0..i - 1).rev() {
             let (joint, between, slides) = (&work[j + 1], &frames[j + 1], frames[j].prismatic);
             let entry = out.lane(lower(i, j));
             if j == 0 {
-                at_each_lane!(F, between, &q[j + 1], link =>
-                    onwards::<_, _, _, _, true>(link, slides, joint, composite, entry));
+                at_each_lane!(T, F, between, &q[j + 1], link =>
+                    onwards::<_, _, _, _, _, true>(link, slides, joint, composite, entry));
             } else {
-                at_each_lane!(F, between, &q[j + 1], link =>
-                    onwards::<_, _, _, _, false>(link, slides, joint, composite, entry));
+                at_each_lane!(T, F, between, &q[j + 1], link =>
+                    onwards::<_, _, _, _, _, false>(link, slides, joint, composite, entry));
             }
         }
         mass += own.mass;
@@ -109,14 +109,14 @@ pub(super) fn composite_bodies<F: MulAdd>(
 
 /// Returns the inertia of a body, entry by entry.
 #[inline(always)]
-fn six(body: &Body) -> [f64; 6] {
+fn six<T: Element>(body: &Body<T>) -> [T; 6] {
     let i = body.inertia;
     [i.xx, i.xy, i.xz, i.yy, i.yz, i.zz]
 }
 
 /// Returns the inertia of a body and its drive at the body's own joint.
 #[inline(always)]
-fn own_diagonal(frame: &Frame, body: &Body) -> f64 {
+fn own_diagonal<T: Element>(frame: &Frame<T>, body: &Body<T>) -> T {
     let inertia = if frame.prismatic {
         body.mass
     } else {
@@ -133,23 +133,24 @@ fn own_diagonal(frame: &Frame, body: &Body) -> f64 {
 /// are needed. The turn about z is computed once for both.
 #[inline(always)]
 fn inwards<
-    F: MulAdd,
+    T: Element,
+    F: MulAdd<T>,
     const TWIST: u8,
     const A: bool,
     const D: bool,
     const TIP: bool,
     const LAST: bool,
 >(
-    link: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
+    link: impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
     prismatic: bool,
     slides: bool,
-    joint: &JointBlock,
-    mass: f64,
-    tip: &Body,
-    own: &Body,
-    composite: &mut CompositeBlock,
-    entry: &mut [f64; LANES],
-    diagonal: &mut [f64; LANES],
+    joint: &JointBlock<T>,
+    mass: T,
+    tip: &Body<T>,
+    own: &Body<T>,
+    composite: &mut CompositeBlock<T>,
+    entry: &mut [T; LANES],
+    diagonal: &mut [T; LANES],
 ) {
     let total = mass + own.mass + own.drive;
     let (first_moment, inertia) = (own.first_moment, six(own));
@@ -171,11 +172,16 @@ fn inwards<
                 [xx[k], xy[k], xz[k], yy[k], yz[k], zz[k]],
             )
         };
-        let moment_back = rotate_z_back::<F>(s, c, Vector3([hxk, hyk, hzk]));
-        let Vector3([ixz, iyz, izz]) = rotate_z_back::<F>(s, c, Vector3([xzk, yzk, zzk]));
+        let moment_back = rotate_z_back::<T, F>(s, c, Vector3([hxk, hyk, hzk]));
+        let Vector3([ixz, iyz, izz]) = rotate_z_back::<T, F>(s, c, Vector3([xzk, yzk, zzk]));
 
         let (f, m) = if prismatic {
-            link.wrench_back(s, c, Vector3([0.0, 0.0, mass]), Vector3([hyk, -hxk, 0.0]))
+            link.wrench_back(
+                s,
+                c,
+                Vector3([T::ZERO, T::ZERO, mass]),
+                Vector3([hyk, -hxk, T::ZERO]),
+            )
         } else {
             started_turn(&link, moment_back, [ixz, iyz, izz])
         };
@@ -185,7 +191,7 @@ fn inwards<
             set(moment, k, m);
         }
 
-        let [ixx, ixy, iyy] = turned::<F>(s, c, xxk, xyk, yyk);
+        let [ixx, ixy, iyy] = turned::<T, F>(s, c, xxk, xyk, yyk);
         let [ixx, ixy, ixz, iyy, iyz, izz] =
             moved_inertia(&link, mass, moment_back, [ixx, ixy, ixz, iyy, iyz, izz]);
         let about_z = izz + inertia[5];
@@ -215,11 +221,11 @@ fn inwards<
 /// Returns force and moment, in the frame before, that turn the composite body at unit acceleration about its joint,
 /// from its first `moment` and the entries xz, yz, zz of its `inertia`, both after the turn back about z.
 #[inline(always)]
-fn started_turn<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    link: &LinkTransform<F, TWIST, A, D>,
-    moment: Vector3<f64>,
-    inertia: [f64; 3],
-) -> (Vector3<f64>, Vector3<f64>) {
+fn started_turn<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    link: &LinkTransform<T, F, TWIST, A, D>,
+    moment: Vector3<T>,
+    inertia: [T; 3],
+) -> (Vector3<T>, Vector3<T>) {
     let Vector3([mx, my, _]) = moment;
     let [mut x, mut y, mut z] = inertia;
     if A {
@@ -230,7 +236,7 @@ fn started_turn<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         y = F::mul_add(-link.d, my, y);
     }
     (
-        link.rotate_back(Vector3([-my, mx, 0.0])),
+        link.rotate_back(Vector3([-my, mx, T::ZERO])),
         link.rotate_back(Vector3([x, y, z])),
     )
 }
@@ -238,27 +244,27 @@ fn started_turn<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 /// Returns the inertia of the composite body (xx, xy, xz, yy, yz, zz) about the origin of the frame before and along its
 /// axes. `mass`, first `moment` and inertia of the body are given after the turn back about z.
 #[inline(always)]
-fn moved_inertia<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    link: &LinkTransform<F, TWIST, A, D>,
-    mass: f64,
-    moment: Vector3<f64>,
-    inertia: [f64; 6],
-) -> [f64; 6] {
+fn moved_inertia<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    link: &LinkTransform<T, F, TWIST, A, D>,
+    mass: T,
+    moment: Vector3<T>,
+    inertia: [T; 6],
+) -> [T; 6] {
     let Vector3([mx, my, mz]) = moment;
     let [mut ixx, mut ixy, mut ixz, mut iyy, mut iyz, mut izz] = inertia;
     // Parallel axes with p = (a, 0, d): the mixed term of p with m·c + m·p/2.
-    let bx = F::mul_add(0.5 * mass, link.a, mx);
-    let bz = F::mul_add(0.5 * mass, link.d, mz);
+    let bx = F::mul_add(T::HALF * mass, link.a, mx);
+    let bz = F::mul_add(T::HALF * mass, link.d, mz);
     if A {
         ixy = F::mul_add(-link.a, my, ixy);
         ixz = F::mul_add(-link.a, bz, ixz);
-        iyy = F::mul_add(2.0 * link.a, bx, iyy);
-        izz = F::mul_add(2.0 * link.a, bx, izz);
+        iyy = F::mul_add(link.a + link.a, bx, iyy);
+        izz = F::mul_add(link.a + link.a, bx, izz);
     }
     if D {
-        ixx = F::mul_add(2.0 * link.d, bz, ixx);
+        ixx = F::mul_add(link.d + link.d, bz, ixx);
         ixz = F::mul_add(-link.d, bx, ixz);
-        iyy = F::mul_add(2.0 * link.d, bz, iyy);
+        iyy = F::mul_add(link.d + link.d, bz, iyy);
         iyz = F::mul_add(-link.d, my, iyz);
     }
     match TWIST {
@@ -267,7 +273,7 @@ fn moved_inertia<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         MINUS_QUARTER => [ixx, ixz, -ixy, izz, -iyz, iyy],
         _ => {
             let (s, c) = (link.sin_alpha, link.cos_alpha);
-            let [iyy, iyz, izz] = turned::<F>(s, c, iyy, iyz, izz);
+            let [iyy, iyz, izz] = turned::<T, F>(s, c, iyy, iyz, izz);
             [
                 ixx,
                 F::mul_add(c, ixy, -(s * ixz)),
@@ -282,7 +288,7 @@ fn moved_inertia<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 
 /// Returns the entries xx, xy, yy of a tensor after a turn back by an angle about z, given its sine and cosine.
 #[inline(always)]
-fn turned<F: MulAdd>(s: f64, c: f64, xx: f64, xy: f64, yy: f64) -> [f64; 3] {
+fn turned<T: Element, F: MulAdd<T>>(s: T, c: T, xx: T, xy: T, yy: T) -> [T; 3] {
     let u = F::mul_add(s, xx - yy, c * (xy + xy));
     [
         F::mul_add(-s, u, xx),
@@ -293,12 +299,19 @@ fn turned<F: MulAdd>(s: f64, c: f64, xx: f64, xy: f64, yy: f64) -> [f64; 3] {
 
 /// Transforms the wrench to the next frame inwards.
 #[inline(always)]
-fn onwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
-    link: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
+fn onwards<
+    T: Element,
+    F: MulAdd<T>,
+    const TWIST: u8,
+    const A: bool,
+    const D: bool,
+    const LAST: bool,
+>(
+    link: impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
     slides: bool,
-    joint: &JointBlock,
-    composite: &mut CompositeBlock,
-    entry: &mut [f64; LANES],
+    joint: &JointBlock<T>,
+    composite: &mut CompositeBlock<T>,
+    entry: &mut [T; LANES],
 ) {
     let CompositeBlock { force, moment, .. } = composite;
     for k in 0..LANES {

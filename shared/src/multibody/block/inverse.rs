@@ -5,35 +5,34 @@ use super::body::Body;
 use super::frame::{
     Frame, GENERAL, LinkTransform, at_each_lane, prismatic_transform, rotate_z, with_link_transform,
 };
-use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
-use crate::lanes::MulAdd;
-use crate::scalar::Real;
+use super::lane::{LANES, Lane, Lane3, get, set};
+use crate::lanes::{Element, MulAdd};
 
 /// Results of the outward pass at a joint for the inward pass.
 #[derive(Clone, Copy, Debug)]
-pub struct JointBlock {
-    pub(super) sin: Lane,
-    pub(super) cos: Lane,
+pub struct JointBlock<T> {
+    pub(super) sin: Lane<T>,
+    pub(super) cos: Lane<T>,
     /// Torques in of the inertial wrench of the link.
-    pub(super) force: Lane3,
-    pub(super) moment: Lane3,
+    pub(super) force: Lane3<T>,
+    pub(super) moment: Lane3<T>,
 }
 
-impl JointBlock {
+impl<T: Element> JointBlock<T> {
     /// All zero.
     pub const ZERO: Self = Self {
-        sin: ZERO,
-        cos: ZERO,
-        force: ZERO3,
-        moment: ZERO3,
+        sin: Lane::ZERO,
+        cos: Lane::ZERO,
+        force: [Lane::ZERO; 3],
+        moment: [Lane::ZERO; 3],
     };
 }
 
 /// Angular velocity and acceleration of a link, and the acceleration of its origin minus gravity, in its frame.
-struct MotionBlock {
-    angular_velocity: Lane3,
-    angular_acceleration: Lane3,
-    proper: Lane3,
+struct MotionBlock<T> {
+    angular_velocity: Lane3<T>,
+    angular_acceleration: Lane3<T>,
+    proper: Lane3<T>,
 }
 
 /// Computes the torques of the links and drives, friction and offsets: recursive Newton–Euler (Luh, Walker & Paul 1980)
@@ -41,28 +40,28 @@ struct MotionBlock {
 ///
 /// `frames`, `bodies`, `work` and the signals have one entry per joint; without `qdd` the accelerations are zero.
 #[inline(always)]
-pub fn inverse_dynamics<F: MulAdd>(
-    frames: &[Frame],
-    gravity: [f64; 3],
-    bodies: &[Body],
-    q: &[Lane],
-    qd: &[Lane],
-    qdd: Option<&[Lane]>,
-    work: &mut [JointBlock],
-    tau: &mut [Lane],
+pub fn inverse_dynamics<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    gravity: [T; 3],
+    bodies: &[Body<T>],
+    q: &[Lane<T>],
+    qd: &[Lane<T>],
+    qdd: Option<&[Lane<T>]>,
+    work: &mut [JointBlock<T>],
+    tau: &mut [Lane<T>],
 ) {
-    let still = ZERO;
+    let still = Lane::ZERO;
     let qdd = |i: usize| qdd.map_or(&still, |qdd| &qdd[i]);
     let mut motion = MotionBlock {
-        angular_velocity: ZERO3,
-        angular_acceleration: ZERO3,
+        angular_velocity: [Lane::ZERO; 3],
+        angular_acceleration: [Lane::ZERO; 3],
         proper: gravity.map(|g| Lane([-g; LANES])),
     };
     for (i, frame) in frames.iter().enumerate() {
         let joint = &mut work[i];
         frame.angle::<F>(&q[i], &mut joint.sin, &mut joint.cos);
         if i == 0 && !frame.prismatic {
-            first_revolute::<F>(
+            first_revolute::<T, F>(
                 frame,
                 gravity,
                 &bodies[i],
@@ -72,9 +71,17 @@ pub fn inverse_dynamics<F: MulAdd>(
                 joint,
             );
         } else if frame.prismatic {
-            outwards_prismatic::<F>(frame, &bodies[i], &q[i], &qd[i], qdd(i), &mut motion, joint);
+            outwards_prismatic::<T, F>(
+                frame,
+                &bodies[i],
+                &q[i],
+                &qd[i],
+                qdd(i),
+                &mut motion,
+                joint,
+            );
         } else {
-            with_link_transform!(F, frame, transform => outwards(transform, &bodies[i], &qd[i], qdd(i), &mut motion, joint));
+            with_link_transform!(T, F, frame, transform => outwards(transform, &bodies[i], &qd[i], qdd(i), &mut motion, joint));
         }
     }
     for (i, frame) in frames.iter().enumerate().rev() {
@@ -96,9 +103,9 @@ pub fn inverse_dynamics<F: MulAdd>(
         }
         if let Some(parent) = before.last_mut() {
             if i == 1 && !frames[0].prismatic {
-                at_each_lane!(F, frame, &q[i], transform => inwards_along_axis(transform, joint, parent));
+                at_each_lane!(T, F, frame, &q[i], transform => inwards_along_axis(transform, joint, parent));
             } else {
-                at_each_lane!(F, frame, &q[i], transform => inwards(transform, joint, parent));
+                at_each_lane!(T, F, frame, &q[i], transform => inwards(transform, joint, parent));
             }
         }
     }
@@ -106,13 +113,13 @@ pub fn inverse_dynamics<F: MulAdd>(
 
 /// Moves across a revolute joint to the next link outwards, and computes that link's inertial wrench.
 #[inline(always)]
-fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    transform: LinkTransform<F, TWIST, A, D>,
-    body: &Body,
-    qd: &Lane,
-    qdd: &Lane,
-    motion: &mut MotionBlock,
-    joint: &mut JointBlock,
+fn outwards<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    transform: LinkTransform<T, F, TWIST, A, D>,
+    body: &Body<T>,
+    qd: &Lane<T>,
+    qdd: &Lane<T>,
+    motion: &mut MotionBlock<T>,
+    joint: &mut JointBlock<T>,
 ) {
     let [mx, my, _] = body.first_moment;
     let i = body.inertia;
@@ -121,9 +128,9 @@ fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         let e = transform.rotate(get(&motion.angular_acceleration, k));
         let v = transform.shift_acceleration(transform.rotate(get(&motion.proper, k)), w, e);
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let [wx, wy, wz] = rotate_z::<F>(s, c, w).0;
-        let [ex, ey, ez] = rotate_z::<F>(s, c, e).0;
-        let v = rotate_z::<F>(s, c, v);
+        let [wx, wy, wz] = rotate_z::<T, F>(s, c, w).0;
+        let [ex, ey, ez] = rotate_z::<T, F>(s, c, e).0;
+        let v = rotate_z::<T, F>(s, c, v);
         let (ex, ey, ez) = (ex + wy * qd[k], ey - wx * qd[k], ez + qdd[k]);
         let wz = wz + qd[k];
         set(&mut motion.angular_velocity, k, Vector3([wx, wy, wz]));
@@ -156,24 +163,28 @@ fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 /// The same for a revolute first joint: the base does not move, and only the moment of the link's wrench along the
 /// joint is needed.
 #[inline(always)]
-fn first_revolute<F: MulAdd>(
-    frame: &Frame,
-    gravity: [f64; 3],
-    body: &Body,
-    qd: &Lane,
-    qdd: &Lane,
-    motion: &mut MotionBlock,
-    joint: &mut JointBlock,
+fn first_revolute<T: Element, F: MulAdd<T>>(
+    frame: &Frame<T>,
+    gravity: [T; 3],
+    body: &Body<T>,
+    qd: &Lane<T>,
+    qdd: &Lane<T>,
+    motion: &mut MotionBlock<T>,
+    joint: &mut JointBlock<T>,
 ) {
     let [mx, my, _] = body.first_moment;
-    let up = LinkTransform::<F, GENERAL, true, true>::new(frame).rotate(-Vector3(gravity));
+    let up = LinkTransform::<T, F, GENERAL, true, true>::new(frame).rotate(-Vector3(gravity));
     for k in 0..LANES {
-        let v = rotate_z::<F>(joint.sin[k], joint.cos[k], up);
-        set(&mut motion.angular_velocity, k, Vector3([0.0, 0.0, qd[k]]));
+        let v = rotate_z::<T, F>(joint.sin[k], joint.cos[k], up);
+        set(
+            &mut motion.angular_velocity,
+            k,
+            Vector3([T::ZERO, T::ZERO, qd[k]]),
+        );
         set(
             &mut motion.angular_acceleration,
             k,
-            Vector3([0.0, 0.0, qdd[k]]),
+            Vector3([T::ZERO, T::ZERO, qdd[k]]),
         );
         set(&mut motion.proper, k, v);
         let [vx, vy, _] = v.0;
@@ -183,25 +194,25 @@ fn first_revolute<F: MulAdd>(
 
 /// The same for a prismatic joint.
 #[inline(always)]
-fn outwards_prismatic<F: MulAdd>(
-    frame: &Frame,
-    body: &Body,
-    q: &Lane,
-    qd: &Lane,
-    qdd: &Lane,
-    motion: &mut MotionBlock,
-    joint: &mut JointBlock,
+fn outwards_prismatic<T: Element, F: MulAdd<T>>(
+    frame: &Frame<T>,
+    body: &Body<T>,
+    q: &Lane<T>,
+    qd: &Lane<T>,
+    qdd: &Lane<T>,
+    motion: &mut MotionBlock<T>,
+    joint: &mut JointBlock<T>,
 ) {
     let [mx, my, mz] = body.first_moment;
     for k in 0..LANES {
-        let transform = prismatic_transform::<F>(frame, q[k]);
+        let transform = prismatic_transform::<T, F>(frame, q[k]);
         let w = transform.rotate(get(&motion.angular_velocity, k));
         let e = transform.rotate(get(&motion.angular_acceleration, k));
         let v = transform.shift_acceleration(transform.rotate(get(&motion.proper, k)), w, e);
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let w = rotate_z::<F>(s, c, w);
-        let e = rotate_z::<F>(s, c, e);
-        let v = (rotate_z::<F>(s, c, v) + w.cross_z(qd[k] + qd[k])).plus_z(qdd[k]);
+        let w = rotate_z::<T, F>(s, c, w);
+        let e = rotate_z::<T, F>(s, c, e);
+        let v = (rotate_z::<T, F>(s, c, v) + w.cross_z(qd[k] + qd[k])).plus_z(qdd[k]);
         set(&mut motion.angular_velocity, k, w);
         set(&mut motion.angular_acceleration, k, e);
         set(&mut motion.proper, k, v);
@@ -217,10 +228,10 @@ fn outwards_prismatic<F: MulAdd>(
 
 /// Adds a link's wrench to that of the link before.
 #[inline(always)]
-fn inwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    transform: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
-    joint: &JointBlock,
-    parent: &mut JointBlock,
+fn inwards<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    transform: impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
+    joint: &JointBlock<T>,
+    parent: &mut JointBlock<T>,
 ) {
     for k in 0..LANES {
         let (s, c) = (joint.sin[k], joint.cos[k]);
@@ -233,10 +244,10 @@ fn inwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 
 /// The same if only the moment along the parent's axis is needed.
 #[inline(always)]
-fn inwards_along_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    transform: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
-    joint: &JointBlock,
-    parent: &mut JointBlock,
+fn inwards_along_axis<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    transform: impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
+    joint: &JointBlock<T>,
+    parent: &mut JointBlock<T>,
 ) {
     for k in 0..LANES {
         let (s, c) = (joint.sin[k], joint.cos[k]);

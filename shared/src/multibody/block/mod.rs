@@ -10,7 +10,10 @@
 //! Knowledge of the chain saves work in every sample. Twists of a quarter turn and zero lengths select one of a few
 //! loop bodies for each joint ([`Frame`]). Parameters with the same action are grouped beforehand ([`Body`]).
 //!
-//! Angles beyond [`ANGLE_LIMIT`](crate::lanes::ANGLE_LIMIT) take one sample at a time: slower, equally accurate.
+//! The kernels are written over the number ([`Element`](crate::lanes::Element)), `f32` or `f64`; chain and parameters are
+//! given in `f64` and rounded once.
+//!
+//! Angles beyond [`ANGLE_LIMIT`](crate::lanes::Element::ANGLE_LIMIT) take one sample at a time: slower, equally accurate.
 
 mod body;
 mod columns;

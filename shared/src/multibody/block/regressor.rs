@@ -4,42 +4,41 @@ use super::super::parameters::{COLUMNS, column};
 use super::super::spatial::Vector3;
 use super::columns::{Columns, Section};
 use super::frame::{Frame, LinkTransform, at_each_lane, rotate_z};
-use super::lane::{LANES, Lane, Lane3, ZERO, ZERO3, get, set};
-use crate::lanes::MulAdd;
-use crate::scalar::Real;
+use super::lane::{LANES, Lane, Lane3, get, set};
+use crate::lanes::{Element, MulAdd};
 
 /// Motion of a link, from which all its columns are computed.
-struct LinkBlock {
+struct LinkBlock<T> {
     /// Angular velocity ω.
-    angular_velocity: Lane3,
+    angular_velocity: Lane3<T>,
     /// Angular acceleration.
-    angular_acceleration: Lane3,
+    angular_acceleration: Lane3<T>,
     /// Acceleration of the origin minus gravity.
-    proper: Lane3,
+    proper: Lane3<T>,
     /// ωx·ωy, ωx·ωz, ωy·ωz
-    mixed: Lane3,
+    mixed: Lane3<T>,
     /// ωy² + ωz², ωx² + ωz², ωx² + ωy²
-    sums: Lane3,
+    sums: Lane3<T>,
     /// ωx² − ωy², ωz² − ωx², ωy² − ωz²
-    differences: Lane3,
+    differences: Lane3<T>,
     /// Entries 21, 31, 32 of U = ė× + ω×ω×: the acceleration of the link's points relative to its origin.
-    below: Lane3,
+    below: Lane3<T>,
     /// Entries 12, 13, 23 of U.
-    above: Lane3,
+    above: Lane3<T>,
 }
 
 /// A joint's axis in the frame of a link further out: rotation, and velocity of that frame's origin.
 #[derive(Clone, Copy, Debug)]
-pub struct AxisBlock {
-    angular: Lane3,
-    linear: Lane3,
+pub struct AxisBlock<T> {
+    angular: Lane3<T>,
+    linear: Lane3<T>,
 }
 
-impl AxisBlock {
+impl<T: Element> AxisBlock<T> {
     /// All zero.
     pub const ZERO: Self = Self {
-        angular: ZERO3,
-        linear: ZERO3,
+        angular: [Lane::ZERO; 3],
+        linear: [Lane::ZERO; 3],
     };
 }
 
@@ -50,30 +49,30 @@ impl AxisBlock {
 /// columns that are zero for every motion, and that of the offset, whose entries are 1. `frames`, `axes` and the
 /// signals have one entry per joint.
 #[inline(always)]
-pub fn differential_regressor<F: MulAdd>(
-    frames: &[Frame],
-    gravity: [f64; 3],
-    q: &[Lane],
-    qd: &[Lane],
-    qdd: &[Lane],
-    axes: &mut [AxisBlock],
-    out: &mut Section,
+pub fn differential_regressor<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    gravity: [T; 3],
+    q: &[Lane<T>],
+    qd: &[Lane<T>],
+    qdd: &[Lane<T>],
+    axes: &mut [AxisBlock<T>],
+    out: &mut Section<T>,
 ) {
     let mut motion = LinkBlock {
-        angular_velocity: ZERO3,
-        angular_acceleration: ZERO3,
+        angular_velocity: [Lane::ZERO; 3],
+        angular_acceleration: [Lane::ZERO; 3],
         proper: gravity.map(|g| Lane([-g; LANES])),
-        mixed: ZERO3,
-        sums: ZERO3,
-        differences: ZERO3,
-        below: ZERO3,
-        above: ZERO3,
+        mixed: [Lane::ZERO; 3],
+        sums: [Lane::ZERO; 3],
+        differences: [Lane::ZERO; 3],
+        below: [Lane::ZERO; 3],
+        above: [Lane::ZERO; 3],
     };
     let width = frames.len() * COLUMNS;
-    let (mut sin, mut cos) = (ZERO, ZERO);
+    let (mut sin, mut cos) = (Lane::ZERO, Lane::ZERO);
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
-        at_each_lane!(F, frame, &q[i], transform => {
+        at_each_lane!(T, F, frame, &q[i], transform => {
             next_link(&transform, frame.prismatic, &sin, &cos, &qd[i], &qdd[i], &mut motion);
             for (j, axis) in axes[..i].iter_mut().enumerate() {
                 let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz] = out.lanes(j * width + i * COLUMNS);
@@ -95,17 +94,21 @@ pub fn differential_regressor<F: MulAdd>(
 
 /// Moves across a joint to the next link outwards (Luh, Walker & Paul 1980).
 #[inline(always)]
-fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    transform: &impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
+fn next_link<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    transform: &impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
     prismatic: bool,
-    sin: &Lane,
-    cos: &Lane,
-    qd: &Lane,
-    qdd: &Lane,
-    motion: &mut LinkBlock,
+    sin: &Lane<T>,
+    cos: &Lane<T>,
+    qd: &Lane<T>,
+    qdd: &Lane<T>,
+    motion: &mut LinkBlock<T>,
 ) {
     // Both kinds in one body: terms of the other kind are multiplied by 0.
-    let (turns, slides) = if prismatic { (0.0, 1.0) } else { (1.0, 0.0) };
+    let (turns, slides) = if prismatic {
+        (T::ZERO, T::ONE)
+    } else {
+        (T::ONE, T::ZERO)
+    };
     for k in 0..LANES {
         let transform = transform(k);
         let w = transform.rotate(get(&motion.angular_velocity, k));
@@ -113,9 +116,9 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         let v = transform.shift_acceleration(transform.rotate(get(&motion.proper, k)), w, e);
         let (s, c) = (sin[k], cos[k]);
         let (w, e, v) = (
-            rotate_z::<F>(s, c, w),
-            rotate_z::<F>(s, c, e),
-            rotate_z::<F>(s, c, v),
+            rotate_z::<T, F>(s, c, w),
+            rotate_z::<T, F>(s, c, e),
+            rotate_z::<T, F>(s, c, v),
         );
         let (rotation_rate, sliding_rate) = (turns * qd[k], slides * qd[k]);
         let e = (e + w.cross_z(rotation_rate)).plus_z(turns * qdd[k]);
@@ -143,31 +146,33 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 // Ten parameters instead of an array of ten: only for reference parameters does the compiler know that they do not
 // overlap, and only then does it vectorise the loop.
 #[inline(always)]
-fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    transform: &impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
-    sin: &Lane,
-    cos: &Lane,
-    axis: &mut AxisBlock,
-    motion: &LinkBlock,
-    m: &mut [f64; LANES],
-    mx: &mut [f64; LANES],
-    my: &mut [f64; LANES],
-    mz: &mut [f64; LANES],
-    ixx: &mut [f64; LANES],
-    ixy: &mut [f64; LANES],
-    ixz: &mut [f64; LANES],
-    iyy: &mut [f64; LANES],
-    iyz: &mut [f64; LANES],
-    izz: &mut [f64; LANES],
+fn carried_axis<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    transform: &impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
+    sin: &Lane<T>,
+    cos: &Lane<T>,
+    axis: &mut AxisBlock<T>,
+    motion: &LinkBlock<T>,
+    m: &mut [T; LANES],
+    mx: &mut [T; LANES],
+    my: &mut [T; LANES],
+    mz: &mut [T; LANES],
+    ixx: &mut [T; LANES],
+    ixy: &mut [T; LANES],
+    ixz: &mut [T; LANES],
+    iyy: &mut [T; LANES],
+    iyz: &mut [T; LANES],
+    izz: &mut [T; LANES],
 ) {
-    let dot =
-        |a: f64, x: f64, b: f64, y: f64, c: f64, z: f64| F::mul_add(a, x, F::mul_add(b, y, c * z));
+    let dot = |a: T, x: T, b: T, y: T, c: T, z: T| F::mul_add(a, x, F::mul_add(b, y, c * z));
     for k in 0..LANES {
         let transform = transform(k);
         let (s, c) = (sin[k], cos[k]);
         let turned = transform.rotate(get(&axis.angular, k));
         let swept = transform.shift_velocity(transform.rotate(get(&axis.linear, k)), turned);
-        let (angular, linear) = (rotate_z::<F>(s, c, turned), rotate_z::<F>(s, c, swept));
+        let (angular, linear) = (
+            rotate_z::<T, F>(s, c, turned),
+            rotate_z::<T, F>(s, c, swept),
+        );
         set(&mut axis.angular, k, angular);
         set(&mut axis.linear, k, linear);
         let ([sx, sy, sz], [lx, ly, lz]) = (angular.0, linear.0);
@@ -205,18 +210,18 @@ fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 
 /// The same for the joint of the link itself, whose axis is z of the frame. `own` is the first of its columns.
 #[inline(always)]
-fn own_axis(
+fn own_axis<T: Element>(
     prismatic: bool,
-    motion: &LinkBlock,
-    axis: &mut AxisBlock,
+    motion: &LinkBlock<T>,
+    axis: &mut AxisBlock<T>,
     own: usize,
-    out: &mut Section,
+    out: &mut Section<T>,
 ) {
-    let z = [ZERO, ZERO, Lane([1.0; LANES])];
+    let z = [Lane::ZERO, Lane::ZERO, Lane([T::ONE; LANES])];
     let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz] = out.lanes(own);
     if prismatic {
         *axis = AxisBlock {
-            angular: ZERO3,
+            angular: [Lane::ZERO; 3],
             linear: z,
         };
         *m = motion.proper[2].0;
@@ -226,7 +231,7 @@ fn own_axis(
     } else {
         *axis = AxisBlock {
             angular: z,
-            linear: ZERO3,
+            linear: [Lane::ZERO; 3],
         };
         *mx = motion.proper[1].0;
         negated(&motion.proper[0], my);
@@ -240,7 +245,7 @@ fn own_axis(
 }
 
 #[inline(always)]
-fn negated(lane: &Lane, out: &mut [f64; LANES]) {
+fn negated<T: Element>(lane: &Lane<T>, out: &mut [T; LANES]) {
     for k in 0..LANES {
         out[k] = -lane[k];
     }
@@ -248,21 +253,21 @@ fn negated(lane: &Lane, out: &mut [f64; LANES]) {
 
 /// Computes the row of the total mechanical energy in 14·n columns. Friction and offset columns are not written.
 #[inline(always)]
-pub fn energy_regressor<F: MulAdd>(
-    frames: &[Frame],
-    gravity: [f64; 3],
-    q: &[Lane],
-    qd: &[Lane],
-    out: &mut Section,
+pub fn energy_regressor<T: Element, F: MulAdd<T>>(
+    frames: &[Frame<T>],
+    gravity: [T; 3],
+    q: &[Lane<T>],
+    qd: &[Lane<T>],
+    out: &mut Section<T>,
 ) {
-    let (mut angular, mut linear) = (ZERO3, ZERO3);
+    let (mut angular, mut linear) = ([Lane::ZERO; 3], [Lane::ZERO; 3]);
     let mut field = gravity.map(|g| Lane([g; LANES]));
-    let mut depth = ZERO;
-    let (mut sin, mut cos) = (ZERO, ZERO);
+    let mut depth = Lane::ZERO;
+    let (mut sin, mut cos) = (Lane::ZERO, Lane::ZERO);
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
         let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive] = out.lanes(i * COLUMNS);
-        at_each_lane!(F, frame, &q[i], transform => link_energy(
+        at_each_lane!(T, F, frame, &q[i], transform => link_energy(
             transform, frame.prismatic, &sin, &cos, &qd[i],
             &mut angular, &mut linear, &mut field, &mut depth,
             m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive,
@@ -272,55 +277,59 @@ pub fn energy_regressor<F: MulAdd>(
 
 /// Moves across a joint to the next link outwards, and computes the energy columns of that link and of the drive.
 #[inline(always)]
-fn link_energy<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
-    transform: impl Fn(usize) -> LinkTransform<F, TWIST, A, D>,
+fn link_energy<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    transform: impl Fn(usize) -> LinkTransform<T, F, TWIST, A, D>,
     prismatic: bool,
-    sin: &Lane,
-    cos: &Lane,
-    qd: &Lane,
-    angular: &mut Lane3,
-    linear: &mut Lane3,
-    gravity: &mut Lane3,
-    depth: &mut Lane,
-    m: &mut [f64; LANES],
-    mx: &mut [f64; LANES],
-    my: &mut [f64; LANES],
-    mz: &mut [f64; LANES],
-    ixx: &mut [f64; LANES],
-    ixy: &mut [f64; LANES],
-    ixz: &mut [f64; LANES],
-    iyy: &mut [f64; LANES],
-    iyz: &mut [f64; LANES],
-    izz: &mut [f64; LANES],
-    drive: &mut [f64; LANES],
+    sin: &Lane<T>,
+    cos: &Lane<T>,
+    qd: &Lane<T>,
+    angular: &mut Lane3<T>,
+    linear: &mut Lane3<T>,
+    gravity: &mut Lane3<T>,
+    depth: &mut Lane<T>,
+    m: &mut [T; LANES],
+    mx: &mut [T; LANES],
+    my: &mut [T; LANES],
+    mz: &mut [T; LANES],
+    ixx: &mut [T; LANES],
+    ixy: &mut [T; LANES],
+    ixz: &mut [T; LANES],
+    iyy: &mut [T; LANES],
+    iyz: &mut [T; LANES],
+    izz: &mut [T; LANES],
+    drive: &mut [T; LANES],
 ) {
-    let (turns, slides) = if prismatic { (0.0, 1.0) } else { (1.0, 0.0) };
+    let (turns, slides) = if prismatic {
+        (T::ZERO, T::ONE)
+    } else {
+        (T::ONE, T::ZERO)
+    };
     for k in 0..LANES {
         let transform = transform(k);
         let (s, c) = (sin[k], cos[k]);
         let w = transform.rotate(get(angular, k));
         let v = transform.shift_velocity(transform.rotate(get(linear, k)), w);
-        let w = rotate_z::<F>(s, c, w).plus_z(turns * qd[k]);
-        let v = rotate_z::<F>(s, c, v).plus_z(slides * qd[k]);
+        let w = rotate_z::<T, F>(s, c, w).plus_z(turns * qd[k]);
+        let v = rotate_z::<T, F>(s, c, v).plus_z(slides * qd[k]);
         let down = transform.rotate(get(gravity, k));
         depth[k] += down.0[0] * transform.a + down.0[2] * transform.d;
-        let down = rotate_z::<F>(s, c, down);
+        let down = rotate_z::<T, F>(s, c, down);
         set(angular, k, w);
         set(linear, k, v);
         set(gravity, k, down);
         let [wx, wy, wz] = w.0;
         let [gx, gy, gz] = down.0;
         let [hx, hy, hz] = v.cross(w).0;
-        m[k] = 0.5 * v.dot(v) - depth[k];
+        m[k] = T::HALF * v.dot(v) - depth[k];
         mx[k] = hx - gx;
         my[k] = hy - gy;
         mz[k] = hz - gz;
-        ixx[k] = 0.5 * (wx * wx);
+        ixx[k] = T::HALF * (wx * wx);
         ixy[k] = wx * wy;
         ixz[k] = wx * wz;
-        iyy[k] = 0.5 * (wy * wy);
+        iyy[k] = T::HALF * (wy * wy);
         iyz[k] = wy * wz;
-        izz[k] = 0.5 * (wz * wz);
-        drive[k] = 0.5 * (qd[k] * qd[k]);
+        izz[k] = T::HALF * (wz * wz);
+        drive[k] = T::HALF * (qd[k] * qd[k]);
     }
 }
