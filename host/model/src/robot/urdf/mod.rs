@@ -9,6 +9,7 @@ mod edits;
 mod locks;
 mod names;
 mod original;
+mod prefixes;
 mod read;
 mod reader;
 mod remarks;

@@ -13,6 +13,7 @@ use roxmltree::Document;
 use super::chain::Chain;
 use super::choice::ChainChoice;
 use super::edits::{Edit, at, put_friction, put_inertia, put_rotor, spliced};
+use super::prefixes::declared;
 use super::read::read;
 use super::reader::{Xml, parsed};
 use super::spatial::SpatialInertia;
@@ -59,6 +60,8 @@ impl Original {
         let converted = convert(&chain);
         check_units(&chain, &converted.robot, path)?;
         chain.remarks.extend(converted.remarks);
+        // Written files have the declarations: edits are places in this text.
+        let text = declared(&text).text.into_owned();
         Ok(Self {
             text,
             chain,

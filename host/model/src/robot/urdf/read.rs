@@ -9,6 +9,7 @@ use rig_shared::multibody::MAX_JOINTS;
 use super::chain::{Body, Chain};
 use super::choice::ChainChoice;
 use super::locks::Held;
+use super::prefixes::declared;
 use super::reader::{Reader, Xml, child, parsed};
 use super::selection::Selection;
 use super::spatial::SpatialInertia;
@@ -24,11 +25,13 @@ pub(in crate::robot) fn read(
     path: &Path,
     choice: &ChainChoice,
 ) -> Result<Chain, RobotError> {
-    let document = parsed(text, path)?;
+    let declared = declared(text);
+    let document = parsed(&declared.text, path)?;
+    let remark = (declared.remark()).map(|own| format!("{}: {own}", path.display()));
     let reader = Reader {
         path,
         document: &document,
-        remarks: RefCell::default(),
+        remarks: RefCell::new(remark.into_iter().collect()),
     };
     reader.chain(choice)
 }

@@ -132,9 +132,26 @@ impl<'a> Reader<'a> {
             position,
             soft_position: self.soft_limits(joint, name, position)?,
             velocity,
-            acceleration: None,
+            acceleration: self.acceleration_limit(node, name)?,
             torque: (!placeholder).then_some(effort),
         }))
+    }
+
+    /// Returns `drake:acceleration` of a `<limit>`, rad/s² or m/s² (Drake, "Supported formats", multibody parsing); its default
+    /// is infinite.
+    fn acceleration_limit(&self, limit: Xml<'a>, name: &str) -> Result<Option<f64>, RobotError> {
+        let mut own = limit.attributes();
+        let Some(own) = own.find(|a| a.name() == "acceleration" && a.namespace().is_some()) else {
+            return Ok(None);
+        };
+        if own.value().trim().parse() == Ok(f64::INFINITY) {
+            return Ok(None);
+        }
+        let value = self.parse_number(limit, "`drake:acceleration` of <limit>", own.value())?;
+        if value < 0.0 {
+            return Err(self.error(limit, format!("the acceleration limit of joint `{name}` is {value}, but it must be greater than 0")));
+        }
+        Ok((value > 0.0).then_some(value))
     }
 
     /// Returns the range in which the robot's own controller keeps the joint: `<safety_controller soft_lower_limit

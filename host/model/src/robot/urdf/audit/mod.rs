@@ -13,6 +13,7 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use super::choice::ChainChoice;
+use super::prefixes::declared;
 use super::read::read;
 use super::reader::{Reader, parsed};
 use crate::robot::dh::convert;
@@ -31,7 +32,8 @@ pub fn audit(
     choice: &ChainChoice,
     seed: u64,
 ) -> Result<Audit, RobotError> {
-    let document = parsed(text, path)?;
+    let declared = declared(text);
+    let document = parsed(&declared.text, path)?;
     let reader = Reader {
         path,
         document: &document,
