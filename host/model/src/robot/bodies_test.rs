@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::{SpatialInertia, is_taken};
 use crate::robot::{
-    Description, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Robot, TX40, XL330,
+    Description, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Original, Robot, TX40,
+    XL330,
 };
 
 fn remarks(inertial: &str) -> Vec<String> {
@@ -140,6 +141,92 @@ fn placeholders_of_exporters_are_no_limits() {
             .to_string()
             .contains("effort limit of joint `one` is -3")
     );
+}
+
+/// Published files have `velocity="0"`, none at all, or a range of 0 to 0 beside a speed.
+#[test]
+fn unknown_limits_of_all_joints_are_told_in_one_sentence() {
+    let read = |limit: &str| {
+        let inertial = "<inertial><mass value='1'/><inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/></inertial>";
+        let joint = |name: &str, parent: &str, child: &str| {
+            format!(
+                "<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/><axis xyz='0 0 1'/>\n<limit {limit}/></joint>"
+            )
+        };
+        let text = format!(
+            "<robot name='r'><link name='base'/><link name='a'>{inertial}</link><link name='b'>{inertial}</link>{}{}</robot>",
+            joint("one", "base", "a"),
+            joint("two", "a", "b")
+        );
+        Original::read(text, Path::new("r.urdf"))
+    };
+    for (limit, words) in [
+        (
+            "lower='-1' upper='1' velocity='0' effort='3'",
+            "the velocity limits of joints `one` and `two` are 0, so",
+        ),
+        (
+            "lower='-1' upper='1' velocity='0' effort='0'",
+            "the velocity limits of joints `one` and `two` are 0, so",
+        ),
+        (
+            "lower='-1' upper='1' effort='3'",
+            "<limit> of joints `one` and `two` has no `velocity`, so",
+        ),
+        (
+            "lower='0' upper='0' velocity='2' effort='3'",
+            "of joints `one` and `two` are both 0, so",
+        ),
+        (
+            "velocity='2' effort='3'",
+            "of joints `one` and `two` are both 0, so",
+        ),
+        (
+            "effort='0' velocity='0'",
+            "<limit> of joints `one` and `two` is zero throughout",
+        ),
+    ] {
+        let original = read(limit).unwrap();
+        let [remark] = original.remarks() else {
+            unreachable!("{limit}: {:?}", original.remarks())
+        };
+        assert!(
+            remark.starts_with("r.urdf:2:1: ") && remark.contains(words),
+            "{limit}: {remark}"
+        );
+        assert!(
+            original
+                .robot()
+                .joints
+                .iter()
+                .all(|own| own.limits.is_none())
+        );
+    }
+    let original = read("lower='-1' upper='1' velocity='2' effort='0'").unwrap();
+    let [remark] = original.remarks() else {
+        unreachable!("{:?}", original.remarks())
+    };
+    assert!(
+        remark.contains("the effort limits 0 of joints `one` and `two` look like placeholders"),
+        "{remark}"
+    );
+    for (limit, words) in [
+        (
+            "lower='-1' upper='1' velocity='-2' effort='3'",
+            "velocity limit of joint `one` is -2",
+        ),
+        (
+            "lower='1' upper='-1' velocity='0' effort='3'",
+            "lower must be below upper",
+        ),
+        (
+            "lower='1' upper='1' velocity='2' effort='3'",
+            "lower must be below upper",
+        ),
+    ] {
+        let message = read(limit).unwrap_err().to_string();
+        assert!(message.contains(words), "{limit}: {message}");
+    }
 }
 
 /// A written link is a possible body if the motion leaves that open; otherwise a remark names it. A test of the writer

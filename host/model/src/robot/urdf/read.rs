@@ -32,6 +32,7 @@ pub(in crate::robot) fn read(
         path,
         document: &document,
         remarks: RefCell::new(remark.into_iter().collect()),
+        unknown: RefCell::default(),
     };
     reader.chain(choice)
 }
@@ -265,6 +266,7 @@ impl<'a> Reader<'a> {
         self.assumed(&chosen, choice, [told, merged], &used);
         Ok(Chain {
             name: root.attribute("name").unwrap_or("robot").to_owned(),
+        self.tell_unknown();
             file: self.path.display().to_string(),
             base: selection.root.to_owned(),
             bodies,

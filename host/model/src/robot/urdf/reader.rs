@@ -7,6 +7,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
+use super::values::Unknown;
 use crate::robot::error::{Place, RobotError};
 use crate::robot::fault::{MAX_NUMBER, is_safe_magnitude};
 use crate::robot::right_angle::WRITTEN;
@@ -17,6 +18,8 @@ pub(super) struct Reader<'a> {
     pub document: &'a Document<'a>,
     /// Remarks for the user, one sentence each.
     pub remarks: RefCell<Vec<String>>,
+    /// Limits that count as not known: why, where, and the joint.
+    pub unknown: RefCell<Vec<(Unknown, Place, String)>>,
 }
 
 /// Correction for a macro.

@@ -12,6 +12,56 @@ use rig_output::format_significant;
 /// Round effort limits from this value on count as placeholders, N·m or N.
 const UNKNOWN_EFFORT: f64 = 1e4;
 
+/// Why a limit of a joint counts as not known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Unknown {
+    /// `<limit>` is zero throughout.
+    All,
+    /// The lower and the upper limit are both 0.
+    Range,
+    /// The velocity limit is 0.
+    Speed,
+    /// There is no velocity limit.
+    NoSpeed,
+    /// The effort limit is a placeholder.
+    Effort(f64),
+    /// There is no effort limit.
+    NoEffort,
+}
+
+impl Unknown {
+    /// Returns the remark about these joints, without its place.
+    fn sentence(self, joints: &str, is_one: bool) -> String {
+        let its = if is_one { "its" } else { "their" };
+        let (limit, look, count) = match is_one {
+            true => ("limit", "looks like a placeholder", "counts"),
+            false => ("limits", "look like placeholders", "count"),
+        };
+        let whole = format!(
+            "so {its} limits count as not known, the stated ones too; a command that designs a motion wants them all"
+        );
+        match self {
+            Self::All => format!(
+                "<limit> of {joints} is zero throughout, a placeholder; {its} limits count as not known."
+            ),
+            Self::Range => {
+                format!("the lower and the upper {limit} of {joints} are both 0, {whole}.")
+            }
+            Self::Speed => format!(
+                "the velocity {limit} of {joints} {} 0, {whole}.",
+                if is_one { "is" } else { "are" }
+            ),
+            Self::NoSpeed => format!("<limit> of {joints} has no `velocity`, {whole}."),
+            Self::Effort(effort) => format!(
+                "the effort {limit} {effort} of {joints} {look}; {its} torque {limit} {count} as not known."
+            ),
+            Self::NoEffort => format!(
+                "<limit> of {joints} has no `effort`; {its} torque {limit} {count} as not known."
+            ),
+        }
+    }
+}
+
 impl<'a> Reader<'a> {
     pub(super) fn inertial(&self, link: Xml<'a>) -> Result<Option<SpatialInertia>, RobotError> {
         let Some(node) = child(link, "inertial") else {
@@ -76,65 +126,101 @@ impl<'a> Reader<'a> {
         let Some(node) = child(joint, "limit") else {
             return Ok(None);
         };
-        let position = if endless {
-            [f64::NEG_INFINITY, f64::INFINITY]
-        } else {
-            let bound = |key| self.optional_number(node, key);
-            let (lower, upper) = (bound("lower")?, bound("upper")?);
-            if lower.is_some() != upper.is_some() {
-                let missing = if lower.is_none() { "lower" } else { "upper" };
-                let place = format!("{}:{}", self.path.display(), self.place(node));
-                self.remarks.borrow_mut().push(format!(
-                    "{place}: <limit> of joint `{name}` has no `{missing}`, which counts as 0."
-                ));
-            }
-            [lower.unwrap_or(0.0), upper.unwrap_or(0.0)]
-        };
-        let remark = |text: String| {
-            let place = format!("{}:{}", self.path.display(), self.place(node));
-            self.remarks.borrow_mut().push(format!("{place}: {text}"));
-        };
-        if node.attribute("velocity").is_none() {
-            let unit = joint_unit(joint);
-            return Err(self.error(node, format!("<limit> has no `velocity`; add velocity=\"…\", the highest speed of joint `{name}` in {unit}, or remove <limit> where the limits are not known")));
-        }
-        let velocity = self.number(node, "velocity")?;
+        let position = self.position_limits(node, name, endless)?;
+        let velocity = self.optional_number(node, "velocity")?;
         let stated = self.optional_number(node, "effort")?;
-        if stated.is_none() {
-            remark(format!(
-                "<limit> of joint `{name}` has no `effort`; its torque limit counts as not known."
-            ));
-        }
         let effort = stated.unwrap_or(0.0);
-        if velocity == 0.0 && effort == 0.0 && (endless || position[0] == position[1]) {
+        let is_open = !endless && position == [0.0; 2];
+        let is_zero = velocity == Some(0.0) && effort == 0.0;
+        if is_zero && (endless || position[0] == position[1]) {
             // CAD exporters write this if the user entered nothing.
-            remark(format!(
-                "<limit> of joint `{name}` is zero throughout, a placeholder; its limits count as not known."
-            ));
+            self.unknown(node, name, Unknown::All);
             return Ok(None);
         }
-        if position[0] >= position[1] {
+        if position[0] >= position[1] && !is_open {
             return Err(self.error(node, format!("the lower limit of joint `{name}` is {} and the upper limit {}, but lower must be below upper", position[0], position[1])));
         }
-        if velocity <= 0.0 {
+        if let Some(velocity) = velocity.filter(|v| *v < 0.0) {
             return Err(self.error(node, format!("the velocity limit of joint `{name}` is {velocity}, but it must be greater than 0; remove <limit> where the limits are not known")));
         }
         if effort < 0.0 {
             return Err(self.error(node, format!("the effort limit of joint `{name}` is {effort}, but it must be greater than 0, or 0 where it is not known")));
         }
+        let acceleration = self.acceleration_limit(node, name)?;
+        let soft_position = self.soft_limits(joint, name, position)?;
+        // Without a speed or a range no motion can be designed; both together are the limits of a joint.
+        let Some(velocity) = velocity.filter(|v| *v > 0.0 && !is_open) else {
+            let what = match velocity {
+                _ if is_open => Unknown::Range,
+                Some(_) => Unknown::Speed,
+                None => Unknown::NoSpeed,
+            };
+            self.unknown(node, name, what);
+            return Ok(None);
+        };
         let placeholder = is_placeholder(effort, UNKNOWN_EFFORT);
-        if placeholder && stated.is_some() {
-            remark(format!(
-                "the effort limit {effort} of joint `{name}` looks like a placeholder; its torque limit counts as not known."
-            ));
+        match stated {
+            None => self.unknown(node, name, Unknown::NoEffort),
+            Some(_) if placeholder => self.unknown(node, name, Unknown::Effort(effort)),
+            Some(_) => {}
         }
         Ok(Some(JointLimits {
             position,
-            soft_position: self.soft_limits(joint, name, position)?,
+            soft_position,
             velocity,
-            acceleration: self.acceleration_limit(node, name)?,
+            acceleration,
             torque: (!placeholder).then_some(effort),
         }))
+    }
+
+    /// Returns the lower and the upper limit; 0 for one that is missing, with a remark if the other one is there.
+    fn position_limits(
+        &self,
+        node: Xml<'a>,
+        name: &str,
+        endless: bool,
+    ) -> Result<[f64; 2], RobotError> {
+        if endless {
+            return Ok([f64::NEG_INFINITY, f64::INFINITY]);
+        }
+        let bound = |key| self.optional_number(node, key);
+        let (lower, upper) = (bound("lower")?, bound("upper")?);
+        if lower.is_some() != upper.is_some() {
+            let missing = if lower.is_none() { "lower" } else { "upper" };
+            let place = format!("{}:{}", self.path.display(), self.place(node));
+            self.remarks.borrow_mut().push(format!(
+                "{place}: <limit> of joint `{name}` has no `{missing}`, which counts as 0."
+            ));
+        }
+        Ok([lower.unwrap_or(0.0), upper.unwrap_or(0.0)])
+    }
+
+    /// Notes that a limit of a joint counts as not known; [`Reader::tell_unknown`] adds the remarks.
+    fn unknown(&self, node: Xml<'a>, name: &str, what: Unknown) {
+        let own = (what, self.place(node), name.to_owned());
+        self.unknown.borrow_mut().push(own);
+    }
+
+    /// Adds one remark for all joints whose limits count as not known for the same reason.
+    pub(super) fn tell_unknown(&self) {
+        let mut pending = self.unknown.take();
+        while let Some((what, place, _)) = pending.first().cloned() {
+            let (same, others): (Vec<_>, Vec<_>) =
+                pending.into_iter().partition(|own| own.0 == what);
+            pending = others;
+            let names: Vec<String> = same.iter().map(|own| format!("`{}`", own.2)).collect();
+            let is_one = names.len() == 1;
+            let joints = format!(
+                "{} {}",
+                if is_one { "joint" } else { "joints" },
+                rig_output::listed(&names)
+            );
+            self.remarks.borrow_mut().push(format!(
+                "{}:{place}: {}",
+                self.path.display(),
+                what.sentence(&joints, is_one)
+            ));
+        }
     }
 
     /// Returns `drake:acceleration` of a `<limit>`, rad/s² or m/s² (Drake, "Supported formats", multibody parsing); its default
@@ -209,14 +295,6 @@ impl<'a> Reader<'a> {
             viscous: value("damping")?,
             offset: 0.0,
         }))
-    }
-}
-
-/// Returns the unit of a joint's speed.
-fn joint_unit(joint: Xml<'_>) -> &'static str {
-    match joint.attribute("type") {
-        Some("prismatic") => "m/s",
-        _ => "rad/s",
     }
 }
 

@@ -39,6 +39,7 @@ pub fn audit(
         document: &document,
         remarks: RefCell::default(),
     };
+        unknown: RefCell::default(),
     let tree = reader.tree()?;
     let mut audit = Audit::default();
     let bodies = links::bodies(&reader, &tree)?;
