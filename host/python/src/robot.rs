@@ -60,6 +60,7 @@ impl Robot {
             robot,
             urdf: None,
             remarks: Vec::new(),
+            notes: Vec::new(),
         })
     }
 
@@ -119,6 +120,7 @@ fn from_text(py: Python<'_>, robot: Result<robot::Robot, robot::RobotError>) -> 
         robot,
         urdf: None,
         remarks,
+        notes: Vec::new(),
     })
 }
 

@@ -9,11 +9,12 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
+use super::error::Place;
 use super::joint::JointKind;
 use super::right_angle::{ROUNDING, WRITTEN, right_angle};
 use super::serial_robot::Robot;
 use super::urdf::{Body, Chain};
-use rig_output::format_significant;
+use rig_output::{format_significant, listed};
 
 /// Returns the multiple of π/2 that `angle` means, if it means one.
 fn intended_angle(angle: f64) -> Option<f64> {
@@ -75,11 +76,47 @@ pub(super) fn square(robot: &mut Robot) -> Vec<Squared> {
     all
 }
 
-/// Returns the poses of the bodies of a URDF chain in the base link's frame at zero position, and a sentence for each
-/// turned joint. Neighbouring axes that are nearly parallel or perpendicular become exactly so: a joint turns about its
+/// A joint of a URDF chain that was turned to a multiple of π/2.
+pub(super) struct Turned {
+    /// Its name.
+    joint: String,
+    /// Distance from the multiple, rad.
+    off: f64,
+    /// The sentence on it alone.
+    sentence: String,
+    /// Its angle, for a sentence on several joints.
+    angle: &'static str,
+    /// Where it stands in the file.
+    place: Place,
+}
+
+/// Returns one sentence for each angle of these joints.
+pub(super) fn told(file: &str, mut turned: Vec<Turned>) -> Vec<String> {
+    let mut sentences = Vec::new();
+    while let Some(angle) = turned.first().map(|own| own.angle) {
+        let (same, others): (Vec<_>, Vec<_>) =
+            turned.into_iter().partition(|own| own.angle == angle);
+        turned = others;
+        if let [one] = same.as_slice() {
+            sentences.push(one.sentence.clone());
+            continue;
+        }
+        let names: Vec<String> = same.iter().map(|own| format!("`{}`", own.joint)).collect();
+        let off = same.iter().map(|own| own.off).fold(0.0, f64::max);
+        sentences.push(format!(
+            "{file}:{}: {angle} joints {} are up to {off:.1e} rad off multiples of π/2, and are taken as these.",
+            same[0].place,
+            listed(&names)
+        ));
+    }
+    sentences
+}
+
+/// Returns the poses of the bodies of a URDF chain in the base link's frame at zero position, and the turned
+/// joints. Neighbouring axes that are nearly parallel or perpendicular become exactly so: a joint turns about its
 /// own origin and carries all bodies behind it.
-pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>) {
-    let (mut poses, mut remarks) = (Vec::new(), Vec::new());
+pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<Turned>) {
+    let (mut poses, mut joints) = (Vec::new(), Vec::new());
     let mut pose = Isometry3::identity();
     let mut axes: Vec<Vector3<f64>> = Vec::new();
     for (k, body) in chain.bodies.iter().enumerate() {
@@ -94,14 +131,21 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
         if let Some(exact) = intended_angle(angle)
             && (angle - exact).abs() > ROUNDING
         {
-            remarks.push(format!(
+            let sentence = format!(
                 "{}:{}: the axis of joint `{}` stands at {} rad to {other}, {}.",
                 chain.file,
                 body.place,
                 body.joint,
                 format_significant(angle, 8),
                 rounding_note((angle - exact).abs(), exact)
-            ));
+            );
+            joints.push(Turned {
+                joint: body.joint.clone(),
+                off: (angle - exact).abs(),
+                sentence,
+                angle: "the axes of",
+                place: body.place,
+            });
             // Direction along `before`, or across it.
             let square = match axis.dot(&before) {
                 cosine if exact == FRAC_PI_2 => axis - before * cosine,
@@ -118,7 +162,7 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
                 && let Some(exact) = intended_angle(angle)
                 && (angle - exact).abs() > ROUNDING
             {
-                remarks.push(format!(
+                let sentence = format!(
                     "{}:{}: about the axis of prismatic joint `{}`, joint `{}` stands at {} rad to the axes before, {}.",
                     chain.file,
                     body.place,
@@ -126,29 +170,40 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
                     body.joint,
                     format_significant(angle, 8),
                     rounding_note((angle - exact).abs(), exact)
-                ));
+                );
+                joints.push(Turned {
+                    joint: body.joint.clone(),
+                    off: (angle - exact).abs(),
+                    sentence,
+                    angle: "the turns about a prismatic axis before",
+                    place: body.place,
+                });
                 pose = turned(&pose, &about, exact - angle);
             }
         }
         axes.push(pose.rotation * body.axis);
         poses.push(pose);
     }
-    (poses, remarks)
+    (poses, joints)
 }
 
-/// Returns the multiple of π/2 that theta of a prismatic joint means, with a sentence if theta differs from it.
-pub(super) fn squared_theta(file: &str, body: &Body, theta: f64) -> Option<(f64, Option<String>)> {
+/// Returns the multiple of π/2 that theta of a prismatic joint means, with the turned joint if theta differs from it.
+pub(super) fn squared_theta(file: &str, body: &Body, theta: f64) -> Option<(f64, Option<Turned>)> {
     let exact = intended_angle(theta)?;
     let off = (theta - exact).abs();
-    let remark = (off > ROUNDING).then(|| {
-        format!(
+    let turned = (off > ROUNDING).then(|| Turned {
+        joint: body.joint.clone(),
+        off,
+        sentence: format!(
             "{file}:{}: theta of prismatic joint `{}` is {theta} rad, {}.",
             body.place,
             body.joint,
             rounding_note(off, exact)
-        )
+        ),
+        angle: "theta of prismatic",
+        place: body.place,
     });
-    Some((exact, remark))
+    Some((exact, turned))
 }
 
 /// If the last joint of `axes` is prismatic: returns its axis, and the last earlier axis that has a fixed angle to the

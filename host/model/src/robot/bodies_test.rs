@@ -266,3 +266,42 @@ fn links_that_a_urdf_is_written_with_are_bodies_or_named() {
         }
     }
 }
+
+/// An arm whose angles have four decimals, and whose links have no inertia, is told in one note of each kind.
+#[test]
+fn rounded_angles_and_massless_links_are_one_note_each() {
+    let mut text = "<robot name='r'><link name='l0'/>".to_owned();
+    for k in 1..=6 {
+        let tilt = if k % 2 == 0 { "1.5708" } else { "-1.5708" };
+        text += &format!(
+            "<link name='l{k}'/><joint name='j{k}' type='continuous'><parent link='l{}'/><child link='l{k}'/><origin xyz='0 0.1 0.3' rpy='{tilt} 0 0'/><axis xyz='0 0 1'/></joint>\n",
+            k - 1
+        );
+    }
+    text += "</robot>";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    std::fs::write(&path, text).unwrap();
+    let read = Description::load(&path).unwrap();
+    let [angles, massless] = read.notes.as_slice() else {
+        unreachable!("{:?}", read.notes)
+    };
+    assert!(
+        angles.contains(
+            "the axes of joints `j1`, `j2`, `j3`, `j4`, `j5` and `j6` are up to 3.7e-6 rad off"
+        ),
+        "{angles}"
+    );
+    assert!(
+        massless.starts_with("Links `l1`, `l2`, `l3`, `l4`, `l5` and `l6`, moved by joints `j1`"),
+        "{massless}"
+    );
+    // They are remarks, too; the last massless link asks for a decision and is no note.
+    assert!(read.notes.iter().all(|own| read.remarks.contains(own)));
+    let others = read.remarks.iter().filter(|own| !read.notes.contains(own));
+    let others: Vec<&String> = others.collect();
+    assert!(
+        others.len() == 1 && others[0].contains("the last link `l6` has no mass"),
+        "{others:?}"
+    );
+}

@@ -49,6 +49,8 @@ pub struct Description {
     pub urdf: Option<Original>,
     /// Remarks for the user, one sentence each.
     pub remarks: Vec<String>,
+    /// Those of the remarks that need no action.
+    pub notes: Vec<String>,
 }
 
 impl Description {
@@ -91,6 +93,7 @@ impl Description {
                 remarks,
                 robot,
                 urdf: None,
+                notes: Vec::new(),
             });
         }
         if mjcf::is_mjcf(&text) {
@@ -106,12 +109,15 @@ impl Description {
             )
         }));
         remarks.extend(robot.implausible_bodies(Some(&original)));
+        let mut notes = original.notes().to_vec();
+        notes.extend(robot.massless_bodies(Some(&original)));
         remarks.extend(robot.limits_in_degrees());
         remarks.extend(robot.unlikely_values());
         Ok(Self {
             robot,
             urdf: Some(original),
             remarks,
+            notes,
         })
     }
 }
@@ -127,11 +133,14 @@ impl Description {
         let mut remarks = chain.remarks;
         remarks.extend(converted.remarks);
         remarks.extend(robot.implausible_bodies(None));
+        let mut notes = converted.notes;
+        notes.extend(robot.massless_bodies(None));
         remarks.extend(robot.unlikely_values());
         Ok(Self {
             robot,
             urdf: None,
             remarks,
+            notes,
         })
     }
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::angles::{angle_about, squared_poses, squared_theta};
+use super::angles::{angle_about, squared_poses, squared_theta, told};
 use super::drive::Drive;
 use super::flange::Flange;
 use super::frame::step;
@@ -31,8 +31,10 @@ pub(super) struct Converted {
     pub base: Isometry3<f64>,
     /// Pose of each body's own frame (the frame of the link that its joint moves) in frame i.
     pub links: Vec<Isometry3<f64>>,
-    /// Angles that were replaced, one sentence each.
+    /// Angles that were replaced and frames that lie far away, one sentence for each kind.
     pub remarks: Vec<String>,
+    /// Those of the remarks that need no action.
+    pub notes: Vec<String>,
 }
 
 /// A line in the base link's frame.
@@ -96,7 +98,8 @@ fn base_frame(first: Line) -> Isometry3<f64> {
 
 /// Converts a URDF chain. Never fails: every chain of axes has such frames.
 pub(super) fn convert(chain: &Chain) -> Converted {
-    let (poses, mut remarks) = squared_poses(chain);
+    let (poses, mut turned) = squared_poses(chain);
+    let mut remarks = Vec::new();
     let reach: f64 = chain
         .bodies
         .iter()
@@ -138,10 +141,10 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         };
         let mut theta = snap_angle(angle_about(x_before, x, z));
         if body.kind == JointKind::Prismatic
-            && let Some((exact, remark)) = squared_theta(&chain.file, body, theta)
+            && let Some((exact, joint)) = squared_theta(&chain.file, body, theta)
         {
             theta = exact;
-            remarks.extend(remark);
+            turned.extend(joint);
         }
         let d = snap_length((origin - foot).dot(&z));
         if a.abs().max(d.abs()) > FAR * reach {
@@ -163,11 +166,14 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         flange: Flange::of(&(links.last().copied().unwrap_or_default() * chain.tip)),
         ..Robot::new(&chain.name, joints)
     };
+    let notes = told(&chain.file, turned);
+    remarks.extend(notes.iter().cloned());
     Converted {
         robot,
         base,
         links,
         remarks,
+        notes,
     }
 }
 

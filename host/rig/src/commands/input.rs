@@ -89,7 +89,10 @@ pub(crate) fn described(
 ) -> Result<Description, CommandError> {
     let description = Description::load_chain(path, &chain.choice())?;
     for remark in &description.remarks {
-        ui.warn(remark);
+        match description.notes.contains(remark) {
+            true => ui.note(remark),
+            false => ui.warn(remark),
+        }
     }
     Ok(description)
 }

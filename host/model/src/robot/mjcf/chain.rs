@@ -229,6 +229,7 @@ impl<'t, 'a> Selected<'t, 'a> {
             tip_link: String::new(),
             beyond_tip: Vec::new(),
             remarks: remark.into_iter().collect(),
+            notes: Vec::new(),
         })
     }
 }

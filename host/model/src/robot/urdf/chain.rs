@@ -50,4 +50,6 @@ pub(in crate::robot) struct Chain {
     pub beyond_tip: Vec<String>,
     /// Remarks for the user, one sentence each.
     pub remarks: Vec<String>,
+    /// Those of the remarks that need no action.
+    pub notes: Vec<String>,
 }

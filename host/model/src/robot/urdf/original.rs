@@ -60,6 +60,7 @@ impl Original {
         let converted = convert(&chain);
         check_units(&chain, &converted.robot, path)?;
         chain.remarks.extend(converted.remarks);
+        chain.notes.extend(converted.notes);
         // Written files have the declarations: edits are places in this text.
         let text = declared(&text).text.into_owned();
         Ok(Self {
@@ -79,6 +80,11 @@ impl Original {
     /// Returns the remarks on the file, one sentence each.
     pub fn remarks(&self) -> &[String] {
         &self.chain.remarks
+    }
+
+    /// Returns those of the remarks that need no action.
+    pub fn notes(&self) -> &[String] {
+        &self.chain.notes
     }
 
     /// Returns the chain as it was read.

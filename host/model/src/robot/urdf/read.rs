@@ -34,7 +34,11 @@ pub(in crate::robot) fn read(
         remarks: RefCell::new(remark.into_iter().collect()),
         unknown: RefCell::default(),
     };
-    reader.chain(choice)
+    let notes = reader.remarks.borrow().clone();
+    Ok(Chain {
+        notes,
+        ..reader.chain(choice)?
+    })
 }
 
 /// A movable joint of the chain with the pose of its parent link in the frame of the body before it.
@@ -262,11 +266,11 @@ impl<'a> Reader<'a> {
             tip = rigid.tip.unwrap_or_default();
             bodies.push(body);
         }
+        self.tell_unknown();
         self.last_link(&bodies);
         self.assumed(&chosen, choice, [told, merged], &used);
         Ok(Chain {
             name: root.attribute("name").unwrap_or("robot").to_owned(),
-        self.tell_unknown();
             file: self.path.display().to_string(),
             base: selection.root.to_owned(),
             bodies,
@@ -274,6 +278,7 @@ impl<'a> Reader<'a> {
             tip_link: selection.tip.to_owned(),
             beyond_tip: chosen.beyond_tip(self)?,
             remarks: self.remarks.take(),
+            notes: Vec::new(),
         })
     }
 
