@@ -7,6 +7,7 @@ mod finding;
 mod limits;
 mod links;
 mod motion;
+mod scale;
 mod shapes;
 
 use std::cell::RefCell;
@@ -38,8 +39,8 @@ pub fn audit(
         path,
         document: &document,
         remarks: RefCell::default(),
-    };
         unknown: RefCell::default(),
+    };
     let tree = reader.tree()?;
     let mut audit = Audit::default();
     let bodies = links::bodies(&reader, &tree)?;
@@ -48,11 +49,14 @@ pub fn audit(
     links::massless(&mut audit, &tree, &bodies, &reader);
     links::copies(&mut audit, &bodies);
     shapes::shapes(&mut audit, &reader, &tree, &bodies)?;
+    scale::lengths(&mut audit, &reader, &tree, &bodies)?;
     limits::limits(&mut audit, &reader, &tree)?;
     match read(text, path, choice) {
         Ok(chain) => {
             let places: Vec<_> = chain.bodies.iter().map(|body| body.place).collect();
-            motion::inertia_matrices(&mut audit, &convert(&chain).robot, &places, seed);
+            let robot = convert(&chain).robot;
+            motion::inertia_matrices(&mut audit, &robot, &places, seed);
+            scale::gravity(&mut audit, &robot, &places, seed);
         }
         Err(why) => audit.unchecked.push(format!(
             "The inertia matrix was not checked, for no chain could be read: {why}."

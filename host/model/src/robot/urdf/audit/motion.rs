@@ -27,6 +27,16 @@ fn range(joint: &Joint) -> [f64; 2] {
     }
 }
 
+/// Draws a pose within the position limits.
+pub(super) fn pose(robot: &Robot, rng: &mut Pcg64) -> Vec<f64> {
+    let ranges = robot.joints.iter().map(range);
+    let drawn = ranges.map(|[low, high]| match low < high {
+        true => rng.random_range(low..high),
+        false => low,
+    });
+    drawn.collect()
+}
+
 /// Checks that the inertia matrix of a chain is positive definite at poses drawn with `seed`. `places`: where each joint
 /// stands.
 pub(super) fn inertia_matrices(audit: &mut Audit, robot: &Robot, places: &[Place], seed: u64) {
@@ -42,15 +52,7 @@ pub(super) fn inertia_matrices(audit: &mut Audit, robot: &Robot, places: &[Place
     let (mut bad, mut worst): (usize, Option<(f64, usize)>) = (0, None);
     let mut out = vec![0.0; n * n];
     for _ in 0..POSES {
-        let q: Vec<f64> = (robot.joints.iter().map(range))
-            .map(|[low, high]| {
-                if low < high {
-                    rng.random_range(low..high)
-                } else {
-                    low
-                }
-            })
-            .collect();
+        let q = pose(robot, &mut rng);
         if inertia_matrix(&chain, &parameters, &q, &mut out).is_err() {
             continue;
         }

@@ -156,6 +156,71 @@ fn each_fault_is_found_at_its_line() {
     }
 }
 
+/// A planar arm of two links: 3 kg at 0.2 m and 1.5 kg at 0.5 m of the stretched arm.
+#[test]
+fn gravity_beyond_the_effort_limit_is_found() {
+    let torque = 9.81 * (3.0 * 0.2 + 1.5 * 0.5);
+    let needs = |limit: f64| {
+        let text = SOUND
+            .replacen("effort='80'", &format!("effort='{limit}'"), 1)
+            .replacen("xyz='0.1 0 0'", "xyz='0 0 0.1'", 1);
+        let found = audited(&text).findings.into_iter();
+        found
+            .filter(|own| own.check == "gravity")
+            .collect::<Vec<_>>()
+    };
+    // The poses come within 1 % of the stretched arm, and never beyond it.
+    assert_eq!(needs(torque), []);
+    let found = needs(0.99 * torque);
+    assert!(found.len() == 1 && found[0].name == "one", "{found:?}");
+    assert_eq!(found[0].place.line, 11);
+    assert!(
+        found[0].sentence.contains("joint `one` needs up to 13.")
+            && found[0].sentence.contains("N·m against gravity"),
+        "{found:?}"
+    );
+}
+
+/// A link of 1500 kg whose centre of mass lies 100 m away on joints that are 0.4 m apart; nothing of it is drawn.
+#[test]
+fn a_wrong_scale_is_found_without_shapes() {
+    let bare = SOUND.replacen(
+        "<visual><origin xyz='0.15 0 0'/><geometry><box size='0.3 0.06 0.06'/></geometry></visual>",
+        "",
+        1,
+    );
+    let found = |text: &str, check: &str| {
+        let found = audited(text).findings.into_iter();
+        let found = found.filter(|own| own.check == check && own.place.line == 8);
+        found.map(|own| own.sentence).collect::<Vec<_>>()
+    };
+    assert_eq!(audited(&bare).findings, []);
+    let far = bare.replacen("xyz='0.1 0 0'", "xyz='100 0 0'", 1);
+    let told = found(&far, "scale");
+    assert!(
+        told.len() == 1
+            && told[0].contains("centre of mass lies 100 m from its frame")
+            && told[0].contains("were this mm, it would be 0.1"),
+        "{told:?}"
+    );
+    let wide = bare.replacen(
+        "ixx='0.002' ixy='0' ixz='0' iyy='0.011' iyz='0' izz='0.011'",
+        "ixx='1e4' ixy='0' ixz='0' iyy='1e4' iyz='0' izz='1e4'",
+        1,
+    );
+    let told = found(&wide, "scale");
+    assert!(
+        told.len() == 1 && told[0].contains("radius of gyration is 100 m"),
+        "{told:?}"
+    );
+    let heavy = bare.replacen("mass value='1.5'", "mass value='1500'", 1);
+    let told = audited(&heavy).findings;
+    let joints: Vec<&str> = (told.iter().filter(|own| own.check == "gravity"))
+        .map(|own| own.name.as_str())
+        .collect();
+    assert_eq!(joints, ["one", "two"], "{told:?}");
+}
+
 /// A body below zero behind a sound one: the matrix fails, and the joint is named.
 #[test]
 fn an_inertia_matrix_that_moves_nothing_is_found() {
