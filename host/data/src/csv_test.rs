@@ -471,3 +471,21 @@ fn a_file_of_matlab_4_is_named() {
         );
     }
 }
+
+#[test]
+fn exact_copies_of_rows_are_left_out_and_counted() {
+    let twice = "t,q1,tau1,note\n0,0.5,-12.5,a\n0,0.5,-12.5,a\n0.001,0.25,3,b\n0.001,0.25,3,b\n0.001,0.25,3,b\n";
+    let said = "3 rows are exact copies of the row before them (same time, same values) and are left out; the first is line 3";
+    holds(twice, 2, &["column `note` holds", said]);
+    let once = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.25,3\n0.001,0.25,3\n";
+    holds(once, 2, &["1 row is an exact copy of the row before it"]);
+    // A value that differs in its last digit makes another measurement of the same time.
+    let other = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.25,3\n0.001,0.25,3.0000000000000004\n";
+    let message = read(other).unwrap_err();
+    assert!(message.contains("a.csv:4: column `t` stands still at 0.001 s"), "{message}");
+    assert!(message.contains("keep one row of each time"), "{message}");
+    // The same values at a later time are a measurement.
+    let rest = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.5,-12.5\n0.002,0.5,-12.5\n";
+    let (blocks, warnings) = read(rest).unwrap();
+    assert_eq!((blocks[0].len(), warnings.len()), (3, 0));
+}

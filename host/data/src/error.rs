@@ -158,7 +158,7 @@ pub enum DataError {
         found: String,
     },
     /// Time that does not grow.
-    #[error("{}: column `t` {}, but time must grow from row to row{hint}", place.in_file(path), not_growing(*previous, *now))]
+    #[error("{}: column `t` {}, but time must grow from row to row{hint}{}", place.in_file(path), not_growing(*previous, *now), same_time(*previous, *now))]
     TimeNotGrowing {
         /// The file.
         path: PathBuf,
@@ -243,6 +243,16 @@ fn not_growing(previous: f64, now: f64) -> String {
         format!("jumps back by {} s at {to} s", format_short(previous - now))
     } else {
         format!("jumps back from {from} to {to} s")
+    }
+}
+
+/// Says what to do about two rows of the same time, after a semicolon; empty if the time jumps back.
+fn same_time(previous: f64, now: f64) -> &'static str {
+    match now == previous {
+        true => {
+            "; its values are not those of the row before, so it is no copy of it: give each row the time of its measurement, or keep one row of each time"
+        }
+        false => "",
     }
 }
 

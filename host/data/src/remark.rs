@@ -1,5 +1,7 @@
 //! How an ambiguous file was read.
 
+use super::place::Place;
+
 /// An assumption or omission during reading; one sentence each.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Remark {
@@ -202,6 +204,20 @@ pub enum Remark {
         /// The first one.
         first: u64,
     },
+    /// Rows that repeat the row before.
+    #[error(
+        "{} left out; the first is {first}",
+        match rows {
+            1 => "1 row is an exact copy of the row before it (same time, same values) and is".to_owned(),
+            n => format!("{n} rows are exact copies of the row before them (same time, same values) and are"),
+        }
+    )]
+    Copies {
+        /// Number of rows.
+        rows: u64,
+        /// The first one.
+        first: Place,
+    },
     /// Velocities that are not numbers.
     #[error(
         "the velocity of joint \"{joint}\" is NaN in the first message: the velocities are not read"
@@ -244,6 +260,7 @@ impl Remark {
             Self::CutRow { .. } => 20,
             Self::OpenEnd { .. } => 21,
             Self::RoundedStamps { .. } => 22,
+            Self::Copies { .. } => 23,
         }
     }
 }

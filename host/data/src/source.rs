@@ -42,10 +42,21 @@ pub struct Source {
 }
 
 /// Reader of the rows of any format.
-pub(super) enum Rows {
+enum Reader {
     Csv(Box<CsvRows>),
     Messages(Box<JoinedRows>),
     Arrays(Box<TableRows>),
+}
+
+/// Rows of a recording of any format, without exact copies of the row before.
+pub(super) struct Rows {
+    reader: Reader,
+    /// Values of the last row, in the units of the file.
+    last: Vec<f64>,
+    /// Number of copies so far.
+    copies: u64,
+    /// Place of the first copy.
+    first_copy: Option<Place>,
 }
 
 impl Rows {
@@ -55,22 +66,28 @@ impl Rows {
         joints: &[String],
         mapping: &Mapping,
     ) -> Result<(Self, Header), DataError> {
-        let (rows, mut header) = match form {
+        let (reader, mut header) = match form {
             Form::Messages(files) => {
                 let (rows, header) = JoinedRows::open(path, files, joints, mapping)?;
-                (Self::Messages(Box::new(rows)), header)
+                (Reader::Messages(Box::new(rows)), header)
             }
             Form::Csv => {
                 let (rows, mut header) = CsvRows::open(path)?;
                 mapping.rename(path, &mut header)?;
-                (Self::Csv(Box::new(rows)), header)
+                (Reader::Csv(Box::new(rows)), header)
             }
             Form::Arrays(form) => {
                 let (rows, mut header) = TableRows::open(path, *form)?;
                 let renamed = mapping.rename(path, &mut header);
                 renamed.map_err(|error| error.explained(&rows.remarks()))?;
-                (Self::Arrays(Box::new(rows)), header)
+                (Reader::Arrays(Box::new(rows)), header)
             }
+        };
+        let rows = Self {
+            reader,
+            last: Vec::new(),
+            copies: 0,
+            first_copy: None,
         };
         let set = mapping.set_units(path, joints, &mut header);
         set.map_err(|error| error.explained(header.remarks.iter().chain(&rows.remarks())))?;
@@ -79,10 +96,24 @@ impl Rows {
 
     /// Returns the assumptions and omissions so far.
     pub(super) fn remarks(&self) -> Vec<Remark> {
-        match self {
-            Self::Csv(r) => r.remarks(),
-            Self::Messages(r) => r.remarks(),
-            Self::Arrays(r) => r.remarks(),
+        let mut remarks = match &self.reader {
+            Reader::Csv(r) => r.remarks(),
+            Reader::Messages(r) => r.remarks(),
+            Reader::Arrays(r) => r.remarks(),
+        };
+        remarks.extend(self.first_copy.map(|first| Remark::Copies {
+            rows: self.copies,
+            first,
+        }));
+        remarks
+    }
+
+    /// Returns the place of a row as its user finds it.
+    fn place(&self, row: u64) -> Place {
+        match &self.reader {
+            Reader::Csv(_) => Place::Line(row),
+            Reader::Messages(_) => Place::Message(row),
+            Reader::Arrays(_) => Place::Row(row),
         }
     }
 
@@ -94,15 +125,14 @@ impl Rows {
         previous: Option<f64>,
         now: f64,
     ) -> Result<(), DataError> {
-        let (place, hint) = match self {
-            Self::Csv(_) => (Place::Line(row), ""),
-            Self::Messages(r) => (Place::Message(row), r.order_hint()),
-            Self::Arrays(_) => (Place::Row(row), ""),
+        let hint = match &self.reader {
+            Reader::Messages(r) if previous.is_some_and(|before| now < before) => r.order_hint(),
+            _ => "",
         };
         match previous {
             Some(previous) if now <= previous => Err(DataError::TimeNotGrowing {
                 path: path.into(),
-                place,
+                place: self.place(row),
                 previous,
                 now,
                 hint,
@@ -122,20 +152,35 @@ impl Rows {
         row
     }
 
-    /// Reads the next row in the units of the file into `values`.
+    /// Reads the next row in the units of the file into `values`. Counts exact copies of the row before and leaves them out.
     fn next_raw(&mut self, layout: &Layout, values: &mut [f64]) -> Result<Option<u64>, DataError> {
-        match self {
-            Self::Csv(r) => r.next_row(layout, values),
-            Self::Messages(r) => r.next_row(layout, values),
-            Self::Arrays(r) => r.next_row(layout, values),
+        loop {
+            let read = match &mut self.reader {
+                Reader::Csv(r) => r.next_row(layout, values),
+                Reader::Messages(r) => r.next_row(layout, values),
+                Reader::Arrays(r) => r.next_row(layout, values),
+            };
+            let Some(row) = read? else {
+                return Ok(None);
+            };
+            // Text that is no number is NaN in both rows.
+            let is_same = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
+            let pairs = values.iter().zip(&self.last);
+            if self.last.len() != values.len() || !pairs.into_iter().all(is_same) {
+                self.last.clear();
+                self.last.extend_from_slice(values);
+                return Ok(Some(row));
+            }
+            self.copies += 1;
+            self.first_copy = self.first_copy.or(Some(self.place(row)));
         }
     }
 
     pub(super) fn bytes_read(&self) -> u64 {
-        match self {
-            Self::Csv(r) => r.bytes_read(),
-            Self::Messages(r) => r.bytes_read(),
-            Self::Arrays(r) => r.bytes_read(),
+        match &self.reader {
+            Reader::Csv(r) => r.bytes_read(),
+            Reader::Messages(r) => r.bytes_read(),
+            Reader::Arrays(r) => r.bytes_read(),
         }
     }
 }
@@ -210,6 +255,7 @@ impl Source {
                     | Remark::LeftOut { .. }
                     | Remark::CutRow { .. }
                     | Remark::OpenEnd { .. }
+                    | Remark::Copies { .. }
             )
         };
         let kept = remarks.filter(|remark| !is_late(remark));

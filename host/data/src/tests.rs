@@ -243,9 +243,9 @@ fn wrong_recordings_are_named_by_line_and_column() {
             &["jumps back from 0.1 to 0.05 s"],
         ),
         (
-            "t,q1,tau1\n0,0,0\n0.1,0,0\n0.1,0,0\n".into(),
+            "t,q1,tau1\n0,0,0\n0.1,0,0\n0.1,0,0.5\n".into(),
             "a.csv:4:",
-            &["stands still"],
+            &["stands still", "no copy of it", "keep one row of each time"],
         ),
     ];
     for (text, place, parts) in cases {

@@ -411,7 +411,7 @@ fn refused(topics: &[Topic], proposal: &mut Proposal) {
         if let Some(step) = time.first_not_growing {
             proposal.doubts.push(format!(
                 "The time of {name} stands still {} times and jumps back {} times, first in row {}; the other commands refuse that.",
-                time.repeated, time.backwards, step.row
+                time.repeated - time.copies, time.backwards, step.row
             ));
         }
         for channel in &topic.channels {

@@ -74,7 +74,11 @@ impl Topic {
     /// Adds a row at time `t`; channels without a value get none.
     pub(super) fn add(&mut self, t: f64, values: &[f64]) {
         self.rows += 1;
-        self.time.add(t, self.rows);
+        let is_same = |(channel, value): (&Channel, &f64)| {
+            *value == channel.last_row || value.is_nan() && channel.last_row.is_nan()
+        };
+        let is_copy = self.rows > 1 && self.channels.iter().zip(values).all(is_same);
+        self.time.add(t, self.rows, is_copy);
         for (channel, value) in self.channels.iter_mut().zip(values) {
             channel.add(t, *value, self.rows);
         }
@@ -157,9 +161,11 @@ pub struct Time {
     pub longest_gap: Option<Step>,
     /// Number of rows whose time is that of the row before.
     pub repeated: u64,
+    /// Number of those that also have its values: the other commands leave them out.
+    pub copies: u64,
     /// Number of rows that are earlier than the row before.
     pub backwards: u64,
-    /// The first such row, or the first repeated one.
+    /// The first such row, or the first repeated one that is no copy.
     pub first_not_growing: Option<Step>,
     /// Number of rows without a time.
     pub missing: u64,
@@ -173,7 +179,8 @@ pub struct Time {
 }
 
 impl Time {
-    fn add(&mut self, t: f64, row: u64) {
+    /// Adds the time of a row; `is_copy`: its values are those of the row before.
+    fn add(&mut self, t: f64, row: u64, is_copy: bool) {
         if !t.is_finite() {
             self.missing += 1;
             return;
@@ -193,8 +200,11 @@ impl Time {
                 self.backwards += 1;
             } else {
                 self.repeated += 1;
+                self.copies += u64::from(is_copy);
             }
-            self.first_not_growing.get_or_insert(step);
+            if step.step < 0.0 || !is_copy {
+                self.first_not_growing.get_or_insert(step);
+            }
             return;
         }
         match self.sampling {
@@ -278,6 +288,9 @@ pub struct Channel {
     pub picture: Picture,
     #[serde(skip)]
     last: f64,
+    /// Value in the row before, NaN if it had none.
+    #[serde(skip)]
+    last_row: f64,
     #[serde(skip)]
     falls: bool,
     /// Sum of squared deviations from the mean (Welford 1962).
@@ -301,6 +314,7 @@ impl Channel {
             smallest_change: None,
             picture: Picture::default(),
             last: f64::NAN,
+            last_row: f64::NAN,
             falls: false,
             squares: 0.0,
         }
@@ -323,6 +337,7 @@ impl Channel {
     }
 
     fn add(&mut self, t: f64, value: f64, row: u64) {
+        self.last_row = value;
         if t.is_finite() {
             self.picture.add(t, value);
         }

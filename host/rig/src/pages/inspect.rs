@@ -147,7 +147,13 @@ pub fn time_in_words(topic: &Topic) -> String {
     if let Some(step) = time.first_not_growing {
         words.push(format!(
             "time stands still {} times and jumps back {} times, first in row {}",
-            time.repeated, time.backwards, step.row
+            time.repeated - time.copies, time.backwards, step.row
+        ));
+    }
+    if time.copies > 0 {
+        words.push(format!(
+            "{} rows are exact copies of the row before them and left out by the other commands",
+            time.copies
         ));
     }
     if time.missing > 0 {
