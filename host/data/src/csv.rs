@@ -148,6 +148,8 @@ pub(super) struct CsvRows {
     /// Decimal point or comma, after the first number that has one.
     mark: Option<u8>,
     remarks: Vec<Remark>,
+    /// True if the first column counts the rows and is not used.
+    counts: bool,
     /// True if the last line is a row that was not returned yet: the header was in a comment before it.
     waiting: bool,
     /// Whole seconds of the first time that is a date or a time of day.
@@ -178,6 +180,7 @@ impl CsvRows {
             separator: found.separator,
             mark: None,
             remarks: found.remarks,
+            counts: found.counts,
             waiting: found.has_row,
             iso_origin: None,
             quoted: QuotedRow {
@@ -189,6 +192,7 @@ impl CsvRows {
         };
         let mut header = Header::of(found.names);
         header.line = Some(found.line);
+        header.row_units = found.units;
         Ok((rows, header))
     }
 
@@ -235,6 +239,9 @@ impl CsvRows {
             Ok(None) => self.quoted_fields(layout, values),
             found => found.map(Option::unwrap_or_default),
         };
+        if let (true, Some(number)) = (self.counts, values.first_mut()) {
+            *number = f64::NAN;
+        }
         if is_cut {
             let is_whole = matches!(found, Ok(found) if found == layout.columns.len());
             let remark = match is_whole {

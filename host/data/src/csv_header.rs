@@ -8,6 +8,10 @@ use super::error::DataError;
 use super::number::number;
 use super::remark::Remark;
 use super::time_names::is_time;
+use super::unit::Unit;
+
+/// Name of a first column that has none and counts the rows.
+pub(super) const ROW_NUMBER: &str = "(row number)";
 
 /// Separator between two columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,7 +122,52 @@ pub(super) struct FoundHeader {
     pub line: u64,
     /// True if the last line is a row, because the header was a comment.
     pub has_row: bool,
+    /// Units that the row behind the header states, one per column; empty without such a row.
+    pub units: Vec<Unit>,
+    /// True if the first column counts the rows; its name is [`ROW_NUMBER`].
+    pub counts: bool,
     pub remarks: Vec<Remark>,
+}
+
+impl FoundHeader {
+    /// Takes a row of units behind the header, which is the last line if `row` has its text.
+    fn take_units(&mut self, row: Option<&str>, lines: &mut impl Lines) -> Result<(), DataError> {
+        let ahead = match row {
+            Some(row) => Some(row.to_owned()),
+            None => lines.ahead().into_iter().next(),
+        };
+        let fields = ahead.map(|text| self.separator.split(&text));
+        let Some(fields) = fields.filter(|own| own.len() == self.names.len()) else {
+            return Ok(());
+        };
+        let units: Vec<Unit> = fields.iter().filter_map(|own| Unit::named(own)).collect();
+        if units.len() != self.names.len() {
+            return Ok(());
+        }
+        if row.is_none() {
+            while lines.next_line()? && lines.line().trim_ascii().is_empty() {}
+        }
+        self.units = units;
+        self.has_row = false;
+        let line = lines.number();
+        self.remarks.push(Remark::UnitsRow { line });
+        Ok(())
+    }
+
+    /// Names a first column that has no name and counts these rows, from any whole number on.
+    fn name_counts(&mut self, rows: &[String]) {
+        if self.names.len() < 2 || !self.names[0].is_empty() || rows.is_empty() {
+            return;
+        }
+        let number = |row: &String| self.separator.split(row).first()?.parse::<u64>().ok();
+        let numbers: Vec<Option<u64>> = rows.iter().map(number).collect();
+        let is_next = |pair: &[Option<u64>]| pair[1] == pair[0].and_then(|own| own.checked_add(1));
+        if numbers.iter().all(Option::is_some) && numbers.windows(2).all(is_next) {
+            self.names[0] = ROW_NUMBER.to_owned();
+            self.counts = true;
+            self.remarks.push(Remark::RowNumbers);
+        }
+    }
 }
 
 /// A comment line.
@@ -138,6 +187,8 @@ pub(super) fn find_header(lines: &mut impl Lines) -> Result<FoundHeader, DataErr
             1 => bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),
             _ => bytes,
         };
+        // The name of the first column may be empty.
+        let is_nameless = bytes.starts_with(b"\t");
         let bytes = bytes.trim_ascii();
         if bytes.is_empty() || (bytes.len() == 5 && bytes.starts_with(b"sep=")) {
             continue;
@@ -159,7 +210,17 @@ pub(super) fn find_header(lines: &mut impl Lines) -> Result<FoundHeader, DataErr
             });
             continue;
         }
-        return Ok(header(text, line, comment, lines.ahead()));
+        let text = match is_nameless && text.contains('\t') {
+            true => format!("\t{text}"),
+            false => text.to_owned(),
+        };
+        let mut found = header(&text, line, comment, lines.ahead());
+        let row = found.has_row.then_some(text);
+        found.take_units(row.as_deref(), lines)?;
+        let rows = row.into_iter().filter(|_| found.has_row);
+        let rows: Vec<String> = rows.chain(lines.ahead()).collect();
+        found.name_counts(&rows);
+        return Ok(found);
     }
     Err(DataError::Empty {
         path: lines.path().into(),
@@ -191,6 +252,8 @@ fn header(text: &str, line: u64, comment: Option<Comment>, mut ahead: Vec<String
                 separator: by,
                 line: comment.line,
                 has_row: true,
+                units: Vec::new(),
+                counts: false,
                 remarks: with_separator(remarks, by),
             };
         }
@@ -203,6 +266,8 @@ fn header(text: &str, line: u64, comment: Option<Comment>, mut ahead: Vec<String
         separator,
         line,
         has_row: false,
+        units: Vec::new(),
+        counts: false,
         remarks: with_separator(remarks, separator),
     }
 }

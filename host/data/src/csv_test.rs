@@ -482,10 +482,95 @@ fn exact_copies_of_rows_are_left_out_and_counted() {
     // A value that differs in its last digit makes another measurement of the same time.
     let other = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.25,3\n0.001,0.25,3.0000000000000004\n";
     let message = read(other).unwrap_err();
-    assert!(message.contains("a.csv:4: column `t` stands still at 0.001 s"), "{message}");
+    assert!(
+        message.contains("a.csv:4: column `t` stands still at 0.001 s"),
+        "{message}"
+    );
     assert!(message.contains("keep one row of each time"), "{message}");
     // The same values at a later time are a measurement.
     let rest = "t,q1,tau1\n0,0.5,-12.5\n0.001,0.5,-12.5\n0.002,0.5,-12.5\n";
     let (blocks, warnings) = read(rest).unwrap();
     assert_eq!((blocks[0].len(), warnings.len()), (3, 0));
+}
+
+#[test]
+fn a_row_of_units_is_read_as_units() {
+    let rows = "0,0.5,-12.5\n0.001,0.25,3\n";
+    let said = "line 2 holds the units of the columns";
+    holds(format!("t,q1,tau1\ns,rad,N·m\n{rows}"), 3, &[said]);
+    // Every unit is converted, also behind `;` and under a header in a comment.
+    let (q, half) = (0.5f64.to_degrees(), 0.25f64.to_degrees());
+    let text = format!("# t;q1;tau1\nms;deg;mNm\n0;{q:?};-12500\n1;{half:?};3000\n");
+    let (blocks, warnings) = read(&text).unwrap();
+    let joint = &blocks[0].joints[0];
+    assert_eq!(blocks[0].t, [0.0, 0.001]);
+    for (value, truth) in joint.q.iter().zip([0.5, 0.25]) {
+        assert!((value - truth).abs() < 1e-15);
+    }
+    for (value, truth) in joint.tau.iter().zip([-12.5, 3.0]) {
+        assert!((value - truth).abs() < 1e-12);
+    }
+    assert!(
+        warnings
+            .iter()
+            .any(|own| own == "column `q1` is converted from deg, as the row of units states"),
+        "{warnings:?}"
+    );
+    // One cell that is no unit: the row is a row.
+    let message = read(format!("t,q1,tau1\ns,rad,grad\n{rows}")).unwrap_err();
+    assert!(
+        message.contains("a.csv:2: column `t` holds \"s\""),
+        "{message}"
+    );
+    let message = read(format!("t,q1,tau1\ns,A,Nm\n{rows}")).unwrap_err();
+    assert!(
+        message.contains("states A for column `q1`, which is a unit of current"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_first_column_that_counts_the_rows_is_left_out() {
+    let said = "column 1 has no name and counts the rows";
+    for (text, copies) in [
+        (",t,q1,tau1\n0,0,0.5,-12.5\n1,0.001,0.25,3\n", 0),
+        ("\"\",t,q1,tau1\n7,0,0.5,-12.5\n8,0.001,0.25,3\n", 0),
+        // A row that was written twice is a copy, whatever its number.
+        (
+            ",t,q1,tau1\n0,0,0.5,-12.5\n1,0,0.5,-12.5\n2,0.001,0.25,3\n",
+            1,
+        ),
+    ] {
+        let (blocks, warnings) = read(text).unwrap();
+        assert_eq!(blocks[0].t, [0.0, 0.001], "{text}");
+        assert_eq!(blocks[0].joints[0].q, [0.5, 0.25], "{text}");
+        assert!(blocks[0].extra.is_empty(), "{text}");
+        assert!(warnings[0].contains(said), "{warnings:?}");
+        assert_eq!(warnings.len(), 1 + copies, "{warnings:?}");
+    }
+    let tabs = "\tt\tq1\ttau1\n0\t0\t0.5\t-12.5\n1\t0.001\t0.25\t3\n";
+    holds(tabs, 2, &[said, "columns are separated by tabs"]);
+    // Values, and no count.
+    let message = read(",t,q1,tau1\n0.3,0,0.5,-12.5\n0.1,0.001,0.25,3\n").unwrap_err();
+    assert!(message.contains("column 1 has no name"), "{message}");
+    let message = read(",t,q1,tau1\n3,0,0.5,-12.5\n5,0.001,0.25,3\n").unwrap_err();
+    assert!(message.contains("column 1 has no name"), "{message}");
+}
+
+#[test]
+fn the_header_stamp_of_rostopic_is_the_time() {
+    let rows = "1732900000000000000,0.5,-12.5\n1732900000001000000,0.25,3\n";
+    let (blocks, warnings) = read(format!("field.header.stamp,q1,tau1\n{rows}")).unwrap();
+    // Doubles resolve 256 ns in nanoseconds since 1970.
+    assert!((blocks[0].t[1] - blocks[0].t[0] - 1e-3).abs() < 3e-7);
+    assert!(
+        warnings
+            .iter()
+            .any(|own| own.contains("`field.header.stamp`")),
+        "{warnings:?}"
+    );
+    // Beside another time it is a column like any other, as `rostopic echo -p` writes it.
+    let both = "%time,field.header.stamp,q1,tau1\n0,7,0.5,-12.5\n0.001,8,0.25,3\n";
+    let (blocks, _) = read(both).unwrap();
+    assert_eq!(blocks[0].t, [0.0, 0.001]);
 }

@@ -16,6 +16,8 @@ pub(super) struct Header {
     pub line: Option<u64>,
     /// Unit of each column; `None` for that of SI. Empty if all have those of SI.
     pub units: Vec<Option<Unit>>,
+    /// Units that a row behind the header states, one per column; empty without such a row.
+    pub row_units: Vec<Unit>,
     /// Assumptions about names and units.
     pub remarks: Vec<Remark>,
     /// Reason for the missing torque, if the file could have one.

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::block::WRENCH_COLUMNS;
 use super::columns::{EffortNeed, FileColumn, Layout, Role, Signal, shown};
+use super::csv_header::ROW_NUMBER;
 use super::efforts::{Efforts, efforts};
 use super::error::{DataError, Warning};
 use super::header::Header;
@@ -60,7 +61,7 @@ pub(super) fn layout(
         if let (Some(unit), Some((signal, joint))) = (unit, signal) {
             check_unit(unit, signal, joint, label, robot).map_err(header)?;
         }
-        let keep = matches!(role, Role::None | Role::Duty(..));
+        let keep = matches!(role, Role::None | Role::Duty(..)) && name != ROW_NUMBER;
         let strict = role != Role::None || signal.is_some() || is_numeric_extra(name);
         columns.push(FileColumn {
             name: name.clone(),

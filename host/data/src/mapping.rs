@@ -10,7 +10,7 @@ use super::error::DataError;
 use super::header::Header;
 use super::joint_names::is_in_joint;
 use super::remark::Remark;
-use super::time_names::is_time;
+use super::time_names::{is_header_stamp, is_time};
 use super::unit::Unit;
 
 /// Columns of a recording that its user names, with their units. Empty by default: then the names of the file count.
@@ -172,8 +172,15 @@ impl Mapping {
         if header.names.iter().any(|name| name == "t") {
             return;
         }
-        let mut times = (0..header.names.len()).filter(|k| is_time(&header.names[*k]));
-        if let (Some(k), None) = (times.next(), times.next()) {
+        let named = |is_named: fn(&str) -> bool| -> Vec<usize> {
+            let all = 0..header.names.len();
+            all.filter(|k| is_named(&header.names[*k])).collect()
+        };
+        let mut times = named(is_time);
+        if times.is_empty() {
+            times = named(is_header_stamp);
+        }
+        if let &[k] = times.as_slice() {
             header.names[k] = "t".into();
             header.remarks.push(Remark::TimeColumn {
                 label: header.labels[k].clone(),
@@ -220,6 +227,31 @@ impl Mapping {
             let stated = Unit::stated(stem).map(|(_, unit)| unit);
             let is_unit = |unit: &Unit| of.contains(&unit.of) && !is_in_joint(stem, joints);
             let stated = stated.filter(|unit| label != name && is_unit(unit));
+            if let Some(unit) = header
+                .row_units
+                .get(k)
+                .copied()
+                .filter(|_| self.unit(name).is_none())
+            {
+                if !of.contains(&unit.of) {
+                    return Err(DataError::Mapping {
+                        message: format!(
+                            "{}: the row of units states {} for column `{label}`, which is a unit of {}; correct the row, or give the unit by --unit {name}=UNIT",
+                            path.display(),
+                            unit.name,
+                            unit.of
+                        ),
+                    });
+                }
+                header.units[k] = Some(unit);
+                if !unit.is_si() {
+                    header.remarks.push(Remark::RowUnit {
+                        label: label.clone(),
+                        unit: unit.name,
+                    });
+                }
+                continue;
+            }
             let Some(unit) = self.unit(name).or(stated) else {
                 continue;
             };

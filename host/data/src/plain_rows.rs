@@ -1,6 +1,7 @@
 //! The rows of a recording with all columns of its file, in SI units: for conversion to another format.
 
 use super::columns::Signal;
+use super::csv_header::ROW_NUMBER;
 use super::error::DataError;
 use super::source::{Rows, Source};
 use super::writer::Column;
@@ -25,13 +26,14 @@ impl<'a> PlainRows<'a> {
     pub fn open(source: &'a Source) -> Result<Self, DataError> {
         let count = source.layout.columns.len();
         let time = source.layout.time;
-        let others = (0..count).filter(|k| *k != time);
+        let is_number = |k: &usize| source.layout.columns[*k].name == ROW_NUMBER;
+        let others = (0..count).filter(|k| *k != time && !is_number(k));
         Ok(Self {
             source,
             rows: source.rows()?,
             order: std::iter::once(time).chain(others).collect(),
             values: vec![0.0; count],
-            row: vec![0.0; count],
+            row: Vec::new(),
             previous: None,
         })
     }
@@ -54,9 +56,8 @@ impl<'a> PlainRows<'a> {
         let Some(place) = self.rows.next_row(layout, &mut self.values)? else {
             return Ok(None);
         };
-        for (value, k) in self.row.iter_mut().zip(&self.order) {
-            *value = self.values[*k];
-        }
+        self.row.clear();
+        self.row.extend(self.order.iter().map(|k| self.values[*k]));
         let now = self.row.first().copied();
         self.rows
             .check_growth(self.source.path(), place, self.previous, now.unwrap_or(0.0))?;

@@ -204,6 +204,25 @@ pub enum Remark {
         /// The first one.
         first: u64,
     },
+    /// A row of units behind the header.
+    #[error("line {line} holds the units of the columns and is read as such")]
+    UnitsRow {
+        /// Its line.
+        line: u64,
+    },
+    /// A unit of a row of units that is not that of SI.
+    #[error("column `{label}` is converted from {unit}, as the row of units states")]
+    RowUnit {
+        /// Its name in the file.
+        label: String,
+        /// The unit.
+        unit: &'static str,
+    },
+    /// A first column without a name that counts the rows.
+    #[error(
+        "column 1 has no name and counts the rows, as pandas writes it without `index=False`; it is left out"
+    )]
+    RowNumbers,
     /// Rows that repeat the row before.
     #[error(
         "{} left out; the first is {first}",
@@ -261,6 +280,9 @@ impl Remark {
             Self::OpenEnd { .. } => 21,
             Self::RoundedStamps { .. } => 22,
             Self::Copies { .. } => 23,
+            Self::UnitsRow { .. } => 24,
+            Self::RowUnit { .. } => 25,
+            Self::RowNumbers => 26,
         }
     }
 }

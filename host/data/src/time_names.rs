@@ -57,6 +57,14 @@ pub(super) fn is_time(name: &str) -> bool {
     }
 }
 
+/// Returns true for the header stamp of ROS messages as `rostopic echo -p` and other converters name it
+/// (`field.header.stamp`). It is the time only of a file without another one.
+pub(super) fn is_header_stamp(name: &str) -> bool {
+    let words = words(name);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    matches!(words.as_slice(), [.., "header", "stamp"])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -127,9 +127,13 @@ fn time(topic: &Topic, proposal: &mut Proposal) {
         return;
     };
     let stated = Unit::split(name).map(|(_, unit)| unit.name);
+    let stated = stated.or(topic.time.unit);
     let guessed = likely_time(topic.time.first, topic.time.period);
     let unit = stated.or(guessed.map(|(unit, _)| unit));
     let why = match (stated, guessed) {
+        (Some(_), _) if topic.time.unit.is_some() => {
+            "its name states time, and the row of units its unit".to_owned()
+        }
         (Some(_), _) => "its name states time and unit".to_owned(),
         (None, Some((_, why))) => format!("its name states time; {why}"),
         _ => "its name states time".to_owned(),

@@ -421,3 +421,40 @@ fn a_second_time_and_a_cut_row_are_told() {
     has(&columns(&found), "t", "t", Some("ns"));
     assert!(found.proposal.is_plain && found.proposal.refusal.is_none());
 }
+
+#[test]
+fn units_rows_counts_and_copies_are_described() {
+    let found = of_text(",t,q1,tau1\n0,0,0.5,1\n1,0,0.5,1\n2,0.001,0.25,1\n3,0.002,0.5,1\n");
+    let topic = &found.topics[0];
+    let names: Vec<&str> = topic.channels.iter().map(|own| own.name.as_str()).collect();
+    assert_eq!(
+        (names.as_slice(), topic.rows),
+        (["q1", "tau1"].as_slice(), 4)
+    );
+    let time = &topic.time;
+    assert_eq!(
+        (time.repeated, time.copies, time.first_not_growing),
+        (1, 1, None)
+    );
+    assert!(found.proposal.doubts.is_empty() && found.proposal.refusal.is_none());
+    assert!(
+        found
+            .remarks
+            .iter()
+            .any(|own| own.contains("counts the rows"))
+    );
+
+    let found = of_text("t,q1,tau1\nms,deg,Nm\n0,10,1\n1,20,1\n2,30,1\n");
+    assert_eq!(found.topics[0].rows, 3);
+    assert!((found.topics[0].time.rate.unwrap() - 1000.0).abs() < 1e-9);
+    assert!(found.proposal.refusal.is_none(), "{:?}", found.proposal);
+    let columns = columns(&found);
+    has(&columns, "q1", "q1", Some("deg"));
+    has(&columns, "t", "t", Some("ms"));
+
+    let found = of_text(
+        "field.header.stamp,field.position0,field.effort0\n1732900000000000000,0.5,1\n1732900000002000128,0.25,1\n1732900000004000000,0.5,2\n",
+    );
+    assert_eq!(found.proposal.options[0], "--map t=field.header.stamp");
+    assert!(found.proposal.refusal.is_none(), "{:?}", found.proposal);
+}

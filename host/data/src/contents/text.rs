@@ -54,6 +54,13 @@ pub(super) fn text(path: &Path, advance: &mut dyn FnMut(u64)) -> Result<Text, Da
         ));
     }
     let (mut topic, time, channels) = Topic::of_table(&found.names, "column");
+    for (channel, k) in topic.channels.iter_mut().zip(&channels) {
+        if let Some(unit) = found.units.get(*k) {
+            channel.unit = Some(unit.name);
+        }
+    }
+    let unit_of_time = time.and_then(|k| found.units.get(k));
+    topic.time.unit = unit_of_time.map(|unit| unit.name);
     let mut reader = Rows {
         separator: found.separator,
         expected: found.names.len(),

@@ -7,8 +7,9 @@ use serde::{Serialize, Serializer};
 use super::names::{unit, unit_of_array};
 use super::picture::Picture;
 use super::proposal::Proposal;
+use crate::csv_header::ROW_NUMBER;
 use crate::sampling::Sampling;
-use crate::time_names::is_time;
+use crate::time_names::{is_header_stamp, is_time};
 use crate::unit::Unit;
 
 /// Number of intervals that determine the period.
@@ -55,9 +56,13 @@ impl Topic {
         names: &[String],
         of: &'static str,
     ) -> (Self, Option<usize>, Vec<usize>) {
-        let time =
-            (names.iter().position(|n| n == "t")).or_else(|| names.iter().position(|n| is_time(n)));
-        let channels: Vec<usize> = (0..names.len()).filter(|k| Some(*k) != time).collect();
+        let first = |is_named: fn(&str) -> bool| names.iter().position(|n| is_named(n));
+        let time = first(|name| name == "t")
+            .or_else(|| first(is_time))
+            .or_else(|| first(is_header_stamp));
+        let channels: Vec<usize> = (0..names.len())
+            .filter(|k| Some(*k) != time && names[*k] != ROW_NUMBER)
+            .collect();
         let mut topic = Self {
             channels: (channels.iter())
                 .map(|k| Channel::new(names[*k].clone()))
