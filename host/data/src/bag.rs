@@ -51,11 +51,20 @@ pub(super) fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     for name in names {
         // Old bags name their files with the folder in front.
         let bare = Path::new(&name).file_name().map(Path::new);
-        let places = [Some(Path::new(&name)), bare];
+        // rosbag2 with compression_mode file names what it compressed; a file that was decompressed beside it counts.
+        let plain = name.strip_suffix(".zstd").map(Path::new);
+        let plain_bare = plain.and_then(Path::file_name).map(Path::new);
+        let places = [plain, plain_bare, Some(Path::new(&name)), bare];
         let found = (places.into_iter().flatten())
             .map(|own| folder.join(own))
             .find(|own| own.is_file());
         match found {
+            Some(found) if is_compressed(&found) => {
+                return Err(wrong(format!(
+                    "rosbag2 compressed its files as a whole (zstd), which cannot be read; decompress them with `zstd -d {}` and give the folder again",
+                    folder.join("*.zstd").display()
+                )));
+            }
             Some(found) => files.push(found),
             None => {
                 return Err(wrong(format!(
@@ -65,6 +74,11 @@ pub(super) fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
         }
     }
     Ok(files)
+}
+
+/// Returns true for a file that `rosbag2` compressed as a whole.
+fn is_compressed(file: &Path) -> bool {
+    file.extension().is_some_and(|own| own == "zstd")
 }
 
 /// Returns the entries of the list `relative_file_paths`.
@@ -93,8 +107,33 @@ fn unquoted(entry: &str) -> String {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
-    use super::listed_files;
+    use super::{bag_files, listed_files};
+
+    #[test]
+    fn files_that_are_compressed_as_a_whole_are_told_with_the_command_that_helps() {
+        let folder = tempfile::tempdir().unwrap();
+        let put = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        put(
+            "metadata.yaml",
+            "rosbag2_bagfile_information:\n  compression_format: zstd\n  compression_mode: file\n  relative_file_paths:\n    - run_0.db3.zstd\n",
+        );
+        put("run_0.db3.zstd", "");
+        let message = bag_files(folder.path()).unwrap_err().to_string();
+        for words in [
+            "compressed its files as a whole",
+            "zstd -d",
+            "*.zstd",
+            "give the folder again",
+        ] {
+            assert!(message.contains(words), "{message}");
+        }
+        // Decompressed beside the listed file.
+        put("run_0.db3", "");
+        let files = bag_files(folder.path()).unwrap();
+        assert_eq!(files, [folder.path().join("run_0.db3")]);
+    }
 
     #[test]
     fn files_are_listed_in_order_whatever_the_style() {

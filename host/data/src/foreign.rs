@@ -21,7 +21,10 @@ pub enum ForeignFormat {
     )]
     Sqlite,
     /// A whole file compressed with gzip, xz, bzip2, zstd or lz4.
-    #[error("a file compressed by {0}; decompress it and give the .csv or .mcap file inside")]
+    #[error(
+        "a file compressed by {0}; decompress it (`{command} FILE`) and give the file inside",
+        command = decompressor(.0)
+    )]
     Compressed(&'static str),
     /// Office workbook.
     #[error(
@@ -93,6 +96,17 @@ pub enum ForeignFormat {
         "XML or HTML text; give the recording itself (the robot's description goes to --robot)"
     )]
     Xml,
+}
+
+/// Returns the command that decompresses a file and keeps it.
+fn decompressor(compression: &str) -> &'static str {
+    match compression {
+        "gzip" => "gzip -dk",
+        "xz" => "xz -dk",
+        "bzip2" => "bzip2 -dk",
+        "lz4" => "lz4 -d",
+        _ => "zstd -d",
+    }
 }
 
 impl ForeignFormat {
