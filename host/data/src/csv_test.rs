@@ -558,6 +558,17 @@ fn a_first_column_that_counts_the_rows_is_left_out() {
 }
 
 #[test]
+fn columns_of_another_robot_are_refused_with_the_command_that_names_them() {
+    for header in ["time,elbow_position,elbow_effort", "a,b,c", "t,q1,u1"] {
+        let message = read(format!("{header}\n0,0.5,1\n0.001,0.25,1\n")).unwrap_err();
+        assert!(
+            message.contains("a.csv` proposes the options that name them (--map, --unit)"),
+            "{message}"
+        );
+    }
+}
+
+#[test]
 fn the_header_stamp_of_rostopic_is_the_time() {
     let rows = "1732900000000000000,0.5,-12.5\n1732900000001000000,0.25,3\n";
     let (blocks, warnings) = read(format!("field.header.stamp,q1,tau1\n{rows}")).unwrap();

@@ -1,6 +1,9 @@
 //! Sources of the joints' torques: their own columns, or torques and currents of the motors.
 
+use std::path::Path;
+
 use super::columns::{EffortNeed, Role, shown};
+use super::layout::proposes;
 use rig_model::robot::Robot;
 
 /// Sources of the torques.
@@ -28,6 +31,7 @@ impl Efforts {
 
 /// Finds a source for the torque of every joint: its own column, or all motors that move it.
 pub(super) fn efforts(
+    path: &Path,
     names: &[String],
     robot: &Robot,
     need: EffortNeed,
@@ -51,7 +55,11 @@ pub(super) fn efforts(
             continue;
         }
         if let Some(gap) = sources.iter().position(Option::is_none) {
-            return Err(no_source(names, robot, j, movers[gap]));
+            return Err(format!(
+                "{}; {}",
+                no_source(names, robot, j, movers[gap]),
+                proposes(path)
+            ));
         }
         let simple = movers == [j]
             && robot.joints[j]

@@ -33,14 +33,14 @@ pub(super) fn layout(
     };
     let names = described.names.as_slice();
     let joints = robot.joints.len();
-    let time = time_column(names).map_err(header)?;
+    let time = time_column(path, names).map_err(header)?;
     check_names(names).map_err(header)?;
     let signals = signals(names, robot).map_err(header)?;
-    let from_motors = motor_positions(names, robot, joints).map_err(header)?;
+    let from_motors = motor_positions(path, names, robot).map_err(header)?;
     if let (Some(why), EffortNeed::Required) = (&described.without_effort, need) {
         return Err(header(why.clone()));
     }
-    let efforts = efforts(names, robot, need).map_err(header)?;
+    let efforts = efforts(path, names, robot, need).map_err(header)?;
     let roles = Roles {
         names,
         robot,
@@ -139,7 +139,15 @@ fn find(names: &[String], name: &str) -> Option<usize> {
     names.iter().position(|n| n == name)
 }
 
-fn time_column(names: &[String]) -> Result<usize, String> {
+/// Returns the end of a sentence on columns that are not those of the robot.
+pub(super) fn proposes(path: &Path) -> String {
+    format!(
+        "`rig inspect {}` proposes the options that name them (--map, --unit)",
+        path.display()
+    )
+}
+
+fn time_column(path: &Path, names: &[String]) -> Result<usize, String> {
     find(names, "t").ok_or_else(|| {
         let only = names.first().map_or("", String::as_str);
         let times: Vec<String> = names.iter().filter(|n| is_time(n)).cloned().collect();
@@ -150,9 +158,9 @@ fn time_column(names: &[String]) -> Result<usize, String> {
             );
         }
         let hint = if only.parse::<f64>().is_ok() {
-            "; the first line must name the columns"
+            "; the first line must name the columns".to_owned()
         } else {
-            ""
+            format!("; {}", proposes(path))
         };
         format!(
             "there is no column `t` (time in s); the columns are {}{hint}",
@@ -281,7 +289,8 @@ fn duty_scale(robot: &Robot, joint: usize) -> f64 {
 }
 
 /// Returns true if the positions are those of the motors.
-fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<bool, String> {
+fn motor_positions(path: &Path, names: &[String], robot: &Robot) -> Result<bool, String> {
+    let joints = robot.joints.len();
     let missing = |quantity: &str| -> Vec<usize> {
         (1..=joints)
             .filter(|k| !names.iter().any(|n| *n == format!("{quantity}{k}")))
@@ -314,13 +323,15 @@ fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<boo
     };
     Err(if motor.len() == joints {
         format!(
-            "there is no column `q{first}` (position of joint `{name}`, in rad or m); {unmoved}the columns are {}",
-            shown(names)
+            "there is no column `q{first}` (position of joint `{name}`, in rad or m); {unmoved}the columns are {}; {}",
+            shown(names),
+            proposes(path)
         )
     } else {
         format!(
-            "there is neither `q{first}` (position of joint `{name}`, in rad or m) nor `qm{first_motor}` (motor position, rad); the position must be given by q for every joint or by qm for every motor, and the columns are {}",
-            shown(names)
+            "there is neither `q{first}` (position of joint `{name}`, in rad or m) nor `qm{first_motor}` (motor position, rad); the position must be given by q for every joint or by qm for every motor, and the columns are {}; {}",
+            shown(names),
+            proposes(path)
         )
     })
 }

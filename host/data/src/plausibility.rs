@@ -287,7 +287,7 @@ pub enum Implausible {
         joint: usize,
     },
     /// Time in milliseconds or in a smaller unit.
-    #[error("t looks like {} (its steps are {step:.4}); give it in s", unit_of_steps(*step))]
+    #[error("t looks like {} (its steps are {step:.4}); give it in s, or --unit t={}", unit_of_steps(*step), sign_of_steps(*step))]
     NotSeconds {
         /// Median step.
         step: f64,
@@ -505,6 +505,15 @@ fn repeated(block: &Block) -> Vec<Implausible> {
             late: format_trimmed(500.0 * (rows as f64 - 1.0) / rate, 2),
         });
     positions.chain(efforts).collect()
+}
+
+/// Returns the sign of [`unit_of_steps`], as `--unit` takes it.
+pub fn sign_of_steps(step: f64) -> &'static str {
+    match unit_of_steps(step) {
+        "milliseconds" => "ms",
+        "microseconds" => "us",
+        _ => "ns",
+    }
 }
 
 /// Returns the likely time unit for steps too long for seconds, if rows come at between 5 and 5000 Hz.

@@ -16,7 +16,7 @@ use rig_data::{
 };
 use rig_diagnose::faults::faults_at_start;
 use rig_model::robot::{Description, Joint, JointKind, Robot};
-use rig_output::{Finding, format_significant, one_a_kind, worst_first};
+use rig_output::{Finding, format_significant, listed, one_a_kind, worst_first};
 
 /// The robot description.
 #[derive(Debug, ClapArgs)]
@@ -200,6 +200,35 @@ fn sentence(source: &Source, wrong: &[Implausible]) -> String {
     format!("{}: {text}.", source.path().display())
 }
 
+/// Puts the positions of a recording that look like degrees into one sentence with the option that converts them; `None` if
+/// there are none.
+fn degrees(source: &Source, robot: &Robot, wrong: &[Implausible]) -> Option<String> {
+    let is_of = |own: &&Implausible| matches!(own, Implausible::Degrees { .. });
+    let found: Vec<&Implausible> = wrong.iter().filter(is_of).collect();
+    let columns: Vec<String> = found.iter().map(|own| own.column()).collect();
+    let text = match found.as_slice() {
+        [] => return None,
+        [one] => one.to_string(),
+        [first, ..] => format!(
+            "{} look like degrees; give them in rad (for instance {first})",
+            listed(&columns)
+        ),
+    };
+    let turns = |joint: &Joint| joint.kind == JointKind::Revolute;
+    let options = match columns.len() == robot.joints.len() && robot.joints.iter().all(turns) {
+        true if columns.len() > 1 => "--unit q=deg".to_owned(),
+        _ => {
+            let options = columns.iter().map(|own| format!("--unit {own}=deg"));
+            options.collect::<Vec<_>>().join(" ")
+        }
+    };
+    let text = source.in_its_names(&text);
+    Some(format!(
+        "{}: {text}; {options} converts them.",
+        source.path().display()
+    ))
+}
+
 /// Returns true if the scale of a position or of an effort is wrong, whether or not the rows are a motion.
 fn is_scale(problem: &Implausible) -> bool {
     matches!(
@@ -326,11 +355,24 @@ impl Inputs {
                 true => Vec::new(),
                 false => faults_at_start(robot, source, JUDGED_ROWS)?,
             };
+            let is_degrees = |own: &Implausible| matches!(own, Implausible::Degrees { .. });
+            let in_degrees = degrees(source, robot, &wrong);
             if !wrong.is_empty() && !judged.iter().any(|fault| fault.certain) {
-                faults.wrong.push(sentence(source, &wrong));
+                faults.wrong.extend(in_degrees);
+                let rest: Vec<Implausible> =
+                    wrong.into_iter().filter(|own| !is_degrees(own)).collect();
+                if !rest.is_empty() {
+                    faults.wrong.push(sentence(source, &rest));
+                }
                 continue;
             }
-            for fault in judged {
+            let told: Vec<String> = (wrong.iter().filter(|own| is_degrees(own)))
+                .map(|own| format!("{own}."))
+                .collect();
+            if judged.iter().any(|fault| told.contains(&fault.text)) {
+                faults.wrong.extend(in_degrees);
+            }
+            for fault in judged.into_iter().filter(|own| !told.contains(&own.text)) {
                 let list = match (fault.certain, fault.of_description) {
                     (true, true) => &mut faults.described,
                     (true, false) => &mut faults.wrong,

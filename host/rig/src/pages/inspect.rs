@@ -147,7 +147,9 @@ pub fn time_in_words(topic: &Topic) -> String {
     if let Some(step) = time.first_not_growing {
         words.push(format!(
             "time stands still {} times and jumps back {} times, first in row {}",
-            time.repeated - time.copies, time.backwards, step.row
+            time.repeated - time.copies,
+            time.backwards,
+            step.row
         ));
     }
     if time.copies > 0 {

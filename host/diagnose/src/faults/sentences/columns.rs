@@ -3,7 +3,7 @@
 use super::{models, names};
 use crate::faults::columns::{FEWEST, LEAST_TO_JUDGE, LEAST_TO_LEARN, SHORTEST};
 use crate::faults::finding::{Finding, Short};
-use rig_data::{Implausible, unit_of_steps};
+use rig_data::{Implausible, sign_of_steps, unit_of_steps};
 use rig_model::robot::Robot;
 
 /// Returns a sentence on recordings that are too short.
@@ -43,7 +43,10 @@ fn clock(problem: &Implausible) -> String {
         return format!("{problem}.");
     };
     let unit = unit_of_steps(*step);
-    format!("t looks like {unit}: its steps are {step:.4}, where seconds would be right.")
+    let sign = sign_of_steps(*step);
+    format!(
+        "t looks like {unit}: its steps are {step:.4}, where seconds would be right; give --unit t={sign}."
+    )
 }
 
 /// Returns a sentence on the columns of the joint `j` (from 0), or on the recording.
