@@ -240,7 +240,8 @@ fn header(text: &str, line: u64, comment: Option<Comment>, mut ahead: Vec<String
             let mark = if field.contains(',') { b',' } else { b'.' };
             number(field.as_bytes(), mark).is_finite()
         };
-        let fits = row.len() == named.len() && row.iter().any(is_number);
+        let is_row = row.iter().any(is_number) || row.iter().all(|own| Unit::named(own).is_some());
+        let fits = row.len() == named.len() && is_row;
         let has_time = |names: &[String]| names.len() > 1 && names.iter().any(|n| is_time(n));
         if fits && !has_time(&names) && has_time(&named) {
             remarks.push(Remark::CommentedHeader {

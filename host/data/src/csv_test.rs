@@ -549,7 +549,7 @@ fn a_first_column_that_counts_the_rows_is_left_out() {
         assert_eq!(warnings.len(), 1 + copies, "{warnings:?}");
     }
     let tabs = "\tt\tq1\ttau1\n0\t0\t0.5\t-12.5\n1\t0.001\t0.25\t3\n";
-    holds(tabs, 2, &[said, "columns are separated by tabs"]);
+    holds(tabs, 2, &["columns are separated by tabs", said]);
     // Values, and no count.
     let message = read(",t,q1,tau1\n0.3,0,0.5,-12.5\n0.1,0.001,0.25,3\n").unwrap_err();
     assert!(message.contains("column 1 has no name"), "{message}");

@@ -242,9 +242,12 @@ fn only_what_the_other_commands_read_is_called_readable() {
     let plain = |k: usize| format!("{},{},1\n", 0.001 * k as f64, 0.1 * k as f64);
     let found = of_text(&format!("t,q1,tau1\n{}", rows(&plain)));
     assert!(found.proposal.is_plain && found.proposal.refusal.is_none());
-    // A trailing comma, the index of pandas, text between the numbers, and an odd row near the end.
-    let comma = rows(&|k| plain(k).replace('\n', ",\n"));
     let index = rows(&|k| format!("{k},{}", plain(k)));
+    let found = of_text(&format!(",t,q1,tau1\n{index}"));
+    assert!(found.proposal.is_plain && found.proposal.refusal.is_none());
+    // A trailing comma, a column without a name that counts nothing, text between the numbers, and an odd row near the end.
+    let comma = rows(&|k| plain(k).replace('\n', ",\n"));
+    let nameless = rows(&|k| format!("{},{}", 2 * k, plain(k)));
     let text = rows(&|k| plain(k).replace(",1\n", ",one\n"));
     let late = rows(&|k| {
         if k == 45 {
@@ -255,7 +258,7 @@ fn only_what_the_other_commands_read_is_called_readable() {
     });
     for (text, words) in [
         (format!("t,q1,tau1\n{comma}"), "fields"),
-        (format!(",t,q1,tau1\n{index}"), "no name"),
+        (format!(",t,q1,tau1\n{nameless}"), "no name"),
         (format!("t,q1,tau1\n{text}"), "tau1"),
         (format!("t,q1,tau1\n{late}"), "csv:47"),
     ] {
