@@ -10,6 +10,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::axes::parameters_from;
 use crate::body::body;
+use crate::cut_torque;
 use crate::error::LoadError;
 use crate::estimate::{
     CERTAIN, CONTRADICTS, Estimate, Parameters, Spread, Square, estimate, sizes_of,
@@ -60,6 +61,7 @@ pub fn identify_load(
                 without,
                 to_joint: &to_joint,
                 prepare: &options.prepare,
+                even_if_wrong: options.even_if_wrong,
             },
             sensed.as_ref().map(|(found, _)| found.values[0]),
             &mut warnings,
@@ -342,6 +344,12 @@ fn by_torque(
     warnings: &mut Vec<String>,
 ) -> Result<(Estimate, TorqueFindings), LoadError> {
     let equations = equations(driven)?;
+    let joints = &driven.robot.joints;
+    warnings.extend(cut_torque::words(
+        &equations.cut,
+        joints,
+        driven.even_if_wrong,
+    )?);
     let mut mass = mass.unwrap_or(1.0);
     let mut found = estimate(&equations.segments, mass, Spread::Segments);
     // The plausible sizes follow the mass; where torques show no mass they stay those of a kilogram.
@@ -354,7 +362,6 @@ fn by_torque(
             why: "the joint torques show none of its parameters; record a livelier motion, or a heavier load".to_owned(),
         });
     }
-    let joints = &driven.robot.joints;
     let (friction, constant) = (&equations.friction, equations.constant_friction);
     warnings.extend(load_friction::words(friction, joints, constant));
     warnings.extend(unexplained(driven, &equations));

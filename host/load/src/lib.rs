@@ -51,6 +51,7 @@ mod channels;
 mod clipping;
 mod controllers;
 mod cut_channel;
+mod cut_torque;
 mod error;
 mod estimate;
 mod faulty_rows;

@@ -19,6 +19,7 @@ use rig_model::robot::Robot;
 use rig_shared::multibody::{COLUMNS, INERTIAL_PARAMETERS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
+use crate::cut_torque::CutTorque;
 use crate::error::LoadError;
 use crate::estimate::solved;
 use crate::load_friction::{Carried, LoadFriction, growing};
@@ -43,6 +44,8 @@ pub(crate) struct Driven<'a> {
     pub to_joint: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
     /// How the recordings are prepared.
     pub prepare: &'a PrepareOptions,
+    /// True to go on if most torques of a joint are cut.
+    pub even_if_wrong: bool,
 }
 
 /// Equations of the joints, in units of their noise.
@@ -53,6 +56,8 @@ pub(crate) struct Equations {
     pub noise: Vec<Option<f64>>,
     /// Per joint, RMS that the noise of its torque leaves, N·m or N; `None` if the band leaves nothing above it.
     pub floor: Vec<Option<f64>>,
+    /// Torques that are at a limit.
+    pub cut: Vec<CutTorque>,
     /// Friction that grows with the load, where the data show it.
     pub friction: Vec<LoadFriction>,
     /// Mass of the load by a fit without such friction, kg.
@@ -180,6 +185,7 @@ pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
         return Err(LoadError::AtRest);
     }
     let constant_friction = constant.solution[0];
+    let cut = constant.cut.clone();
     let (collected, friction) = readings.beside_load_friction(constant)?;
     let segments = collected.segments();
     Ok(Equations {
@@ -187,6 +193,7 @@ pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
         segments,
         noise: collected.noise,
         floor: torque_noise(&usable, &treatment, joints)?,
+        cut,
         friction,
         constant_friction,
         plan: treatment,
@@ -204,6 +211,8 @@ struct Collected {
     noise: Vec<Option<f64>>,
     /// Values of all unknowns.
     solution: DVector<f64>,
+    /// Torques that are at a limit.
+    cut: Vec<CutTorque>,
 }
 
 impl Collected {
@@ -231,7 +240,7 @@ impl Readings<'_> {
     fn collected(&self, carried: Option<&Carried>) -> Result<Collected, LoadError> {
         let with = self.assembly.driven.with;
         let mut parts: Vec<Vec<TriangularFactor>> = Vec::new();
-        let mut samples = Vec::new();
+        let (mut samples, mut cut) = (Vec::new(), Vec::new());
         let mut squares = vec![(0.0, 0u64); carried.map_or(0, |own| own.joints.len())];
         for (k, (recording, expected)) in self.recordings.iter().enumerate() {
             let own = Kept {
@@ -239,8 +248,20 @@ impl Readings<'_> {
                 expected: *expected,
                 carried,
             };
-            let (segments, kept) =
-                (self.assembly).segments(*recording, self.plan, &own, &mut squares)?;
+            let Segmented {
+                segments,
+                samples: kept,
+                rows,
+                saturated,
+            } = (self.assembly).segments(*recording, self.plan, &own, &mut squares)?;
+            let is_cut = saturated.iter().enumerate().filter(|(_, rows)| **rows > 0);
+            cut.extend(is_cut.map(|(joint, own)| CutTorque {
+                recording: recording.label(),
+                joint,
+                limits: self.plan.treatment.saturation[joint],
+                rows: *own,
+                of: rows,
+            }));
             parts.extend(segments);
             if own.loaded {
                 samples.push((with[k].label(), kept));
@@ -255,6 +276,7 @@ impl Readings<'_> {
                 .collect(),
             noise,
             solution: DVector::zeros(self.assembly.count() + squares.len()),
+            cut,
         };
         let segments = collected.segments();
         if let Some(first) = segments.first() {
@@ -340,6 +362,18 @@ fn traces(
         .collect()
 }
 
+/// What one pass over a recording gives.
+struct Segmented {
+    /// One factor a segment and joint.
+    segments: Vec<Vec<TriangularFactor>>,
+    /// Rows for a figure.
+    samples: Vec<Sample>,
+    /// Number of rows.
+    rows: u64,
+    /// Per joint, rows whose torque is at a limit.
+    saturated: Vec<u64>,
+}
+
 /// What the rows of a recording are made of.
 struct Assembly<'a> {
     driven: &'a Driven<'a>,
@@ -380,7 +414,7 @@ impl Assembly<'_> {
         plan: &Plan,
         own: &Kept,
         squares: &mut [(f64, u64)],
-    ) -> Result<(Vec<Vec<TriangularFactor>>, Vec<Sample>), LoadError> {
+    ) -> Result<Segmented, LoadError> {
         let Kept {
             loaded, expected, ..
         } = *own;
@@ -392,7 +426,7 @@ impl Assembly<'_> {
         let mut seen = 0u64;
         let mut row = vec![0.0; count];
         let mut samples = Vec::new();
-        each_rows(recording, plan, ModelKind::Differential, &mut |rows| {
+        let tally = each_rows(recording, plan, ModelKind::Differential, &mut |rows| {
             for k in 0..rows.t.len() {
                 let place = u128::from(seen) * SEGMENTS as u128 / u128::from(expected.max(1));
                 let segment = &mut segments[(place as usize).min(SEGMENTS - 1)];
@@ -430,7 +464,12 @@ impl Assembly<'_> {
             Ok(())
         })?;
         segments.retain(|own| own.iter().any(|factor| factor.rows() > 0));
-        Ok((segments, samples))
+        Ok(Segmented {
+            segments,
+            samples,
+            rows: seen,
+            saturated: tally.saturated,
+        })
     }
 
     /// Composes a row from that of the model; returns the torque that is known.

@@ -288,3 +288,47 @@ fn a_known_mass_tells_a_torque_scale() {
         found.warnings
     );
 }
+
+/// A drive that saturates: the rows at its limit are left out and counted, and a joint that loses most of them is refused.
+#[test]
+fn torques_that_saturate_are_left_out_and_counted() {
+    let moving = Moving::new(arm(), 0.7, 21);
+    let part = tool();
+    let truth = parameters(&part)[0];
+    let both: Points = hand().into_iter().chain(part).collect();
+    let without = driven(&moving, &hand(), 0.8, 1);
+    let with = driven(&moving, &both, 0.9, 2);
+    let options = LoadOptions {
+        by: By::Torque,
+        ..LoadOptions::default()
+    };
+    let mut sorted = with.blocks[0].joints[1].tau.clone();
+    sorted.sort_by(f64::total_cmp);
+    for share in [0.2, 0.35] {
+        let rows = sorted.len();
+        let [low, high] = [share, 1.0 - share].map(|own| sorted[(own * rows as f64) as usize]);
+        let mut cut = with.clone();
+        let torques = cut.blocks[0].joints[1].tau.iter_mut();
+        torques.for_each(|tau| *tau = tau.clamp(low, high));
+        let found = identify_load(&moving.robot, &[&cut], &[&without], &options);
+        let name = &moving.robot.joints[1].name;
+        let words = format!("the torque of {name} saturates (");
+        match found {
+            Ok(found) => {
+                let said = found
+                    .warnings
+                    .iter()
+                    .find(|own| own.contains(&words))
+                    .unwrap();
+                println!("{said} {:?}", found.mass);
+                assert!(share < 0.25 && said.contains("were left out"), "{said}");
+                let off = (found.mass.value - truth) / found.mass.std;
+                assert!(off.abs() < 4.5, "{:?}", found.mass);
+            }
+            Err(error) => {
+                let text = error.to_string();
+                assert!(share > 0.25 && text.contains(&words), "{text}");
+            }
+        }
+    }
+}
