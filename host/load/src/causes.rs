@@ -11,6 +11,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::candidates::{exchanged, exchanged_and_scaled, scaled, turned};
 use crate::error::LoadError;
 use crate::mounting::{Channels, Mounting};
+use crate::pose_noise::Scatter;
 use crate::rows::LEAST_ROWS;
 use crate::selection::{Selected, selected};
 use crate::settle::{DECISIVE, settled};
@@ -24,7 +25,7 @@ const ABOUT: f64 = 2.0;
 /// Residual as a share of what the readings change by, up to which a fit counts as exact: sensors resolve no less.
 const EXACT: f64 = 1e-3;
 /// The same for recordings that tell no noise, as poses: a wrong cause leaves half of the readings or more.
-pub(crate) const EXPLAINED: f64 = 0.22;
+const EXPLAINED: f64 = 0.22;
 /// Ratio to the least residual of the forces beyond which a cause is not looked at further. Delays, leaning bases and jumps
 /// change what all causes leave.
 const HOPELESS: f64 = 10.0;
@@ -39,6 +40,8 @@ const BESIDE: f64 = 1.1;
 
 /// Probability by chance below which a gain of a channel of poses is looked at.
 const BY_CHANCE: f64 = 1e-3;
+/// Probability by chance below which the residual at rest is more than the noise of the rows of the poses.
+const BEYOND_BY_CHANCE: f64 = 1e-4;
 
 /// Why readings are not those of a load as described.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,6 +94,16 @@ pub(crate) struct Compared {
     pub causes: Vec<Tried>,
     /// Delay by the fit that is nearest to the readings so far, s.
     pub delay: Option<f64>,
+    /// Score of columns put right that explain poses; infinite if there are none.
+    pub columns: f64,
+}
+
+impl Compared {
+    /// Returns the least score of all that was compared.
+    pub(crate) fn least(&self) -> f64 {
+        let all = self.causes.iter().chain([&self.described]);
+        all.map(|own| own.score).fold(self.columns, f64::min)
+    }
 }
 
 /// Fits the equations as described, and by every cause for which they may not fit.
@@ -143,6 +156,7 @@ fn compare(
             described,
             causes: Vec::new(),
             delay,
+            columns: f64::INFINITY,
         };
     }
     let mut all = trial.causes(unknowns, sign_stated);
@@ -163,12 +177,16 @@ fn compare(
     }
     all.retain(|own| {
         own.score < described.score - DECISIVE
-            && trial.leaves_less(&own.selected.fit, &described.selected.fit)
+            && leaves_less(
+                (sensed, &own.selected.fit),
+                (sensed, &described.selected.fit),
+            )
     });
     Compared {
         causes: without_special_cases(sensed, all),
         described,
         delay,
+        columns: f64::INFINITY,
     }
 }
 
@@ -196,6 +214,7 @@ fn displaced_or_scaled(
             causes: vec![all.remove(at)],
             described,
             delay,
+            columns: f64::INFINITY,
         };
     }
     // A channel alone has one unknown, a position three. It stands for no other unit, as long as it needs no position that
@@ -213,6 +232,7 @@ fn displaced_or_scaled(
             causes: only,
             described,
             delay,
+            columns: f64::INFINITY,
         };
     }
     // A turned sensor that is found from the described rotation is a property beside the description.
@@ -231,6 +251,7 @@ fn displaced_or_scaled(
         described,
         causes,
         delay,
+        columns: f64::INFINITY,
     }
 }
 
@@ -449,17 +470,42 @@ impl Trial<'_> {
         let chance = FisherSnedecor::new(1.0, freedom).map(|f| f.sf(ratio.max(0.0)));
         chance.is_ok_and(|p| 6.0 * p < BY_CHANCE)
     }
+}
 
-    /// Returns true if a fit leaves less than another in nearly all segments of a motion that both use.
-    fn leaves_less(&self, fit: &Fit, other: &Fit) -> bool {
-        if self.sensed.recordings.iter().any(|r| r.poses) {
-            return true;
-        }
-        let [own, others] = [fit, other].map(|own| self.sensed.squares_by_segment(own));
-        let over = |s: &[f64; 2]| s[0] / fit.noise[0].powi(2) + s[1] / fit.noise[1].powi(2);
-        let pairs = own.iter().filter_map(|(at, a)| Some((a, others.get(at)?)));
-        let is_less: Vec<bool> = pairs.map(|(a, b)| over(a) < over(b)).collect();
-        let less = is_less.iter().filter(|is_less| **is_less).count();
-        less as f64 >= NEARLY_ALL * is_less.len() as f64
+/// Returns true if a fit leaves less than another in nearly all segments of a motion that both use. Each stands beside the
+/// recordings that it was made of.
+pub(crate) fn leaves_less(
+    (sensed, fit): (&Sensed, &Fit),
+    (others, other): (&Sensed, &Fit),
+) -> bool {
+    if sensed.recordings.iter().any(|r| r.poses) {
+        return true;
     }
+    let [own, others] = [(sensed, fit), (others, other)].map(|(s, f)| s.squares_by_segment(f));
+    let over = |s: &[f64; 2]| s[0] / fit.noise[0].powi(2) + s[1] / fit.noise[1].powi(2);
+    let pairs = own.iter().filter_map(|(at, a)| Some((a, others.get(at)?)));
+    let is_less: Vec<bool> = pairs.map(|(a, b)| over(a) < over(b)).collect();
+    let less = is_less.iter().filter(|is_less| **is_less).count();
+    less as f64 >= NEARLY_ALL * is_less.len() as f64
+}
+
+/// Returns how the rows of the poses of all recordings differ.
+pub(crate) fn scatter(sensed: &Sensed) -> Scatter {
+    let recordings = sensed.recordings.iter();
+    recordings.fold(Scatter::default(), |sum, own| sum.and(own.passed.scatter))
+}
+
+/// Returns true if the rows of the poses tell their noise, and the residual is no such noise of the mean readings by chance
+/// (F test).
+pub(crate) fn is_beyond_scatter(sensed: &Sensed, fit: &Fit) -> bool {
+    let Some((noise, freedom)) = scatter(sensed).noise() else {
+        return false;
+    };
+    let own = (0.5 * fit.freedom()).max(1.0);
+    let is_more = |kind: usize| {
+        let ratio = (fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2);
+        let by_chance = FisherSnedecor::new(own, freedom);
+        by_chance.is_ok_and(|all| 2.0 * all.sf(ratio) < BEYOND_BY_CHANCE)
+    };
+    is_more(0) || is_more(1)
 }

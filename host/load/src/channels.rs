@@ -226,11 +226,11 @@ pub(crate) fn judge(
             continue;
         }
         let reach = [channels[c].low, channels[c].high];
+        if let Some(range) = range {
+            refuse_beyond(recording, &channels, c, (range, sensor))?;
+        }
         for side in 0..2 {
             let reached = |range: f64| reach[side].abs() >= range;
-            if let Some(range) = range.filter(|range| reach[side].abs() > BEYOND * range) {
-                return Err(beyond(recording, c, reach[side], range));
-            }
             // Rows of one pose repeat a reading, and a reading well inside of the range is none of its ends.
             let is_cut = !poses && found[c][side].is_cut() && range.is_none_or(reached);
             if is_cut || range.is_some_and(reached) {
@@ -301,20 +301,71 @@ fn refuse_dead(recording: &dyn Recording, channels: &[Channel; 6]) -> Result<(),
     }
 }
 
-/// Says that a reading is outside of what the sensor measures.
-fn beyond(recording: &dyn Recording, c: usize, value: f64, range: f64) -> LoadError {
-    let (unit, other) = if c < 3 {
-        ("N", "kgf or mN")
-    } else {
-        ("N·m", "N·mm or N·cm")
+/// Says that the columns of all forces hold the moments.
+pub(crate) const KINDS_EXCHANGED: &str = "fx fy fz are exchanged with mx my mz";
+
+/// Units whose numbers are larger than those in N or N·m, with the factor.
+const SMALL_UNITS: [&[(&str, f64)]; 2] = [&[("mN", 1e3)], &[("N·mm", 1e3), ("N·cm", 1e2)]];
+/// Least share of its range that a sensor is used with: a unit is named only if the load is as large in it.
+const LEAST_USED: f64 = 0.01;
+/// Ratio to the described range beyond which no load is meant: the electronics of a sensor end before.
+const OVERLOADED: f64 = 10.0;
+/// Distance of the centre of mass from the sensor that no load has, m.
+const FARTHEST: f64 = 3.0;
+
+/// Returns true if forces and moments are within the ranges only if they are exchanged, and the load as recorded would be
+/// farther away than any.
+fn kinds_exchanged(channels: &[Channel; 6], sensor: &WristSensor) -> bool {
+    let [Some(force), Some(moment)] = [sensor.force_range, sensor.moment_range] else {
+        return false;
     };
-    LoadError::Fault(format!(
-        "{} reaches {} in {}, but the range of the sensor is {} {unit}: the column looks like {other}, or the range in [wrist_sensor] is wrong.",
+    let of = |kind: usize, size: &dyn Fn(&Channel) -> f64| {
+        let own = &channels[3 * kind..3 * kind + 3];
+        own.iter().map(size).fold(0.0, f64::max)
+    };
+    let reach = |channel: &Channel| channel.high.abs().max(channel.low.abs());
+    let span = |channel: &Channel| channel.high - channel.low;
+    let is_far = of(1, &span) > FARTHEST * of(0, &span);
+    is_far && of(0, &reach) <= moment && of(1, &reach) <= force
+}
+
+/// Refuses a channel that reads what the sensor does not measure.
+///
+/// # Errors
+/// [`LoadError::Fault`] with what may be meant.
+fn refuse_beyond(
+    recording: &dyn Recording,
+    channels: &[Channel; 6],
+    c: usize,
+    (range, sensor): (f64, &WristSensor),
+) -> Result<(), LoadError> {
+    let Channel { low, high, .. } = channels[c];
+    let value = if low.abs() > high.abs() { low } else { high };
+    if value.abs() <= BEYOND * range {
+        return Ok(());
+    }
+    let unit = if c < 3 { "N" } else { "N·m" };
+    let ratio = value.abs() / range;
+    let mut causes = Vec::new();
+    if kinds_exchanged(channels, sensor) {
+        causes.push(format!("{KINDS_EXCHANGED}: exchange these columns"));
+    } else {
+        if ratio <= OVERLOADED {
+            causes.push("the load exceeds the range of the sensor".to_owned());
+        }
+        let units = SMALL_UNITS[c / 3].iter();
+        let units = units.filter(|(_, factor)| (LEAST_USED..1.0).contains(&(ratio / factor)));
+        causes.extend(units.map(|(name, _)| format!("the column is in {name}")));
+        causes.push("the range in [wrist_sensor] is wrong".to_owned());
+    }
+    Err(LoadError::Fault(format!(
+        "{} reaches {} in {}, but the range of the sensor is {} {unit}: {}.",
         WRENCH_COLUMNS[c],
         format_significant(value, 4),
         recording.label(),
-        format_short(range)
-    ))
+        format_short(range),
+        causes.join(", or ")
+    )))
 }
 
 /// What one pass over a recording tells.

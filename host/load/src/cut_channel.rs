@@ -42,9 +42,7 @@ pub(crate) fn cut_channel(sensed: &Sensed, compared: &Compared) -> Option<CutCha
     if beside != plain {
         tried.push((&fit.mounting, &beside));
     }
-    let all = compared.causes.iter().chain([described]);
-    let others = all.map(|own| own.score).fold(f64::INFINITY, f64::min);
-    let mut best = (others - DECISIVE, None);
+    let mut best = (compared.least() - DECISIVE, None);
     for (mounting, unknowns) in tried {
         for channel in 0..6 {
             let without = settled(sensed, &mounting.with_gain(channel, 0.0), unknowns);

@@ -1,5 +1,6 @@
 //! Rows whose readings the load by all other rows contradicts: they are left out, and a sentence names them.
 
+use rig_data::Block;
 use rig_model::robot::WristSensor;
 
 use crate::causes::{Compared, compared, explains, score};
@@ -56,7 +57,21 @@ impl FaultyRows {
         delay: f64,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Recorded>, LoadError> {
-        let mut recordings = intake.read(delay, &places(&self.cut), warnings)?;
+        self.left_out_changed(intake, delay, warnings, &|_| {})
+    }
+
+    /// Reads the recordings as [`Self::left_out`] does, each block changed beforehand.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub(crate) fn left_out_changed(
+        &self,
+        intake: &Intake,
+        delay: f64,
+        warnings: &mut Vec<String>,
+        change: &dyn Fn(&mut Block),
+    ) -> Result<Vec<Recorded>, LoadError> {
+        let mut recordings = intake.read_changed(delay, &places(&self.cut), warnings, change)?;
         for own in &self.poses {
             own.leave_out(&mut recordings);
         }
@@ -183,8 +198,7 @@ fn odd_beside(
     let described = &compared.described;
     let own = &described.selected.fit;
     let plain = sensed.fit(&described.start, &own.unknowns.plain());
-    let all = compared.causes.iter().chain([described]);
-    let least = all.map(|own| own.score).fold(f64::INFINITY, f64::min);
+    let least = compared.least();
     for fit in [&plain, own] {
         let Some(odd) = (!sensed.is_exact(fit))
             .then(|| odd_poses(sensed, fit))

@@ -5,13 +5,12 @@ use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::PreprocessingPlan;
 use rig_model::robot::{Reads, Robot, WristSensor};
 use rig_output::{capital, format_significant, format_value, listed};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::causes::{is_beyond_scatter, scatter};
 use crate::error::LoadError;
 use crate::estimate::Estimate;
 use crate::gain_error::GainError;
 use crate::mounting::Channels;
-use crate::pose_noise::Scatter;
 use crate::statistics::{Recorded, noise_floor};
 use crate::system::{Fit, Nuisance, Sensed};
 use crate::units::{alternatives, by_lever};
@@ -185,7 +184,7 @@ impl Told<'_> {
             residual: self.fit.noise,
             share: self.sensed.share(self.fit),
             noise: noise_floor(self.sensed.recordings)
-                .or_else(|| self.scatter().noise().map(|(noise, _)| noise)),
+                .or_else(|| scatter(self.sensed).noise().map(|(noise, _)| noise)),
             gain_error: self.gain_error,
             biases,
             warming: self.sensed.warming(self.fit),
@@ -354,9 +353,12 @@ impl Told<'_> {
     pub(crate) fn not_rigid(&self, even_if_wrong: bool) -> Result<Option<String>, LoadError> {
         let are_poses = self.sensed.recordings.iter().all(|own| own.poses);
         let is_unexplained = are_poses && !self.explains;
-        let (noise, of) = match (noise_floor(self.sensed.recordings), self.scatter().noise()) {
+        let (noise, of) = match (
+            noise_floor(self.sensed.recordings),
+            scatter(self.sensed).noise(),
+        ) {
             (Some(noise), _) => (Some(noise), "noise as that above the band"),
-            (_, Some((noise, freedom))) if self.is_beyond(noise, freedom) => {
+            (_, Some((noise, _))) if is_beyond_scatter(self.sensed, self.fit) => {
                 (Some(noise), "noise by which the rows of a pose differ")
             }
             _ if is_unexplained => (None, ""),
@@ -397,23 +399,6 @@ impl Told<'_> {
             true => Err(LoadError::Fault(text)),
             false => Ok(Some(text)),
         }
-    }
-
-    /// Returns how the rows of the poses differ.
-    fn scatter(&self) -> Scatter {
-        let recordings = self.sensed.recordings.iter();
-        recordings.fold(Scatter::default(), |sum, own| sum.and(own.passed.scatter))
-    }
-
-    /// Returns true if the residual is no such noise of the mean readings of the poses by chance (F test).
-    fn is_beyond(&self, noise: [f64; 2], freedom: f64) -> bool {
-        let own = (0.5 * self.fit.freedom()).max(1.0);
-        let is_more = |kind: usize| {
-            let ratio = (self.fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2);
-            let by_chance = FisherSnedecor::new(own, freedom);
-            by_chance.is_ok_and(|all| 2.0 * all.sf(ratio) < BY_CHANCE)
-        };
-        is_more(0) || is_more(1)
     }
 
     /// Says that nothing tells the noise of poses; nothing for a motion.
@@ -493,8 +478,6 @@ fn unit_by_lever(lever: f64) -> String {
     }
 }
 
-/// Probability by chance below which the residual at rest is more than the noise of the rows of the poses.
-const BY_CHANCE: f64 = 1e-4;
 /// Share of the residual's power in one of twenty segments from which something happened in it.
 const MOST: f64 = 0.5;
 

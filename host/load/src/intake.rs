@@ -1,7 +1,8 @@
 //! The recordings of the wrist sensor: judged and surveyed once, and read as often as the equations need them.
 
+use rig_data::Block;
 use rig_data::prepare::{
-    MaybeResampled, PrepareOptions, PreprocessingPlan, Recording, Survey, as_recordings,
+    Changed, MaybeResampled, PrepareOptions, PreprocessingPlan, Recording, Survey, as_recordings,
 };
 use rig_model::robot::{Robot, WristSensor};
 use rig_output::{format_significant, listed};
@@ -11,15 +12,20 @@ use crate::axes::SensorAxes;
 use crate::channels::{Judged, judge};
 use crate::clipping::Suspect;
 use crate::error::LoadError;
+use crate::motion_sample::MotionSample;
 use crate::pace::Pace;
 use crate::poses::poses;
 use crate::rows::each_row;
+use crate::settle::DECISIVE;
 use crate::statistics::{Collector, Recorded};
 use crate::torqueless::Torqueless;
 use crate::wrench_row::WrenchRow;
 
 /// Share of the rows that may be left out because of saturation.
 pub(crate) const MOST_SATURATED: f64 = 0.5;
+
+/// Most halvings of the cut-off of the positions.
+const HALVINGS: i32 = 6;
 
 /// Recordings of the wrist sensor.
 pub(crate) struct Sensing<'a> {
@@ -68,6 +74,8 @@ pub(crate) struct Intake<'a> {
     usable: Vec<&'a dyn Recording>,
     /// Preparation of the recordings of a motion; `None` for poses.
     pub plan: Option<PreprocessingPlan>,
+    /// Plan whose band the readings keep; `None` for that of `plan`.
+    band: Option<PreprocessingPlan>,
 }
 
 impl<'a> Intake<'a> {
@@ -97,7 +105,46 @@ impl<'a> Intake<'a> {
             surveys,
             usable: as_recordings(usable),
             plan,
+            band: None,
         })
+    }
+
+    /// Lowers the cut-off of the positions as long as load and bias leave less, if that is decisively less in the end. The spectrum of a robot that hardly
+    /// moves is that of noise, which gives a high cut-off, and accelerations of noise would be taken for what moves the load.
+    /// The readings stay in their band, so all cut-offs are compared on the same readings. Returns the cut-off if it was
+    /// lowered, Hz.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub(crate) fn lower_cutoff(
+        &mut self,
+        misfit: &dyn Fn(&[Recorded]) -> f64,
+    ) -> Result<Option<f64>, LoadError> {
+        let Some(first) = self.plan.clone() else {
+            return Ok(None);
+        };
+        let of = |own: &Self| Ok::<_, LoadError>(misfit(&own.read(0.0, &[], &mut Vec::new())?));
+        let as_decided = of(self)?;
+        let mut least = as_decided;
+        self.band = Some(first.clone());
+        let mut kept = first.clone();
+        for halving in 1..=HALVINGS {
+            let plan = PreprocessingPlan {
+                cutoff: first.cutoff / f64::from(1 << halving),
+                ..first.clone()
+            };
+            self.plan = Some(plan.clone());
+            let own = of(self)?;
+            if own > least {
+                break;
+            }
+            (least, kept) = (own, plan);
+        }
+        let is_lower = least < as_decided - DECISIVE;
+        let plan = if is_lower { kept } else { first };
+        let lowered = is_lower.then_some(plan.cutoff);
+        self.plan = Some(plan);
+        Ok(lowered)
     }
 
     /// Returns what is to be said of the recordings before they are read.
@@ -124,8 +171,22 @@ impl<'a> Intake<'a> {
         cut: &[(usize, Suspect)],
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Recorded>, LoadError> {
+        self.read_changed(delay, cut, warnings, &|_| {})
+    }
+
+    /// Reads the recordings as [`Self::read`] does, each block changed beforehand.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub(crate) fn read_changed(
+        &self,
+        delay: f64,
+        cut: &[(usize, Suspect)],
+        warnings: &mut Vec<String>,
+        change: &dyn Fn(&mut Block),
+    ) -> Result<Vec<Recorded>, LoadError> {
         let sensing = self.sensing;
-        let axes = SensorAxes::of(&(sensing.robot.flange_pose() * self.sensor.pose()));
+        let axes = self.axes();
         let mut prepared = self.surveys.iter().zip(&self.usable);
         let mut recordings = Vec::new();
         let all = sensing.recordings.iter().zip(&self.judged).enumerate();
@@ -142,12 +203,17 @@ impl<'a> Intake<'a> {
                     let mut collector = Collector::new(rows, judged.length);
                     let mut take = |row: &WrenchRow| collector.push(row);
                     let read = (&ends, delay);
-                    let passed = each_row(sensing.chain, &axes, *usable, plan, read, &mut take)?;
+                    let inner = *usable;
+                    let usable = Changed { inner, change };
+                    let plans = [plan, self.band.as_ref().unwrap_or(plan)];
+                    let passed = each_row(sensing.chain, &axes, &usable, plans, read, &mut take)?;
                     (collector, passed)
                 }
                 _ => {
                     let read = (&ends, judged.pace);
-                    let (rows, passed) = self::poses(sensing.chain, &axes, *recording, read)?;
+                    let inner = *recording;
+                    let recording = Changed { inner, change };
+                    let (rows, passed) = self::poses(sensing.chain, &axes, &recording, read)?;
                     let mut collector = Collector::new(rows.len() as u64, judged.length);
                     rows.iter().for_each(|row| collector.push(row));
                     if !sensing.poses {
@@ -163,7 +229,52 @@ impl<'a> Intake<'a> {
         }
         Ok(recordings)
     }
+
+    /// Returns the model of the robot.
+    pub(crate) fn chain(&self) -> &Chain<f64> {
+        self.sensing.chain
+    }
+
+    /// Returns the robot.
+    pub(crate) fn robot(&self) -> &Robot {
+        self.sensing.robot
+    }
+
+    /// Returns the described axes of the sensor.
+    pub(crate) fn axes(&self) -> SensorAxes {
+        SensorAxes::of(&(self.sensing.robot.flange_pose() * self.sensor.pose()))
+    }
+
+    /// Reads a sample of each recording, with its name and whether the load is mounted; `None` if one of them is of poses.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub(crate) fn samples(&self) -> Result<Option<Vec<Sampled>>, LoadError> {
+        let Some(plan) = self
+            .plan
+            .as_ref()
+            .filter(|_| self.judged.iter().all(|judged| !judged.poses))
+        else {
+            return Ok(None);
+        };
+        let prepared = self.surveys.iter().zip(&self.usable);
+        let all = self
+            .sensing
+            .recordings
+            .iter()
+            .zip(&self.judged)
+            .zip(prepared);
+        let samples = all.map(|(((recording, loaded), judged), (survey, usable))| {
+            let size = (survey.rows / plan.decimation as u64, judged.length);
+            let sample = MotionSample::read(*usable, plan, &judged.ends, size)?;
+            Ok((sample, recording.label(), *loaded))
+        });
+        samples.collect::<Result<_, _>>().map(Some)
+    }
 }
+
+/// A sample of a recording, its name, and true if the load was mounted.
+pub(crate) type Sampled = (MotionSample, String, bool);
 
 /// Says that a recording was taken as poses at rest.
 fn taken_as_poses(label: &str, judged: &Judged, poses: u64) -> String {

@@ -35,7 +35,7 @@ pub(crate) struct Passed {
 }
 
 /// Streams the rows of a recording of motion. Position, regressor and readings pass the same low-pass, so that they
-/// are compared in the same band. Readings are those `delay` seconds later. Rows beside a reading outside of `ends` are
+/// are compared in the same band, that of the plan `band`; the motion is prepared by `plan`. Readings are those `delay` seconds later. Rows beside a reading outside of `ends` are
 /// left out.
 ///
 /// # Errors
@@ -44,11 +44,11 @@ pub(crate) fn each_row(
     chain: &Chain<f64>,
     axes: &SensorAxes,
     recording: &dyn Recording,
-    plan: &PreprocessingPlan,
+    [plan, band]: [&PreprocessingPlan; 2],
     (ends, delay): (&Ends, f64),
     take: &mut dyn FnMut(&WrenchRow),
 ) -> Result<Passed, LoadError> {
-    let low_pass = plan
+    let low_pass = band
         .parallel_low_pass()
         .ok_or_else(|| PrepareError::Cutoff {
             cutoff: plan.cutoff,
@@ -57,7 +57,7 @@ pub(crate) fn each_row(
         })?;
     let label = recording.label();
     let mut passed = Passed::default();
-    let mut floor = NoiseFloor::new(&low_pass, plan);
+    let mut floor = NoiseFloor::new(&low_pass, band);
     let mut start = None;
     let mut missing = None;
     each_motion(recording, plan, 0, &mut |motion| {
@@ -137,7 +137,7 @@ pub(crate) fn each_readings(
 }
 
 /// Returns the six columns of the sensor; the name of the first that is missing otherwise.
-fn readings(extra: &[(String, Vec<f64>)]) -> Result<[&[f64]; 6], &'static str> {
+pub(crate) fn readings(extra: &[(String, Vec<f64>)]) -> Result<[&[f64]; 6], &'static str> {
     let mut found: [&[f64]; 6] = [&[]; 6];
     for (to, name) in found.iter_mut().zip(WRENCH_COLUMNS) {
         *to = extra

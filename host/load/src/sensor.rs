@@ -8,17 +8,17 @@ use rig_output::{capital, format_significant, format_value};
 
 use crate::axes::parameters_from;
 use crate::causes::{Cause, Compared, Tried, compared, explains};
+use crate::changed_columns::{Columns, changed_columns};
 use crate::error::LoadError;
-use crate::estimate::{CERTAIN, Estimate, Spread, estimate};
+use crate::estimate::{CERTAIN, Estimate, Spread, Square, estimate};
 use crate::faulty_rows::FaultyRows;
 use crate::findings::{SensorFindings, Told};
 use crate::gain_error::{self, ACCURACY};
 use crate::intake::{Intake, Sensing, judged, moving};
-use crate::mounting::Channels;
-use crate::position_columns::changed_positions;
+use crate::mounting::{Channels, Mounting};
 use crate::selection::{deviation, selected};
 use crate::settle::settled;
-use crate::system::{Fit, Nuisance, Sensed};
+use crate::system::{Fit, Nuisance, Sensed, Unknowns};
 use crate::units::{alternatives, named};
 
 /// Most times that the readings are shifted by the delay found.
@@ -44,10 +44,11 @@ pub(crate) fn by_sensor(
     let moving = moving(sensing, &judged);
     let moving: Vec<&dyn Recording> = moving.iter().map(|r| r as &dyn Recording).collect();
     let (surveys, usable) = surveyed(&moving, robot.joints.len())?;
-    let intake = Intake::of(sensing, &sensor, judged, surveys, &usable)?;
+    let mut intake = Intake::of(sensing, &sensor, judged, surveys, &usable)?;
     warnings.extend(intake.notes());
     let pose = robot.flange_pose() * sensor.pose();
     let to_axes = parameters_from(&(pose.rotation.inverse() * robot.flange_pose()));
+    warnings.extend(lower_cutoff(&mut intake, &sensor, &to_axes)?);
     let (mut delay, mut shifts) = (0.0, 0);
     let mut faulty = FaultyRows::default();
     loop {
@@ -58,7 +59,15 @@ pub(crate) fn by_sensor(
             to_axes: &to_axes,
             gravity: robot.gravity.into(),
         };
-        let compared = compared(&sensed, &sensor)?;
+        let mut compared = compared(&sensed, &sensor)?;
+        // Columns that are wrong make poses that look faulty. They are compared in a motion once its delay is known.
+        let is_still = recordings.iter().all(|own| own.poses);
+        let changed =
+            |compared: &Compared| changed_columns(&intake, &faulty, &sensor, (&sensed, compared));
+        let early = is_still.then(|| changed(&compared)).transpose()?;
+        if let Some(Columns::Wrong(_, score)) = early {
+            compared.columns = score;
+        }
         if faulty.search(&intake, &sensed, &compared, (&sensor, delay))? {
             continue;
         }
@@ -70,7 +79,13 @@ pub(crate) fn by_sensor(
             shifts += 1;
             continue;
         }
-        said.extend(wrong_positions(sensing, &sensor, &sensed, &compared)?);
+        let columns = match early {
+            Some(columns) => columns,
+            None => changed_columns(&intake, &faulty, &sensor, (&sensed, &compared))?,
+        };
+        if faulty.channel(&sensed, &sensor).is_none() {
+            said.extend(wrong_columns(columns, sensing.even_if_wrong)?);
+        }
         let fitted = match faulty.channel(&sensed, &sensor) {
             Some(cut) => without_cut(&sensed, &compared, sensing, cut, &mut said)?,
             None => believed(&sensed, compared, sensing, &mut said)?,
@@ -86,6 +101,34 @@ pub(crate) fn by_sensor(
             warnings,
         );
     }
+}
+
+/// Filters the positions lower if the robot hardly moves beside their noise, and says so.
+fn lower_cutoff(
+    intake: &mut Intake,
+    sensor: &WristSensor,
+    to_axes: &Square,
+) -> Result<Option<String>, LoadError> {
+    let gravity = intake.robot().gravity.into();
+    let sign = sensor.reads.unwrap_or(Reads::Load).sign();
+    let cutoff = intake.lower_cutoff(&|recordings| {
+        let sensed = Sensed {
+            recordings,
+            to_axes,
+            gravity,
+        };
+        let unknowns = Unknowns {
+            tool: recordings.iter().any(|own| !own.loaded),
+            ..Unknowns::default()
+        };
+        sensed.fit(&Mounting::of(sign), &unknowns).misfit()
+    })?;
+    Ok(cutoff.map(|cutoff| {
+        format!(
+            "The robot hardly moves beside the noise of its positions; they were filtered at {} Hz. Record a livelier motion, or poses.",
+            format_significant(cutoff, 3)
+        )
+    }))
 }
 
 /// A fit, and what it was decided on.
@@ -169,25 +212,15 @@ fn is_accurate(tried: &Tried) -> bool {
     }
 }
 
-/// Says which error of the position columns explains poses that nothing else does.
+/// Says which error of the columns explains the readings, or explains them as well as what was found.
 ///
 /// # Errors
-/// [`LoadError::Fault`] with the columns, unless the user goes on.
-fn wrong_positions(
-    sensing: &Sensing,
-    sensor: &WristSensor,
-    sensed: &Sensed,
-    compared: &Compared,
-) -> Result<Option<String>, LoadError> {
-    let described = &compared.described;
-    let is_still = sensed.recordings.iter().all(|own| own.poses);
-    if !is_still || !compared.causes.is_empty() || explains(sensed, &described.selected.fit) {
-        return Ok(None);
-    }
-    let found = changed_positions(sensing, sensor, sensed, &described.start)?;
+/// [`LoadError::Fault`] with the columns if nothing else explains the readings, unless the user goes on.
+fn wrong_columns(found: Columns, even_if_wrong: bool) -> Result<Option<String>, LoadError> {
     match found {
-        Some(text) if !sensing.even_if_wrong => Err(LoadError::Fault(text)),
-        other => Ok(other),
+        Columns::Silent => Ok(None),
+        Columns::Wrong(text, _) if !even_if_wrong => Err(LoadError::Fault(text)),
+        Columns::Wrong(text, _) | Columns::AsGood(text) => Ok(Some(text)),
     }
 }
 

@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod causes;
+mod columns;
 mod made;
 mod sensor;
 mod torque;
