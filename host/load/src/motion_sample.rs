@@ -7,7 +7,7 @@ use rig_shared::multibody::{Chain, MultibodyError, wrench_regressor};
 use crate::axes::SensorAxes;
 use crate::error::LoadError;
 use crate::rows::{Ends, Passed, base_axes, beyond, readings};
-use crate::statistics::{Collector, Recorded};
+use crate::statistics::{Collector, Recorded, SEGMENTS};
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
 
 /// Number of rows of a sample. A load, six biases and an angle are 17 unknowns, and six readings a row leave 1800 equations.
@@ -86,7 +86,9 @@ impl MotionSample {
         (label, loaded): (String, bool),
         change: &dyn Fn(&mut [JointState], &mut [f64; 6]),
     ) -> Result<Recorded, LoadError> {
-        let mut collector = Collector::new(self.rows.len() as u64, self.length);
+        // All rows in one segment: they are fitted together, and each segment costs as much as its merger.
+        let expected = (self.rows.len() * SEGMENTS) as u64;
+        let mut collector = Collector::new(expected, self.length);
         let mut joints = Vec::new();
         for row in &self.rows {
             joints.clone_from(&row.joints);
