@@ -355,7 +355,7 @@ fn refuse_beyond(
         }
         let units = SMALL_UNITS[c / 3].iter();
         let units = units.filter(|(_, factor)| (LEAST_USED..1.0).contains(&(ratio / factor)));
-        causes.extend(units.map(|(name, _)| format!("the column is in {name}")));
+        causes.extend(units.map(|(name, _)| format!("the column looks like {name}")));
         causes.push("the range in [wrist_sensor] is wrong".to_owned());
     }
     Err(LoadError::Fault(format!(

@@ -83,23 +83,26 @@ pub(crate) fn by_sensor(
             Some(columns) => columns,
             None => changed_columns(&intake, &faulty, &sensor, (&sensed, &compared))?,
         };
-        if faulty.channel(&sensed, &sensor).is_none() {
-            said.extend(wrong_columns(columns, sensing.even_if_wrong)?);
-        }
+        let beside = match faulty.channel(&sensed, &sensor) {
+            Some(_) => None,
+            None => wrong_columns(columns, sensing.even_if_wrong)?,
+        };
         let fitted = match faulty.channel(&sensed, &sensor) {
             Some(cut) => without_cut(&sensed, &compared, sensing, cut, &mut said)?,
             None => believed(&sensed, compared, sensing, &mut said)?,
         };
         warnings.extend(said);
         warnings.extend(faulty.words(&sensed, &sensor, sensing.even_if_wrong)?);
-        return finished(
+        let found = finished(
             &sensed,
             fitted,
             sensing,
             (&sensor, delay),
             intake.plan,
             warnings,
-        );
+        )?;
+        warnings.extend(beside);
+        return Ok(found);
     }
 }
 

@@ -206,12 +206,12 @@ fn a_load_beyond_the_range_is_no_unit() {
     wide.wrist_sensor.as_mut().unwrap().force_range = Some(200.0);
     let text = said(&wide, &made([1e3, 1.0]));
     assert!(
-        text.contains("the column is in mN") && !text.contains("exceeds"),
+        text.contains("the column looks like mN") && !text.contains("exceeds"),
         "{text}"
     );
     let text = said(&moving.robot, &made([0.1, 1e3]));
     assert!(
-        text.contains("the column is in N·mm") && !text.contains("exceeds"),
+        text.contains("the column looks like N·mm") && !text.contains("exceeds"),
         "{text}"
     );
 }
