@@ -252,6 +252,14 @@ impl Layout {
     }
 }
 
+/// Returns the end of a sentence on columns that are not those of the robot.
+pub(super) fn proposes(path: &Path) -> String {
+    format!(
+        "`rig inspect {}` proposes the options that name them (--map, --unit)",
+        path.display()
+    )
+}
+
 /// Lists names of columns for a message, at most twelve.
 pub(super) fn shown(names: &[String]) -> String {
     const MOST: usize = 12;

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use super::columns::{EffortNeed, Role, shown};
-use super::layout::proposes;
+use super::columns::{EffortNeed, Role, proposes, shown};
 use rig_model::robot::Robot;
 
 /// Sources of the torques.

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::block::WRENCH_COLUMNS;
-use super::columns::{EffortNeed, FileColumn, Layout, Role, Signal, shown};
+use super::columns::{EffortNeed, FileColumn, Layout, Role, Signal, proposes, shown};
 use super::csv_header::ROW_NUMBER;
 use super::efforts::{Efforts, efforts};
 use super::error::{DataError, Warning};
@@ -137,14 +137,6 @@ fn is_numeric_extra(name: &str) -> bool {
 /// Returns the index of the column with this name.
 fn find(names: &[String], name: &str) -> Option<usize> {
     names.iter().position(|n| n == name)
-}
-
-/// Returns the end of a sentence on columns that are not those of the robot.
-pub(super) fn proposes(path: &Path) -> String {
-    format!(
-        "`rig inspect {}` proposes the options that name them (--map, --unit)",
-        path.display()
-    )
 }
 
 fn time_column(path: &Path, names: &[String]) -> Result<usize, String> {

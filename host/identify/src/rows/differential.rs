@@ -267,6 +267,11 @@ fn picks(motion: &Motion, picked: &[usize], of: fn(&JointMotion) -> &[f64]) -> V
     motion.joints.iter().map(pick).collect()
 }
 
+/// Returns the number of true entries before each place; `None` if there is none at all.
+fn marks(list: &[bool]) -> Option<Vec<u32>> {
+    list.contains(&true).then(|| running_count(list))
+}
+
 /// Returns the number of true entries before each place.
 fn running_count(list: &[bool]) -> Vec<u32> {
     std::iter::once(0)
@@ -295,8 +300,8 @@ fn kept(
         .chain(motors.iter().filter(|m| m.moves[j]).map(|m| &*m.slow))
         .map(|list| (list, running_count(list)))
         .collect();
-    let saturated_before = running_count(&joint.saturated);
-    let unsettled_before = running_count(&joint.unsettled);
+    let saturated_before = marks(&joint.saturated);
+    let unsettled_before = marks(&joint.unsettled);
     // Number of marked rows within `reach` of k, and number of rows there.
     let around = |before: &[u32], k: usize, reach: usize| {
         let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(rows));
@@ -312,9 +317,12 @@ fn kept(
                 let dwells = near == all || around(before, k, 2 * step).0 > 3 * step.max(2);
                 list[k] || dwells || around(before, k, margin).0 > 0
             });
-            let saturated = around(&saturated_before, k, step).0 > 0;
+            let any = |before: &Option<Vec<u32>>, reach: usize| {
+                (before.as_ref()).is_some_and(|before| around(before, k, reach).0 > 0)
+            };
+            let saturated = any(&saturated_before, step);
             // The low-pass spreads a wrong torque over its response.
-            let unsettled = around(&unsettled_before, k, RESPONSE * step).0 > 0;
+            let unsettled = any(&unsettled_before, RESPONSE * step);
             tally.decide(j, [saturated, unsettled, slow])
         })
         .collect()

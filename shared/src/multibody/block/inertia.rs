@@ -176,12 +176,7 @@ fn inwards<
         let Vector3([ixz, iyz, izz]) = rotate_z_back::<T, F>(s, c, Vector3([xzk, yzk, zzk]));
 
         let (f, m) = if prismatic {
-            link.wrench_back(
-                s,
-                c,
-                Vector3([T::ZERO, T::ZERO, mass]),
-                Vector3([hyk, -hxk, T::ZERO]),
-            )
+            started_slide(&link, [s, c], mass, [hxk, hyk])
         } else {
             started_turn(&link, moment_back, [ixz, iyz, izz])
         };
@@ -216,6 +211,19 @@ fn inwards<
             zz[k] = about_z;
         }
     }
+}
+
+/// Returns force and moment, in the frame before, that move the composite body at unit acceleration along its joint, from sine
+/// and cosine of the joint, its mass and first moments across the axis.
+#[inline(always)]
+fn started_slide<T: Element, F: MulAdd<T>, const TWIST: u8, const A: bool, const D: bool>(
+    link: &LinkTransform<T, F, TWIST, A, D>,
+    [s, c]: [T; 2],
+    mass: T,
+    [hx, hy]: [T; 2],
+) -> (Vector3<T>, Vector3<T>) {
+    let force = Vector3([T::ZERO, T::ZERO, mass]);
+    link.wrench_back(s, c, force, Vector3([hy, -hx, T::ZERO]))
 }
 
 /// Returns force and moment, in the frame before, that turn the composite body at unit acceleration about its joint,

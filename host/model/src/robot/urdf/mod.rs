@@ -19,6 +19,7 @@ mod spatial;
 mod transmissions;
 mod tree;
 mod unit_check;
+mod unknown_limit;
 mod values;
 mod write;
 

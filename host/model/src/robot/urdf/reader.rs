@@ -7,7 +7,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
-use super::values::Unknown;
+use super::unknown_limit::Unknown;
 use crate::robot::error::{Place, RobotError};
 use crate::robot::fault::{MAX_NUMBER, is_safe_magnitude};
 use crate::robot::right_angle::WRITTEN;
