@@ -119,6 +119,11 @@ class Surface:
         depth = self.normal @ (position - self.origin) - self.gap
         return max(0.0, self.stiffness * depth + self.damping * (self.normal @ velocity)) if depth > 0.0 else 0.0
 
+    def creeps(self, position, velocity):
+        """True if the tool is on the surface and so slow that friction is not full."""
+        slip = velocity - self.normal * (self.normal @ velocity)
+        return self.pressure(position, velocity) > 0.0 and np.linalg.norm(slip) < CREEP
+
     def force(self, position, velocity):
         """Force on the tool in the base frame."""
         pressure = self.pressure(position, velocity)
@@ -189,7 +194,8 @@ def read(path, n):
 def inverse(arm, surface, point, motion):
     """Torque that the recorded motion lacks after inverse dynamics, contact and friction within its bounds, one tick at a time.
 
-    It is a share of the largest torque of its joint: the largest share while all joints slide, and while some may rest.
+    It is a share of the largest torque of its joint: the largest share while all joints and the tool slide, and while some may
+    rest, or the tool creeps on the surface, where the friction of the surface follows its speed.
     """
     t, q, v, tau, pressed = motion
     h = t[1] - t[0]
@@ -204,10 +210,11 @@ def inverse(arm, surface, point, motion):
         middle = 0.5 * (q[k] + q[k + 1]) + h / 8.0 * (v[k] - v[k + 1])
         directions = arm.directions(middle)
         speeds = np.array([directions @ v[k], directions @ v[k + 1]])
-        force = np.zeros(arm.n)
+        force, creeps = np.zeros(arm.n), False
         for at, speed, share in ((q[k], v[k], 1.0), (middle, mean, 4.0), (q[k + 1], v[k + 1], 1.0)):
             position, jacobian = arm.tool(at, point)
             force += share / 6.0 * jacobian.T @ surface.force(position, jacobian @ speed)
+            creeps |= surface.creeps(position, jacobian @ speed)
         left = tau[k] - arm.mass(middle) @ a - arm.bias(middle, mean) + force
         left -= directions.T @ (arm.viscous * (directions @ mean))
         # Friction acts against the motion where the speed keeps its sign through the tick, and is within its bounds elsewhere.
@@ -215,7 +222,7 @@ def inverse(arm, surface, point, motion):
         low = np.where(sure & (speeds[0] > 0), arm.coulomb, -arm.coulomb)
         high = np.where(sure & (speeds[0] < 0), -arm.coulomb, arm.coulomb)
         if (sure | (arm.coulomb == 0.0)).all():
-            off, kind = left - directions.T @ low, "sliding"
+            off, kind = left - directions.T @ low, "sticking" if creeps else "sliding"
         else:
             weight = 1.0 / scale
             friction = boxed(weight[:, None] * directions.T, weight * left, low, high)

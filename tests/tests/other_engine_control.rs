@@ -177,9 +177,10 @@ fn record(name: &str, robot: &Robot, law: LawKind) -> tempfile::TempDir {
 /// Force closure, tick by tick: torque = inverse dynamics + friction + Jᵀ·force. And the same motion and force from the
 /// recorded torques.
 ///
-/// Largest values that were found with MuJoCo 4.0.0 and Pinocchio 4.1.0 (27 November 2026): 0.0031 of the largest torque
-/// where all joints slide, 0.012 where some rest, 0.0017 in 99 of 100 ticks; force 0.031 N, tool 3.1 µm. The friction of the
-/// surface at creeping speeds, which the simulation takes at the start of its step, makes most of it.
+/// Largest values that were found with MuJoCo 4.0.0 and Pinocchio 4.1.0 (29 November 2026): 0.00032 of the largest torque
+/// where all joints and the tool slide, 0.0094 where some rest or the tool creeps, 0.0022 in 99 of 100 ticks; force 0.031 N,
+/// tool 3.1 µm. The friction of the surface at creeping speeds, which the simulation takes at the start of its step, makes
+/// most of it.
 #[test]
 fn contacts_are_those_of_other_engines() {
     let Some(python) = python(Path::new(env!("CARGO_TARGET_TMPDIR"))) else {
@@ -197,7 +198,7 @@ fn contacts_are_those_of_other_engines() {
             assert!(name == "irp6" || at("inverse", "sliding_ticks") > 50.0);
             for (key, most) in [
                 ("pressed", 1e-9),
-                ("sliding", 5e-3),
+                ("sliding", 1e-3),
                 ("sticking", 2e-2),
                 ("in_99_of_100", 3e-3),
             ] {
