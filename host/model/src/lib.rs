@@ -14,7 +14,8 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let robot = Robot::from_toml(TX40, "tx40.toml".as_ref())?;
 //! let chain = Chain::new(&robot.geometry(), robot.gravity)?;
-//! let model = ModelBatch::new(&chain, &robot.standard_parameters())?;
+//! // In f64; a ModelBatch<f32> takes signals of f32.
+//! let model: ModelBatch = ModelBatch::new(&chain, &robot.standard_parameters())?;
 //! let still = vec![vec![0.0; 1000]; 6];
 //! let position = vec![vec![0.3; 1000]; 6];
 //! let mut torque = vec![0.0; 6 * 1000];
