@@ -109,22 +109,23 @@ impl<'a> Intake<'a> {
         })
     }
 
-    /// Lowers the cut-off of the positions as long as load and bias leave less, if that is decisively less in the end. The spectrum of a robot that hardly
-    /// moves is that of noise, which gives a high cut-off, and accelerations of noise would be taken for what moves the load.
-    /// The readings stay in their band, so all cut-offs are compared on the same readings. Returns the cut-off if it was
-    /// lowered, Hz.
+    /// Lowers the cut-off of the positions as long as load and bias leave less, if that is decisively less in the end and about
+    /// the noise. The spectrum of a robot that hardly moves is that of noise, which gives a high cut-off, and accelerations of
+    /// noise would be taken for what moves the load. The readings stay in their band, so all cut-offs are compared on the same
+    /// readings. `fit` returns the misfit, and true if no more than about the noise is left: positions that are wrong fit better
+    /// the less they move, and explain nothing. Returns the cut-off if it was lowered, Hz.
     ///
     /// # Errors
     /// [`LoadError`].
     pub(crate) fn lower_cutoff(
         &mut self,
-        misfit: &dyn Fn(&[Recorded]) -> f64,
+        fit: &dyn Fn(&[Recorded]) -> (f64, bool),
     ) -> Result<Option<f64>, LoadError> {
         let Some(first) = self.plan.clone() else {
             return Ok(None);
         };
-        let of = |own: &Self| Ok::<_, LoadError>(misfit(&own.read(0.0, &[], &mut Vec::new())?));
-        let as_decided = of(self)?;
+        let of = |own: &Self| Ok::<_, LoadError>(fit(&own.read(0.0, &[], &mut Vec::new())?));
+        let (as_decided, mut explained) = of(self)?;
         let mut least = as_decided;
         self.band = Some(first.clone());
         let mut kept = first.clone();
@@ -134,13 +135,13 @@ impl<'a> Intake<'a> {
                 ..first.clone()
             };
             self.plan = Some(plan.clone());
-            let own = of(self)?;
+            let (own, explains) = of(self)?;
             if own > least {
                 break;
             }
-            (least, kept) = (own, plan);
+            (least, explained, kept) = (own, explains, plan);
         }
-        let is_lower = least < as_decided - DECISIVE;
+        let is_lower = explained && least < as_decided - DECISIVE;
         let plan = if is_lower { kept } else { first };
         let lowered = is_lower.then_some(plan.cutoff);
         self.plan = Some(plan);

@@ -124,7 +124,8 @@ fn lower_cutoff(
             tool: recordings.iter().any(|own| !own.loaded),
             ..Unknowns::default()
         };
-        sensed.fit(&Mounting::of(sign), &unknowns).misfit()
+        let fit = sensed.fit(&Mounting::of(sign), &unknowns);
+        (fit.misfit(), explains(&sensed, &fit))
     })?;
     Ok(cutoff.map(|cutoff| {
         format!(
