@@ -166,7 +166,8 @@ fn send(report: &Report, transmit: &mut impl Transmit) -> bool {
     }
 }
 
-fn greeting(config: &Config) -> Greeting {
+/// Returns what a rig of this configuration says of itself.
+pub fn greeting(config: &Config) -> Greeting {
     Greeting {
         protocol: PROTOCOL_VERSION,
         schema: schema(),

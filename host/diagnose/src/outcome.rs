@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rig_data::Implausible;
 use serde::Serialize;
 
 use crate::experiment::ExperimentKind;
@@ -355,6 +356,9 @@ pub struct DataFault {
     /// True if it names an error of the description: gravity, an axis, a zero, a gear ratio, a rotor.
     #[serde(skip)]
     pub of_description: bool,
+    /// The check of the column that found it, if one did.
+    #[serde(skip)]
+    pub column: Option<Implausible>,
     /// The fault and its correction, a sentence.
     pub text: String,
 }

@@ -6,7 +6,7 @@ use rig_shared::multibody::{Chain, MultibodyError, wrench_regressor};
 
 use crate::axes::SensorAxes;
 use crate::error::LoadError;
-use crate::rows::{Ends, Passed, base_axes, beyond, readings};
+use crate::rows::{Ends, Passed, base_axes, beyond, parallel_low_pass, readings};
 use crate::statistics::{Collector, Recorded, SEGMENTS};
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
 
@@ -43,13 +43,7 @@ impl MotionSample {
         ends: &Ends,
         (expected, length): (u64, f64),
     ) -> Result<Self, LoadError> {
-        let low_pass = plan
-            .parallel_low_pass()
-            .ok_or_else(|| PrepareError::Cutoff {
-                cutoff: plan.cutoff,
-                rate: plan.sample_rate,
-                nyquist: plan.sample_rate / 2.0,
-            })?;
+        let low_pass = parallel_low_pass(plan)?;
         let step = plan.decimation as u64 * expected.div_ceil(ROWS).max(1);
         let mut rows = Vec::new();
         let mut start = None;

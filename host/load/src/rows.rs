@@ -35,8 +35,8 @@ pub(crate) struct Passed {
 }
 
 /// Streams the rows of a recording of motion. Position, regressor and readings pass the same low-pass, so that they
-/// are compared in the same band, that of the plan `band`; the motion is prepared by `plan`. Readings are those `delay` seconds later. Rows beside a reading outside of `ends` are
-/// left out.
+/// are compared in the same band, that of the plan `band`; the motion is prepared by `plan`. Readings are those `delay`
+/// seconds later. Rows beside a reading outside of `ends` are left out.
 ///
 /// # Errors
 /// [`LoadError`]: a recording that cannot be read or has no sensor.
@@ -48,13 +48,7 @@ pub(crate) fn each_row(
     (ends, delay): (&Ends, f64),
     take: &mut dyn FnMut(&WrenchRow),
 ) -> Result<Passed, LoadError> {
-    let low_pass = band
-        .parallel_low_pass()
-        .ok_or_else(|| PrepareError::Cutoff {
-            cutoff: plan.cutoff,
-            rate: plan.sample_rate,
-            nyquist: plan.sample_rate / 2.0,
-        })?;
+    let low_pass = parallel_low_pass(band)?;
     let label = recording.label();
     let mut passed = Passed::default();
     let mut floor = NoiseFloor::new(&low_pass, band);
@@ -94,6 +88,19 @@ pub(crate) fn each_row(
     })?;
     passed.noise = floor.noise();
     Ok(passed)
+}
+
+/// Returns the low-pass of the readings.
+///
+/// # Errors
+/// [`PrepareError::Cutoff`].
+pub(crate) fn parallel_low_pass(band: &PreprocessingPlan) -> Result<LowPass, PrepareError> {
+    band.parallel_low_pass()
+        .ok_or_else(|| PrepareError::Cutoff {
+            cutoff: band.cutoff,
+            rate: band.sample_rate,
+            nyquist: band.sample_rate / 2.0,
+        })
 }
 
 /// Returns the axes of the base in the axes of the last joint.

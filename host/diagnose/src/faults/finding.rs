@@ -160,6 +160,14 @@ impl Finding {
         matches!(self, Self::Fit(misfit) if misfit.is_of_description())
     }
 
+    /// Returns the check of the column that found it, if one did.
+    pub(crate) fn column(&self) -> Option<&Implausible> {
+        match self {
+            Self::Column(problem, _) => Some(problem),
+            _ => None,
+        }
+    }
+
     /// Returns the columns that it concerns.
     pub(crate) fn about(&self) -> About {
         match self {

@@ -157,6 +157,7 @@ fn told(robot: &Robot, recording: String, fault: &Fault) -> DataFault {
         joint: joint.map_or_else(String::new, |joint| joint.name.clone()),
         certain: fault.is_certain(),
         of_description: fault.finding.is_of_description(),
+        column: fault.finding.column().cloned(),
         text: sentences::of(robot, fault),
     }
 }
@@ -170,6 +171,7 @@ fn told_short((found, recording): (Short, String)) -> DataFault {
         joint: String::new(),
         certain: true,
         of_description: false,
+        column: None,
     }
 }
 

@@ -22,6 +22,7 @@ pub(crate) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
         joint: String::new(),
         certain: true,
         of_description: false,
+        column: None,
         text: error.to_string(),
     })
 }

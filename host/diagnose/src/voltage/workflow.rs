@@ -53,6 +53,7 @@ pub fn diagnose_voltage(
             joint: robot.joints[0].name.clone(),
             certain: true,
             of_description: false,
+            column: None,
             text: sentences::fault(&wrong),
         })
         .collect();

@@ -3,17 +3,21 @@
 //! A wrong factor of a joint's torques stays in the residual of a fit that all joints share. The joint's own fit is as good
 //! with the factor as without it, so its residual is the noise against which the factor is judged.
 
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
 use crate::error::IdentifyError;
 use crate::estimators::problem::Problem;
 use crate::rows::factor::TriangularFactor;
 use crate::rows::stream::each_rows;
 use crate::uncertainty::residual::LEAST_ERROR;
+use rig_model::robot::CONTRADICTED;
 use rig_numerics::autocorrelation::Autocorrelation;
 use rig_numerics::svd::Svd;
 use rig_numerics::vector::dot_in_order;
 
 /// Relative singular value below which a direction is rounding.
-const ROUNDING: f64 = 1e-9;
+pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// The fit of a joint's torque alone.
 pub(crate) struct OwnFit<'a> {
@@ -86,4 +90,28 @@ pub(crate) fn own_fits<'a>(
         .zip(&memories)
         .map(own)
         .collect())
+}
+
+/// Returns true if a sum of squares in units of the noise is as improbable as a value that counts as contradicted.
+pub(crate) fn is_contradicted(squares: f64, freedom: usize) -> bool {
+    let chance = 2.0 * Normal::standard().sf(CONTRADICTED);
+    ChiSquared::new(freedom as f64).is_ok_and(|d| d.sf(squares) < chance)
+}
+
+/// Returns orthonormal directions that span columns, whatever their sizes.
+pub(crate) fn directions(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let largest = matrix.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+    let columns: Vec<DVector<f64>> = (matrix.column_iter())
+        .filter(|c| c.norm() > ROUNDING * largest)
+        .map(|c| c.normalize())
+        .collect();
+    if columns.is_empty() {
+        return DMatrix::zeros(matrix.nrows(), 0);
+    }
+    let svd = Svd::of(DMatrix::from_columns(&columns));
+    let most = svd.singular_values.max();
+    let kept: Vec<usize> = (0..svd.singular_values.len())
+        .filter(|k| svd.singular_values[*k] > ROUNDING.sqrt() * most)
+        .collect();
+    svd.u.select_columns(&kept)
 }

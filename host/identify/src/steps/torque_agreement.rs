@@ -12,16 +12,11 @@
 //! nothing is said.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::own_fit::OwnFit;
-use super::torque_scale::directions;
+use super::own_fit::{OwnFit, ROUNDING, directions, is_contradicted};
 use crate::warning::{TorqueFactor, Warning};
 use rig_model::robot::{CONTRADICTED, Robot};
 use rig_numerics::svd::Svd;
-
-/// Relative singular value below which a direction is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// What a joint's torque shows, one row per independent direction of its own parameters, in units of its noise.
 struct Shown {
@@ -42,14 +37,14 @@ impl Shown {
 
 /// A fit of all joints with common parameters.
 struct CommonFit {
-    /// Probability of what it leaves beyond the joints' own fits.
-    chance: f64,
-    /// Value and standard deviation of the last column's coefficient.
+    /// True if it leaves more beyond the joints' own fits than noise does.
+    is_contradicted: bool,
+    /// Coefficient of the last column, which is the scaled torque if there is one, and its standard deviation.
     last: [f64; 2],
 }
 
 impl CommonFit {
-    /// Fits the joints; the torque of `scaled` has a free factor. `None` if the data do not show every column.
+    /// Fits the joints; the torque of `scaled` has a free factor. `None` if as many parameters as rows are free.
     fn of(joints: &[Shown], scaled: Option<usize>) -> Option<Self> {
         let rows: usize = joints.iter().map(|own| own.torque.len()).sum();
         let p = joints.first()?.regressor.ncols();
@@ -82,7 +77,7 @@ impl CommonFit {
         let inverse = svd.pseudo_inverse(least);
         let last = width - 1;
         Some(Self {
-            chance: ChiSquared::new(freedom as f64).map_or(1.0, |d| d.sf(squares)),
+            is_contradicted: is_contradicted(squares, freedom),
             last: [values[last], inverse.row(last).norm()].map(|v| v / sizes[last]),
         })
     }
@@ -94,13 +89,12 @@ pub(crate) fn torque_agreement(fits: &[OwnFit], robot: &Robot) -> Option<Warning
         return None;
     }
     let joints: Vec<Shown> = fits.iter().map(Shown::of).collect();
-    let chance = 2.0 * Normal::standard().sf(CONTRADICTED);
-    if CommonFit::of(&joints, None)?.chance >= chance {
+    if !CommonFit::of(&joints, None)?.is_contradicted {
         return None;
     }
     let found: Vec<TorqueFactor> = (0..joints.len())
         .filter_map(|j| {
-            let fit = CommonFit::of(&joints, Some(j)).filter(|fit| fit.chance >= chance)?;
+            let fit = CommonFit::of(&joints, Some(j)).filter(|fit| !fit.is_contradicted)?;
             let [u, std] = fit.last;
             let factor = 1.0 / (1.0 + u);
             Some(TorqueFactor {

@@ -14,21 +14,17 @@
 //! Leaves out: friction that grows with load unequally in both directions.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::own_fit::OwnFit;
+use super::own_fit::{OwnFit, ROUNDING, directions, is_contradicted};
 use crate::error::IdentifyError;
 use crate::estimators::problem::Problem;
 use crate::structure::chain::chain_of;
 use crate::warning::{TorqueScale, Warning};
 use rig_model::robot::{CONTRADICTED, Robot};
-use rig_numerics::svd::Svd;
 use rig_shared::multibody::{COLUMNS, column, inverse_dynamics};
 
 /// Poses at which gravity is looked for.
 const POSES: usize = 8;
-/// Relative singular value below which a direction is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// Gravity in the torques of a joint beside inertias, friction and constants.
 struct Gravity {
@@ -193,25 +189,6 @@ impl Gravity {
     /// Returns true if a torque along some directions is farther from zero than a value that counts as contradicted.
     fn contradicted(&self, directions: &DMatrix<f64>, torque: &DVector<f64>) -> bool {
         let squares = directions.tr_mul(torque).norm_squared() / (self.std * self.std);
-        let chance = 2.0 * Normal::standard().sf(CONTRADICTED);
-        ChiSquared::new(directions.ncols() as f64).is_ok_and(|d| d.sf(squares) < chance)
+        is_contradicted(squares, directions.ncols())
     }
-}
-
-/// Returns orthonormal directions that span columns, whatever their sizes.
-pub(crate) fn directions(matrix: DMatrix<f64>) -> DMatrix<f64> {
-    let largest = matrix.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
-    let columns: Vec<DVector<f64>> = (matrix.column_iter())
-        .filter(|c| c.norm() > ROUNDING * largest)
-        .map(|c| c.normalize())
-        .collect();
-    if columns.is_empty() {
-        return DMatrix::zeros(matrix.nrows(), 0);
-    }
-    let svd = Svd::of(DMatrix::from_columns(&columns));
-    let most = svd.singular_values.max();
-    let kept: Vec<usize> = (0..svd.singular_values.len())
-        .filter(|k| svd.singular_values[*k] > ROUNDING.sqrt() * most)
-        .collect();
-    svd.u.select_columns(&kept)
 }

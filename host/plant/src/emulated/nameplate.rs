@@ -4,6 +4,7 @@ use core::f64::consts::FRAC_PI_2;
 
 use rig_firmware::config::{Config, Encoder, Rates, Settings};
 use rig_firmware::nameplate::SENSE_SETTLING_NS;
+use rig_firmware::report_sender::greeting;
 use rig_shared::compensation::{EFFECTS, Effects};
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
@@ -207,24 +208,20 @@ impl Nameplate {
 /// # Errors
 /// [`NameplateError::OtherHardware`], or as [`Nameplate::from_robot`].
 pub fn check_hardware(robot: &Robot, greeting: &Greeting) -> Result<(), NameplateError> {
-    let config = Nameplate::from_robot(robot)?.config;
-    let pairs = [
-        (
-            "encoder_counts_per_rev",
-            greeting.counts_per_motor_turn as f32,
-            config.encoder.counts_per_motor_turn as f32,
-        ),
-        ("gear_ratio", greeting.gear_ratio, config.drive.gear_ratio),
-        (
-            "torque_constant",
-            greeting.torque_constant,
-            config.drive.torque_constant,
-        ),
-    ];
+    let own = self::greeting(&Nameplate::from_robot(robot)?.config);
+    let values = |of: &Greeting| {
+        [
+            ("encoder_counts_per_rev", of.counts_per_motor_turn as f32),
+            ("gear_ratio", of.gear_ratio),
+            ("torque_constant", of.torque_constant),
+        ]
+    };
+    let pairs = values(greeting).into_iter().zip(values(&own));
+    let mut pairs = pairs.map(|((what, rig), (_, described))| (what, rig, described));
     // The firmware's build reads the same text to the same digits.
     let differ =
         |(_, rig, described): &(_, f32, f32)| !((rig - described).abs() <= 1e-6 * rig.abs());
-    match pairs.into_iter().find(differ) {
+    match pairs.find(differ) {
         None => Ok(()),
         Some((what, rig, described)) => Err(NameplateError::OtherHardware {
             joint: robot
@@ -419,17 +416,7 @@ mod tests {
     fn a_description_of_another_drive_is_refused_by_value() {
         let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
         let (config, _) = one_link();
-        let greeting = Greeting {
-            protocol: 0,
-            schema: 0,
-            firmware: Default::default(),
-            control_rate_hz: config.rates.control_hz,
-            telemetry_decimation: config.rates.telemetry_decimation,
-            estimator_decimation: config.rates.estimator_decimation,
-            counts_per_motor_turn: config.encoder.counts_per_motor_turn,
-            gear_ratio: config.drive.gear_ratio,
-            torque_constant: config.drive.torque_constant,
-        };
+        let greeting = greeting(&config);
         check_hardware(&robot, &greeting).unwrap();
         let refused = |change: &dyn Fn(&mut rig_model::robot::Drive)| {
             let mut robot = robot.clone();

@@ -387,6 +387,7 @@ pub(super) fn data_fault() -> Diagnosis {
             joint: "link".into(),
             certain: true,
         of_description: false,
+        column: None,
             text: "Over the whole recording the motor takes energy from the link that nothing puts in; the sign of i1 or of q1 is turned round.".into(),
         }],
         ..empty(Verdict::DataFault, &["train.csv says that the motor brakes whenever it should drive."])

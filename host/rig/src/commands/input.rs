@@ -366,13 +366,14 @@ impl Inputs {
                 }
                 continue;
             }
-            let told: Vec<String> = (wrong.iter().filter(|own| is_degrees(own)))
-                .map(|own| format!("{own}."))
-                .collect();
-            if judged.iter().any(|fault| told.contains(&fault.text)) {
+            // One sentence for all joints stands for those of each.
+            let (told, judged): (Vec<_>, Vec<_>) = judged.into_iter().partition(|fault| {
+                in_degrees.is_some() && fault.column.as_ref().is_some_and(is_degrees)
+            });
+            if !told.is_empty() {
                 faults.wrong.extend(in_degrees);
             }
-            for fault in judged.into_iter().filter(|own| !told.contains(&own.text)) {
+            for fault in judged {
                 let list = match (fault.certain, fault.of_description) {
                     (true, true) => &mut faults.described,
                     (true, false) => &mut faults.wrong,

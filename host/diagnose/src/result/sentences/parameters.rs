@@ -131,30 +131,27 @@ pub(crate) fn offsets(context: &DiagnosisContext, after: &Solution) -> Option<St
 
 /// Warns of names in `[uncertainty]` that are no base parameters; `None` without any.
 pub(crate) fn unknown_uncertainty(names: &[&str]) -> Option<String> {
-    let [first, rest @ ..] = names else {
-        return None;
-    };
-    let more = match rest.len() {
-        0 => String::new(),
-        count => format!(" and {count} more"),
-    };
     Some(format!(
-        "[uncertainty] of the description has `{first}`{more}, which this robot does not have as a base parameter: it was not used. If the joints, the geometry or the drives were changed by hand, remove the table or identify again (`rig identify`)."
+        "[uncertainty] of the description has {}, which this robot does not have as a base parameter: it was not used. If the joints, the geometry or the drives were changed by hand, remove the table or identify again (`rig identify`).",
+        first_of(names, "names")?
     ))
 }
 
 /// Warns of base parameters that `[uncertainty]` leaves out; `None` without any.
 pub(crate) fn exact(names: &[&str]) -> Option<String> {
-    let [first, rest @ ..] = names else {
-        return None;
-    };
-    let more = match rest.len() {
-        0 => String::new(),
-        count => format!(" and {count} more base parameters"),
-    };
     Some(format!(
-        "[uncertainty] of the description has nothing for `{first}`{more}: the described value counts as exact, so a small difference is told as a change."
+        "[uncertainty] of the description has nothing for {}: the described value counts as exact, so a small difference is told as a change.",
+        first_of(names, "base parameters")?
     ))
+}
+
+/// Returns the first of some names and the number of the others, which are `what`; `None` without any.
+fn first_of(names: &[&str], what: &str) -> Option<String> {
+    let (first, others) = names.split_first()?;
+    Some(match others.len() {
+        0 => format!("`{first}`"),
+        count => format!("`{first}` and {count} more {what}"),
+    })
 }
 
 /// Warns that a spring may have taken part of a link's weight: the fitted first moment `now` and its standard deviation
