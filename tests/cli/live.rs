@@ -1,6 +1,6 @@
 //! `rig live` with the emulated rig: each kind of client, and who is refused.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Stdio};
@@ -133,6 +133,16 @@ fn socket(url: &str, headers: &[(&'static str, &str)]) -> Result<WebSocket<TcpSt
     }
 }
 
+/// The next message. A read with a timeout ends with `EINTR` if the process is halted and goes on (signal(7)).
+fn read(socket: &mut WebSocket<TcpStream>) -> Message {
+    loop {
+        match socket.read() {
+            Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => {}
+            message => return message.unwrap(),
+        }
+    }
+}
+
 /// A page, as the server sees it.
 struct Watcher {
     socket: WebSocket<TcpStream>,
@@ -150,7 +160,7 @@ impl Watcher {
         let begin = Instant::now();
         while !done(self) {
             assert!(begin.elapsed() < PATIENCE, "no {what}; {}", self.status);
-            match self.socket.read().unwrap() {
+            match read(&mut self.socket) {
                 Message::Text(text) => {
                     let message: Value = serde_json::from_str(&text).unwrap();
                     match message["op"].as_str().unwrap() {
@@ -434,7 +444,7 @@ fn foxglove_clients_of_both_protocols_decode_the_samples() {
         ];
         let mut client = socket(&url, &headers).unwrap();
         let next = |client: &mut WebSocket<TcpStream>| -> Value {
-            serde_json::from_str(client.read().unwrap().to_text().unwrap()).unwrap()
+            serde_json::from_str(read(client).to_text().unwrap()).unwrap()
         };
         assert_eq!(next(&mut client)["op"], "serverInfo");
         let advertised = next(&mut client);
@@ -456,7 +466,7 @@ fn foxglove_clients_of_both_protocols_decode_the_samples() {
         client.send(Message::text(subscribe.to_string())).unwrap();
         let (mut times, mut stamps) = (Vec::new(), Vec::new());
         while times.len() < 500 {
-            let Message::Binary(bytes) = client.read().unwrap() else {
+            let Message::Binary(bytes) = read(&mut client) else {
                 panic!("no data")
             };
             assert_eq!((bytes[0], &bytes[1..5]), (1, &7u32.to_le_bytes()[..]));
@@ -493,7 +503,10 @@ fn plotjuggler_gets_every_sample_as_json() {
     let _live = Live::start(&["--plotjuggler", &address]);
     let (mut bytes, mut times) = ([0; 2048], Vec::new());
     while times.len() < 500 {
-        let length = receiver.recv(&mut bytes).unwrap();
+        let length = match receiver.recv(&mut bytes) {
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            length => length.unwrap(),
+        };
         let message: Value = serde_json::from_slice(&bytes[..length]).unwrap();
         if message.get("rig").is_some() {
             times.push(message["timestamp"].as_f64().unwrap());

@@ -232,6 +232,7 @@ async fn receive(hub: &Arc<Hub>, mut from: SplitStream<WebSocket>, answers: mpsc
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::panic)]
 mod tests {
+    use std::io::ErrorKind;
     use std::net::TcpStream;
     use std::time::{Duration, Instant};
 
@@ -244,6 +245,16 @@ mod tests {
         assert_eq!(decoded("my%20motion%C3%A9.toml"), "my motioné.toml");
         assert_eq!(decoded("100%"), "100%");
         assert_eq!(decoded("%zz%4"), "%zz%4");
+    }
+
+    /// The next message. A read with a timeout ends with `EINTR` if the process is halted and goes on (signal(7)).
+    fn read(socket: &mut tungstenite::WebSocket<TcpStream>) -> tungstenite::Message {
+        loop {
+            match socket.read() {
+                Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => {}
+                message => return message.unwrap(),
+            }
+        }
     }
 
     /// Starts the server on its own thread; returns its address.
@@ -281,7 +292,7 @@ mod tests {
             .set_read_timeout(Some(Duration::from_secs(20)))
             .unwrap();
         let (mut socket, _) = tungstenite::client(format!("ws://{address}/live"), stream).unwrap();
-        let hello = socket.read().unwrap();
+        let hello = read(&mut socket);
         assert!(hello.is_text());
         for k in 0..PACKETS {
             let rows = vec![Row::default(); ROWS as usize];
@@ -301,7 +312,7 @@ mod tests {
         }
         let (mut received, mut missed, mut told) = (0, 0, 0);
         while received + missed < PACKETS * ROWS {
-            match socket.read().unwrap() {
+            match read(&mut socket) {
                 tungstenite::Message::Binary(bytes) => {
                     let first = f64::from_le_bytes(bytes[8..16].try_into().unwrap()) as u64;
                     // What is missing before this packet was told before.
