@@ -108,6 +108,8 @@ impl Bench<'_> {
         warnings.extend(warnings::of_motion(self.robot, &trace, false));
         warnings.extend(motor_limits::exceeded(self.robot, &trace)?);
         warnings.extend(adaptation.as_ref().and_then(warnings::of_adaptation));
+        let robustness = self.robustness(law, model, None, measure)?;
+        warnings.extend(robustness.as_ref().and_then(warnings::of_failures));
         let measures = Tracking {
             law,
             model: name.to_owned(),
@@ -115,7 +117,7 @@ impl Bench<'_> {
             joints: measures::joints(self.robot, &trace, self.reference),
             tool_rms,
             tool_largest,
-            robustness: self.robustness(law, model, None, measure)?,
+            robustness,
             adaptation,
             warnings,
             motion: String::new(),
@@ -158,6 +160,10 @@ impl Bench<'_> {
             trace.beyond_range,
             touching,
         ));
+        let robustness = self.robustness(law, model, Some(task), measure)?;
+        let draws = robustness.as_ref();
+        warnings.extend(draws.and_then(|draws| warnings::of_wrong_models(law, draws, task)));
+        warnings.extend(draws.and_then(warnings::of_failures));
         let ticks = measures::ticks(trace.force.len());
         let pick = |list: &[f64]| -> Vec<f64> {
             ticks.clone().filter_map(|k| list.get(k)).copied().collect()
@@ -177,7 +183,7 @@ impl Bench<'_> {
             slide_peak: found.slide_peak,
             slide_error: found.slide_error,
             bounces: found.bounces,
-            robustness: self.robustness(law, model, Some(task), measure)?,
+            robustness,
             warnings,
             motion: String::new(),
             time: ticks.clone().map(|k| k as f64 * trace.period).collect(),
@@ -209,7 +215,7 @@ impl Bench<'_> {
         });
         let models: Vec<LawModel> = models.collect();
         let next = AtomicUsize::new(0);
-        let found = Mutex::new(vec![f64::NAN; draws]);
+        let found = Mutex::new((0..draws).map(|_| None).collect::<Vec<_>>());
         let workers = std::thread::available_parallelism().map_or(1, |count| count.get());
         std::thread::scope(|scope| {
             for _ in 0..workers.min(draws) {
@@ -221,20 +227,27 @@ impl Bench<'_> {
                         let value = self
                             .run(law, model, task)
                             .and_then(|moved| measure(&moved.trace));
-                        if let (Ok(value), Ok(mut list)) = (value, found.lock()) {
-                            list[k] = value;
+                        if let Ok(mut list) = found.lock() {
+                            list[k] = Some(value);
                         }
                     }
                 });
             }
         });
-        let found = found.into_inner().unwrap_or_default();
+        let (mut values, mut failures) = (Vec::new(), Vec::new());
+        for value in found.into_inner().unwrap_or_default().into_iter().flatten() {
+            match value {
+                Ok(value) => values.push(value),
+                Err(error) => failures.push(error),
+            }
+        }
         Ok(Some(Robustness {
             share,
             draws,
-            failed: found.iter().filter(|value| value.is_nan()).count(),
-            worst: found.iter().copied().fold(f64::NAN, f64::max),
-            median: median_of_finite(found).unwrap_or(f64::NAN),
+            failed: draws - values.len(),
+            reason: failures.first().map(ToString::to_string),
+            worst: values.iter().copied().fold(f64::NAN, f64::max),
+            median: median_of_finite(values).unwrap_or(f64::NAN),
         }))
     }
 

@@ -77,12 +77,15 @@ impl PositionLimits {
         let combined = robot.combined_limits().into_iter();
         let combined = combined.map(|(weights, bounds)| {
             let joints = robot.joints.iter().zip(&weights);
-            let names: Vec<&str> = joints
+            let names: Vec<String> = joints
                 .filter(|(_, weight)| **weight != 0.0)
-                .map(|(joint, _)| joint.name.as_str())
+                .map(|(joint, weight)| match *weight {
+                    1.0 => joint.name.clone(),
+                    weight => format!("{weight}*{}", joint.name),
+                })
                 .collect();
             Range {
-                name: format!("the crank angle of {}", names.join(" and ")),
+                name: format!("the sum {} (it turns a crank)", names.join(" + ")),
                 weights,
                 bounds,
                 unit: "rad",

@@ -112,6 +112,8 @@ pub struct Robustness {
     pub draws: usize,
     /// Motions that were unstable, in which the law gave no torque, or in which the tool did not reach the surface.
     pub failed: usize,
+    /// Why the first of them failed.
+    pub reason: Option<String>,
     /// Median of the motions that did not fail; RMS error of the tool (m), or overshoot of the force in the whole
     /// contact (1).
     pub median: f64,

@@ -4,7 +4,7 @@ use super::closed_loop::Trace;
 use super::contact_task::{ContactTask, fastest_rate};
 use super::measures::ForceMeasures;
 use super::position_limits::PositionLimits;
-use super::result::Adaptation;
+use super::result::{Adaptation, Robustness};
 use super::settings::{LawKind, Settings};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, listed};
@@ -70,6 +70,44 @@ pub(crate) fn of_force(
         .collect()
 }
 
+/// Returns a sentence if the force peaks with one of the wrong models.
+pub(crate) fn of_wrong_models(
+    law: LawKind,
+    draws: &Robustness,
+    task: &ContactTask,
+) -> Option<String> {
+    let remedy = match law {
+        LawKind::Hybrid => {
+            "Identify the parameters better, or give a higher --rate or a softer surface."
+        }
+        _ => {
+            "The impedance does not control the force: identify the parameters better, or press with the hybrid law."
+        }
+    };
+    let force = |overshoot: f64| format_significant((1.0 + overshoot) * task.force, 3);
+    (draws.worst > OVERSHOOT).then(|| {
+        format!(
+            "with parameters wrong by up to {} % the force peaks at {} N of {:.1} N in the worst of {} motions, and at {} N in the median. {remedy}",
+            format_significant(100.0 * draws.share, 3),
+            force(draws.worst),
+            task.force,
+            draws.draws - draws.failed,
+            force(draws.median),
+        )
+    })
+}
+
+/// Returns a sentence if motions with wrong models failed.
+pub(crate) fn of_failures(draws: &Robustness) -> Option<String> {
+    let reason = draws.reason.as_ref()?;
+    Some(format!(
+        "{} of {} motions with parameters wrong by up to {} % failed. The first: {reason}",
+        draws.failed,
+        draws.draws,
+        format_significant(100.0 * draws.share, 3),
+    ))
+}
+
 fn at_contact(found: &ForceMeasures, task: &ContactTask) -> Option<String> {
     let before = found.overshoot_before_slide;
     (before > OVERSHOOT).then(|| {
@@ -115,8 +153,17 @@ fn in_slide(
             (MARGIN * peak / OVERSHOOT).ceil(),
         ),
     };
+    let inertia = |k: usize| format_significant(task.inertia[k], 3);
+    let pose = match task.inertia.len() {
+        0 | 1 => String::new(),
+        _ => format!(
+            " The tool's inertia is {} kg along the normal and {} kg along the slide: if the second is far larger, give another --pose.",
+            inertia(0),
+            inertia(1)
+        ),
+    };
     Some(format!(
-        "the force peaks at {:.1} N of {:.1} N during the slide: joint friction changes its direction, and the force loop of {:.1} Hz needs time to press against it.{larger} Give {faster}, or a softer surface.",
+        "the force peaks at {:.1} N of {:.1} N during the slide: joint friction changes its direction, and the force loop of {:.1} Hz needs time to press against it.{larger} Give {faster}, or a softer surface.{pose}",
         (1.0 + during) * task.force,
         task.force,
         task.force_bandwidth,

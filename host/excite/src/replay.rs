@@ -346,18 +346,31 @@ fn feed_forward(
 
 impl Replay {
     /// Rounds the positions to the described encoders: 2π/(counts · gear ratio) of a revolute joint. Velocities keep
-    /// their values, because no description tells how the robot derives them. Returns one note for each joint that is
-    /// not rounded: without `encoder_counts_per_rev`, prismatic, or with a drive of varying or coupled ratio.
-    pub fn quantise(&mut self, robot: &Robot) -> Vec<String> {
+    /// their values, because no description tells how the robot derives them. A joint without `encoder_counts_per_rev`,
+    /// prismatic, or with a drive of varying or coupled ratio is rounded to the step `otherwise` (rad or m), or not at
+    /// all; returns one note for each.
+    pub fn quantise(&mut self, robot: &Robot, otherwise: Option<f64>) -> Vec<String> {
         let mut notes = Vec::new();
         for (q, joint) in self.motion.q.iter_mut().zip(&robot.joints) {
-            match encoder_step(joint) {
-                Ok(step) => q.iter_mut().for_each(|q| *q = (*q / step).round() * step),
-                Err(why) => notes.push(format!(
-                    "The position of joint {} is not quantised: {why}.",
-                    joint.name
-                )),
-            }
+            let step = match (encoder_step(joint), otherwise) {
+                (Ok(step), _) => step,
+                (Err(why), Some(step)) => {
+                    notes.push(format!(
+                        "The position of joint {} is rounded to steps of {step} {}: {why}.",
+                        joint.name,
+                        joint.kind.units().0
+                    ));
+                    step
+                }
+                (Err(why), None) => {
+                    notes.push(format!(
+                        "The position of joint {} is not quantised: {why}.",
+                        joint.name
+                    ));
+                    continue;
+                }
+            };
+            q.iter_mut().for_each(|q| *q = (*q / step).round() * step);
         }
         notes
     }

@@ -14,6 +14,8 @@ use super::options::SimulateOptions;
 pub(super) const TORQUE_NOISE: f64 = 0.01;
 /// Standard deviation of the noise of the position before it is quantised, rad or m.
 pub(super) const POSITION_NOISE: f64 = 1e-5;
+/// Encoder step of a joint whose description has none, rad or m.
+const ENCODER_STEP: f64 = 1e-5;
 
 /// A designed motion as it was recorded.
 pub(super) struct Recorded {
@@ -62,7 +64,7 @@ pub(super) fn recorded(
     }
     let mut notes = motion.notes;
     notes.append(&mut done.notes);
-    notes.extend(done.quantise(robot));
+    notes.extend(done.quantise(robot, Some(ENCODER_STEP)));
     let slowest = (done.motion.qd.iter())
         .map(|qd| rms(qd))
         .fold(f64::INFINITY, f64::min);

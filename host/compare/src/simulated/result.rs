@@ -104,12 +104,14 @@ pub struct Holdout {
     pub joint: String,
     /// "N·m" or "N".
     pub unit: &'static str,
-    /// RMS of the measured torque.
+    /// Share of the rows that the residuals count: those that are slow or near a reversal are left out.
+    pub used: f64,
+    /// RMS of the measured torque on these rows.
     pub torque_rms: f64,
     /// RMS of the residual by estimate, as a share of the torque.
     pub relative_error: Vec<f64>,
     /// The same of the true parameters: noise and the error of the filtered motion.
     pub relative_error_of_truth: f64,
-    /// Time, measured torque and the torque predicted by the first estimate, for a figure.
+    /// Time, measured torque and the torque predicted by the first estimate, for a figure; all rows.
     pub series: [Vec<f64>; 3],
 }

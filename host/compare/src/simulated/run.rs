@@ -63,7 +63,7 @@ pub fn simulated(
         holdout: factors(robot, &base, &holdout.recording, &differential)?,
     };
     let mut notes = vec![format!(
-        "Simulated noise: {} % of each joint's RMS torque, and {POSITION_NOISE} rad or m on the position; the position is then rounded to the encoder's counts if the description has them.",
+        "Simulated noise: {} % of each joint's RMS torque, and {POSITION_NOISE} rad or m on the position; the position is then rounded to the encoder's counts.",
         100.0 * TORQUE_NOISE
     )];
     notes.extend(training.notes);
@@ -286,6 +286,8 @@ impl Judge<'_> {
                         JointKind::Revolute => "N·m",
                         JointKind::Prismatic => "N",
                     },
+                    used: curves.used.iter().filter(|used| **used).count() as f64
+                        / curves.used.len().max(1) as f64,
                     torque_rms: (all / factor.rows().max(1) as f64).sqrt(),
                     relative_error: estimates.iter().map(share).collect(),
                     relative_error_of_truth: share(&self.truth),

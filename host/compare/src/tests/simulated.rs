@@ -65,7 +65,10 @@ fn a_seed_gives_the_same_result_and_a_missing_encoder_is_said() {
     let found = run(ONE_LINK_TEMPLATE, 7);
     assert_eq!(found, run(ONE_LINK_TEMPLATE, 7));
     assert_ne!(found.estimates, run(ONE_LINK_TEMPLATE, 8).estimates);
-    let missing = |found: &SimulatedRobot| found.notes.iter().any(|n| n.contains("not quantised"));
+    let missing = |found: &SimulatedRobot| {
+        let of_step = |n: &String| n.contains("rounded to steps of 0.00001 rad");
+        found.notes.iter().any(of_step)
+    };
     assert!(!missing(&found));
     assert!(missing(&run(EDDA_TEMPLATE, 7)));
 }

@@ -20,7 +20,7 @@ pub enum SimulateError {
     },
     /// A link without inertia.
     #[error(
-        "the inertia that joint {joint} has to move is not positive: give its link a mass and an inertia, or its drive a rotor inertia."
+        "the inertia that joint {joint} has to move is not positive: give its link a mass and an inertia about its axis, or its drive a rotor inertia. Where joint_elasticity or backlash parts the drive from the link, the link needs its own."
     )]
     NotPositiveDefinite {
         /// From 1 at the base.

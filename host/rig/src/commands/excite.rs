@@ -594,7 +594,8 @@ fn speed_up(effort: &Effort) -> String {
     let gain = match (effort.threads, effort.speed_up()) {
         (1, _) => ".".to_owned(),
         (_, gain) if gain > 1.0 => format!(": {gain:.2} times as fast as one thread."),
-        _ => ": other programs used the processors, so the threads saved no time.".to_owned(),
+        _ => ": other programs used the processors, so what the threads saved cannot be told."
+            .to_owned(),
     };
     format!(
         "Search: {:.1} s of {kind} by {threads} in {:.1} s{gain}",

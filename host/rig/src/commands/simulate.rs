@@ -126,7 +126,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let mut done = replay_carrying(&robot, &carried, &reference, noise, args.seed, tell)?;
     drop(progress);
     if args.quantised {
-        for note in done.quantise(&robot) {
+        for note in done.quantise(&robot, None) {
             ui.note(&note);
         }
     }

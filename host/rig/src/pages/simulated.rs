@@ -64,6 +64,7 @@ pub fn simulated_overview(all: &[(String, SimulatedRobot)], context: &Context) -
     let mut columns = vec![Column::text("Robot"), Column::text("Joint")];
     columns.extend(names.iter().map(|name| Column::number(name.clone(), "%")));
     columns.push(Column::number("true parameters", "%"));
+    columns.push(Column::number("rows counted", "%"));
     let rows = all.iter().flat_map(|(name, r)| {
         let own = move |h| [vec![name.clone()], joint_row(h)].concat();
         r.holdout.iter().map(own)
@@ -72,7 +73,7 @@ pub fn simulated_overview(all: &[(String, SimulatedRobot)], context: &Context) -
         caption: "Residual on the hold-out motion, measured less predicted".into(),
         columns,
         rows: rows.collect(),
-        note: "Share of the torque RMS of the joint. The true parameters leave the noise and the error of the filtered motion.".into(),
+        note: COUNTED.into(),
     };
     let reports = all.iter().map(|(folder, r)| Link {
         text: format!("{folder} ({})", r.robot),
@@ -206,7 +207,7 @@ fn values_of(found: &SimulatedRobot, way: &str) -> Table {
         caption: format!("Base parameters, {way}"),
         columns,
         rows: rows.collect(),
-        note: String::new(),
+        note: "fv, fc and Ia of a joint also hold the friction and inertia of coupled motors that each of its motions turns alike, seen at the joint, so they may differ from the description's values. fvm, fcm and Iam belong to a motor.".into(),
     }
 }
 
@@ -234,10 +235,14 @@ fn convergence(found: &SimulatedRobot) -> Section {
     .with(Block::Plot(plot))
 }
 
+/// What the residuals on the hold-out hold.
+const COUNTED: &str = "Share of the torque RMS of the joint, on the rows that count: slow ones and those near a reversal, where friction has any value between its two signs, are left out, and the figures show them too. The true parameters leave the noise and the error of the filtered motion.";
+
 fn joint_row(h: &Holdout) -> Vec<String> {
     let mut cells = vec![h.joint.clone()];
     cells.extend(h.relative_error.iter().map(|e| parts::percent(*e)));
     cells.push(parts::percent(h.relative_error_of_truth));
+    cells.push(parts::percent(h.used));
     cells
 }
 
@@ -250,6 +255,7 @@ fn holdout(found: &SimulatedRobot) -> Section {
             .map(|e| Column::number(words(e), "%")),
     );
     columns.push(Column::number("true parameters", "%"));
+    columns.push(Column::number("rows counted", "%"));
     let mut section = Section::new(
         "holdout",
         "Measured and predicted torque",
@@ -259,7 +265,7 @@ fn holdout(found: &SimulatedRobot) -> Section {
         caption: "Residual on the hold-out as a share of the torque".into(),
         columns,
         rows: found.holdout.iter().map(joint_row).collect(),
-        note: "The true parameters leave the noise and the error of the filtered motion.".into(),
+        note: COUNTED.into(),
     }));
     for h in &found.holdout {
         let [t, measured, predicted] = h.series.clone();
@@ -281,7 +287,8 @@ fn holdout(found: &SimulatedRobot) -> Section {
         .with(Series::line("predicted", Role::Model, t.clone(), predicted))
         .with(Series::line("residual", Role::Residual, t, residual));
         plot = plot.note(format!(
-            "Predicted by the off-line differential model. RMS torque: {} {}.",
+            "Predicted by the off-line differential model; all rows. RMS torque of the {} % that the table counts: {} {}.",
+            parts::percent(h.used),
             format_significant(h.torque_rms, 3),
             h.unit
         ));
