@@ -286,3 +286,53 @@ fn a_recording_may_begin_in_motion_and_a_hold_out_is_another_motion() {
     let sentence = refuse(&mut command(&[&shorter, &train], &other));
     assert!(sentence.contains("holds samples of"), "{sentence}");
 }
+
+/// The workflow of the README on two emulated rigs, from the identified description. A free fit of the contact has elements
+/// with a negative share there.
+#[test]
+fn what_an_identified_description_lacks_is_named_and_explained() {
+    std::thread::scope(|scope| {
+        for seed in ["1", "4"] {
+            scope.spawn(move || explained_from_identified(seed));
+        }
+    });
+}
+
+fn explained_from_identified(seed: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |words: &str| {
+        succeed(
+            rig()
+                .current_dir(folder.path())
+                .args(words.split_whitespace()),
+        );
+    };
+    run("init one-link --out rig.toml");
+    run("excite --robot rig.toml --start -1.5708 --out motion.toml");
+    run("excite --robot rig.toml --start -1.5708 --seed 2 --out other.toml");
+    run("excite --robot rig.toml --start -1.5708 --kind reversals --out slow.toml");
+    let recordings = [
+        ("1", "motion", "train"),
+        ("2", "motion", "again"),
+        ("3", "slow", "slow"),
+        ("4", "other", "other"),
+    ];
+    for (number, motion, data) in recordings {
+        run(&format!(
+            "record --emulated --seed {seed} --run {number} --robot rig.toml --home -1.5708 --trajectory {motion}.toml --out {data}.csv"
+        ));
+    }
+    run("identify --robot rig.toml --data train.csv --holdout other.csv --out found");
+    run(
+        "diagnose --robot found/identified.toml --data train.csv --data again.csv --data slow.csv --holdout other.csv --out lacking",
+    );
+    let text = std::fs::read_to_string(folder.path().join("lacking/diagnosis.json")).unwrap();
+    let result: Value = serde_json::from_str(&text).unwrap();
+    let names: Vec<&str> = (result["steps"].as_array().unwrap().iter())
+        .map(|step| step["effect"].as_str().unwrap())
+        .collect();
+    assert_eq!(result["verdict"], "explained", "{seed}: {names:?}");
+    assert_eq!(names, ["presliding", "stribeck"], "{seed}");
+    let closed = result["gap_closed"].as_f64().unwrap();
+    assert!(closed > 0.85, "{seed}: {closed}");
+}

@@ -129,11 +129,12 @@ impl<'r> Refit<'r> {
     fn columns<'c>(&'c self, chosen: &'c [FittedCandidate]) -> Columns<'c> {
         let mut columns = Columns {
             fitted: self.free.iter().collect(),
+            bounded: vec![false; self.free.len()],
             known: Vec::new(),
             places: Vec::new(),
         };
         for profile in chosen {
-            for column in profile.columns.iter() {
+            for (gain, column) in profile.columns.iter().enumerate() {
                 if profile.followed.is_some() {
                     columns
                         .places
@@ -141,6 +142,7 @@ impl<'r> Refit<'r> {
                     columns.known.push(column);
                 } else {
                     columns.fitted.push(column);
+                    columns.bounded.push(profile.may_be_zero(gain));
                 }
             }
         }
@@ -154,7 +156,7 @@ impl<'r> Refit<'r> {
     pub(crate) fn solution(&self, chosen: &[FittedCandidate]) -> Result<Solution, DiagnoseError> {
         let columns = self.columns(chosen);
         let [plain, _] = self.footing(chosen);
-        solve(&columns.beside(plain), &columns.fitted, &[])
+        solve(&columns.beside(plain), &columns.fitted, &columns.bounded)
             .map(|solution| solution.with_known(&columns.places))
             .ok_or_else(|| {
                 DiagnoseError::Model("its parameters with the effects are not all excited.".into())
@@ -189,7 +191,7 @@ impl<'r> Refit<'r> {
         let columns = self.columns(chosen);
         let plain = columns.beside(&plain);
         let solved = |slopes: &[Column]| {
-            let solution = jackknifed(&plain, &strata, &columns.fitted, slopes)?;
+            let solution = jackknifed(&plain, &strata, &columns.fitted, &columns.bounded, slopes)?;
             Some(solution.with_known(&columns.places))
         };
         let solution = solved(&[]).ok_or_else(failed)?;
@@ -318,6 +320,8 @@ pub(crate) fn named(
 /// Fitted columns and columns of known torque.
 struct Columns<'c> {
     fitted: Vec<&'c Column>,
+    /// True for each fitted column whose coefficient cannot be negative.
+    bounded: Vec<bool>,
     known: Vec<&'c Column>,
     /// Indices of the known columns among all columns.
     places: Vec<usize>,

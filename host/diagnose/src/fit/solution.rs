@@ -4,7 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fit::least_squares::Fit;
 use crate::rows::regression::Column;
+use rig_numerics::optimise::non_negative::nnls;
 use rig_numerics::vector::dot;
+
+/// Rounds of least squares with non-negative coefficients.
+const ROUNDS: usize = 100;
 
 /// Coefficients of columns fitted together.
 #[derive(Clone, Debug)]
@@ -34,23 +38,27 @@ impl Solution {
     }
 }
 
-/// Fits `columns` to the torque. `slopes` are derivatives by nonlinear parameters; they follow the columns in the
-/// covariance only. None if the columns are collinear.
-pub(crate) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
-    solved(columns, slopes, plain, &|all, inverse, rest| {
+/// Fits `columns` to the torque. The coefficients marked in `bounded` (empty: none) cannot be negative. None if the
+/// columns are collinear.
+///
+/// The covariance is that of the fit without bounds, so a coefficient at its bound has a standard deviation.
+pub(crate) fn solve(plain: &Fit, columns: &[&Column], bounded: &[bool]) -> Option<Solution> {
+    solved(columns, bounded, &[], plain, &|all, inverse, rest| {
         Some(plain.sandwich(all, inverse, rest))
     })
 }
 
 /// [`solve`] with a jackknife covariance over the blocks of `plain`, widened if blocks of one of the `strata` give
-/// more. A law's mismatch follows speed, position or load, with the same bias in all such rows.
+/// more. A law's mismatch follows speed, position or load, with the same bias in all such rows. `slopes` are derivatives
+/// by nonlinear parameters; they follow the columns in the covariance only.
 pub(crate) fn jackknifed(
     plain: &Fit,
     strata: &[Fit],
     columns: &[&Column],
+    bounded: &[bool],
     slopes: &[Column],
 ) -> Option<Solution> {
-    solved(columns, slopes, plain, &|all, inverse, rest| {
+    solved(columns, bounded, slopes, plain, &|all, inverse, rest| {
         let mut covariance = plain.jackknife(all, rest)?;
         let mut widest = covariance.diagonal();
         for strata in strata {
@@ -74,13 +82,14 @@ type Covariance<'f> = dyn Fn(&[Vec<f64>], &DMatrix<f64>, &[f64]) -> Option<DMatr
 
 fn solved(
     columns: &[&Column],
+    bounded: &[bool],
     slopes: &[Column],
     plain: &Fit,
     covariance: &Covariance,
 ) -> Option<Solution> {
     let weighted: Vec<Vec<f64>> = columns.iter().map(|c| plain.weighted(c)).collect();
     let torque = plain.left();
-    let (values, inverse) = normal(&weighted, torque)?;
+    let (values, inverse) = normal(&weighted, torque, bounded)?;
     let mut rest = torque.to_vec();
     for (column, value) in weighted.iter().zip(&values) {
         for (r, c) in rest.iter_mut().zip(column) {
@@ -93,13 +102,18 @@ fn solved(
     }
     let mut all = weighted;
     all.extend(slopes.iter().map(|c| plain.weighted(c)));
-    let (_, inverse) = normal(&all, torque)?;
+    let (_, inverse) = normal(&all, torque, &[])?;
     let covariance = covariance(&all, &inverse, &rest)?;
     Some(Solution { values, covariance })
 }
 
-/// Returns the solution and the inverse of the normal matrix, with columns scaled to unit length.
-fn normal(columns: &[Vec<f64>], torque: &[f64]) -> Option<(Vec<f64>, DMatrix<f64>)> {
+/// Returns the solution, without negative values where `bounded`, and the inverse of the normal matrix. The columns are
+/// scaled to unit length.
+fn normal(
+    columns: &[Vec<f64>],
+    torque: &[f64],
+    bounded: &[bool],
+) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let k = columns.len();
     let lengths: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt()).collect();
     if lengths.iter().any(|l| l.is_nan() || *l == 0.0) {
@@ -114,8 +128,11 @@ fn normal(columns: &[Vec<f64>], torque: &[f64]) -> Option<(Vec<f64>, DMatrix<f64
         }
     }
     let right = DVector::from_fn(k, |a, _| dot(&columns[a], torque) / lengths[a]);
-    let factor = gram.cholesky()?;
-    let solution = factor.solve(&right);
+    let factor = gram.clone().cholesky()?;
+    let mut solution = factor.solve(&right);
+    if (solution.iter().zip(bounded)).any(|(value, bounded)| *bounded && *value < 0.0) {
+        solution = nnls(&gram, &right, bounded, &mut vec![true; k], ROUNDS)?;
+    }
     let mut inverse = factor.inverse();
     for a in 0..k {
         for b in 0..k {

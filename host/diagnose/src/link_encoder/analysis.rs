@@ -98,8 +98,8 @@ impl TransmissionAnalysis<'_, '_> {
                 _ => None,
             })
             .collect();
-        let solution =
-            jackknifed(plain, &[], &columns, &slopes).or_else(|| solve(plain, &columns, &[]))?;
+        let solution = jackknifed(plain, &[], &columns, &[], &slopes)
+            .or_else(|| solve(plain, &columns, &[]))?;
         Some(Solved { solution, terms })
     }
 

@@ -188,7 +188,7 @@ impl<'e> Transmitted<'e> {
     ) -> Option<Solution> {
         let columns: Vec<&Column> = own.iter().chain(self.beside()).collect();
         let step = DIFFERENCE * gap;
-        let stiffness = jackknifed(clustered, &[], &columns, &[])?.values[0];
+        let stiffness = jackknifed(clustered, &[], &columns, &[], &[])?.values[0];
         let slope = |up: [Column; 2], down: [Column; 2]| {
             let factor = 0.5 * stiffness / step;
             combined(1, [(&up[0], factor), (&down[0], -factor)])
@@ -197,6 +197,6 @@ impl<'e> Transmitted<'e> {
             slope(self.law(gap + step, zero), self.law(gap - step, zero)),
             slope(self.law(gap, zero + step), self.law(gap, zero - step)),
         ];
-        jackknifed(clustered, &[], &columns, &slopes)
+        jackknifed(clustered, &[], &columns, &[], &slopes)
     }
 }

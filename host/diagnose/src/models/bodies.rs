@@ -242,15 +242,7 @@ impl<'a, 'r> ModelCache<'a, 'r> {
         let moved = near.iter().zip(&values).map(|(b, f)| b - f);
         let nominal = rest.rows().nominal.iter().zip(moved);
         rest.subtract(&combined(n, nominal));
-        if let Some(made_up) = solve(&rest, &fitted, &[]).filter(|_| !fitted.is_empty()) {
-            rest.subtract(&combined(
-                n,
-                fitted.iter().copied().zip(made_up.values.iter().copied()),
-            ));
-            let own = gains.iter_mut().zip(&effects).filter(|(_, (_, f))| *f);
-            own.zip(made_up.values)
-                .for_each(|((gain, _), change)| *gain += change);
-        }
+        refit_gains(&mut rest, chosen, &mut gains);
         let mut remarks = of_identification(bodies.remarks);
         let more = (0..n).map(|j| (j, rest.rms(j) / before[j].max(f64::MIN_POSITIVE) - 1.0));
         let most = more.max_by(|a, b| a.1.total_cmp(&b.1));
@@ -290,6 +282,38 @@ fn measure<'r>(
         }
     }
     (fit, information)
+}
+
+/// Refits the effects' `gains` to what is left beside them, `rest`, and subtracts the change of their torque.
+fn refit_gains(rest: &mut Fit, chosen: &[FittedCandidate], gains: &mut [f64]) {
+    let joints = rest.rows().joints();
+    let (mut columns, mut bounded, mut places) = (Vec::new(), Vec::new(), Vec::new());
+    let mut at = 0;
+    for profile in chosen {
+        if profile.followed.is_none() {
+            columns.extend(profile.columns.iter());
+            bounded.extend((0..profile.columns.len()).map(|gain| profile.may_be_zero(gain)));
+            places.extend(at..at + profile.columns.len());
+        }
+        at += profile.columns.len();
+    }
+    if columns.is_empty() {
+        return;
+    }
+    let torque = |gains: &[f64], sign: f64| {
+        let own = columns.iter().copied().zip(&places);
+        combined(
+            joints,
+            own.map(|(column, place)| (column, sign * gains[*place])),
+        )
+    };
+    rest.subtract(&torque(gains, -1.0));
+    if let Some(solution) = solve(rest, &columns, &bounded) {
+        for (place, value) in places.iter().zip(&solution.values) {
+            gains[*place] = *value;
+        }
+    }
+    rest.subtract(&torque(gains, 1.0));
 }
 
 /// Returns the RMS torque, speed and acceleration of the joints.

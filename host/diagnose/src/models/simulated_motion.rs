@@ -10,6 +10,7 @@ use crate::search::fitted_candidate::FittedCandidate;
 use rig_data::runs::Run;
 use rig_model::robot::{Controller, Robot};
 use rig_model::simulate::{Model, SimulateError};
+use rig_numerics::autocorrelation::correlation_time_to_zero;
 use rig_numerics::optimise::gauss_newton::BlockedResidual;
 use rig_numerics::statistics;
 use rig_validate::replay::{of_joints, replayed};
@@ -38,15 +39,19 @@ impl Errors {
         (sum / f64::max(rows, 1.0)).sqrt()
     }
 
-    /// Returns true if the errors of a joint are significantly larger than in `before`.
+    /// Returns true if the errors of a joint are significantly larger than in `before`. Neighbouring blocks are not
+    /// independent: friction holds a joint for many blocks where one event has put it, so the blocks count by their
+    /// correlation time.
     pub(crate) fn worse_than(&self, before: &Self, joint: usize) -> bool {
         let changes: Vec<f64> = (self.0[joint].iter().zip(&before.0[joint]))
             .map(|(a, b)| a[0] - b[0])
             .collect();
         let n = changes.len() as f64;
         let mean = statistics::mean(&changes);
-        let spread = statistics::squares_about(&changes, mean);
-        let std = (spread / (n * (n - 1.0))).sqrt();
+        let deviations: Vec<f64> = changes.iter().map(|change| change - mean).collect();
+        let blocks = correlation_time_to_zero(&deviations, &[0, changes.len()], changes.len());
+        let spread = statistics::sum_of_squares(&deviations);
+        let std = (blocks.max(1.0) * spread / (n * (n - 1.0))).sqrt();
         self.rms(joint) > (1.0 + WORSE) * before.rms(joint) && mean > SIGMAS * std
     }
 }
@@ -277,7 +282,14 @@ mod tests {
         let before = errors(&[1.0, 1.2, 0.9, 1.1, 1.0, 1.0]);
         assert!(errors(&[1.5, 1.8, 1.4, 1.6, 1.5, 1.6]).worse_than(&before, 0));
         assert!(!errors(&[0.5, 0.6, 0.4, 0.5, 0.5, 0.5]).worse_than(&before, 0));
-        // A single bad block is not significant.
+        // A single bad block is not significant, ...
         assert!(!errors(&[1.0, 1.2, 0.9, 4.1, 1.0, 1.0]).worse_than(&before, 0));
+        // ... nor is one event that lasts.
+        let alike = |k: usize| 1.0 + 0.2 * ((k * 7) % 5) as f64;
+        let before = errors(&(0..60).map(alike).collect::<Vec<_>>());
+        let held = |k: usize| if k < 40 { 0.8 * alike(k) } else { 4.0 };
+        assert!(!errors(&(0..60).map(held).collect::<Vec<_>>()).worse_than(&before, 0));
+        let everywhere = |k: usize| 1.5 * alike(k);
+        assert!(errors(&(0..60).map(everywhere).collect::<Vec<_>>()).worse_than(&before, 0));
     }
 }

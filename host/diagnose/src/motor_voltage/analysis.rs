@@ -250,7 +250,7 @@ impl<'a> Analysis<'a> {
                 let memory = noise_floor::memory(rows, &[last.residual(0)]);
                 let plain = self.plain.clone().clustered(memory, &self.pairs);
                 let all: Vec<_> = rows.nominal.iter().chain(self.dead(fade)).collect();
-                jackknifed(&plain, &[], &all, &self.training.fading(fade))
+                jackknifed(&plain, &[], &all, &[], &self.training.fading(fade))
                     .ok_or(Lack::Inseparable)?
             }
             None => self.before.clone(),

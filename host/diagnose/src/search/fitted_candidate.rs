@@ -91,6 +91,15 @@ impl FittedCandidate {
         }
     }
 
+    /// Returns true for one of several gains that cannot be negative: the law stands without it. A law whose only gain is
+    /// zero is none.
+    pub(crate) fn may_be_zero(&self, gain: usize) -> bool {
+        let gains = self.candidate.kind.about().gains;
+        gains.len() == self.columns.len()
+            && gains.len() > 1
+            && gains[gain].bounds == [0.0, f64::INFINITY]
+    }
+
     /// Returns the reason for refusal at a p-value corrected for `tried` trials; None if the candidate passes.
     pub(crate) fn refused(&self, tried: usize) -> Option<Refusal> {
         let e = &self.evidence;

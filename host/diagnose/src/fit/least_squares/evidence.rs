@@ -8,7 +8,8 @@ use crate::fit::least_squares::{Beside, Fit};
 use rig_numerics::vector::{axpy, dot};
 
 impl Fit<'_> {
-    /// Returns the evidence for projected columns.
+    /// Returns the evidence for projected columns. Columns whose coefficient cannot be negative and is zero take part in
+    /// nothing but the list of coefficients.
     pub(crate) fn evidence(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<Evidence> {
         let beside = Beside {
             gram: DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
@@ -20,6 +21,25 @@ impl Fit<'_> {
             ),
         };
         let (explained, gains) = self.explained(&beside, bounds)?;
+        let part: Vec<usize> = (0..columns.len()).filter(|c| gains[*c] != 0.0).collect();
+        if part.is_empty() {
+            return None;
+        }
+        if part.len() < columns.len() {
+            let own: Vec<Vec<f64>> = part.iter().map(|c| columns[*c].clone()).collect();
+            let open: Vec<[f64; 2]> = part.iter().map(|c| bounds[*c]).collect();
+            let mut evidence = self.evidence(&own, &open)?;
+            let spread = |values: &[f64]| {
+                let mut all = vec![0.0; columns.len()];
+                for (c, value) in part.iter().zip(values) {
+                    all[*c] = *value;
+                }
+                all
+            };
+            evidence.gains = spread(&evidence.gains);
+            evidence.stds = spread(&evidence.stds);
+            return Some(evidence);
+        }
         let k = columns.len();
         // The residual under the alternative: with the columns.
         let mut rest = self.residual.clone();
