@@ -10,6 +10,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod bound;
 mod calibration;
 pub mod capture;
 pub mod config;

@@ -38,15 +38,13 @@ pub fn precheck(config: &Config, request: Request) -> PrecheckedRequest {
 }
 
 fn prepare(config: &Config, body: &RequestBody) -> Result<Prepared, Refusal> {
-    let valid = match body {
+    match body {
         RequestBody::SetTrajectory(trajectory) => {
-            return match trajectory.validate() {
-                Ok(()) => Ok(Prepared::Trajectory(
-                    trajectory.extremes(),
-                    trajectory.prepare(),
-                )),
-                Err(_) => Err(Refusal::BadValue),
-            };
+            trajectory.validate().map_err(|_| Refusal::BadValue)?;
+            return Ok(Prepared::Trajectory(
+                trajectory.extremes(),
+                trajectory.prepare(),
+            ));
         }
         RequestBody::SetEffects(given) => {
             let mut effects = Effects::default();
@@ -57,32 +55,23 @@ fn prepare(config: &Config, body: &RequestBody) -> Result<Prepared, Refusal> {
                 EffectFault::NotCompensable(kind) => Refusal::NotCompensable(kind),
                 EffectFault::Parameter(_) | EffectFault::Surplus => Refusal::BadValue,
             })?;
-            return match validation::effects(config, &compensation) {
-                Ok(()) => Ok(Prepared::Effects(compensation)),
-                Err(_) => Err(Refusal::BadValue),
-            };
+            validation::effects(config, &compensation)?;
+            return Ok(Prepared::Effects(compensation));
         }
         RequestBody::SetEstimator(settings) => {
+            validation::estimator(config, settings)?;
             return one_link::Config::new(settings, config.rates.estimator_hz())
                 .map(Prepared::Estimator)
                 .map_err(|_| Refusal::BadValue);
         }
         RequestBody::SetGains(gains) => validation::gains(config, gains),
-        RequestBody::SetModel(model) => {
-            return validation::model(config, model).map(|()| Prepared::Nothing);
-        }
-        RequestBody::SetFriction(friction) => {
-            return validation::friction(config, friction).map(|()| Prepared::Nothing);
-        }
+        RequestBody::SetModel(model) => validation::model(config, model),
+        RequestBody::SetFriction(friction) => validation::friction(config, friction),
         RequestBody::SetPrecompensation(precompensation) => {
             validation::precompensation(precompensation)
         }
         RequestBody::SetLimits(limits) => validation::limits(config, limits),
-        _ => true,
-    };
-    if valid {
-        Ok(Prepared::Nothing)
-    } else {
-        Err(Refusal::BadValue)
+        _ => Ok(()),
     }
+    .map(|()| Prepared::Nothing)
 }

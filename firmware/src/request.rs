@@ -4,8 +4,9 @@ use micromath::F32Ext;
 use rig_shared::control::{adaptive, current};
 use rig_shared::safety::{Fault, Limits, Mode};
 use rig_shared::trajectory::{Extremes, PreparedTrajectory};
-use rig_shared::wire::message::{Refusal, RequestBody};
+use rig_shared::wire::message::{Bounded, Refusal, RequestBody};
 
+use crate::bound::{at_least, at_most};
 use crate::config::Config;
 use crate::prechecked_request::{PrecheckedRequest, Prepared};
 use crate::state::{Calibration, Run, State};
@@ -188,9 +189,8 @@ fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     }
     let counts = position / state.derived.radians_per_count;
     // From 2²³ counts on, x ± ½, which rounding needs, is not an f32.
-    if counts.is_nan() || counts.abs() >= 8_388_608.0 {
-        return Err(Refusal::BadValue);
-    }
+    let largest = 8_388_607.0 * state.derived.radians_per_count.abs();
+    at_most(Bounded::Home, position.abs(), largest)?;
     let shift = F32Ext::round(counts) as i64 - state.counts;
     state.origin = state.origin.map(|origin| origin - shift);
     state.counts += shift;
@@ -238,7 +238,7 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
 }
 
 /// Checks a trajectory against the limits: speed and acceleration always, position only if the base point is known.
-/// Written so that NaN is refused.
+#[inline(never)]
 fn check_limits(
     extremes: &Extremes<f32>,
     limits: &Limits<f32>,
@@ -246,15 +246,22 @@ fn check_limits(
 ) -> Result<(), Refusal> {
     // Rounding of the peak must not refuse a motion designed to touch its limit.
     const TOLERANCE: f32 = 1.0 + 1e-6;
-    let moves = extremes.velocity <= limits.velocity * TOLERANCE
-        && extremes.acceleration <= limits.acceleration * TOLERANCE;
-    let stays = base.is_none_or(|base| {
-        limits.position_low <= base + extremes.lowest
-            && base + extremes.highest <= limits.position_high
-    });
-    if moves && stays {
-        Ok(())
-    } else {
-        Err(Refusal::OutsideLimits)
+    for (quantity, value, limit) in [
+        (Bounded::MotionSpeed, extremes.velocity, limits.velocity),
+        (
+            Bounded::MotionAcceleration,
+            extremes.acceleration,
+            limits.acceleration,
+        ),
+    ] {
+        if value > limit * TOLERANCE || !value.is_finite() {
+            at_most(quantity, value, limit)?;
+        }
     }
+    if let Some(base) = base {
+        let (low, high) = (base + extremes.lowest, base + extremes.highest);
+        at_least(Bounded::MotionPosition, low, limits.position_low)?;
+        at_most(Bounded::MotionPosition, high, limits.position_high)?;
+    }
+    Ok(())
 }

@@ -4,12 +4,14 @@ use core::fmt;
 
 use rig_shared::compensation::Compensation;
 use rig_shared::control::Gains;
+use rig_shared::estimation::EstimatorSettings;
 use rig_shared::friction::Friction;
 use rig_shared::link::LinkParameters;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
 use rig_shared::wire::message::{Bounded, Refusal};
 
+use crate::bound::{at_least, at_most, positive};
 use crate::config::{Config, Settings};
 
 /// Slowest current loop, as a share of the control rate. Its lag must fit the remembered ticks of the effects
@@ -36,78 +38,120 @@ const MIN_SPEED: f32 = 1.0;
 /// the link within 0.01 rad.
 pub const MAX_ARM_VELOCITY: f32 = 0.2;
 
-/// Checks all settings that the host may replace.
+/// Returns true if all settings that the host may replace are valid.
 pub(crate) fn settings(config: &Config, settings: &Settings) -> bool {
-    limits(config, &settings.limits)
-        && gains(config, &settings.gains)
+    limits(config, &settings.limits).is_ok()
+        && gains(config, &settings.gains).is_ok()
         && friction(config, &settings.friction).is_ok()
         && model(config, &settings.model).is_ok()
         && loops(&settings.gains, &settings.model).is_ok()
-        && precompensation(&settings.precompensation)
-        && settings
-            .estimator
-            .check(config.rates.estimator_hz())
-            .is_ok()
+        && precompensation(&settings.precompensation).is_ok()
+        && estimator(config, &settings.estimator).is_ok()
         && Compensation::new(&settings.effects)
             .is_ok_and(|compensation| effects(config, &compensation).is_ok())
 }
 
-pub(crate) fn limits(config: &Config, limits: &Limits<f32>) -> bool {
-    limits.is_valid() && limits.is_within(&config.ratings)
+/// Checks limits against the ratings of the rig. Not inlined, like the checks below: each is called from two places.
+#[inline(never)]
+pub(crate) fn limits(config: &Config, limits: &Limits<f32>) -> Result<(), Refusal> {
+    let ratings = &config.ratings;
+    for (quantity, value, rating) in [
+        (Bounded::SpeedLimit, limits.velocity, ratings.velocity),
+        (
+            Bounded::AccelerationLimit,
+            limits.acceleration,
+            ratings.acceleration,
+        ),
+        (Bounded::TorqueLimit, limits.torque, ratings.torque),
+        (
+            Bounded::ContinuousCurrent,
+            limits.continuous_current,
+            ratings.continuous_current,
+        ),
+        (
+            Bounded::PeakCurrent,
+            limits.peak_current,
+            ratings.peak_current,
+        ),
+    ] {
+        positive(quantity, value)?;
+        at_most(quantity, value, rating)?;
+    }
+    let (low, high) = (limits.position_low, limits.position_high);
+    at_least(Bounded::PositionLimit, low, ratings.position_low)?;
+    at_most(Bounded::PositionLimit, high, ratings.position_high)?;
+    positive(Bounded::PositionRange, high - low)?;
+    // A continuous current above the peak.
+    at_least(
+        Bounded::PeakCurrent,
+        limits.peak_current,
+        limits.continuous_current,
+    )
 }
 
-pub(crate) fn gains(config: &Config, gains: &Gains<f32>) -> bool {
-    let share = gains.current_bandwidth / config.rates.control_hz as f32;
-    gains.is_valid() && (MIN_CURRENT_BANDWIDTH..=MAX_CURRENT_BANDWIDTH).contains(&share)
-}
-
-/// Returns a refusal unless the value is at most its bound. NaN is refused.
-fn within(quantity: Bounded, value: f32, bound: f32) -> Result<(), Refusal> {
-    if value <= bound {
+/// Checks gains for themselves; [`loops`] checks them with a model.
+#[inline(never)]
+pub(crate) fn gains(config: &Config, gains: &Gains<f32>) -> Result<(), Refusal> {
+    at_least(Bounded::ProportionalGain, gains.proportional, 0.0)?;
+    positive(Bounded::DerivativeGain, gains.derivative)?;
+    at_least(Bounded::AdaptationGain, gains.adaptation, 0.0)?;
+    let (quantity, bandwidth) = (Bounded::CurrentLoop, gains.current_bandwidth);
+    let rate = config.rates.control_hz as f32;
+    at_least(quantity, bandwidth, MIN_CURRENT_BANDWIDTH * rate)?;
+    at_most(quantity, bandwidth, MAX_CURRENT_BANDWIDTH * rate)?;
+    if gains.is_valid() {
         Ok(())
     } else {
-        Err(Refusal::OutOfBounds {
-            quantity,
-            value,
-            bound,
-        })
+        Err(Refusal::BadValue)
     }
 }
 
-/// Checks a model against the ratings of the rig. Not inlined, like the checks below: each is called from two places.
+/// Checks a model against the ratings of the rig.
 #[inline(never)]
 pub(crate) fn model(config: &Config, model: &LinkParameters<f32>) -> Result<(), Refusal> {
-    let physical = model.to_array().iter().all(|value| value.is_finite())
-        && model.inertia > 0.0
-        && model.viscous >= 0.0
-        && model.coulomb >= 0.0;
-    if !physical {
+    if !model.to_array().iter().all(|value| value.is_finite()) {
         return Err(Refusal::BadValue);
     }
     let torque = config.ratings.torque;
-    let (cos, sin) = (model.gravity_cos, model.gravity_sin);
+    positive(Bounded::Inertia, model.inertia)?;
+    at_most(Bounded::Inertia, model.inertia, torque / MIN_ACCELERATION)?;
     // Each alone first, so that the squares are finite.
-    within(Bounded::Gravity, cos.abs().max(sin.abs()), torque)?;
-    let gravity = libm::sqrtf(cos * cos + sin * sin);
-    within(Bounded::Inertia, model.inertia, torque / MIN_ACCELERATION)?;
-    within(Bounded::Gravity, gravity, torque)?;
-    within(Bounded::ViscousFriction, model.viscous, torque / MIN_SPEED)?;
-    within(Bounded::DryFriction, model.coulomb, torque)?;
-    within(Bounded::Offset, model.offset.abs(), torque)
+    let (cos, sin) = (model.gravity_cos, model.gravity_sin);
+    at_most(Bounded::Gravity, cos.abs().max(sin.abs()), torque)?;
+    at_most(Bounded::Gravity, libm::sqrtf(cos * cos + sin * sin), torque)?;
+    at_least(Bounded::ViscousFriction, model.viscous, 0.0)?;
+    at_most(Bounded::ViscousFriction, model.viscous, torque / MIN_SPEED)?;
+    at_least(Bounded::DryFriction, model.coulomb, 0.0)?;
+    at_most(Bounded::DryFriction, model.coulomb, torque)?;
+    at_most(Bounded::Offset, model.offset.abs(), torque)
 }
 
 /// Checks a friction law against the ratings of the rig.
 #[inline(never)]
 pub(crate) fn friction(config: &Config, friction: &Friction<f32>) -> Result<(), Refusal> {
-    friction.check().map_err(|_| Refusal::BadValue)?;
+    let Friction {
+        coulomb,
+        viscous,
+        breakaway_excess,
+        load_coefficient,
+        ..
+    } = *friction;
     let torque = config.ratings.torque;
-    let dry = friction.coulomb + friction.breakaway_excess + friction.load_coefficient * torque;
-    within(Bounded::DryFriction, dry, torque)?;
-    within(
-        Bounded::ViscousFriction,
-        friction.viscous,
-        torque / MIN_SPEED,
-    )
+    at_least(Bounded::DryFriction, coulomb, 0.0)?;
+    at_least(Bounded::DryFriction, breakaway_excess, 0.0)?;
+    at_least(Bounded::LoadFriction, load_coefficient, 0.0)?;
+    let dry = coulomb + breakaway_excess + load_coefficient * torque;
+    at_most(Bounded::DryFriction, dry, torque)?;
+    at_least(Bounded::ViscousFriction, viscous, 0.0)?;
+    at_most(Bounded::ViscousFriction, viscous, torque / MIN_SPEED)?;
+    let (of_dry, of_viscous) = (friction.coulomb_asymmetry, friction.viscous_asymmetry);
+    at_most(Bounded::DryAsymmetry, of_dry.abs(), coulomb)?;
+    at_most(Bounded::ViscousAsymmetry, of_viscous.abs(), viscous)?;
+    at_least(Bounded::StribeckVelocity, friction.stribeck_velocity, 0.0)?;
+    if breakaway_excess > 0.0 {
+        positive(Bounded::StribeckVelocity, friction.stribeck_velocity)?;
+    }
+    friction.check().map_err(|_| Refusal::BadValue)
 }
 
 /// Checks that gains leave the current loop room, for the inertia of the model.
@@ -115,8 +159,8 @@ pub(crate) fn friction(config: &Config, friction: &Friction<f32>) -> Result<(), 
 pub(crate) fn loops(gains: &Gains<f32>, model: &LinkParameters<f32>) -> Result<(), Refusal> {
     let bound = MAX_LOOP_SHARE * core::f32::consts::TAU * gains.current_bandwidth;
     let natural = libm::sqrtf(gains.proportional / model.inertia);
-    within(Bounded::PositionLoop, natural, bound)?;
-    within(
+    at_most(Bounded::PositionLoop, natural, bound)?;
+    at_most(
         Bounded::VelocityLoop,
         gains.derivative / model.inertia,
         bound,
@@ -125,23 +169,45 @@ pub(crate) fn loops(gains: &Gains<f32>, model: &LinkParameters<f32>) -> Result<(
 
 /// Checks that a link may be armed where it is and at its speed, rad and rad/s.
 pub(crate) fn arming(limits: &Limits<f32>, position: f32, velocity: f32) -> Result<(), Refusal> {
-    let quantity = Bounded::ArmPosition;
-    within(quantity, position, limits.position_high)?;
-    if position < limits.position_low {
-        return Err(Refusal::OutOfBounds {
-            quantity,
-            value: position,
-            bound: limits.position_low,
-        });
-    }
-    within(Bounded::ArmVelocity, velocity.abs(), MAX_ARM_VELOCITY)
+    at_most(Bounded::ArmPosition, position, limits.position_high)?;
+    at_least(Bounded::ArmPosition, position, limits.position_low)?;
+    at_most(Bounded::ArmVelocity, velocity.abs(), MAX_ARM_VELOCITY)
 }
 
-pub(crate) fn precompensation(settings: &PrecompensationSettings<f32>) -> bool {
-    settings.check().is_ok()
-        // The adaptive law smooths its sign with it, with or without friction precompensation.
-        && settings.velocity_threshold > 0.0
-        && settings.velocity_threshold.is_finite()
+/// Checks the settings of the precompensation.
+#[inline(never)]
+pub(crate) fn precompensation(settings: &PrecompensationSettings<f32>) -> Result<(), Refusal> {
+    // The adaptive law smooths its sign with it, with or without friction precompensation.
+    positive(Bounded::VelocityThreshold, settings.velocity_threshold)?;
+    if settings.enabled {
+        let (gain, at_rest) = (settings.gain, settings.gain_at_rest);
+        at_least(Bounded::FrictionShare, gain, 0.0)?;
+        at_most(Bounded::FrictionShare, gain, 1.0)?;
+        at_least(Bounded::FrictionShareAtRest, at_rest, 0.0)?;
+        at_most(Bounded::FrictionShareAtRest, at_rest, gain)?;
+        if at_rest >= 1.0 {
+            return Err(Refusal::OutOfBounds {
+                quantity: Bounded::FrictionShareAtRest,
+                value: at_rest,
+                bound: 1.0,
+            });
+        }
+    }
+    settings.check().map_err(|_| Refusal::BadValue)
+}
+
+/// Checks the settings of the on-line estimator.
+#[inline(never)]
+pub(crate) fn estimator(config: &Config, settings: &EstimatorSettings<f32>) -> Result<(), Refusal> {
+    let rate = config.rates.estimator_hz();
+    positive(Bounded::EstimatorMemory, settings.memory)?;
+    positive(Bounded::EstimatorBandwidth, settings.bandwidth)?;
+    at_most(Bounded::EstimatorBandwidth, settings.bandwidth, 0.1 * rate)?;
+    at_least(Bounded::SlipVelocity, settings.slip_velocity, 0.0)?;
+    for (low, high) in settings.lower.iter().zip(&settings.upper) {
+        positive(Bounded::EstimatorBand, high - low)?;
+    }
+    settings.check(rate).map_err(|_| Refusal::BadValue)
 }
 
 /// A correction beyond the possible error of a sensor or bridge: it would hide a fault, or reverse a loop.
@@ -190,6 +256,27 @@ impl fmt::Display for CorrectionTooLarge {
 }
 
 impl core::error::Error for CorrectionTooLarge {}
+
+impl From<CorrectionTooLarge> for Refusal {
+    fn from(correction: CorrectionTooLarge) -> Self {
+        let (quantity, value, bound) = match correction {
+            CorrectionTooLarge::CurrentOffset { value, limit } => {
+                (Bounded::CurrentCorrection, value, limit)
+            }
+            CorrectionTooLarge::DriveDeadzone { value, limit } => {
+                (Bounded::VoltageCorrection, value, limit)
+            }
+            CorrectionTooLarge::EncoderEccentricity { value, limit } => {
+                (Bounded::EncoderCorrection, value, limit)
+            }
+        };
+        Self::OutOfBounds {
+            quantity,
+            value,
+            bound,
+        }
+    }
+}
 
 /// Checks that corrections of measured values stay within the possible errors of sensors and bridge.
 ///
@@ -273,6 +360,56 @@ mod tests {
         assert_eq!(model(&config, &broken), Err(Refusal::BadValue));
     }
 
+    /// Each limit that is beyond its rating, 0 or in contradiction to another one is refused with value and bound.
+    #[test]
+    fn limits_are_refused_with_value_and_bound() {
+        let (config, own) = one_link();
+        let ratings = config.ratings;
+        let refused = |change: fn(&mut Limits<f32>)| {
+            let mut changed = own.limits;
+            change(&mut changed);
+            limits(&config, &changed).unwrap_err()
+        };
+        let expected = |quantity, value, bound| Refusal::OutOfBounds {
+            quantity,
+            value,
+            bound,
+        };
+        assert_eq!(
+            refused(|limits| limits.peak_current = 1e8),
+            expected(Bounded::PeakCurrent, 1e8, ratings.peak_current)
+        );
+        assert_eq!(
+            refused(|limits| limits.velocity = 0.0),
+            expected(Bounded::SpeedLimit, 0.0, 0.0)
+        );
+        assert_eq!(
+            refused(|limits| limits.torque = 10.5),
+            expected(Bounded::TorqueLimit, 10.5, ratings.torque)
+        );
+        assert_eq!(
+            refused(|limits| limits.acceleration = -1.0),
+            expected(Bounded::AccelerationLimit, -1.0, 0.0)
+        );
+        assert_eq!(
+            refused(|limits| limits.peak_current = 1.0),
+            expected(Bounded::PeakCurrent, 1.0, own.limits.continuous_current)
+        );
+        assert_eq!(
+            refused(|limits| limits.position_low = 4.0),
+            expected(Bounded::PositionRange, own.limits.position_high - 4.0, 0.0)
+        );
+        assert_eq!(
+            refused(|limits| limits.position_high = 1e4),
+            expected(Bounded::PositionLimit, 1e4, ratings.position_high)
+        );
+        assert_eq!(
+            refused(|limits| limits.torque = f32::NAN),
+            Refusal::BadValue
+        );
+        assert_eq!(limits(&config, &ratings), Ok(()));
+    }
+
     fn is_allowed(effect: Effect<f32>) -> bool {
         let mut all = Effects::default();
         all[0] = Some(effect);
@@ -323,7 +460,7 @@ mod tests {
             (f32::NAN, false),
         ] {
             settings.gains.current_bandwidth = hertz;
-            assert_eq!(gains(&config, &settings.gains), valid, "{hertz} Hz");
+            assert_eq!(gains(&config, &settings.gains).is_ok(), valid, "{hertz} Hz");
             if valid {
                 let derived = crate::derived::Derived::new(&config, &settings);
                 let (ticks, share) = derived.lag;

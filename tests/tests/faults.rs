@@ -6,6 +6,7 @@ use rig_plant::effect::dead_time::DeadTime;
 use rig_plant::effect::end_stops::EndStops;
 use rig_plant::effect::winding_temperature::WindingTemperature;
 use rig_plant::{Faults, PlantConfig};
+use rig_shared::effects::{Effect, Kind};
 use rig_shared::safety::{Fault, Mode, Reaction};
 use rig_shared::trajectory::{Staircase, Trajectory};
 use rig_shared::wire::message::{Bounded, Refusal, RequestBody};
@@ -385,11 +386,11 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
     let mut gains = good.gains;
     gains.proportional = f32::NAN;
     let mut friction = good.friction;
-    friction.coulomb = -0.1;
+    friction.coulomb = f32::NAN;
     let mut limits = good.limits;
     limits.torque = f32::NAN;
     let mut estimator = good.estimator;
-    estimator.memory = -1.0;
+    estimator.memory = f32::INFINITY;
     for body in [
         RequestBody::SetGains(gains),
         RequestBody::SetFriction(friction),
@@ -408,10 +409,8 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
         }
         other => other,
     };
-    assert_eq!(
-        refused(&mut line, RequestBody::SetTrajectory(fast)),
-        Refusal::OutsideLimits
-    );
+    let refusal = refused(&mut line, RequestBody::SetTrajectory(fast));
+    assert_eq!(bound(refusal), (Bounded::MotionSpeed, good.limits.velocity));
     line.request(RequestBody::Arm).unwrap();
     assert_eq!(
         refused(&mut line, RequestBody::Start),
@@ -465,11 +464,32 @@ fn what_a_user_may_not_ask_is_refused_with_its_bound() {
     model.gravity_cos = 1e20;
     let mut friction = own.friction;
     friction.coulomb = 1e20;
+    let mut slow = own.gains;
+    slow.current_bandwidth = 1.0;
+    let mut precompensation = own.precompensation;
+    (precompensation.enabled, precompensation.gain) = (true, 1.2);
+    let mut estimator = own.estimator;
+    estimator.memory = -1.0;
+    // As a torque, N·m.
+    let offset = Effect::new(Kind::CurrentOffset, &[8.0], &[]);
     let before = *line.port().device().state().settings();
     for (body, quantity) in [
         (RequestBody::SetGains(gains), Bounded::PositionLoop),
+        (RequestBody::SetGains(slow), Bounded::CurrentLoop),
         (RequestBody::SetModel(model), Bounded::Gravity),
         (RequestBody::SetFriction(friction), Bounded::DryFriction),
+        (
+            RequestBody::SetPrecompensation(precompensation),
+            Bounded::FrictionShare,
+        ),
+        (
+            RequestBody::SetEstimator(estimator),
+            Bounded::EstimatorMemory,
+        ),
+        (
+            RequestBody::SetEffects(core::iter::once(offset).collect()),
+            Bounded::CurrentCorrection,
+        ),
     ] {
         assert_eq!(bound(refused(&mut line, body)).0, quantity);
     }

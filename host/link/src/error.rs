@@ -4,10 +4,11 @@ use std::borrow::Cow;
 use std::io;
 use std::time::Duration;
 
-use rig_output::format_significant;
 use rig_shared::compensation::Role;
-use rig_shared::wire::message::{Bounded, Refusal};
+use rig_shared::wire::message::{Refusal, SelfTest};
 use rig_shared::wire::{EncodeError, EndMismatch};
+
+use crate::bound::out_of_bounds;
 
 /// An error of the line; each text is a whole sentence.
 #[derive(Debug, thiserror::Error)]
@@ -145,9 +146,6 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
         }
         Refusal::CauseActing => "the cause of the fault still acts; remove it first",
         Refusal::BadValue => "a value is not finite or outside its physical range",
-        Refusal::OutsideLimits => {
-            "the trajectory would leave the limits; make it smaller or slower"
-        }
         Refusal::NoTrajectory => "no trajectory is loaded; upload one first",
         Refusal::Busy => "the settings are being stored; try again in a moment",
         Refusal::NoStorage => "this rig has no memory that keeps settings",
@@ -159,6 +157,15 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
             value,
             bound,
         } => return Cow::Owned(out_of_bounds(quantity, value, bound)),
+        Refusal::SelfTestFailed(SelfTest::Outputs) => {
+            "the self-test at the start found that the chip's outputs to the bridge do not follow its commands; check the wires at PA8 and PA9 for a short circuit, then reset the board"
+        }
+        Refusal::SelfTestFailed(SelfTest::UpperComparator) => {
+            "the self-test at the start found that positive over-current would not switch the outputs off; check the wire of the current sense at PC1, then reset the board"
+        }
+        Refusal::SelfTestFailed(SelfTest::LowerComparator) => {
+            "the self-test at the start found that negative over-current would not switch the outputs off; check the wire of the current sense at PB0, then reset the board"
+        }
         Refusal::Overtaken => "a disarm or stop that was sent later came first",
         Refusal::NotCompensable(kind) => {
             let about = kind.about();
@@ -170,36 +177,4 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
             ));
         }
     })
-}
-/// Describes a quantity beyond its bound, with the remedy.
-fn out_of_bounds(quantity: Bounded, value: f32, bound: f32) -> String {
-    let (what, unit, remedy) = match quantity {
-        Bounded::ArmPosition => (
-            "the position of the link",
-            "rad",
-            "move the link into its range, correct --home, or widen the limits while disarmed",
-        ),
-        Bounded::ArmVelocity => (
-            "the speed of the link",
-            "rad/s",
-            "wait until it hangs still",
-        ),
-        Bounded::PositionLoop => (
-            "the natural frequency of the position loop, sqrt(kp/J),",
-            "rad/s",
-            "lower the proportional gain or raise the bandwidth of the current loop",
-        ),
-        Bounded::VelocityLoop => (
-            "the bandwidth of the velocity loop, kd/J,",
-            "rad/s",
-            "lower the derivative gain or raise the bandwidth of the current loop",
-        ),
-        Bounded::Inertia => ("the inertia of the model", "kg*m^2", "check its unit"),
-        Bounded::Gravity => ("the gravity torque of the model", "N*m", "check its unit"),
-        Bounded::DryFriction => ("the friction torque at rest", "N*m", "check its unit"),
-        Bounded::ViscousFriction => ("the viscous friction", "N*m*s/rad", "check its unit"),
-        Bounded::Offset => ("the constant torque of the model", "N*m", "check its unit"),
-    };
-    let [value, bound] = [value, bound].map(|number| format_significant(f64::from(number), 4));
-    format!("{what} is {value} {unit}, and the bound is {bound} {unit}: {remedy}")
 }

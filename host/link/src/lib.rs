@@ -15,6 +15,7 @@
 //! # }
 //! ```
 
+mod bound;
 pub mod convert;
 pub mod emulated;
 pub mod error;

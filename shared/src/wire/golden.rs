@@ -179,7 +179,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
             "Acknowledge, refused",
             Report::Acknowledge(Acknowledge {
                 id: 301,
-                result: Err(Refusal::OutsideLimits)
+                result: Err(Refusal::NoTrajectory)
             }),
             "0a01ad020104e561923300"
         ),
@@ -258,7 +258,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 id: 302,
                 result: Err(Refusal::StorageFailed)
             }),
-            "0a01ae0201080c27f31c00"
+            "0a01ae020107281be04200"
         ),
         (
             "Acknowledge, out of bounds",
@@ -270,7 +270,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                     bound: 10.0
                 })
             }),
-            "060107010b050103804101072041d28c436600"
+            "060107010a05010380410107204177f715ad00"
         ),
         (
             "Acknowledge, not compensable",
@@ -278,7 +278,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 id: 303,
                 result: Err(Refusal::NotCompensable(Kind::Stribeck))
             }),
-            "0601af020109057d98913400"
+            "0601af020108020a03332700"
         ),
         (
             "Capture",

@@ -168,6 +168,77 @@ pub enum Bounded {
     ViscousFriction,
     /// Constant torque of the model, N·m; bound: the torque rating.
     Offset,
+    /// Limit of the speed, rad/s; bound: the rating, or 0.
+    SpeedLimit,
+    /// Limit of the acceleration, rad/s²; bound: the rating, or 0.
+    AccelerationLimit,
+    /// Limit of the torque, N·m; bound: the rating, or 0.
+    TorqueLimit,
+    /// Continuous current, A; bound: the rating, or 0.
+    ContinuousCurrent,
+    /// Peak current, A; bound: the rating, 0, or the continuous current.
+    PeakCurrent,
+    /// End of the position range, rad; bound: the range of exact positions.
+    PositionLimit,
+    /// Width of the position range, rad; bound: 0.
+    PositionRange,
+    /// Speed of a motion, rad/s; bound: the limit.
+    MotionSpeed,
+    /// Acceleration of a motion, rad/s²; bound: the limit.
+    MotionAcceleration,
+    /// Position that a motion reaches, rad; bound: the end of the position range.
+    MotionPosition,
+    /// Position for the present counts, rad, without its sign.
+    Home,
+    /// Proportional gain, N·m/rad; bound: 0.
+    ProportionalGain,
+    /// Derivative gain, N·m·s/rad; bound: 0.
+    DerivativeGain,
+    /// Adaptation gain, 1/s; bound: 0.
+    AdaptationGain,
+    /// Bandwidth of the current loop, Hz; bounds: shares of the control rate.
+    CurrentLoop,
+    /// Load-dependent friction per torque; bound: 0.
+    LoadFriction,
+    /// Difference of the Coulomb friction between the directions, N·m, without its sign; bound: the Coulomb friction.
+    DryAsymmetry,
+    /// Difference of the viscous friction between the directions, N·m·s/rad, likewise.
+    ViscousAsymmetry,
+    /// Stribeck velocity, rad/s; bound: 0.
+    StribeckVelocity,
+    /// Share of the friction that is compensated in motion; bounds: 0 and 1.
+    FrictionShare,
+    /// Share of the friction that is compensated at rest; bounds: 0 and the share in motion, below 1.
+    FrictionShareAtRest,
+    /// Speed below which the direction of friction is smoothed, rad/s; bound: 0.
+    VelocityThreshold,
+    /// Memory of the on-line estimator, s; bound: 0.
+    EstimatorMemory,
+    /// Bandwidth of the on-line estimator's filter, Hz; bounds: 0 and a tenth of its rate.
+    EstimatorBandwidth,
+    /// Speed below which the on-line estimator does not learn, rad/s; bound: 0.
+    SlipVelocity,
+    /// Width of a parameter's band in the on-line estimator, in the parameter's unit; bound: 0.
+    EstimatorBand,
+    /// Correction of the current by the effects, A; bound: the largest plausible offset.
+    CurrentCorrection,
+    /// Voltage loss of the bridge by the effects, V; bound: a share of the lowest supply.
+    VoltageCorrection,
+    /// Error of the encoder by the effects, as a share of the velocity.
+    EncoderCorrection,
+    /// Motor current read with the bridge off, A, without its sign; bound: the largest plausible offset.
+    IdleCurrent,
+}
+
+/// A part of the protection that a self-test has found wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum SelfTest {
+    /// The outputs do not come on, or do not go off by command.
+    Outputs,
+    /// The comparator of positive over-current does not switch the outputs off.
+    UpperComparator,
+    /// The comparator of negative over-current does not switch the outputs off.
+    LowerComparator,
 }
 
 /// Reason for a refused request. Nothing has changed then.
@@ -179,10 +250,8 @@ pub enum Refusal {
     FaultLatched,
     /// The cause of the fault still acts.
     CauseActing,
-    /// A value is not finite or outside its physical range.
+    /// A value is not finite, or one without a bound of its own is outside its physical range.
     BadValue,
-    /// The trajectory would leave the limits.
-    OutsideLimits,
     /// No trajectory is loaded.
     NoTrajectory,
     /// The settings are being stored; repeat the request after the answer to that.
@@ -204,6 +273,8 @@ pub enum Refusal {
         /// Its bound.
         bound: f32,
     },
+    /// The self-test of the protection failed at the start.
+    SelfTestFailed(SelfTest),
 }
 
 /// Consecutive state samples, oldest first.

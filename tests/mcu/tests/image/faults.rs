@@ -9,7 +9,9 @@ use rig_mcu::time::{NEVER, from_seconds, to_seconds};
 use rig_shared::safety::{Fault, FaultRecord, Limit, Reaction};
 use rig_shared::trajectory::{Staircase, Trajectory};
 use rig_shared::wire::encode;
-use rig_shared::wire::message::{CrashKind, Refusal, Report, Request, RequestBody, ResetCause};
+use rig_shared::wire::message::{
+    Bounded, CrashKind, Refusal, Report, Request, RequestBody, ResetCause,
+};
 use rig_tests::{calibrated, excitation, wait};
 
 use crate::{
@@ -283,7 +285,12 @@ fn limits_beyond_what_the_parts_stand_are_refused() {
     let mut limits = settings.limits;
     limits.peak_current = 1e8;
     let beyond = RequestBody::SetLimits(limits);
-    assert_eq!(refused(&mut line, beyond), Refusal::BadValue);
+    let expected = Refusal::OutOfBounds {
+        quantity: Bounded::PeakCurrent,
+        value: 1e8,
+        bound: config.ratings.peak_current,
+    };
+    assert_eq!(refused(&mut line, beyond), expected);
     line.request(RequestBody::SetLimits(config.ratings))
         .unwrap();
     limits = settings.limits;

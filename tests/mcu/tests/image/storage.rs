@@ -7,7 +7,7 @@ use rig_mcu::peripheral::rcc::Cause;
 use rig_plant::PlantConfig;
 use rig_plant::effect::cogging::Cogging;
 use rig_shared::trajectory::{SlowReversals, Trajectory};
-use rig_shared::wire::message::{Refusal, RequestBody, ResetCause, SettingsOrigin};
+use rig_shared::wire::message::{Bounded, Refusal, RequestBody, ResetCause, SettingsOrigin};
 use rig_tests::{calibrated, cogging_of, driven, truth_of, wait};
 
 use crate::{BoardSession, bench, board, greeted, health, image, place, plant};
@@ -57,7 +57,11 @@ fn stored_settings_come_back_and_damaged_ones_do_not() {
     assert!(matches!(
         line.request(fast.clone()),
         Err(LinkError::Refused {
-            refusal: Refusal::OutsideLimits,
+            refusal: Refusal::OutOfBounds {
+                quantity: Bounded::MotionSpeed,
+                bound: 1.0,
+                ..
+            },
             ..
         })
     ));
