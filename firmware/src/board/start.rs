@@ -53,7 +53,7 @@ static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
 pub(crate) fn run() -> ! {
     let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
-    let crash = crash::take();
+    let crash = crash::take(reset);
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
     let (peripherals, crystal) = clock::start();
     cycles::start(&mut core.DCB, &mut core.DWT);
@@ -110,12 +110,14 @@ pub(crate) fn run() -> ! {
     });
     if let Some(crash) = crash {
         defmt::error!(
-            "restarted after a failure: pc {=u32:#x}, lr {=u32:#x}, CFSR {=u32:#x}, address {=u32:#x}, line {=u32}",
+            "restarted after a failure: pc {=u32:#x}, lr {=u32:#x}, CFSR {=u32:#x}, address {=u32:#x}, {=str}:{=u32}, silent {=u8:#x}",
             crash.pc,
             crash.lr,
             crash.status,
             crash.address,
-            crash.line
+            crash.file(),
+            crash.line,
+            crash.silent
         );
     }
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);

@@ -391,7 +391,21 @@ pub enum CrashKind {
     FlashError,
     /// An exception came that the program does not use.
     UnexpectedException,
+    /// The watchdog reset the chip, because a part of the program had stopped reporting.
+    Watchdog,
 }
+
+/// Parts of the firmware that report to its watchdog, in the order of the bits of [`Crash::silent`].
+pub const WATCHED_PARTS: [&str; 5] = [
+    "the control tick",
+    "the telemetry",
+    "the receiver",
+    "the storage",
+    "the precheck of requests",
+];
+
+/// Bytes of a source file's path in [`Crash::file`].
+pub const FILE_BYTES: usize = 28;
 
 /// A failure of the program, after which the chip restarted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -408,6 +422,23 @@ pub struct Crash {
     pub address: u32,
     /// Line of a panic in its source file, or number of an unexpected exception; else 0.
     pub line: u32,
+    /// End of the path of a panic's source file, UTF-8, filled up with zeros.
+    pub file: [u8; FILE_BYTES],
+    /// Parts that had stopped reporting when the watchdog acted, one bit each ([`WATCHED_PARTS`]); 0 if the processor
+    /// could not note them any more.
+    pub silent: u8,
+}
+
+impl Crash {
+    /// Returns the end of the path of a panic's source file; empty if it is unknown.
+    pub fn file(&self) -> &str {
+        let end = self.file.iter().position(|byte| *byte == 0);
+        let bytes = self
+            .file
+            .get(..end.unwrap_or(FILE_BYTES))
+            .unwrap_or_default();
+        core::str::from_utf8(bytes).unwrap_or_default()
+    }
 }
 
 /// State of the board.

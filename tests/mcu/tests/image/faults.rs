@@ -14,6 +14,7 @@ use rig_shared::wire::message::{
 };
 use rig_tests::{calibrated, excitation, wait};
 
+use crate::crash::assert_interrupted_code;
 use crate::{
     BoardSession, awaited, bench, board, greeted, hang_still, health, moving, powered, snapshot,
 };
@@ -270,10 +271,9 @@ fn a_crystal_that_stops_switches_off_and_starts_anew_without_it() {
     ));
     let report = health(&mut line);
     assert!(!report.crystal && report.reset == ResetCause::Software);
-    assert_eq!(
-        report.crash.map(|crash| crash.kind),
-        Some(CrashKind::ClockStopped)
-    );
+    let crash = report.crash.unwrap();
+    assert_eq!(crash.kind, CrashKind::ClockStopped);
+    assert_interrupted_code(&mut line, &crash);
     assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
 }
 
@@ -468,7 +468,11 @@ fn a_processor_that_hangs_is_reset_by_the_watchdog() {
         [(_, Cause::Watchdog)]
     ));
     board(&mut line).run_for(0.1).unwrap();
-    assert_eq!(health(&mut line).reset, ResetCause::Watchdog);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Watchdog);
+    // No part could note who was silent.
+    let crash = report.crash.unwrap();
+    assert_eq!((crash.kind, crash.silent), (CrashKind::Watchdog, 0));
     assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
 }
 
@@ -507,65 +511,6 @@ fn an_implausible_current_offset_is_a_fault_until_it_is_measured_anew() {
     assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::WrongMode);
     calibrated(&mut line);
     line.request(RequestBody::Arm).unwrap();
-}
-
-/// A panic, met by the program at any place: the bridge goes off at once and stays so, and the next start says why.
-#[test]
-fn a_panic_switches_off_and_starts_anew() {
-    let mut line = moving(42);
-    let emulated = board(&mut line);
-    let handler = emulated
-        .image()
-        .function_ending("rust_begin_unwind")
-        .unwrap();
-    // What the handler is given, where the stack never comes: a message with a pointer to a place in a file, of which every
-    // word is the line. Debian's compiler passes the place itself, whose third word is the line.
-    let (end, _) = emulated.image().symbol("_stack_end").unwrap();
-    let (info, place) = (end, end + 16);
-    let store = |cpu: &mut dyn Memory, address: u32, words: &[u32]| {
-        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        assert!(cpu.store(address, &bytes));
-    };
-    let paint = emulated.word(end + 64);
-    store(emulated.cpu(), info, &[place, place, 1234, place]);
-    store(emulated.cpu(), place, &[1234; 4]);
-    assert_eq!(paint, 0xCCCC_CCCC);
-    emulated.cpu().set(Register::General(0), info);
-    emulated.cpu().set(Register::Pc, handler);
-    assert!(off_after(&mut line, 1e-4).is_some());
-    board(&mut line).run_for(0.1).unwrap();
-    let emulated = board(&mut line);
-    assert!(matches!(emulated.resets[..], [(_, Cause::Software)]));
-    assert!(emulated.with_board(|b| b.enable_edges.len() == 2 && !b.bridge().enabled));
-    let report = health(&mut line);
-    assert_eq!(report.reset, ResetCause::Software);
-    let crash = report.crash.unwrap();
-    assert_eq!((crash.kind, crash.line), (CrashKind::Panic, 1234));
-    // The next start has a reason of its own.
-    board(&mut line).reset(Cause::Pin);
-    wait(&mut line, 0.1);
-    assert_eq!(health(&mut line).crash, None);
-}
-
-/// An instruction that the processor cannot carry out: the next start tells where it was and what it wanted.
-#[test]
-fn a_processor_fault_is_recorded_with_its_place() {
-    let mut line = moving(45);
-    let emulated = board(&mut line);
-    emulated.faults_expected = true;
-    // No memory there.
-    let nowhere = 0x0A00_0100;
-    emulated.cpu().set(Register::Lr, 0x0800_0201);
-    emulated.cpu().set(Register::Pc, nowhere);
-    assert!(off_after(&mut line, 1e-4).is_some());
-    wait(&mut line, 0.1);
-    let report = health(&mut line);
-    assert_eq!(report.reset, ResetCause::Software);
-    let crash = report.crash.unwrap();
-    println!("{crash:x?}");
-    assert_eq!(crash.kind, CrashKind::ProcessorFault);
-    assert_eq!((crash.pc & !1, crash.lr), (nowhere, 0x0800_0201));
-    assert!(crash.status != 0 && crash.address == nowhere, "{crash:x?}");
 }
 
 /// Bytes that the logs have written to the debug probe's channel: its write position, in a ring that nobody reads.

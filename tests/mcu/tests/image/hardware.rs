@@ -11,6 +11,7 @@ use rig_shared::trajectory::{Staircase, Trajectory};
 use rig_shared::wire::message::{CrashKind, Refusal, RequestBody, ResetCause};
 use rig_tests::{calibrated, excitation, wait};
 
+use crate::crash::assert_interrupted_code;
 use crate::faults::{latched_after, off_after, refused};
 use crate::{
     BoardSession, bench, board, captured, greeted, hang_still, health, image, moving, place, plant,
@@ -276,8 +277,9 @@ fn lock_up_and_flash_errors_take_the_outputs_in_hardware() {
     ));
     let report = health(&mut line);
     assert_eq!(report.reset, ResetCause::Software);
-    let kind = report.crash.map(|crash| crash.kind);
-    assert_eq!(kind, Some(CrashKind::FlashError));
+    let crash = report.crash.unwrap();
+    assert_eq!(crash.kind, CrashKind::FlashError);
+    assert_interrupted_code(&mut line, &crash);
 
     // In the settings' bank, as an interrupted store leaves it: off all the same, but the program goes on.
     let mut line = moving(85);

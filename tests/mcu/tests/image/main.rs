@@ -6,6 +6,7 @@
 mod boot;
 mod budget;
 mod circle;
+mod crash;
 mod dynamics;
 mod faults;
 mod hardware;

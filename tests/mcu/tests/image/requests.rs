@@ -4,13 +4,14 @@
 use std::collections::BTreeSet;
 
 use rig_link::LinkError;
+use rig_mcu::board::BoardFaults;
 use rig_mcu::chip::CONTROL_EXCEPTION;
 use rig_mcu::emulation::Silenced;
 use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::time::{from_seconds, to_seconds};
 use rig_shared::control::ControlKind;
 use rig_shared::trajectory::{HARMONICS, Trajectory};
-use rig_shared::wire::message::{Refusal, Report, Request, RequestBody};
+use rig_shared::wire::message::{CrashKind, Refusal, Report, Request, RequestBody};
 use rig_shared::wire::{MAX_FRAME, MessageDecoder, encode};
 use rig_tests::{excitation, wait};
 
@@ -172,23 +173,25 @@ fn each_part_that_stops_is_found_by_the_watchdog() {
         });
     }
     // Seconds within which the chip must start anew; the watchdog's clock is right to a few per cent (DS12288, LSI).
-    let parts: [(&str, Stop, f64); 5] = [
+    let parts: [(&str, Stop, f64, u8); 5] = [
         (
             "tick",
             |line| board(line).with_board(|b| b.faults.trigger_lost = true),
             0.12,
+            1,
         ),
         (
             // It stops with its next frame, which is an estimate every 50 ms.
             "telemetry",
             |line| board(line).with_board(|b| b.faults.line_blocked = true),
             0.17,
+            2,
         ),
-        ("receiver", |line| silence(line, 4), 0.65),
-        ("storage", |line| silence(line, 8), 0.65),
-        ("precheck", |line| silence(line, 16), 0.65),
+        ("receiver", |line| silence(line, 4), 0.65, 4),
+        ("storage", |line| silence(line, 8), 0.65, 8),
+        ("precheck", |line| silence(line, 16), 0.65, 16),
     ];
-    for (part, stop, within) in parts {
+    for (part, stop, within, bit) in parts {
         let mut line = moving(91);
         stop(&mut line);
         let from = board(&mut line).with_chip(|chip| chip.work.now);
@@ -206,6 +209,14 @@ fn each_part_that_stops_is_found_by_the_watchdog() {
         assert_eq!(cause, Cause::Watchdog, "{part}");
         assert!(after < within, "{part}: {after} s");
         assert!(!emulated.with_board(|b| b.bridge().enabled), "{part}");
+        // The next start tells which part it was.
+        emulated.silenced = None;
+        emulated.with_board(|b| b.faults = BoardFaults::default());
+        emulated.run_for(0.05).unwrap();
+        let crash = health(&mut line).crash.unwrap();
+        println!("{part}: {:#07b}", crash.silent);
+        assert_eq!(crash.kind, CrashKind::Watchdog, "{part}");
+        assert_eq!(crash.silent & bit, bit, "{part}");
     }
 }
 

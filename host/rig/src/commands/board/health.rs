@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use rig_shared::wire::message::{Crash, CrashKind, Greeting, Health, Report, SettingsOrigin};
+use rig_shared::wire::message::{
+    Crash, CrashKind, Greeting, Health, Report, SettingsOrigin, WATCHED_PARTS,
+};
 
 use super::super::error::CommandError;
 use rig_link::{Port, Session};
@@ -77,15 +79,37 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
     })
 }
 
+/// Describes a reset by the watchdog.
+fn describe_silence(silent: u8) -> String {
+    let parts: Vec<&str> = WATCHED_PARTS
+        .iter()
+        .enumerate()
+        .filter(|(bit, _)| silent & 1 << bit != 0)
+        .map(|(_, part)| *part)
+        .collect();
+    if parts.is_empty() {
+        "the watchdog reset the chip: the processor stopped, or an interrupt did not end".to_owned()
+    } else {
+        format!(
+            "the watchdog reset the chip: {} had stopped reporting",
+            parts.join(" and ")
+        )
+    }
+}
+
 /// Describes the failure of the program before the last start.
 fn describe_crash(crash: &Crash) -> String {
     let what = match crash.kind {
         CrashKind::Panic if crash.line == 0 => "a panic".to_owned(),
-        CrashKind::Panic => format!("a panic in line {} of its source file", crash.line),
+        CrashKind::Panic if crash.file().is_empty() => {
+            format!("a panic in line {} of its source file", crash.line)
+        }
+        CrashKind::Panic => format!("a panic at {}:{}", crash.file(), crash.line),
         CrashKind::ProcessorFault => "a processor fault".to_owned(),
         CrashKind::ClockStopped => "the crystal stopped".to_owned(),
         CrashKind::FlashError => "a word of the flash memory has two wrong bits".to_owned(),
         CrashKind::UnexpectedException => format!("exception {} came unexpectedly", crash.line),
+        CrashKind::Watchdog => describe_silence(crash.silent),
     };
     let numbers = [
         ("pc", crash.pc),
@@ -97,4 +121,54 @@ fn describe_crash(crash: &Crash) -> String {
     known.fold(what, |text, (name, value)| {
         format!("{text}, {name} {value:#010x}")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rig_shared::wire::message::FILE_BYTES;
+
+    #[test]
+    fn failures_are_told_in_words() {
+        let mut file = [0; FILE_BYTES];
+        file[..15].copy_from_slice(b"board/storage.r");
+        let known = Crash {
+            kind: CrashKind::Panic,
+            pc: 0,
+            lr: 0,
+            status: 0,
+            address: 0,
+            line: 87,
+            file,
+            silent: 0,
+        };
+        assert_eq!(describe_crash(&known), "a panic at board/storage.r:87");
+        let fault = Crash {
+            kind: CrashKind::ProcessorFault,
+            pc: 0x0800_1234,
+            status: 0x8200,
+            ..known
+        };
+        assert_eq!(
+            describe_crash(&fault),
+            "a processor fault, pc 0x08001234, CFSR 0x00008200"
+        );
+        let silent = Crash {
+            kind: CrashKind::Watchdog,
+            silent: 0b10_010,
+            ..known
+        };
+        assert_eq!(
+            describe_crash(&silent),
+            "the watchdog reset the chip: the telemetry and the precheck of requests had stopped reporting"
+        );
+        let stopped = Crash {
+            silent: 0,
+            ..silent
+        };
+        assert_eq!(
+            describe_crash(&stopped),
+            "the watchdog reset the chip: the processor stopped, or an interrupt did not end"
+        );
+    }
 }
