@@ -6,6 +6,7 @@ mod clock;
 mod comparator;
 mod crash;
 mod cycles;
+mod debugger;
 mod encoder;
 mod fault;
 mod health;

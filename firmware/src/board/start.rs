@@ -29,7 +29,7 @@ use super::storage::Storage;
 use super::tick::{EVENTS, RECEIVED, REQUESTS, Tick, URGENT};
 use super::watchdog::{Task, Watchdog, check_in};
 use super::wire_check::WireCheck;
-use super::{crash, cycles, health, heat, link, probe, stack, tick};
+use super::{crash, cycles, debugger, health, heat, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -57,6 +57,7 @@ pub(crate) fn run() -> ! {
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
     let (peripherals, crystal) = clock::start();
     cycles::start(&mut core.DCB, &mut core.DWT);
+    debugger::freeze_outputs_at_halts();
     interrupt::TIM3.set_priority(LINK_PRIORITY);
     let pins = Pins::new(peripherals);
 
@@ -193,6 +194,7 @@ async fn indicator(mut watchdog: Watchdog, mut led: Output<'static>) -> ! {
     loop {
         ticker.next().await;
         watchdog.feed();
+        debugger::tell_halts();
         count = count.wrapping_add(1);
         if count.is_multiple_of(50) {
             led.toggle();

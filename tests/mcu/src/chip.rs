@@ -3,6 +3,7 @@
 mod bus;
 mod error;
 mod event;
+mod halt;
 mod lines;
 mod pins;
 mod reset;

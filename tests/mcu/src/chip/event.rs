@@ -4,7 +4,7 @@ use super::error::ChipError;
 use super::state::{Chip, NON_MASKABLE, TIM1_TRGO2, TIM4_TRGO};
 use crate::cpu::Memory;
 use crate::peripheral::Refusal;
-use crate::time::Instant;
+use crate::time::{Instant, NEVER};
 
 impl Chip {
     /// Handles a locked-up processor: an input of the break if enabled (SYSCFG_CFGR2.CLL).
@@ -39,7 +39,8 @@ impl Chip {
             .min(self.lpuart.due())
             .min(self.iwdg.bites())
             .min(self.flash.due())
-            .min(self.nvic.due());
+            .min(self.nvic.due())
+            .min(self.halt.map_or(NEVER, |[_, end]| end));
         for tim in &self.tim {
             due = due.min(tim.due());
         }
@@ -81,6 +82,7 @@ impl Chip {
 
     /// Handles all events of one instant.
     fn happen(&mut self, at: Instant, memory: &mut dyn Memory) -> Result<(), Refusal> {
+        self.end_halt(at);
         for tim in &mut self.tim {
             tim.advance(at);
         }

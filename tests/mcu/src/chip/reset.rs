@@ -29,6 +29,7 @@ impl Chip {
             deadline: 0,
             limit: 0,
             held_until: 0,
+            halt: None,
             expected: 0,
             block: 0,
             accelerator: Accelerator::default(),
@@ -87,6 +88,7 @@ impl Chip {
         self.lpuart.reset();
         self.iwdg = Iwdg::default();
         self.cycle_counter = (false, 0);
+        self.halt = None;
         self.stores.clear();
         self.deadline = 0;
         self.set_pins();

@@ -50,6 +50,8 @@ pub struct Chip {
     pub limit: Instant,
     /// Time until which something outside holds the processor up.
     pub held_until: Instant,
+    /// A halt of the processor by a debugger: its beginning and its end.
+    pub(super) halt: Option<[Instant; 2]>,
     /// Address that follows the last block.
     pub(super) expected: u32,
     /// Last block.

@@ -49,6 +49,8 @@ pub struct Nvic {
     pub(super) float_default: u32,
     pub(super) fault_status: [u32; 4],
     pub(super) debug: u32,
+    /// DFSR: debug events since it was cleared.
+    pub debug_status: u32,
     pub(super) mpu: [u32; 4],
     /// Reset has been requested by AIRCR.
     pub reset_requested: bool,
@@ -77,6 +79,7 @@ impl Default for Nvic {
             float_default: 0,
             fault_status: [0; 4],
             debug: 0,
+            debug_status: 0,
             mpu: [0; 4],
             reset_requested: false,
             candidate: None,

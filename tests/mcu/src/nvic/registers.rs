@@ -61,6 +61,7 @@ impl Nvic {
             0xD24 => self.handlers,
             0xD28 => self.fault_status[0],
             0xD2C => self.fault_status[1],
+            0xD30 => self.debug_status,
             0xD34 => self.fault_status[2],
             0xD38 => self.fault_status[3],
             0xD88 => self.coprocessors,
@@ -155,6 +156,7 @@ impl Nvic {
             }
             0xD28 => self.fault_status[0] &= !value,
             0xD2C => self.fault_status[1] &= !value,
+            0xD30 => self.debug_status &= !value,
             0xD88 => self.coprocessors = value,
             0xD94 if value & 1 != 0 => return told("the MPU is not modelled"),
             0xD94..=0xDA0 => {

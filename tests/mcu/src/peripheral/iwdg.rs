@@ -16,6 +16,8 @@ pub struct Iwdg {
     /// Longest time between two refreshes so far.
     longest: u64,
     refreshed: Option<Instant>,
+    /// Time of the halt of the processor since which the watchdog stands.
+    frozen: Option<Instant>,
 }
 
 impl Default for Iwdg {
@@ -27,6 +29,7 @@ impl Default for Iwdg {
             bites: NEVER,
             longest: 0,
             refreshed: None,
+            frozen: None,
         }
     }
 }
@@ -40,7 +43,23 @@ impl Iwdg {
 
     /// Returns the time at which the watchdog resets the chip if it is not fed.
     pub fn bites(&self) -> Instant {
-        self.bites
+        if self.frozen.is_some() {
+            NEVER
+        } else {
+            self.bites
+        }
+    }
+
+    /// Stops the watchdog while the processor is halted, or lets it go on from where it stood (DBG_IWDG_STOP).
+    pub fn freeze(&mut self, now: Instant, frozen: bool) {
+        if frozen {
+            self.frozen.get_or_insert(now);
+        } else if let Some(since) = self.frozen.take()
+            && self.bites != NEVER
+        {
+            self.bites += now - since;
+            self.refreshed = self.refreshed.map(|at| at + (now - since));
+        }
     }
 
     /// Returns the longest time between two refreshes since the start.

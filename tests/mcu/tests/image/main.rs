@@ -7,6 +7,7 @@ mod boot;
 mod budget;
 mod circle;
 mod crash;
+mod debugger;
 mod dynamics;
 mod faults;
 mod hardware;

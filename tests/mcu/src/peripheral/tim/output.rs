@@ -12,7 +12,10 @@ impl Tim {
     pub fn output(&self, channel: usize) -> Result<Option<f64>, Refusal> {
         let enable = self.bank.get(CCER) >> (4 * channel);
         let advanced = matches!(self.number, 1 | 8 | 15 | 16 | 17 | 20);
-        if enable & 1 == 0 || advanced && self.bank.get(BDTR) & MOE == 0 {
+        // While the counter stands for a debugger, the outputs are disabled "as if the MOE bit was reset" (RM0440, TIM1,
+        // "Debug mode").
+        let disabled = self.bank.get(BDTR) & MOE == 0 || self.is_frozen();
+        if enable & 1 == 0 || advanced && disabled {
             return Ok(None);
         }
         let modes = self.bank.get(if channel < 2 { CCMR1 } else { CCMR2 }) >> (8 * (channel % 2));

@@ -114,6 +114,8 @@ pub struct Tim {
     pub(super) break_levels: [bool; 5],
     pub(super) break_active: bool,
     pub(super) system_break: bool,
+    /// The debugger has halted the processor, and the timer stands meanwhile (DBG_TIMx_STOP).
+    frozen: bool,
     /// Update events so far.
     pub updates: u64,
 }
@@ -147,6 +149,7 @@ impl Tim {
             break_levels: [true, false, false, false, false],
             break_active: false,
             system_break: false,
+            frozen: false,
             updates: 0,
         }
     }
@@ -165,7 +168,21 @@ impl Tim {
     }
 
     pub(super) fn counts_by_clock(&self) -> bool {
-        self.bank.get(CR1) & CEN != 0 && !self.is_encoder()
+        self.bank.get(CR1) & CEN != 0 && !self.is_encoder() && !self.frozen
+    }
+
+    /// Stops the counter while the processor is halted, or lets it go on from where it stood.
+    pub fn freeze(&mut self, now: Instant, frozen: bool) {
+        if frozen != self.frozen {
+            let count = self.count(now);
+            self.frozen = frozen;
+            self.rebase(now, count);
+        }
+    }
+
+    /// Returns true while the counter stands because the processor is halted.
+    pub fn is_frozen(&self) -> bool {
+        self.frozen
     }
 
     pub(super) fn is_centred(&self) -> bool {
