@@ -80,7 +80,17 @@ pub struct Image {
     functions: BTreeMap<u32, Function>,
     /// Where data begins (true) among code and code again (false): mapping symbols.
     data: BTreeMap<u32, bool>,
-    loaded: u32,
+    segments: Vec<Segment>,
+}
+
+/// Bytes that are loaded to the chip.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    /// Address in flash.
+    address: u32,
+    /// Place in the file.
+    place: usize,
+    size: u32,
 }
 
 fn half(bytes: &[u8], at: usize) -> Option<u16> {
@@ -125,7 +135,7 @@ impl Image {
             sections: Vec::new(),
             functions: BTreeMap::new(),
             data: BTreeMap::new(),
-            loaded: 0,
+            segments: Vec::new(),
             bytes: Vec::new(),
         };
         let segments = Table {
@@ -134,9 +144,14 @@ impl Image {
             count: half(&bytes, 44)?.into(),
         };
         for index in 0..segments.count {
-            // PT_LOAD; bytes in the file.
-            if segments.field(&bytes, index, 0)? == 1 {
-                image.loaded += segments.field(&bytes, index, 4)?;
+            let field = |field| segments.field(&bytes, index, field);
+            // PT_LOAD: place in the file, physical address, bytes in the file.
+            if field(0)? == 1 && field(4)? > 0 {
+                image.segments.push(Segment {
+                    address: field(3)?,
+                    place: field(1)? as usize,
+                    size: field(4)?,
+                });
             }
         }
         let table = Table {
@@ -216,7 +231,26 @@ impl Image {
 
     /// Bytes that are loaded to flash.
     pub fn loaded(&self) -> u32 {
-        self.loaded
+        self.segments.iter().map(|segment| segment.size).sum()
+    }
+
+    /// Contents of the flash memory from address `start` on, with erased bytes between what is loaded; `None` if something
+    /// is loaded below `start` or more than `room` bytes above it.
+    pub fn flash(&self, start: u32, room: u32) -> Option<Vec<u8>> {
+        let mut flash = Vec::new();
+        for segment in &self.segments {
+            let from = segment.address.checked_sub(start)?;
+            let to = from.checked_add(segment.size).filter(|to| *to <= room)?;
+            let content = self.bytes.get(segment.place..)?;
+            let content = content.get(..segment.size as usize)?;
+            if flash.len() < to as usize {
+                flash.resize(to as usize, 0xFF);
+            }
+            flash
+                .get_mut(from as usize..to as usize)?
+                .copy_from_slice(content);
+        }
+        Some(flash)
     }
 
     /// The half word of code at an address.

@@ -1,6 +1,8 @@
-//! Checks an image of the firmware against `firmware/fast_code.list`, and says how much memory is left.
+//! Checks an image of the firmware against `firmware/fast_code.list`, says how much memory is left, and writes the image as
+//! the bytes of the flash memory beside it (`.bin`), for the drive of the ST-LINK.
 
 use std::error::Error;
+use std::path::Path;
 use std::process::ExitCode;
 
 use rig_layout::{Image, LIST, MEMORY, Placement, ROOT, Use, entries, regions};
@@ -23,6 +25,12 @@ fn run() -> Result<bool, Box<dyn Error>> {
         .ok_or("rig-layout: name the firmware's ELF file, which firmware/build makes.")?;
     let image = Image::read(path.as_ref())?;
     let regions = regions(MEMORY);
+    let [flash, load] = ["FLASH", "LOAD"].map(|name| regions.iter().find(|r| r.name == name));
+    let (flash, load) = (flash.zip(load)).ok_or("memory.x has no regions FLASH and LOAD.")?;
+    let room = load.origin + load.length - flash.origin;
+    let bytes = (image.flash(flash.origin, room))
+        .ok_or("the image has parts outside the regions FLASH and LOAD of memory.x.")?;
+    std::fs::write(Path::new(&path).with_extension("bin"), bytes)?;
     let code = (regions.iter().find(|region| region.name == "CODE"))
         .ok_or("memory.x has no region CODE: the tick's code has no place.")?;
     let placement = Placement::of(&image, &entries(LIST)?, code, ROOT);

@@ -10,7 +10,9 @@ use rig_mcu::rig::{EmulatedBoard, Line};
 use rig_shared::wire::message::{Report, RequestBody, ResetCause, SettingsOrigin};
 use rig_tests::{calibrated, excitation, wait};
 
-use crate::{BoardSession, awaited, bench, board, captured, greeted, health, place, powered};
+use crate::{
+    BoardSession, awaited, bench, board, captured, greeted, health, image, path_of, place, powered,
+};
 
 #[test]
 fn it_boots_samples_at_ten_kilohertz_and_moves_nothing() {
@@ -222,4 +224,19 @@ fn a_capture_holds_every_tick_in_a_row() {
             .windows(2)
             .all(|pair| pair[1].tick == pair[0].tick + 1)
     );
+}
+
+/// The file for the drive of the ST-LINK, which writes it from the start of the flash on: what the emulated board runs.
+#[test]
+fn the_bin_file_is_the_flash_that_the_image_loads() {
+    let path = path_of("RIG_FIRMWARE_ELF", "rig-firmware").with_extension("bin");
+    let bytes = std::fs::read(&path).unwrap();
+    let flash = image().flash;
+    assert!(bytes.len() > 100_000 && bytes.len() <= 256 * 1024);
+    let (loaded, rest) = flash.split_at(bytes.len());
+    assert!(loaded == bytes && rest.iter().all(|byte| *byte == 0xFF));
+    // Stack and first instruction.
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    assert!((0x2000_0000..0x2002_0000).contains(&word(0)));
+    assert!((0x0800_0000..0x0804_0000).contains(&word(4)) && word(4) & 1 == 1);
 }

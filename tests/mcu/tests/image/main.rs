@@ -38,7 +38,12 @@ fn image() -> Image {
 
 /// An image: that of the environment variable, or `name` from where the build puts it.
 fn image_of(variable: &str, name: &str) -> Image {
-    let path = std::env::var_os(variable).map_or_else(
+    let path = path_of(variable, name);
+    Image::read(&path).unwrap_or_else(|error| panic!("{error} Build it with firmware/build first."))
+}
+
+fn path_of(variable: &str, name: &str) -> PathBuf {
+    std::env::var_os(variable).map_or_else(
         || {
             let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
                 || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../target"),
@@ -47,8 +52,7 @@ fn image_of(variable: &str, name: &str) -> Image {
             target.join("thumbv7em-none-eabihf/chip").join(name)
         },
         PathBuf::from,
-    );
-    Image::read(&path).unwrap_or_else(|error| panic!("{error} Build it with firmware/build first."))
+    )
 }
 
 /// A laboratory rig whose torque constant the firmware knows: no motion of the rig could show an error in it.
