@@ -1,4 +1,9 @@
 //! Copies the control tick's code into the CCM SRAM, before anything else happens.
+//!
+//! Before that, each cut of the memories is read once. The first access to one after a reset may be lost if it is a store
+//! (errata ES0430, 2.2.7): the first word of the code, or of the stack. The cuts begin at 0x20000000, 0x20008000, 0x20010000
+//! (SRAM1), 0x20014000 (SRAM2) and 0x10000000. Reading keeps what a crash has left behind. The option that checks the parity of
+//! these memories must be off, as the factory leaves it (SRAM_PE = 1): what was never written has no parity.
 
 use core::arch::global_asm;
 
@@ -14,6 +19,17 @@ mod pre_init {
         ".type __pre_init, %function",
         ".thumb_func",
         "__pre_init:",
+        "ldr r0, =0x20000000",
+        "ldr r1, [r0]",
+        "ldr r0, =0x20008000",
+        "ldr r1, [r0]",
+        "ldr r0, =0x20010000",
+        "ldr r1, [r0]",
+        "ldr r0, =0x20014000",
+        "ldr r1, [r0]",
+        "ldr r0, =0x10000000",
+        "ldr r1, [r0]",
+        "dsb",
         "ldr r0, =__tick_start",
         "ldr r1, =__tick_end",
         "ldr r2, =__tick_load",

@@ -10,6 +10,7 @@ mod crash;
 mod debugger;
 mod dynamics;
 mod faults;
+mod first_access;
 mod hardware;
 mod identification;
 mod ill;
