@@ -7,6 +7,7 @@ use rig_shared::estimation::{OneLinkEstimator, SettingsFault, one_link};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
 use rig_shared::trajectory::{Extremes, PreparedTrajectory, Reference};
+use rig_shared::wire::message::SelfTest;
 
 use crate::config::{Config, Settings};
 use crate::derived::Derived;
@@ -98,6 +99,8 @@ pub struct State {
     pub(crate) run: Run,
     /// Present if the motor brakes after a fault.
     pub(crate) motor_brake: Option<MotorBrake>,
+    /// Part of the protection that failed the self-test at the start: the rig is not armed.
+    pub(crate) failed_test: Option<SelfTest>,
 }
 
 /// The motion under way.
@@ -143,6 +146,20 @@ impl Calibration {
 }
 
 impl State {
+    /// Notes the part of the protection that failed the self-test of the board, if any did.
+    pub fn note_self_test(&mut self, failed: Option<SelfTest>) {
+        self.failed_test = failed;
+    }
+
+    /// Returns the mean current of the last `ticks` control ticks, A; while the snapshot is frozen, of its last.
+    pub(crate) fn mean_current(&self, ticks: usize) -> f32 {
+        let held = self.snapshot.len();
+        let from = held.saturating_sub(ticks);
+        let last = (from..held).filter_map(|index| self.snapshot.get(index));
+        let sum: f32 = last.map(|tick| tick.current).sum();
+        sum / (held - from).max(1) as f32
+    }
+
     /// Returns the state at power on: calibrating, bridge off.
     ///
     /// # Errors
@@ -211,6 +228,7 @@ impl State {
             marks: LimitSet::default(),
             run: Run::default(),
             motor_brake: None,
+            failed_test: None,
         }
     }
 

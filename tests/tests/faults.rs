@@ -448,6 +448,12 @@ fn what_a_user_may_not_ask_is_refused_with_its_bound() {
     }
     line.request(RequestBody::SetPosition(plant.initial_position as f32))
         .unwrap();
+    // 0.8 A with the bridge off, as through a shorted half bridge.
+    inject(&mut line, |f| f.current_stuck = Some(2048 + 100));
+    wait(&mut line, 0.01);
+    let refusal = refused(&mut line, RequestBody::Arm);
+    assert_eq!(bound(refusal), (Bounded::IdleCurrent, 0.5));
+    inject(&mut line, |f| f.current_stuck = None);
     inject(&mut line, |f| f.external_torque = 3.0);
     wait(&mut line, 0.1);
     let refusal = refused(&mut line, RequestBody::Arm);

@@ -19,15 +19,14 @@ const ABOVE_160_MHZ: u8 = 2;
 
 /// Starts both with thresholds, lower and upper, as codes of the converter. The clock of SYSCFG, which the comparators
 /// use, must be on.
-pub(crate) fn start([lower, upper]: [u16; 2]) {
+pub(crate) fn start(thresholds: [u16; 2]) {
     RCC.ahb2enr().modify(|w| w.set_dac3en(true));
     DAC3.mcr().write(|w| {
         w.set_hfsel(ABOVE_160_MHZ);
         w.set_mode(0, Mode::NORMAL_INT_BUFDIS);
         w.set_mode(1, Mode::NORMAL_INT_BUFDIS);
     });
-    DAC3.dhr12r(0).write(|w| w.set_dhr(upper));
-    DAC3.dhr12r(1).write(|w| w.set_dhr(lower));
+    set_thresholds(thresholds);
     DAC3.cr().write(|w| {
         w.set_en(0, true);
         w.set_en(1, true);
@@ -46,4 +45,10 @@ pub(crate) fn start([lower, upper]: [u16; 2]) {
         });
     }
     cortex_m::asm::delay(START_US * (CORE_HZ / 1_000_000));
+}
+
+/// Sets the thresholds, lower and upper.
+pub(crate) fn set_thresholds([lower, upper]: [u16; 2]) {
+    DAC3.dhr12r(0).write(|w| w.set_dhr(upper));
+    DAC3.dhr12r(1).write(|w| w.set_dhr(lower));
 }

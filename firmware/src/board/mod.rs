@@ -18,6 +18,7 @@ mod pwm;
 mod queue;
 mod receiver;
 mod return_barrier;
+mod self_test;
 mod stack;
 pub(crate) mod start;
 mod storage;

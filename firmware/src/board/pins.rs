@@ -137,6 +137,18 @@ pub(crate) fn is_fault_line_low() -> bool {
     GPIOB.idr().read().idr(12) == Idr::LOW
 }
 
+/// Returns true if both inputs of the bridge, PA8 and PA9, have this level.
+pub(crate) fn are_bridge_inputs(high: bool) -> bool {
+    let wanted = if high { Idr::HIGH } else { Idr::LOW };
+    let levels = GPIOA.idr().read();
+    levels.idr(8) == wanted && levels.idr(9) == wanted
+}
+
+/// Returns true if the enable of the bridge, PB5, is low.
+pub(crate) fn is_bridge_asleep() -> bool {
+    GPIOB.idr().read().idr(5) == Idr::LOW
+}
+
 impl BridgePins {
     /// Connects the outputs and the break input to TIM1, which must already hold its outputs idle.
     pub(crate) fn connect(self) -> Output<'static> {

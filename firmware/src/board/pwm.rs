@@ -20,11 +20,12 @@ use embassy_stm32::pac::timer::vals::{
 use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1, TIM4};
 use rig_firmware::nameplate;
 use rig_firmware::sample::{Command, PWM_HZ};
+use rig_shared::wire::message::SelfTest;
 
 use super::adc::SAMPLING_LEAD;
 use super::clock::CORE_HZ;
-use super::comparator;
 use super::pins::{BridgePins, disable_bridge, is_fault_line_low};
+use super::{comparator, self_test};
 
 // A whole number of pulses between two ticks: every update is then an underflow.
 const _: () = assert!(PWM_HZ.is_multiple_of(nameplate::RATES.control_hz));
@@ -60,13 +61,14 @@ pub(crate) struct Bridge {
 }
 
 impl Bridge {
-    /// Sets TIM1 up with idle outputs and a disabled bridge; `thresholds` are those of the comparators.
+    /// Sets TIM1 up with idle outputs and a disabled bridge; `thresholds` are those of the comparators. Also returns the
+    /// part that fails the self-test.
     pub(crate) fn new(
         pins: BridgePins,
         control_hz: u32,
         wake_ticks: u32,
         thresholds: [u16; 2],
-    ) -> Self {
+    ) -> (Self, Option<SelfTest>) {
         RCC.apb2enr().modify(|w| {
             w.set_tim1en(true);
             w.set_syscfgen(true);
@@ -112,7 +114,8 @@ impl Bridge {
         // (RM0440, TIM1_AF1: BKCMP3E and BKCMP4E with their polarities).
         comparator::start(thresholds);
         timer.af1().write(|w| {
-            w.set_bkine(true);
+            // Only after the self-test: the bridge sleeps, and may hold its fault line low.
+            w.set_bkine(false);
             w.set_bkinp(Bkinp::NOT_INVERTED);
             for comparator in COMPARATORS {
                 w.set_bkcmpe(comparator, true);
@@ -133,12 +136,17 @@ impl Bridge {
         timer.egr().write(|w| w.set_ug(true));
         timer.sr().write_value(Default::default());
         start_sample_trigger(control_hz);
-        Self {
-            enable: pins.connect(),
+        let enable = pins.connect();
+        let failed = self_test::run(thresholds);
+        timer.af1().modify(|w| w.set_bkine(true));
+        clear_breaks();
+        let bridge = Self {
+            enable,
             wake_ticks,
             waking: 0,
             awake: false,
-        }
+        };
+        (bridge, failed)
     }
 
     /// Starts the ramp and the sampling. The converter must be set up before, ready for every trigger. The outputs stay
@@ -209,7 +217,7 @@ impl Bridge {
 
 /// Clears the flags of the break. A fault that has ended is forgotten; one that still acts sets its flag again at once.
 #[inline(always)]
-fn clear_breaks() {
+pub(crate) fn clear_breaks() {
     TIM1.sr().write(|w| {
         // Writing zero clears a flag, writing one keeps it (rc_w0).
         *w = embassy_stm32::pac::timer::regs::SrAdv(!0);

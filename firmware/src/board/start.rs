@@ -73,13 +73,14 @@ pub(crate) fn run() -> ! {
     let (storage, selection) = Storage::open(config);
     let settings = selection.settings.unwrap_or(default_settings);
     let thresholds = config.current_thresholds();
-    let bridge = Bridge::new(
+    let (bridge, failed_test) = Bridge::new(
         pins.bridge,
         config.rates.control_hz,
         config.wake_ticks,
         thresholds,
     );
     let state = state(config, settings);
+    state.note_self_test(failed_test);
     state.restore_heat(heat::load().unwrap_or_default());
     let (event_in, event_out) = EVENT_QUEUE.init(spsc::Queue::new()).split();
     let (to_store, settings_from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();

@@ -61,6 +61,8 @@ pub struct BoardFaults {
     pub crystal_dead: bool,
     /// The comparators detect nothing.
     pub comparators_dead: bool,
+    /// The wire of the current sense to PB0 is open.
+    pub second_sense_open: bool,
     /// The converter's trigger does not come.
     pub trigger_lost: bool,
     /// The serial line accepts no byte.

@@ -64,7 +64,8 @@ impl Chip {
             let analogue = self.gpio[port].function(pin) == Function::Analogue;
             (analogue && !self.board.faults.comparators_dead).then_some(sense)
         };
-        let (pc1, pb0) = (wired(2, 1), wired(1, 0));
+        let pb0 = wired(1, 0).filter(|_| !self.board.faults.second_sense_open);
+        let pc1 = wired(2, 1);
         let third = self.comp.compare(3, [None, pc1], self.dac.output(0));
         let fourth = self.comp.compare(4, [pb0, None], self.dac.output(1));
         self.tim[0].set_comparator(3, third);
@@ -76,11 +77,16 @@ impl Chip {
         let mut half = [0.0; 2];
         for (k, level) in half.iter_mut().enumerate() {
             let pin = 8 + k as u32;
-            *level = match self.gpio[0].function(pin) {
+            let function = self.gpio[0].function(pin);
+            *level = match function {
                 Function::Alternate(6) => self.tim[0].output(k)?.unwrap_or(0.0),
                 Function::Output => f64::from(u8::from(self.gpio[0].drives_high(pin))),
                 _ => 0.0,
             };
+            // The pin's input sees its own output.
+            if function == Function::Alternate(6) {
+                self.gpio[0].set_outside(pin, *level > 0.5);
+            }
         }
         let enable = self.gpio[1].drives_high(5);
         self.board.set_bridge(

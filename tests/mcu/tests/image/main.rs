@@ -16,6 +16,7 @@ mod identification;
 mod ill;
 mod line;
 mod requests;
+mod self_test;
 mod storage;
 
 use std::path::PathBuf;
