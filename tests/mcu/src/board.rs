@@ -4,6 +4,8 @@
 //! the middle acts with the resolution of a period. Between two periods the shaft turns at its last speed, so the
 //! encoder counts at the instant of reading.
 
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use rig_firmware::sample::Command;
 use rig_plant::{Plant, PlantConfig, Truth};
 use rig_shared::units::Duty;
@@ -34,6 +36,10 @@ const WAKE: f64 = 1e-3;
 pub(crate) const BRIDGE_DELAY: f64 = 0.6e-6;
 const AMPLIFIER_DELAY: f64 = 0.4e-6;
 
+/// Time from the shunt to the output of a comparator, s: an amplifier with 400 kHz of bandwidth, and some tens of ns of the
+/// comparator (DS12288: 17 ns typical). An estimate.
+const COMPARATOR_DELAY: f64 = AMPLIFIER_DELAY + 0.1e-6;
+
 /// Faults on the board; [`Plant::faults_mut`] has the faults of the rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoardFaults {
@@ -45,6 +51,8 @@ pub struct BoardFaults {
     pub index_cut: bool,
     /// The index comes once at a wrong place. Cleared when it comes.
     pub false_index: bool,
+    /// Edges that the wires lose once, while the shaft turns: whole lines of four. Cleared when they are lost.
+    pub lost_edges: i64,
     /// Both channels change once at the same time. Cleared when they do.
     pub skewed: bool,
     /// The motor's wires touch: current while the bridge drives, A.
@@ -127,6 +135,12 @@ pub struct Board {
     pub sense_delay: f64,
     /// Amplifier of the current, if its error after an edge of the bridge counts.
     pub amplifier: Option<Amplifier>,
+    /// Time from the shunt to the output of a comparator, s.
+    pub comparator_delay: f64,
+    /// Largest error of the place at which the encoder makes an edge, counts: another one each time.
+    pub edge_jitter: f64,
+    /// Chance for the jitter.
+    chance: Pcg64Mcg,
 }
 
 impl Board {
@@ -164,7 +178,15 @@ impl Board {
             first_duty: 0.0,
             sense_delay: BRIDGE_DELAY + AMPLIFIER_DELAY,
             amplifier: None,
+            comparator_delay: COMPARATOR_DELAY,
+            edge_jitter: 0.0,
+            chance: Pcg64Mcg::seed_from_u64(seed ^ 0x0E0D_E500),
         }
+    }
+
+    /// Returns a number from 0 to 1 by chance.
+    fn draw(&mut self) -> f64 {
+        f64::from(self.chance.next_u32()) / 2_f64.powi(32)
     }
 
     /// Returns the rig.
@@ -298,6 +320,14 @@ impl Board {
         }
     }
 
+    /// Returns the lowest and the highest current sense within a pulse, in codes of the converter, without limits.
+    pub fn sense_extremes(&self) -> [f64; 2] {
+        let mean = self.sense();
+        let ripple = self.ripple();
+        let codes = ripple.codes_per_ampere / self.reference();
+        ripple.extremes().map(|current| mean + codes * current)
+    }
+
     /// Returns the code of the chip's reference: 1500 at nominal supply, 1.2085 V (DS12288, V_REFINT: 1.182 to 1.232).
     pub fn reference_code(&self) -> u16 {
         (1500.0 / self.reference()).round() as u16
@@ -341,9 +371,15 @@ impl Board {
 
     /// Returns the time of the edge before `now`, if the count has changed since the last reading: from the last speed,
     /// not before that reading.
-    fn edge(&self, now: Instant, reading: f64, upwards: bool) -> Instant {
+    fn edge(&mut self, now: Instant, reading: f64, upwards: bool) -> Instant {
         let within = reading.rem_euclid(1.0);
         let since = if upwards { within } else { 1.0 - within };
+        let jitter = if self.edge_jitter > 0.0 {
+            self.edge_jitter * (2.0 * self.draw() - 1.0)
+        } else {
+            0.0
+        };
+        let since = (since + jitter).max(0.0);
         let speed = (self.truth.motor_velocity * self.counts_per_radian).abs();
         let longest = to_seconds(now - self.looked);
         // Zero speed: it has just come to rest.
@@ -393,8 +429,13 @@ impl Board {
         self.levels = levels;
         let skewed = core::mem::take(&mut self.faults.skewed);
         if !broken {
+            let lost = if count > before {
+                core::mem::take(&mut self.faults.lost_edges)
+            } else {
+                0
+            };
             return Edges {
-                counts: count - before,
+                counts: count - before - lost,
                 last,
                 index,
                 skewed,

@@ -1,7 +1,7 @@
 //! Boards with the errors of real parts, drawn at random.
 //!
-//! Ranges marked "estimate" are not from a data sheet. Not drawn: the delay of the comparators (tens of ns, below the
-//! resolution of the emulated rig), and missing or bouncing edges of the encoder, which are faults.
+//! Ranges marked "estimate" are not from a data sheet. Not drawn: edges of the encoder that are lost, which are a fault
+//! ([`BoardFaults`](crate::board::BoardFaults)).
 
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
@@ -27,6 +27,10 @@ pub struct IllBoard {
     pub current_noise: f64,
     /// Offsets of the encoder's four edges of a line, counts.
     pub edges: [f64; 4],
+    /// Largest error of the place at which the encoder makes an edge, counts: another one each time.
+    pub edge_jitter: f64,
+    /// Time from the shunt to the output of a comparator, s.
+    pub comparator_delay: f64,
     /// Share of bytes from the host with an error.
     pub line_errors: f64,
 }
@@ -75,6 +79,10 @@ impl IllBoard {
             // 9° of a line: an encoder of the better sort states 7 to 15° of phase error.
             edges: core::array::from_fn(|_| draw.within([-0.1, 0.1])),
             line_errors: draw.within([0.0, 2e-3]),
+            // 4 to 9° of a line (estimate).
+            edge_jitter: draw.within([0.05, 0.1]),
+            // Amplifier and comparator (estimate).
+            comparator_delay: draw.within([0.3e-6, 0.6e-6]),
         }
     }
 
@@ -98,6 +106,8 @@ impl IllBoard {
     pub fn apply_to_board(&self, board: &mut Board) {
         board.sense_delay = self.amplifier.delay + self.amplifier_lag;
         board.amplifier = Some(self.amplifier);
+        board.comparator_delay = self.comparator_delay;
+        board.edge_jitter = self.edge_jitter;
     }
 }
 

@@ -42,11 +42,33 @@ impl Ripple {
         (self.braking * beside).copysign(self.braking * within)
     }
 
+    /// Returns the lowest and the highest difference of the reading from the mean current within a pulse, A: at the corners of
+    /// the sawtooth, and on both sides of the amplifier's steps.
+    pub fn extremes(&self) -> [f64; 2] {
+        let edge = 0.5 / PULSES * (1.0 - self.duty.abs());
+        let steps = self
+            .amplifier
+            .map_or(self.delay, |amplifier| amplifier.delay);
+        let beside = 1e-9;
+        let corners = [self.delay - edge, self.delay + edge];
+        let before = [steps - edge - beside, steps + edge - beside];
+        let behind = [steps - edge + beside, steps + edge + beside];
+        let all = [corners, before, behind].concat();
+        all.into_iter().fold([0.0; 2], |[low, high], after| {
+            let reading = self.reading_at(after);
+            [reading.min(low), reading.max(high)]
+        })
+    }
+
+    /// Returns the difference of the reading from the mean current, A.
+    fn reading_at(&self, after: f64) -> f64 {
+        let error = |amplifier: Amplifier| amplifier.error_at(after, self.duty, self.supply);
+        self.at(after) + self.amplifier.map_or(0.0, error)
+    }
+
     /// Returns the converter's code, from the code of the mean.
     pub fn on(&self, code: u16, after: f64) -> u16 {
-        let error = |amplifier: Amplifier| amplifier.error_at(after, self.duty, self.supply);
-        let current = self.at(after) + self.amplifier.map_or(0.0, error);
-        let moved = f64::from(code) + self.codes_per_ampere * current;
+        let moved = f64::from(code) + self.codes_per_ampere * self.reading_at(after);
         moved.round().clamp(0.0, LARGEST) as u16
     }
 }
@@ -75,6 +97,11 @@ mod test {
             ..ripple
         };
         assert!(close(late.at(1e-6), 0.0) && close(late.at(3e-6), -0.04));
+        // The corners lie at the edges of the braking interval.
+        let [low, high] = ripple.extremes();
+        assert!(close(low, -0.3) && close(high, 0.3), "{low} {high}");
+        let [low, high] = late.extremes();
+        assert!(close(low, -0.3) && close(high, 0.3), "{low} {high}");
         assert_eq!(ripple.on(2048, 2e-6), 2044);
         assert_eq!(ripple.on(2, 10e-6), 0);
     }

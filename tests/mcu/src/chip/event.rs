@@ -44,7 +44,8 @@ impl Chip {
         for tim in &self.tim {
             due = due.min(tim.due());
         }
-        due
+        let rises = self.comparators.iter().filter_map(|output| output.rises);
+        rises.fold(due, Instant::min)
     }
 
     /// Handles all events that are due, in order.

@@ -1,13 +1,13 @@
 //! The lines between the chip's pins and the board around it.
 
 use super::error::ChipError;
-use super::state::Chip;
+use super::state::{Chip, DelayedOutput};
 use crate::board::Bridge;
 use crate::peripheral::Refusal;
 use crate::peripheral::gpio::Function;
 use crate::peripheral::lpuart::LineError;
 use crate::ripple::Ripple;
-use crate::time::{Instant, to_seconds};
+use crate::time::{Instant, from_seconds, to_seconds};
 
 impl Chip {
     /// Applies changes of the board at once, without waiting for an event.
@@ -59,17 +59,42 @@ impl Chip {
 
     /// Compares the current sense on PC1 (COMP3's second input) and PB0 (COMP4's first) with DAC3.
     pub(super) fn compare(&mut self) {
-        let sense = self.board.sense();
-        let wired = |port: usize, pin| {
+        let [low, high] = self.board.sense_extremes();
+        let wired = |port: usize, pin, sense| {
             let analogue = self.gpio[port].function(pin) == Function::Analogue;
             (analogue && !self.board.faults.comparators_dead).then_some(sense)
         };
-        let pb0 = wired(1, 0).filter(|_| !self.board.faults.second_sense_open);
-        let pc1 = wired(2, 1);
+        // A comparator acts at any instant of a pulse: COMP3 sees its highest current, COMP4 its lowest.
+        let pb0 = wired(1, 0, low).filter(|_| !self.board.faults.second_sense_open);
+        let pc1 = wired(2, 1, high);
         let third = self.comp.compare(3, [None, pc1], self.dac.output(0));
         let fourth = self.comp.compare(4, [pb0, None], self.dac.output(1));
-        self.tim[0].set_comparator(3, third);
-        self.tim[0].set_comparator(4, fourth);
+        for (place, (number, output)) in [(3, third), (4, fourth)].into_iter().enumerate() {
+            let output = self.delayed(place, output);
+            self.tim[0].set_comparator(number, output);
+        }
+    }
+
+    /// Returns the output of a comparator behind its delay: it rises late.
+    fn delayed(&mut self, place: usize, output: bool) -> bool {
+        let now = self.work.now;
+        let delay = from_seconds(self.board.comparator_delay);
+        let Some(state) = self.comparators.get_mut(place) else {
+            return output;
+        };
+        if !output {
+            *state = DelayedOutput::default();
+        } else if !state.high {
+            let at = *state.rises.get_or_insert(now + delay);
+            self.deadline = self.deadline.min(at);
+            if at <= now {
+                *state = DelayedOutput {
+                    high: true,
+                    rises: None,
+                };
+            }
+        }
+        state.high
     }
 
     /// Sets the bridge from PWM and enable pin. PA8 and PA9 by alternate function 6 (DS12288 table 13).

@@ -42,6 +42,7 @@ impl Chip {
             flash: Flash::default(),
             syscfg: Syscfg::default(),
             comp: Comp::default(),
+            comparators: Default::default(),
             dac: Dac::default(),
             exti: Exti::default(),
             gpio: core::array::from_fn(|n| Gpio::new(n as u8)),
@@ -78,6 +79,7 @@ impl Chip {
         self.flash = Flash::default();
         self.syscfg = Syscfg::default();
         self.comp = Comp::default();
+        self.comparators = Default::default();
         self.dac = Dac::default();
         self.exti = Exti::default();
         self.gpio = core::array::from_fn(|n| Gpio::new(n as u8));

@@ -70,6 +70,8 @@ pub struct Chip {
     pub flash: Flash,
     pub(super) syscfg: Syscfg,
     pub(super) comp: Comp,
+    /// Outputs of COMP3 and COMP4 behind their delay.
+    pub(super) comparators: [DelayedOutput; 2],
     pub(super) dac: Dac,
     pub(super) exti: Exti,
     pub(super) gpio: [Gpio; 7],
@@ -98,6 +100,14 @@ pub struct Chip {
     /// If present, collects loads in the control interrupt from the encoder's counter, its edge timing and the
     /// converter's results.
     pub readings: Option<Vec<Reading>>,
+}
+
+/// An output that rises late.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DelayedOutput {
+    pub(super) high: bool,
+    /// Time at which it rises, if it does.
+    pub(super) rises: Option<Instant>,
 }
 
 /// A value that the firmware read in the control interrupt.

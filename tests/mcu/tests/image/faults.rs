@@ -46,7 +46,7 @@ pub(crate) fn latched_after(line: &mut BoardSession, within: f64) -> Option<f64>
 }
 
 /// The latched fault, if there is one.
-fn snapshot_of_fault(line: &mut BoardSession) -> Option<FaultRecord> {
+pub(crate) fn snapshot_of_fault(line: &mut BoardSession) -> Option<FaultRecord> {
     match line.request(RequestBody::Arm) {
         Err(LinkError::Refused {
             refusal: Refusal::FaultLatched,

@@ -17,7 +17,7 @@ use rig_tests::{
     Recording, base_parameters_of, calibrated, deviations, driven, excitation, in_parallel, robot,
 };
 
-use crate::{BoardSession, greeted, image, place, plant};
+use crate::{BoardSession, board, greeted, image, place, plant};
 
 /// Boards without the environment variable.
 const BOARDS: u64 = 4;
@@ -115,7 +115,7 @@ fn as_recording(recording: &Recording, torque_per_ampere: f64, with_marks: bool)
     made
 }
 
-/// What was found on one board.
+/// What was found in one run of one board.
 struct Outcome {
     /// Share of rows with a mark.
     marked: f64,
@@ -126,11 +126,11 @@ struct Outcome {
     off_line: [[f64; 6]; 2],
 }
 
-/// Errors of the off-line identification in half widths of its 95 % intervals.
-fn off_line(runs: &[Recording], plant: &PlantConfig, with_marks: bool) -> [f64; 6] {
+/// Errors of the off-line identification of a run in half widths of its 95 % intervals.
+fn off_line(run: &Recording, plant: &PlantConfig, with_marks: bool) -> [f64; 6] {
     let torque_per_ampere = plant.mechanism.ratio * plant.motor.torque_constant;
-    let [first, second] = [0, 1].map(|k| as_recording(&runs[k], torque_per_ampere, with_marks));
-    let found = identify(&robot(), &[&first, &second], &[], &Options::default()).unwrap();
+    let recording = as_recording(run, torque_per_ampere, with_marks);
+    let found = identify(&robot(), &[&recording], &[], &Options::default()).unwrap();
     let truth = base_parameters_of(plant);
     assert_eq!(found.base_parameters.len(), truth.len());
     std::array::from_fn(|k| {
@@ -139,30 +139,31 @@ fn off_line(runs: &[Recording], plant: &PlantConfig, with_marks: bool) -> [f64; 
     })
 }
 
-fn study(seed: u64) -> Outcome {
+/// Runs a board twice. `wrong_delay`: error of the sense delay in the nameplate, s.
+fn study(seed: u64, wrong_delay: f64) -> [Outcome; 2] {
     let (mut line, plant) = ill_bench(seed);
-    let runs = [0, 1].map(|run| {
+    board(&mut line).with_board(|board| board.sense_delay += wrong_delay);
+    [0, 1].map(|run| {
         let run = driven(&mut line, vec![], fast(2 * seed + run, 6, &plant), 0.5);
         assert!(run.faults.is_empty(), "board {seed}: {:?}", run.faults);
-        run
-    });
-    let rows = || runs.iter().flat_map(|run| &run.rows);
-    let estimate = runs[1].estimate();
-    Outcome {
-        marked: rows().filter(|row| is_marked(row)).count() as f64 / rows().count() as f64,
-        trusted: estimate.trusted,
-        on_line: deviations(&estimate, &plant),
-        off_line: [true, false].map(|with_marks| off_line(&runs, &plant, with_marks)),
-    }
+        let estimate = run.estimate();
+        let marked = run.rows.iter().filter(|row| is_marked(row)).count();
+        Outcome {
+            marked: marked as f64 / run.rows.len() as f64,
+            trusted: estimate.trusted,
+            on_line: deviations(&estimate, &plant),
+            off_line: [true, false].map(|with_marks| off_line(&run, &plant, with_marks)),
+        }
+    })
 }
 
-/// Returns the fewest intervals of `count` that hold the truth if each does with `share`, but for a chance of [`CHANCE`].
-fn fewest_covered(count: usize, share: f64) -> usize {
+/// Returns the fewest intervals of `count` that hold the truth if each does with `share`, but for this chance.
+fn fewest_covered(count: usize, share: f64, chance: f64) -> usize {
     // Probability of exactly k misses, from k = 0 on.
     let mut exactly = share.powi(count as i32);
     let mut more = 1.0 - exactly;
     let mut misses = 0;
-    while more > CHANCE && misses < count {
+    while more > chance && misses < count {
         exactly *= (count - misses) as f64 / (misses + 1) as f64 * (1.0 - share) / share;
         misses += 1;
         more -= exactly;
@@ -189,9 +190,9 @@ impl Coverage {
         }
     }
 
-    /// Returns true if as many hold the truth as 95 % intervals must.
-    fn is_fair(&self) -> bool {
-        self.inside >= fewest_covered(self.count, 0.95)
+    /// Returns true if as many hold the truth as 95 % intervals must, but for this chance.
+    fn is_fair(&self, chance: f64) -> bool {
+        self.inside >= fewest_covered(self.count, 0.95, chance)
     }
 }
 
@@ -202,41 +203,126 @@ impl std::fmt::Display for Coverage {
     }
 }
 
-/// Ill boards move fast: up to a fifth of their rows is marked. On line and off line the 95 % intervals hold the
-/// truth. Off line they do not if the marks are ignored.
+/// How many intervals hold the truth.
+struct Report {
+    text: String,
+    /// Of each parameter, over all boards and runs: on line, off line, and off line with the marks ignored.
+    each: Vec<[Coverage; 3]>,
+    /// Of all parameters together.
+    all: [Coverage; 3],
+    /// Share of the on-line estimates that are trusted.
+    trusted: f64,
+}
+
+/// Chance with which a sound estimator fails the bound of one parameter: with on line and off line these are twelve bounds.
+const CHANCE_OF_ONE: f64 = CHANCE / 12.0;
+/// Half width of the 95 % intervals in the unit of the errors.
+const WIDTHS: [f64; 3] = [1.96, 1.0, 1.0];
+
+impl Report {
+    fn of(outcomes: &[Outcome]) -> Self {
+        let mut pooled: [Vec<f64>; 3] = Default::default();
+        let mut each = Vec::new();
+        for k in 0..PARAMETER_NAMES.len() {
+            // Base parameters begin with those of gravity.
+            let base = [2, 0, 1, 3, 4, 5][k];
+            let trusted = outcomes.iter().filter(|outcome| outcome.trusted[k]);
+            let errors: [Vec<f64>; 3] = [
+                trusted.map(|outcome| outcome.on_line[k]).collect(),
+                outcomes.iter().map(|o| o.off_line[0][base]).collect(),
+                outcomes.iter().map(|o| o.off_line[1][base]).collect(),
+            ];
+            each.push(std::array::from_fn(|way| {
+                Coverage::of(&errors[way], WIDTHS[way])
+            }));
+            for (all, errors) in pooled.iter_mut().zip(&errors) {
+                all.extend(errors);
+            }
+        }
+        let estimates = PARAMETER_NAMES.len() * outcomes.len();
+        let mut report = Self {
+            text: String::new(),
+            each,
+            all: std::array::from_fn(|way| Coverage::of(&pooled[way], WIDTHS[way])),
+            trusted: pooled[0].len() as f64 / estimates as f64,
+        };
+        report.text = report.table(outcomes);
+        println!("{}", report.text);
+        report
+    }
+
+    fn table(&self, outcomes: &[Outcome]) -> String {
+        let mut text = String::from(
+            "95 % intervals with the truth (RMS error, on line in standard deviations, off line in half widths)\n\
+             parameter           on line          off line     marks ignored\n",
+        );
+        let rows = PARAMETER_NAMES.iter().zip(&self.each);
+        for (name, [on_line, marked, ignored]) in rows.chain([(&"all", &self.all)]) {
+            text += &format!("{name:<9} {on_line} {marked} {ignored}\n");
+        }
+        for (name, count, chance) in [
+            ("of one", outcomes.len(), CHANCE_OF_ONE),
+            ("of all", self.all[1].count, CHANCE),
+        ] {
+            text += &format!(
+                "{name}: n = {count}, expected {:.1}, at least {}\n",
+                0.95 * count as f64,
+                fewest_covered(count, 0.95, chance)
+            );
+        }
+        let shares = outcomes.iter().map(|o| 100.0 * o.marked);
+        let [least, most] = [
+            shares.clone().fold(100.0, f64::min),
+            shares.fold(0.0, f64::max),
+        ];
+        text + &format!(
+            "{} runs, {least:.1} to {most:.1} % of the rows marked\n",
+            outcomes.len()
+        )
+    }
+
+    /// Returns the coverage of the viscous friction, which takes up errors of the current that follow the speed.
+    fn viscous(&self) -> &[Coverage; 3] {
+        let place = PARAMETER_NAMES.iter().position(|name| *name == "fv");
+        &self.each[place.unwrap()]
+    }
+
+    /// Returns true if the intervals of each parameter and of all hold the truth often enough: on line (0) or off line (1).
+    fn is_fair(&self, way: usize) -> bool {
+        self.all[way].is_fair(CHANCE) && self.each.iter().all(|of| of[way].is_fair(CHANCE_OF_ONE))
+    }
+}
+
+/// Runs boards whose nameplate is wrong by this sense delay, s.
+fn studied(boards: u64, wrong_delay: f64) -> Report {
+    let outcomes = in_parallel(boards, |seed| study(seed, wrong_delay));
+    Report::of(&outcomes.into_iter().flatten().collect::<Vec<_>>())
+}
+
+/// Ill boards move fast: up to a fifth of their rows is marked. On line and off line the 95 % intervals hold the truth as often
+/// as a binomial distribution allows, those of each parameter over all boards and runs, and all together. Off line the
+/// viscous friction is farther from the truth if the marks are ignored.
 #[test]
 fn the_intervals_of_ill_boards_hold_the_truth_as_often_as_they_claim() {
-    let outcomes = in_parallel(boards(), study);
-    let mut text = String::from(
-        "95 % intervals with the truth (RMS error, on line in standard deviations, off line in half widths)\n\
-         parameter           on line          off line     marks ignored\n",
+    let found = studied(boards(), 0.0);
+    assert!(found.is_fair(0) && found.is_fair(1), "\n{}", found.text);
+    assert!(found.trusted >= 0.9, "\n{}", found.text);
+    let [_, marked, ignored] = found.viscous();
+    assert!(ignored.rms > marked.rms, "\n{}", found.text);
+}
+
+/// The same bounds fail if the samples are not corrected for the delay of bridge and amplifier, 1 µs: the boards have as much
+/// more of it than the nameplate says. Viscous friction takes it up.
+#[test]
+fn the_intervals_of_ill_boards_miss_the_truth_without_the_sense_delay() {
+    let delay = 1e-9 * f64::from(rig_firmware::nameplate::SENSE_DELAY_NS);
+    let found = studied(2, delay);
+    assert!(!found.is_fair(0) && !found.is_fair(1), "\n{}", found.text);
+    let [on_line, off_line, _] = found.viscous();
+    assert_eq!(
+        [on_line.inside, off_line.inside],
+        [0; 2],
+        "\n{}",
+        found.text
     );
-    let (mut fair, mut with_marks, mut without) = (true, 0, 0);
-    for (k, name) in PARAMETER_NAMES.iter().enumerate() {
-        // Base parameters begin with those of gravity.
-        let base = [2, 0, 1, 3, 4, 5][k];
-        let trusted = outcomes.iter().filter(|o| o.trusted[k]);
-        let errors: Vec<f64> = trusted.map(|o| o.on_line[k]).collect();
-        let on_line = Coverage::of(&errors, 1.96);
-        let [marked, ignored] = [0, 1].map(|way| {
-            let errors: Vec<f64> = outcomes.iter().map(|o| o.off_line[way][base]).collect();
-            Coverage::of(&errors, 1.0)
-        });
-        text += &format!("{name:<9} {on_line} {marked} {ignored}\n");
-        fair &= on_line.is_fair() && marked.is_fair();
-        fair &= 10 * on_line.count >= 9 * outcomes.len();
-        with_marks += marked.inside;
-        without += ignored.inside;
-    }
-    let shares = outcomes.iter().map(|o| 100.0 * o.marked);
-    let [least, most] = [
-        shares.clone().fold(100.0, f64::min),
-        shares.fold(0.0, f64::max),
-    ];
-    text += &format!(
-        "{} boards, {least:.1} to {most:.1} % of the rows marked\n",
-        outcomes.len()
-    );
-    println!("{text}");
-    assert!(fair && without < with_marks, "\n{text}");
 }

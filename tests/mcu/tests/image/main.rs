@@ -18,6 +18,7 @@ mod line;
 mod requests;
 mod self_test;
 mod storage;
+mod wires;
 
 use std::path::PathBuf;
 use std::time::Duration;
