@@ -67,8 +67,7 @@ fn first_accesses() -> [Option<bool>; 5] {
     // It ends with an error at the first peripheral, which is not there.
     let end = engine.emu_start(start.into(), 0x3000_0000, 0, 1_000_000);
     assert!(end.is_err(), "the program met no peripheral");
-    let first = *first.borrow();
-    first
+    *first.borrow()
 }
 
 #[test]
