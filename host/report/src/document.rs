@@ -1,5 +1,6 @@
 //! Content of a document, independent of HTML.
 
+use super::error::ReportError;
 use super::heat_map::HeatMap;
 use super::plot::Plot;
 
@@ -221,4 +222,23 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
     /// Explanation for the reader. May be empty.
     pub note: String,
+}
+
+impl Table {
+    /// Checks that each row has a cell for each column.
+    ///
+    /// # Errors
+    /// [`ReportError::Row`] with the first that has not.
+    pub(crate) fn check(&self) -> Result<(), ReportError> {
+        let columns = self.columns.len();
+        let wrong = (self.rows.iter().enumerate()).find(|(_, row)| row.len() != columns);
+        wrong.map_or(Ok(()), |(k, row)| {
+            Err(ReportError::Row {
+                table: self.caption.clone(),
+                row: k + 1,
+                cells: row.len(),
+                columns,
+            })
+        })
+    }
 }

@@ -2,7 +2,7 @@
 
 /// Replaces characters that a page must not contain: control characters, which XML forbids, and overrides of the
 /// writing direction, with which a name could reverse its surroundings.
-fn visible(c: char) -> char {
+pub(crate) fn visible(c: char) -> char {
     match c {
         '\n' | '\t' => c,
         '\u{0}'..='\u{1f}' | '\u{7f}'..='\u{9f}' => '\u{fffd}',

@@ -254,19 +254,7 @@ impl Page {
     }
 
     fn table(&mut self, table: &Table) -> Result<(), ReportError> {
-        if let Some((i, row)) = table
-            .rows
-            .iter()
-            .enumerate()
-            .find(|(_, row)| row.len() != table.columns.len())
-        {
-            return Err(ReportError::Row {
-                table: table.caption.clone(),
-                row: i + 1,
-                cells: row.len(),
-                columns: table.columns.len(),
-            });
-        }
+        table.check()?;
         self.tables += 1;
         let number = self.tables;
         let class = |alignment: Alignment| match alignment {

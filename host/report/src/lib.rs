@@ -1,8 +1,10 @@
-//! Documents of text, tables and plots, and their one-file HTML form.
+//! Documents of text, tables and plots, as one HTML file or as Markdown with pictures.
 //!
 //! Compose a [`Document`], then [`write()`] it. The page is self-contained and needs no network. Without JavaScript
 //! every plot is a still picture; with JavaScript it can be zoomed. In print, everything is unfolded. The same document
 //! gives the same bytes. Every text is escaped: a name from a file cannot become mark-up.
+//!
+//! [`markdown()`] and [`write_markdown`] give the same document as Markdown, with its figures as SVG files.
 //!
 //! [`svg`] and [`write_svg`] return one plot as a separate picture. [`assets`] holds what other pages share with these.
 //!
@@ -24,6 +26,7 @@ mod escape;
 mod file;
 mod heat_map;
 mod html;
+mod markdown;
 mod plot;
 mod scene;
 mod svg;
@@ -33,9 +36,10 @@ pub use document::{
     Alignment, Block, Column, Document, Fact, Link, NoteKind, Section, Table, Tone,
 };
 pub use error::ReportError;
-pub use file::{write, write_svg};
+pub use file::{remove_markdown, write, write_markdown, write_svg};
 pub use heat_map::HeatMap;
 pub use html::render;
+pub use markdown::{Markdown, markdown};
 pub use plot::{Axis, Direction, Marker, Plot, Role, Series, Style};
 pub use svg::svg;
 pub use thin::thin;
