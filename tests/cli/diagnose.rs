@@ -225,7 +225,7 @@ fn a_recording_may_begin_in_motion_and_a_hold_out_is_another_motion() {
     };
     let command = |data: &[&Path], holdout: &Path| {
         let mut command = rig();
-        (command.args(["diagnose", "--robot"])).arg(robot("one-link.toml"));
+        (command.args(["diagnose", "--verbose", "--robot"])).arg(robot("one-link.toml"));
         for path in data {
             command.arg("--data").arg(path);
         }

@@ -165,7 +165,7 @@ impl Made {
     }
 
     fn map(&self, train: &str, sweep: &str) -> (Value, String) {
-        let said = succeed(&mut self.command(train, sweep));
+        let said = succeed(self.command(train, sweep).arg("--verbose"));
         let text = fs::read_to_string(self.at("map/friction-map.json")).unwrap();
         (serde_json::from_str(&text).unwrap(), said)
     }

@@ -186,3 +186,99 @@ fn every_command_has_a_page_for_man() {
     );
     succeed(write().arg("--force"));
 }
+
+#[test]
+fn details_are_printed_by_verbose_and_the_answer_is_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let excite = |out: &str, more: &[&str]| {
+        let mut command = rig();
+        command.args(["excite", "--start", "-1.5708", "--starts", "1", "--robot"]);
+        command.arg(robot("one-link.toml")).args(more);
+        succeed(command.arg("--out").arg(folder.path().join(out)))
+    };
+    let (short, long) = (
+        excite("a.toml", &[]),
+        excite("b.toml", &["--verbose"]).replace("b.toml", "a.toml"),
+    );
+    for said in [&short, &long] {
+        let last = said.lines().last().unwrap();
+        assert!(last.contains("a.toml: the motion,"), "{said}");
+    }
+    assert!(short.lines().all(|line| long.contains(line)), "{long}");
+    for detail in ["stays within position", "processor time", "rig simulate"] {
+        assert!(long.contains(detail) && !short.contains(detail), "{long}");
+    }
+    let output = rig().args(["doctor", "--verbose", "--quiet"]).output();
+    assert_eq!(output.unwrap().status.code(), Some(2));
+}
+
+/// The 57 parameters of an arm fill several screens: the terminal has their number, `--verbose` and the files have all.
+#[test]
+fn a_long_list_of_parameters_is_a_detail() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut excite = rig();
+    excite.args(["excite", "--starts", "1", "--robot"]);
+    excite
+        .arg(robot("irp6.toml"))
+        .arg("--out")
+        .arg(at("m.toml"));
+    succeed(&mut excite);
+    let mut simulate = rig();
+    simulate.args(["simulate", "--rate", "100", "--robot"]);
+    simulate.arg(robot("irp6.toml")).arg("--trajectory");
+    simulate.arg(at("m.toml")).arg("--out").arg(at("d.csv"));
+    succeed(&mut simulate);
+    let identify = |out: &str, more: &[&str]| {
+        let mut command = rig();
+        command.args(["identify", "--compare", "none", "--robot"]);
+        command
+            .arg(robot("irp6.toml"))
+            .arg("--data")
+            .arg(at("d.csv"));
+        succeed(command.args(more).arg("--out").arg(at(out)))
+    };
+    let (short, long) = (identify("short", &[]), identify("long", &["--verbose"]));
+    let listed = |said: &str| said.matches("(95 %: ").count();
+    assert_eq!((listed(&short), listed(&long)), (0, 57), "{short}");
+    assert!(short.contains("57 base parameters: "), "{short}");
+    let residuals = |said: &str| said.matches(": residual ").count();
+    assert_eq!((residuals(&short), residuals(&long)), (5, 5));
+}
+
+/// The report as Markdown has the tables of the page and a picture for each of its figures; without `--markdown` a later run
+/// leaves neither.
+#[test]
+fn the_report_is_written_as_markdown_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, out) = (folder.path().join("a.csv"), folder.path().join("out"));
+    recording(&data, 1.0);
+    let identify = |more: &[&str]| {
+        let mut command = rig();
+        command.args(["identify", "--compare", "none", "--robot"]);
+        command.arg(robot("one-link.toml")).arg("--data").arg(&data);
+        succeed(command.args(more).arg("--out").arg(&out))
+    };
+    let count = |ending: &str| {
+        let files = fs::read_dir(&out).unwrap().map(|file| file.unwrap().path());
+        files
+            .filter(|path| path.extension().unwrap() == ending)
+            .count()
+    };
+    identify(&["--markdown"]);
+    let text = fs::read_to_string(out.join("report.md")).unwrap();
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert_eq!(
+        text.matches("\n**Table ").count(),
+        page.matches("<caption>").count()
+    );
+    let pictures = text.matches("![Figure ").count();
+    assert_eq!(pictures, page.matches("class=\"static\"").count());
+    assert!(pictures > 2 && pictures == count("svg"), "{text}");
+    assert!(text.contains("Izz1 + Ia1") && text.contains("report-figure-1.svg"));
+    identify(&["--force"]);
+    assert_eq!((count("md"), count("svg")), (0, 0));
+    let mut inspect = rig();
+    let said = crate::run::refuse(inspect.arg("inspect").arg(&data).arg("--markdown"));
+    assert!(said.contains("--out"), "{said}");
+}

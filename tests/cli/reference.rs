@@ -13,9 +13,9 @@ const HEAD: &str = "# Which commands and options are there?
 <!-- Made from the help of the program: RIG_WRITE_DOCS=1 cargo test -p rig --test cli the_reference -->
 
 This page is the help of the program, as `--help` prints it behind each command. `rig man` writes the same as pages for `man`.
-Two options stand behind every command: `--help`, and `--quiet`, which prints errors alone and what `--json` asks for. The exit
-status is 0 only if the work was done, 1 after an error and 2 after wrong arguments; a command with statuses of its own names
-them below.
+Three options stand behind every command: `--help`; `--quiet`, which prints errors alone and what `--json` asks for; and
+`--verbose`, which prints details of the result, too. The answer is the last thing that is printed. The exit status is 0 only if
+the work was done, 1 after an error and 2 after wrong arguments; a command with statuses of its own names them below.
 
 ";
 
@@ -91,7 +91,8 @@ fn section(command: &mut Command, path: &str, page: &mut String) {
     let _ = writeln!(page, "```text\n{usage}\n```\n");
     let own: Vec<&Arg> = (command.get_arguments())
         .filter(|a| {
-            !a.is_hide_set() && !["help", "version", "quiet"].contains(&a.get_id().as_str())
+            let everywhere = ["help", "version", "quiet", "verbose"];
+            !a.is_hide_set() && !everywhere.contains(&a.get_id().as_str())
         })
         .collect();
     for arg in &own {

@@ -163,6 +163,7 @@ impl Diagnosis {
             &self.model,
             self.command.clone(),
             self.warnings.clone(),
+            false,
         )
     }
 }

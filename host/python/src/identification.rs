@@ -214,6 +214,7 @@ impl Identification {
             &self.found,
             self.command.clone(),
             self.warnings.clone(),
+            false,
         )
     }
 }

@@ -52,9 +52,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.print(&format!("{result:#}"));
         return Ok(());
     }
-    ui.say(&format!("{}: {} base parameters", robot.name, list.len()));
     if same {
-        ui.say("Numeric rank and the grouping rules for modified Denavit-Hartenberg frames give the same set.");
+        ui.detail("Numeric rank and the grouping rules for modified Denavit-Hartenberg frames give the same set.");
     } else {
         ui.note(&format!(
             "The grouping rules give {} parameters, the numeric rank {}, and the sets differ; the list is that of the numeric rank.",
@@ -62,8 +61,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             list.len()
         ));
     }
-    for (expression, unit) in list {
+    for (expression, unit) in &list {
         ui.say(&format!("{expression}  [{unit}]"));
     }
+    ui.say(&format!("{}: {} base parameters", robot.name, list.len()));
     Ok(())
 }

@@ -9,6 +9,7 @@ use super::input::{Inputs, RobotArg, recordings, refuse_twice};
 use super::map_arg::UnitArg;
 use super::overwrite::refuse_folder;
 use super::pose_arg::positions;
+use super::report_arg::ReportArg;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -80,6 +81,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -247,7 +250,7 @@ fn write(args: &Args, found: &Compliance, context: &Context) -> Result<(), Comma
         &args.out.join("compliance.toml"),
         elasticity_text(found)?.as_bytes(),
     )?;
-    rig_report::write(
+    args.report.write(
         &args.out.join("report.html"),
         &pages::compliance(found, context),
     )?;

@@ -8,6 +8,7 @@ use super::error::CommandError;
 use super::input::{RobotArg, described};
 use super::overwrite::{refuse_file, refuse_folder};
 use super::pose_arg::positions;
+use super::report_arg::ReportArg;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -84,6 +85,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -702,7 +705,7 @@ fn write(
         command: ui.command_line(),
         ..Context::default()
     };
-    rig_report::write(
+    args.report.write(
         &args.out.join("report.html"),
         &pages::control(robot, evaluation, &context),
     )?;

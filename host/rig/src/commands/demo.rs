@@ -8,6 +8,7 @@ use clap::Args as ClapArgs;
 use super::error::CommandError;
 use super::overwrite::{DEMONSTRATION, free_folder, refuse_folder};
 use super::pictures;
+use super::report_arg::ReportArg;
 use super::ui::Ui;
 use crate::demo;
 use rig_output::write_whole;
@@ -21,6 +22,8 @@ pub(crate) struct Args {
     /// Folder for recordings, results and the report [default: rig-demo; rig-demo-2 and so on if that holds results]
     #[arg(long)]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportArg,
     /// Replace results that the folder already holds
     #[arg(long)]
     force: bool,
@@ -33,6 +36,7 @@ impl Default for Args {
     fn default() -> Self {
         Self {
             out: None,
+            report: ReportArg::default(),
             force: false,
             seed: 1,
         }
@@ -59,19 +63,21 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     })?;
     drop(progress);
     let path = out.join("report.html");
-    rig_report::write(&path, &demo.page(&ui.command_line())?)?;
+    args.report.write(&path, &demo.page(&ui.command_line())?)?;
     let found = out.join("diagnosis.html");
-    rig_report::write(&found, &demo.diagnosis_page(&ui.command_line())?)?;
+    args.report
+        .write(&found, &demo.diagnosis_page(&ui.command_line())?)?;
     let json = serde_json::to_string_pretty(&demo.diagnosis).map_err(|error| {
         CommandError::Sentence(format!("The diagnosis cannot be written as JSON: {error}."))
     })?;
     write_whole(&out.join("diagnosis.json"), (json + "\n").as_bytes())?;
     rig_report::write_svg(&out.join("tracking.svg"), &demo.picture())?;
     pictures::write(&out, &demo.diagnosis)?;
+    ui.note(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));
+    ui.detail(&demo.at_rest());
     for line in demo.summary()? {
         ui.say(&line);
     }
-    ui.note(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));
     ui.say(&format!("report: {}", path.display()));
     Ok(())
 }

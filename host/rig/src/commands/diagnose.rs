@@ -13,6 +13,7 @@ use super::input::{Inputs, RobotArg, recordings, refuse_as_rest, refuse_shared, 
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::pictures::{self, forget};
+use super::report_arg::{ReportArg, write_report};
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -89,6 +90,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -148,7 +151,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
         let names = args.without.join(", ");
         (found.words).push(format!("Left out of the library, as asked: {names}."));
     }
-    write_diagnosis(&args.out, &found, &model, ui.command_line(), warnings)?;
+    write_diagnosis(
+        &args.out,
+        &found,
+        &model,
+        ui.command_line(),
+        warnings,
+        args.report.is_markdown(),
+    )?;
     printed::print(ui, &found, &args.out.join(REPORT));
     Ok(if args.exit_code {
         status(found.verdict)
@@ -270,7 +280,8 @@ impl Logs {
 }
 
 /// Writes model.toml, diagnosis.json, report.html, the figures and, if there is one, next_experiment.toml into the folder
-/// `out`. `command`: what repeats the result, for the report. `warnings`: from the recordings.
+/// `out`. `command`: what repeats the result, for the report. `warnings`: from the recordings. `markdown`: the report as
+/// Markdown, too.
 ///
 /// # Errors
 /// Values that cannot be written as a description, or a file that cannot be written.
@@ -280,6 +291,7 @@ pub fn write_diagnosis(
     model: &Robot,
     command: String,
     warnings: Vec<String>,
+    markdown: bool,
 ) -> Result<(), CommandError> {
     let text = model.to_toml()?;
     let context = Context {
@@ -288,7 +300,7 @@ pub fn write_diagnosis(
         remarks: Vec::new(),
         warnings,
     };
-    let page = rig_report::render(&pages::diagnosis(found, &context))?;
+    let page = pages::diagnosis(found, &context);
     let json = serde_json::to_string_pretty(found).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
@@ -300,7 +312,7 @@ pub fn write_diagnosis(
     }
     write_whole(&out.join(MODEL), text.as_bytes())?;
     write_whole(&out.join(DIAGNOSIS), (json + "\n").as_bytes())?;
-    write_whole(&out.join(REPORT), page.as_bytes())?;
+    write_report(&out.join(REPORT), &page, markdown)?;
     pictures::write(out, found)
 }
 

@@ -396,13 +396,13 @@ fn design(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     for note in notes {
         ui.note(&note);
     }
+    ui.say(NOT_LOOKED_AT);
     ui.answer(&format!(
         "{}: the motion, {} of {:.1} s.",
         args.out.display(),
         kind.name(),
         file.duration()
     ));
-    ui.say(NOT_LOOKED_AT);
     Ok(())
 }
 
@@ -431,7 +431,7 @@ fn many_sines(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         ui.note(note);
     }
     let [position, velocity, acceleration] = found.shares.map(|share| 100.0 * share);
-    ui.say(&format!(
+    ui.detail(&format!(
         "{} odd harmonics from {} to {} Hz; crest factor {:.2} of the position, {:.2} of the velocity, {:.2} of the acceleration.",
         found.harmonics,
         format_significant(found.band[0], 4),
@@ -443,6 +443,7 @@ fn many_sines(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     ui.say(&format!(
         "It uses {position:.0} % of the distance to the position limit, {velocity:.0} % of the velocity limit and {acceleration:.0} % of the acceleration limit."
     ));
+    ui.say(NOT_LOOKED_AT);
     ui.answer(&format!(
         "{}: the motion, {} periods of {} s with rise and fall, {:.1} s.",
         args.out.display(),
@@ -450,7 +451,6 @@ fn many_sines(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         found.period,
         found.duration()
     ));
-    ui.say(NOT_LOOKED_AT);
     Ok(())
 }
 
@@ -468,22 +468,25 @@ fn at_rest(args: &Args, count: usize, robot: &Robot, ui: &Ui) -> Result<(), Comm
         ui.note(note);
     }
     found.file.save(&args.out, robot, args.rate)?;
+    for line in poses_one_by_one(&found) {
+        ui.detail(&line);
+    }
     for line in summary_of_poses(&found) {
         ui.say(&line);
     }
+    ui.say(NOT_LOOKED_AT);
     ui.answer(&format!(
         "{}: the motion, {:.1} s, with a rest of {:.1} s at each pose.",
         args.out.display(),
         found.file.duration(),
         found.dwell
     ));
-    ui.say(NOT_LOOKED_AT);
     Ok(())
 }
 
-/// Describes poses, line by line.
-fn summary_of_poses(found: &Poses) -> Vec<String> {
-    let mut lines = vec![
+/// Describes how well poses identify a load.
+fn summary_of_poses(found: &Poses) -> [String; 2] {
+    [
         format!(
             "For mass and first moment of a load, with six unknown biases: D-optimal value {:.3} of at most {:.3}, condition number {}.",
             found.value,
@@ -494,17 +497,20 @@ fn summary_of_poses(found: &Poses) -> Vec<String> {
             "Standard deviations for a noise of 1 in the mean reading of each pose: mass {:.4} kg per N; first moment {:.4} kg·m per N·m, in its least certain direction (divided by the load's mass: its centre of mass, in m per N·m).",
             found.mass_deviation, found.first_moment_deviation
         ),
-    ];
+    ]
+}
+
+/// Describes each pose in a line.
+fn poses_one_by_one(found: &Poses) -> impl Iterator<Item = String> {
     let poses = found.positions.iter().zip(&found.gravity).enumerate();
-    lines.extend(poses.map(|(k, (q, [x, y, z]))| {
+    poses.map(|(k, (q, [x, y, z]))| {
         let q: Vec<String> = q.iter().map(|q| format!("{q:.3}")).collect();
         format!(
             "Pose {}: gravity along {x:.2}, {y:.2}, {z:.2} of the sensor; joints at {}.",
             k + 1,
             q.join(", ")
         )
-    }));
-    lines
+    })
 }
 
 fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
@@ -562,21 +568,24 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         )));
     }
     found.file.save(&args.out, robot, args.rate)?;
-    for line in summary(args.load, &found, robot) {
+    for line in reached(&found, robot) {
+        ui.detail(&line);
+    }
+    ui.detail(&speed_up(&effort));
+    ui.detail(&format!(
+        "Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
+        args.robot.display(),
+        args.out.display()
+    ));
+    for line in judged(args.load, &found, robot) {
         ui.say(&line);
     }
-    ui.say(&speed_up(&effort));
+    ui.say(NOT_LOOKED_AT);
     ui.answer(&format!(
         "{}: the motion, {:.1} s from rest to rest.",
         args.out.display(),
         found.file.duration()
     ));
-    ui.say(&format!(
-        "Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
-        args.robot.display(),
-        args.out.display()
-    ));
-    ui.say(NOT_LOOKED_AT);
     Ok(())
 }
 
@@ -626,15 +635,15 @@ fn verdict(condition: f64) -> String {
     }
 }
 
-/// Describes the designed motion, line by line.
-fn summary(load: bool, found: &Design, robot: &Robot) -> Vec<String> {
+/// Describes how well the designed motion identifies.
+fn judged(load: bool, found: &Design, robot: &Robot) -> [String; 2] {
     let values = &found.values;
     let kind = match (load, &robot.wrist_sensor) {
         (false, _) => "base parameters",
         (true, Some(_)) => "parameters of a load at the sensor, with six unknown biases:",
         (true, None) => "parameters of a load, by the joint torques:",
     };
-    let mut lines = vec![
+    [
         format!(
             "For the {} {kind} {}:",
             found.base_parameters.len(),
@@ -648,7 +657,12 @@ fn summary(load: bool, found: &Design, robot: &Robot) -> Vec<String> {
             values.smallest_singular_value,
             values.mean_singular_value
         ),
-    ];
+    ]
+}
+
+/// Describes what the designed motion uses of the limits, line by line.
+fn reached(found: &Design, robot: &Robot) -> Vec<String> {
+    let mut lines = Vec::new();
     for (joint, reach) in robot.joints.iter().zip(&found.reach) {
         let torque = reach
             .torque

@@ -1,6 +1,6 @@
 //! `rig friction-map`: friction as a function of speed, from a sweep of constant speeds.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
@@ -8,11 +8,12 @@ use super::error::CommandError;
 use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
+use super::report_arg::ReportArg;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
 use rig_data::EffortNeed;
-use rig_identify::{DroppedPass, FrictionMap, FrictionMapOptions, Options, friction_map, identify};
+use rig_identify::{FrictionMap, FrictionMapOptions, Options, friction_map, identify};
 use rig_model::robot::{JointKind, Robot};
 use rig_output::format_significant;
 use rig_output::{can_take, folder, write_whole};
@@ -43,6 +44,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -130,15 +133,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             ui.warn(warning);
         }
         let warnings = training.warnings().chain(sweep.warnings()).chain(heard);
-        write(&args.out, &robot, &map, warnings.collect(), ui)?;
-        let lines = lines(&map, robot.joints[joint].kind);
-        // The law and the decision are the last two lines.
-        for (k, line) in lines.iter().enumerate() {
-            match k + 2 < lines.len() {
-                true => ui.say(line),
-                false => ui.answer(line),
-            }
-        }
+        write(args, &robot, &map, warnings.collect(), ui)?;
+        print(&map, robot.joints[joint].kind, ui);
     }
     ui.say(&format!(
         "report: {}",
@@ -152,12 +148,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 /// # Errors
 /// A file cannot be written.
 fn write(
-    out: &Path,
+    args: &Args,
     robot: &Robot,
     map: &FrictionMap,
     warnings: Vec<String>,
     ui: &Ui,
 ) -> Result<(), CommandError> {
+    let out = &args.out;
     let context = Context {
         command: ui.command_line(),
         warnings,
@@ -168,22 +165,30 @@ fn write(
         CommandError::Sentence(format!("The map cannot be written as JSON: {error}."))
     })?;
     write_whole(&out.join("friction-map.json"), (json + "\n").as_bytes())?;
-    rig_report::write(
+    args.report.write(
         &out.join("report.html"),
         &pages::friction_map(robot, map, &context),
     )?;
     Ok(())
 }
 
-/// Printed lines: stretches that gave points, rejected stretches with the reason, the friction law, the decision.
-fn lines(map: &FrictionMap, kind: JointKind) -> Vec<String> {
+/// Prints rejected stretches with the reason (a detail), those that gave points, the friction law and the decision.
+fn print(map: &FrictionMap, kind: JointKind, ui: &Ui) {
     let (velocity, torque, viscous) = match kind {
         JointKind::Revolute => ("rad/s", "N·m", "N·m·s/rad"),
         JointKind::Prismatic => ("m/s", "N", "N·s/m"),
     };
     let speeds = map.points.iter().map(|p| p.speed.abs());
     let (slow, fast) = speeds.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
-    let mut lines = vec![format!(
+    for pass in &map.dropped {
+        ui.detail(&format!(
+            "left out: {} {velocity} at {:.2} s, {}.",
+            format_significant(pass.speed, 3),
+            pass.start,
+            pass.why
+        ));
+    }
+    ui.say(&format!(
         "{} of {} stretches of constant speed, from {}, give points from {} to {} {velocity}.",
         map.points.len(),
         map.points.len() + map.dropped.len(),
@@ -194,25 +199,16 @@ fn lines(map: &FrictionMap, kind: JointKind) -> Vec<String> {
         },
         format_significant(slow, 3),
         format_significant(fast, 3),
-    )];
-    lines.extend(map.dropped.iter().map(|pass: &DroppedPass| {
-        format!(
-            "left out: {} {velocity} at {:.2} s, {}.",
-            format_significant(pass.speed, 3),
-            pass.start,
-            pass.why
-        )
-    }));
+    ));
     let fit = map.stribeck.as_ref().unwrap_or(&map.simple);
     let value = |value: f64, k: usize| {
         let half = fit.half_interval.get(k).copied().unwrap_or(f64::NAN);
         rig_output::format_value(value, half)
     };
-    lines.push(format!(
+    ui.answer(&format!(
         "Coulomb {} {torque}, viscous {} {viscous} (± half the 95 % interval).",
         value(fit.coulomb, 0),
         value(fit.viscous, 1)
     ));
-    lines.push(map.text.clone());
-    lines
+    ui.answer(&map.text);
 }

@@ -14,6 +14,7 @@ use super::error::CommandError;
 use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults, refuse_shared, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
+use super::report_arg::{ReportArg, write_report};
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -213,6 +214,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -281,8 +284,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     let found = identified(robot, args, [&training, &holdout], ui)?;
     folder(&args.out)?;
-    let said = write_identification(&args.out, &description, &found, ui.command_line(), warnings)?;
-    printed::print(ui, &found);
+    let said = write_identification(
+        &args.out,
+        &description,
+        &found,
+        ui.command_line(),
+        warnings,
+        args.report.is_markdown(),
+    )?;
     if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
         ui.say(&format!(
             "No estimators were compared, so none is recommended: the recordings have {:.0} MiB, and a comparison takes long beyond {} MiB. Give --compare all to run it.",
@@ -293,6 +302,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for sentence in &said {
         ui.say(&format!("{URDF}: {sentence}"));
     }
+    printed::print(ui, &found);
     ui.say(&format!("report: {}", args.out.join(REPORT).display()));
     Ok(())
 }
@@ -376,7 +386,7 @@ fn identified(
 
 /// Writes identified.toml, identification.json, report.html and, with a full set of parameters, identified.urdf into
 /// the folder `out`. Returns the remarks on the written URDF. `command`: what repeats the result, for the report.
-/// `warnings`: from the recordings.
+/// `warnings`: from the recordings. `markdown`: the report as Markdown, too.
 ///
 /// # Errors
 /// Values that cannot be written as a description, or a file that cannot be written.
@@ -386,6 +396,7 @@ pub fn write_identification(
     found: &Identification,
     command: String,
     warnings: Vec<String>,
+    markdown: bool,
 ) -> Result<Vec<String>, CommandError> {
     let robot = &description.robot;
     let (identified, mut remarks) = identified_robot(robot, found);
@@ -415,6 +426,6 @@ pub fn write_identification(
         write_whole(&out.join(URDF), urdf.as_bytes())?;
     }
     write_whole(&out.join(JSON), (json + "\n").as_bytes())?;
-    rig_report::write(&out.join(REPORT), &page)?;
+    write_report(&out.join(REPORT), &page, markdown)?;
     Ok(said)
 }

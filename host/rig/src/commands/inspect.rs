@@ -8,6 +8,7 @@ use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
 use super::overwrite::refuse_folder;
+use super::report_arg::ReportArg;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -40,6 +41,8 @@ pub(crate) struct Args {
     /// Print as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for report.html and inspect.json
     #[arg(long)]
     out: Option<PathBuf>,
@@ -56,6 +59,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     if let Some(out) = &args.out {
         can_take(out, &[JSON, REPORT])?;
         refuse_folder(out, &[], args.force)?;
+    } else if args.report.is_markdown() {
+        return Err(CommandError::Sentence(
+            "--markdown needs a folder for the report; give it with --out.".into(),
+        ));
     }
     let robot = match &args.robot {
         Some(path) => Some(described(path, &args.chain, ui)?.robot),
@@ -83,7 +90,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ..Context::default()
     };
     write_whole(&out.join(JSON), json.as_bytes())?;
-    rig_report::write(
+    args.report.write(
         &out.join(REPORT),
         &pages::inspect(&args.file, &found, &context),
     )?;

@@ -9,6 +9,7 @@ use super::error::CommandError;
 use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
+use super::report_arg::ReportArg;
 use super::same_file::{is_copy, is_same};
 use super::ui::Ui;
 use crate::pages;
@@ -88,6 +89,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -340,7 +343,7 @@ fn write(
         found.body.to_toml()?.as_bytes(),
     )?;
     write_whole(&args.out.join("load.urdf"), urdf_link(found).as_bytes())?;
-    rig_report::write(
+    args.report.write(
         &args.out.join("report.html"),
         &pages::load(found, controllers, context),
     )?;

@@ -67,6 +67,7 @@ mod overwrite;
 mod pictures;
 mod pose_arg;
 mod record;
+mod report_arg;
 mod run;
 mod same_file;
 mod simulate;
@@ -97,6 +98,9 @@ pub struct Cli {
     /// Print errors alone, and what --json asks for
     #[arg(long, global = true)]
     quiet: bool,
+    /// Print details of the result, too: how it was found, and all that the report says in a line
+    #[arg(long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -133,7 +137,11 @@ impl Cli {
     /// # Errors
     /// A sentence for the user.
     pub fn run(self) -> Result<u8, CommandError> {
-        let ui = if self.quiet { Ui::quiet() } else { Ui::new() };
+        let ui = match (self.quiet, self.verbose) {
+            (true, _) => Ui::quiet(),
+            (false, true) => Ui::verbose(),
+            (false, false) => Ui::new(),
+        };
         match self.command {
             None => demo::run(&demo::Args::default(), &ui),
             Some(Command::Demo(args)) => demo::run(&args, &ui),

@@ -10,6 +10,7 @@ use super::error::CommandError;
 /// could take a file of an earlier run for a result of the later one.
 const RESULTS: &[&str] = &[
     "report.html",
+    "report.md",
     "identified.toml",
     "identified.urdf",
     "identification.json",
@@ -31,7 +32,8 @@ const RESULTS: &[&str] = &[
 ];
 
 /// Further files that the demonstration writes. Other commands ignore them: they may be the user's own recordings.
-pub(crate) const DEMONSTRATION: [&str; 7] = [
+pub(crate) const DEMONSTRATION: [&str; 8] = [
+    "diagnosis.md",
     "train.csv",
     "train-again.csv",
     "holdout.csv",

@@ -30,6 +30,8 @@ const EXAMPLE: &str = include_str!("run/example.toml");
 /// is the folder with its name, or the file with its name and the ending that the command needs, unless `out` says
 /// otherwise.
 ///
+/// Prints the answers of the steps; with --verbose all that they print.
+///
 /// Steps whose options, inputs and outputs are unchanged are skipped. The first step that fails ends the run. The page
 /// beside the project file (lab.html for lab.toml) has the answers and links; lab.run.json has what the next run compares.
 #[derive(Debug, ClapArgs)]
@@ -38,14 +40,11 @@ pub(crate) struct Args {
     #[arg(value_name = "FILE", default_value = "lab.toml")]
     file: PathBuf,
     /// Write a project file for the emulated rig instead of running one
-    #[arg(long, conflicts_with_all = ["again", "json", "verbose"])]
+    #[arg(long, conflicts_with_all = ["again", "json"])]
     example: bool,
     /// Run all steps, also those that are unchanged
     #[arg(long)]
     again: bool,
-    /// Print everything that the steps print, not only their answers
-    #[arg(long)]
-    verbose: bool,
     /// Print what the steps did as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
@@ -214,7 +213,7 @@ impl Run<'_> {
 
     /// Runs a step unless it is unchanged.
     fn one(&mut self, Ready { step, work }: &Ready) -> Result<(), CommandError> {
-        let ui = self.ui.of_step(&step.words, self.args.verbose);
+        let ui = self.ui.of_step(&step.words, self.ui.is_verbose());
         let command = ui.command_line();
         // A recording is not made again because the program is a newer one.
         let version = (step.command != "record").then_some(env!("CARGO_PKG_VERSION"));

@@ -10,6 +10,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::error::CommandError;
 
+/// Longest list that is printed without `--verbose`: with the answer behind it, it fits a terminal of 24 lines.
+pub(crate) const LISTED: usize = 14;
+
 /// Prints messages for the user. Results go to standard output, everything else to standard error.
 #[derive(Clone, Debug)]
 pub(crate) struct Ui {
@@ -18,6 +21,8 @@ pub(crate) struct Ui {
     has_results: bool,
     /// True if remarks are printed.
     has_remarks: bool,
+    /// True if details of results are printed.
+    has_details: bool,
     /// The words of the command, without the name of the program.
     words: Vec<String>,
     /// The lines of the result that answer the question of the command.
@@ -31,6 +36,7 @@ impl Ui {
             terminal: std::io::stderr().is_terminal(),
             has_results: true,
             has_remarks: true,
+            has_details: false,
             words: std::env::args().skip(1).collect(),
             answers: Rc::default(),
         }
@@ -44,6 +50,19 @@ impl Ui {
             has_remarks: false,
             ..Self::new()
         }
+    }
+
+    /// Returns an output that prints details of results, too.
+    pub(crate) fn verbose() -> Self {
+        Self {
+            has_details: true,
+            ..Self::new()
+        }
+    }
+
+    /// Returns true if details of results are printed.
+    pub(crate) fn is_verbose(&self) -> bool {
+        self.has_details
     }
 
     /// Returns this output without sentences about results.
@@ -101,6 +120,21 @@ impl Ui {
     pub(crate) fn say(&self, text: &str) {
         if self.has_results {
             self.print(&plain(text));
+        }
+    }
+
+    /// Prints a detail of a result, if details are asked for: one line on standard output.
+    pub(crate) fn detail(&self, text: &str) {
+        if self.has_details {
+            self.say(text);
+        }
+    }
+
+    /// Prints one of `count` lines of a list. A long list is a detail: the report has it.
+    pub(crate) fn say_of_many(&self, count: usize, text: &str) {
+        match count > LISTED {
+            true => self.detail(text),
+            false => self.say(text),
         }
     }
 

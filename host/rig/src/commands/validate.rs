@@ -1,6 +1,6 @@
 //! `rig validate`: compares a description with recordings that were not used to make it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use serde::Serialize;
@@ -9,6 +9,7 @@ use super::error::CommandError;
 use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
+use super::report_arg::ReportArg;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -46,6 +47,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -115,7 +118,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ..Context::default()
     };
     write(
-        &args.out,
+        args,
         &validation,
         &pages::validation(&robot, &validation, &context),
     )?;
@@ -144,13 +147,13 @@ fn opened(
     }
 }
 
-/// Prints the answer, the warnings and the path of the report.
+/// Prints the warnings, the answer and the path of the report.
 fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
-    for line in answer {
-        ui.answer(line);
-    }
     for warning in warnings {
         ui.warn(warning);
+    }
+    for line in answer {
+        ui.answer(line);
     }
     ui.say(&format!(
         "report: {}",
@@ -159,14 +162,14 @@ fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
 }
 
 /// Writes the result as JSON and as a page into a folder.
-fn write<T: Serialize>(out: &Path, found: &T, page: &Document) -> Result<(), CommandError> {
+fn write<T: Serialize>(args: &Args, found: &T, page: &Document) -> Result<(), CommandError> {
+    let out = &args.out;
     folder(out)?;
     let json = serde_json::to_string_pretty(found).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
     write_whole(&out.join("validation.json"), (json + "\n").as_bytes())?;
-    rig_report::write(&out.join("report.html"), page)?;
-    Ok(())
+    args.report.write(&out.join("report.html"), page)
 }
 
 /// Validates a joint whose motor voltage was recorded without torque or current.
@@ -178,11 +181,7 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result
         warnings: inputs.warnings().collect(),
         ..Context::default()
     };
-    write(
-        &args.out,
-        &found,
-        &pages::validation_voltage(&found, &context),
-    )?;
+    write(args, &found, &pages::validation_voltage(&found, &context))?;
     let each = found.recordings.iter().map(|checked| {
         let moved = moved(&checked.motion, Some(&checked.driven), &found.position_unit);
         format!("{}, {}: {moved}", checked.recording, found.joint)

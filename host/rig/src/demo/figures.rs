@@ -231,13 +231,17 @@ impl Demo {
             1e3 * with,
             without / with,
         ));
-        lines.push(rest_note(self.without.rest_span(), self.with.rest_span()));
         lines.push(format!(
             "diagnosis of the identified model: {}",
             pages::verdict(self.diagnosis.verdict)
         ));
         lines.extend(self.diagnosis.words.iter().cloned());
         Ok(lines)
+    }
+
+    /// Says whether the link moved at rest, with and without precompensation.
+    pub fn at_rest(&self) -> String {
+        rest_note(self.without.rest_span(), self.with.rest_span())
     }
 }
 

@@ -14,6 +14,7 @@ use super::identify::{Fit, Model, lead, speed};
 use super::input::{Inputs, Use, Watched, described, recordings, refuse_faults, refuse_twice};
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
+use super::report_arg::ReportArg;
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
@@ -86,6 +87,8 @@ pub(crate) struct Args {
     /// Print the result as JSON, as in the file, instead of sentences
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    report: ReportArg,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -177,6 +180,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             chain: &args.chain,
             seed: args.seed,
             out: &args.out,
+            report: args.report,
             force: args.force,
         };
         return simulated.run(ui);
@@ -226,10 +230,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     found.warnings.extend(own);
     write(args, &robot, &found, read, ui)?;
-    ui.answer(&grade(&found));
-    for line in lines(&found) {
+    for line in pooled(&found) {
+        ui.say_of_many(found.parameters.len(), &line);
+    }
+    for line in reasons(&found) {
         ui.say(&line);
     }
+    ui.answer(&grade(&found));
     ui.say(&format!("report: {}", args.out.join(FILES[2]).display()));
     Ok(())
 }
@@ -262,8 +269,7 @@ fn write(
         warnings: read,
     };
     let page = pages::compare(found, &context);
-    rig_report::write(&args.out.join(FILES[2]), &page)?;
-    Ok(())
+    args.report.write(&args.out.join(FILES[2]), &page)
 }
 
 /// Returns the answer in a sentence.
@@ -282,8 +288,8 @@ fn grade(found: &Comparison) -> String {
     }
 }
 
-/// Returns what is printed after the answer.
-fn lines(found: &Comparison) -> Vec<String> {
+/// Returns what is printed before the answer: the reasons for it, and what the sets do not show.
+fn reasons(found: &Comparison) -> Vec<String> {
     let mut lines = found.reasons.clone();
     for set in &found.sets {
         if !set.not_shown.is_empty() {
@@ -295,7 +301,12 @@ fn lines(found: &Comparison) -> Vec<String> {
         }
     }
     lines
-        .push("Pooled values ± half the 95 % interval (spread within a set, between sets):".into());
+}
+
+/// Returns the pooled values, one line each.
+fn pooled(found: &Comparison) -> Vec<String> {
+    let mut lines =
+        vec!["Pooled values ± half the 95 % interval (spread within a set, between sets):".into()];
     for p in &found.parameters {
         lines.push(format!(
             "  {} {} {} (within {}, between {})",

@@ -6,6 +6,7 @@ use super::super::chain_arg::ChainArg;
 use super::super::error::CommandError;
 use super::super::input::described;
 use super::super::overwrite::refuse_folder;
+use super::super::report_arg::ReportArg;
 use super::super::ui::Ui;
 use crate::pages::{self, Context};
 use rig_compare::{SimulateOptions, SimulatedRobot, simulated};
@@ -33,6 +34,8 @@ pub(super) struct Simulated<'a> {
     pub seed: u64,
     /// Folder for the results.
     pub out: &'a Path,
+    /// Form of the reports.
+    pub report: ReportArg,
     /// Replace results.
     pub force: bool,
 }
@@ -113,12 +116,12 @@ impl Simulated<'_> {
                 ))
             })?;
             write_whole(&own.join(FILES[0]), (json + "\n").as_bytes())?;
-            rig_report::write(
+            self.report.write(
                 &own.join(FILES[1]),
                 &pages::simulated_robot(found, &context),
             )?;
         }
-        rig_report::write(
+        self.report.write(
             &self.out.join(FILES[1]),
             &pages::simulated_overview(all, &context),
         )?;

@@ -12,18 +12,11 @@ const ANSWER: usize = 2;
 
 /// Prints the result in short, and the path of the report.
 pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
-    let lines = summary(found);
     for fault in &found.data_faults {
         ui.warn(&match fault.recording.as_str() {
             recording if fault.text.contains(recording) => fault.text.clone(),
             recording => format!("{recording}: {}", fault.text),
         });
-    }
-    for (k, line) in lines.iter().enumerate() {
-        match k < ANSWER {
-            true => ui.answer(line),
-            false => ui.say(line),
-        }
     }
     if found.verdict == Verdict::DataFault {
         let way_on = match found.data_faults.iter().all(DataFault::leaves_rows) {
@@ -34,14 +27,40 @@ pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
             "nothing was fitted; model.toml is the unchanged description.{way_on}"
         ));
     }
+    for line in besides(found) {
+        ui.detail(&line);
+    }
+    let more = found.words.len().saturating_sub(1);
+    if more > 0 && !ui.is_verbose() {
+        ui.say(&format!(
+            "({more} further sentences: the report and --verbose have them)"
+        ));
+    }
+    for (k, line) in summary(found).iter().enumerate() {
+        match k < ANSWER {
+            true => ui.answer(line),
+            false => ui.say(line),
+        }
+    }
     ui.say(&format!("report: {}", report.display()));
 }
 
-/// Lines of the short result: verdict and effects first, further sentences of the diagnosis last.
+/// Further sentences of the diagnosis.
+fn besides(found: &Diagnosis) -> Vec<String> {
+    let sentences = found.words.iter().skip(1);
+    let mut lines: Vec<String> = sentences
+        .map(|sentence| format!("  - {sentence}"))
+        .collect();
+    if !lines.is_empty() {
+        lines.insert(0, "also:".into());
+    }
+    lines
+}
+
+/// Lines of the short result, verdict and effects first.
 fn summary(found: &Diagnosis) -> Vec<String> {
     let mut lines = vec![format!("verdict: {}", pages::verdict(found.verdict))];
-    let (first, besides) = found.words.split_at(found.words.len().min(1));
-    lines.extend(first.iter().cloned());
+    lines.extend(found.words.first().cloned());
     let of_joint = found.waterfall.len() > 1;
     for (k, step) in found.steps.iter().enumerate() {
         lines.push(effect(k + 1, step, of_joint));
@@ -81,10 +100,6 @@ fn summary(found: &Diagnosis) -> Vec<String> {
             }
             _ => format!("next experiment: {}", next.text),
         });
-    }
-    if !besides.is_empty() {
-        lines.push("also:".into());
-        lines.extend(besides.iter().map(|sentence| format!("  - {sentence}")));
     }
     lines
 }

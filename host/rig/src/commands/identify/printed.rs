@@ -1,77 +1,89 @@
 //! Terminal output of `rig identify`.
 
-use super::super::ui::Ui;
-use rig_identify::{Estimator, Identification, NotExcited, StandardSet};
+use super::super::ui::{LISTED, Ui};
+use rig_identify::{Estimator, Identification, JointFigures, NotExcited, StandardSet};
 use rig_output::{format_interval, format_value};
 
 /// Share of used rows from which on the figure over all rows is not printed, because it is nearly the same.
 const ALL_BUT_A_FEW: f64 = 0.985;
 
-/// Prints the result in short.
+/// Prints the result: details, what the data do not show, the parameters, and last the residuals and the estimator to trust.
 pub(super) fn print(ui: &Ui, result: &Identification) {
-    let width = result
-        .base_parameters
-        .iter()
-        .map(|p| p.expression.chars().count())
-        .max()
-        .unwrap_or(0);
-    for parameter in &result.base_parameters {
-        ui.say(&format!(
-            "{:width$}  {} {}  (95 %: {})",
-            parameter.expression,
-            format_value(parameter.value, parameter.std),
-            parameter.unit,
-            format_interval(parameter.interval, parameter.value, parameter.std),
-        ));
+    for warning in &result.warnings {
+        ui.warn(&warning.to_string());
     }
-    for joint in &result.joints {
-        let held = (
-            joint.holdout_relative_error,
-            joint.holdout_rows_share,
-            joint.holdout_relative_error_all_rows,
-        );
-        let holdout = match held {
-            (Some(error), ..) if error.is_nan() => ", no usable row in the hold-out".to_owned(),
-            (Some(error), Some(share), Some(all)) => {
-                format!(", on the hold-out {}", left(error, share, all))
-            }
-            _ => String::new(),
-        };
-        if joint.train_residual_rms.is_nan() {
-            ui.answer(&format!(
-                "{}: no row of its torque was used{holdout}",
-                joint.name
-            ));
-            continue;
-        }
-        ui.answer(&format!(
-            "{}: residual {:.4} rms, {}{holdout}",
-            joint.name,
-            joint.train_residual_rms,
-            left(
-                joint.train_relative_error,
-                joint.train_rows_share,
-                joint.train_relative_error_all_rows
-            ),
-        ));
+    for sentence in &result.procedure {
+        ui.detail(sentence);
     }
     if result.estimator != Estimator::Consistent
         && let Some(set) = &result.standard_parameters
     {
-        ui.say(&of_the_files(set));
+        ui.detail(&of_the_files(set));
     }
     for line in not_excited(&result.not_excited) {
         ui.say(&line);
     }
-    for sentence in &result.procedure {
-        ui.say(sentence);
+    parameters(ui, result);
+    for joint in &result.joints {
+        ui.answer(&residual(joint));
     }
     if let Some(comparison) = &result.comparison {
         ui.say(&comparison.recommendation);
     }
-    for warning in &result.warnings {
-        ui.warn(&warning.to_string());
+}
+
+/// Prints the base parameters, or their number if there are many.
+fn parameters(ui: &Ui, result: &Identification) {
+    let found = &result.base_parameters;
+    let width = (found.iter().map(|p| p.expression.chars().count())).max();
+    let width = width.unwrap_or(0);
+    for parameter in found {
+        ui.say_of_many(
+            found.len(),
+            &format!(
+                "{:width$}  {} {}  (95 %: {})",
+                parameter.expression,
+                format_value(parameter.value, parameter.std),
+                parameter.unit,
+                format_interval(parameter.interval, parameter.value, parameter.std),
+            ),
+        );
     }
+    if found.len() > LISTED && !ui.is_verbose() {
+        ui.say(&format!(
+            "{} base parameters: the report and --verbose list them",
+            found.len()
+        ));
+    }
+}
+
+/// Describes the residual of a joint.
+fn residual(joint: &JointFigures) -> String {
+    let held = (
+        joint.holdout_relative_error,
+        joint.holdout_rows_share,
+        joint.holdout_relative_error_all_rows,
+    );
+    let holdout = match held {
+        (Some(error), ..) if error.is_nan() => ", no usable row in the hold-out".to_owned(),
+        (Some(error), Some(share), Some(all)) => {
+            format!(", on the hold-out {}", left(error, share, all))
+        }
+        _ => String::new(),
+    };
+    if joint.train_residual_rms.is_nan() {
+        return format!("{}: no row of its torque was used{holdout}", joint.name);
+    }
+    format!(
+        "{}: residual {:.4} rms, {}{holdout}",
+        joint.name,
+        joint.train_residual_rms,
+        left(
+            joint.train_relative_error,
+            joint.train_rows_share,
+            joint.train_relative_error_all_rows
+        ),
+    )
 }
 
 /// Residual in per cent of the torque, over the used rows and over all rows.

@@ -1,0 +1,50 @@
+//! The option of all commands that write a report.
+
+use std::path::Path;
+
+use clap::Args;
+
+use super::error::CommandError;
+use rig_report::Document;
+
+/// The form of a report.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub(crate) struct ReportArg {
+    /// Write the report as Markdown, too: report.md, with its figures as SVG files beside it
+    #[arg(long)]
+    markdown: bool,
+}
+
+impl ReportArg {
+    /// Returns true if Markdown is asked for.
+    pub(crate) fn is_markdown(self) -> bool {
+        self.markdown
+    }
+
+    /// Writes a report as the HTML file `path`.
+    ///
+    /// # Errors
+    /// As [`write_report`].
+    pub(crate) fn write(self, path: &Path, page: &Document) -> Result<(), CommandError> {
+        write_report(path, page, self.markdown)
+    }
+}
+
+/// Writes a report as the HTML file `path`; if `markdown`, as Markdown beside it. Otherwise removes the Markdown of an earlier
+/// report, so that nobody takes it for a part of the new result.
+///
+/// # Errors
+/// A document that contradicts itself, or a file that cannot be written or removed.
+pub(super) fn write_report(
+    path: &Path,
+    page: &Document,
+    markdown: bool,
+) -> Result<(), CommandError> {
+    let beside = path.with_extension("md");
+    match markdown {
+        true => rig_report::write_markdown(&beside, page)?,
+        false => rig_report::remove_markdown(&beside)?,
+    }
+    rig_report::write(path, page)?;
+    Ok(())
+}
