@@ -371,3 +371,8 @@ fn the_exercise_runs_as_the_page_says() {
 fn control_laws_run_as_the_page_says() {
     walk("docs/control.md", 1);
 }
+
+#[test]
+fn the_tutorial_runs_as_the_page_says() {
+    walk("docs/tutorial.md", 6);
+}
