@@ -219,6 +219,20 @@ fn refused(cases: &[(String, &str)]) {
     }
 }
 
+/// The inertia of a body that no joint moves does not enter: published arms stand on a mount of geoms alone.
+#[test]
+fn a_mount_of_geoms_needs_no_inertia() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.xml");
+    let arm = format!("<body name='link'><joint name='turn'/>{INERTIAL}</body>");
+    let mount = format!("<geom size='1'/><body name='mount'><geom size='1'/>{arm}</body>");
+    std::fs::write(&path, body(&mount)).unwrap();
+    let robot = Description::load(&path).unwrap().robot;
+    assert_eq!(robot.joints.len(), 1);
+    let moved = "<geom size='1'/><body><joint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/><body><geom size='1'/></body></body>";
+    refused(&[(body(moved), "has geoms and no <inertial>")]);
+}
+
 #[test]
 fn what_cannot_be_read_is_named_by_its_line() {
     let inertial = INERTIAL;

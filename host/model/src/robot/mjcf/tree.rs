@@ -136,7 +136,7 @@ impl<'a> Tree<'a> {
         let own_inertia = reader.inertial(inner, &name)?;
         if own_inertia.is_none()
             && inner.iter().any(|own| own.node.has_tag_name("geom"))
-            && (parent.is_some() || !joints.is_empty())
+            && (!joints.is_empty() || self.moves(parent))
         {
             return Err(reader.error(
                 node,
@@ -152,6 +152,12 @@ impl<'a> Tree<'a> {
             parent,
             children: Vec::new(),
         })
+    }
+
+    /// Returns true if a joint moves this body.
+    fn moves(&self, body: Option<usize>) -> bool {
+        let has_joint = |own: &usize| !self.bodies[*own].joints.is_empty();
+        body.is_some_and(|own| self.path_to(own).iter().any(has_joint))
     }
 
     /// Returns the bodies from the world to a body, that one last.
