@@ -9,7 +9,7 @@ use super::mobility::free_inertia;
 use super::plant::{Contact, Plant};
 use super::sensing::Encoders;
 use super::settings::Settings;
-use rig_model::robot::{JointKind, Robot};
+use rig_model::robot::{JointKind, JointLimits, Robot};
 use rig_model::simulate::Model;
 use rig_shared::control::arm::Inputs;
 use rig_shared::trajectory::Reference;
@@ -176,7 +176,8 @@ fn stable(
     time: f64,
 ) -> Result<(), ControlError> {
     for (joint, &speed) in robot.joints.iter().zip(&plant.v) {
-        let limit = joint.limits.as_ref().map_or(50.0, |l| l.velocity);
+        let limit = joint.limits.as_ref().and_then(JointLimits::known_velocity);
+        let limit = limit.unwrap_or(50.0);
         let factor = speed.abs() / limit;
         if !(factor <= UNSTABLE) {
             return Err(ControlError::Unstable {

@@ -105,6 +105,11 @@ pub(super) fn bounds_of(
         if simple {
             notes.extend(narrowed(joint, &mut limits)?);
         }
+        // A motion is sized by a speed, or by an acceleration within a range.
+        if limits.known_velocity().is_none() && limits.acceleration.is_none() {
+            limitless.push(joint.name.clone());
+            continue;
+        }
         let [mut low, mut high] = limits.for_motions();
         if !low.is_finite() || !high.is_finite() {
             (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
@@ -139,7 +144,7 @@ pub(super) fn bounds_of(
                 velocity,
             });
         }
-        if velocity < stated {
+        if velocity < stated && stated.is_finite() {
             notes.push(sized_by(&joint.name, velocity));
         }
         list.push(Bounds {

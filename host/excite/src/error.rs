@@ -15,7 +15,7 @@ use rig_output::{WriteError, format_significant};
 pub enum ExciteError {
     /// Joints without limits.
     #[error(
-        "{} no limits, and a motion is only designed within limits; give position and velocity at least, as [joint.limits] in TOML, as <limit lower=\"…\" upper=\"…\" velocity=\"…\" effort=\"…\"/> in a URDF",
+        "{} no limits of both position and velocity, and a motion is only designed within limits; give both at least, as [joint.limits] in TOML, as <limit lower=\"…\" upper=\"…\" velocity=\"…\" effort=\"…\"/> in a URDF",
         limitless(joints)
     )]
     NoLimits {

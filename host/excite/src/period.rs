@@ -8,7 +8,7 @@ use crate::bounds::{Bounds, Room, bounds_of};
 use crate::error::wrong;
 use crate::schedule::Schedule;
 use crate::{ExciteError, Options};
-use rig_model::robot::{Joint, JointKind, Robot};
+use rig_model::robot::{Joint, JointKind, JointLimits, Robot};
 
 /// Shortest chosen period, s. Limits that mean "none" would give a motion of a fraction of a second, too short to
 /// settle and to record.
@@ -61,7 +61,10 @@ fn slow(joint: &Joint, bounds: &Bounds, of_velocity: bool, period: f64) -> Excit
         ),
         _ => (
             "velocity limit",
-            described(bounds.velocity, limits.map(|l| l.velocity)),
+            described(
+                bounds.velocity,
+                limits.and_then(JointLimits::known_velocity),
+            ),
             ["rad/s", "m/s"],
         ),
     };

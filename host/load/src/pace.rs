@@ -97,7 +97,7 @@ impl Steps {
     /// Begins for a robot.
     pub(crate) fn of(robot: &Robot) -> Self {
         let speed = |joint: &Joint| match &joint.limits {
-            Some(limits) if limits.velocity > 0.0 => limits.velocity,
+            Some(limits) if limits.velocity > 0.0 && limits.velocity.is_finite() => limits.velocity,
             _ => FASTEST,
         };
         Self {

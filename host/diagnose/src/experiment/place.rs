@@ -8,7 +8,7 @@ use crate::experiment::family::Hands;
 use crate::experiment::nominal::{Held, Nominal};
 use rig_identify::chain_of;
 use rig_model::batch::ModelBatch;
-use rig_model::robot::{JointKind, Robot};
+use rig_model::robot::{JointKind, JointLimits, Robot};
 use rig_plant::emulated::Nameplate;
 
 /// Usable share of the torque limit.
@@ -49,7 +49,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Returns the setup of a joint (from 0); `None` without limits, or for a prismatic joint without finite ones.
+    /// Returns the setup of a joint (from 0); `None` without limits of position and velocity, or for a prismatic joint without finite ones.
     pub(crate) fn of(
         robot: &Robot,
         joint: usize,
@@ -59,7 +59,8 @@ impl Place {
         let Some(own) = robot.joints.get(joint) else {
             return Ok(None);
         };
-        let Some(limits) = &own.limits else {
+        let known = |limits: &&JointLimits| limits.known_velocity().is_some();
+        let Some(limits) = own.limits.as_ref().filter(known) else {
             return Ok(None);
         };
         let revolute = own.kind == JointKind::Revolute;

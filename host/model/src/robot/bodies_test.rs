@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::{SpatialInertia, is_taken};
 use crate::robot::{
-    Description, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Original, Robot, TX40,
-    XL330,
+    Description, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, JointLimits, ONE_LINK_TEMPLATE, Original,
+    Robot, TX40, XL330,
 };
 
 fn remarks(inertial: &str) -> Vec<String> {
@@ -167,7 +167,7 @@ fn unknown_limits_of_all_joints_are_told_in_one_sentence() {
         ),
         (
             "lower='-1' upper='1' velocity='0' effort='0'",
-            "the velocity limits of joints `one` and `two` are 0, so",
+            "neither the velocity nor the effort limits of joints `one` and `two` are stated",
         ),
         (
             "lower='-1' upper='1' effort='3'",
@@ -194,13 +194,22 @@ fn unknown_limits_of_all_joints_are_told_in_one_sentence() {
             remark.starts_with("r.urdf:2:1: ") && remark.contains(words),
             "{limit}: {remark}"
         );
-        assert!(
-            original
-                .robot()
-                .joints
-                .iter()
-                .all(|own| own.limits.is_none())
-        );
+        // A stated range stays; the speed is not known.
+        let ranged = limit.contains("upper='1'");
+        for own in &original.robot().joints {
+            let range = own.limits.as_ref().map(|own| own.position);
+            assert_eq!(range, ranged.then_some([-1.0, 1.0]), "{limit}");
+            let speed = own.limits.as_ref().and_then(JointLimits::known_velocity);
+            assert_eq!(speed, None, "{limit}");
+            let torque = own.limits.as_ref().and_then(|own| own.torque);
+            let known = ranged && limit.contains("effort='3'");
+            assert_eq!(torque, known.then_some(3.0), "{limit}");
+        }
+        // The TOML has a line for the speed, and is read again without it.
+        let draft = original.robot().to_toml_draft(&[]).unwrap();
+        assert_eq!(draft.matches("# velocity =").count(), 2, "{draft}");
+        let again = Robot::from_toml(&draft, Path::new("r.toml")).unwrap();
+        assert_eq!(again.joints[0].limits, original.robot().joints[0].limits);
     }
     let original = read("lower='-1' upper='1' velocity='2' effort='0'").unwrap();
     let [remark] = original.remarks() else {

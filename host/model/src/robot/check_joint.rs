@@ -105,14 +105,17 @@ fn check_limits(joint: &Joint, limits: &JointLimits, units: Units) -> Result<(),
     check_position_limits(joint, limits.position, angle)?;
     check_soft_limits(joint, limits, angle)?;
     let key_path = |k| [Key("limits"), Key(k)];
-    number(
-        joint,
-        &key_path("velocity"),
-        "velocity limit",
-        &format!("{angle}/s"),
-        Limit,
-        limits.velocity,
-    )?;
+    // An infinite one is not known.
+    if limits.velocity != f64::INFINITY {
+        number(
+            joint,
+            &key_path("velocity"),
+            "velocity limit",
+            &format!("{angle}/s"),
+            Limit,
+            limits.velocity,
+        )?;
+    }
     if let Some(v) = limits.acceleration {
         number(
             joint,

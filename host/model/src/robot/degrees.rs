@@ -23,28 +23,34 @@ impl Robot {
             let reach = low.abs().max(high.abs());
             let turns = reach / std::f64::consts::TAU;
             if turns > TURNS {
+                let speed = limits.known_velocity().map_or(String::new(), |v| {
+                    format!(
+                        " (and a velocity of {} deg/s {} rad/s)",
+                        number(v),
+                        number(v.to_radians())
+                    )
+                });
                 return Some(format!(
-                    "Joint \"{}\": position limits of {} to {} rad are {} turns; were these degrees, they would be {} to {} rad (and a velocity of {} deg/s {} rad/s). Limits are in rad and rad/s.",
+                    "Joint \"{}\": position limits of {} to {} rad are {} turns; were these degrees, they would be {} to {} rad{speed}. Limits are in rad and rad/s.",
                     joint.name,
                     number(low),
                     number(high),
                     format_significant((high - low) / std::f64::consts::TAU, 3),
                     number(low.to_radians()),
-                    number(high.to_radians()),
-                    number(limits.velocity),
-                    number(limits.velocity.to_radians())
+                    number(high.to_radians())
                 ));
             }
-            let least = limits.velocity.powi(2) / (high - low);
+            let velocity = limits.known_velocity()?;
+            let least = velocity.powi(2) / (high - low);
             let stated = limits.acceleration.is_none_or(|a| a < least);
             (least > ABRUPT && stated).then(|| {
                 format!(
                     "Joint \"{}\": to reach its velocity limit of {} rad/s within its range takes at least {} rad/s²; were this deg/s, it would be {} rad/s, in rpm {}. Limits are in rad/s.",
                     joint.name,
-                    number(limits.velocity),
+                    number(velocity),
                     number(least),
-                    number(limits.velocity.to_radians()),
-                    number(limits.velocity * std::f64::consts::PI / 30.0)
+                    number(velocity.to_radians()),
+                    number(velocity * std::f64::consts::PI / 30.0)
                 )
             })
         };

@@ -75,6 +75,7 @@ fn absent_keys(joint: &Joint, line: &str) -> Vec<String> {
     let (table, keys): (&str, Vec<&str>) = match (line, &joint.limits, &joint.drive) {
         ("[joint.limits]", Some(limits), _) => {
             let absent = [
+                (limits.known_velocity().is_none(), "velocity"),
                 (limits.acceleration.is_none(), "acceleration"),
                 (limits.torque.is_none(), "torque"),
             ];

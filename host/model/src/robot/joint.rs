@@ -114,7 +114,8 @@ pub struct JointLimits {
     /// `safety_controller`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub soft_position: Option<[f64; 2]>,
-    /// Highest speed, rad/s or m/s.
+    /// Highest speed, rad/s or m/s; ∞ if it is not known.
+    #[serde(default = "unknown_speed", skip_serializing_if = "is_unknown_speed")]
     pub velocity: f64,
     /// Highest acceleration, rad/s² or m/s².
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -129,6 +130,19 @@ impl JointLimits {
     pub fn for_motions(&self) -> [f64; 2] {
         self.soft_position.unwrap_or(self.position)
     }
+
+    /// Returns the highest speed, rad/s or m/s, if it is known.
+    pub fn known_velocity(&self) -> Option<f64> {
+        Some(self.velocity).filter(|velocity| velocity.is_finite())
+    }
+}
+
+fn unknown_speed() -> f64 {
+    f64::INFINITY
+}
+
+fn is_unknown_speed(velocity: &f64) -> bool {
+    *velocity == f64::INFINITY
 }
 
 /// Joint-side friction of the standard model.

@@ -331,7 +331,9 @@ fn limits(joint: &Joint, drive: &rig_model::robot::Drive) -> Result<Limits<f32>,
     Ok(Limits {
         position_low: limits.position[0] as f32,
         position_high: limits.position[1] as f32,
-        velocity: limits.velocity as f32,
+        velocity: limits
+            .known_velocity()
+            .ok_or_else(|| missing("limits.velocity"))? as f32,
         acceleration: limits
             .acceleration
             .ok_or_else(|| missing("limits.acceleration"))? as f32,

@@ -11,6 +11,8 @@ pub(super) enum Unknown {
     Speed,
     /// There is no velocity limit.
     NoSpeed,
+    /// Neither the velocity nor the effort limit is known.
+    SpeedAndEffort,
     /// The effort limit is a placeholder.
     Effort(f64),
     /// There is no effort limit.
@@ -25,6 +27,10 @@ impl Unknown {
             true => ("limit", "looks like a placeholder", "counts"),
             false => ("limits", "look like placeholders", "count"),
         };
+        let speed = match is_one {
+            true => "so it counts as not known; a command that designs a motion wants it",
+            false => "so they count as not known; a command that designs a motion wants them",
+        };
         let whole = format!(
             "so {its} limits count as not known, the stated ones too; a command that designs a motion wants them all"
         );
@@ -36,10 +42,14 @@ impl Unknown {
                 format!("the lower and the upper {limit} of {joints} are both 0, {whole}.")
             }
             Self::Speed => format!(
-                "the velocity {limit} of {joints} {} 0, {whole}.",
+                "the velocity {limit} of {joints} {} 0, {speed}.",
                 if is_one { "is" } else { "are" }
             ),
-            Self::NoSpeed => format!("<limit> of {joints} has no `velocity`, {whole}."),
+            Self::NoSpeed => format!("<limit> of {joints} has no `velocity`, {speed}."),
+            Self::SpeedAndEffort => format!(
+                "neither the velocity nor the effort {limit} of {joints} {} stated (0 is none), so both count as not known; a command that designs a motion wants the velocity.",
+                if is_one { "is" } else { "are" }
+            ),
             Self::Effort(effort) => format!(
                 "the effort {limit} {effort} of {joints} {look}; {its} torque {limit} {count} as not known."
             ),

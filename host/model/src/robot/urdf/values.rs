@@ -99,26 +99,26 @@ impl<'a> Reader<'a> {
         }
         let acceleration = self.acceleration_limit(node, name)?;
         let soft_position = self.soft_limits(joint, name, position)?;
-        // Without a speed or a range no motion can be designed; both together are the limits of a joint.
-        let Some(velocity) = velocity.filter(|v| *v > 0.0 && !is_open) else {
-            let what = match velocity {
-                _ if is_open => Unknown::Range,
-                Some(_) => Unknown::Speed,
-                None => Unknown::NoSpeed,
-            };
-            self.unknown(node, name, what);
+        if is_open {
+            self.unknown(node, name, Unknown::Range);
             return Ok(None);
-        };
+        }
         let placeholder = is_placeholder(effort, UNKNOWN_EFFORT);
-        match stated {
-            None => self.unknown(node, name, Unknown::NoEffort),
-            Some(_) if placeholder => self.unknown(node, name, Unknown::Effort(effort)),
-            Some(_) => {}
+        let known = velocity.filter(|own| *own > 0.0);
+        let what = match (known, velocity, stated) {
+            (None, ..) if placeholder => Some(Unknown::SpeedAndEffort),
+            (None, Some(_), _) => Some(Unknown::Speed),
+            (None, None, _) => Some(Unknown::NoSpeed),
+            (Some(_), _, None) => Some(Unknown::NoEffort),
+            (Some(_), _, Some(_)) => placeholder.then_some(Unknown::Effort(effort)),
+        };
+        if let Some(what) = what {
+            self.unknown(node, name, what);
         }
         Ok(Some(JointLimits {
             position,
             soft_position,
-            velocity,
+            velocity: known.unwrap_or(f64::INFINITY),
             acceleration,
             torque: (!placeholder).then_some(effort),
         }))

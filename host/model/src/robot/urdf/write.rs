@@ -14,7 +14,7 @@ use rig_shared::transmission::DriveKind;
 use super::spatial::SpatialInertia;
 use crate::robot::error::RobotError;
 use crate::robot::frame::{GRAVITY, roll_pitch_yaw, step};
-use crate::robot::joint::{Joint, JointKind};
+use crate::robot::joint::{Joint, JointKind, JointLimits};
 use crate::robot::serial_robot::Robot;
 
 /// Limit written if the description has none: URDF demands one.
@@ -102,7 +102,9 @@ impl Robot {
         for remark in &remarks {
             let _ = writeln!(text, "{}", comment(remark));
         }
-        let drake = match rotors.contains(&true) {
+        let limited =
+            |joint: &Joint| (joint.limits.as_ref()).is_some_and(|l| l.acceleration.is_some());
+        let drake = match rotors.contains(&true) || self.joints.iter().any(limited) {
             true => " xmlns:drake=\"http://drake.mit.edu\"",
             false => "",
         };
@@ -267,11 +269,15 @@ fn write_joint(
                 format!("lower=\"{:?}\" upper=\"{far:?}\" ", -far)
             }
         };
-        let velocity = known(limits.map(|l| l.velocity), "velocity");
+        let velocity = known(limits.and_then(JointLimits::known_velocity), "velocity");
         let effort = known(torque, "effort");
+        let acceleration = limits.and_then(|l| l.acceleration);
+        let acceleration = acceleration.map_or(String::new(), |own| {
+            format!(" drake:acceleration=\"{own:?}\"")
+        });
         let _ = writeln!(
             out,
-            "    <limit {range}velocity=\"{velocity:?}\" effort=\"{effort:?}\"/>"
+            "    <limit {range}velocity=\"{velocity:?}\" effort=\"{effort:?}\"{acceleration}/>"
         );
         if !unknown.is_empty() {
             remarks.push(format!(

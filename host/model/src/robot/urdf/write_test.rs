@@ -191,6 +191,7 @@ fn limits_drives_and_what_is_left_out_are_told() {
     let mut soft = robot.clone();
     let [low, high] = soft.joints[0].limits.as_ref().unwrap().position;
     soft.joints[0].limits.as_mut().unwrap().soft_position = Some([0.9 * low, 0.8 * high]);
+    soft.joints[0].limits.as_mut().unwrap().acceleration = Some(12.5);
     let written = soft.to_urdf().unwrap().text;
     let read = Robot::from_urdf(&written, Path::new("r.urdf")).unwrap();
     assert_eq!(read.joints[0].limits, soft.joints[0].limits);
