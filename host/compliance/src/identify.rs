@@ -11,7 +11,8 @@ use crate::error::ComplianceError;
 use crate::frequency::{FrequencyResponse, respond};
 use crate::loading::{LoadingFindings, loading};
 use crate::map::{ComplianceMap, compliance_map};
-use crate::signals::{read, refuse_degrees};
+use crate::sag::{at_the_joint, sagging};
+use crate::signals::{Signals, read, refuse_degrees};
 use crate::stiffness::{DriveStiffness, Source, described_stiffness, given_stiffness};
 use crate::tool_point::{ToolCompliance, ToolPoint};
 use crate::value::Value;
@@ -94,7 +95,7 @@ pub fn identify_compliance(
     if sensed {
         tool = tool.with_sensor()?;
     }
-    let mut warnings = Vec::new();
+    let (mut warnings, mut poses) = (Vec::new(), options.poses.clone());
     let mut drives = described_stiffness(robot)?;
     if !options.stiffness.is_empty() {
         given_stiffness(&mut drives, &options.stiffness, &options.stiffness_std)?;
@@ -104,6 +105,7 @@ pub fn identify_compliance(
         _ => {
             let stretches = read(load)?;
             refuse_degrees(robot, &stretches)?;
+            poses.extend(stretches.iter().map(middle));
             Some(loading(&tool, &stretches)?)
         }
     };
@@ -142,6 +144,7 @@ pub fn identify_compliance(
     if options.stiffness.is_empty() {
         warnings.extend(rigid(&drives));
     }
+    warnings.extend(sagging(&tool, &drives, &poses)?);
     let (computed, map) = at_poses(&tool, &drives, options, &mut warnings)?;
     Ok(Compliance {
         schema: "rig-compliance/1",
@@ -178,6 +181,7 @@ fn at_poses(
     let map = (options.map)
         .map(|joints| compliance_map(tool, drives, joints, &poses[0]))
         .transpose()?;
+    warnings.extend(at_the_joint(tool, drives, &poses[0])?);
     warnings.extend(computed.iter().filter_map(on_axis));
     for (own, map) in map
         .iter()
@@ -190,6 +194,13 @@ fn at_poses(
         ));
     }
     Ok((computed, map))
+}
+
+/// Returns the mean position of a stretch.
+fn middle(signals: &Signals) -> Vec<f64> {
+    let all = signals.joints.iter();
+    all.map(|joint| rig_numerics::statistics::mean_or_zero(&joint.q))
+        .collect()
 }
 
 /// Refuses a pose in degrees, by the rule for recordings.

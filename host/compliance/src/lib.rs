@@ -30,6 +30,7 @@ mod frequency;
 mod identify;
 mod loading;
 mod map;
+mod sag;
 mod signals;
 mod stiffness;
 #[cfg(test)]
