@@ -31,6 +31,9 @@ const LACK_SIGMAS: f64 = 6.0;
 /// Systematic residual over the deflection beyond which a warning tells it. By judgement: what is smaller widens the standard
 /// deviations alone.
 const TOLD: f64 = 0.03;
+/// Student's t of the correlation of instrument and load from which on the instrument shows the load. Noise alone has a standard
+/// deviation of one; below about 3 the estimate of a weak instrument has no valid interval (Stock & Yogo 2005).
+const STRONG: f64 = 5.0;
 /// Reciprocal condition number of the normal matrix below which a direction is left out of the search.
 const SINGULAR: f64 = 1e-12;
 
@@ -45,8 +48,11 @@ pub(super) struct Row {
     pub group: usize,
     /// Reading per twist of each drive.
     pub arms: Vec<f64>,
-    /// Torque of each drive, 0 where the spring is free as far as is known.
+    /// Torque of each drive by the neighbours, 0 where the spring is free as far as is known. It decides the side of a gap, which
+    /// the noise of the window itself must not do.
     pub loads: Vec<f64>,
+    /// Torque of each drive by the weight, part of `loads` with the opposite sign.
+    pub weight: Vec<f64>,
     pub directions: Vec<f64>,
     /// Number of the window.
     pub window: usize,
@@ -193,6 +199,10 @@ fn with_gap(rows: &[Row], before: &Fit, search: bool) -> Option<Fit> {
     let column = next.estimate.values.len() - 1;
     let significant = next.estimate.values[column] > GAP_SIGMAS * next.estimate.std(column)
         && !next.estimate.hidden[column]
+        && next
+            .gaps
+            .last()
+            .is_some_and(|gap| shows(&clear, &next, gap.drive))
         && bends(&clear, &next);
     significant.then_some(next)
 }
@@ -212,6 +222,19 @@ fn bends(rows: &[Row], next: &Fit) -> bool {
         (Some(a), Some(b)) => step.residual(&a) < smooth.residual(&b),
         _ => false,
     }
+}
+
+/// Returns true if the rows determine the compliance of drive `k`: the neighbours tell its load apart from all other columns. Where
+/// a load has two levels, each with its own direction of the hysteresis, only noise is left of it.
+pub(super) fn shows(rows: &[Row], found: &Fit, k: usize) -> bool {
+    if found.estimate.hidden[k] {
+        return false;
+    }
+    let [load, instrument] = regression(rows, &found.gaps, &found.friction, &|_| None).apart(k);
+    let along = load.dot(&instrument);
+    let rest = (load.norm_squared() * instrument.norm_squared() - along * along).max(0.0);
+    let freedom = rows.len().saturating_sub(found.estimate.values.len()) as f64;
+    along > 0.0 && along * freedom.sqrt() > STRONG * rest.sqrt()
 }
 
 fn springs(rows: &[Row], k: usize, friction: &[f64]) -> Vec<f64> {

@@ -115,6 +115,26 @@ impl Regression {
         }
     }
 
+    /// Returns what column `k` and its instrument have apart from the other columns and their instruments.
+    pub(crate) fn apart(&self, k: usize) -> [DVector<f64>; 2] {
+        [&self.x, &self.z].map(|list| {
+            let count = list.first().map_or(0, Vec::len);
+            let mut all = DMatrix::from_fn(list.len(), count, |r, c| list[r][c]);
+            for mut column in all.column_iter_mut() {
+                let length = column.norm();
+                if length > 0.0 {
+                    column /= length;
+                }
+            }
+            let own: DVector<f64> = all.column(k).into_owned();
+            let others = all.remove_column(k);
+            match pseudo_inverse(&others.tr_mul(&others)) {
+                Some((inverse, _)) => &own - &others * (inverse * others.tr_mul(&own)),
+                None => own,
+            }
+        })
+    }
+
     /// Returns the estimate; `None` for too few rows or values that are not finite.
     pub(crate) fn solve(&self) -> Option<Estimate> {
         let (rows, count) = (self.len(), self.x.first()?.len());

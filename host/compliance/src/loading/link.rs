@@ -16,9 +16,9 @@ use rig_output::{format_significant, format_unit};
 use rig_shared::multibody::{Chain, gravity_vector};
 use rig_shared::transmission::DriveKind;
 
-use super::fit::{Fit, Row, fit};
+use super::fit::{Fit, Row, fit, shows};
 use super::result::{Deflection, DriveLoading};
-use super::windows::{Course, courses, means, window_rows};
+use super::windows::{Course, Slow, TURN, courses, is_within_run, means, range, window_rows};
 use super::wrench::{has_wrench, torques, wrench};
 use crate::drives::loaded;
 use crate::error::ComplianceError;
@@ -50,7 +50,7 @@ const PASSES: usize = 4;
 struct Window {
     stretch: usize,
     load: f64,
-    /// Mean load of both neighbours.
+    /// Mean load of the neighbours.
     instrument: f64,
     twist: f64,
     speed: f64,
@@ -163,11 +163,19 @@ fn collect(series: &[Series], by_wrench: bool) -> Vec<Window> {
     let usual = rig_numerics::statistics::percentile(&steps, 0.8);
     let mut all = Vec::new();
     for (stretch, own) in series.iter().enumerate() {
-        let courses = courses(&own.place, range);
+        // A load beside which noise is large has no turning points to be seen, and no windows.
+        let slow = match by_wrench {
+            true => Slow::clear(&own.load),
+            false => Slow::of(&own.load, 1),
+        };
+        let courses = match by_wrench {
+            true => slow.courses(&own.load, range),
+            false => courses(&own.place, TURN * range),
+        };
         for i in 1..own.load.len().saturating_sub(1) {
             let moved = own.place[i + 1] - own.place[i - 1];
             // The neighbours of a window beside a turning point lie on the other side of it.
-            let alone = courses[i - 1].run != courses[i + 1].run;
+            let alone = !by_wrench && !is_within_run(&courses, i, 1);
             // In motion friction depends on the speed, which is low on both sides of a turning point: what is left out
             // must be the same on both, or the friction there looks like a load.
             let near = match by_wrench {
@@ -181,7 +189,7 @@ fn collect(series: &[Series], by_wrench: bool) -> Vec<Window> {
             all.push(Window {
                 stretch,
                 load: own.load[i],
-                instrument: 0.5 * (own.load[i - 1] + own.load[i + 1]),
+                instrument: slow.values[i],
                 twist: own.twist[i],
                 speed: moved,
                 moves: by_wrench || moved.abs() > MOVES * usual,
@@ -322,14 +330,6 @@ impl Series {
     }
 }
 
-/// Returns largest minus smallest value; 0 without values.
-pub(super) fn range<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-        (l.min(*v), h.max(*v))
-    });
-    (high - low).max(0.0)
-}
-
 /// Rows of the regression of the twist.
 fn rows(windows: &[Window]) -> Vec<Row> {
     let stretches = windows.iter().map(|w| w.stretch + 1).max().unwrap_or(0);
@@ -351,7 +351,8 @@ fn rows(windows: &[Window]) -> Vec<Row> {
                 y: w.twist,
                 group: w.stretch,
                 arms: vec![1.0],
-                loads: vec![w.load],
+                loads: vec![w.instrument],
+                weight: vec![0.0],
                 directions: vec![w.course.direction],
                 window,
             }
@@ -378,7 +379,7 @@ fn estimate(
     }
     let mut result = DriveLoading::new(robot.joints[k].name.clone(), k, by);
     result.windows = kept.len();
-    let Some(found) = found.filter(|f| !f.estimate.hidden[LOAD]) else {
+    let Some(found) = found.filter(|f| shows(&rows(&kept), f, LOAD)) else {
         result.missing = Some(missing(robot, k, by));
         return (result, Vec::new());
     };

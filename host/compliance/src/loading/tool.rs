@@ -14,22 +14,20 @@ use rig_shared::multibody::{Chain, gravity_vector};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::advice::advice;
-use super::fit::{Fit, Lack, Row, fit, without_gaps};
-use super::link::{NEGATIVE, NOT_SHOWN, range};
+use super::fit::{Fit, Lack, Row, fit, shows, without_gaps};
+use super::link::{NEGATIVE, NOT_SHOWN};
 use super::result::{Deflection, DriveLoading};
-use super::windows::{Course, courses, means, window_rows};
+use super::windows::{Course, Slow, means, noise, range, window_rows};
 use super::wrench::{DISPLACEMENT, torques, wrench};
 use crate::drives::{listed_pose, loaded};
 use crate::error::ComplianceError;
+use crate::sag::TWIST;
 use crate::signals::Signals;
 use crate::tool_point::ToolPoint;
 use crate::value::Value;
 
 /// Largest movement of a held motor within a recording, rad or m.
 const HELD: f64 = 0.02;
-/// Largest plausible twist of a loaded joint, rad or m. By judgement: gears twist by milliradians, and beyond this the arm is
-/// not linear.
-const TWIST: f64 = 0.2;
 /// Arm below which the tool point lies on the axes, m.
 const ARMLESS: f64 = 1e-9;
 /// Probability that noise alone makes the hysteresis of any drive look impossible.
@@ -49,6 +47,8 @@ struct Held {
     arms: [Vec<f64>; 3],
     /// Torque of each drive by window, of the wrench.
     loads: Vec<Vec<f64>>,
+    /// Slow course of these torques; one width for all drives.
+    slow: Vec<Slow>,
     /// Torque of each drive by the weight at the start; of what is described.
     weight: Vec<f64>,
     /// Displacement without that of the motors, for each measured axis.
@@ -64,8 +64,9 @@ fn read(
     let held = (stretches.iter())
         .map(|signals| hold(tool, signals, size))
         .collect::<Result<Vec<_>, _>>()?;
+    refuse_noise(&held, stretches, size)?;
     let ranges: Vec<f64> = (0..tool.count())
-        .map(|k| range(held.iter().flat_map(|h| &h.loads[k])))
+        .map(|k| range(held.iter().flat_map(|h| &h.slow[k].values)))
         .collect();
     let (rows, windows) = rows(&held, &ranges);
     Ok((held, rows, windows))
@@ -196,12 +197,48 @@ fn hold(tool: &ToolPoint<'_>, signals: &Signals, rows: usize) -> Result<Held, Co
                 .collect(),
         )
     });
+    let arms = std::array::from_fn(|axis| (0..n).map(|k| per_twist[(axis, k)]).collect());
     Ok(Held {
-        arms: std::array::from_fn(|axis| (0..n).map(|k| per_twist[(axis, k)]).collect()),
+        slow: slow(&arms, &loads),
+        arms,
         loads,
         weight,
         displacement,
     })
+}
+
+/// Returns the slow course of each drive's torque, with the width that the most loaded drive needs.
+fn slow(arms: &[Vec<f64>; 3], loads: &[Vec<f64>]) -> Vec<Slow> {
+    let size = |k: &usize| range(loads[*k].iter()) * arm(arms, *k);
+    let most = (0..loads.len()).max_by(|a, b| size(a).total_cmp(&size(b)));
+    let reach = most.map_or(1, |k| Slow::clear(&loads[k]).reach);
+    loads.iter().map(|own| Slow::of(own, reach)).collect()
+}
+
+/// Refuses recordings of which the most loaded one does not show its turning points for noise.
+fn refuse_noise(
+    held: &[Held],
+    stretches: &[&Signals],
+    window: usize,
+) -> Result<(), ComplianceError> {
+    let size = |(own, k): (&Held, usize)| range(own.slow[k].values.iter()) * arm(&own.arms, k);
+    let all =
+        (held.iter().enumerate()).flat_map(|(s, own)| (0..own.slow.len()).map(move |k| (s, k)));
+    let most = all.max_by(|a, b| size((&held[a.0], a.1)).total_cmp(&size((&held[b.0], b.1))));
+    let Some((s, _)) = most.filter(|(s, k)| !held[*s].slow[*k].is_clear()) else {
+        return Ok(());
+    };
+    let force = wrench(stretches[s])?.map(|list| noise(&means(&list, window)));
+    Err(ComplianceError::Recording(format!(
+        "{}: the force is too noisy, or changes too fast: it has a noise of {} N (standard deviation of the mean of {window} rows) beside its slow course, and its turning points are not seen. Change it more slowly or further, record more rows a second, or filter force and displacement alike.",
+        stretches[s].label,
+        format_significant(force[..3].iter().copied().fold(0.0, f64::max), 2)
+    )))
+}
+
+/// Length of the arm of a drive.
+fn arm(arms: &[Vec<f64>; 3], k: usize) -> f64 {
+    arms.iter().map(|a| a[k] * a[k]).sum::<f64>().sqrt()
 }
 
 /// Refuses a displacement that no small twist of the joints gives.
@@ -287,20 +324,19 @@ fn rows(held: &[Held], ranges: &[f64]) -> (Vec<Row>, usize) {
 /// Windows away from turning points, with the direction of each drive that is loaded, 0 of the others.
 fn settled(own: &Held, ranges: &[f64]) -> Vec<(usize, Vec<f64>)> {
     let n = ranges.len();
-    let courses: Vec<Vec<Course>> = (0..n).map(|k| courses(&own.loads[k], ranges[k])).collect();
-    let size = |k: usize| {
-        let arm: f64 = own.arms.iter().map(|a| a[k] * a[k]).sum();
-        range(own.loads[k].iter()) * arm.sqrt()
-    };
+    let courses: Vec<Vec<Course>> = (0..n)
+        .map(|k| own.slow[k].courses(&own.loads[k], ranges[k]))
+        .collect();
+    let size = |k: usize| range(own.slow[k].values.iter()) * arm(&own.arms, k);
     let most = (0..n).map(size).fold(0.0, f64::max);
-    let material: Vec<usize> = (0..n).filter(|k| size(*k) > MATERIAL * most).collect();
+    let material: Vec<usize> = (0..n)
+        .filter(|k| size(*k) > MATERIAL * most && own.slow[*k].is_loaded())
+        .collect();
     (1..own.loads.first().map_or(0, Vec::len).saturating_sub(1))
         .filter(|i| {
             material.iter().all(|k| {
                 let course = &courses[*k];
-                course[*i].direction != 0.0
-                    && course[*i].travel > TRANSITION * ranges[*k]
-                    && course[i - 1].run == course[i + 1].run
+                course[*i].direction != 0.0 && course[*i].travel > TRANSITION * ranges[*k]
             })
         })
         .map(|i| {
@@ -317,7 +353,7 @@ fn settled(own: &Held, ranges: &[f64]) -> Vec<(usize, Vec<f64>)> {
 fn row(own: &Held, i: usize, axis: usize, directions: &[f64], group: usize, offsets: usize) -> Row {
     let n = directions.len();
     let arms = own.arms[axis].clone();
-    let beside = |k: usize| 0.5 * (own.loads[k][i - 1] + own.loads[k][i + 1]);
+    let beside = |k: usize| own.slow[k].values[i];
     let load = (0..n).map(|k| arms[k] * own.loads[k][i]);
     let friction = (0..n).map(|k| -arms[k] * directions[k]);
     let offset = (0..offsets).map(|o| f64::from(u8::from(o == group)));
@@ -326,7 +362,8 @@ fn row(own: &Held, i: usize, axis: usize, directions: &[f64], group: usize, offs
         z: (0..n).map(|k| arms[k] * beside(k)).collect(),
         y: 0.0,
         group,
-        loads: (0..n).map(|k| own.loads[k][i] - own.weight[k]).collect(),
+        loads: (0..n).map(|k| beside(k) - own.weight[k]).collect(),
+        weight: own.weight.clone(),
         directions: directions.to_vec(),
         window: 0,
         arms,
@@ -349,7 +386,7 @@ fn drive(
     let low = loads.iter().copied().fold(f64::INFINITY, f64::min);
     result.load = [low, low + range(loads.iter())];
     let compliance = found.value(k);
-    let determined = !found.estimate.hidden[k] && compliance.relative() < NOT_SHOWN;
+    let determined = shows(rows, found, k) && compliance.relative() < NOT_SHOWN;
     if !(determined && compliance.value > 0.0) {
         let random = found.estimate.std(k) < NOT_SHOWN * compliance.value.abs();
         let told = found.lack.told("m").filter(|_| random);
@@ -362,7 +399,10 @@ fn drive(
                 100.0 * NOT_SHOWN,
                 crooked(tool, &told)
             ),
-            (false, None) => missing(tool, robot, k)?,
+            (false, None) => match without_hysteresis(held, k) {
+                Some(bound) => hidden_by_hysteresis(tool, k, bound),
+                None => missing(tool, robot, k)?,
+            },
         });
         return Ok(result);
     }
@@ -427,7 +467,7 @@ fn partial_twists(rows: &[Row], found: &Fit, k: usize) -> [Vec<[f64; 2]>; 2] {
         });
         let twist = values[k] * load - values[n + k] * direction + step + found.left(row) / arm;
         // The weight of the links loads the spring as well: the gap is crossed at a torque of the spring.
-        let weight = row.loads[k] - load;
+        let weight = -row.weight[k];
         points[usize::from(direction < 0.0)].push([load + weight, twist + values[k] * weight]);
     }
     points
@@ -437,6 +477,41 @@ fn partial_twists(rows: &[Row], found: &Fit, k: usize) -> [Vec<[f64; 2]>; 2] {
 fn opposite_sign(name: &str) -> String {
     format!(
         "The displacement of the tool point follows the torque of joint \"{name}\", but with the opposite sign: the force is that on the environment instead of that on the robot, or the gauge counts the other way, or two axes are exchanged, or --tool is wrong. Correct the signs, the columns or the tool point."
+    )
+}
+
+/// Returns the stiffness of drive `k` as it would be without hysteresis, by all windows; `None` if they do not show it
+/// either.
+fn without_hysteresis(held: &[Held], k: usize) -> Option<Value> {
+    let n = held.first()?.loads.len();
+    let (mut rows, mut windows) = (Vec::new(), 0);
+    for (stretch, own) in held.iter().enumerate() {
+        let count = own.loads.first().map_or(0, Vec::len);
+        for (axis, read) in own.displacement.iter().enumerate() {
+            let group = 3 * stretch + axis;
+            for (i, y) in read.iter().flatten().enumerate() {
+                rows.push(Row {
+                    y: *y,
+                    window: windows + i,
+                    ..row(own, i, axis, &vec![0.0; n], group, 3 * held.len())
+                });
+            }
+        }
+        windows += count;
+    }
+    let found = without_gaps(&rows, n).filter(|found| !found.estimate.hidden[k])?;
+    let own = found.value(k);
+    (own.value > 0.0 && own.relative() < NOT_SHOWN).then(|| own.reciprocal())
+}
+
+/// Says that the levels of the load do not tell the spring from its hysteresis.
+fn hidden_by_hysteresis(tool: &ToolPoint<'_>, k: usize, bound: Value) -> String {
+    format!(
+        "This loading does not tell the stiffness of joint \"{}\" from its hysteresis: the load has too few levels between its turning points, or turns before it has changed by {} % of its range. Change it slowly to and fro, or in steps with at least one level between the extremes on the way up and on the way down (0, 10, 20, 10, 0 N). Without hysteresis the stiffness would be {} {}; hysteresis makes it smaller.",
+        tool.robot().joints[k].name,
+        100.0 * TRANSITION,
+        rig_output::format_value(bound.value, bound.std),
+        rig_output::format_unit(tool.drives().unit(tool.robot(), k))
     )
 }
 

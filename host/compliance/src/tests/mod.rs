@@ -4,6 +4,7 @@
 
 mod frequency;
 mod loading;
+mod noisy_force;
 mod periodic;
 mod rig;
 mod statics;
