@@ -7,6 +7,7 @@ use rig_model::robot::{Reads, Robot, WristSensor};
 use rig_output::{capital, format_significant, format_value, listed};
 
 use crate::causes::{is_beyond_scatter, scatter};
+use crate::curved_bias::{Curve, curve};
 use crate::error::LoadError;
 use crate::estimate::Estimate;
 use crate::gain_error::GainError;
@@ -31,6 +32,10 @@ pub struct Bias {
     pub drift: Option<[f64; 6]>,
     /// Time of each jump, s after the begin, and the bias after it, in the order of time.
     pub jumps: Vec<(f64, [f64; 6])>,
+    /// Smooth course that explains the readings better than the jumps, which approximate it.
+    pub curve: Option<Curve>,
+    /// Value of the column `temp` at which `bias` holds, in its unit, if the bias follows it.
+    pub temperature: Option<f64>,
 }
 
 /// Readings of a recording over time, thinned for a figure, and what the fit gives for them.
@@ -74,7 +79,7 @@ pub struct SensorFindings {
     pub gain_error: GainError,
     /// Bias by recording.
     pub biases: Vec<Bias>,
-    /// Change of the bias per °C, if the data show one.
+    /// Change of the bias per unit of the column `temp`, if the data show one.
     pub warming: Option<[f64; 6]>,
     /// Readings over time.
     #[serde(skip)]
@@ -162,7 +167,10 @@ impl Told<'_> {
         });
         let biases = self.biases();
         for bias in &biases {
-            let told = [jump_words(bias), drift_words(bias, self.fit.noise)];
+            let told = match curve_words(bias) {
+                Some(text) => [Some(text), None],
+                None => [jump_words(bias), drift_words(bias, self.fit.noise)],
+            };
             let doubt = self.advice("");
             let doubted = told
                 .into_iter()
@@ -170,6 +178,7 @@ impl Told<'_> {
                 .map(|text| text + doubt.trim_end());
             warnings.extend(doubted);
         }
+        warnings.extend(self.warming_words());
         SensorFindings {
             reads,
             reads_found,
@@ -325,8 +334,21 @@ impl Told<'_> {
                 bias: self.sensed.bias(self.fit, r),
                 drift: self.sensed.drift(self.fit, r),
                 jumps: self.jumps(r, recorded),
+                curve: curve(self.sensed, self.fit, r),
+                temperature: (self.sensed.warming(self.fit)).map(|_| recorded.reference),
             })
             .collect()
+    }
+
+    /// Says how the bias follows the recorded temperature.
+    fn warming_words(&self) -> Option<String> {
+        let warming = self.sensed.warming(self.fit)?;
+        let first = self.sensed.recordings.first()?.reference;
+        Some(format!(
+            "The bias of the sensor follows the column `temp` ({} per unit of temp); the load was identified beside it. The bias of a recording is that at its first value of temp ({} in the first one).",
+            channel_words(&warming, &[0, 1, 2, 3, 4, 5]),
+            format_significant(first, 4)
+        ))
     }
 
     /// Returns time and bias after each jump of a recording, in the order of time.
@@ -501,24 +523,52 @@ const NO_CAUSE: &str = "Exchanged or reversed channels, a dead channel or one wi
 /// Says that a bias drifts, with the change of each channel that is above its noise.
 fn drift_words(bias: &Bias, noise: [f64; 2]) -> Option<String> {
     let drift = bias.drift?;
-    let large = |c: &usize| drift[*c].abs() > noise[*c / 3];
-    let change: Vec<String> = ((0..6).filter(large))
-        .map(|c| {
-            let unit = if c < 3 { "N" } else { "N·m" };
-            format!(
-                "{} {} {unit}",
-                WRENCH_COLUMNS[c],
-                format_significant(drift[c], 2)
-            )
-        })
-        .collect();
-    let which = match change.is_empty() {
+    let large: Vec<usize> = ((0..6).filter(|c| drift[*c].abs() > noise[*c / 3])).collect();
+    let which = match large.is_empty() {
         true => "by less than the noise of a reading".to_owned(),
-        false => change.join(", "),
+        false => channel_words(&drift, &large),
     };
     Some(format!(
         "{}: the bias of the sensor drifts over the recording ({which}); the load was identified beside it. Let the sensor warm up before the recording.",
         bias.recording
+    ))
+}
+
+/// Returns values of some channels with names and units.
+fn channel_words(values: &[f64; 6], channels: &[usize]) -> String {
+    let each: Vec<String> = (channels.iter())
+        .map(|c| {
+            let unit = if *c < 3 { "N" } else { "N·m" };
+            format!(
+                "{} {} {unit}",
+                WRENCH_COLUMNS[*c],
+                format_significant(values[*c], 2)
+            )
+        })
+        .collect();
+    each.join(", ")
+}
+
+/// Says that a bias changes smoothly, and what stands for it in the fit.
+fn curve_words(bias: &Bias) -> Option<String> {
+    let curve = bias.curve?;
+    let course = match curve.time_constant {
+        Some(constant) => format!(
+            "settles with a time constant of about {} s",
+            format_significant(constant, 2)
+        ),
+        None => "changes smoothly along a curve".to_owned(),
+    };
+    let stands = match (bias.jumps.len(), bias.drift) {
+        (1, None) => "one jump stands".to_owned(),
+        (count, None) => format!("{count} jumps stand"),
+        (1, Some(_)) => "one jump and a linear drift stand".to_owned(),
+        (count, Some(_)) => format!("{count} jumps and a linear drift stand"),
+    };
+    Some(format!(
+        "{}: the bias of the sensor {course} ({} over the recording), as that of a sensor that warms up; {stands} for it in the fit, and a tenth of the recording around each jump was left out. Let the sensor warm up before the recording, or record its temperature as the column `temp`.",
+        bias.recording,
+        channel_words(&curve.change, &[0, 1, 2, 3, 4, 5])
     ))
 }
 

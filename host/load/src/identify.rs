@@ -445,7 +445,15 @@ fn agreement(a: &Estimate, b: &Estimate) -> Agreement {
 /// Says that sensor and torques contradict each other.
 fn contradiction(agreement: &Agreement) -> Option<String> {
     (agreement.chance < CONTRADICTS).then(|| {
+        let apart = |k: usize| {
+            let std = agreement.by_sensor_std[k].hypot(agreement.by_torque_std[k]);
+            (agreement.by_sensor[k] - agreement.by_torque[k]).abs() / std.max(f64::MIN_POSITIVE)
+        };
+        let all = 0..INERTIAL_PARAMETERS;
+        let worst = all.max_by(|a, b| apart(*a).total_cmp(&apart(*b)));
+        // Mass and first moments, and the entry of the inertia that differs most.
         let parameters: Vec<String> = (0..4)
+            .chain(worst.filter(|k| *k >= 4))
             .map(|k| {
                 format!(
                     "{} {} ± {} by the sensor, {} ± {} by the torques",
@@ -458,9 +466,16 @@ fn contradiction(agreement: &Agreement) -> Option<String> {
             })
             .collect();
         format!(
-            "Sensor and joint torques contradict each other (probability by chance {:.1e}): {}. The result is that of the sensor alone. Check the units and scales of both: a torque constant that is 5 % wrong makes a mass by torque 5 % wrong.",
+            "Sensor and joint torques contradict each other (probability by chance {:.1e}): {}. {}The result is that of the sensor alone. Check the units and scales of both: a torque constant that is 5 % wrong makes a mass by torque 5 % wrong.",
             agreement.chance,
-            listed(&parameters)
+            listed(&parameters),
+            worst.map_or_else(String::new, |k| {
+                format!(
+                    "{} differs most, by {} standard deviations (SI units). ",
+                    COLUMN_NAMES[k],
+                    format_significant(apart(k), 2)
+                )
+            })
         )
     })
 }
@@ -491,5 +506,38 @@ fn inconsistent(found: &Estimate, body: &Parameters) -> String {
         false => format!(
             "No rigid body has these ten values, or values within their uncertainty. The nearest body, in load.toml, {figures}."
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_contradiction_names_the_parameter_that_differs_most() {
+        let by_sensor: [f64; 10] = [2.0, 0.06, -0.04, 0.2, 0.1, 0.0, 0.0, 0.1, 0.0, 0.03];
+        let agreement = |at: usize| {
+            let mut by_torque = by_sensor;
+            by_torque[at] += 0.05;
+            Agreement {
+                chance: 1e-9,
+                directions: 10,
+                by_sensor,
+                by_sensor_std: [1e-3; 10],
+                by_torque,
+                by_torque_std: [1e-3; 10],
+            }
+        };
+        let inertia = contradiction(&agreement(7)).unwrap();
+        assert!(
+            inertia.contains("Iyy 0.1000") && inertia.contains("Iyy differs most, by 35"),
+            "{inertia}"
+        );
+        let mass = contradiction(&agreement(0)).unwrap();
+        assert!(
+            mass.contains("m differs most") && !mass.contains("Iyy"),
+            "{mass}"
+        );
     }
 }

@@ -51,6 +51,7 @@ mod changed_columns;
 mod channels;
 mod clipping;
 mod controllers;
+mod curved_bias;
 mod cut_channel;
 mod cut_torque;
 mod error;
@@ -90,6 +91,7 @@ mod urdf_link;
 mod wrench_row;
 
 pub use controllers::{ControllerNumbers, controller_numbers};
+pub use curved_bias::Curve;
 pub use error::LoadError;
 pub use findings::{Bias, SensorFindings, Trace};
 pub use gain_error::GainError;

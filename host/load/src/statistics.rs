@@ -23,7 +23,7 @@ pub(crate) mod column {
     pub(crate) const ONE: usize = 10;
     /// Time, −½ to ½ over the recording.
     pub(crate) const TIME: usize = 11;
-    /// Temperature, °C.
+    /// Temperature, in the unit of its column.
     pub(crate) const TEMPERATURE: usize = 12;
     /// The first of the three readings of the channel's kind.
     pub(crate) const READINGS: usize = 13;
@@ -87,7 +87,7 @@ pub(crate) struct Recorded {
     pub warms: bool,
     /// What its rows tell beside the fit.
     pub passed: Passed,
-    /// Temperature of the first row, °C.
+    /// Temperature of the first row, in the unit of its column.
     pub reference: f64,
     /// Rows spread evenly over the recording, at most about [`SAMPLED`].
     pub sample: Vec<WrenchRow>,

@@ -639,7 +639,7 @@ impl Sensed<'_> {
         Some(self.read(fit, place.start + 6 * recording))
     }
 
-    /// Returns the drift with temperature, per °C, as the sensor reads it.
+    /// Returns the drift with temperature, per unit of the column `temp`, as the sensor reads it.
     pub(crate) fn warming(&self, fit: &Fit) -> Option<[f64; 6]> {
         let place = self.place(&fit.unknowns, Nuisance::Warming)?;
         Some(self.read(fit, place.start))
@@ -703,7 +703,7 @@ impl Sensed<'_> {
     }
 
     /// Turns a wrench of the robot on the load, in the described axes of the sensor, to readings.
-    fn as_read(&self, fit: &Fit, wrench: &[f64]) -> [f64; 6] {
+    pub(crate) fn as_read(&self, fit: &Fit, wrench: &[f64]) -> [f64; 6] {
         let of = |first: usize| {
             let own = Vector3::from_column_slice(&wrench[first..first + 3]);
             fit.mounting.matrix(first).transpose() * own

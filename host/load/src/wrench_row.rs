@@ -16,7 +16,7 @@ pub(crate) const WEIGHT_ENTRIES: usize = 6 * WEIGHED;
 pub(crate) struct WrenchRow {
     /// Time since the begin of the recording, s.
     pub time: f64,
-    /// Temperature of the sensor, °C; 0 if it was not recorded.
+    /// Temperature of the sensor, in the unit of its column; 0 if it was not recorded.
     pub temperature: f64,
     /// Regressor of the wrench of the robot on the load, about the sensor's origin, in the described axes of
     /// the sensor.

@@ -5,3 +5,4 @@ mod columns;
 mod made;
 mod sensor;
 mod torque;
+mod warm_up;

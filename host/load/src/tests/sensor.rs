@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rig_data::prepare::InMemory;
 use rig_model::robot::{IRP6_TEMPLATE, Reads, Robot, TX40, WristSensor};
 
-fn irp6() -> Robot {
+pub(super) fn irp6() -> Robot {
     let mut robot = Robot::from_toml(IRP6_TEMPLATE, "irp6.toml".as_ref()).unwrap();
     robot.wrist_sensor = Some(WristSensor {
         position: [0.0, 0.0, 0.03],
@@ -23,7 +23,7 @@ fn tx40() -> Robot {
     robot
 }
 
-const NO_FLAW: &dyn Fn(f64, [f64; 6]) -> [f64; 6] = &|_, read| read;
+pub(super) const NO_FLAW: &dyn Fn(f64, [f64; 6]) -> [f64; 6] = &|_, read| read;
 
 /// Errors of mass (share) and centre of mass (m).
 fn errors(load: &LoadIdentification, points: &Points) -> [f64; 2] {

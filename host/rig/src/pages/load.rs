@@ -266,7 +266,11 @@ fn biases(sensor: &SensorFindings) -> Section {
     };
     let mut rows = Vec::new();
     for bias in &sensor.biases {
-        rows.push(row(bias.recording.clone(), &bias.bias));
+        let name = match bias.temperature {
+            Some(at) => format!("{} at temp {}", bias.recording, format_significant(at, 4)),
+            None => bias.recording.clone(),
+        };
+        rows.push(row(name, &bias.bias));
         if let Some(drift) = &bias.drift {
             rows.push(row("change from begin to end".into(), drift));
         }
@@ -275,7 +279,7 @@ fn biases(sensor: &SensorFindings) -> Section {
         }
     }
     if let Some(warming) = &sensor.warming {
-        rows.push(row("per °C".into(), warming));
+        rows.push(row("per unit of temp".into(), warming));
     }
     let mut columns = vec![Column::text("Recording")];
     columns.extend(
