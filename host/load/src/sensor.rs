@@ -373,12 +373,16 @@ fn weighs(sensed: &Sensed, fit: &Fit) -> Result<(), LoadError> {
     })
 }
 
+/// Share of the load's mass from which on the recording without it carries a body of the opposite sign. A flange that carries nothing
+/// gives the whole mass if the recordings are exchanged, with noise, and none if the readings have the wrong sign.
+const CARRIED: f64 = 0.5;
+
 /// Says that the sensor carries less with the load than without it. The mass of both is that of one body, whatever sign the
 /// readings have.
 fn exchanged_recordings(sensed: &Sensed, fit: &Fit) -> Option<String> {
     let tool = fit.unknowns.tool.then(|| sensed.tool_mass(fit))?;
     let load = sensed_mass(fit);
-    (load * tool < 0.0 && tool.abs() > load.abs()).then(|| {
+    (load * tool < 0.0 && tool.abs() > CARRIED * load.abs()).then(|| {
         format!(
             "The sensor carries {} kg with the load and {} kg without it: --data and --without look exchanged. Exchange them.",
             format_significant((tool + load).abs(), 4),

@@ -488,6 +488,14 @@ fn a_spike_is_named_by_its_row_and_exchanged_recordings_by_their_weights() {
     assert!(identify(&with, &[&without]).is_ok());
     let text = identify(&without, &[&with]).unwrap_err().to_string();
     assert!(text.contains("look exchanged"), "{text}");
+    // A flange that carries nothing: only noise decides which of both masses is the larger one.
+    for seed in 0..4 {
+        let with = recorded(&moving, &heavy, &sensor, [20.0, 100.0], 10 + seed, NO_FLAW);
+        let none = vec![(1e-6, [0.0, 0.0, 0.05])];
+        let empty = recorded(&moving, &none, &sensor, [20.0, 100.0], 20 + seed, NO_FLAW);
+        let text = identify(&empty, &[&with]).unwrap_err().to_string();
+        assert!(text.contains("look exchanged"), "{text}");
+    }
     // Small units in all six channels: no joint carries such a load.
     let milli = |_: f64, read: [f64; 6]| read.map(|v| 1e3 * v);
     let motion = recorded(&moving, &heavy, &sensor, [20.0, 100.0], 6, &milli);
