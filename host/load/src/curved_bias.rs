@@ -5,6 +5,7 @@
 //! all channels.
 
 use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 
 use crate::settle::settled;
 use crate::system::{Fit, Nuisance, Sensed};
@@ -79,7 +80,7 @@ pub(crate) fn curve(sensed: &Sensed, fit: &Fit, recording: usize) -> Option<Curv
     };
     let change: [f64; 6] = std::array::from_fn(|channel| {
         let x = matrix(kept.len(), &|i| shape(time[i]));
-        let found = fitted(&x, &readings[channel]).unwrap_or_else(|| DVector::zeros(x.ncols()));
+        let found = fitted(&x, &readings[channel]);
         let at = |t: f64| -> f64 { shape(t).iter().zip(found.iter()).map(|(a, b)| a * b).sum() };
         at(1.0) - at(0.0)
     });
@@ -95,8 +96,8 @@ fn matrix(rows: usize, row: &dyn Fn(usize) -> Vec<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(rows, columns, |r, c| all[r][c])
 }
 
-fn fitted(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
-    x.clone().svd(true, true).solve(y, 1e-10).ok()
+fn fitted(x: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> {
+    Svd::of(x.clone()).solve(y, 1e-10)
 }
 
 /// Returns the criterion of a description of all channels with these columns and `more` unknowns that all channels share; `None`
@@ -109,7 +110,7 @@ fn score(readings: &[DVector<f64>; 6], row: &dyn Fn(usize) -> Vec<f64>, more: f6
     }
     let (count, mut sum) = (rows as f64, 0.0);
     for y in readings {
-        let left = (y - &x * fitted(&x, y)?).norm_squared();
+        let left = (y - &x * fitted(&x, y)).norm_squared();
         sum += count * (left / count).max(f64::MIN_POSITIVE).ln();
     }
     Some(sum + (6.0 * x.ncols() as f64 + more) * (6.0 * count).ln())

@@ -685,7 +685,7 @@ fn the_force_overshoots_little_at_other_poses() {
             if task_path::check(&robot, &task).is_err() {
                 continue;
             }
-            let found = press(&robot, LawKind::Hybrid, &task, settings.clone()).measures;
+            let found = press(&robot, LawKind::Hybrid, &task, settings).measures;
             let told = found.warnings.iter().any(|w| w.contains("the force peaks"));
             assert_eq!(told, found.overshoot > 0.1, "{name}: {:?}", found.warnings);
             overshoots.push(found.overshoot);
