@@ -39,7 +39,7 @@ fn poses_are_designed_simulated_and_repeated() {
     let at = |name: &str| folder.path().join(name);
     let arm = sensed(folder.path());
     let poses = ["--load", "--poses", "4"];
-    let said = succeed(&mut excite(&arm, &poses, &at("poses.toml")));
+    let said = succeed(excite(&arm, &poses, &at("poses.toml")).arg("--verbose"));
     assert!(
         said.contains("Pose 4: gravity along") && said.contains("kg per N"),
         "{said}"

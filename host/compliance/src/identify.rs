@@ -144,8 +144,8 @@ pub fn identify_compliance(
     if options.stiffness.is_empty() {
         warnings.extend(rigid(&drives));
     }
-    warnings.extend(sagging(&tool, &drives, &poses)?);
     let (computed, map) = at_poses(&tool, &drives, options, &mut warnings)?;
+    warnings.extend(sagging(&tool, &drives, &poses)?);
     Ok(Compliance {
         schema: "rig-compliance/1",
         robot: robot.name.clone(),

@@ -175,19 +175,19 @@ mod tests {
         for (quantity, expected) in [
             (
                 Bounded::PeakCurrent,
-                "the peak current is 8 A, and the bound is 4 A: it is at least the continuous current and within the rating of the rig's parts",
+                "the peak current is 8.000 A, and the bound is 4.000 A: it is at least the continuous current and within the rating of the rig's parts",
             ),
             (
                 Bounded::MotionSpeed,
-                "the speed of the motion is 8 rad/s, and the bound is 4 rad/s: make the motion smaller or slower",
+                "the speed of the motion is 8.000 rad/s, and the bound is 4.000 rad/s: make the motion smaller or slower",
             ),
             (
                 Bounded::FrictionShare,
-                "the compensated share of the friction is 8, and the bound is 4: choose it between 0 and 1",
+                "the compensated share of the friction is 8.000, and the bound is 4.000: choose it between 0 and 1",
             ),
             (
                 Bounded::Inertia,
-                "the inertia of the model is 8 kg*m^2, and the bound is 4 kg*m^2: check its unit",
+                "the inertia of the model is 8.000 kg*m^2, and the bound is 4.000 kg*m^2: check its unit",
             ),
         ] {
             assert_eq!(out_of_bounds(quantity, 8.0, 4.0), expected);
