@@ -110,21 +110,9 @@ pub(super) fn bounds_of(
             limitless.push(joint.name.clone());
             continue;
         }
-        let [mut low, mut high] = limits.for_motions();
-        if !low.is_finite() || !high.is_finite() {
-            (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
-            notes.push(format!(
-                "Joint \"{}\" turns endlessly; the motion stays within one turn, -pi to pi.",
-                joint.name
-            ));
-        } else {
-            let stated = [low, high];
-            let at = start.and_then(|s| s.get(j).copied());
-            [low, high] = room.positions(stated, at);
-            if room.margin > 0.0 && (low == stated[0] || high == stated[1]) {
-                notes.push(starts_in_margin(&joint.name));
-            }
-        }
+        let at = start.and_then(|s| s.get(j).copied());
+        let ([low, high], note) = range(joint, &limits, room, at);
+        notes.extend(note);
         // A value beyond any drive often means "no limit"; a row weighted by it would be lost.
         let reachable = |limit: &f64| is_safe_magnitude(*limit);
         let acceleration = limits
@@ -167,6 +155,28 @@ pub(super) fn bounds_of(
     }
     drive(robot, &mut list)?;
     Ok((list, notes))
+}
+
+/// Returns the range of a designed motion that begins `at` this position, with a note where it is not the stated one less the
+/// margin.
+fn range(
+    joint: &Joint,
+    limits: &JointLimits,
+    room: Room,
+    at: Option<f64>,
+) -> ([f64; 2], Option<String>) {
+    let stated = limits.for_motions();
+    if !stated.iter().all(|end| end.is_finite()) {
+        let note = format!(
+            "Joint \"{}\" turns endlessly; the motion stays within one turn, -pi to pi.",
+            joint.name
+        );
+        let turn = core::f64::consts::PI;
+        return ([-turn, turn], Some(note));
+    }
+    let [low, high] = room.positions(stated, at);
+    let is_wide = room.margin > 0.0 && (low == stated[0] || high == stated[1]);
+    ([low, high], is_wide.then(|| starts_in_margin(&joint.name)))
 }
 
 fn starts_in_margin(joint: &str) -> String {

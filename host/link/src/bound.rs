@@ -12,7 +12,8 @@ const CORRECTION: &str = "mend the part, or leave the effect out";
 pub(crate) fn out_of_bounds(quantity: Bounded, value: f32, bound: f32) -> String {
     let (what, unit, remedy) = of_the_rig(quantity)
         .or_else(|| of_a_motion(quantity))
-        .unwrap_or_else(|| of_a_law(quantity));
+        .or_else(|| of_a_loop(quantity))
+        .unwrap_or_else(|| of_a_model(quantity));
     let [value, bound] = [value, bound].map(|number| format_significant(f64::from(number), 4));
     let unit = if unit.is_empty() {
         String::new()
@@ -76,9 +77,9 @@ fn of_a_motion(quantity: Bounded) -> Option<Words> {
     })
 }
 
-/// Gains, models, effects and estimator.
-fn of_a_law(quantity: Bounded) -> Words {
-    match quantity {
+/// Gains and bandwidths.
+fn of_a_loop(quantity: Bounded) -> Option<Words> {
+    Some(match quantity {
         Bounded::PositionLoop => (
             "the natural frequency of the position loop, sqrt(kp/J),",
             "rad/s",
@@ -101,6 +102,13 @@ fn of_a_law(quantity: Bounded) -> Words {
             "Hz",
             "choose it between 1/256 and 1/10 of the control rate",
         ),
+        _ => return None,
+    })
+}
+
+/// Models, effects and estimator.
+fn of_a_model(quantity: Bounded) -> Words {
+    match quantity {
         Bounded::Gravity => ("the gravity torque of the model", "N*m", UNIT),
         Bounded::DryFriction => ("the friction torque at rest", "N*m", UNIT),
         Bounded::ViscousFriction => ("the viscous friction", "N*m*s/rad", UNIT),
@@ -162,6 +170,12 @@ fn of_a_law(quantity: Bounded) -> Words {
         | Bounded::MotionSpeed
         | Bounded::MotionAcceleration
         | Bounded::MotionPosition
+        | Bounded::PositionLoop
+        | Bounded::VelocityLoop
+        | Bounded::ProportionalGain
+        | Bounded::DerivativeGain
+        | Bounded::AdaptationGain
+        | Bounded::CurrentLoop
         | Bounded::Home => ("the inertia of the model", "kg*m^2", UNIT),
     }
 }
