@@ -488,3 +488,35 @@ fn a_motor_that_is_too_weak_is_told_with_numbers_and_its_fault_in_words() {
         );
     }
 }
+
+#[test]
+fn a_motion_that_starts_elsewhere_is_refused_with_what_to_give() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(
+        rig()
+            .args(["init", "one-link", "--out"])
+            .arg(at("rig.toml")),
+    );
+    let mut design = rig();
+    design.args(["excite", "--start", "-1.5708", "--kind", "reversals"]);
+    succeed(
+        (design.arg("--robot").arg(at("rig.toml")))
+            .arg("--out")
+            .arg(at("slow.toml")),
+    );
+    for (home, said) in [
+        (None, "Give --home -1.5708 if it is there"),
+        (Some("-90"), "-90 degrees are -1.5708 rad"),
+        (Some("0.5"), "`rig excite --start 0.5000`"),
+    ] {
+        let mut record = rig();
+        record
+            .args(["record", "--emulated"])
+            .args(home.map(|home| format!("--home={home}")));
+        record.arg("--robot").arg(at("rig.toml"));
+        record.arg("--trajectory").arg(at("slow.toml"));
+        let sentence = refuse(record.arg("--out").arg(at("run.csv")));
+        assert!(sentence.contains(said), "{home:?}: {sentence}");
+    }
+}

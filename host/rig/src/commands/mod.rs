@@ -98,7 +98,7 @@ pub struct Cli {
     /// Print errors alone, and what --json asks for
     #[arg(long, global = true)]
     quiet: bool,
-    /// Print details of the result, too: how it was found, and all that the report says in a line
+    /// Print details, too: of a designed motion, of a fit, and all sentences of a diagnosis
     #[arg(long, global = true, conflicts_with = "quiet")]
     verbose: bool,
 }

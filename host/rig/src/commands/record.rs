@@ -256,11 +256,19 @@ fn single<'a>(
     let joint = file.only_joint(path)?;
     let stands = f64::from(home.unwrap_or(0.0));
     if (joint.start - stands).abs() > START_TOLERANCE {
-        return Err(CommandError::Sentence(format!(
-            "{} starts at {:.4} rad, but the link is at {stands:.4} rad (--home); move the link to the start, or design the motion with `rig excite --start {stands:.4}`.",
-            path.display(),
-            joint.start
-        )));
+        let (file, start) = (path.display(), joint.start);
+        return Err(CommandError::Sentence(match home {
+            None => format!(
+                "{file} starts at {start:.4} rad, but without --home the link is taken to be at 0 rad. Give --home {start:.4} if it is there; otherwise give its position, and design the motion with `rig excite --start` from there."
+            ),
+            Some(_) if stands.abs() > core::f64::consts::TAU => format!(
+                "{file} starts at {start:.4} rad, but --home is {stands} rad. It looks like degrees: {stands} degrees are {:.4} rad.",
+                stands.to_radians()
+            ),
+            Some(_) => format!(
+                "{file} starts at {start:.4} rad, but the link is at {stands:.4} rad (--home); move the link to the start, or design the motion with `rig excite --start {stands:.4}`."
+            ),
+        }));
     }
     Ok(joint)
 }
