@@ -23,15 +23,19 @@ fn value(result: &Value, expression: &str) -> (f64, f64) {
     )
 }
 
+/// A folder with the one-link description as `rig.toml`.
+fn described() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut init = rig();
+    init.args(["init", "one-link", "--out"]);
+    succeed(init.arg(folder.path().join("rig.toml")));
+    folder
+}
+
 #[test]
 fn init_excite_record_identify_validate() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = described();
     let at = |name: &str| folder.path().join(name);
-    succeed(
-        rig()
-            .args(["init", "one-link", "--out"])
-            .arg(at("rig.toml")),
-    );
     succeed(
         rig()
             .args(["excite", "--start", "-1.5707963", "--robot"])
@@ -491,13 +495,8 @@ fn a_motor_that_is_too_weak_is_told_with_numbers_and_its_fault_in_words() {
 
 #[test]
 fn a_motion_that_starts_elsewhere_is_refused_with_what_to_give() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = described();
     let at = |name: &str| folder.path().join(name);
-    succeed(
-        rig()
-            .args(["init", "one-link", "--out"])
-            .arg(at("rig.toml")),
-    );
     let mut design = rig();
     design.args(["excite", "--start", "-1.5708", "--kind", "reversals"]);
     succeed(

@@ -25,8 +25,10 @@ const LEAST_CLUSTER: f64 = 1.0;
 const STRATA: usize = 12;
 /// Share of a column's length orthogonal to the others below which it is collinear.
 const DISTINCT: f64 = 0.02;
-/// Rounds of least squares with non-negative coefficients: a law has a few.
-const ROUNDS: usize = 20;
+/// Rounds of least squares with non-negative coefficients: a law has a few, and a model some of them.
+pub(crate) const ROUNDS: usize = 100;
+/// Bounds of a coefficient that cannot be negative.
+pub(crate) const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Weighted rows, an orthonormal basis of the columns, and the torque residual.
 #[derive(Clone)]
@@ -62,7 +64,7 @@ impl Beside {
             return Some(free);
         }
         let bounded: Vec<bool> = (bounds.iter())
-            .map(|bounds| *bounds == [0.0, f64::INFINITY])
+            .map(|bounds| *bounds == NOT_NEGATIVE)
             .collect();
         let mut inside = vec![true; bounded.len()];
         let beta = nnls(&self.gram, &self.right, &bounded, &mut inside, ROUNDS)?;

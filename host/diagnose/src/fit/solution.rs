@@ -2,13 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::least_squares::Fit;
+use crate::fit::least_squares::{Fit, ROUNDS};
 use crate::rows::regression::Column;
 use rig_numerics::optimise::non_negative::nnls;
 use rig_numerics::vector::dot;
-
-/// Rounds of least squares with non-negative coefficients.
-const ROUNDS: usize = 100;
 
 /// Coefficients of columns fitted together.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ use rig_shared::effects::{Kind, SHAPES};
 use crate::columns::candidate::Candidate;
 use crate::columns::kinds::is_gear;
 use crate::fit::evidence::Evidence;
+use crate::fit::least_squares::NOT_NEGATIVE;
 use crate::levels::{LEAST_GAIN, SIGNIFICANT};
 use crate::rows::regression::Column;
 use crate::search::refusal::Refusal;
@@ -95,9 +96,7 @@ impl FittedCandidate {
     /// zero is none.
     pub(crate) fn may_be_zero(&self, gain: usize) -> bool {
         let gains = self.candidate.kind.about().gains;
-        gains.len() == self.columns.len()
-            && gains.len() > 1
-            && gains[gain].bounds == [0.0, f64::INFINITY]
+        gains.len() == self.columns.len() && gains.len() > 1 && gains[gain].bounds == NOT_NEGATIVE
     }
 
     /// Returns the reason for refusal at a p-value corrected for `tried` trials; None if the candidate passes.
