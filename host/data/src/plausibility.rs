@@ -23,7 +23,7 @@ pub const JUDGED_ROWS: usize = 100_000;
 pub enum Implausible {
     /// Position of a revolute joint in degrees.
     #[error(
-        "q{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad{or}"
+        "q{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad, or name its unit with --unit q{joint}=deg{or}"
     )]
     Degrees {
         /// Joint, 1-based.
@@ -73,8 +73,9 @@ pub enum Implausible {
     },
     /// A position with jumps.
     #[error(
-        "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {} s{more}, while its fastest motion is {fastest:.2e} {unit} a row; {mend}",
-        format_time(*at)
+        "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {} s{more}, while its fastest motion is {} {unit} a row; {mend}",
+        format_time(*at),
+        format_significant(*fastest, 3)
     )]
     Jump {
         /// Joint, 1-based.
@@ -264,7 +265,8 @@ pub enum Implausible {
     },
     /// Effort too low to move the joint.
     #[error(
-        "tau{joint} looks too small by a factor of about 1000, as k{unit} would be (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint, or correct the {of} in the description"
+        "tau{joint} looks too small by a factor of about 1000, as k{unit} would be (at most {} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint, or correct the {of} in the description",
+        format_significant(*highest, 4)
     )]
     EffortTooSmall {
         /// Joint, 1-based.

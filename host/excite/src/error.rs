@@ -24,7 +24,8 @@ pub enum ExciteError {
     },
     /// Limits that are too wide.
     #[error(
-        "the limits of joint \"{joint}\" let it move at {velocity:e} (SI units), and a motion is sized by them; give the velocity, or the acceleration, that its drive can do"
+        "the limits of joint \"{joint}\" let it move at {} (SI units), and a motion is sized by them; give the velocity, or the acceleration, that its drive can do",
+        format_significant(*velocity, 4)
     )]
     Boundless {
         /// Its name.

@@ -241,8 +241,9 @@ fn tracking_notes(robot: &Robot, motion: &Motion, asked: &[Vec<f64>]) -> Vec<Str
                 false => "though it should rest".to_owned(),
             };
             notes.push(format!(
-                "Joint \"{}\" is off its reference by {off:.3e} {unit} RMS, {of}: the recording shows what it did, not what was designed.",
+                "Joint \"{}\" is off its reference by {off} {unit} RMS, {of}: the recording shows what it did, not what was designed.",
                 joint.name,
+                off = rig_output::format_significant(off, 4),
                 unit = joint.kind.units().0,
             ));
         }

@@ -135,6 +135,28 @@ pub fn format_unit(ascii: &str) -> String {
     ascii.replace("^2", "²").replace('*', "·")
 }
 
+/// Spells the units within a sentence as [`format_unit`] does: `0.12 kg*m^2 or N*m` is `0.12 kg·m² or N·m`. Other products and
+/// powers stay.
+#[must_use]
+pub fn spell_units(sentence: &str) -> String {
+    if !sentence.contains(['*', '^']) {
+        return sentence.to_owned();
+    }
+    const SPELLED: [(&str, &str); 8] = [
+        ("N*m", "N·m"),
+        ("kg*m", "kg·m"),
+        ("N*s", "N·s"),
+        ("m*s", "m·s"),
+        ("rad*K", "rad·K"),
+        ("m^2", "m²"),
+        ("s^2", "s²"),
+        ("rad^2", "rad²"),
+    ];
+    (SPELLED.iter()).fold(sentence.to_owned(), |text, (ascii, printed)| {
+        text.replace(ascii, printed)
+    })
+}
+
 /// Formats a value and its standard deviation, both rounded to the deviation's two significant digits (the rule of the
 /// Guide to the Expression of Uncertainty in Measurement, JCGM 100:2008, 7.2.6): `format_value(95.1123, 0.1083)` is
 /// `95.11 ± 0.11`.
@@ -356,6 +378,21 @@ mod tests {
             (1e300, "1·10³⁰⁰"),
         ] {
             assert_eq!(format_time(seconds), text);
+        }
+    }
+
+    #[test]
+    fn units_within_a_sentence_are_spelled_and_expressions_are_not() {
+        for (ascii, printed) in [
+            ("0.12 kg*m^2 or 3 N*m", "0.12 kg·m² or 3 N·m"),
+            ("N*m*s/rad, N*m*s^2/rad^2", "N·m·s/rad, N·m·s²/rad²"),
+            ("mx1 + 0.3*m2 - d2^2*m3", "mx1 + 0.3*m2 - d2^2*m3"),
+            ("none", "none"),
+        ] {
+            assert_eq!(spell_units(ascii), printed);
+        }
+        for unit in ["kg*m^2", "N*m*s/rad", "N*m*s/(rad*K)", "kg*m", "N*s/m"] {
+            assert_eq!(spell_units(unit), format_unit(unit));
         }
     }
 }

@@ -28,6 +28,21 @@ pub(crate) fn text(source: &str) -> String {
     out
 }
 
+/// Escapes a sentence for HTML, in element content, with one spelling of units. Words between two backticks, as the sentences have commands and names
+/// of a file, become code; a backtick without another stays one.
+pub(crate) fn prose(source: &str) -> String {
+    let spelled = rig_output::spell_units(source);
+    let mut parts = spelled.split('`').map(text);
+    let mut out = parts.next().unwrap_or_default();
+    while let Some(code) = parts.next() {
+        match parts.next() {
+            Some(rest) => out += &format!("<code>{code}</code>{rest}"),
+            None => out += &format!("`{code}"),
+        }
+    }
+    out
+}
+
 /// Returns a JSON string with quotes that ends neither a script element nor a line in it.
 pub(crate) fn json(source: &str) -> String {
     use std::fmt::Write;
@@ -88,6 +103,17 @@ mod tests {
             parsed.root_element().attribute("title"),
             Some(clean.as_str())
         );
+    }
+
+    #[test]
+    fn words_between_backticks_are_code_and_nothing_else_is_markup() {
+        assert_eq!(
+            prose("Run `rig doctor` and `<b>`."),
+            "Run <code>rig doctor</code> and <code>&lt;b&gt;</code>."
+        );
+        assert_eq!(prose("a `b"), "a `b");
+        assert_eq!(prose(""), "");
+        assert_eq!(prose(HOSTILE), text(HOSTILE));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::assets::{PLOT_LICENCE, PLOT_SCRIPT, PLOT_STYLE, THEME, palette};
 use super::document::{Alignment, Block, Document, Fact, Link, NoteKind, Section, Table, Tone};
 use super::error::ReportError;
-use super::escape::{address, text};
+use super::escape::{address, prose, text};
 use super::heat_map::HeatMap;
 use super::plot::Plot;
 use super::scene::Scene;
@@ -50,7 +50,7 @@ pub fn render(document: &Document) -> Result<String, ReportError> {
     out.push_str(&page.body);
     out.push_str("</main>\n</div>\n");
     if !document.footer.is_empty() {
-        let _ = writeln!(out, "<footer><p>{}</p></footer>", text(&document.footer));
+        let _ = writeln!(out, "<footer><p>{}</p></footer>", prose(&document.footer));
     }
     if page.plots > 0 {
         let _ = writeln!(
@@ -133,7 +133,11 @@ fn card(out: &mut String, fact: &Fact) {
         let _ = write!(out, " <span class=\"unit\">{}</span>", text(unit));
     }
     if !fact.note.is_empty() {
-        let _ = write!(out, "<span class=\"fact-note\">{}</span>", text(&fact.note));
+        let _ = write!(
+            out,
+            "<span class=\"fact-note\">{}</span>",
+            prose(&fact.note)
+        );
     }
     out.push_str("</dd></div>\n");
 }
@@ -174,7 +178,7 @@ impl Page {
             text(&section.title)
         );
         if !section.lead.is_empty() {
-            let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", text(&section.lead));
+            let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", prose(&section.lead));
         }
         for block in &section.blocks {
             self.block(block)?;
@@ -189,7 +193,7 @@ impl Page {
             Block::List(items) => {
                 self.body.push_str("<ul>\n");
                 for item in items {
-                    let _ = writeln!(self.body, "<li>{}</li>", text(item));
+                    let _ = writeln!(self.body, "<li>{}</li>", prose(item));
                 }
                 self.body.push_str("</ul>\n");
             }
@@ -201,7 +205,7 @@ impl Page {
                 let _ = writeln!(
                     self.body,
                     "<details><summary>{}</summary>\n<div class=\"inside\">",
-                    text(summary)
+                    prose(summary)
                 );
                 for block in blocks {
                     self.block(block)?;
@@ -249,7 +253,7 @@ impl Page {
     fn paragraphs(&mut self, source: &str) {
         let clean = source.replace("\r\n", "\n");
         for paragraph in clean.split("\n\n").map(str::trim).filter(|p| !p.is_empty()) {
-            let _ = writeln!(self.body, "<p>{}</p>", text(paragraph));
+            let _ = writeln!(self.body, "<p>{}</p>", prose(paragraph));
         }
     }
 
@@ -293,7 +297,7 @@ impl Page {
                     self.body,
                     "<{open} class=\"{}\">{}</{close}>",
                     class(column.alignment),
-                    text(cell)
+                    prose(cell)
                 );
             }
             self.body.push_str("</tr>\n");
@@ -306,7 +310,7 @@ impl Page {
             let _ = writeln!(
                 self.body,
                 "<p class=\"table-note\">{}</p>",
-                text(&table.note)
+                prose(&table.note)
             );
         }
         Ok(())
@@ -334,7 +338,7 @@ impl Page {
             let _ = writeln!(
                 self.body,
                 "<figcaption><p>{}</p></figcaption>",
-                text(&map.note)
+                prose(&map.note)
             );
         }
         self.body.push_str("</figure>\n");
@@ -358,7 +362,7 @@ impl Page {
                 let why = if plot.series.iter().all(|s| s.x.is_empty()) {
                     "There are no samples to draw here."
                 } else {
-                    "None of the samples can be drawn: all are not finite, or not positive on a logarithmic axis."
+                    "None of the samples can be drawn: they have no value, or none above zero, as a logarithmic axis needs."
                 };
                 let _ = writeln!(self.body, "<p class=\"empty\">{why}</p>");
             }
@@ -382,7 +386,7 @@ impl Page {
         if !notes.is_empty() {
             self.body.push_str("<figcaption>");
             for note in &notes {
-                let _ = write!(self.body, "<p>{}</p>", text(note));
+                let _ = write!(self.body, "<p>{}</p>", prose(note));
             }
             self.body.push_str("</figcaption>\n");
         }

@@ -30,6 +30,7 @@ mod markdown;
 mod plot;
 mod scene;
 mod svg;
+mod text;
 mod thin;
 
 pub use document::{
@@ -42,6 +43,7 @@ pub use html::render;
 pub use markdown::{Markdown, markdown};
 pub use plot::{Axis, Direction, Marker, Plot, Role, Series, Style};
 pub use svg::svg;
+pub use text::text_tables;
 pub use thin::thin;
 
 #[cfg(test)]

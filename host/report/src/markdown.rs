@@ -9,6 +9,7 @@ use super::heat_map::HeatMap;
 use super::plot::Plot;
 use super::scene::Scene;
 use super::svg::svg;
+use rig_output::spell_units;
 
 /// A document as Markdown.
 #[derive(Clone, Debug, PartialEq)]
@@ -226,7 +227,7 @@ impl Page<'_> {
         match picture {
             Some(picture) => {
                 let name = figure_name(self.stem, number);
-                let _ = writeln!(self.text, "\n![Figure {number}]({})", address(&name));
+                let _ = writeln!(self.text, "\n![{title}]({})", address(&name));
                 self.figures.push((name, picture));
             }
             None => self.paragraphs("No value can be drawn.", ""),
@@ -241,7 +242,8 @@ pub(crate) fn figure_name(stem: &str, number: usize) -> String {
 
 /// Escapes text for one line of Markdown, so that nothing in it is read as mark-up. Line breaks become spaces.
 fn inline(source: &str) -> String {
-    let words: Vec<&str> = source.split_whitespace().collect();
+    let spelled = spell_units(source);
+    let words: Vec<&str> = spelled.split_whitespace().collect();
     let clean: Vec<char> = words.join(" ").chars().map(visible).collect();
     let mut out = String::with_capacity(clean.len() + 8);
     for (k, &c) in clean.iter().enumerate() {

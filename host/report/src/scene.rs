@@ -257,11 +257,11 @@ fn drawn<'a>(
     let [missing, samples] = missing(source, &x_all, &across);
     if missing > 0 && count > 0 {
         let why = match (plot.x.log, plot.y.log) {
-            (false, false) => "not a finite number",
-            _ => "not finite, or not positive on a logarithmic axis",
+            (false, false) => "have no value",
+            _ => "have no value, or none above zero, as the logarithmic axis needs",
         };
         remarks.push(format!(
-            "{}: {missing} of {samples} samples are {why} and left as gaps.",
+            "{}: {missing} of {samples} samples {why} and are left as gaps.",
             source.name
         ));
     }

@@ -26,7 +26,8 @@ pub(super) fn refusal(refusal: Refusal) -> String {
         }
         Refusal::Shadow => "it is no more than what another law is off by".to_owned(),
         Refusal::Unresolved { size, least } => {
-            format!("its {size:.1e} are less than two steps of the encoders, {least:.1e}")
+            let [size, least] = [size, least].map(|own| format_significant(own, 2));
+            format!("its {size} are less than two steps of the encoders, {least}")
         }
     };
     format!("across the transmission {why}")

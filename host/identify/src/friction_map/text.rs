@@ -5,7 +5,7 @@ use super::law::Decision;
 use super::map::{DroppedPass, FrictionPoint};
 use crate::error::IdentifyError;
 use rig_model::robot::JointKind;
-use rig_output::format_significant;
+use rig_output::{format_p_value, format_significant};
 
 /// Describes the decision in words.
 pub(super) fn text_of(decision: &Decision, points: &[FrictionPoint], kind: JointKind) -> String {
@@ -26,7 +26,8 @@ pub(super) fn text_of(decision: &Decision, points: &[FrictionPoint], kind: Joint
     let simple = &decision.simple;
     if decision.warranted {
         return format!(
-            "A Stribeck term is warranted (p = {p:.1e}): friction is {:.4} {torque} above Coulomb friction at standstill and falls with a Stribeck velocity of {:.4} {velocity}; points left out are predicted to {:.4} instead of {:.4} {torque}.",
+            "A Stribeck term is warranted (p = {}): friction is {:.4} {torque} above Coulomb friction at standstill and falls with a Stribeck velocity of {:.4} {velocity}; points left out are predicted to {:.4} instead of {:.4} {torque}.",
+            format_p_value(p),
             b.breakaway_excess,
             b.stribeck_velocity.unwrap_or(0.0),
             b.leave_one_out_rms,
@@ -39,7 +40,8 @@ pub(super) fn text_of(decision: &Decision, points: &[FrictionPoint], kind: Joint
     );
     if b.breakaway_excess < 0.0 && p < 0.05 {
         return format!(
-            "{tested} do not warrant a Stribeck term: friction is lower at low speed than Coulomb and viscous friction say (p = {p:.1e}), which no Stribeck law does; look at the torque's limits and at the motion's clock."
+            "{tested} do not warrant a Stribeck term: friction is lower at low speed than Coulomb and viscous friction say (p = {}), which no Stribeck law does; look at the torque's limits and at the motion's clock.",
+            format_p_value(p)
         );
     }
     let untold = "a Stribeck velocity below the slowest speed would not show";
@@ -48,7 +50,8 @@ pub(super) fn text_of(decision: &Decision, points: &[FrictionPoint], kind: Joint
     } else {
         // The F-test alone accepts the term, so the text names the failed criterion.
         format!(
-            "(p = {p:.1e}, but its size is less certain than it is large, or points left out are predicted no better: {} against {} {torque})",
+            "(p = {}, but its size is less certain than it is large, or points left out are predicted no better: {} against {} {torque})",
+            format_p_value(p),
             format_significant(b.leave_one_out_rms, 3),
             format_significant(simple.leave_one_out_rms, 3)
         )

@@ -146,7 +146,9 @@ pub(crate) fn hardly_excited(
             (known > plausible).then(|| NotExcited {
                 combination: name.clone(),
                 why: format!(
-                    "These data alone know it to {known:.2e} {unit} (standard deviation), less well than the {plausible:.2e} {unit} within which it is plausible without them."
+                    "These data alone know it to {} {unit} (standard deviation), less well than the {} {unit} within which it is plausible without them.",
+                    rig_output::format_significant(known, 3),
+                    rig_output::format_significant(plausible, 3)
                 ),
                 motion: motion(base, data.kept[k]),
             })

@@ -154,12 +154,12 @@ impl Binned {
             )
         } else if p_value < 0.01 {
             format!(
-                "The mean residual depends on {}: near {:.4} it is {:.4}, {:.0} % of the residual's RMS (p = {:.1e}).",
+                "The mean residual depends on {}: near {:.4} it is {:.4}, {:.0} % of the residual's RMS (p = {}).",
                 self.name,
                 best.1,
                 best.2,
                 100.0 * best.2.abs() / rms.max(f64::MIN_POSITIVE),
-                p_value
+                rig_output::format_p_value(p_value)
             )
         } else {
             format!(
@@ -180,10 +180,9 @@ impl Binned {
 
 /// Writes a small p-value in words; values below the smallest number are not shown as zero.
 fn p_text(p: f64) -> String {
-    if p < 1e-300 {
-        "p < 1e-300".to_owned()
-    } else {
-        format!("p = {p:.1e}")
+    match rig_output::format_p_value(p) {
+        below if below.starts_with('<') => format!("p {below}"),
+        value => format!("p = {value}"),
     }
 }
 

@@ -31,7 +31,8 @@ fn rounding_note(off: f64, exact: f64) -> String {
         -2 => "-π".to_owned(),
         quarters => format!("{quarters}·π/2"),
     };
-    format!("{off:.1e} rad off {name}, and is taken as {name}")
+    let off = format_significant(off, 2);
+    format!("{off} rad off {name}, and is taken as {name}")
 }
 
 /// An angle of a description that was replaced by a multiple of π/2.
@@ -104,9 +105,10 @@ pub(super) fn told(file: &str, mut turned: Vec<Turned>) -> Vec<String> {
         let names: Vec<String> = same.iter().map(|own| format!("`{}`", own.joint)).collect();
         let off = same.iter().map(|own| own.off).fold(0.0, f64::max);
         sentences.push(format!(
-            "{file}:{}: {angle} joints {} are up to {off:.1e} rad off multiples of π/2, and are taken as these.",
+            "{file}:{}: {angle} joints {} are up to {} rad off multiples of π/2, and are taken as these.",
             same[0].place,
-            listed(&names)
+            listed(&names),
+            format_significant(off, 2)
         ));
     }
     sentences
