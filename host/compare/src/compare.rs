@@ -24,7 +24,7 @@ use crate::significance::{FAMILY_LEVEL, TEST_LEVEL, holm};
 use crate::single::{Single, Spread, spread};
 use crate::torque::torque_matrix;
 use crate::trades::trades;
-use crate::warnings::{brief_warnings, contradicting, drifting, warnings};
+use crate::warnings::{brief_warnings, contradicting, drifting, too_short, warnings};
 use crate::zero_shift::Zeros;
 
 /// Compares the parameters that several sets of recordings of one robot give. Memory does not grow with the recordings.
@@ -39,7 +39,7 @@ pub fn compare(
     if sets.len() < 2 {
         return Err(CompareError::TooFew(sets.len()));
     }
-    if !(options.tolerance > 0.0 && options.tolerance.is_finite()) {
+    if !(options.tolerance > 0.0 && options.tolerance <= 1.0) {
         return Err(CompareError::Tolerance(options.tolerance));
     }
     let mut names = BTreeSet::new();
@@ -107,6 +107,7 @@ fn compared(
         without: &without,
         drifting: &drifting(sets, robot, options.tolerance),
         contradicting: &contradicting(sets),
+        short: &too_short(sets),
         torque: &torque,
         causes: causes.as_ref(),
         tolerance: options.tolerance,

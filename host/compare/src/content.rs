@@ -2,7 +2,10 @@
 //!
 //! Each recording is reduced to a sketch: the smallest of the hashes of all runs of [`RUN`] consecutive rows (Broder
 //! 1997, "On the resemblance and containment of documents"). Two sketches give the share of runs that both recordings
-//! hold. A sketch has the same size for every recording. A row is its positions and torques; time does not count.
+//! hold. A sketch has the same size for every recording. A row is its positions and torques; time does not count. Runs of
+//! every second, third … row are sketched as well, so that a copy with fewer rows is found.
+//!
+//! Leaves out: a copy whose values were changed by more than single precision, as by rounding to few digits.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -15,6 +18,8 @@ use crate::error::CompareError;
 /// Rows in a run. Measured rows are noisy: that eight rows are equal to the last bit by chance is practically
 /// impossible.
 const RUN: usize = 8;
+/// Largest distance of the rows in a run: that to which a copy may be thinned.
+const STRIDES: usize = 10;
 /// Hashes in a sketch.
 const SIZE: usize = 512;
 /// Common hashes in a sketch from which two recordings overlap: they share 1.6 % or more of all their runs.
@@ -22,14 +27,21 @@ const COMMON: usize = 8;
 /// Rows that are read together.
 const ROWS: usize = 4096;
 
+/// Sketch of the runs of a recording with one distance of their rows.
+#[derive(Default)]
+struct Runs {
+    /// The smallest hashes.
+    smallest: BTreeSet<u64>,
+    /// Number of runs, without those in which all rows are equal.
+    count: u64,
+}
+
 /// Sketch of a recording.
 struct Sketch {
     /// Label of the recording.
     label: String,
-    /// The smallest hashes.
-    smallest: BTreeSet<u64>,
-    /// Number of runs, without those in which all rows are equal.
-    runs: u64,
+    /// Runs of adjacent rows, of every second row and so on.
+    strides: Vec<Runs>,
 }
 
 /// Refuses recordings that share rows.
@@ -58,38 +70,62 @@ pub(crate) fn refuse_same_rows<'a>(
 
 impl Sketch {
     fn of(recording: &dyn Recording) -> Result<Self, PrepareError> {
-        let mut sketch = Self {
-            label: recording.label(),
-            smallest: BTreeSet::new(),
-            runs: 0,
-        };
+        let mut strides: Vec<Runs> = (0..STRIDES).map(|_| Runs::default()).collect();
         let mut rows: Vec<u64> = Vec::new();
+        let mut kept = 0;
         recording.each_block(ROWS, &mut |block| {
             rows.extend((0..block.t.len()).map(|k| hash_of_row(&block, k)));
-            for run in rows.windows(RUN) {
-                sketch.take(run);
+            for last in kept..rows.len() {
+                for (k, runs) in strides.iter_mut().enumerate() {
+                    if let Some(first) = last.checked_sub((RUN - 1) * (k + 1)) {
+                        runs.take(rows[first..=last].iter().step_by(k + 1));
+                    }
+                }
             }
-            rows.drain(..rows.len().saturating_sub(RUN - 1));
+            rows.drain(..rows.len().saturating_sub((RUN - 1) * STRIDES));
+            kept = rows.len();
             Ok(())
         })?;
-        Ok(sketch)
+        Ok(Self {
+            label: recording.label(),
+            strides,
+        })
     }
 
+    /// Returns the estimated share of the shorter recording that both hold, one of them perhaps thinned; none if it is not
+    /// clearly above 0.
+    fn shared(&self, other: &Self) -> Option<f64> {
+        let thinned = |a: &Self, b: &Self| {
+            let whole = a.strides.first()?;
+            let shares = b.strides.iter().filter_map(|runs| whole.shared(runs));
+            shares.reduce(f64::max)
+        };
+        let shares = [thinned(self, other), thinned(other, self)];
+        shares.into_iter().flatten().reduce(f64::max)
+    }
+}
+
+impl Runs {
     /// Takes a run. At rest, noise-free recordings repeat one row, whatever the motion; such runs do not count.
-    fn take(&mut self, run: &[u64]) {
-        if run.iter().all(|row| *row == run[0]) {
+    fn take<'a>(&mut self, mut run: impl Iterator<Item = &'a u64> + Clone) {
+        let mut hasher = DefaultHasher::new();
+        run.clone().for_each(|row| row.hash(&mut hasher));
+        let first = run.next();
+        if run.all(|row| Some(row) == first) {
             return;
         }
-        let mut hasher = DefaultHasher::new();
-        run.hash(&mut hasher);
-        self.runs += 1;
-        self.smallest.insert(hasher.finish());
+        self.count += 1;
+        let hash = hasher.finish();
+        let is_small = (self.smallest.last()).is_none_or(|largest| hash < *largest);
+        if is_small || self.smallest.len() < SIZE {
+            self.smallest.insert(hash);
+        }
         if self.smallest.len() > SIZE {
             self.smallest.pop_last();
         }
     }
 
-    /// Returns the estimated share of the shorter recording that both hold; none if it is not clearly above 0.
+    /// Returns the estimated share of the shorter one that both hold; none if it is not clearly above 0.
     fn shared(&self, other: &Self) -> Option<f64> {
         let all: BTreeSet<u64> = self.smallest.union(&other.smallest).copied().collect();
         let looked = all.len().min(SIZE);
@@ -100,8 +136,8 @@ impl Sketch {
             return None;
         }
         let resemblance = common as f64 / looked as f64;
-        let both = resemblance / (1.0 + resemblance) * (self.runs + other.runs) as f64;
-        Some((both / self.runs.min(other.runs) as f64).min(1.0))
+        let both = resemblance / (1.0 + resemblance) * (self.count + other.count) as f64;
+        Some((both / self.count.min(other.count) as f64).min(1.0))
     }
 }
 

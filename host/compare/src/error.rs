@@ -45,6 +45,8 @@ pub enum CompareError {
     )]
     Singular(String),
     /// The tolerance is not a positive number.
-    #[error("The tolerance {0} is not possible; give a share of the torque above 0, such as 0.05.")]
+    #[error(
+        "The tolerance {0} is not possible; give a share of the torque above 0 and at most 1, such as 0.05 for 5 %."
+    )]
     Tolerance(f64),
 }

@@ -17,6 +17,8 @@ pub(crate) struct Graded<'a> {
     pub drifting: &'a [String],
     /// Sets whose joints' torques contradict each other.
     pub contradicting: &'a [&'a str],
+    /// Sets that are too short for errors: place among the sets, and a sentence.
+    pub short: &'a [(usize, String)],
     /// Torque residuals.
     pub torque: &'a TorqueMatrix,
     /// Tested causes.
@@ -84,20 +86,34 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
     }
     reasons.extend_from_slice(of.drifting);
     let grade = match (differ, matters) {
+        (true, _) if !decided_without_short(of) => Grade::Undecided,
         (false, false) => Grade::Agree,
         (false, true) => Grade::Undecided,
         (true, false) => Grade::DifferWithoutEffect,
         (true, true) => Grade::DifferAndMatter,
     };
+    if grade != Grade::Agree {
+        reasons.extend(of.short.iter().map(|(_, why)| why.clone()));
+    }
     if grade == Grade::Undecided && !of.contradicting.is_empty() {
         reasons.push(format!(
             "The torques of the joints of {} contradict each other (see the warnings), which makes the errors of its parameters large: correct the torques, or leave out the set.",
             of.contradicting.join(" and of ")
         ));
-    } else if grade == Grade::Undecided && of.drifting.is_empty() {
+    } else if grade == Grade::Undecided && of.drifting.is_empty() && of.short.is_empty() {
         reasons.push("The errors of the parameters are too large to tell whether the sets differ: longer or livelier recordings would decide it.".into());
     }
     (grade, reasons)
+}
+
+/// Returns false if a difference may be that of sets whose errors are not known: no others are left to compare, or the
+/// others do not differ.
+fn decided_without_short(of: &Graded) -> bool {
+    match of.short {
+        [] => true,
+        [(set, _)] => (of.without.get(*set)).is_some_and(|others| others.differs),
+        _ => false,
+    }
 }
 
 /// Names the one set without which the others do not differ.
@@ -108,7 +124,7 @@ fn outlier(of: &Graded) -> Option<String> {
         return None;
     }
     Some(format!(
-        "Without {name} the other sets do not differ: χ² {:.1} with {} degrees of freedom, p {}.",
+        "Without {name} the other sets do not differ: χ² {:.1} with {} degrees of freedom, p {}. Compare them without it for pooled values to trust.",
         test.chi2,
         test.degrees_of_freedom,
         written(test.p)
@@ -120,5 +136,54 @@ pub(crate) fn written(p: f64) -> String {
     match p < 1e-4 {
         true => "< 0.0001".into(),
         false => format!("= {p:.4}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two sets, or three, that differ by a test; `others`: whether all but the last differ, too.
+    fn graded(short: &[(usize, String)], others: &[bool]) -> (Grade, Vec<String>) {
+        let test = |differs: bool| JointTest {
+            chi2: if differs { 90.0 } else { 3.0 },
+            degrees_of_freedom: 4,
+            p: if differs { 1e-9 } else { 0.5 },
+            differs,
+        };
+        let without: Vec<JointTest> = others.iter().map(|own| test(*own)).collect();
+        let names = ["long", "longer", "short"].map(str::to_owned);
+        let added = vec![vec![vec![0.5; 4]; 3]];
+        grade(&Graded {
+            names: &names,
+            parameters: &[],
+            joint: Some(&test(true)),
+            without: &without,
+            drifting: &[],
+            contradicting: &[],
+            short,
+            torque: &TorqueMatrix {
+                joints: vec!["link".into()],
+                residual: added.clone(),
+                torque: vec![vec![1.0; 3]],
+                added,
+            },
+            causes: None,
+            tolerance: 0.05,
+        })
+    }
+
+    #[test]
+    fn a_set_without_known_errors_decides_nothing_and_hides_nothing() {
+        let short = [(2, "short is too short.".to_owned())];
+        let (grade, reasons) = graded(&short, &[]);
+        assert_eq!(grade, Grade::Undecided);
+        assert!(reasons.contains(&short[0].1), "{reasons:?}");
+        assert_eq!(graded(&short, &[true, true, false]).0, Grade::Undecided);
+        assert_eq!(
+            graded(&short, &[true, true, true]).0,
+            Grade::DifferAndMatter
+        );
+        assert_eq!(graded(&[], &[]).0, Grade::DifferAndMatter);
     }
 }

@@ -1,6 +1,6 @@
 //! Warnings of the identifications, in full and one of each kind; friction that changes during a recording.
 
-use rig_identify::Warning;
+use rig_identify::{LEAST_STRETCHES, MEMORIES, Warning};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_value, worst_first};
 
@@ -71,6 +71,30 @@ pub(crate) fn contradicting(sets: &[IdentifiedSet]) -> Vec<&str> {
     sets.iter()
         .filter(is)
         .map(|set| set.name.as_str())
+        .collect()
+}
+
+/// Returns the sets whose errors come from groups of rows that are not independent, with a sentence: what they differ by
+/// cannot be compared with their errors.
+pub(crate) fn too_short(sets: &[IdentifiedSet]) -> Vec<(usize, String)> {
+    let short = |set: &IdentifiedSet| {
+        let mut own = set.found.warnings.iter();
+        own.find_map(|warning| match warning {
+            Warning::FewStretches { memory, stretches } => Some((*memory, *stretches)),
+            _ => None,
+        })
+    };
+    (sets.iter().enumerate())
+        .filter_map(|(k, set)| {
+            let (memory, stretches) = short(set)?;
+            let needed = LEAST_STRETCHES * MEMORIES * memory;
+            Some((k, format!(
+                "{} is too short: its errors come from {} independent stretches instead of {LEAST_STRETCHES} or more, so whether it differs is not decided. Record at least {} s for it, or leave it out.",
+                set.name,
+                format_significant(stretches, 2),
+                format_significant(needed, 2)
+            )))
+        })
         .collect()
 }
 

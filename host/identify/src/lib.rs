@@ -111,6 +111,6 @@ pub use unmodelled::field_torque::FieldTorque;
 pub use unmodelled::position::PositionTorque;
 pub use unmodelled::tilt::BaseTilt;
 pub use warning::{
-    AtJoint, JointFinding, OwnCutoff, Part, TorqueFactor, TorqueScale, Unsettled, Warning,
-    WarningKind,
+    AtJoint, JointFinding, LEAST_STRETCHES, MEMORIES, OwnCutoff, Part, TorqueFactor, TorqueScale,
+    Unsettled, Warning, WarningKind,
 };

@@ -8,6 +8,11 @@ use serde::{Serialize, Serializer};
 
 use crate::estimator::Estimator;
 
+/// Independent stretches of a recording from which the intervals of the parameters are reliable.
+pub const LEAST_STRETCHES: f64 = 8.0;
+/// Correlation times of the residuals in an independent stretch.
+pub const MEMORIES: f64 = 10.0;
+
 /// A warning of an identification. As text and as JSON it is one or more sentences.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
@@ -54,7 +59,7 @@ pub enum Warning {
         /// Last motion of a parameter in standard deviations, if known.
         moved: Option<f64>,
     },
-    /// Too few independent stretches for reliable intervals.
+    /// Too few independent stretches for reliable intervals: fewer than [`LEAST_STRETCHES`].
     FewStretches {
         /// Correlation time of the residuals, s.
         memory: f64,

@@ -205,21 +205,22 @@ fn the_pooled_robot_has_the_pooled_torques() {
 fn recordings_with_the_same_rows_are_refused() {
     let truth = Truth::default();
     let whole = Made::new(90_001).recording(&truth);
-    let cut = |from: usize, to: usize, label: &str| {
+    let every = |step: usize, from: usize, to: usize, label: &str| {
         let mut part = whole.clone();
         part.label = label.to_owned();
         for block in &mut part.blocks {
-            block.t = block.t[from..to].to_vec();
+            block.t = block.t[from..to].iter().copied().step_by(step).collect();
             for joint in &mut block.joints {
                 for list in [&mut joint.q, &mut joint.tau] {
                     // As written with nine digits.
                     let nine = |x: &f64| format!("{x:.8e}").parse().unwrap();
-                    *list = list[from..to].iter().map(nine).collect();
+                    *list = list[from..to].iter().step_by(step).map(nine).collect();
                 }
             }
         }
         part
     };
+    let cut = |from, to, label: &str| every(1, from, to, label);
     let other = Made::new(90_002).recording(&truth);
     let said = |first: &InMemory, second: &InMemory| {
         let set = |name: &str, recording| RecordingSet {
@@ -233,7 +234,43 @@ fn recordings_with_the_same_rows_are_refused() {
     assert!(copy.contains("made 90001 and copy"), "{copy}");
     let parts = said(&cut(0, 2400, "morning"), &cut(1600, 4000, "evening")).unwrap_err();
     assert!(parts.contains("morning and evening"), "{parts}");
+    for step in [2, 3] {
+        let thin = said(&every(step, 0, 4000, "thin"), &whole).unwrap_err();
+        assert!(thin.contains("thin and made 90001"), "{thin}");
+    }
     assert!(said(&whole, &other).is_ok());
+}
+
+/// A recording whose residual remembers as long as it lasts has no known errors: beside a long one of the same arm it is
+/// never said to differ, and what two long ones differ by stays told beside it.
+#[test]
+fn a_recording_that_is_too_short_decides_nothing() {
+    let truth = Truth::default();
+    let short = |seed| Made {
+        seconds: 1.4,
+        ..Made::new(seed)
+    };
+    for draw in 0..8 {
+        let found = compared(&[
+            (Made::new(96_000 + draw), truth.clone()),
+            (short(96_100 + draw), truth.clone()),
+        ]);
+        assert!(
+            !matches!(
+                found.grade,
+                Grade::DifferAndMatter | Grade::DifferWithoutEffect
+            ),
+            "{:?}",
+            found.reasons
+        );
+    }
+    let heavy = truth.clone().with_payload(0.3, [0.3, 0.0]);
+    let found = compared(&[
+        (Made::new(96_201), truth.clone()),
+        (Made::new(96_202), heavy),
+        (short(96_203), truth),
+    ]);
+    assert_eq!(found.grade, Grade::DifferAndMatter, "{:?}", found.reasons);
 }
 
 /// Two sets that agree by chance: the standard error is not smaller than the errors within the sets allow, and Student's

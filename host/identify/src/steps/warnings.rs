@@ -8,7 +8,7 @@ use crate::treatment::cutoff;
 use crate::uncertainty::estimate::Estimate;
 use crate::uncertainty::residual::{LEAST_ERROR, ResidualReport};
 use crate::unmodelled::lag::Lag;
-use crate::warning::{AtJoint, JointFinding, Part, Unsettled, Warning};
+use crate::warning::{AtJoint, JointFinding, LEAST_STRETCHES, MEMORIES, Part, Unsettled, Warning};
 use rig_data::prepare::{PreprocessingPlan, Survey};
 use rig_model::robot::{Joint, JointKind, Robot};
 
@@ -75,13 +75,13 @@ impl Heard<'_> {
                 moved: None,
             });
         }
-        let stretches = self.instants as f64 / (10.0 * self.estimate.memory_rows);
+        let stretches = self.instants as f64 / (MEMORIES * self.estimate.memory_rows);
         // Rounding of a recording without noise has no memory that counts.
         let inexact = self
             .train
             .iter()
             .any(|own| own.relative_error > LEAST_ERROR);
-        if stretches < 8.0 && inexact {
+        if stretches < LEAST_STRETCHES && inexact {
             warnings.push(Warning::FewStretches {
                 memory: self.estimate.memory_rows * row_period,
                 stretches,
