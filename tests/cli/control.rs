@@ -186,7 +186,7 @@ fn wrong_options_are_refused_in_a_sentence() {
     }
     let impedance = ["--law", "impedance", "--impedance", "nan"];
     assert!(refuse(&mut control("edda.toml", &impedance, &out)).contains("impedance NaN"));
-    assert!(contact(&["--slide", "1"]).contains("--slide"));
+    assert!(contact(&["--slide", "1", "--pose", "0.5,0.4"]).contains("--slide"));
     // A model of another robot.
     let mut command = control("edda.toml", &[], &out);
     let said = refuse(command.arg("--model").arg(robot("irp6.toml")));

@@ -3,16 +3,14 @@
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
 
 use super::design::at_start;
-use super::error::{ControlError, within};
+use super::error::ControlError;
 use super::law_model::LawModel;
 use super::mobility::{jacobian, mobility};
-use super::position_limits::PositionLimits;
 use super::settings::{LawKind, Settings};
 use super::surface::Surface;
-use rig_model::robot::Robot;
 use rig_shared::control::arm::Task;
 use rig_shared::control::arm::impedance::Target;
-use rig_shared::multibody::{column, gravity_vector};
+use rig_shared::multibody::gravity_vector;
 use rig_shared::trajectory::Reference;
 
 /// Largest share of the torque limits that a default force takes in the start pose.
@@ -37,11 +35,7 @@ const TICKS: f64 = 100.0;
 const FASTEST: f64 = 4.0;
 /// Mobility along a direction, as a share of the largest, from which the tool can be moved along it. The square root is
 /// the ratio of distances: a hundredth.
-const MOBILE: f64 = 1e-4;
-/// Poses that are tried of each joint, as shares of its range.
-const SHARES: [f64; 3] = [0.25, 0.5, 0.75];
-/// Joints of which several poses are tried.
-const TRIED: usize = 6;
+pub(crate) const MOBILE: f64 = 1e-4;
 /// Time between contact, slide and end, s.
 const SETTLE: f64 = 3.0;
 /// Time of the impedance's approach, as a share of that before the slide.
@@ -104,97 +98,6 @@ pub struct ContactTask {
     pub notes: Vec<String>,
 }
 
-/// Singular values of the tool's Jacobian, squared, from the largest.
-fn reach(model: &LawModel, q: &[f64], tool: [f64; 3]) -> Result<[f64; 3], ControlError> {
-    let (_, matrix) = jacobian(model, q, tool)?;
-    let square = &matrix * matrix.transpose();
-    let square = Matrix3::from_fn(|a, b| square[(a, b)]);
-    let mut values: [f64; 3] = SymmetricEigen::new(square).eigenvalues.into();
-    values.sort_by(|a, b| b.total_cmp(a));
-    Ok(values)
-}
-
-fn rank(values: &[f64; 3]) -> usize {
-    values
-        .iter()
-        .filter(|v| **v > MOBILE * values[0] && **v > 0.0)
-        .count()
-}
-
-/// All poses of a grid that respect the combined limits of coupled drives; the middle first.
-fn grid(robot: &Robot) -> Vec<Vec<f64>> {
-    let middle = robot.middle_position();
-    let mut poses = vec![middle.clone()];
-    for (j, joint) in robot.joints.iter().enumerate().take(TRIED) {
-        let range = joint.limits.as_ref().map(|l| l.for_motions());
-        let [low, high] = match range {
-            Some([low, high]) if low.is_finite() && high.is_finite() => [low, high],
-            _ => [middle[j] - 1.5, middle[j] + 1.5],
-        };
-        poses = (poses.iter())
-            .flat_map(|pose| {
-                SHARES.map(|share| {
-                    let mut pose = pose.clone();
-                    pose[j] = low + share * (high - low);
-                    pose
-                })
-            })
-            .collect();
-    }
-    let combined = robot.combined_limits();
-    let fits = |q: &Vec<f64>| {
-        combined.iter().all(|(weights, [low, high])| {
-            let sum: f64 = weights.iter().zip(q).map(|(w, q)| w * q).sum();
-            let edge = 0.1 * (high - low);
-            (low + edge..=high - edge).contains(&sum)
-        })
-    };
-    poses.retain(fits);
-    poses.insert(0, middle);
-    poses
-}
-
-/// Returns the pose of the grid from which the tool moves most evenly, and the number of directions that it moves along.
-fn best_pose(model: &LawModel, tool: [f64; 3]) -> Result<(Vec<f64>, usize), ControlError> {
-    let mut best: Option<(usize, f64, Vec<f64>)> = None;
-    for pose in grid(&model.robot) {
-        let values = reach(model, &pose, tool)?;
-        let rank = rank(&values);
-        let least = if rank == 0 { 0.0 } else { values[rank - 1] };
-        if (best.as_ref()).is_none_or(|(r, l, _)| (rank, least) > (*r, *l)) {
-            best = Some((rank, least, pose));
-        }
-    }
-    let (rank, _, pose) = best.unwrap_or_default();
-    Ok((pose, rank))
-}
-
-/// Chooses the tool point in the frame of the last joint, m: the origin, or twice the last link's centre of mass if the arm
-/// moves that in more directions. Adds a sentence about it.
-///
-/// # Errors
-/// [`ControlError`] if the model is no valid chain.
-pub fn tool_point(model: &LawModel, notes: &mut Vec<String>) -> Result<[f64; 3], ControlError> {
-    let own = model
-        .parameters
-        .last()
-        .map_or([0.0; 4], |row| [0, 1, 2, 3].map(|k| row[column::MASS + k]));
-    let [mass, x, y, z] = own;
-    let (_, at_origin) = best_pose(model, [0.0; 3])?;
-    if mass > 0.0 && at_origin < model.parameters.len().min(3) {
-        let end = [x, y, z].map(|moment| 2.0 * moment / mass);
-        if best_pose(model, end)?.1 > at_origin {
-            notes.push(format!(
-                "No tool is given: its point is {:.3}, {:.3}, {:.3} m in the frame of the last joint, twice the centre of mass of the last link.",
-                end[0], end[1], end[2]
-            ));
-            return Ok(end);
-        }
-    }
-    notes.push("No tool is given: its point is the origin of the last joint's frame.".to_owned());
-    Ok([0.0; 3])
-}
-
 /// Returns the directions: `normal` first, then those along the surface that the tool can be moved along.
 fn directions(mobility: &Matrix3<f64>, normal: Vector3<f64>) -> Vec<Vector3<f64>> {
     let largest = mobility.diagonal().max();
@@ -249,42 +152,6 @@ fn choose_normal(
     Ok(normal)
 }
 
-/// Returns the given pose of the joints, or one in which the tool moves most evenly.
-fn start_pose(
-    model: &LawModel,
-    given: Option<&[f64]>,
-    tool: [f64; 3],
-    notes: &mut Vec<String>,
-) -> Result<Vec<f64>, ControlError> {
-    let n = model.parameters.len();
-    match given {
-        Some(pose) if pose.len() == n => match pose.iter().find(|q| !q.is_finite()) {
-            Some(wrong) => Err(ControlError::Unreachable(format!(
-                "--pose contains {wrong}; give a finite number, rad or m, for each joint."
-            ))),
-            None => match PositionLimits::of(&model.robot).outside(|j| pose[j]) {
-                Some(outside) => Err(ControlError::Unreachable(format!(
-                    "The start pose is beyond a position limit: {outside}. Give another --pose."
-                ))),
-                None => Ok(pose.to_vec()),
-            },
-        },
-        Some(pose) => Err(ControlError::Unreachable(format!(
-            "--pose has {} numbers; give one for each of the {n} joints.",
-            pose.len()
-        ))),
-        None => {
-            let (pose, _) = best_pose(model, tool)?;
-            let list: Vec<String> = pose.iter().map(|q| format!("{q:.3}")).collect();
-            notes.push(format!(
-                "No pose is given: the arm starts at {} (rad or m), where the tool moves most evenly.",
-                list.join(", ")
-            ));
-            Ok(pose)
-        }
-    }
-}
-
 /// Returns the inertia of the tool along each direction while it moves along all of them, kg.
 fn inertias(
     mobility: &Matrix3<f64>,
@@ -315,37 +182,18 @@ impl ContactTask {
         self.pose.iter().map(at_rest).collect()
     }
 
-    /// Chooses a task for the model of a law, with defaults where the options leave them open.
+    /// Returns the task from a start pose, with defaults where the options leave them open.
     ///
     /// # Errors
-    /// [`ControlError`] if a value is out of range or the tool cannot press there.
-    pub fn choose(
+    /// [`ControlError`] if the tool cannot press there.
+    pub(crate) fn at(
         model: &LawModel,
         options: &ContactOptions,
         settings: &Settings,
+        (pose, tool): (Vec<f64>, [f64; 3]),
+        mut notes: Vec<String>,
     ) -> Result<Self, ControlError> {
         let surface = options.surface;
-        surface.check()?;
-        within(
-            "slide",
-            options.slide,
-            0.0..=1.0,
-            "it must be between 0 and 1 m",
-        )?;
-        if let Some(stiffness) = options.stiffness {
-            within(
-                "impedance",
-                stiffness,
-                1.0..=1e6,
-                "it must be between 1 and 1000000 N/m",
-            )?;
-        }
-        let mut notes = Vec::new();
-        let tool = match options.tool {
-            Some(tool) => tool,
-            None => tool_point(model, &mut notes)?,
-        };
-        let pose = start_pose(model, options.pose.as_deref(), tool, &mut notes)?;
         let (origin, matrix) = jacobian(model, &pose, tool)?;
         let mobility = mobility(model, &pose, &matrix)?;
         let normal = choose_normal(&mobility, options.normal, &mut notes)?;
@@ -370,8 +218,8 @@ impl ContactTask {
             .max(QUINTIC_PEAK * way / (IMPEDANCE_SHARE * damped));
         if !(slide_start < LONGEST) {
             return Err(ControlError::Unreachable(format!(
-                "With {force} N on this surface the tool comes at {:.2e} m/s, so that the approach takes {slide_start:.0} s, of which {LONGEST:.0} are simulated. Give a larger --press, a smaller --gap, or a softer or less damped surface.",
-                speed
+                "With {force} N on this surface the tool comes at {} m/s, so that the approach takes {slide_start:.0} s, of which {LONGEST:.0} are simulated. Give a larger --press, a smaller --gap, or a softer or less damped surface.",
+                rig_output::format_significant(speed, 3)
             )));
         }
         let slides = count > 1 && options.slide > 0.0;

@@ -210,7 +210,7 @@ impl Bench<'_> {
         };
         let models = (0..draws).map(|k| {
             let mut own = model.clone();
-            own.disturb(share, self.settings.seed + k as u64);
+            own.disturb(share, seed_of_draw(self.settings.seed, k as u64));
             own
         });
         let models: Vec<LawModel> = models.collect();
@@ -299,5 +299,23 @@ impl Bench<'_> {
             time: trace.theta.iter().map(|(t, _)| *t).collect(),
             course: [0, 1].map(|k| course.iter().map(|own| own[k]).collect()),
         })
+    }
+}
+
+/// Returns the seed of draw `k`, below 2³². No two seeds have a draw in common.
+fn seed_of_draw(seed: u64, k: u64) -> u64 {
+    (seed.wrapping_sub(1) << 32).wrapping_add(k + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::seed_of_draw;
+
+    #[test]
+    fn seeds_share_no_draw() {
+        let draws = (0..5).flat_map(|seed| (0..100).map(move |k| seed_of_draw(seed, k)));
+        assert_eq!(draws.collect::<BTreeSet<u64>>().len(), 500);
     }
 }

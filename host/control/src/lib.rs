@@ -50,6 +50,7 @@ mod reference;
 mod result;
 mod sensing;
 mod settings;
+mod start_pose;
 mod surface;
 mod task_path;
 #[cfg(test)]
@@ -59,7 +60,7 @@ mod warnings;
 
 pub use adaptation::EXCITED;
 pub use closed_loop::Trace;
-pub use contact_task::{ContactOptions, ContactTask, tool_point};
+pub use contact_task::{ContactOptions, ContactTask};
 pub use error::ControlError;
 pub use evaluate::{Bench, Run};
 pub use law_model::LawModel;
@@ -70,4 +71,5 @@ pub use result::{
 };
 pub use sensing::resolution;
 pub use settings::{LawKind, Settings};
+pub use start_pose::tool_point;
 pub use surface::Surface;

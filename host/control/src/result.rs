@@ -160,6 +160,13 @@ pub struct Adaptation {
     pub course: [Vec<f64>; 2],
 }
 
+impl Contact {
+    /// Returns true unless the tool left the surface again and the force did not settle before the slide.
+    pub fn is_steady(&self) -> bool {
+        self.settling.is_some() || self.bounces == 0
+    }
+}
+
 /// A law that presses on a surface.
 #[derive(Clone, Debug, Serialize)]
 pub struct Contact {

@@ -46,11 +46,19 @@ pub(crate) fn of_motion(robot: &Robot, trace: &Trace, on_surface: bool) -> Vec<S
 /// Returns a sentence if the adaptation made the parameters worse.
 pub(crate) fn of_adaptation(learnt: &Adaptation) -> Option<String> {
     let [start, end] = learnt.torque_error;
-    (end > start && end > GROWN).then(|| {
-        format!(
+    let [own_start, own_end] = learnt.error;
+    if end > start && end > GROWN {
+        return Some(format!(
             "the error of the adapted parameters grew: their torque error is {:.2} % of the torque limits at the start and {:.2} % at the end. Give a lower --bandwidth, which slows the adaptation too, or start from a better model.",
             100.0 * start,
             100.0 * end
+        ));
+    }
+    (own_end > own_start && start > GROWN).then(|| {
+        format!(
+            "the adapted parameters predict the torque better, but their error grew from {} to {} parameter sizes in the directions that the motion excites: they trade against each other first and converge slowly. Give a longer --duration to see them converge.",
+            format_significant(own_start, 3),
+            format_significant(own_end, 3)
         )
     })
 }

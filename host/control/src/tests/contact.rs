@@ -469,6 +469,11 @@ fn tasks_beyond_the_position_limits_are_refused() {
     task_path::check(&robot, &near).unwrap();
     let mut own = options(1e4);
     own.slide = 1.0;
+    let said = ContactTask::choose(&model, &own, &settings)
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("limit") && said.contains("--slide"), "{said}");
+    own.pose = Some(near.pose.clone());
     let far = choose(&robot, &own, &settings);
     let said = task_path::check(&robot, &far).unwrap_err().to_string();
     assert!(said.contains("limit") && said.contains("--slide"), "{said}");
@@ -525,6 +530,26 @@ fn tasks_beyond_the_position_limits_are_refused() {
         let said = ContactTask::choose(&model, &own, &settings).unwrap_err();
         assert!(said.to_string().starts_with("impedance"), "{said}");
     }
+}
+
+/// From the pose where the tool of the UR10e moves most evenly, the slide would leave the range of its wrist; another pose is
+/// taken, and the task can be done from it.
+#[test]
+fn a_pose_that_is_chosen_lets_the_tool_do_the_task() {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../docs/excitation/ur10e.toml"
+    );
+    let arm = Robot::load(std::path::Path::new(path)).unwrap();
+    let task = choose(&arm, &options(1e4), &Settings::default());
+    task_path::check(&arm, &task).unwrap();
+    assert!(
+        task.notes
+            .iter()
+            .any(|note| note.contains("from which it can do the task")),
+        "{:?}",
+        task.notes
+    );
 }
 
 #[test]
