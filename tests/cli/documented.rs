@@ -373,6 +373,11 @@ fn control_laws_run_as_the_page_says() {
 }
 
 #[test]
+fn an_arm_with_worn_gears_is_simulated_as_the_page_says() {
+    walk("docs/simulate.md", 3);
+}
+
+#[test]
 fn the_tutorial_runs_as_the_page_says() {
     walk("docs/tutorial.md", 6);
 }

@@ -199,7 +199,7 @@ fn a_load_is_identified_and_read_again() {
     let tool = at("found/load.toml");
     let said = refuse(&mut identify(
         "again.csv",
-        &["--tool", tool.to_str().unwrap()],
+        &["--subtract", tool.to_str().unwrap()],
         "nothing",
     ));
     assert!(said.contains("mass"), "{said}");

@@ -13,8 +13,9 @@ const HEAD: &str = "# Which commands and options are there?
 <!-- Made from the help of the program: RIG_WRITE_DOCS=1 cargo test -p rig --test cli the_reference -->
 
 This page is the help of the program, as `--help` prints it behind each command. `rig man` writes the same as pages for `man`.
-Three options stand behind every command: `--help`; `--quiet`, which prints errors alone and what `--json` asks for; and
-`--verbose`, which prints details of the result, too. The answer is the last thing that is printed. The exit status is 0 only if
+Four options stand behind every command: `--help`; `--quiet`, which prints errors alone and what `--json` asks for;
+`--verbose`, which prints details of the result, too; and `--json`, which prints the result as JSON
+([formats.md](formats.md#results)). The answer is the last thing that is printed. The exit status is 0 only if
 the work was done, 1 after an error and 2 after wrong arguments; a command with statuses of its own names them below.
 
 ";
@@ -91,7 +92,7 @@ fn section(command: &mut Command, path: &str, page: &mut String) {
     let _ = writeln!(page, "```text\n{usage}\n```\n");
     let own: Vec<&Arg> = (command.get_arguments())
         .filter(|a| {
-            let everywhere = ["help", "version", "quiet", "verbose"];
+            let everywhere = ["help", "version", "quiet", "verbose", "json"];
             !a.is_hide_set() && !everywhere.contains(&a.get_id().as_str())
         })
         .collect();
@@ -102,7 +103,11 @@ fn section(command: &mut Command, path: &str, page: &mut String) {
         *page += "\n";
     }
     if let Some(after) = command.get_after_long_help().or(command.get_after_help()) {
-        let _ = writeln!(page, "{}\n", escaped(&after.to_string()));
+        let examples = after
+            .to_string()
+            .replace("Examples:\n", "")
+            .replace("\n  ", "\n");
+        let _ = writeln!(page, "```sh\n{}\n```\n", examples.trim());
     }
     for below in command.get_subcommands_mut() {
         if below.get_name() != "help" && !below.is_hide_set() {

@@ -129,6 +129,11 @@ impl Mapping {
         self
     }
 
+    /// Returns the units that were given, each with its column, or with the name of columns without a number.
+    pub fn units(&self) -> impl Iterator<Item = (&str, &'static str)> {
+        (self.units.iter()).map(|(column, unit)| (column.as_str(), unit.name))
+    }
+
     /// Returns the columns and their channels.
     pub(super) fn columns(&self) -> &[(String, String)] {
         &self.columns

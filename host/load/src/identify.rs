@@ -4,7 +4,7 @@ use nalgebra::SymmetricEigen;
 use rig_data::prepare::Recording;
 use rig_identify::{chain_of, least_eigenvalue};
 use rig_model::robot::{Joint, Load, Robot};
-use rig_output::{format_significant, format_unit, listed};
+use rig_output::{format_p_value, format_significant, format_unit, listed};
 use rig_shared::multibody::{COLUMN_NAMES, Chain, INERTIAL_PARAMETERS};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -259,7 +259,7 @@ fn without_tool(mut found: Estimate, tool: &Load) -> Result<Estimate, LoadError>
     if mass < CERTAIN * std {
         return Err(LoadError::NoMass {
             why: format!(
-                "the sensor or the torques show {} kg, and --tool has {} kg, so that {} ± {} kg are left for it; check that the load is mounted, and that the file describes the tool",
+                "the sensor or the torques show {} kg, and --subtract has {} kg, so that {} ± {} kg are left for it; check that the load is mounted, and that the file describes the tool",
                 format_significant(mass + tool.mass, 4),
                 format_significant(tool.mass, 4),
                 format_significant(mass, 3),
@@ -466,8 +466,8 @@ fn contradiction(agreement: &Agreement) -> Option<String> {
             })
             .collect();
         format!(
-            "Sensor and joint torques contradict each other (probability by chance {:.1e}): {}. {}The result is that of the sensor alone. Check the units and scales of both: a torque constant that is 5 % wrong makes a mass by torque 5 % wrong.",
-            agreement.chance,
+            "Sensor and joint torques contradict each other (probability by chance {}): {}. {}The result is that of the sensor alone. Check the units and scales of both: a torque constant that is 5 % wrong makes a mass by torque 5 % wrong.",
+            format_p_value(agreement.chance),
             listed(&parameters),
             worst.map_or_else(String::new, |k| {
                 format!(

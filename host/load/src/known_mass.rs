@@ -116,7 +116,7 @@ impl MassCheck {
         (same && sensor.contradicts() && torque.contradicts()).then(|| {
             let [a, b] = [sensor, torque].map(|c| format_value(c.factor, c.std));
             format!(
-                "The sensor shows {a} times the known mass of {} kg, and the joint torques show {b} times (± one standard deviation): two measurements agree, so the known mass looks wrong. Check its unit (--mass is in kg), what was weighed, and what else is mounted at the flange (--tool).",
+                "The sensor shows {a} times the known mass of {} kg, and the joint torques show {b} times (± one standard deviation): two measurements agree, so the known mass looks wrong. Check its unit (--mass is in kg), what was weighed, and what else is mounted at the flange (--subtract).",
                 format_significant(sensor.known.mass, 4)
             )
         })

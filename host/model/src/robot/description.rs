@@ -40,6 +40,9 @@ impl Robot {
     }
 }
 
+/// Endings of recordings.
+const RECORDINGS: [&str; 6] = ["csv", "mcap", "npz", "mat", "db3", "bag"];
+
 /// A file that describes a robot.
 #[derive(Debug)]
 pub struct Description {
@@ -68,11 +71,17 @@ impl Description {
     /// # Errors
     /// [`RobotError`] with the fault of the file and its line, or of the choice.
     pub fn load_chain(path: &Path, choice: &ChainChoice) -> Result<Self, RobotError> {
-        let (text, from) = read_text(path)?;
         let extension = path
             .extension()
             .and_then(|e| e.to_str())
             .map(str::to_ascii_lowercase);
+        if extension
+            .as_deref()
+            .is_some_and(|own| RECORDINGS.contains(&own))
+        {
+            return Err(RobotError::Recording { path: path.into() });
+        }
+        let (text, from) = read_text(path)?;
         let urdf = match extension.as_deref() {
             Some("toml") => false,
             Some("urdf") => true,

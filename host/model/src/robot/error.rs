@@ -41,7 +41,7 @@ impl fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 pub enum RobotError {
     /// The file cannot be opened or read.
-    #[error("cannot read the robot description {}: {source}; give the path of a .toml or .urdf file", path.display())]
+    #[error("cannot read the robot description {}: {source}; give the path of a .toml, .urdf or .xml (MJCF) file", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -57,13 +57,19 @@ pub enum RobotError {
         source: std::io::Error,
     },
     /// The path is a directory.
-    #[error("{} is a directory, but a robot description is one .toml or .urdf file", path.display())]
+    #[error("{} is a directory, but a robot description is one file: .toml, .urdf or .xml (MJCF)", path.display())]
     Directory {
         /// The directory.
         path: PathBuf,
     },
+    /// By its name the file is a recording.
+    #[error("{} is a recording by its name, but a robot description (.toml, .urdf or .xml) is wanted here; are --robot and --data exchanged?", path.display())]
+    Recording {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file is larger than any description.
-    #[error("{} is larger than {} MiB, but a robot description is a short text (.toml or .urdf); is this a recording?", path.display(), MAX_BYTES >> 20)]
+    #[error("{} is larger than {} MiB, but a robot description is a short text (.toml, .urdf or .xml); is this a recording?", path.display(), MAX_BYTES >> 20)]
     TooLarge {
         /// The file.
         path: PathBuf,

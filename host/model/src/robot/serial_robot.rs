@@ -53,6 +53,13 @@ impl Robot {
         self.flange.pose()
     }
 
+    /// Returns a point of the flange frame in the frame of the last joint, m.
+    pub fn point_of_flange(&self, point: [f64; 3]) -> [f64; 3] {
+        (self.flange_pose() * nalgebra::Point3::from(point))
+            .coords
+            .into()
+    }
+
     /// Returns the index (from 0) of the joint called `name`.
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|j| j.name == name)

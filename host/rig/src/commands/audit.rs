@@ -15,12 +15,11 @@ pub(crate) fn run(
     path: &Path,
     choice: &ChainChoice,
     seed: u64,
-    json: bool,
     ui: &Ui,
 ) -> Result<(), CommandError> {
     let audit = audit_file(path, choice, seed)?;
-    if json {
-        ui.print(&format!("{:#}", as_json(path, &audit)));
+    if ui.is_json() {
+        ui.print_json(&format!("{:#}", as_json(path, &audit)));
         return Ok(());
     }
     for finding in &audit.findings {

@@ -16,9 +16,6 @@ pub(crate) struct Args {
     /// Equations that the parameters belong to
     #[arg(long, value_enum, default_value = "differential")]
     model: Model,
-    /// Print as JSON
-    #[arg(long)]
-    json: bool,
     /// Seed of the random states from which the parameters are computed
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -36,7 +33,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let list: Vec<(String, &str)> = (0..base.len())
         .map(|k| (base.expression(k), base.unit(k)))
         .collect();
-    if args.json {
+    if ui.is_json() {
         let parameters: Vec<_> = list
             .iter()
             .map(|(expression, unit)| serde_json::json!({ "expression": expression, "unit": unit }))
@@ -49,7 +46,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             "rules_agree": same,
             "base_parameters": parameters,
         });
-        ui.print(&format!("{result:#}"));
+        ui.print_json(&format!("{result:#}"));
         return Ok(());
     }
     if same {

@@ -138,11 +138,11 @@ fn act<P: Port>(
     match &args.action {
         Action::Health => {
             let health = health::fetch(&mut session)?;
-            ui.say(&health::describe(session.greeting(), &health));
+            ui.answer(&health::describe(session.greeting(), &health));
         }
         Action::Store => {
             when_calibrated(&mut session, RequestBody::Store)?;
-            ui.say(
+            ui.answer(
                 "The present settings are stored; the rig starts with them at the next power-on.",
             );
         }
@@ -150,17 +150,17 @@ fn act<P: Port>(
         Action::Fault { out, .. } => fault(&mut session, out.as_deref(), ui)?,
         Action::Clear => {
             session.request(RequestBody::ClearFault)?;
-            ui.say("No fault is latched. After a fault of the encoder, tell the rig the position of the link (--home).");
+            ui.answer("No fault is latched. After a fault of the encoder, tell the rig the position of the link (--home).");
         }
         Action::Disarm => {
             session.request(RequestBody::Disarm)?;
-            ui.say("The bridge is off.");
+            ui.answer("The bridge is off.");
         }
         Action::Upload {
             model, unstored, ..
         } => {
             let kept = upload(&mut session, sent, model, *unstored)?;
-            ui.say(&format!("{}: sent to the rig {kept}.", model.display()));
+            ui.answer(&format!("{}: sent to the rig {kept}.", model.display()));
         }
     }
     Ok(())
@@ -182,7 +182,8 @@ fn capture<P: Port>(
         _ => None,
     })?;
     ticks::write(session.greeting(), &burst.ticks, out)?;
-    ui.say(&format!(
+    ui.file(out);
+    ui.answer(&format!(
         "{}: {} control ticks",
         out.display(),
         burst.ticks.len()
@@ -202,16 +203,17 @@ fn fault<P: Port>(
         _ => None,
     })?;
     let Some(record) = kept.fault else {
-        ui.say("No fault is latched.");
+        ui.answer("No fault is latched.");
         return Ok(());
     };
-    ui.say(&format!(
+    ui.answer(&format!(
         "{} docs/firmware.md describes each fault; `rig board clear` clears it.",
         describe_fault(&record, f64::from(session.greeting().control_rate_hz)),
     ));
     if let Some(out) = out {
         ticks::write(session.greeting(), &kept.ticks, out)?;
-        ui.say(&format!(
+        ui.file(out);
+        ui.answer(&format!(
             "{}: {} control ticks around it",
             out.display(),
             kept.ticks.len()

@@ -17,5 +17,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, command: &mut clap::Command, ui: &Ui) {
     let mut script = Vec::new();
     generate(args.shell, command, "rig", &mut script);
-    ui.print(String::from_utf8_lossy(&script).trim_end());
+    let script = String::from_utf8_lossy(&script);
+    ui.fact("script", script.trim_end());
+    if !ui.is_json() {
+        ui.print(script.trim_end());
+    }
 }

@@ -78,9 +78,6 @@ pub(crate) struct Args {
     map: Vec<String>,
     #[command(flatten)]
     columns: UnitArg,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -110,9 +107,9 @@ enum WrenchArg {
 }
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join("compliance.json"))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join("compliance.json")
     }
 }
 
@@ -150,17 +147,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         warnings: load.warnings().chain(response.warnings()).collect(),
         ..Context::default()
     };
-    write(args, &found, &context)?;
+    write(args, &found, &context, ui)?;
     for warning in &found.warnings {
         ui.warn(warning);
     }
     for line in lines(&robot, &found) {
         ui.answer(&line);
     }
-    ui.say(&format!(
-        "report: {}",
-        args.out.join("report.html").display()
-    ));
+    args.report.tell(&args.out.join("report.html"), ui);
     Ok(())
 }
 
@@ -238,7 +232,7 @@ impl Args {
 ///
 /// # Errors
 /// A file cannot be written.
-fn write(args: &Args, found: &Compliance, context: &Context) -> Result<(), CommandError> {
+fn write(args: &Args, found: &Compliance, context: &Context, ui: &Ui) -> Result<(), CommandError> {
     folder(&args.out)?;
     let json = serde_json::to_string_pretty(found).map_err(|error| {
         CommandError::Sentence(format!(
@@ -250,9 +244,10 @@ fn write(args: &Args, found: &Compliance, context: &Context) -> Result<(), Comma
         &args.out.join("compliance.toml"),
         elasticity_text(found)?.as_bytes(),
     )?;
-    args.report.write(
+    args.report.write_and_show(
         &args.out.join("report.html"),
         &pages::compliance(found, context),
+        ui,
     )?;
     Ok(())
 }

@@ -50,7 +50,7 @@ pub(crate) struct Args {
     /// Length of the default motion, s [default: 10]
     #[arg(long, conflicts_with = "trajectory")]
     duration: Option<f64>,
-    /// Multiply all parameters of the laws' models by this factor
+    /// Multiply all parameters of the laws' models by this factor; 0.7 is 70 %
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
     /// Repeat with parameters that are wrong at random by up to this share, per cent
@@ -82,9 +82,6 @@ pub(crate) struct Args {
     /// Seed of the noise and of the wrong parameters
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -118,7 +115,7 @@ struct ContactArgs {
     /// Standard deviation of the noise of the measured force, N [default: 0]
     #[arg(long)]
     noise_force: Option<f64>,
-    /// Tool point in the frame of the last joint, m
+    /// Tool point in the flange frame, m
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     tool: Option<Vec<f64>>,
     /// Joint positions at the start, base first, separated by commas or spaces, rad or m
@@ -189,9 +186,9 @@ const SLIDE: f64 = 0.05;
 const MOST_WRONG: f64 = 90.0;
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join("control.json"))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join("control.json")
     }
 
     /// Returns the laws, each once.
@@ -304,8 +301,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for line in lines(&evaluation) {
         ui.answer(&line);
     }
-    let report = args.out.join("report.html");
-    ui.say(&format!("report: {}", report.display()));
+    args.report.tell(&args.out.join("report.html"), ui);
     refuse_failed(&evaluation, &args.out)
 }
 
@@ -394,6 +390,12 @@ impl Whole<'_> {
         Ok(())
     }
 
+    /// Returns the tool point that was given in the flange frame, in the frame of the last joint, m.
+    fn tool(&self) -> Result<Option<[f64; 3]>, CommandError> {
+        let given = three("tool", self.args.contact.tool.as_deref())?;
+        Ok(given.map(|point| self.robot.point_of_flange(point)))
+    }
+
     fn bench<'b>(
         &'b self,
         reference: &'b [Vec<Reference<f64>>],
@@ -444,7 +446,7 @@ impl Whole<'_> {
     ) -> Result<(), CommandError> {
         let sampled = self.motion(settings.rate, &mut evaluation.notes)?;
         let reference = references(&sampled)?;
-        let tool = match three("tool", self.args.contact.tool.as_deref())? {
+        let tool = match self.tool()? {
             Some(tool) => tool,
             None => tool_point(&LawModel::of(self.robot)?, &mut evaluation.notes)?,
         };
@@ -481,7 +483,7 @@ impl Whole<'_> {
                 friction: given.surface_friction.unwrap_or(usual.friction),
                 gap: given.gap.unwrap_or(usual.gap),
             },
-            tool: three("tool", given.tool.as_deref())?,
+            tool: self.tool()?,
             pose: given.start()?,
             normal: three("normal", given.normal.as_deref())?,
             force: given.press,
@@ -585,13 +587,13 @@ fn settings(args: &Args) -> Result<Settings, CommandError> {
         ..Settings::default()
     };
     settings.check()?;
-    for (name, value, most) in [
-        ("scale", args.scale, 100.0),
-        ("duration", args.duration.unwrap_or(DURATION), 3600.0),
+    for (name, value, most, hint) in [
+        ("scale", args.scale, 10.0, "; it is a factor, 0.7 for 70 %"),
+        ("duration", args.duration.unwrap_or(DURATION), 3600.0, ""),
     ] {
         if !(value > 0.0 && value <= most) {
             return Err(CommandError::Sentence(format!(
-                "--{name} {value} is not possible: it must be above 0 and at most {most}."
+                "--{name} {value} is not possible: it must be above 0 and at most {most}{hint}."
             )));
         }
     }
@@ -705,9 +707,10 @@ fn write(
         command: ui.command_line(),
         ..Context::default()
     };
-    args.report.write(
+    args.report.write_and_show(
         &args.out.join("report.html"),
         &pages::control(robot, evaluation, &context),
+        ui,
     )?;
     Ok(())
 }
@@ -740,7 +743,7 @@ fn lines(evaluation: &Evaluation) -> Vec<String> {
         lines.push(line);
         if let Some(learnt) = &own.adaptation {
             lines.push(format!(
-                "  the motion excites {} of {} directions of the base parameters; error in these {} -> {} parameter sizes; torque error of the model {} -> {} % of the limits",
+                "  the motion excites {} of {} directions of the base parameters; error in these {} -> {} sizes of the parameters; torque error of the model {} -> {} % of the limits",
                 learnt.excited,
                 learnt.count,
                 short(learnt.error[0]),
@@ -762,14 +765,23 @@ fn lines(evaluation: &Evaluation) -> Vec<String> {
             format!(" ({before} % before the slide)")
         });
         let mut line = format!(
-            "{} with {}: {} N, overshoot {} %{before}, settled {settling}, steady error {} N{slide}, {} bounces",
+            "{} with {}: {} N, ",
             own.law.name(),
             own.model,
-            short(own.force),
-            short(100.0 * own.overshoot),
-            short(own.steady_error),
-            own.bounces
+            short(own.force)
         );
+        let overshoot = short(100.0 * own.overshoot);
+        let steady = short(own.steady_error);
+        line += &match own.is_steady() {
+            true => format!(
+                "overshoot {overshoot} %{before}, settled {settling}, steady error {steady} N{slide}, {} bounces",
+                own.bounces
+            ),
+            false => format!(
+                "no steady contact: {} bounces, mean error {steady} N before the slide, overshoot {overshoot} %{before}{slide}",
+                own.bounces
+            ),
+        };
         if let Some(found) = &own.robustness {
             line.push_str(&robust(found, 100.0, "%"));
         }

@@ -88,6 +88,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         "npz" => archive(&source, &kept, &args.out, &mut at)?,
         _ => rows(&source, &kept, &args.out, &mut at)?,
     }
+    ui.file(&args.out);
+    ui.fact("rows", kept.rows);
+    ui.fact("columns", names(&kept));
     ui.answer(&format!(
         "{}: {} rows of {}",
         args.out.display(),

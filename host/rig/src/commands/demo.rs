@@ -76,8 +76,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     ui.note(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));
     ui.detail(&demo.at_rest());
     for line in demo.summary()? {
-        ui.say(&line);
+        ui.answer(&line);
     }
-    ui.say(&format!("report: {}", path.display()));
+    ui.file(&found);
+    ui.fact("diagnosis", serde_json::json!(demo.diagnosis.verdict));
+    args.report.tell(&path, ui);
     Ok(())
 }

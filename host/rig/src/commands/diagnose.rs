@@ -87,9 +87,6 @@ pub(crate) struct Args {
     /// (1 and 2 remain errors)
     #[arg(long)]
     exit_code: bool,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -104,9 +101,9 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join(DIAGNOSIS))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join(DIAGNOSIS)
     }
 }
 
@@ -159,7 +156,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
         warnings,
         args.report.is_markdown(),
     )?;
-    printed::print(ui, &found, &args.out.join(REPORT));
+    printed::print(ui, &found, (&args.out.join(REPORT), args.report));
     Ok(if args.exit_code {
         status(found.verdict)
     } else {

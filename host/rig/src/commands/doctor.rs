@@ -22,9 +22,6 @@ const FAULT: u8 = 10;
 /// fault, else 0.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
-    /// Print as JSON
-    #[arg(long)]
-    json: bool,
     /// Folder in place of /, with dev/ and etc/: for tests
     #[arg(long, hide = true, default_value = "/")]
     root: PathBuf,
@@ -37,14 +34,14 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
     let found = findings(&Facts::gather(&args.root, std::env::var_os("RIG_DATA")));
     let faults = found.iter().filter(|own| own.state == State::Fault).count();
-    if args.json {
+    if ui.is_json() {
         let result = serde_json::json!({
             "schema": "rig-doctor/1",
             "version": env!("CARGO_PKG_VERSION"),
             "faults": faults,
             "findings": found,
         });
-        ui.print(&format!("{result:#}"));
+        ui.print_json(&format!("{result:#}"));
     } else {
         for own in &found {
             ui.say(&line(own));

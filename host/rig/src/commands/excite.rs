@@ -8,7 +8,7 @@ use super::chain_arg::ChainArg;
 use super::error::CommandError;
 use super::input::described;
 use super::overwrite::refuse_file;
-use super::ui::Ui;
+use super::ui::{LISTED, Ui};
 use rig_excite::{
     Criterion, Design, Effort, MultisineOptions, Options, Parameters, PoseOptions, Poses, Scaling,
     StagedKind, StagedOptions, design_measured, multisine, poses, staged,
@@ -397,6 +397,8 @@ fn design(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         ui.note(&note);
     }
     ui.say(NOT_LOOKED_AT);
+    ui.file(&args.out);
+    ui.fact("duration", file.duration());
     ui.answer(&format!(
         "{}: the motion, {} of {:.1} s.",
         args.out.display(),
@@ -444,6 +446,8 @@ fn many_sines(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         "It uses {position:.0} % of the distance to the position limit, {velocity:.0} % of the velocity limit and {acceleration:.0} % of the acceleration limit."
     ));
     ui.say(NOT_LOOKED_AT);
+    ui.file(&args.out);
+    ui.fact("duration", found.duration());
     ui.answer(&format!(
         "{}: the motion, {} periods of {} s with rise and fall, {:.1} s.",
         args.out.display(),
@@ -475,6 +479,8 @@ fn at_rest(args: &Args, count: usize, robot: &Robot, ui: &Ui) -> Result<(), Comm
         ui.say(&line);
     }
     ui.say(NOT_LOOKED_AT);
+    ui.file(&args.out);
+    ui.fact("duration", found.file.duration());
     ui.answer(&format!(
         "{}: the motion, {:.1} s, with a rest of {:.1} s at each pose.",
         args.out.display(),
@@ -571,16 +577,18 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     for line in reached(&found, robot) {
         ui.detail(&line);
     }
-    ui.detail(&speed_up(&effort));
+    ui.say(&speed_up(&effort));
     ui.detail(&format!(
         "Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
         args.robot.display(),
         args.out.display()
     ));
-    for line in judged(args.load, &found, robot) {
+    for line in judged(args.load, &found, robot, ui) {
         ui.say(&line);
     }
     ui.say(NOT_LOOKED_AT);
+    ui.file(&args.out);
+    ui.fact("duration", found.file.duration());
     ui.answer(&format!(
         "{}: the motion, {:.1} s from rest to rest.",
         args.out.display(),
@@ -618,7 +626,7 @@ fn number(condition: f64) -> String {
     if condition < 1e6 {
         format!("{condition:.3}")
     } else {
-        format!("{condition:.1e}")
+        format_significant(condition, 2)
     }
 }
 
@@ -630,13 +638,14 @@ fn verdict(condition: f64) -> String {
         "usable (100 to 1000)".into()
     } else {
         format!(
-            "poor: one combination of parameters shows {condition:.0e} times less than the others and will not be identified; {MORE_MOTION}"
+            "poor: one combination of parameters shows {} times less than the others and will not be identified; {MORE_MOTION}",
+            format_significant(condition, 1)
         )
     }
 }
 
 /// Describes how well the designed motion identifies.
-fn judged(load: bool, found: &Design, robot: &Robot) -> [String; 2] {
+fn judged(load: bool, found: &Design, robot: &Robot, ui: &Ui) -> [String; 2] {
     let values = &found.values;
     let kind = match (load, &robot.wrist_sensor) {
         (false, _) => "base parameters",
@@ -644,11 +653,15 @@ fn judged(load: bool, found: &Design, robot: &Robot) -> [String; 2] {
         (true, None) => "parameters of a load, by the joint torques:",
     };
     [
-        format!(
-            "For the {} {kind} {}:",
-            found.base_parameters.len(),
-            found.base_parameters.join(", ")
-        ),
+        match found.base_parameters.len() {
+            count if count > LISTED && !ui.is_verbose() => {
+                format!("For the {count} {}:", kind.trim_end_matches(':'))
+            }
+            count => format!(
+                "For the {count} {kind} {}:",
+                found.base_parameters.join(", ")
+            ),
+        },
         format!(
             "condition number {} with columns scaled to their largest sizes ({} in SI units), {}; smallest singular value {:.3}, mean {:.3}.",
             number(values.condition_number),

@@ -39,7 +39,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     call(&["download", "--chip", CHIP, "--verify"], Some(&elf))?;
     // The chip is halted after a download.
     call(&["reset", "--chip", CHIP], None)?;
-    ui.say(&format!(
+    ui.fact("image", elf.display().to_string());
+    ui.answer(&format!(
         "{} was flashed to the board and runs.",
         elf.display()
     ));

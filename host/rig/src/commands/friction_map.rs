@@ -41,9 +41,6 @@ pub(crate) struct Args {
     even_if_wrong: bool,
     #[command(flatten)]
     columns: MapArg,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -72,9 +69,9 @@ fn joint_of(robot: &Robot, given: &str) -> Result<usize, CommandError> {
 }
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join("friction-map.json"))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join("friction-map.json")
     }
 }
 
@@ -136,10 +133,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         write(args, &robot, &map, warnings.collect(), ui)?;
         print(&map, robot.joints[joint].kind, ui);
     }
-    ui.say(&format!(
-        "report: {}",
-        args.out.join("report.html").display()
-    ));
+    args.report.tell(&args.out.join("report.html"), ui);
     Ok(())
 }
 

@@ -41,6 +41,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for sentence in &header.left_out {
         ui.warn(sentence);
     }
+    ui.file(&args.out);
     ui.answer(&format!(
         "{}: friction of {}",
         args.out.display(),

@@ -211,9 +211,6 @@ pub(crate) struct Args {
     even_if_wrong: bool,
     #[command(flatten)]
     columns: MapArg,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -251,9 +248,9 @@ impl Args {
 }
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join(JSON))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join(JSON)
     }
 }
 
@@ -303,7 +300,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.say(&format!("{URDF}: {sentence}"));
     }
     printed::print(ui, &found);
-    ui.say(&format!("report: {}", args.out.join(REPORT).display()));
+    args.report.tell(&args.out.join(REPORT), ui);
     Ok(())
 }
 

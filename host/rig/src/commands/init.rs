@@ -84,7 +84,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from(name));
     refuse_file(&path, args.force)?;
     write_whole(&path, text.as_bytes())?;
-    ui.say(&format!(
+    ui.file(&path);
+    ui.answer(&format!(
         "{}: change the values that differ on your rig, then give the file to the other commands with --robot.",
         path.display()
     ));
@@ -119,7 +120,9 @@ fn from_urdf(from: &Path, args: &Args, ui: &Ui) -> Result<(), CommandError> {
     head.extend(description.remarks.iter().cloned());
     let text = description.robot.to_toml_draft(&head)?;
     write_whole(&path, text.as_bytes())?;
-    ui.say(&format!(
+    ui.file(&path);
+    ui.fact("joints", description.robot.joints.len());
+    ui.answer(&format!(
         "{}: {} joints; fill in the commented lines that you know, then give the file to the other commands with --robot.",
         path.display(),
         description.robot.joints.len()

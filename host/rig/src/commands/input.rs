@@ -119,6 +119,8 @@ pub struct Inputs {
     outside: Vec<RefCell<Outside>>,
     /// Sentences about rows that were not checked for faults.
     unchecked: RefCell<Vec<String>>,
+    /// The units that the user gave, with their columns.
+    units: Vec<(String, &'static str)>,
 }
 
 /// Name of a joint, its finite position limits (if any) and its unit.
@@ -283,6 +285,9 @@ impl Inputs {
             ranges: robot.joints.iter().map(Range::of).collect(),
             outside,
             unchecked: RefCell::default(),
+            units: (mapping.units())
+                .map(|(column, unit)| (column.to_owned(), unit))
+                .collect(),
         })
     }
 
@@ -315,6 +320,28 @@ impl Inputs {
         })
     }
 
+    /// Adds the units that the user gave to the columns that a sentence names: they are the first suspects.
+    fn with_given_units(&self, text: String) -> String {
+        let is_of = |word: &str, column: &str| {
+            let number = word.strip_prefix(column);
+            number.is_some_and(|rest| rest.bytes().all(|b| b.is_ascii_digit()))
+        };
+        // `t = 1.5 s` is a time, not the column.
+        let searched = text.replace("t = ", "");
+        let names = |column: &str| {
+            let mut words = searched.split(|c: char| !(c.is_alphanumeric() || c == '_'));
+            words.any(|word| is_of(word, column))
+        };
+        let given: Vec<String> = (self.units.iter())
+            .filter(|(column, _)| names(column))
+            .map(|(column, unit)| format!("{column}={unit}"))
+            .collect();
+        match given.is_empty() {
+            true => text,
+            false => format!("{text} Check the given unit first: {}.", given.join(", ")),
+        }
+    }
+
     fn refuse_implausible(
         &self,
         judge: impl Fn(&Block) -> Vec<Implausible>,
@@ -322,7 +349,8 @@ impl Inputs {
         for source in &self.sources {
             let wrong = judge(&first_part(source)?.rows());
             if !wrong.is_empty() {
-                return Err(CommandError::Implausible(sentence(source, &wrong)));
+                let text = self.with_given_units(sentence(source, &wrong));
+                return Err(CommandError::Implausible(text));
             }
         }
         Ok(())
@@ -387,6 +415,9 @@ impl Inputs {
             }
         }
         self.unchecked.replace(unchecked);
+        for text in faults.wrong.iter_mut().chain(&mut faults.described) {
+            *text = self.with_given_units(std::mem::take(text));
+        }
         Ok(faults)
     }
 

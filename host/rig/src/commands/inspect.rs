@@ -38,9 +38,6 @@ pub(crate) struct Args {
     robot: Option<PathBuf>,
     #[command(flatten)]
     chain: ChainArg,
-    /// Print as JSON
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for report.html and inspect.json
@@ -76,10 +73,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     })?;
     drop(progress);
     let json = as_json(&args.file, &found);
-    if args.json {
-        ui.print(json.trim_end());
-    } else {
-        print(&args.file, &found, ui);
+    match ui.is_json() {
+        true => ui.print_json(json.trim_end()),
+        false => print(&args.file, &found, ui),
     }
     let Some(out) = &args.out else {
         return Ok(());
@@ -94,9 +90,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &out.join(REPORT),
         &pages::inspect(&args.file, &found, &context),
     )?;
-    if !args.json {
-        ui.say(&format!("report: {}", out.join(REPORT).display()));
-    }
+    args.report.tell(&out.join(REPORT), ui);
     Ok(())
 }
 

@@ -162,7 +162,11 @@ fn show<P: Port>(
     let mut session = open(port, settings.robot.as_ref())?;
     interrupts::listen(None)?;
     for line in lines(listeners.addresses(), &settings.source) {
-        ui.say(&line);
+        ui.answer(&line);
+    }
+    // A view has no end that a script can wait for.
+    if ui.is_json() {
+        ui.print_summary();
     }
     let losses = listeners.run(&mut session, settings, &Terminal)?;
     ui.say(&format!("{losses}"));

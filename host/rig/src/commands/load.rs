@@ -56,8 +56,8 @@ pub(crate) struct Args {
     #[arg(long)]
     poses: bool,
     /// A known load (load.toml) that is mounted as well, and is subtracted
-    #[arg(long, value_name = "FILE", conflicts_with = "without")]
-    tool: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", conflicts_with = "without", alias = "tool")]
+    subtract: Option<PathBuf>,
     /// Mass of the load as weighed, kg: a contradiction to the identified mass tells a wrong unit of the forces, or a wrong
     /// scale of forces or torques. It enters no fit
     #[arg(long, value_name = "KG")]
@@ -86,9 +86,6 @@ pub(crate) struct Args {
     even_if_wrong: bool,
     #[command(flatten)]
     columns: MapArg,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -142,9 +139,9 @@ struct Written<'a> {
 }
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join("load.json"))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join("load.json")
     }
 }
 
@@ -227,15 +224,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ..Context::default()
     };
     let flange = urdf.as_ref().map(Original::tip);
-    write(args, &found, (flange, numbers.as_ref()), &context)?;
+    write(args, &found, (flange, numbers.as_ref()), (&context, ui))?;
     told(&robot, &found, numbers.as_ref(), ui);
     if let Some(link) = flange {
         ui.answer(&format!("flange frame: that of link {link}"));
     }
-    ui.say(&format!(
-        "report: {}",
-        args.out.join("report.html").display()
-    ));
+    args.report.tell(&args.out.join("report.html"), ui);
     Ok(())
 }
 
@@ -326,7 +320,7 @@ fn write(
     args: &Args,
     found: &LoadIdentification,
     (flange, controllers): (Option<&str>, Option<&ControllerNumbers>),
-    context: &Context,
+    (context, ui): (&Context, &Ui),
 ) -> Result<(), CommandError> {
     folder(&args.out)?;
     let written = Written {
@@ -343,9 +337,10 @@ fn write(
         found.body.to_toml()?.as_bytes(),
     )?;
     write_whole(&args.out.join("load.urdf"), urdf_link(found).as_bytes())?;
-    args.report.write(
+    args.report.write_and_show(
         &args.out.join("report.html"),
         &pages::load(found, controllers, context),
+        ui,
     )?;
     Ok(())
 }
@@ -373,7 +368,7 @@ fn options(args: &Args) -> Result<LoadOptions, CommandError> {
             Measured::Both => By::Both,
         },
         poses: args.poses,
-        tool: args.tool.as_deref().map(Load::read).transpose()?,
+        tool: args.subtract.as_deref().map(Load::read).transpose()?,
         known_mass: known_mass(args)?,
         prepare: PrepareOptions {
             cutoff: args.cutoff.map_or(Choice::Auto, Choice::Fixed),

@@ -39,6 +39,9 @@ pub(crate) fn run(args: &Args, program: clap::Command, ui: &Ui) -> Result<(), Co
     for (name, text) in &pages {
         write_whole(&args.out.join(name), text)?;
     }
+    for (name, _) in &pages {
+        ui.file(&args.out.join(name));
+    }
     ui.answer(&format!(
         "{}: {} pages; `man -l {}` shows the first",
         args.out.display(),

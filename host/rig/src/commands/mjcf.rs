@@ -41,6 +41,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for remark in &written.remarks {
         ui.warn(remark);
     }
+    ui.file(&args.out);
+    ui.fact("joints", robot.joints.len());
     ui.answer(&format!(
         "{}: {} joints",
         args.out.display(),

@@ -49,6 +49,7 @@ mod demo;
 mod diagnose;
 mod doctor;
 mod error;
+mod examples;
 mod excite;
 mod flash;
 mod friction_map;
@@ -74,6 +75,7 @@ mod simulate;
 mod table;
 mod ui;
 mod urdf;
+mod usage;
 mod validate;
 mod work;
 
@@ -81,11 +83,12 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 
 pub use diagnose::write_diagnosis;
 pub use error::CommandError;
+use examples::with_examples;
 pub use identify::{Compare, Impossible, write_identification};
 pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
 pub use overwrite::{refuse_file, refuse_folder};
-use ui::Ui;
 pub use ui::plain;
+use ui::{Ui, Wanted};
 use work::{Work, with_negative_numbers};
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
@@ -101,6 +104,9 @@ pub struct Cli {
     /// Print details, too: of a designed motion, of a fit, and all sentences of a diagnosis
     #[arg(long, global = true, conflicts_with = "quiet")]
     verbose: bool,
+    /// Print the result as JSON instead of sentences
+    #[arg(long, global = true)]
+    json: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -121,7 +127,7 @@ enum Command {
 impl CommandFactory for Cli {
     fn command() -> clap::Command {
         let program = clap::Command::new("rig").version(env!("CARGO_PKG_VERSION"));
-        with_negative_numbers(Self::augment_args(program))
+        with_examples(with_negative_numbers(Self::augment_args(program)))
     }
 
     fn command_for_update() -> clap::Command {
@@ -132,29 +138,45 @@ impl CommandFactory for Cli {
 reads_poses!(Cli);
 
 impl Cli {
+    /// Returns what is wrong with the arguments `words` and what would be right, one line; `None` if `error` is that the user
+    /// asked for help or the version.
+    pub fn wrong_arguments(error: &clap::Error, words: &[String]) -> Option<String> {
+        usage::wrong_arguments(error, words, &Self::command())
+    }
+
     /// Runs the command; returns the exit status.
     ///
     /// # Errors
     /// A sentence for the user.
     pub fn run(self) -> Result<u8, CommandError> {
-        let ui = match (self.quiet, self.verbose) {
-            (true, _) => Ui::quiet(),
-            (false, true) => Ui::verbose(),
-            (false, false) => Ui::new(),
-        };
-        match self.command {
-            None => demo::run(&demo::Args::default(), &ui),
-            Some(Command::Demo(args)) => demo::run(&args, &ui),
-            Some(Command::Run(args)) => return run::run(&args, &ui),
-            Some(Command::Work(work)) => return work.run(&ui),
-            Some(Command::Live(args)) => live::run(&args, &ui),
-            Some(Command::Board(args)) => board::run(&args, &ui),
-            Some(Command::Flash(args)) => flash::run(&args, &ui),
-            Some(Command::Doctor(args)) => return doctor::run(&args, &ui),
-            Some(Command::Base(args)) => base::run(&args, &ui),
-            Some(Command::Man(args)) => man::run(&args, Self::command(), &ui),
-            Some(Command::Completions(args)) => {
-                completions::run(&args, &mut Self::command(), &ui);
+        let ui = Ui::new(Wanted {
+            quiet: self.quiet,
+            verbose: self.verbose,
+            json: self.json,
+        });
+        let command = (self.command).unwrap_or_else(|| Command::Demo(demo::Args::default()));
+        let status = command.run(&ui)?;
+        if self.json {
+            ui.print_summary();
+        }
+        Ok(status)
+    }
+}
+
+impl Command {
+    fn run(self, ui: &Ui) -> Result<u8, CommandError> {
+        match self {
+            Self::Demo(args) => demo::run(&args, ui),
+            Self::Run(args) => return run::run(&args, ui),
+            Self::Work(work) => return work.run(ui),
+            Self::Live(args) => live::run(&args, ui),
+            Self::Board(args) => board::run(&args, ui),
+            Self::Flash(args) => flash::run(&args, ui),
+            Self::Doctor(args) => return doctor::run(&args, ui),
+            Self::Base(args) => base::run(&args, ui),
+            Self::Man(args) => man::run(&args, Cli::command(), ui),
+            Self::Completions(args) => {
+                completions::run(&args, &mut Cli::command(), ui);
                 Ok(())
             }
         }

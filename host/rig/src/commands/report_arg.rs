@@ -5,7 +5,8 @@ use std::path::Path;
 use clap::Args;
 
 use super::error::CommandError;
-use rig_report::Document;
+use super::ui::Ui;
+use rig_report::{Document, text_tables};
 
 /// The form of a report.
 #[derive(Clone, Copy, Debug, Default, Args)]
@@ -27,6 +28,40 @@ impl ReportArg {
     /// As [`write_report`].
     pub(crate) fn write(self, path: &Path, page: &Document) -> Result<(), CommandError> {
         write_report(path, page, self.markdown)
+    }
+
+    /// Writes a report as the HTML file `path`, and prints its tables if details are asked for.
+    ///
+    /// # Errors
+    /// As [`write_report`].
+    pub(crate) fn write_and_show(
+        self,
+        path: &Path,
+        page: &Document,
+        ui: &Ui,
+    ) -> Result<(), CommandError> {
+        self.write(path, page)?;
+        if ui.is_verbose() {
+            for table in text_tables(page)? {
+                ui.detail(&format!("{table}\n"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Prints where the report `path` is.
+    pub(crate) fn tell(self, path: &Path, ui: &Ui) {
+        ui.file(path);
+        if !self.markdown {
+            return ui.say(&format!("report: {}", path.display()));
+        }
+        let beside = path.with_extension("md");
+        ui.file(&beside);
+        ui.say(&format!(
+            "report: {} and {}",
+            path.display(),
+            beside.display()
+        ));
     }
 }
 

@@ -16,6 +16,7 @@ use super::interrupts;
 use super::overwrite::refuse_file;
 use super::pictures::forget;
 use super::ui::Ui;
+use super::usage::fault;
 use super::work::{Words, Work};
 use crate::pages::{self, RunStep};
 use rig_output::write_whole;
@@ -40,14 +41,11 @@ pub(crate) struct Args {
     #[arg(value_name = "FILE", default_value = "lab.toml")]
     file: PathBuf,
     /// Write a project file for the emulated rig instead of running one
-    #[arg(long, conflicts_with_all = ["again", "json"])]
+    #[arg(long, conflicts_with = "again")]
     example: bool,
     /// Run all steps, also those that are unchanged
     #[arg(long)]
     again: bool,
-    /// Print what the steps did as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     /// Replace files that the run did not write, or that were changed since
     #[arg(long)]
     force: bool,
@@ -76,7 +74,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
     if args.example {
         refuse_file(&args.file, args.force)?;
         write_whole(&args.file, EXAMPLE.as_bytes())?;
-        ui.say(&format!(
+        ui.file(&args.file);
+        ui.answer(&format!(
             "{}: the steps for the emulated rig; run them with `rig run {}`.",
             args.file.display(),
             args.file.display()
@@ -117,8 +116,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<u8, CommandError> {
         refuse_file(&page, args.force)?;
     }
     let state = State::load(&state_file)?;
-    let json = args.json.then(|| state_file.clone());
-    ui.with_json(json, |ui| {
+    ui.with_json(state_file.clone(), |ui| {
         let mut run = Run {
             args,
             ui,
@@ -135,14 +133,7 @@ fn parsed(step: Step) -> Result<Ready, CommandError> {
     match Words::try_parse_from(words) {
         Ok(Words { work }) => Ok(Ready { step, work }),
         Err(error) => {
-            let text = error.to_string();
-            let text = text.strip_prefix("error: ").unwrap_or(&text);
-            let said: Vec<&str> = (text.lines())
-                .map(str::trim)
-                .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
-                .filter(|line| !line.is_empty())
-                .collect();
-            let said = said.join(" ");
+            let said = fault(&error);
             let at_fault = (step.options.iter())
                 .filter(|option| said.contains(&format!("'--{} ", option.name)))
                 .map(|option| format!(" (line {})", option.line));

@@ -135,6 +135,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.note(note);
     }
     let rows = done.motion.q.first().map_or(0, Vec::len);
+    ui.file(&args.out);
+    ui.fact("samples", rows);
     ui.answer(&format!(
         "{}: {rows} samples, {:.1} s.",
         args.out.display(),
@@ -265,6 +267,8 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError
         .last()
         .zip(done.t.first())
         .map_or(0.0, |(end, begin)| end - begin);
+    ui.file(&args.out);
+    ui.fact("samples", done.t.len());
     ui.answer(&format!(
         "{}: {} samples, {length:.1} s, under voltage in the closed loop of [joint.voltage_controller].",
         args.out.display(),

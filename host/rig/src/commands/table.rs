@@ -83,9 +83,16 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         Notation::Markdown => markdown(&found),
     };
     match &args.out {
-        None => ui.print(text.trim_end()),
+        None => {
+            ui.fact("table", text.trim_end());
+            if !ui.is_json() {
+                ui.print(text.trim_end());
+            }
+        }
         Some(out) => {
             write_whole(out, text.as_bytes())?;
+            ui.file(out);
+            ui.fact("parameters", found.base_parameters.len());
             ui.answer(&format!(
                 "{}: {} parameters",
                 out.display(),

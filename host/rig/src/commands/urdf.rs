@@ -30,9 +30,6 @@ pub(crate) struct Args {
     /// Check the values of the URDF instead: masses, inertias, shapes, limits, the inertia matrix; writes nothing
     #[arg(long, conflicts_with = "into")]
     audit: bool,
-    /// Print the findings as JSON (--audit)
-    #[arg(long, requires = "audit")]
-    json: bool,
     /// Seed of the poses at which the inertia matrix is checked (--audit)
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -48,7 +45,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let (false, Some(out)) = (args.audit, &args.out) else {
         let choice = args.robot.chain().choice();
-        return audit::run(args.robot.path(), &choice, args.seed, args.json, ui);
+        return audit::run(args.robot.path(), &choice, args.seed, ui);
     };
     refuse_file(out, args.force)?;
     let description = match args.into {
@@ -83,6 +80,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         (Some(_), Some(_)) => "the URDF file with the description's values",
         (None, _) => "the link frames are those of the description",
     };
+    ui.file(out);
+    ui.fact("joints", robot.joints.len());
     ui.answer(&format!(
         "{}: {} joints; {what}.",
         out.display(),

@@ -44,9 +44,6 @@ pub(crate) struct Args {
     even_if_wrong: bool,
     #[command(flatten)]
     columns: MapArg,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -58,9 +55,9 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join("validation.json"))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join("validation.json")
     }
 }
 
@@ -155,10 +152,7 @@ fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
     for line in answer {
         ui.answer(line);
     }
-    ui.say(&format!(
-        "report: {}",
-        args.out.join("report.html").display()
-    ));
+    args.report.tell(&args.out.join("report.html"), ui);
 }
 
 /// Writes the result as JSON and as a page into a folder.

@@ -194,7 +194,8 @@ fn values(found: &Comparison) -> Section {
         ],
         rows: rows.collect(),
         note: "p: of Cochran's test that a parameter is the same in all sets, after Holm's correction; Q is below the figures. Standard error: the larger of that by the errors within the sets and that by the scatter of the sets. Within: typical standard deviation in one set. Between: standard deviation of the true values between sets that the errors within them do not explain.".into(),
-    }));
+    }))
+    .with(parts::names_of_parameters());
     if found.sets.len() < 5 {
         section = section.with(parts::info(format!(
             "{} sets tell little about the spread between sets: its value is uncertain by about half of itself or more, and the intervals use Student's t with few degrees of freedom.",

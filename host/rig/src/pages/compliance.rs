@@ -497,6 +497,15 @@ fn signals(found: &FrequencyResponse) -> Plot {
     ))
 }
 
+/// Returns a row of a matrix as text. Rounding leaves what is zero a little off: beside `all` entries that is 0.
+fn entries<'a>(row: &'a [f64], all: &[f64]) -> impl Iterator<Item = String> + use<'a> {
+    let most = all.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    row.iter().map(move |v| match v.abs() < 1e-12 * most {
+        true => "0".to_owned(),
+        false => format_significant(*v, 4),
+    })
+}
+
 /// A 6 × 6 matrix as a table.
 fn matrix(
     caption: &str,
@@ -505,10 +514,6 @@ fn matrix(
     values: &[[f64; 6]; 6],
     note: String,
 ) -> Table {
-    let most = values
-        .iter()
-        .flatten()
-        .fold(0.0, |m: f64, v| m.max(v.abs()));
     let mut heads = vec![Column::text("")];
     heads.extend(columns.map(|(name, unit)| Column::number(name, unit)));
     Table {
@@ -517,11 +522,7 @@ fn matrix(
         rows: (rows.iter().zip(values))
             .map(|(name, row)| {
                 let mut cells = vec![(*name).to_owned()];
-                // Rounding leaves what is zero a little off.
-                cells.extend(row.map(|v| match v.abs() < 1e-12 * most {
-                    true => "0".to_owned(),
-                    false => format_significant(v, 4),
-                }));
+                cells.extend(entries(row, values.as_flattened()));
                 cells
             })
             .collect(),
@@ -593,7 +594,7 @@ fn tool_point(found: &Compliance, pose: &ToolCompliance, k: usize) -> Section {
             rows: (["fx (N)", "fy (N)", "fz (N)"].iter().zip(block))
                 .map(|(name, row)| {
                     let mut cells = vec![(*name).to_owned()];
-                    cells.extend(row.map(|v| format_significant(v, 4)));
+                    cells.extend(entries(row, block.as_flattened()));
                     cells
                 })
                 .collect(),

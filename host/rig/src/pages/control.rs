@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::parts;
-use rig_control::{Adaptation, Contact, Evaluation, Robustness, Tracking};
+use rig_control::{Adaptation, Contact, Evaluation, LawKind, Robustness, Tracking};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit};
 use rig_report::{
@@ -114,15 +114,18 @@ fn summary(found: &Evaluation, warned: usize) -> Vec<Fact> {
             format!(", {before} % before the slide")
         });
         let good = own.overshoot <= GOOD_OVERSHOOT && own.warnings.is_empty();
-        facts.push(
-            Fact::new(
+        facts.push(match own.is_steady() {
+            true => Fact::new(
                 format!("Force overshoot, {}", own.law.name()),
                 short(100.0 * own.overshoot),
             )
             .unit("%")
             .note(format!("{}{before}", own.model))
             .tone(tone(good)),
-        );
+            false => Fact::new(format!("Contact, {}", own.law.name()), "not steady")
+                .note(format!("{}: {} bounces", own.model, own.bounces))
+                .tone(tone(false)),
+        });
     }
     facts
 }
@@ -187,7 +190,7 @@ fn tracking(robot: &Robot, laws: &[Tracking]) -> Section {
         let [unit, _, torque] = parts::units(joint.kind);
         let plot = |title: String, axis: Axis, pick: &dyn Fn(&Tracking) -> Vec<f64>| {
             laws.iter().enumerate().fold(
-                Plot::new(title, Axis::new("Time", "s"), axis),
+                Plot::new(title, Axis::new("time", "s"), axis),
                 |plot, (k, own)| {
                     let name = label(own.law.name(), &own.model, many);
                     let series = Series::line(name, role(k), own.time.clone(), pick(own));
@@ -197,14 +200,14 @@ fn tracking(robot: &Robot, laws: &[Tracking]) -> Section {
         };
         section = section.with(Block::Plot(plot(
             format!("Tracking error of {}", joint.name),
-            Axis::new("Error", &format!("m{unit}")),
+            Axis::new("error", &format!("m{unit}")),
             &|own| own.errors[j].iter().map(|e| 1e3 * e).collect(),
         )));
         section = section.with(Block::Details {
             summary: format!("Torque of {}", joint.name),
             blocks: vec![Block::Plot(plot(
                 format!("Torque of {}", joint.name),
-                Axis::new("Torque", torque),
+                Axis::new("torque", torque),
                 &|own| own.torques[j].clone(),
             ))],
         });
@@ -256,7 +259,7 @@ fn adaptation(k: usize, own: &Tracking, learnt: &Adaptation) -> Section {
     });
     let [error, torque] = &learnt.course;
     let plot = |title: &str, axis: Axis, values: Vec<f64>, name: &str| {
-        Plot::new(title, Axis::new("Time", "s"), axis).with(Series::line(
+        Plot::new(title, Axis::new("time", "s"), axis).with(Series::line(
             name,
             Role::Model,
             learnt.time.clone(),
@@ -278,13 +281,13 @@ fn adaptation(k: usize, own: &Tracking, learnt: &Adaptation) -> Section {
     )
     .with(Block::Plot(plot(
         "Torque that the parameter errors make along the motion",
-        Axis::new("Torque error, RMS", "% of the limits"),
+        Axis::new("torque error, RMS", "% of the limits"),
         torque.iter().map(|v| 100.0 * v).collect(),
         "all parameters",
     )))
     .with(Block::Plot(plot(
         "Error of the parameters in the excited directions",
-        Axis::new("Error", "sizes of parameters"),
+        Axis::new("error", "sizes of parameters"),
         error.clone(),
         "excited directions",
     )))
@@ -385,13 +388,13 @@ fn contact(found: &Evaluation) -> Section {
     let many = several(laws.iter().map(|own| own.model.as_str()));
     let mut force = Plot::new(
         "Force on the surface",
-        Axis::new("Time", "s"),
-        Axis::new("Force", "N"),
+        Axis::new("time", "s"),
+        Axis::new("force", "N"),
     );
     let mut depth = Plot::new(
         "Tool along the normal",
-        Axis::new("Time", "s"),
-        Axis::new("Distance from the start", "mm"),
+        Axis::new("time", "s"),
+        Axis::new("distance from the start", "mm"),
     );
     let wanted = laws[0].force;
     let ends: Vec<f64> = [laws[0].time.first(), laws[0].time.last()]
@@ -454,9 +457,13 @@ fn settings(found: &Evaluation) -> Section {
             short(s.damping)
         ),
         format!(
-            "Dry friction is compensated by {} % in motion and {} % near rest.",
+            "Dry friction is compensated by {} % in motion and {} % near rest{}.",
             short(100.0 * s.friction_gain),
-            short(100.0 * s.friction_gain_at_rest.min(s.friction_gain))
+            short(100.0 * s.friction_gain_at_rest.min(s.friction_gain)),
+            match found.contact.iter().any(|own| own.law == LawKind::Hybrid) {
+                true => "; by the hybrid law near rest as in motion",
+                false => "",
+            }
         ),
         format!("Noise of the measured force: {} N.", short(s.force_noise)),
     ]))

@@ -97,6 +97,7 @@ fn parameters(found: &Identification) -> Section {
             e.degrees_of_freedom
         ),
     }))
+    .with(parts::names_of_parameters())
 }
 
 fn not_excited(found: &Identification) -> Section {

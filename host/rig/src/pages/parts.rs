@@ -149,6 +149,24 @@ pub(super) fn warning_count(warnings: usize) -> Fact {
     }
 }
 
+/// Returns what the names of parameters mean, folded.
+pub(super) fn names_of_parameters() -> Block {
+    Block::Details {
+        summary: "What the names mean".into(),
+        blocks: vec![Block::List(
+            [
+                "m2: mass of link 2; mx2, my2, mz2: that mass times the coordinates of its centre",
+                "Ixx2 … Izz2: inertia of link 2 about the axes of its frame",
+                "Ia2: inertia of the drive of joint 2, seen at the joint; Iam2 at the motor",
+                "fv2, fc2: viscous and Coulomb friction of joint 2; off2: a constant torque at it; fvm2, fcm2, offm2: at the motor",
+                "A sum such as Izz1 + Ia1 is one parameter: no motion tells its parts apart.",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
+        )],
+    }
+}
+
 /// The command that repeats the result, and the description that was written.
 pub(super) fn repeat(context: &Context) -> Section {
     let mut section =

@@ -63,7 +63,7 @@ pub(crate) struct Args {
     /// Estimator. Those with a prior draw all sets towards the description, which hides differences
     #[arg(long, value_enum, default_value = "weighted")]
     estimator: Fit,
-    /// Share of a joint's torque RMS above which a difference of the parameters matters
+    /// Share of a joint's torque RMS above which a difference of the parameters matters; 0.05 is 5 %
     #[arg(long, default_value_t = 0.05)]
     tolerance: f64,
     /// Cut-off of the zero-phase low-pass on the position, Hz [default: from each set]
@@ -84,9 +84,6 @@ pub(crate) struct Args {
     even_if_wrong: bool,
     #[command(flatten)]
     columns: MapArg,
-    /// Print the result as JSON, as in the file, instead of sentences
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     report: ReportArg,
     /// Folder for the results
@@ -163,9 +160,9 @@ impl Args {
 }
 
 impl Args {
-    /// Returns the file to print if the result is wanted as JSON.
-    pub(crate) fn json_file(&self) -> Option<PathBuf> {
-        self.json.then(|| self.out.join(FILES[0]))
+    /// Returns the file that holds the result as JSON.
+    pub(crate) fn json_file(&self) -> PathBuf {
+        self.out.join(FILES[0])
     }
 }
 
@@ -237,7 +234,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.say(&line);
     }
     ui.answer(&grade(&found));
-    ui.say(&format!("report: {}", args.out.join(FILES[2]).display()));
+    args.report.tell(&args.out.join(FILES[2]), ui);
     Ok(())
 }
 
@@ -269,7 +266,7 @@ fn write(
         warnings: read,
     };
     let page = pages::compare(found, &context);
-    args.report.write(&args.out.join(FILES[2]), &page)
+    (args.report).write_and_show(&args.out.join(FILES[2]), &page, ui)
 }
 
 /// Returns the answer in a sentence.

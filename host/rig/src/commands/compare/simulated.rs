@@ -97,7 +97,7 @@ impl Simulated<'_> {
                 ui.answer(&line);
             }
         }
-        ui.say(&format!("report: {}", self.out.join(FILES[1]).display()));
+        self.report.tell(&self.out.join(FILES[1]), ui);
         Ok(())
     }
 
@@ -121,9 +121,10 @@ impl Simulated<'_> {
                 &pages::simulated_robot(found, &context),
             )?;
         }
-        self.report.write(
+        self.report.write_and_show(
             &self.out.join(FILES[1]),
             &pages::simulated_overview(all, &context),
+            ui,
         )?;
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::super::report_arg::ReportArg;
 use super::super::ui::Ui;
 use crate::pages;
 use rig_diagnose::outcome::{DataFault, Diagnosis, Step, Verdict};
@@ -10,8 +11,8 @@ use rig_output::{format_significant, format_unit};
 /// Number of lines that answer the question: the verdict, and the sentence that explains it.
 const ANSWER: usize = 2;
 
-/// Prints the result in short, and the path of the report.
-pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
+/// Prints the result in short, and where the report is, in which form.
+pub(super) fn print(ui: &Ui, found: &Diagnosis, (report, form): (&Path, ReportArg)) {
     for fault in &found.data_faults {
         ui.warn(&match fault.recording.as_str() {
             recording if fault.text.contains(recording) => fault.text.clone(),
@@ -42,7 +43,7 @@ pub(super) fn print(ui: &Ui, found: &Diagnosis, report: &Path) {
             false => ui.say(line),
         }
     }
-    ui.say(&format!("report: {}", report.display()));
+    form.tell(report, ui);
 }
 
 /// Further sentences of the diagnosis.
