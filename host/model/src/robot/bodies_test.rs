@@ -297,7 +297,7 @@ fn rounded_angles_and_massless_links_are_one_note_each() {
     };
     assert!(
         angles.contains(
-            "the axes of joints `j1`, `j2`, `j3`, `j4`, `j5` and `j6` are up to 3.7e-6 rad off"
+            "the axes of joints `j1`, `j2`, `j3`, `j4`, `j5` and `j6` are up to 3.7·10⁻⁶ rad off"
         ),
         "{angles}"
     );
