@@ -5,9 +5,10 @@
 //! for any number of joints.
 
 use super::capacity::with_capacity;
-use super::chain::{Chain, JointKind, MultibodyError, check};
+use super::chain::{Chain, JointKind, MAX_JOINTS, MultibodyError, check};
 use super::inverse::LinkMotion;
 use super::parameters::{COLUMNS, column, inertia};
+use super::projection::REGRESSOR;
 use super::spatial::{Motion, Transform, Vector3, Wrench};
 use crate::scalar::Real;
 
@@ -36,6 +37,9 @@ pub fn regressor_gradient<T: Real>(
     by_qd: &mut [T],
     by_qdd: &mut [T],
 ) -> Result<(), MultibodyError> {
+    if chain.has_followers() {
+        return projected_gradient(chain, [q, qd, qdd], weights, [by_q, by_qd, by_qdd]);
+    }
     let n = chain.joint_count();
     check("q", n, q.len())?;
     check("qd", n, qd.len())?;
@@ -218,6 +222,46 @@ fn link_gradient<T: Real>(
     by_motion.velocity += centripetal(angular_velocity, moment, l)
         + momentum.cross(s)
         + body.inertia.times(s.cross(angular_velocity));
+}
+
+/// The weights of Y = Mᵀ·Y_axes are M·W over the axes; the gradients by positions are projected like torques.
+#[cold]
+#[inline(never)]
+fn projected_gradient<T: Real>(
+    chain: &Chain<T>,
+    [q, qd, qdd]: [&[T]; 3],
+    weights: &[T],
+    outs: [&mut [T]; 3],
+) -> Result<(), MultibodyError> {
+    let (n, all, width) = (
+        chain.joint_count(),
+        chain.link_count(),
+        chain.parameter_count(),
+    );
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    check("qdd", n, qdd.len())?;
+    check("weights", n * width, weights.len())?;
+    for (argument, out) in ["by_q", "by_qd", "by_qdd"].into_iter().zip(&outs) {
+        check(argument, n, out.len())?;
+    }
+    let mut wide = [T::ZERO; REGRESSOR];
+    chain.weights(weights, &mut wide);
+    let [mut by_q, mut by_qd, mut by_qdd] = [[T::ZERO; MAX_JOINTS]; 3];
+    regressor_gradient(
+        &chain.unfolded(),
+        &chain.positions(q)[..all],
+        &chain.rates(qd)[..all],
+        &chain.rates(qdd)[..all],
+        &wide[..all * width],
+        &mut by_q[..all],
+        &mut by_qd[..all],
+        &mut by_qdd[..all],
+    )?;
+    for (own, out) in [by_q, by_qd, by_qdd].iter().zip(outs) {
+        chain.project(&own[..all], out);
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::capacity::with_capacity;
 use super::chain::{Chain, Joint, JointKind, MultibodyError, check};
+use super::forward::forward_dynamics;
 use super::parameters::{COLUMNS, column, inertia};
 use super::spatial::{Inertia, Motion, Symmetric3, Transform, Vector3, Wrench};
 use crate::scalar::{Mask, Real};
@@ -24,6 +25,10 @@ pub fn articulated_forward_dynamics<T: Real>(
     tau: &[T],
     qdd: &mut [T],
 ) -> Result<(), MultibodyError> {
+    if chain.has_followers() {
+        // A follower moves with a joint anywhere in the chain, which the recursion over free links does not cover.
+        return forward_dynamics(chain, parameters, q, qd, tau, qdd);
+    }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
     check("q", n, q.len())?;

@@ -4,7 +4,7 @@ use core::fmt;
 
 use heapless::Vec;
 
-use super::parameters::COLUMNS;
+use super::parameters::{COLUMNS, column};
 use super::spatial::{Motion, Transform, Vector3, Wrench};
 use crate::scalar::Real;
 
@@ -56,6 +56,13 @@ pub enum ChainError {
     },
     /// A component of gravity is infinite or NaN.
     GravityNotFinite,
+    /// A follower has no joint to follow, no place in the chain, or a ratio or an offset that is no number.
+    Follower {
+        /// The follower, from 0.
+        follower: usize,
+        /// `master`, `before`, `ratio`, `offset`, or a geometric parameter.
+        parameter: &'static str,
+    },
 }
 
 impl fmt::Display for ChainError {
@@ -72,6 +79,14 @@ impl fmt::Display for ChainError {
                 joint + 1
             ),
             Self::GravityNotFinite => write!(f, "Gravity must be three finite numbers."),
+            Self::Follower {
+                follower,
+                parameter,
+            } => write!(
+                f,
+                "Parameter {parameter} of follower {} is not possible.",
+                follower + 1
+            ),
         }
     }
 }
@@ -151,7 +166,7 @@ pub(super) struct Joint<T> {
 }
 
 impl<T: Real> Joint<T> {
-    fn new(geometry: &JointGeometry<f64>) -> Self {
+    pub(super) fn new(geometry: &JointGeometry<f64>) -> Self {
         let (sin_alpha, cos_alpha) = exact_quarters(geometry.alpha);
         let (sin_theta, cos_theta) = exact_quarters(geometry.theta);
         Self {
@@ -244,11 +259,104 @@ fn exact_quarters(angle: f64) -> (f64, f64) {
     }
 }
 
+/// An axis of the chain that a joint's drive turns too: its position is ratio·q + offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Follower {
+    /// Geometry, as that of a joint in the same place.
+    pub geometry: JointGeometry<f64>,
+    /// The joint (from 0) that the axis stands before; the number of joints for an axis beyond all of them. Followers in
+    /// the same place stand in their order.
+    pub before: usize,
+    /// The joint (from 0) that it follows.
+    pub master: usize,
+    /// Position per position of the joint: no unit, rad/m or m/rad.
+    pub ratio: f64,
+    /// Position at the joint's zero, rad or m.
+    pub offset: f64,
+}
+
+/// How an axis moves with the coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis<T> {
+    /// Row of its link's parameters.
+    pub(super) link: usize,
+    /// The joint that it is or follows.
+    pub(super) joint: usize,
+    pub(super) ratio: T,
+    pub(super) offset: T,
+    pub(super) follows: bool,
+}
+
+impl<T: Real> Axis<T> {
+    pub(super) fn joint(joint: usize) -> Self {
+        Self {
+            link: joint,
+            joint,
+            ratio: T::ONE,
+            offset: T::ZERO,
+            follows: false,
+        }
+    }
+
+    pub(super) fn follower(link: usize, follower: &Follower) -> Self {
+        Self {
+            link,
+            joint: follower.master,
+            ratio: T::from_f64(follower.ratio),
+            offset: T::from_f64(follower.offset),
+            follows: true,
+        }
+    }
+
+    /// Returns the number of columns that its link has: without those of a drive if it follows.
+    pub(super) fn columns(&self) -> usize {
+        if self.follows {
+            column::DRIVE_INERTIA
+        } else {
+            COLUMNS
+        }
+    }
+}
+
+/// How an axis moves: its position is ratio·q + offset of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisMotion<T> {
+    /// Row of its link's parameters.
+    pub link: usize,
+    /// The joint that it is or follows.
+    pub joint: usize,
+    /// 1 for a joint.
+    pub ratio: T,
+    /// 0 for a joint.
+    pub offset: T,
+    /// True if it is no joint.
+    pub follows: bool,
+}
+
 /// A serial chain: the geometry of its joints and gravity, without masses or friction.
+///
+/// An axis of the chain is a joint, or a [`Follower`] that the drive of a joint turns too.
 #[derive(Clone, Debug)]
 pub struct Chain<T> {
+    /// Axes from the base outwards: joints and followers.
     pub(super) joints: Vec<Joint<T>, MAX_JOINTS>,
     pub(super) gravity: Vector3<T>,
+    /// How each axis follows a joint; empty if every axis is a joint.
+    pub(super) axes: Vec<Axis<T>, MAX_JOINTS>,
+    /// Number of axes that follow.
+    pub(super) followers: usize,
+}
+
+/// Returns the first parameter that is not finite.
+fn not_finite(geometry: &JointGeometry<f64>) -> Option<&'static str> {
+    [
+        ("alpha", geometry.alpha),
+        ("a", geometry.a),
+        ("theta", geometry.theta),
+        ("d", geometry.d),
+    ]
+    .into_iter()
+    .find_map(|(parameter, value)| (!value.is_finite()).then_some(parameter))
 }
 
 impl<T: Real> Chain<T> {
@@ -266,18 +374,11 @@ impl<T: Real> Chain<T> {
         }
         let mut list = Vec::new();
         for (index, geometry) in joints.iter().enumerate() {
-            for (parameter, value) in [
-                ("alpha", geometry.alpha),
-                ("a", geometry.a),
-                ("theta", geometry.theta),
-                ("d", geometry.d),
-            ] {
-                if !value.is_finite() {
-                    return Err(ChainError::GeometryNotFinite {
-                        joint: index,
-                        parameter,
-                    });
-                }
+            if let Some(parameter) = not_finite(geometry) {
+                return Err(ChainError::GeometryNotFinite {
+                    joint: index,
+                    parameter,
+                });
             }
             list.push(Joint::new(geometry))
                 .map_err(|_| ChainError::TooManyJoints {
@@ -290,7 +391,73 @@ impl<T: Real> Chain<T> {
         Ok(Self {
             joints: list,
             gravity: Vector3(gravity.map(T::from_f64)),
+            axes: Vec::new(),
+            followers: 0,
         })
+    }
+
+    /// Builds a chain in which some drives turn several axes. Without followers it is [`Self::new`].
+    ///
+    /// # Errors
+    /// [`ChainError`] as [`Self::new`]; joints and followers together are at most [`MAX_JOINTS`]. A follower needs a
+    /// joint to follow, a place in the chain, a ratio other than 0 and finite numbers.
+    pub fn with_followers(
+        joints: &[JointGeometry<f64>],
+        followers: &[Follower],
+        gravity: [f64; 3],
+    ) -> Result<Self, ChainError> {
+        let mut chain = Self::new(joints, gravity)?;
+        for (index, follower) in followers.iter().enumerate() {
+            let wrong = [
+                ("master", follower.master >= joints.len()),
+                ("before", follower.before > joints.len()),
+                (
+                    "ratio",
+                    !follower.ratio.is_finite() || follower.ratio == 0.0,
+                ),
+                ("offset", !follower.offset.is_finite()),
+            ]
+            .into_iter()
+            .find_map(|(parameter, wrong)| wrong.then_some(parameter));
+            if let Some(parameter) = wrong.or_else(|| not_finite(&follower.geometry)) {
+                return Err(ChainError::Follower {
+                    follower: index,
+                    parameter,
+                });
+            }
+        }
+        if !followers.is_empty() {
+            chain.insert(joints, followers)?;
+        }
+        Ok(chain)
+    }
+
+    /// Puts the followers between the joints.
+    fn insert(
+        &mut self,
+        joints: &[JointGeometry<f64>],
+        followers: &[Follower],
+    ) -> Result<(), ChainError> {
+        let found = joints.len() + followers.len();
+        let mut list = Vec::new();
+        for place in 0..=joints.len() {
+            let mut push = |geometry: &JointGeometry<f64>, axis: Axis<T>| {
+                list.push(Joint::new(geometry))
+                    .and_then(|()| self.axes.push(axis).map_err(|_| Joint::new(geometry)))
+                    .map_err(|_| ChainError::TooManyJoints { found })
+            };
+            for (k, own) in followers.iter().enumerate() {
+                if own.before == place {
+                    push(&own.geometry, Axis::follower(joints.len() + k, own))?;
+                }
+            }
+            if let Some(joint) = joints.get(place) {
+                push(joint, Axis::joint(place))?;
+            }
+        }
+        self.joints = list;
+        self.followers = followers.len();
+        Ok(())
     }
 
     /// The same chain under another gravity, m/s² in the base frame (a tilted base, lane by lane if need be).
@@ -299,6 +466,8 @@ impl<T: Real> Chain<T> {
         Self {
             joints: self.joints.clone(),
             gravity: Vector3(gravity),
+            axes: self.axes.clone(),
+            followers: self.followers,
         }
     }
 
@@ -307,20 +476,71 @@ impl<T: Real> Chain<T> {
         self.gravity.0
     }
 
-    /// Number of joints n.
+    /// Number of joints n: of coordinates, each with a drive.
     #[inline(always)]
     pub fn joint_count(&self) -> usize {
+        self.joints.len() - self.followers
+    }
+
+    /// Number of links, joints and followers: of rows of parameters.
+    #[inline(always)]
+    pub fn link_count(&self) -> usize {
         self.joints.len()
     }
 
-    /// Number of parameters of the whole chain, 14·n.
+    /// Number of parameters of the whole chain, 14 for each link.
     #[inline(always)]
     pub fn parameter_count(&self) -> usize {
         COLUMNS * self.joints.len()
     }
 
-    /// How joint `index` (from 0) moves; `None` past the end.
+    /// How the axis of link `index` (from 0; followers after the joints) moves; `None` past the end.
     pub fn kind(&self, index: usize) -> Option<JointKind> {
-        self.joints.get(index).map(|joint| joint.kind)
+        let axis = self.axis_of_link(index);
+        self.joints.get(axis).map(|joint| joint.kind)
+    }
+
+    /// Returns true if some axis follows a joint.
+    #[inline(always)]
+    pub fn has_followers(&self) -> bool {
+        self.followers > 0
+    }
+
+    /// Returns the chain of all axes, each as a joint of its own.
+    #[must_use]
+    pub fn unfolded(&self) -> Self {
+        Self {
+            joints: self.joints.clone(),
+            gravity: self.gravity,
+            axes: Vec::new(),
+            followers: 0,
+        }
+    }
+
+    /// Returns for each axis, from the base outwards: its link, and the joint and ratio that it moves with.
+    pub fn axis_motions(&self) -> impl Iterator<Item = AxisMotion<T>> + '_ {
+        (0..self.joints.len()).map(|index| {
+            let axis = self.axes.get(index).copied();
+            let axis = axis.unwrap_or_else(|| Axis::joint(index));
+            AxisMotion {
+                link: axis.link,
+                joint: axis.joint,
+                ratio: axis.ratio,
+                offset: axis.offset,
+                follows: axis.follows,
+            }
+        })
+    }
+
+    /// Returns the axis, from the base outwards, that moves link `link`.
+    pub(super) fn axis_of_link(&self, link: usize) -> usize {
+        let found = self.axes.iter().position(|axis| axis.link == link);
+        found.unwrap_or(link)
+    }
+
+    /// Returns the link beyond all axes: the last joint's, or that of a follower behind it.
+    pub fn last_link(&self) -> usize {
+        let last = self.joints.len() - 1;
+        self.axes.last().map_or(last, |axis| axis.link)
     }
 }

@@ -25,7 +25,7 @@ pub fn velocity_coefficients<T: Real>(
     c: &mut [T],
 ) -> Result<(), MultibodyError> {
     let n = chain.joint_count();
-    check("parameters", n, parameters.len())?;
+    check("parameters", chain.link_count(), parameters.len())?;
     check("q", n, q.len())?;
     check("b", n * (n * (n - 1) / 2), b.len())?;
     check("c", n * n, c.len())?;

@@ -21,6 +21,9 @@ pub fn kinetic_energy_regressor<T: Real>(
     qd: &[T],
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
+    if chain.has_followers() {
+        return kinetic_of_axes(chain, q, qd, out);
+    }
     let n = chain.joint_count();
     check("q", n, q.len())?;
     check("qd", n, qd.len())?;
@@ -39,6 +42,9 @@ pub fn potential_energy_regressor<T: Real>(
     q: &[T],
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
+    if chain.has_followers() {
+        return potential_of_axes(chain, q, out);
+    }
     check("q", chain.joint_count(), q.len())?;
     check("out", chain.parameter_count(), out.len())?;
     out.fill(T::ZERO);
@@ -57,6 +63,9 @@ pub fn energy_regressor<T: Real>(
     qd: &[T],
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
+    if chain.has_followers() {
+        return energy_of_axes(chain, q, qd, out);
+    }
     kinetic_energy_regressor(chain, q, qd, out)?;
     add_potential(chain, q, out);
     Ok(())
@@ -97,6 +106,9 @@ pub fn power_regressor<T: Real>(
     qdd: &[T],
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
+    if chain.has_followers() {
+        return power_of_axes(chain, q, qd, qdd, out);
+    }
     let n = chain.joint_count();
     check("q", n, q.len())?;
     check("qd", n, qd.len())?;
@@ -132,6 +144,9 @@ pub fn kinetic_energy<T: Real>(
     q: &[T],
     qd: &[T],
 ) -> Result<T, MultibodyError> {
+    if chain.has_followers() {
+        return kinetic_energy_of_axes(chain, parameters, q, qd);
+    }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
     check("q", n, q.len())?;
@@ -156,6 +171,9 @@ pub fn potential_energy<T: Real>(
     parameters: &[[T; COLUMNS]],
     q: &[T],
 ) -> Result<T, MultibodyError> {
+    if chain.has_followers() {
+        return potential_energy_of_axes(chain, parameters, q);
+    }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
     check("q", n, q.len())?;
@@ -233,4 +251,108 @@ fn add_potential<T: Real>(chain: &Chain<T>, q: &[T], out: &mut [T]) {
             *entry -= value;
         }
     }
+}
+
+#[cold]
+#[inline(never)]
+fn kinetic_of_axes<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    qd: &[T],
+    out: &mut [T],
+) -> Result<(), MultibodyError> {
+    let (n, all) = (chain.joint_count(), chain.link_count());
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    let (q, qd) = (chain.positions(q), chain.rates(qd));
+    chain.arranged(out, |axes, wide| {
+        kinetic_energy_regressor(axes, &q[..all], &qd[..all], wide)
+    })
+}
+
+#[cold]
+#[inline(never)]
+fn potential_of_axes<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    out: &mut [T],
+) -> Result<(), MultibodyError> {
+    check("q", chain.joint_count(), q.len())?;
+    let (q, all) = (chain.positions(q), chain.link_count());
+    chain.arranged(out, |axes, wide| {
+        potential_energy_regressor(axes, &q[..all], wide)
+    })
+}
+
+#[cold]
+#[inline(never)]
+fn energy_of_axes<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    qd: &[T],
+    out: &mut [T],
+) -> Result<(), MultibodyError> {
+    let (n, all) = (chain.joint_count(), chain.link_count());
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    let (q, qd) = (chain.positions(q), chain.rates(qd));
+    chain.arranged(out, |axes, wide| {
+        energy_regressor(axes, &q[..all], &qd[..all], wide)
+    })
+}
+
+#[cold]
+#[inline(never)]
+fn power_of_axes<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    qd: &[T],
+    qdd: &[T],
+    out: &mut [T],
+) -> Result<(), MultibodyError> {
+    let (n, all) = (chain.joint_count(), chain.link_count());
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    check("qdd", n, qdd.len())?;
+    let (q, qd, qdd) = (chain.positions(q), chain.rates(qd), chain.rates(qdd));
+    chain.arranged(out, |axes, wide| {
+        power_regressor(axes, &q[..all], &qd[..all], &qdd[..all], wide)
+    })
+}
+
+#[cold]
+#[inline(never)]
+fn kinetic_energy_of_axes<T: Real>(
+    chain: &Chain<T>,
+    parameters: &[[T; COLUMNS]],
+    q: &[T],
+    qd: &[T],
+) -> Result<T, MultibodyError> {
+    let (n, all) = (chain.joint_count(), chain.link_count());
+    check("parameters", all, parameters.len())?;
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    kinetic_energy(
+        &chain.unfolded(),
+        &chain.rows(parameters)[..all],
+        &chain.positions(q)[..all],
+        &chain.rates(qd)[..all],
+    )
+}
+
+#[cold]
+#[inline(never)]
+fn potential_energy_of_axes<T: Real>(
+    chain: &Chain<T>,
+    parameters: &[[T; COLUMNS]],
+    q: &[T],
+) -> Result<T, MultibodyError> {
+    let all = chain.link_count();
+    check("parameters", all, parameters.len())?;
+    check("q", chain.joint_count(), q.len())?;
+    potential_energy(
+        &chain.unfolded(),
+        &chain.rows(parameters)[..all],
+        &chain.positions(q)[..all],
+    )
 }

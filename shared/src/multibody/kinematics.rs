@@ -1,6 +1,6 @@
 //! Pose of a frame of a link, and its derivatives by the joint positions.
 
-use super::chain::{Chain, JointKind, MultibodyError, check};
+use super::chain::{Chain, JointKind, MAX_JOINTS, MultibodyError, check};
 use super::spatial::Vector3;
 use crate::scalar::Real;
 
@@ -18,6 +18,9 @@ pub fn point_position<T: Real>(
     point: [T; 3],
     jacobian: &mut [[T; 3]],
 ) -> Result<[T; 3], MultibodyError> {
+    if chain.has_followers() {
+        return point_behind_followers(chain, q, link, point, jacobian);
+    }
     check_link(chain, q, link, jacobian.len())?;
     jacobian.fill([T::ZERO; 3]);
     let mut place = Vector3(point);
@@ -82,6 +85,9 @@ pub fn frame_pose<T: Real>(
     fixed: &Pose<T>,
     jacobian: &mut [[T; 6]],
 ) -> Result<Pose<T>, MultibodyError> {
+    if chain.has_followers() {
+        return pose_behind_followers(chain, q, link, fixed, jacobian);
+    }
     check_link(chain, q, link, jacobian.len())?;
     jacobian.fill([T::ZERO; 6]);
     let z = Vector3([T::ZERO, T::ZERO, T::ONE]);
@@ -117,6 +123,76 @@ pub fn frame_pose<T: Real>(
 fn six<T: Copy>(linear: Vector3<T>, angular: Vector3<T>) -> [T; 6] {
     let ([x, y, z], [a, b, c]) = (linear.0, angular.0);
     [x, y, z, a, b, c]
+}
+
+/// Checks the arguments of a pose of link `link`, and returns its axis.
+fn axis_checked<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    link: usize,
+    jacobian: usize,
+) -> Result<usize, MultibodyError> {
+    let n = chain.joint_count();
+    check("q", n, q.len())?;
+    check("jacobian", n, jacobian)?;
+    if link >= chain.link_count() {
+        return Err(MultibodyError::WrongLength {
+            argument: "q",
+            expected: link + 1,
+            found: n,
+        });
+    }
+    Ok(chain.axis_of_link(link))
+}
+
+/// Adds the columns of a Jacobian over the axes to those of the joints that they follow.
+fn project_jacobian<T: Real, const N: usize>(
+    chain: &Chain<T>,
+    of_axes: &[[T; N]],
+    jacobian: &mut [[T; N]],
+) {
+    jacobian.fill([T::ZERO; N]);
+    for (column, axis) in of_axes.iter().zip(&chain.axes) {
+        for (to, value) in jacobian[axis.joint].iter_mut().zip(column) {
+            *to += axis.ratio * *value;
+        }
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn point_behind_followers<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    link: usize,
+    point: [T; 3],
+    jacobian: &mut [[T; 3]],
+) -> Result<[T; 3], MultibodyError> {
+    let axis = axis_checked(chain, q, link, jacobian.len())?;
+    let all = chain.link_count();
+    let mut own = [[T::ZERO; 3]; MAX_JOINTS];
+    let (axes, q) = (chain.unfolded(), chain.positions(q));
+    let place = point_position(&axes, &q[..all], axis, point, &mut own[..all])?;
+    project_jacobian(chain, &own, jacobian);
+    Ok(place)
+}
+
+#[cold]
+#[inline(never)]
+fn pose_behind_followers<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    link: usize,
+    fixed: &Pose<T>,
+    jacobian: &mut [[T; 6]],
+) -> Result<Pose<T>, MultibodyError> {
+    let axis = axis_checked(chain, q, link, jacobian.len())?;
+    let all = chain.link_count();
+    let mut own = [[T::ZERO; 6]; MAX_JOINTS];
+    let (axes, q) = (chain.unfolded(), chain.positions(q));
+    let pose = frame_pose(&axes, &q[..all], axis, fixed, &mut own[..all])?;
+    project_jacobian(chain, &own, jacobian);
+    Ok(pose)
 }
 
 #[cfg(test)]

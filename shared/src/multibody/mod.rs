@@ -15,6 +15,9 @@
 //! [`articulated_forward_dynamics`], which stop if some lane's inertia is not positive. [`block`] holds the functions
 //! that recordings use repeatedly, for blocks of samples.
 //!
+//! One drive may turn several axes ([`Follower`]). Parameters and columns are then 14 for each link: those of the joints,
+//! followed by those of the followers.
+//!
 //! Leaves out: elasticity of links and joints, closed loops, coupling between drives, the gyroscopic torque of the
 //! rotors (their inertia acts only along its own joint), external forces on the links, and friction other than Coulomb
 //! and viscous. At q̇ = 0 Coulomb friction is 0 instead of the set of torques that hold the joint.
@@ -33,6 +36,7 @@ mod inverse;
 mod kinematics;
 mod momentum;
 mod parameters;
+mod projection;
 mod regressor;
 mod spatial;
 
@@ -50,7 +54,9 @@ mod wrench;
 
 pub use adjoint::regressor_gradient;
 pub use articulated::articulated_forward_dynamics;
-pub use chain::{Chain, ChainError, JointGeometry, JointKind, MAX_JOINTS, MultibodyError};
+pub use chain::{
+    AxisMotion, Chain, ChainError, Follower, JointGeometry, JointKind, MAX_JOINTS, MultibodyError,
+};
 pub use coefficients::{pair_column, velocity_coefficients};
 pub use coriolis::coriolis_matrix;
 pub use energy::{
