@@ -1,10 +1,14 @@
 //! Reasons why results cannot be compared.
 
 use rig_identify::IdentifyError;
+use rig_model::robot::RobotError;
 
 /// Reasons why results cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
+    /// The robot has axes that follow a joint.
+    #[error(transparent)]
+    Robot(#[from] Box<RobotError>),
     /// Fewer than two sets.
     #[error("{0} set of recordings cannot be compared with itself; give at least two.")]
     TooFew(usize),

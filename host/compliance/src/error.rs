@@ -1,10 +1,14 @@
 //! Reasons why a stiffness or a compliance cannot be computed.
 
 use rig_data::prepare::PrepareError;
+use rig_model::robot::RobotError;
 
 /// Reasons why a stiffness or a compliance cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum ComplianceError {
+    /// The robot has axes that follow a joint.
+    #[error(transparent)]
+    Robot(#[from] Box<RobotError>),
     /// Reading a recording failed.
     #[error(transparent)]
     Prepare(#[from] PrepareError),

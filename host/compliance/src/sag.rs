@@ -6,7 +6,7 @@
 //! radian.
 
 use rig_output::{format_significant, format_unit};
-use rig_shared::multibody::{Chain, gravity_vector};
+use rig_shared::multibody::gravity_vector;
 use rig_shared::transmission::DriveKind;
 
 use crate::drives::{listed_pose, loaded};
@@ -77,7 +77,7 @@ fn turns(
 ) -> Result<Vec<f64>, ComplianceError> {
     let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
     let (n, robot) = (tool.count(), tool.robot());
-    let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+    let chain = robot.chain().map_err(|e| wrong(&e))?;
     let mut weight = vec![0.0; n];
     gravity_vector(&chain, &loaded(robot)?, pose, &mut weight).map_err(|e| wrong(&e))?;
     let inverse = tool.drives().inverse(pose)?;

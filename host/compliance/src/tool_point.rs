@@ -83,7 +83,11 @@ impl<'a> ToolPoint<'a> {
     /// # Errors
     /// [`ComplianceError::Model`].
     pub fn new(robot: &'a Robot, offset: [f64; 3]) -> Result<Self, ComplianceError> {
-        let chain = Chain::new(&robot.geometry(), robot.gravity)
+        robot
+            .without_followers("The compliance")
+            .map_err(Box::new)?;
+        let chain = robot
+            .chain()
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
         let flange = &robot.flange_pose();
         let place = flange * nalgebra::Translation3::from(Vector3::from(offset));

@@ -2,12 +2,16 @@
 
 use rig_data::DataError;
 use rig_identify::IdentifyError;
+use rig_model::robot::RobotError;
 use rig_model::simulate::SimulateError;
 use rig_shared::control::arm::ControlFault;
 
 /// Reason why a closed loop cannot be simulated or evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
+    /// The robot has axes that follow a joint.
+    #[error(transparent)]
+    Robot(#[from] Box<RobotError>),
     /// The simulation of the robot.
     #[error(transparent)]
     Simulate(#[from] SimulateError),

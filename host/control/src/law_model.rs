@@ -39,6 +39,9 @@ impl LawModel {
     /// # Errors
     /// [`ControlError::Simulate`] if it is no valid chain.
     pub fn of(robot: &Robot) -> Result<Self, ControlError> {
+        robot
+            .without_followers("The simulation of control laws")
+            .map_err(Box::new)?;
         let Model {
             chain,
             parameters,

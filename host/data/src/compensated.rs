@@ -258,7 +258,7 @@ impl Compensated<'_> {
             beside,
         } = scratch;
         let placed = self.effects.placed();
-        for (j, p) in self.effects.standard().iter().enumerate() {
+        for (j, p) in self.effects.standard().iter().take(at.qd.len()).enumerate() {
             sum[j] = 0.0;
             slid[j] = at.qd[j].sgn();
             behind[j] = at.drive[j]

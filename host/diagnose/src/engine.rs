@@ -54,6 +54,7 @@ pub fn diagnose(
     options: &Options,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Diagnosis, Robot), DiagnoseError> {
+    robot.without_followers("The diagnosis").map_err(Box::new)?;
     if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }

@@ -1,10 +1,14 @@
 //! Reasons why a diagnosis is not possible.
 
 use rig_data::prepare::PrepareError;
+use rig_model::robot::RobotError;
 
 /// Reasons why a diagnosis is not possible.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
+    /// The robot has axes that follow a joint.
+    #[error(transparent)]
+    Robot(#[from] Box<RobotError>),
     /// Reading or preparing has failed.
     #[error(transparent)]
     Prepare(#[from] PrepareError),

@@ -263,8 +263,8 @@ pub(super) fn named(joints: &[&str]) -> String {
 
 /// Returns the prior parameters if every link has its own; otherwise the name of the first joint without.
 pub(super) fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>, String> {
-    match robot.joints.iter().find(|j| j.inertial.is_none()) {
-        Some(joint) => Err(joint.name.clone()),
+    match (0..robot.link_count()).find(|link| robot.link_inertial(*link).is_none()) {
+        Some(link) => Err(robot.link_name(link).to_owned()),
         None => Ok(model.parameters.clone()),
     }
 }

@@ -61,11 +61,11 @@ fn motors_at(
     Ok(out)
 }
 
-/// Returns the entry of base column `c` in the row of joint `j`; the motors' columns follow the joints'.
-fn entry(own: &[f64], motors: &[f64], n: usize, j: usize, c: usize) -> f64 {
-    match c.checked_sub(n * COLUMNS) {
+/// Returns the entry of base column `c` in the row of joint `j`; the motors' columns follow the `width` of the links.
+fn entry(own: &[f64], motors: &[f64], [n, width]: [usize; 2], j: usize, c: usize) -> f64 {
+    match c.checked_sub(width) {
         Some(m) => motors[j * n * MOTOR_COLUMNS + m],
-        None => own[j * n * COLUMNS + c],
+        None => own[j * width + c],
     }
 }
 
@@ -89,11 +89,12 @@ impl Frame {
         }
         let [q, qd, qdd] = state;
         let n = q.len();
-        let mut own = vec![0.0; n * n * COLUMNS];
+        let width = self.plain.parameter_count();
+        let mut own = vec![0.0; n * width];
         differential_regressor(&self.plain, q, qd, qdd, &mut own)?;
         let motors = motors_at(self.drives.as_ref(), q, qd, qdd)?;
         Ok(DMatrix::from_fn(n, columns.len(), |j, c| {
-            entry(&own, &motors, n, j, columns[c])
+            entry(&own, &motors, [n, width], j, columns[c])
         }))
     }
 }

@@ -214,8 +214,7 @@ pub(super) fn search(
     options: &Options,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<(Candidate, Vec<f64>, Effort), ExciteError> {
-    let enclosing =
-        Chain::<Interval>::new(&robot.geometry(), robot.gravity).map_err(SimulateError::from)?;
+    let enclosing = robot.chain::<Interval>().map_err(SimulateError::from)?;
     let starts = options.starts as usize;
     let finalists = (starts / FINALIST_SHARE).max(LEAST_FINALISTS).min(starts);
     let threads = options

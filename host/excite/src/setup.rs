@@ -1,6 +1,6 @@
 //! The data common to all starts of a design, from robot and options.
 
-use rig_shared::multibody::{COLUMNS, Chain, INERTIAL_PARAMETERS, column};
+use rig_shared::multibody::{COLUMNS, INERTIAL_PARAMETERS, column};
 
 use crate::bounds::{Bounds, Room, bounds_of, named, prior};
 use crate::drives::{Combined, Drives};
@@ -136,7 +136,7 @@ fn identify(
     options: &Options,
     frame: &mut Frame,
 ) -> Result<(Vec<String>, Option<String>), ExciteError> {
-    let own = robot.joints.len() * COLUMNS;
+    let own = robot.link_count() * COLUMNS;
     frame.weights = weights_of(robot, options, &frame.bounds)?;
     if options.parameters == Parameters::Load {
         return identify_load(robot, options, frame);
@@ -164,7 +164,7 @@ fn identify_load(
             frame.weights = vec![force, force, force, moment, moment, moment];
             0
         }
-        None => (robot.joints.len() - 1) * COLUMNS,
+        None => robot.last_link() * COLUMNS,
     };
     frame.columns = (first..first + INERTIAL_PARAMETERS).collect();
     let is_independent = independent(frame)?;
@@ -242,7 +242,7 @@ pub(super) fn frame_of(
         notes.push("The torque limits of [joint.drive.limits] were not checked: not every joint has [joint.inertial], so the torques are not known beforehand.".to_owned());
     }
     let mut frame = Frame {
-        lanes: Chain::new(&robot.geometry(), robot.gravity).map_err(SimulateError::from)?,
+        lanes: robot.chain().map_err(SimulateError::from)?,
         planes: planes_of(robot),
         plain: model.chain,
         columns: Vec::new(),

@@ -3,7 +3,7 @@
 use rig_shared::multibody::JointKind;
 
 use super::interval::Interval;
-use rig_model::robot::Robot;
+use rig_model::robot::{self, Robot};
 
 /// A half-space in which a point of a link must stay.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,8 +18,51 @@ pub(super) struct Plane {
     pub least: f64,
     /// Upper bound of the distance between the point and the base frame's origin, m: the unit of violations.
     pub reach: f64,
-    /// For each joint up to the link: its kind, and the absolute values of its link lengths a and d, m.
-    segments: Vec<(JointKind, f64, f64)>,
+    /// One for each axis up to the link.
+    segments: Vec<Segment>,
+}
+
+/// An axis with the lengths of its link.
+#[derive(Clone, Debug, PartialEq)]
+struct Segment {
+    kind: JointKind,
+    /// Absolute values of a and d, m.
+    across: f64,
+    along: f64,
+    /// The joint that it is or follows.
+    joint: usize,
+    /// Absolute values of its position per position of the joint, and at the joint's zero.
+    ratio: f64,
+    offset: f64,
+}
+
+impl Segment {
+    /// Returns the axis of link `link`; `None` if it follows an unknown joint, which the loader refuses.
+    fn of(robot: &Robot, link: usize) -> Option<Self> {
+        let own = robot.link_as_joint(link)?;
+        let follower = (link.checked_sub(robot.joints.len())).map(|k| &robot.followers[k]);
+        Some(Self {
+            kind: match own.kind {
+                robot::JointKind::Revolute => JointKind::Revolute,
+                robot::JointKind::Prismatic => JointKind::Prismatic,
+            },
+            across: own.a.abs(),
+            along: own.d.abs(),
+            joint: robot.joint_of_link(link)?,
+            ratio: follower.map_or(1.0, |own| own.ratio.abs()),
+            offset: follower.map_or(0.0, |own| own.offset.abs()),
+        })
+    }
+
+    /// Returns the largest length for positions of the joint up to `position` from zero, m.
+    fn length(&self, position: f64) -> f64 {
+        match self.kind {
+            JointKind::Revolute => self.across.hypot(self.along),
+            JointKind::Prismatic => {
+                (self.across).hypot(self.along + self.ratio * position + self.offset)
+            }
+        }
+    }
 }
 
 impl Plane {
@@ -36,18 +79,17 @@ impl Plane {
     pub(super) fn acceleration_bound(&self, state: &[[Interval; 3]]) -> f64 {
         let (mut turning, mut swinging, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64);
         let around = |length: f64, w: f64, a: f64| length * (a + 1.5 * w * w);
-        for ((kind, across, along), [q, qd, qdd]) in self.segments.iter().zip(state) {
-            let (speed, change) = (qd.magnitude(), qdd.magnitude());
-            match kind {
+        for segment in &self.segments {
+            let [q, qd, qdd] = &state[segment.joint];
+            let speed = segment.ratio * qd.magnitude();
+            let change = segment.ratio * qdd.magnitude();
+            sum += around(segment.length(q.magnitude()), turning, swinging);
+            match segment.kind {
                 JointKind::Revolute => {
-                    sum += around(across.hypot(*along), turning, swinging);
                     turning += speed;
                     swinging += change;
                 }
-                JointKind::Prismatic => {
-                    let length = across.hypot(along + q.magnitude());
-                    sum += around(length, turning, swinging) + 2.0 * turning * speed + change;
-                }
+                JointKind::Prismatic => sum += 2.0 * turning * speed + change,
             }
         }
         let [x, y, z] = self.point;
@@ -57,16 +99,16 @@ impl Plane {
 
 /// Returns the planes of all regions of a robot.
 pub(super) fn planes_of(robot: &Robot) -> Vec<Plane> {
-    let geometry = robot.geometry();
     let mut planes = Vec::new();
     for region in &robot.workspace {
         // The loader has rejected unknown names.
         let Some(link) = robot.joint_index(&region.joint) else {
             continue;
         };
-        let segments: Vec<_> = geometry[..=link]
-            .iter()
-            .map(|g| (g.kind, g.a.abs(), g.d.abs()))
+        let order = robot.links_outwards();
+        let before = order.iter().take_while(|own| **own != link).copied();
+        let segments: Vec<Segment> = (before.chain([link]))
+            .filter_map(|link| Segment::of(robot, link))
             .collect();
         let [x, y, z] = region.point;
         let travel = |j: usize| {
@@ -76,11 +118,7 @@ pub(super) fn planes_of(robot: &Robot) -> Vec<Plane> {
         let reach = x.hypot(y).hypot(z)
             + segments
                 .iter()
-                .enumerate()
-                .map(|(j, (kind, across, along))| match kind {
-                    JointKind::Revolute => across.hypot(*along),
-                    JointKind::Prismatic => across.hypot(along + travel(j)),
-                })
+                .map(|own| own.length(travel(own.joint)))
                 .sum::<f64>();
         let mut add = |normal: [f64; 3], least: f64| {
             if least.is_finite() {

@@ -37,7 +37,7 @@ impl WristChain {
     /// Adds the six joints to those of a robot.
     ///
     /// # Errors
-    /// [`ChainError::TooManyJoints`] if the robot has more than ten.
+    /// [`ChainError::TooManyJoints`] if the robot has more than ten axes.
     pub(super) fn of(robot: &Robot, sensor: &WristSensor) -> Result<Self, ChainError> {
         let at = (robot.flange_pose() * sensor.pose()).translation;
         let joint = |kind, alpha, theta, d| JointGeometry {
@@ -59,8 +59,8 @@ impl WristChain {
         ]);
         Ok(Self {
             joints: robot.joints.len(),
-            lanes: Chain::new(&joints, robot.gravity)?,
-            plain: Chain::new(&joints, robot.gravity)?,
+            lanes: Chain::with_followers(&joints, &robot.follower_axes(), robot.gravity)?,
+            plain: Chain::with_followers(&joints, &robot.follower_axes(), robot.gravity)?,
         })
     }
 
@@ -88,7 +88,7 @@ impl WristChain {
         weights: &[L; AXES * INERTIAL_PARAMETERS],
     ) -> Result<[Vec<L>; 3], ExciteError> {
         let count = self.joints + AXES;
-        let width = count * COLUMNS;
+        let width = self.plain.parameter_count();
         let mut entries = vec![L::ZERO; count * width];
         for (own, held_by) in weights.chunks_exact(INERTIAL_PARAMETERS).zip(HELD_BY) {
             let start = (self.joints + held_by) * width + (count - 1) * COLUMNS;

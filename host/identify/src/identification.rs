@@ -140,6 +140,8 @@ pub struct Details {
     pub free: Vec<[f64; 3]>,
     /// K in identified values = K·π, with π the 14 standard parameters of each joint; rows as `base_parameters`.
     pub combination: nalgebra::DMatrix<f64>,
+    /// Number of links, each with 14 standard columns.
+    pub links: usize,
     /// Standard column that represents each base parameter.
     pub columns: Vec<usize>,
     /// Residuals of the training recordings by joint (torque, differential form).

@@ -2,10 +2,14 @@
 
 use rig_data::prepare::PrepareError;
 use rig_identify::IdentifyError;
+use rig_model::robot::RobotError;
 
 /// Reasons why a load cannot be identified.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
+    /// The robot has axes that follow a joint.
+    #[error(transparent)]
+    Robot(#[from] Box<RobotError>),
     /// Reading or preparing a recording failed.
     #[error(transparent)]
     Prepare(#[from] PrepareError),

@@ -48,6 +48,9 @@ pub fn identify_load(
     without: &[&dyn Recording],
     options: &LoadOptions,
 ) -> Result<LoadIdentification, LoadError> {
+    robot
+        .without_followers("The identification of a load")
+        .map_err(Box::new)?;
     let to_joint = parameters_from(&robot.flange_pose());
     let chain = chain_of(robot)?;
     let mut warnings = Vec::new();

@@ -13,7 +13,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let robot = Robot::from_toml(TX40, "tx40.toml".as_ref())?;
-//! let chain = Chain::new(&robot.geometry(), robot.gravity)?;
+//! let chain = robot.chain()?;
 //! // In f64; a ModelBatch<f32> takes signals of f32.
 //! let model: ModelBatch = ModelBatch::new(&chain, &robot.standard_parameters())?;
 //! let still = vec![vec![0.0; 1000]; 6];

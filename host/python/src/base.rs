@@ -57,7 +57,7 @@ impl BaseParameters {
         self.base.columns.clone()
     }
 
-    /// K in beta = K @ pi, shape (rank, 14 * joints), or (rank, 17 * joints) with coupled drives.
+    /// K in beta = K @ pi, shape (rank, 14 * links), or (rank, 17 * joints) with coupled drives.
     ///
     /// ``pi`` holds the standard parameters of the joints; with coupled drives the 3 parameters of each motor follow.
     #[getter]

@@ -207,9 +207,9 @@ impl Kernel for Regressor<'_> {
         };
         self.batch
             .differential_regressor(q, qd, qdd, &mut self.block)?;
-        let width = n * COLUMNS;
+        let width = self.batch.link_count() * COLUMNS;
         for joint in 0..n {
-            for c in (0..width).filter(|c| !RegressorBlock::is_zero(joint, *c)) {
+            for c in (0..width).filter(|c| !self.batch.is_zero(joint, *c)) {
                 let column = self.block.column(joint, c);
                 for (sample, value) in out.chunks_exact_mut(n * width).zip(column) {
                     sample[joint * width + c] = *value;
@@ -330,8 +330,10 @@ pub(crate) fn regressor(
     wanted: usize,
 ) -> Result<Vec<f64>, BatchError> {
     let n = batch.joint_count();
-    over_rows(&signals, n * n * COLUMNS, wanted, || Regressor {
-        batch,
-        block: batch.block(ROWS),
+    over_rows(&signals, n * batch.link_count() * COLUMNS, wanted, || {
+        Regressor {
+            batch,
+            block: batch.block(ROWS),
+        }
     })
 }

@@ -8,7 +8,7 @@ use pyo3::types::{PySlice, PyType};
 use rig::commands::{CommandError, refuse_file};
 use rig_identify::{chain_of, column_name, unit};
 use rig_model::batch::{BatchError, ChainBatch, ModelBatch};
-use rig_model::robot::{self, Description, JointKind};
+use rig_model::robot::{self, Description};
 use rig_output::write_whole;
 use rig_shared::multibody::COLUMNS;
 
@@ -186,7 +186,7 @@ impl Robot {
         effects.map(robot::RobotEffect::title).collect()
     }
 
-    /// The standard parameters, shape (joints, 14): m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz, Ia, fv, fc, off.
+    /// The standard parameters, shape (links, 14), the links of the joints before those of followers: m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz, Ia, fv, fc, off.
     ///
     /// Inertia is about the origin of the joint's frame (modified Denavit-Hartenberg); 0 for values that are not stated.
     #[getter]
@@ -195,17 +195,19 @@ impl Robot {
         shaped(py, rows.concat(), vec![rows.len(), COLUMNS])
     }
 
-    /// Names of the columns of :meth:`regressor`, with the number of the joint: 14 * joints names.
+    /// Names of the columns of :meth:`regressor`, with the number of the link: 14 * links names.
     #[getter]
     fn parameter_names(&self) -> Vec<String> {
-        let n = self.joint_count();
-        (0..n * COLUMNS).map(|c| column_name(c, n)).collect()
+        let links = self.robot().link_count();
+        (0..links * COLUMNS)
+            .map(|c| column_name(c, links))
+            .collect()
     }
 
-    /// Units of the columns of :meth:`regressor`, ASCII: 14 * joints units.
+    /// Units of the columns of :meth:`regressor`, ASCII: 14 * links units.
     #[getter]
     fn parameter_units(&self) -> Vec<&'static str> {
-        let kinds: Vec<JointKind> = self.robot().joints.iter().map(|joint| joint.kind).collect();
+        let kinds = self.robot().link_kinds();
         let drives = self.robot().drive_kinds();
         (0..kinds.len() * COLUMNS)
             .map(|c| unit(c, &kinds, &drives))
@@ -357,7 +359,7 @@ impl Robot {
         array(py, out, &q, &[q.joints()])
     }
 
-    /// Return the regressor Y with tau = Y @ parameters.ravel(), shape (n, joints, 14 * joints).
+    /// Return the regressor Y with tau = Y @ parameters.ravel(), shape (n, joints, 14 * links).
     ///
     /// :attr:`parameter_names` and :attr:`parameter_units` describe the columns.
     #[pyo3(signature = (q, qd, qdd, *, threads = 0))]
@@ -374,7 +376,8 @@ impl Robot {
         let out = py
             .detach(|| dynamics::regressor(&self.batch, signals, threads))
             .map_err(failed)?;
-        array(py, out, &q, &[q.joints(), q.joints() * COLUMNS])
+        let columns = self.robot().link_count() * COLUMNS;
+        array(py, out, &q, &[q.joints(), columns])
     }
 
     fn __repr__(&self) -> String {

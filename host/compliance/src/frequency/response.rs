@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use rig_model::robot::{JointKind, Robot};
 use rig_output::format_significant;
-use rig_shared::multibody::{Chain, column, gravity_vector, inertia_matrix};
+use rig_shared::multibody::{column, gravity_vector, inertia_matrix};
 use rig_shared::transmission::DriveKind;
 use serde::Serialize;
 
@@ -338,7 +338,7 @@ fn within(
 fn described(robot: &Robot, pose: &[f64], k: usize) -> Result<Described, ComplianceError> {
     let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
     let n = robot.joints.len();
-    let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+    let chain = robot.chain().map_err(|e| wrong(&e))?;
     let mut rows = loaded(robot)?;
     let motor = rows[k][column::DRIVE_INERTIA];
     for row in &mut rows {

@@ -13,7 +13,7 @@
 
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit};
-use rig_shared::multibody::{Chain, gravity_vector};
+use rig_shared::multibody::gravity_vector;
 use rig_shared::transmission::DriveKind;
 
 use super::fit::{Fit, Row, fit, shows};
@@ -258,7 +258,8 @@ impl Series {
                 signals.label
             )));
         }
-        let chain = Chain::new(&tool.robot().geometry(), tool.robot().gravity)
+        let chain = (tool.robot())
+            .chain()
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
         let parameters = loaded(tool.robot())?;
         let count = q.first().map_or(0, Vec::len);

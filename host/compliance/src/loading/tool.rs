@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use rig_model::robot::Robot;
 use rig_output::format_significant;
-use rig_shared::multibody::{Chain, gravity_vector};
+use rig_shared::multibody::gravity_vector;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::advice::advice;
@@ -270,7 +270,7 @@ fn loads(
 ) -> Result<(Vec<Vec<f64>>, Vec<f64>), ComplianceError> {
     let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
     let (n, robot) = (tool.count(), tool.robot());
-    let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+    let chain = robot.chain().map_err(|e| wrong(&e))?;
     let parameters = loaded(robot)?;
     let weight = |q: &[f64]| {
         let mut torque = vec![0.0; n];

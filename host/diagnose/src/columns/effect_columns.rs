@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
 use rig_shared::effects::{Channel, Effect, GAINS, Instant, Kind, Parameter, SHAPES, Scale};
-use rig_shared::multibody::{COLUMNS, Chain, column};
+use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::scalar::Real as _;
 
 use crate::DiagnoseError;
@@ -382,7 +382,7 @@ impl Source<'_> {
         let axes = self.nominal.tilt_axes();
         // Gravity turns opposite to the base, and the torque is linear in gravity.
         let fields = (axes.iter()).map(|axis| gravity.cross(&Vector3::from(*axis)).into());
-        let chain = Chain::new(&self.robot.geometry(), gravity.into()).map_err(|e| failed(&e))?;
+        let chain = self.robot.chain().map_err(|e| failed(&e))?;
         let mut tilted = FieldTorque::new(&chain, fields, parameters);
         let mut columns: Vec<Column> = vec![vec![Some(Vec::new()); n]; axes.len()];
         for k in 0..run.len() {

@@ -172,7 +172,7 @@ impl DescribedEffects {
         }
         let failed = |e: &dyn std::fmt::Display| DiagnoseError::Model(e.to_string());
         let effects = Effects::of(&robot).map_err(|e| failed(&e))?;
-        let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| failed(&e))?;
+        let chain = robot.chain().map_err(|e| failed(&e))?;
         Ok(Some((effects, chain)))
     }
 

@@ -96,6 +96,9 @@ pub fn faults_at_start(
     source: &Source,
     rows: usize,
 ) -> Result<Vec<DataFault>, DiagnoseError> {
+    robot
+        .without_followers("The search for faults of the data")
+        .map_err(Box::new)?;
     let sampling = source.sampling();
     let rate = 1.0 / sampling.period;
     let Some(low_pass) = LowPass::butterworth(4, f64::min(BAND, 0.2 * rate), rate) else {

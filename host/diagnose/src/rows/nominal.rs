@@ -7,7 +7,7 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 use crate::DiagnoseError;
 use rig_data::runs::Run;
 use rig_identify::{Base, ModelKind, chain_of, transmission_of};
-use rig_model::batch::{BLOCK, ChainBatch, RegressorBlock};
+use rig_model::batch::{BLOCK, ChainBatch};
 use rig_model::robot::{JointKind, Robot};
 
 /// Sine of the angle below which two directions are parallel.
@@ -132,7 +132,7 @@ impl Nominal {
         let wanted: Vec<(usize, usize, usize)> = (self.base.columns.iter().enumerate())
             .filter(|(_, c)| **c < standard)
             .flat_map(|(k, &c)| (0..n).map(move |j| (k, j, c)))
-            .filter(|&(_, j, c)| !RegressorBlock::is_zero(j, c))
+            .filter(|&(_, j, c)| !self.batch.is_zero(j, c))
             .collect();
         let mut values = vec![Vec::with_capacity(samples); wanted.len()];
         let mut block = self.batch.block(BLOCK);

@@ -1,6 +1,6 @@
 //! Known values of a voltage-driven joint, and its nominal parameters.
 
-use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector};
+use rig_shared::multibody::{COLUMNS, column, gravity_vector};
 
 use crate::DiagnoseError;
 use rig_model::robot::{JointKind, Robot};
@@ -73,7 +73,7 @@ impl Plant {
             return Err(Unfit::Joints(robot.joints.len()).into());
         };
         let wrong = |error: &dyn std::fmt::Display| DiagnoseError::Model(error.to_string());
-        let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+        let chain = robot.chain().map_err(|e| wrong(&e))?;
         let mut row = [0.0; COLUMNS];
         if let Some(inertial) = &joint.inertial {
             row[column::MASS] = inertial.mass;

@@ -34,6 +34,9 @@ pub fn diagnose_voltage(
     options: &Options,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Diagnosis, Robot), DiagnoseError> {
+    robot
+        .without_followers("The diagnosis by motor voltage")
+        .map_err(Box::new)?;
     if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }

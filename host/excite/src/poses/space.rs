@@ -86,8 +86,7 @@ impl<'a> Space<'a> {
 
     /// Returns the pose at joint positions.
     pub(super) fn pose(&self, q: Vec<f64>) -> Pose {
-        let joints = self.robot.joints.iter().zip(&q);
-        let last = joints.fold(Isometry3::identity(), |at, (joint, q)| at * joint.pose(*q));
+        let last = self.robot.last_pose(&q);
         let gravity = (last * self.sensor).rotation.inverse() * Vector3::from(self.robot.gravity);
         Pose { q, gravity }
     }

@@ -31,7 +31,7 @@ impl Problem<'_> {
     fn fill_torque_rows(&mut self) -> Result<(), ExciteError> {
         let n = self.joints();
         let frame = self.frame;
-        let width = n * COLUMNS;
+        let width = frame.plain.parameter_count();
         for s in (0..self.basis.whole).step_by(LANES) {
             let [q, qd, qdd] = [0, 1, 2].map(|order| self.state(order, s));
             differential_regressor(&frame.lanes, &q, &qd, &qdd, &mut self.out)?;

@@ -49,6 +49,8 @@ impl<'a> Problem<'a> {
         let limited = frame.drives.as_ref().map_or(0, |d| d.limits.len());
         let first: Vec<usize> = match &frame.wrist {
             Some(_) => vec![0; frame.readings()],
+            // The drive of a joint may move links before it too.
+            None if frame.plain.has_followers() => vec![0; n],
             None => (0..n)
                 .map(|j| frame.columns.partition_point(|c| *c < j * COLUMNS))
                 .collect(),
@@ -70,7 +72,7 @@ impl<'a> Problem<'a> {
             pulls: rows.clone(),
             rows,
             first,
-            out: vec![L::ZERO; n * n * COLUMNS],
+            out: vec![L::ZERO; n * frame.plain.parameter_count()],
             motors: vec![L::ZERO; n * n * MOTOR_COLUMNS],
             basis,
         }

@@ -147,7 +147,7 @@ impl Problem<'_> {
     /// Sets the weights of the criterion on the row of joint `j`. Returns the weight on its Coulomb entry.
     fn weigh_criterion(&mut self, j: usize, s: usize) -> L {
         let (n, frame, first) = (self.joints(), self.frame, self.first[j]);
-        let width = n * COLUMNS;
+        let width = frame.plain.parameter_count();
         let mut coulomb = L::ZERO;
         for (c, source) in frame.columns.iter().enumerate().skip(first) {
             let factor = frame.weights[j] / frame.sizes[c];
@@ -168,8 +168,15 @@ impl Problem<'_> {
     /// Adds the weights of a torque penalty to the row of joint `j`, except that on its Coulomb entry.
     fn weigh_torque(&mut self, j: usize, force: L, prior: &Prior) {
         let n = self.joints();
-        for (i, row) in prior.rows.iter().enumerate().skip(j) {
-            let start = j * n * COLUMNS + i * COLUMNS;
+        let width = self.frame.plain.parameter_count();
+        // Links before the joint do not load it, unless its drive moves axes before it too.
+        let first = if self.frame.plain.has_followers() {
+            0
+        } else {
+            j
+        };
+        for (i, row) in prior.rows.iter().enumerate().skip(first) {
+            let start = j * width + i * COLUMNS;
             let weights = &mut self.out[start..start + COLUMNS];
             for (weight, parameter) in weights.iter_mut().zip(row) {
                 *weight += force * *parameter;

@@ -62,7 +62,7 @@ pub(crate) struct Prior {
 impl Prior {
     /// Builds the prior from the description; `given` is the relative uncertainty of its values.
     pub(crate) fn of(robot: &Robot, columns: usize, hints: &Hints, given: f64) -> Self {
-        let n = robot.joints.len();
+        let n = robot.link_count();
         let shares = shares(robot, columns);
         let mut described = described(robot, columns);
         if let Some(shares) = &shares {
@@ -91,6 +91,12 @@ impl Prior {
         for c in 0..columns {
             let (joint, place) = place_of(c, n);
             if place < INERTIAL {
+                continue;
+            }
+            // A follower has no drive and no friction of its own: these stay 0.
+            if joint >= robot.joints.len() {
+                prior.rules[c] = Rule::Free;
+                prior.uncertainty[c] = f64::INFINITY;
                 continue;
             }
             let size = size_of(place, joint, hints);
@@ -147,7 +153,7 @@ impl Prior {
             .filter(|&c| self.whole[c] > 0.0 && self.uncertainty[c].is_finite())
             .collect();
         for (c, times) in contradicted(&own, &surprise, &spread, &stated) {
-            let (joint, place) = place_of(c, robot.joints.len());
+            let (joint, place) = place_of(c, robot.link_count());
             self.remarks.push(format!(
                 "Joint {}: the data contradict the described {} of {} by {} standard deviations of the description's worth and theirs, so it counts as not known.",
                 robot.joints[joint].name,
@@ -188,7 +194,7 @@ impl Prior {
     /// Sets the ten parameters of link `i`: the described ones if they are physically consistent, else a substitute.
     fn link(&mut self, robot: &Robot, i: usize, given: f64) {
         let at = i * COLUMNS;
-        let stated = robot.joints[i].inertial.is_some();
+        let stated = robot.link_inertial(i).is_some();
         let own = &self.centre[at..at + INERTIAL];
         let divergence = if stated { Divergence::new(own) } else { None };
         let divergence = match divergence {
@@ -200,8 +206,13 @@ impl Prior {
                 self.centre[at..at + INERTIAL].copy_from_slice(&stand_in);
                 self.stated = false;
                 self.remarks.push(format!(
-                    "Joint {}: {}, so a uniform block of {:.3} kg stands in for its link.",
-                    robot.joints[i].name,
+                    "{} {}: {}, so a uniform block of {:.3} kg stands in for its link.",
+                    if i < robot.joints.len() {
+                        "Joint"
+                    } else {
+                        "Follower"
+                    },
+                    robot.link_name(i),
                     if stated {
                         "no body has the inertial values that the description states"
                     } else {
@@ -282,19 +293,19 @@ impl Prior {
     }
 }
 
-/// Returns the joint of a standard column and its place among the joint's columns. Motor columns follow, three per
+/// Returns the link of a standard column and its place among the link's columns. Motor columns follow, three per
 /// joint: inertia, viscous, Coulomb.
-fn place_of(c: usize, joints: usize) -> (usize, usize) {
-    if c < joints * COLUMNS {
+fn place_of(c: usize, links: usize) -> (usize, usize) {
+    if c < links * COLUMNS {
         return (c / COLUMNS, c % COLUMNS);
     }
-    let after = c - joints * COLUMNS;
+    let after = c - links * COLUMNS;
     let place = match after % MOTOR_COLUMNS {
         motor_column::INERTIA => column::DRIVE_INERTIA,
         motor_column::VISCOUS => column::VISCOUS,
         _ => column::COULOMB,
     };
-    ((after / MOTOR_COLUMNS).min(joints.saturating_sub(1)), place)
+    ((after / MOTOR_COLUMNS).min(links.saturating_sub(1)), place)
 }
 
 /// Returns the friction, drive inertia or offset that would make all of the joint's torque; 1 if nothing moved.
@@ -323,7 +334,7 @@ pub fn described(robot: &Robot, columns: usize) -> DVector<f64> {
 /// Returns the matrix by which drives that move several joints add inertia and viscous friction to their columns, with
 /// the square of the ratio; see [`rig_shared::transmission`].
 fn shares(robot: &Robot, columns: usize) -> Option<DMatrix<f64>> {
-    let n = robot.joints.len();
+    let n = robot.link_count();
     if columns <= n * COLUMNS {
         return None;
     }
@@ -356,7 +367,10 @@ fn stand_in(
     mass: Option<f64>,
     moment: Option<[f64; 3]>,
 ) -> [f64; INERTIAL] {
-    let reach = robot.joints.get(i + 1).map_or([0.0; 3], |next| {
+    let order = robot.links_outwards();
+    let next = order.iter().skip_while(|link| **link != i).nth(1);
+    let next = next.and_then(|link| robot.link_as_joint(*link));
+    let reach = next.map_or([0.0; 3], |next| {
         let (s, c) = next.alpha.sin_cos();
         [next.a, -s * next.d, c * next.d]
     });

@@ -119,7 +119,7 @@ pub(crate) fn standard_set(
                 100.0 * (bound / free.max(f64::MIN_POSITIVE) - 1.0)
             })
             .collect(),
-        least_eigenvalue: (0..robot.joints.len())
+        least_eigenvalue: (0..robot.link_count())
             .map(|i| least_eigenvalue(&found[i * COLUMNS..i * COLUMNS + INERTIAL]))
             .collect(),
         prior: remarks,

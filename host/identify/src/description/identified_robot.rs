@@ -41,7 +41,7 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
         values: &details.estimate.values,
     };
     let (result, mut remarks) = redistributed(robot, &base, None);
-    if robot.joints.len() > 1 {
+    if robot.link_count() > 1 {
         remarks.insert(0, "No physically consistent set of standard parameters was found for these values: the split of the combinations over the links is the smallest change of the description, and single masses and inertias need not be those of a body. Use the combinations, not single parameters.".into());
     }
     (result, remarks)

@@ -21,7 +21,7 @@ pub fn redistributed(
     let k = base.combination;
     let mut pi = described(robot, k.ncols());
     let mut remarks = Vec::new();
-    if robot.joints.len() == 1 {
+    if robot.link_count() == 1 {
         one_link(robot, base, &mut pi, &mut remarks);
         return written(robot, &pi, remarks);
     }
@@ -48,7 +48,7 @@ fn without_negative_masses(
     pi: &mut DVector<f64>,
     remarks: &mut Vec<String>,
 ) {
-    let masses: Vec<usize> = (0..robot.joints.len())
+    let masses: Vec<usize> = (0..robot.link_count())
         .map(|j| j * COLUMNS + column::MASS)
         .collect();
     let lacking = DVector::from_iterator(masses.len(), masses.iter().map(|&c| -pi[c].min(0.0)));

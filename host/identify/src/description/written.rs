@@ -12,7 +12,7 @@ pub(crate) fn written(
     pi: &DVector<f64>,
     mut remarks: Vec<String>,
 ) -> (Robot, Vec<String>) {
-    let links = robot.joints.len() * COLUMNS;
+    let links = robot.link_count() * COLUMNS;
     let (joints, motors) = pi.as_slice().split_at(links);
     let mut motors = motors.to_vec();
     motors.resize(robot.joints.len() * MOTOR_COLUMNS, 0.0);

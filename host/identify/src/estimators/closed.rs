@@ -149,7 +149,7 @@ pub(crate) fn model_of(
     chain: &Chain<f64>,
     standard: &[f64],
 ) -> Result<Model, IdentifyError> {
-    let (joints, motors) = standard.split_at(robot.joints.len() * COLUMNS);
+    let (joints, motors) = standard.split_at(robot.link_count() * COLUMNS);
     let motors = if robot.drive_kinds().iter().all(|k| *k == DriveKind::Simple) {
         None
     } else {

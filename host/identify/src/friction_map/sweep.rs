@@ -82,7 +82,7 @@ pub(super) fn rows_of(
     let details = &identification.details;
     let chain = chain_of(robot)?;
     let n = robot.joints.len();
-    let width = n * COLUMNS;
+    let width = chain.parameter_count();
     let friction_columns = [column::VISCOUS, column::COULOMB].map(|c| joint * COLUMNS + c);
     let (own, rest): (Vec<(usize, f64)>, Vec<(usize, f64)>) =
         (details.columns.iter().zip(&details.estimate.values))

@@ -4,7 +4,6 @@
 //! A stretch of a few hundred rows passes from motion through regressor to low-pass while it is in the second-level
 //! cache. Regressor columns at the full rate are never stored, and structurally zero columns are never computed.
 
-use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::equation::{Equation, Rows};
@@ -52,21 +51,24 @@ impl<'a> Differential<'a> {
             .treatment
             .parallel_low_pass()
             .ok_or_else(|| failed("The parallel low-pass cannot be built."))?;
+        let batch = ChainBatch::new(plan.chain);
         let mut signals: Vec<Signal> = (0..n).map(Signal::Torque).collect();
         for j in 0..n {
             for (place, &c) in plan.columns.iter().enumerate() {
                 match plan.belongs(c) {
-                    Belongs::Joint(c) if !RegressorBlock::is_zero(j, c) => {
+                    Belongs::Joint(c) if !batch.is_zero(j, c) => {
                         signals.push(Signal::Regressor(j, c, place));
                     }
-                    Belongs::Motor(..) => signals.push(Signal::Motor(j, c - n * COLUMNS, place)),
+                    Belongs::Motor(..) => {
+                        signals.push(Signal::Motor(j, c - plan.chain.parameter_count(), place))
+                    }
                     Belongs::Joint(_) | Belongs::Nothing => {}
                 }
             }
         }
         Ok(Self {
             plan,
-            batch: ChainBatch::new(plan.chain),
+            batch,
             decimator: Decimator::new(&low_pass, plan.treatment.decimation),
             settle: low_pass.settle_samples(),
             signals,

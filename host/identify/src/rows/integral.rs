@@ -207,7 +207,7 @@ struct Energies<'a> {
 
 impl<'a> Energies<'a> {
     fn new(motion: &'a Motion, plan: &'a Plan<'a>) -> Self {
-        let width = motion.joints.len() * (COLUMNS + MOTOR_COLUMNS);
+        let width = plan.chain.parameter_count() + motion.joints.len() * MOTOR_COLUMNS;
         Self {
             motion,
             plan,
@@ -240,7 +240,7 @@ impl<'a> Energies<'a> {
 fn energy(motion: &Motion, plan: &Plan, k: usize, out: &mut [f64]) -> Result<(), PrepareError> {
     let q: Vec<f64> = motion.joints.iter().map(|j| j.q[k]).collect();
     let qd: Vec<f64> = motion.joints.iter().map(|j| j.qd[k]).collect();
-    let (links, motors) = out.split_at_mut(motion.joints.len() * COLUMNS);
+    let (links, motors) = out.split_at_mut(plan.chain.parameter_count());
     energy_regressor(plan.chain, &q, &qd, links).map_err(failed)?;
     if !plan.transmission.is_simple() {
         plan.transmission

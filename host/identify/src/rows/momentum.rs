@@ -45,7 +45,7 @@ impl<'a> Maker<'a> {
     fn new(plan: &'a Plan<'a>, n: usize) -> Self {
         Self {
             plan,
-            wide: vec![0.0; n * n * COLUMNS],
+            wide: vec![0.0; n * plan.chain.parameter_count()],
             motors: MotorMomentum::new(n),
             directions: vec![0.0; n * n],
         }
@@ -61,7 +61,7 @@ impl<'a> Maker<'a> {
         out: &mut Instant,
     ) -> Result<(), PrepareError> {
         let (n, plan) = (q.len(), self.plan);
-        let (p, width) = (plan.columns.len(), n * COLUMNS);
+        let (p, width) = (plan.columns.len(), plan.chain.parameter_count());
         let coupled = !plan.transmission.is_simple();
         momentum_regressor(plan.chain, q, qd, &mut self.wide).map_err(failed)?;
         self.pick(n, width, p, &mut out.momentum);

@@ -13,7 +13,7 @@ pub struct Plan<'a> {
     pub chain: &'a Chain<f64>,
     /// Drives.
     pub transmission: &'a Transmission<f64>,
-    /// Wanted columns (of the base parameters): 14 per joint, followed by 3 per motor.
+    /// Wanted columns (of the base parameters): 14 per link, followed by 3 per motor.
     pub columns: &'a [usize],
     /// Treatment of the recordings.
     pub treatment: &'a PreprocessingPlan,
@@ -32,7 +32,7 @@ pub struct Plan<'a> {
 /// The origin of a regressor column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Belongs {
-    /// Column of [`Chain`]'s regressors, 14 per joint.
+    /// Column of [`Chain`]'s regressors, 14 per link.
     Joint(usize),
     /// Column of [`Transmission`]'s: motor, and index among its three.
     Motor(usize, usize),

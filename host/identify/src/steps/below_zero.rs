@@ -28,8 +28,8 @@ impl Identification {
     /// cannot be negative.
     pub fn is_positive_sum(&self, parameter: usize) -> bool {
         let own = self.details.combination.row(parameter);
-        // Columns of motors that move several joints come after those of the joints.
-        let links = self.joints.len() * COLUMNS;
+        // Columns of motors that move several joints come after those of the links.
+        let links = self.details.links * COLUMNS;
         let may = |(c, x): (usize, &f64)| {
             x.abs() < ROUNDING || (*x > 0.0 && c < links && POSITIVE.contains(&(c % COLUMNS)))
         };
@@ -43,7 +43,8 @@ impl Identification {
             let kind = standard % COLUMNS;
             let concerned = ![column::COULOMB, column::MASS].contains(&kind);
             // Motors that move several joints have no joint of their own.
-            let joint = self.joints.get(standard / COLUMNS)?;
+            let link = standard / COLUMNS;
+            let joint = self.joints.get(robot.joint_of_link(link)?)?;
             // Without noise a value of zero is a rounding error below it.
             let least = LEAST_ERROR / joint.train_relative_error;
             let rounding = least.is_finite() && least > 1.0 && -own.value <= least * own.std;
@@ -52,7 +53,7 @@ impl Identification {
                 format!(
                     "{} of joint \"{}\" is {} ± {} {}",
                     own.expression,
-                    robot.joints[standard / COLUMNS].name,
+                    robot.link_name(link),
                     format_significant(own.value, 3),
                     format_significant(own.std, 2),
                     format_unit(&own.unit)

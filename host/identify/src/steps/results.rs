@@ -200,6 +200,7 @@ impl Results<'_> {
             estimate,
             free,
             combination,
+            links: self.problem.robot.link_count(),
             columns,
             train: self.train,
             holdout_residuals: self.holdout,

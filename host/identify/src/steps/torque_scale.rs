@@ -111,10 +111,11 @@ fn gravity_columns(problem: &Problem, described: &Robot) -> Result<Vec<usize>, I
     let still = vec![0.0; n];
     let mut shown = Vec::new();
     for (k, &c) in problem.base.columns.iter().enumerate() {
-        if c >= n * COLUMNS || !(column::MASS..column::INERTIA).contains(&(c % COLUMNS)) {
+        if c >= chain.parameter_count() || !(column::MASS..column::INERTIA).contains(&(c % COLUMNS))
+        {
             continue;
         }
-        let mut rows = vec![[0.0; COLUMNS]; n];
+        let mut rows = vec![[0.0; COLUMNS]; chain.link_count()];
         rows[c / COLUMNS][c % COLUMNS] = 1.0;
         let mut weighs = false;
         for pose in 0..POSES {

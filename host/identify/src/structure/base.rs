@@ -6,16 +6,18 @@ use rig_shared::transmission::DriveKind;
 use super::columns::{column_name, expression, unit};
 use rig_model::robot;
 
-/// The base parameters of a robot: β = K·π, with π the 14 parameters of every joint. If a drive moves several joints,
+/// The base parameters of a robot: β = K·π, with π the 14 parameters of every link (joints, then followers). If a drive moves several joints,
 /// the 3 parameters of every motor follow ([`rig_shared::transmission`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Base {
-    /// Columns of the standard regressor (14 per joint, 3 per motor) that represent the base parameters.
+    /// Columns of the standard regressor (14 per link, 3 per motor) that represent the base parameters.
     pub columns: Vec<usize>,
-    /// K, base parameters × 14n, or × 17n with motor columns.
+    /// K, base parameters × 14 per link, with 3 more per motor.
     pub combination: DMatrix<f64>,
-    /// Kinds of the joints, for units and names.
+    /// Kinds of the links' axes, for units and names.
     pub kinds: Vec<robot::JointKind>,
+    /// The joint that moves each link.
+    pub joints: Vec<usize>,
     /// Kinds of the drives, one per joint.
     pub drives: Vec<DriveKind>,
 }
@@ -31,6 +33,7 @@ impl Base {
             columns: rows.iter().map(|&k| self.columns[k]).collect(),
             combination: self.combination.select_rows(&rows),
             kinds: self.kinds,
+            joints: self.joints,
             drives: self.drives,
         }
     }

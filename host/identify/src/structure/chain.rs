@@ -11,7 +11,9 @@ use rig_model::robot::Robot;
 /// # Errors
 /// [`IdentifyError::Model`] if the geometry is invalid.
 pub fn chain_of(robot: &Robot) -> Result<Chain<f64>, IdentifyError> {
-    Chain::new(&robot.geometry(), robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
+    robot
+        .chain()
+        .map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
 /// Builds the drives of a robot description.

@@ -37,9 +37,9 @@ pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
     order
 }
 
-/// Returns the name of a column, with the number of its joint or motor, for a robot with `joints` joints.
-pub fn column_name(c: usize, joints: usize) -> String {
-    match c.checked_sub(joints * COLUMNS) {
+/// Returns the name of a column, with the number of its link or motor, for a robot with `links` links.
+pub fn column_name(c: usize, links: usize) -> String {
+    match c.checked_sub(links * COLUMNS) {
         None => format!("{}{}", COLUMN_NAMES[c % COLUMNS], c / COLUMNS + 1),
         Some(motor) => format!(
             "{}{}",
@@ -49,8 +49,8 @@ pub fn column_name(c: usize, joints: usize) -> String {
     }
 }
 
-/// Returns the number of joints for a number of columns: 14 per joint, or 17 with motor columns (unambiguous for up to
-/// [`MAX_JOINTS`] joints).
+/// Returns the number of links for a number of columns: 14 per link, or 17 with motor columns, beside which there are no
+/// followers (unambiguous for up to [`MAX_JOINTS`] links).
 fn joints_of(columns: usize) -> usize {
     let without = columns / COLUMNS;
     if columns.is_multiple_of(COLUMNS) && without <= MAX_JOINTS {

@@ -96,8 +96,9 @@ pub(crate) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
 fn motion(base: &Base, k: usize) -> String {
     let links = base.kinds.len() * COLUMNS;
     let motor = base.columns[k].checked_sub(links);
-    let joint = motor.map_or(base.columns[k] / COLUMNS, |m| m / MOTOR_COLUMNS) + 1;
-    let revolute = base.kinds[joint - 1] == JointKind::Revolute;
+    let link = motor.map_or(base.columns[k] / COLUMNS, |m| m / MOTOR_COLUMNS);
+    let joint = base.joints[link] + 1;
+    let revolute = base.kinds[link] == JointKind::Revolute;
     match base.columns[k] % COLUMNS {
         _ if motor.is_some() => format!(
             "Move joint {joint} and the joints that its drive is coupled to together and against each other, at several speeds and with changing accelerations."

@@ -55,6 +55,9 @@ type Combination = Vec<f64>;
 /// [`IdentifyError::Model`] if the geometry is invalid.
 pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     chain_of(robot)?;
+    robot
+        .without_followers("The grouping of base parameters by rules")
+        .map_err(|e| IdentifyError::Model(e.to_string()))?;
     let transmission = robot
         .transmission()
         .map_err(|e| IdentifyError::Model(e.to_string()))?;
@@ -86,7 +89,8 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     Ok(Base {
         columns: kept,
         combination,
-        kinds: robot.joints.iter().map(|j| j.kind).collect(),
+        kinds: robot.link_kinds(),
+        joints: (0..n).collect(),
         drives: robot.drive_kinds(),
     })
 }

@@ -1,5 +1,5 @@
 //! Regressors of a robot with its drives at given and at random states; the rank at random states shows what is
-//! identifiable. They have 14 columns per joint and, if a drive moves several joints, 3 per motor.
+//! identifiable. They have 14 columns per link and, if a drive moves several joints, 3 per motor.
 
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
@@ -57,7 +57,7 @@ impl States {
         } else {
             self.joints() * MOTOR_COLUMNS
         };
-        [self.joints() * COLUMNS, motors]
+        [self.chain.parameter_count(), motors]
     }
 
     /// Joins the links' and the motors' columns, each joint × its own; zero for replaced link columns.
@@ -85,7 +85,7 @@ impl States {
         qdd: &[f64],
     ) -> Result<DMatrix<f64>, IdentifyError> {
         let n = self.joints();
-        let mut links = vec![0.0; n * n * COLUMNS];
+        let mut links = vec![0.0; n * self.chain.parameter_count()];
         let mut motors = vec![0.0; n * n * MOTOR_COLUMNS];
         differential_regressor(&self.chain, q, qd, qdd, &mut links).map_err(failed)?;
         self.transmission
@@ -101,7 +101,7 @@ impl States {
         qd: &[f64],
     ) -> Result<[DMatrix<f64>; 2], IdentifyError> {
         let n = self.joints();
-        let mut momentum = vec![0.0; n * n * COLUMNS];
+        let mut momentum = vec![0.0; n * self.chain.parameter_count()];
         let mut loss = momentum.clone();
         let mut motors = MotorMomentum::new(n);
         momentum_regressor(&self.chain, q, qd, &mut momentum).map_err(failed)?;
@@ -169,7 +169,7 @@ impl States {
 
     /// Returns the row of the energy of one joint.
     fn energy(&self, q: &[f64], qd: &[f64]) -> Result<DMatrix<f64>, IdentifyError> {
-        let mut links = [0.0; COLUMNS];
+        let mut links = vec![0.0; self.chain.parameter_count()];
         let mut motors = [0.0; MOTOR_COLUMNS];
         energy_regressor(&self.chain, q, qd, &mut links).map_err(failed)?;
         self.transmission
@@ -180,7 +180,7 @@ impl States {
 
     /// Returns the row of the friction power of one joint.
     fn power(&self, q: &[f64], qd: &[f64]) -> Result<DMatrix<f64>, IdentifyError> {
-        let mut links = [0.0; COLUMNS];
+        let mut links = vec![0.0; self.chain.parameter_count()];
         let mut motors = [0.0; MOTOR_COLUMNS];
         friction_power_regressor(&self.chain, qd, &mut links).map_err(failed)?;
         self.transmission

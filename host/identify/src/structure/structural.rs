@@ -10,7 +10,6 @@ use super::independent::independent_columns;
 use super::states::States;
 use crate::error::IdentifyError;
 use crate::options::ModelKind;
-use rig_model::robot;
 use rig_model::robot::Robot;
 
 /// Remainder of a column of unit length after projection onto the preceding columns, below which it is dependent.
@@ -29,7 +28,7 @@ impl Base {
     /// [`IdentifyError::Model`] for an impossible geometry, [`IdentifyError::Undecided`] if a column is neither clearly
     /// dependent nor clearly independent.
     pub fn structural(robot: &Robot, model: ModelKind, seed: u64) -> Result<Self, IdentifyError> {
-        let kinds: Vec<robot::JointKind> = robot.joints.iter().map(|j| j.kind).collect();
+        let kinds = robot.link_kinds();
         let matrix = States::of(robot)?.rows(model, seed)?;
         let mut order = preference(&kinds);
         order.extend(order.len()..matrix.ncols());
@@ -43,13 +42,13 @@ impl Base {
                 .min_by(|a, b| left(a).total_cmp(&left(b)))
                 .unwrap_or(0);
             let n = kinds.len();
-            let joint = match doubtful.checked_sub(n * COLUMNS) {
+            let link = match doubtful.checked_sub(n * COLUMNS) {
                 None => doubtful / COLUMNS,
                 Some(motor) => motor / MOTOR_COLUMNS,
             };
             return Err(IdentifyError::Undecided {
                 column: column_name(doubtful, n),
-                joint: robot.joints[joint].name.clone(),
+                joint: robot.link_name(link).to_owned(),
                 least: found.remainders.0,
                 robot: robot.name.clone(),
             });
@@ -57,6 +56,9 @@ impl Base {
         let numeric = Self {
             columns: found.kept,
             combination: found.combination,
+            joints: (0..kinds.len())
+                .filter_map(|k| robot.joint_of_link(k))
+                .collect(),
             kinds,
             drives: robot.drive_kinds(),
         };

@@ -12,7 +12,7 @@ pub struct FieldTorque {
 
 impl FieldTorque {
     /// Builds it for `fields`, accelerations in the base frame, m/s². `parameters` has the standard parameters of each
-    /// joint, of which those of drives and friction do not count.
+    /// link, of which those of drives and friction do not count.
     pub fn new(
         chain: &Chain<f64>,
         fields: impl IntoIterator<Item = [f64; 3]>,

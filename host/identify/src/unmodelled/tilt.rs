@@ -91,12 +91,12 @@ impl Axes {
     }
 }
 
-/// Builds the torque of a tilt of one radian about each axis; `standard` holds the parameters of all joints, [`COLUMNS`]
+/// Builds the torque of a tilt of one radian about each axis; `standard` holds the parameters of all links, [`COLUMNS`]
 /// each.
 pub(crate) fn tilt_torque(chain: &Chain<f64>, axes: &Axes, standard: &[f64]) -> FieldTorque {
     let parameters = standard
         .chunks_exact(COLUMNS)
-        .take(chain.joint_count())
+        .take(chain.link_count())
         .map(|link| std::array::from_fn(|k| link[k]))
         .collect();
     let fields = axes.level.map(|e| (e * axes.size).into());

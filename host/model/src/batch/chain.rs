@@ -7,6 +7,7 @@ use rig_shared::multibody::{COLUMNS, Chain, column};
 
 use super::BatchError;
 use super::dispatch::Number;
+use super::gears::Gears;
 use super::signals::{in_place, lanes, load, output, samples, stretches};
 
 /// Bytes in a cache line.
@@ -17,6 +18,8 @@ const LINE: usize = 64;
 pub struct ChainBatch<T = f64> {
     frames: Vec<Frame<T>>,
     gravity: [T; 3],
+    /// How axes follow joints, if some do.
+    gears: Option<Gears<T>>,
 }
 
 /// The differential regressor of several samples, column by column: [`Self::column`].
@@ -27,16 +30,21 @@ pub struct ChainBatch<T = f64> {
 #[derive(Clone, Debug)]
 pub struct RegressorBlock<T = f64> {
     joints: usize,
+    /// Joints and followers: the links that have columns.
+    links: usize,
     room: usize,
     start: usize,
     len: usize,
-    /// Column (joint, c) begins at `first + (joint * 14 * joints + c) * stride`.
+    /// Column (joint, c) begins at `first + (joint * 14 * links + c) * stride`.
     data: Vec<T>,
     /// Numbers skipped so that columns begin at a cache line.
     first: usize,
     stride: usize,
     signals: [Vec<Lane<T>>; 3],
     axes: Vec<AxisBlock<T>>,
+    /// Signals and regressor of all axes, if some follow; otherwise empty.
+    of_axes: [Vec<Lane<T>>; 3],
+    regressor_of_axes: Vec<T>,
 }
 
 impl<T> RegressorBlock<T> {
@@ -60,25 +68,15 @@ impl<T> RegressorBlock<T> {
         self.room
     }
 
-    /// Returns the factor of parameter `c` (of the 14·n) in the torque of `joint` (from 0), sample by sample.
+    /// Returns the factor of parameter `c` (of 14 a link) in the torque of `joint` (from 0), sample by sample.
     ///
     /// # Panics
     /// If `joint` or `c` is past the end.
     pub fn column(&self, joint: usize, c: usize) -> &[T] {
-        let width = self.joints * COLUMNS;
+        let width = self.links * COLUMNS;
         assert!(c < width, "column {c} of {width}");
         let at = self.first + (joint * width + c) * self.stride;
         &self.data[at..at + self.len]
-    }
-}
-
-// The same for every number: a caller need not name one.
-impl RegressorBlock {
-    /// Returns true if [`Self::column`] is 0 for every motion. A link does not load the joints beyond it. Drive inertia,
-    /// friction and offset of a joint load only that joint.
-    pub fn is_zero(joint: usize, c: usize) -> bool {
-        let owner = c / COLUMNS;
-        owner < joint || (owner > joint && c % COLUMNS >= column::DRIVE_INERTIA)
     }
 }
 
@@ -88,18 +86,34 @@ impl<T: Number> ChainBatch<T> {
         Self {
             frames: Frame::of(chain).collect(),
             gravity: chain.gravity().map(T::from_f64),
+            gears: Gears::of(chain),
         }
     }
 
     /// Returns the number of joints n.
     pub fn joint_count(&self) -> usize {
+        (self.gears.as_ref()).map_or(self.frames.len(), Gears::joint_count)
+    }
+
+    /// Returns the number of links, joints and followers.
+    pub fn link_count(&self) -> usize {
         self.frames.len()
+    }
+
+    /// Returns true if column `c` of [`RegressorBlock::column`] of `joint` is 0 for every motion. A link does not load the
+    /// joints beyond it. Drive inertia, friction and offset of a joint load only that joint.
+    pub fn is_zero(&self, joint: usize, c: usize) -> bool {
+        if let Some(gears) = &self.gears {
+            return gears.is_zero(joint, c);
+        }
+        let owner = c / COLUMNS;
+        owner < joint || (owner > joint && c % COLUMNS >= column::DRIVE_INERTIA)
     }
 
     /// Returns an empty block with room for `samples`, to be reused with this chain.
     pub fn block(&self, samples: usize) -> RegressorBlock<T> {
-        let n = self.joint_count();
-        let width = n * COLUMNS;
+        let (n, links) = (self.joint_count(), self.link_count());
+        let width = links * COLUMNS;
         // An odd number of stretches: columns a power of two apart would share a few places in the cache.
         let stride = (samples.div_ceil(LANES) | 1) * LANES;
         let line = LINE / size_of::<T>();
@@ -111,6 +125,7 @@ impl<T: Number> ChainBatch<T> {
         }
         RegressorBlock {
             joints: n,
+            links,
             room: samples,
             start: 0,
             len: 0,
@@ -118,7 +133,12 @@ impl<T: Number> ChainBatch<T> {
             first,
             stride,
             signals: [lanes(n), lanes(n), lanes(n)],
-            axes: vec![AxisBlock::ZERO; n],
+            axes: vec![AxisBlock::ZERO; links],
+            of_axes: [(); 3].map(|()| lanes(if n == links { 0 } else { links })),
+            regressor_of_axes: match n == links {
+                true => Vec::new(),
+                false => vec![T::ZERO; links * width * LANES],
+            },
         }
     }
 
@@ -183,7 +203,7 @@ impl<T: Number> ChainBatch<T> {
         block: &RegressorBlock<T>,
     ) -> Result<usize, BatchError> {
         let expected = self.joint_count();
-        if block.joints != expected {
+        if block.joints != expected || block.links != self.link_count() {
             return Err(BatchError::WrongBlock {
                 expected,
                 found: block.joints,
@@ -208,6 +228,10 @@ impl<T: Number> ChainBatch<T> {
             load(q, &part, a);
             load(qd, &part, b);
             load(qdd, &part, c);
+            if let Some(gears) = &self.gears {
+                self.fill_geared(gears, part.start - start, block);
+                continue;
+            }
             T::differential_regressor(
                 &self.frames,
                 self.gravity,
@@ -223,8 +247,20 @@ impl<T: Number> ChainBatch<T> {
         }
     }
 
-    /// Computes the [`energy_regressor`](rig_shared::multibody::energy_regressor) of every sample: `out` holds 14·n
-    /// columns.
+    /// Computes a block's samples, whose signals are loaded, from `at` on.
+    fn fill_geared(&self, gears: &Gears<T>, at: usize, block: &mut RegressorBlock<T>) {
+        let [a, b, c] = &mut block.of_axes;
+        gears.spread(&block.signals[0], true, a);
+        gears.spread(&block.signals[1], false, b);
+        gears.spread(&block.signals[2], false, c);
+        let wide = &mut block.regressor_of_axes;
+        let (frames, axes) = (&self.frames, &mut block.axes);
+        T::differential_regressor(frames, self.gravity, a, b, c, axes, wide, LANES, 0);
+        gears.project_regressor(wide, &mut block.data[block.first..], block.stride, at);
+    }
+
+    /// Computes the [`energy_regressor`](rig_shared::multibody::energy_regressor) of every sample: `out` holds 14
+    /// columns a link.
     ///
     /// # Errors
     /// [`BatchError`] if a length is wrong.
@@ -235,10 +271,20 @@ impl<T: Number> ChainBatch<T> {
         out: &mut [T],
     ) -> Result<(), BatchError> {
         let n = self.joint_count();
-        let width = n * COLUMNS;
+        let width = self.link_count() * COLUMNS;
         let count = samples(n, &[("q", q), ("qd", qd)])?;
         output(width, count, out)?;
         if count == 0 {
+            return Ok(());
+        }
+        if let Some(gears) = &self.gears {
+            let axes = Self {
+                gears: None,
+                ..self.clone()
+            };
+            let mut wide = vec![T::ZERO; out.len()];
+            axes.energy_regressor(&gears.positions(q), &gears.rates(qd), &mut wide)?;
+            gears.arrange(&wide, count, out);
             return Ok(());
         }
         for (c, column) in out.chunks_exact_mut(count).enumerate() {

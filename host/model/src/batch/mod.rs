@@ -17,6 +17,9 @@
 mod chain;
 mod dispatch;
 mod error;
+mod gears;
+#[cfg(test)]
+mod gears_test;
 mod model;
 mod signals;
 #[cfg(test)]

@@ -11,10 +11,7 @@ use rig_shared::multibody::{
     inverse_dynamics,
 };
 
-use super::{
-    BLOCK, BatchError, ChainBatch, Derivatives, ModelBatch, Number, RegressorBlock, lower,
-    over_threads,
-};
+use super::{BLOCK, BatchError, ChainBatch, Derivatives, ModelBatch, Number, lower, over_threads};
 
 pub(super) struct Made {
     pub(super) joints: Vec<JointGeometry>,
@@ -262,7 +259,7 @@ fn blocks_cover_every_sample_once_and_say_which_columns_are_zero() {
                 for c in 0..5 * COLUMNS {
                     let column = block.column(joint, c);
                     assert_eq!(column.len(), block.len());
-                    if RegressorBlock::is_zero(joint, c) {
+                    if batch.is_zero(joint, c) {
                         assert!(column.iter().all(|x| *x == 0.0));
                     }
                 }

@@ -37,8 +37,8 @@ fn rounding_note(off: f64, exact: f64) -> String {
 
 /// An angle of a description that was replaced by a multiple of π/2.
 pub(super) struct Squared {
-    /// Joint, from 0.
-    pub joint: usize,
+    /// Link whose axis it is, from 0.
+    pub link: usize,
     /// Key of the angle.
     pub key: &'static str,
     /// The remark without its place.
@@ -48,12 +48,17 @@ pub(super) struct Squared {
 /// Sets the angles of `robot` that mean multiples of a right angle to exact values.
 pub(super) fn square(robot: &mut Robot) -> Vec<Squared> {
     let mut all = Vec::new();
-    for (number, joint) in robot.joints.iter_mut().enumerate() {
-        let slides = joint.kind == JointKind::Prismatic;
-        let angles = [
-            ("alpha", Some(&mut joint.alpha)),
-            ("theta", slides.then_some(&mut joint.theta)),
-        ];
+    let joints = (robot.joints.iter_mut()).map(|own| {
+        let angles = [&mut own.alpha, &mut own.theta];
+        ("joint", &own.name, own.kind, angles)
+    });
+    let followers = (robot.followers.iter_mut()).map(|own| {
+        let angles = [&mut own.alpha, &mut own.theta];
+        ("follower", &own.name, own.kind, angles)
+    });
+    for (link, (what, name, kind, [alpha, theta])) in joints.chain(followers).enumerate() {
+        let slides = kind == JointKind::Prismatic;
+        let angles = [("alpha", Some(alpha)), ("theta", slides.then_some(theta))];
         for (key, angle) in angles {
             let Some(angle) = angle else { continue };
             let Some(exact) = intended_angle(*angle) else {
@@ -62,11 +67,10 @@ pub(super) fn square(robot: &mut Robot) -> Vec<Squared> {
             let off = (*angle - exact).abs();
             if off > ROUNDING {
                 all.push(Squared {
-                    joint: number,
+                    link,
                     key,
                     remark: format!(
-                        "{key} of joint `{}` is {angle} rad, {}.",
-                        joint.name,
+                        "{key} of {what} `{name}` is {angle} rad, {}.",
                         rounding_note(off, exact)
                     ),
                 });

@@ -24,11 +24,18 @@ pub(super) enum Shown {
 }
 
 impl Robot {
-    /// Returns the directions about which link `k` turns, in frame k at zero position. Neighbouring axes keep their
+    /// Returns the directions about which link `link` turns, in its frame at zero position. Neighbouring axes keep their
     /// angle at every position. So axes that are parallel here stay parallel, or an axis between them is not parallel.
-    pub(super) fn shown(&self, k: usize) -> Shown {
+    ///
+    /// A follower counts as a joint of its own, so that no part of an inertia is taken as free that a motion shows.
+    pub(super) fn shown(&self, link: usize) -> Shown {
         let mut direction: Option<Vector3<f64>> = None;
-        for joint in &self.joints[..=k] {
+        let order = self.links_outwards();
+        let before = order.iter().take_while(|own| **own != link).count();
+        for joint in order[..=before.min(order.len() - 1)]
+            .iter()
+            .filter_map(|own| self.link_as_joint(*own))
+        {
             let turn = step(joint.alpha, joint.a, joint.theta, joint.d).rotation;
             direction = direction.map(|own| turn.inverse() * own);
             if joint.kind == JointKind::Revolute {
@@ -114,19 +121,22 @@ impl Robot {
     pub(super) fn with_bodies(&self) -> (Self, Vec<String>) {
         let mut robot = self.clone();
         let mut remarks = Vec::new();
-        for k in 0..self.joints.len() {
-            let Some(inertial) = &self.joints[k].inertial else {
+        let first = self.links_outwards().first().copied();
+        for k in 0..self.link_count() {
+            let Some(inertial) = self.link_inertial(k) else {
                 continue;
             };
             let body = SpatialInertia::of(inertial);
             if is_taken(&body) {
                 continue;
             }
-            let name = &self.joints[k].name;
+            let name = self.link_name(k);
             let shown = self.shown(k);
-            match body_like(&body, &shown, k == 0) {
+            match body_like(&body, &shown, first == Some(k)) {
                 Some(new) => {
-                    robot.joints[k].inertial = Some(new.inertial());
+                    if let Some(place) = robot.link_inertial_mut(k) {
+                        *place = Some(new.inertial());
+                    }
                     remarks.push(format!(
                         "The link of joint {name}: inertia that no motion of this robot shows was chosen so that the link is a body, as MuJoCo and Gazebo demand. Its motion is the same."
                     ));

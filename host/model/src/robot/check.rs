@@ -9,6 +9,7 @@ use rig_shared::multibody::MAX_JOINTS;
 
 use super::check_drives::check_transmission;
 use super::check_effects::check_effects;
+use super::check_followers::check_followers;
 use super::check_joint::check_joint;
 use super::check_workspace::check_workspace;
 use super::fault::{Fault, MAX_NUMBER, Step, fault, is_safe_magnitude};
@@ -43,11 +44,15 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             advice: "a robot has at least one [[joint]]".into(),
         });
     }
-    if robot.joints.len() > MAX_JOINTS {
+    if robot.link_count() > MAX_JOINTS {
+        let (key_path, what) = match robot.joints.len() > MAX_JOINTS {
+            true => (vec![Key("joint"), At(MAX_JOINTS)], "the number of joints"),
+            false => (vec![Key("follower")], "the number of joints and followers"),
+        };
         return Err(Fault {
-            key_path: vec![Key("joint"), At(MAX_JOINTS)],
-            what: "the number of joints".into(),
-            found: robot.joints.len().to_string(),
+            key_path,
+            what: what.into(),
+            found: robot.link_count().to_string(),
             advice: format!("a robot has at most {MAX_JOINTS}"),
         });
     }
@@ -74,11 +79,26 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             f
         })?;
     }
+    for (i, own) in robot.followers.iter().enumerate() {
+        let found = match own.name.trim().is_empty() {
+            true => "empty".to_owned(),
+            false if names.insert(own.name.as_str()) => continue,
+            false => format!("`{}` again", own.name),
+        };
+        return Err(Fault {
+            key_path: vec![Key("follower"), At(i), Key("name")],
+            what: format!("the name of follower {}", i + 1),
+            found,
+            advice: "every joint and every follower has a name of its own".into(),
+        });
+    }
+    check_followers(robot)?;
     // Identified values may be known only in combinations and are read back unchanged.
     if robot.identified.is_none()
-        && let Some((i, mut fault)) = oversized(&robot.joints)
+        && let Some((axis, mut fault)) = oversized(&robot.axes())
     {
-        fault.key_path.splice(0..0, [Key("joint"), At(i)]);
+        let link = robot.links_outwards()[axis];
+        fault.key_path.splice(0..0, robot.link_key(link));
         return Err(fault);
     }
     check_transmission(robot)?;

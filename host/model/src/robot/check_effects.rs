@@ -49,6 +49,15 @@ pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
             }
         }
         let found = Some(kind.about().name.to_owned());
+        if kind.about().channel == Channel::Transmission
+            && let Some(own) = robot.followers.first()
+        {
+            let advice = format!(
+                "the robot has follower `{}`, and a gear that gives or has backlash beside followers is no part of the equations; remove the effect or the follower",
+                own.name
+            );
+            return Err(refuse("kind", &found, &advice));
+        }
         if kind.about().channel == Channel::Transmission && !elastic.insert(joint) {
             let advice = "the joint has another effect between motor and link; state one of them, backlash with the stiffness of both";
             return Err(refuse("kind", &found, advice));

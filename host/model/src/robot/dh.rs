@@ -9,11 +9,12 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::angles::{angle_about, squared_poses, squared_theta, told};
 use super::drive::Drive;
 use super::flange::Flange;
+use super::follower::Follower;
 use super::frame::step;
 use super::joint::{Joint, JointKind};
 use super::right_angle::{ROUNDING, right_angle};
 use super::serial_robot::Robot;
-use super::urdf::{Body, Chain};
+use super::urdf::{Body, Chain, Mimic};
 use super::worth::Origin;
 use rig_output::format_significant;
 
@@ -29,7 +30,7 @@ pub(super) struct Converted {
     pub robot: Robot,
     /// Frame 0 in the base link's frame.
     pub base: Isometry3<f64>,
-    /// Pose of each body's own frame (the frame of the link that its joint moves) in frame i.
+    /// Pose of each body's own frame (the frame of the link that its axis moves) in frame i, in the order of the chain.
     pub links: Vec<Isometry3<f64>>,
     /// Angles that were replaced and frames that lie far away, one sentence for each kind.
     pub remarks: Vec<String>,
@@ -114,7 +115,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
     // Each frame is placed relative to the frame that the parameters produce so far. So neither the snapping above nor
     // the file's rounding accumulates along the chain.
     let mut frame = base;
-    let mut joints = Vec::new();
+    let (mut joints, mut followers): (Vec<Joint>, Vec<Follower>) = (Vec::new(), Vec::new());
     let mut links = Vec::new();
     for (i, body) in chain.bodies.iter().enumerate() {
         let line = axis_of(i);
@@ -158,11 +159,19 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         }
         frame = bent * step(0.0, 0.0, theta, d);
         let link = frame.inverse() * poses[i];
-        joints.push(joint(body, [alpha, a, theta, d], &link));
+        let made = joint(body, [alpha, a, theta, d], &link);
+        match &body.mimic {
+            None => joints.push(made),
+            Some(mimic) => {
+                let after = joints.last().map(|own| own.name.clone());
+                followers.push(follower(made, mimic, after));
+            }
+        }
         links.push(link);
     }
     let robot = Robot {
         origin: Origin::Urdf,
+        followers,
         flange: Flange::of(&(links.last().copied().unwrap_or_default() * chain.tip)),
         ..Robot::new(&chain.name, joints)
     };
@@ -184,6 +193,23 @@ fn joint(body: &Body, geometry: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joi
         friction: body.friction.clone(),
         drive: drive(body),
         ..Joint::new(&body.joint, body.kind, geometry)
+    }
+}
+
+/// Returns the axis of `made` as one that follows a joint. `after`: the joint before it.
+fn follower(made: Joint, mimic: &Mimic, after: Option<String>) -> Follower {
+    Follower {
+        name: made.name,
+        follows: mimic.joint.clone(),
+        ratio: mimic.ratio,
+        offset: mimic.offset,
+        after,
+        kind: made.kind,
+        alpha: made.alpha,
+        a: made.a,
+        theta: made.theta,
+        d: made.d,
+        inertial: made.inertial,
     }
 }
 

@@ -163,7 +163,7 @@ impl Robot {
     }
 
     /// Returns the description with other values: the inverse of [`Self::standard_parameters`] and
-    /// [`Self::motor_parameters`], one row a joint and a motor. A rotor gets the joint's `Ia` minus the share of the
+    /// [`Self::motor_parameters`], one row a link and a motor. A rotor gets the joint's `Ia` minus the share of the
     /// motors coupled to it. Friction is stored at the joints, except for coupled motors and screws. A joint without a
     /// drive gets a drive of ratio 1 to hold its drive inertia.
     ///
@@ -185,6 +185,9 @@ impl Robot {
         for (k, (joint, row)) in robot.joints.iter_mut().zip(rows).enumerate() {
             let simple = kinds[k] == DriveKind::Simple;
             put_joint(joint, k, row, simple, shares[k], &mut floor);
+        }
+        for (follower, row) in (robot.followers.iter_mut()).zip(rows.iter().skip(kinds.len())) {
+            follower.inertial = Some(inertial(row));
         }
         (robot, floor.remarks)
     }
@@ -356,10 +359,6 @@ fn put_joint(
     share: [f64; 2],
     floor: &mut Floor<'_>,
 ) {
-    let mut first_moment = [0.0; 3];
-    first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
-    let mut inertia = [0.0; 6];
-    inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
     let rest = row[column::DRIVE_INERTIA] - share[0];
     if joint.drive.is_none() && rest != 0.0 {
         // Rotor inertia added to the link would make a body that cannot exist.
@@ -381,11 +380,7 @@ fn put_joint(
             }
         }
     }
-    joint.inertial = Some(Inertial {
-        mass: row[column::MASS],
-        first_moment,
-        inertia,
-    });
+    joint.inertial = Some(inertial(row));
     joint.friction = Some(JointFriction {
         coulomb: floor.at_least_zero("Coulomb friction", k, row[column::COULOMB]),
         viscous: floor.at_least_zero(
@@ -395,6 +390,19 @@ fn put_joint(
         ),
         offset: row[column::OFFSET],
     });
+}
+
+/// Returns the inertial parameters of a row.
+fn inertial(row: &[f64; COLUMNS]) -> Inertial {
+    let mut first_moment = [0.0; 3];
+    first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
+    let mut inertia = [0.0; 6];
+    inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
+    Inertial {
+        mass: row[column::MASS],
+        first_moment,
+        inertia,
+    }
 }
 
 /// Returns the difference, or zero if it is only rounding of `part`.

@@ -148,4 +148,16 @@ pub enum RobotError {
         /// The missing item, as the rest of a sentence about the joint.
         why: String,
     },
+    /// The work does not cover an axis that follows a joint.
+    #[error(
+        "{what} does not cover robots in which one drive turns several axes, and here `{follower}` follows joint `{joint}` (<mimic> of a URDF, [[follower]] of a TOML); end the chain before it, or hold both with --lock"
+    )]
+    Followers {
+        /// The work, as the subject of a sentence.
+        what: String,
+        /// The follower.
+        follower: String,
+        /// The joint that it follows.
+        joint: String,
+    },
 }

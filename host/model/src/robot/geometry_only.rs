@@ -34,6 +34,7 @@ impl Robot {
             name: name.to_owned(),
             gravity: [0.0, 0.0, -GRAVITY],
             joints,
+            followers: Vec::new(),
             flange: Flange::default(),
             wrist_sensor: None,
             workspace: Vec::new(),

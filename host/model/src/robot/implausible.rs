@@ -18,7 +18,7 @@ impl Robot {
         let (massless, others): (Vec<_>, Vec<_>) =
             (self.implausible().into_iter()).partition(|(_, why)| why == MASSLESS);
         let of = |(k, why): (usize, String)| {
-            let joint = &self.joints[k].name;
+            let joint = self.link_name(k);
             let link = match urdf.and_then(|original| original.link(k)) {
                 Some(link) => format!("Link `{link}`, moved by joint `{joint}`,"),
                 None => format!("The link of joint `{joint}`"),
@@ -50,7 +50,7 @@ impl Robot {
             let names: Vec<String> = joints.iter().map(|k| format!("`{}`", of(*k))).collect();
             listed(&names)
         };
-        let moved = names(&|k| self.joints[k].name.clone());
+        let moved = names(&|k| self.link_name(k).to_owned());
         let links = match urdf {
             Some(original) => {
                 let own = names(&|k| original.link(k).unwrap_or_default().to_owned());
@@ -65,9 +65,9 @@ impl Robot {
 
     /// Returns the joints (from 0) whose link no body can be, each with the reason as the end of a sentence.
     fn implausible(&self) -> Vec<(usize, String)> {
-        (0..self.joints.len())
+        (0..self.link_count())
             .filter_map(|k| {
-                let inertial = self.joints[k].inertial.as_ref()?;
+                let inertial = self.link_inertial(k)?;
                 let why = implausibility(&SpatialInertia::of(inertial), &self.shown(k))?;
                 Some((k, why))
             })

@@ -4,7 +4,7 @@
 //! description sets the other values to zero. The torque of a joint accelerates such a combination: the diagonal
 //! element of the inertia matrix. It is positive for every way of splitting the combination.
 
-use rig_shared::multibody::{COLUMNS, Chain, column, inertia_matrix};
+use rig_shared::multibody::{COLUMNS, column, inertia_matrix};
 use rig_shared::transmission::DriveKind;
 
 use super::fault::{Fault, Step, written};
@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-12;
 /// and the fault with the path from that joint.
 pub(super) fn negative_inertia(robot: &Robot) -> Option<(usize, Fault)> {
     let rows = robot.standard_parameters();
-    let drive = (0..rows.len()).find_map(|k| Some((k, of_drive(robot, &rows, k)?)));
+    let drive = (0..robot.joints.len()).find_map(|k| Some((k, of_drive(robot, &rows, k)?)));
     // A coupled drive adds to several joints.
     let simple = robot
         .drive_kinds()
@@ -46,7 +46,7 @@ fn of_drive(robot: &Robot, rows: &[[f64; COLUMNS]], k: usize) -> Option<Fault> {
 /// Checks the diagonal of the inertia matrix with the joints at zero and in the middle of their limits.
 fn of_joints(robot: &Robot, rows: &[[f64; COLUMNS]]) -> Option<(usize, Fault)> {
     let n = robot.joints.len();
-    let chain = Chain::new(&robot.geometry(), robot.gravity).ok()?;
+    let chain = robot.chain().ok()?;
     let largest = rows.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
     [vec![0.0; n], robot.middle_position()]
         .iter()

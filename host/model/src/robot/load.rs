@@ -178,9 +178,9 @@ impl Robot {
     #[must_use]
     pub fn with_load(&self, load: &Load) -> Self {
         let mut robot = self.clone();
-        if let Some(last) = robot.joints.last_mut() {
+        if let Some(last) = robot.link_inertial_mut(self.last_link()) {
             let load = SpatialInertia::of(&load.inertial()).seen_from(&self.flange_pose());
-            last.inertial = Some(match &last.inertial {
+            *last = Some(match &*last {
                 Some(own) => SpatialInertia::of(own).plus(&load).inertial(),
                 None => load.inertial(),
             });

@@ -5,20 +5,24 @@ use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind as Kind, column};
 use super::joint::{Joint, JointKind};
 use super::serial_robot::Robot;
 
+/// Returns the geometry of a joint.
+pub(super) fn geometry_of(joint: &Joint) -> JointGeometry<f64> {
+    JointGeometry {
+        kind: match joint.kind {
+            JointKind::Revolute => Kind::Revolute,
+            JointKind::Prismatic => Kind::Prismatic,
+        },
+        alpha: joint.alpha,
+        a: joint.a,
+        theta: joint.theta,
+        d: joint.d,
+    }
+}
+
 impl Robot {
-    /// Returns the geometry, joint by joint, for [`rig_shared::multibody::Chain::new`].
+    /// Returns the geometry, joint by joint, without followers; [`Self::chain`] has all axes.
     pub fn geometry(&self) -> Vec<JointGeometry<f64>> {
-        let joint = |joint: &Joint| JointGeometry {
-            kind: match joint.kind {
-                JointKind::Revolute => Kind::Revolute,
-                JointKind::Prismatic => Kind::Prismatic,
-            },
-            alpha: joint.alpha,
-            a: joint.a,
-            theta: joint.theta,
-            d: joint.d,
-        };
-        self.joints.iter().map(joint).collect()
+        self.joints.iter().map(geometry_of).collect()
     }
 
     /// Returns the torque limit of each joint, N·m or N, if one is stated.
@@ -28,8 +32,8 @@ impl Robot {
             .collect()
     }
 
-    /// Returns the standard parameters, one row a joint in the order of `COLUMN_NAMES`; 0 for values that are not
-    /// stated. Inertia and friction of the drives are on the joint side. [`Self::motor_parameters`] returns the terms
+    /// Returns the standard parameters, one row a link (joints, then followers) in the order of `COLUMN_NAMES`; 0 for
+    /// values that are not stated. Inertia and friction of the drives are on the joint side. [`Self::motor_parameters`] returns the terms
     /// of coupled drives and screws beyond the joints' diagonals.
     pub fn standard_parameters(&self) -> Vec<[f64; COLUMNS]> {
         let joint = |joint: &Joint| {
@@ -46,6 +50,7 @@ impl Robot {
         };
         let mut rows: Vec<[f64; COLUMNS]> = self.joints.iter().map(joint).collect();
         self.add_drives(&mut rows);
+        rows.extend(self.followers.iter().map(|own| joint(&own.as_joint())));
         rows
     }
 }

@@ -6,6 +6,7 @@ use super::array::exact;
 use super::band::IdentifiedBand;
 use super::effects::RobotEffect;
 use super::flange::Flange;
+use super::follower::Follower;
 use super::joint::Joint;
 use super::uncertainty::Uncertainty;
 use super::workspace::Region;
@@ -24,7 +25,10 @@ pub struct Robot {
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
-    /// Pose of the flange frame in the frame of the last joint.
+    /// Axes that the drive of a joint turns too.
+    #[serde(default, rename = "follower", skip_serializing_if = "Vec::is_empty")]
+    pub followers: Vec<Follower>,
+    /// Pose of the flange frame in the frame of the last axis.
     #[serde(default, skip_serializing_if = "Flange::is_last_joint")]
     pub flange: Flange,
     /// Force and torque sensor at the wrist, if there is one.
@@ -48,7 +52,7 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Returns the pose of the flange frame in the frame of the last joint.
+    /// Returns the pose of the flange frame in the frame of the last axis.
     pub fn flange_pose(&self) -> nalgebra::Isometry3<f64> {
         self.flange.pose()
     }

@@ -421,8 +421,8 @@ fn what_is_no_serial_chain_is_refused_by_name() {
             ],
         ),
         (
-            urdf(&(one.clone() + &joint("two", "revolute", "a", "b", "<mimic joint='one'/>"))),
-            &["`two` mimics"],
+            urdf(&(one.clone() + &joint("two", "revolute", "a", "b", "<mimic joint='two'/>"))),
+            &["`two` mimics itself"],
         ),
         (
             urdf(&(one.clone() + &joint("two", "revolute", "a", "c", ""))),

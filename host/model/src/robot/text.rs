@@ -56,11 +56,8 @@ pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), Robo
         }
     }
     let remarks = square(&mut robot).into_iter().map(|squared| {
-        let key_path = [
-            Step::Key("joint"),
-            Step::At(squared.joint),
-            Step::Key(squared.key),
-        ];
+        let [table, at] = robot.link_key(squared.link);
+        let key_path = [table, at, Step::Key(squared.key)];
         let place = Place::of(text, offset(text, &key_path));
         format!("{}:{place}: {}", path.display(), squared.remark)
     });

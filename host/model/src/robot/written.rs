@@ -68,6 +68,11 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
             comment_toml(table, comments);
         }
     }
+    for (table, own) in toml_tables(&mut document, "follower").zip(&robot.followers) {
+        if let Item::Table(comments) = &comments(own.kind)["follower"] {
+            comment_toml(table, comments);
+        }
+    }
     for (table, effect) in toml_tables(&mut document, "effect").zip(&robot.effects) {
         comment_toml(table, &comments_on(robot, effect));
     }

@@ -93,7 +93,7 @@ impl Elastic {
     /// # Errors
     /// [`SimulateError::NoRotor`], [`SimulateError::NotPositiveDefinite`] if motor or link has no inertia.
     pub(super) fn of(model: &Model) -> Result<Self, SimulateError> {
-        let n = model.parameters.len();
+        let n = model.joint_count();
         let mut gears = Vec::new();
         let mut at: Vec<usize> = (0..n).collect();
         for joint in 0..n {
@@ -221,7 +221,7 @@ impl Elastic {
     fn drive_inertia(model: &Model, q: &[f64]) -> Result<DMatrix<f64>, SimulateError> {
         let n = q.len();
         let mut matrix = DMatrix::zeros(n, n);
-        for (j, own) in model.parameters.iter().enumerate() {
+        for (j, own) in model.joint_rows().iter().enumerate() {
             matrix[(j, j)] = own[column::DRIVE_INERTIA];
         }
         if let Some(motors) = &model.motors {
@@ -363,7 +363,7 @@ impl Elastic {
         for _ in 0..REST_PASSES {
             bias_torque(&model.chain, &model.parameters, &links, &still, &mut load)?;
             // The model's own offset and friction act on the motor.
-            for (load, own) in load.iter_mut().zip(&model.parameters) {
+            for (load, own) in load.iter_mut().zip(model.joint_rows()) {
                 *load -= own[column::OFFSET];
             }
             let inverse = self.map.inverse(model, &links)?;

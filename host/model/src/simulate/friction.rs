@@ -128,7 +128,7 @@ pub(super) fn refuse_driving_friction(
     model: &Model,
     elastic: &Elastic,
 ) -> Result<(), SimulateError> {
-    let n = model.parameters.len();
+    let n = model.joint_count();
     let Some(motors) = &model.motors else {
         return Ok(());
     };

@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::link_motion::LinkMotion;
-use crate::robot::{CentredBody, JointKind, Load, Reads, Robot};
+use crate::robot::{CentredBody, Joint, JointKind, Load, Reads, Robot};
 
 /// A load behind the wrist sensor of a robot.
 ///
@@ -15,6 +15,8 @@ use crate::robot::{CentredBody, JointKind, Load, Reads, Robot};
 #[derive(Clone, Debug)]
 pub struct LoadWrench<'a> {
     robot: &'a Robot,
+    /// The axes from the base outwards.
+    axes: Vec<Axis>,
     gravity: Vector3<f64>,
     /// The load in the flange frame.
     load: CentredBody,
@@ -22,6 +24,31 @@ pub struct LoadWrench<'a> {
     sensor: Isometry3<f64>,
     /// 1 for the wrench of the robot on the load, −1 for its opposite.
     sign: f64,
+}
+
+/// An axis, and the joint that moves it: its position is ratio · q + offset.
+#[derive(Clone, Debug)]
+struct Axis {
+    own: Joint,
+    joint: usize,
+    ratio: f64,
+    offset: f64,
+}
+
+/// Returns the axes of a robot from the base outwards.
+fn axes(robot: &Robot) -> Vec<Axis> {
+    let axis = |link: usize| {
+        let (joint, ratio, offset) = robot.link_motion(link)?;
+        Some(Axis {
+            own: robot.link_as_joint(link)?,
+            joint,
+            ratio,
+            offset,
+        })
+    };
+    (robot.links_outwards().into_iter())
+        .filter_map(axis)
+        .collect()
 }
 
 /// Motion of a frame: its pose in the base frame and, in the base's axes, the acceleration of its origin, angular
@@ -48,6 +75,7 @@ impl<'a> LoadWrench<'a> {
         let sensor = robot.wrist_sensor.as_ref()?;
         Some(Self {
             robot,
+            axes: axes(robot),
             gravity: Vector3::from(robot.gravity),
             load: load.centred()?,
             sensor: sensor.pose(),
@@ -55,7 +83,7 @@ impl<'a> LoadWrench<'a> {
         })
     }
 
-    /// Returns the motion of the last joint's frame (Siciliano et al. 2009, eqs. 7.93 to 7.99, in the base frame).
+    /// Returns the motion of the last axis' frame (Siciliano et al. 2009, eqs. 7.93 to 7.99, in the base frame).
     fn last_frame(&self, links: &LinkMotion) -> FrameMotion {
         let mut motion = FrameMotion {
             pose: Isometry3::identity(),
@@ -63,9 +91,12 @@ impl<'a> LoadWrench<'a> {
             omega: Vector3::zeros(),
             omega_dot: Vector3::zeros(),
         };
-        let states = links.q.iter().zip(&links.qd).zip(&links.qdd);
-        for (joint, ((q, qd), qdd)) in self.robot.joints.iter().zip(states) {
-            let pose = motion.pose * joint.pose(*q);
+        for axis in &self.axes {
+            let (k, ratio) = (axis.joint, axis.ratio);
+            let q = ratio * links.q[k] + axis.offset;
+            let [qd, qdd] = [links.qd[k], links.qdd[k]].map(|rate| ratio * rate);
+            let joint = &axis.own;
+            let pose = motion.pose * joint.pose(q);
             let arm = pose.translation.vector - motion.pose.translation.vector;
             let axis = pose.rotation * Vector3::z();
             let mut next = FrameMotion {
@@ -75,11 +106,11 @@ impl<'a> LoadWrench<'a> {
             };
             match joint.kind {
                 JointKind::Revolute => {
-                    next.omega += axis * *qd;
-                    next.omega_dot += axis * *qdd + motion.omega.cross(&axis) * *qd;
+                    next.omega += axis * qd;
+                    next.omega_dot += axis * qdd + motion.omega.cross(&axis) * qd;
                 }
                 JointKind::Prismatic => {
-                    next.acceleration += axis * *qdd + 2.0 * motion.omega.cross(&axis) * *qd;
+                    next.acceleration += axis * qdd + 2.0 * motion.omega.cross(&axis) * qd;
                 }
             }
             motion = next;
@@ -114,10 +145,12 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use nalgebra::SVector;
     use rand::{RngExt, SeedableRng};
-    use rig_shared::multibody::{Chain, wrench_regressor};
+    use rig_shared::multibody::wrench_regressor;
 
     use super::*;
-    use crate::robot::{Controller, Flange, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, WristSensor};
+    use crate::robot::{
+        Controller, Flange, Follower, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, WristSensor,
+    };
     use crate::simulate::{Inputs, Model, Since, closed_loop_watched};
 
     const G: f64 = 9.81;
@@ -201,6 +234,29 @@ mod tests {
                     joint.kind = JointKind::Prismatic;
                 }
             }
+            if round % 4 == 1 {
+                // Axes that follow a joint: behind the first joint, and at the end.
+                let last = robot.joints.last().map(|own| own.name.clone());
+                let first = robot.joints[0].name.clone();
+                for (after, follows, kind) in [
+                    (Some(first.clone()), first.clone(), JointKind::Revolute),
+                    (last, robot.joints[1].name.clone(), JointKind::Prismatic),
+                ] {
+                    robot.followers.push(Follower {
+                        name: format!("f{}", robot.followers.len()),
+                        follows,
+                        ratio: draw(2.0),
+                        offset: draw(0.5),
+                        after,
+                        kind,
+                        alpha: draw(1.5),
+                        a: draw(0.5),
+                        theta: draw(1.5),
+                        d: draw(0.5),
+                        inertial: None,
+                    });
+                }
+            }
             robot.flange = Flange {
                 position: [(); 3].map(|()| draw(0.2)),
                 rotation: [draw(3.0), draw(1.5), draw(3.0)],
@@ -230,7 +286,7 @@ mod tests {
                 qdd: state(20.0),
             };
             let found = LoadWrench::new(&robot, &load).unwrap().at(&links);
-            let chain = Chain::<f64>::new(&robot.geometry(), robot.gravity).unwrap();
+            let chain = robot.chain::<f64>().unwrap();
             let mut w = [0.0; 60];
             wrench_regressor(&chain, &links.q, &links.qd, &links.qdd, &mut w).unwrap();
             let phi = load.seen_from(&robot.flange_pose()).parameters();

@@ -7,11 +7,11 @@ use super::error::SimulateError;
 use crate::effects::Effects;
 use crate::robot::Robot;
 
-/// A robot as numbers: geometry, and one row of parameters a joint in the order of `COLUMN_NAMES`.
+/// A robot as numbers: geometry, and one row of parameters a link in the order of `COLUMN_NAMES`.
 pub struct Model {
     /// Geometry and gravity.
     pub chain: Chain<f64>,
-    /// Parameters, joint by joint.
+    /// Parameters, link by link: those of the joints, then those of followers.
     pub parameters: Vec<[f64; COLUMNS]>,
     /// Drives that move several joints or have a changing ratio; `None` if there is no such drive.
     pub motors: Option<Motors>,
@@ -34,7 +34,7 @@ impl Model {
     /// # Errors
     /// [`SimulateError::Chain`] on geometry that does not form a chain.
     pub fn from_robot(robot: &Robot) -> Result<Self, SimulateError> {
-        let chain = Chain::new(&robot.geometry(), robot.gravity)?;
+        let chain = robot.chain()?;
         let motors = Motors::from_robot(robot)?;
         Self::assembled(robot, chain, robot.standard_parameters(), motors)
     }
@@ -57,6 +57,16 @@ impl Model {
             motors,
             effects,
         })
+    }
+
+    /// Returns the number of joints.
+    pub fn joint_count(&self) -> usize {
+        self.chain.joint_count()
+    }
+
+    /// Returns the rows of parameters of the joints, without those of followers.
+    pub fn joint_rows(&self) -> &[[f64; COLUMNS]] {
+        &self.parameters[..self.joint_count().min(self.parameters.len())]
     }
 
     /// Computes the inertia matrix at `q`, n × n row-major, with drives and motors.

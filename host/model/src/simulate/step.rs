@@ -82,7 +82,7 @@ impl<'a> Stepper<'a> {
     /// # Errors
     /// [`SimulateError::NegativeFriction`] if a joint's friction would feed energy in.
     pub fn new(model: &'a Model) -> Result<Self, SimulateError> {
-        let joints = model.parameters.len();
+        let joints = model.joint_count();
         let elastic = Elastic::of(model)?;
         // The motors, then the links that are masses of their own.
         let n = joints + elastic.gears.len();
@@ -136,7 +136,7 @@ impl<'a> Stepper<'a> {
         self.mass.fill(0.0);
         map.add_matrix(&own.matrix, &mut self.mass, n);
         self.damping.fill(0.0);
-        for (i, parameters) in self.model.parameters.iter().enumerate() {
+        for (i, parameters) in self.model.joint_rows().iter().enumerate() {
             self.damping[i * n + i] = parameters[column::VISCOUS];
             if map.is_separate(i) {
                 self.mass[i * n + i] += parameters[column::DRIVE_INERTIA];
@@ -406,7 +406,7 @@ impl<'a> Stepper<'a> {
             self.bias()?;
             self.effects(torque, dt)?;
             for i in 0..n {
-                let own = self.model.parameters.get(i);
+                let own = self.model.joint_rows().get(i);
                 let offset = own.map_or(0.0, |own| own[column::OFFSET]) + self.acting.torque[i];
                 let drive = torque.get(i).copied().unwrap_or(0.0);
                 let row = i * n..(i + 1) * n;
@@ -465,7 +465,7 @@ fn without_friction(
     elastic: &Elastic,
 ) -> Result<Vec<[f64; COLUMNS]>, SimulateError> {
     let mut smooth = model.parameters.clone();
-    for (joint, row) in smooth.iter_mut().enumerate() {
+    for (joint, row) in smooth.iter_mut().take(model.joint_count()).enumerate() {
         for (place, name) in [(column::VISCOUS, "fv"), (column::COULOMB, "fc")] {
             refuse_negative(name, joint, row[place])?;
         }
@@ -486,7 +486,7 @@ fn without_friction(
 /// [`SimulateError::NegativeFriction`].
 fn coulomb(model: &Model, elastic: &Elastic) -> Result<Vec<f64>, SimulateError> {
     let mut coulomb: Vec<f64> = model
-        .parameters
+        .joint_rows()
         .iter()
         .map(|p| p[column::COULOMB])
         .collect();

@@ -100,18 +100,18 @@ class Robot:
 
     @property
     def parameters(self) -> _Floats:
-        """The standard parameters, shape (joints, 14): m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz, Ia, fv, fc, off.
+        """The standard parameters, shape (links, 14), the links of the joints before those of followers: m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz, Ia, fv, fc, off.
 
         Inertia is about the origin of the joint's frame (modified Denavit-Hartenberg); 0 for values that are not stated.
         """
 
     @property
     def parameter_names(self) -> list[str]:
-        """Names of the columns of :meth:`regressor`, with the number of the joint: 14 * joints names."""
+        """Names of the columns of :meth:`regressor`, with the number of the link: 14 * links names."""
 
     @property
     def parameter_units(self) -> list[str]:
-        """Units of the columns of :meth:`regressor`, ASCII: 14 * joints units."""
+        """Units of the columns of :meth:`regressor`, ASCII: 14 * links units."""
 
     def to_toml(self) -> str:
         """Return the description as TOML with units in comments."""
@@ -156,7 +156,7 @@ class Robot:
         """Return the torques that hold the links against gravity, shape (n, joints), N*m or N."""
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int = 0) -> _Floats:
-        """Return the regressor Y with tau = Y @ parameters.ravel(), shape (n, joints, 14 * joints).
+        """Return the regressor Y with tau = Y @ parameters.ravel(), shape (n, joints, 14 * links).
 
         :attr:`parameter_names` and :attr:`parameter_units` describe the columns.
         """
@@ -183,7 +183,7 @@ class BaseParameters:
 
     @property
     def combination(self) -> _Floats:
-        """K in beta = K @ pi, shape (rank, 14 * joints), or (rank, 17 * joints) with coupled drives.
+        """K in beta = K @ pi, shape (rank, 14 * links), or (rank, 17 * joints) with coupled drives.
 
         ``pi`` holds the standard parameters of the joints; with coupled drives the 3 parameters of each motor follow.
         """

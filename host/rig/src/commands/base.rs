@@ -5,6 +5,7 @@ use clap::Args as ClapArgs;
 use super::error::CommandError;
 use super::identify::Model;
 use super::input::RobotArg;
+use super::link_numbers::followers_note;
 use super::ui::Ui;
 use rig_identify::{Base, agree, grouped};
 
@@ -28,8 +29,12 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load(ui)?;
     let base = Base::structural(&robot, args.model.into(), args.seed)?;
-    let rules = grouped(&robot)?;
-    let same = agree(&rules, &base);
+    // There are no rules for axes that follow a joint.
+    let rules = match robot.has_followers() {
+        true => None,
+        false => Some(grouped(&robot)?),
+    };
+    let same = rules.as_ref().map(|rules| agree(rules, &base));
     let list: Vec<(String, &str)> = (0..base.len())
         .map(|k| (base.expression(k), base.unit(k)))
         .collect();
@@ -42,21 +47,23 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             "schema": "rig-base/1",
             "robot": robot.name,
             "count": list.len(),
-            "count_by_rules": rules.len(),
+            "count_by_rules": rules.as_ref().map(Base::len),
             "rules_agree": same,
             "base_parameters": parameters,
         });
         ui.print_json(&format!("{result:#}"));
         return Ok(());
     }
-    if same {
-        ui.detail("Numeric rank and the grouping rules for modified Denavit-Hartenberg frames give the same set.");
-    } else {
+    if let (Some(false), Some(rules)) = (same, &rules) {
         ui.note(&format!(
             "The grouping rules give {} parameters, the numeric rank {}, and the sets differ; the list is that of the numeric rank.",
             rules.len(),
             list.len()
         ));
+    } else if rules.is_some() {
+        ui.detail("Numeric rank and the grouping rules for modified Denavit-Hartenberg frames give the same set.");
+    } else if let Some(note) = followers_note(&robot) {
+        ui.note(&note);
     }
     for (expression, unit) in &list {
         ui.say(&format!("{expression}  [{unit}]"));

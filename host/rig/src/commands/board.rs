@@ -106,6 +106,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             model, leave_out, ..
         } => {
             let described = described(model, &ChainArg::default(), ui)?.robot;
+            described.without_followers("The board's compensation")?;
             sent = uploaded(&described, *leave_out, ui)?;
             robot = Some(described);
         }

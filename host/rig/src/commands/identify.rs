@@ -12,6 +12,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 pub use self::impossible::Impossible;
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, Use, recordings, refuse_faults, refuse_shared, refuse_twice};
+use super::link_numbers::followers_note;
 use super::map_arg::MapArg;
 use super::overwrite::refuse_folder;
 use super::report_arg::{ReportArg, write_report};
@@ -298,6 +299,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     for sentence in &said {
         ui.say(&format!("{URDF}: {sentence}"));
+    }
+    if let Some(note) = followers_note(&description.robot) {
+        ui.note(&note);
     }
     printed::print(ui, &found);
     args.report.tell(&args.out.join(REPORT), ui);

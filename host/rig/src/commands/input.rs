@@ -379,7 +379,10 @@ impl Inputs {
             }
             // A comparison with the model names a wrong unit more precisely, if the columns allow the comparison.
             let spoilt = wrong.iter().any(Implausible::spoils);
-            let judged = match spoilt || !source.has_effort() {
+            if robot.has_followers() {
+                unchecked.push(format!("{}: signs, scales and the order of columns were not compared with the model before the fit, because one drive of this robot turns several axes.", source.path().display()));
+            }
+            let judged = match spoilt || !source.has_effort() || robot.has_followers() {
                 true => Vec::new(),
                 false => faults_at_start(robot, source, JUDGED_ROWS)?,
             };

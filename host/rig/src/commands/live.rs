@@ -92,7 +92,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         )));
     }
     let robot = match &args.robot {
-        Some(path) => Some(described(path, &args.chain, ui)?.robot),
+        Some(path) => {
+            let robot = described(path, &args.chain, ui)?.robot;
+            robot.without_followers("The rig, which has one link,")?;
+            Some(robot)
+        }
         None => None,
     };
     let hardware = args.port.is_some() || args.probe;

@@ -59,6 +59,7 @@ mod init;
 mod input;
 mod inspect;
 mod interrupts;
+mod link_numbers;
 mod live;
 mod load;
 mod man;

@@ -89,7 +89,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     refuse_file(&args.out, args.force)?;
     let robot = match &args.robot {
-        Some(path) => Some(described(path, &args.chain, ui)?.robot),
+        Some(path) => {
+            let robot = described(path, &args.chain, ui)?.robot;
+            robot.without_followers("The rig, which has one link,")?;
+            Some(robot)
+        }
         None => None,
     };
     let mut settings: Vec<RequestBody> = args

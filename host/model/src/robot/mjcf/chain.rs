@@ -254,6 +254,7 @@ fn moved(
         link: link.to_owned(),
         heavy: Vec::new(),
         kind: joint.kind,
+        mimic: None,
         origin,
         axis: joint.axis.into_inner(),
         inertia: nothing,

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use rig_shared::multibody::Chain;
 use serde::Deserialize;
 
 use crate::batch::ModelBatch;
@@ -24,7 +23,7 @@ fn file(name: &str) -> PathBuf {
 }
 
 fn torques(robot: &Robot, state: &State) -> Vec<f64> {
-    let chain = Chain::new(&robot.geometry(), robot.gravity).unwrap();
+    let chain = robot.chain().unwrap();
     let model = ModelBatch::new(&chain, &robot.standard_parameters()).unwrap();
     let column = |values: &[f64]| values.iter().map(|v| vec![*v]).collect::<Vec<_>>();
     let mut torque = vec![0.0; robot.joints.len()];

@@ -81,6 +81,20 @@ impl Robot {
                 named(&constant)
             ));
         }
+        let followers: Vec<String> = (self.followers.iter())
+            .map(|own| {
+                format!(
+                    "<joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{:?} {:?} 0 0 0\"/>",
+                    own.name, own.follows, own.offset, own.ratio
+                )
+            })
+            .collect();
+        if !followers.is_empty() {
+            remarks.push(format!(
+                "The fragment does not couple axes: put {} into <equality> of the model.",
+                followers.join(" ")
+            ));
+        }
         let is_coupled = |joint: &&Joint| {
             let drive = joint.drive.as_ref();
             drive.is_some_and(|drive| !drive.couples.is_empty() || drive.screw.is_some())

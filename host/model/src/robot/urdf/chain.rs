@@ -18,6 +18,8 @@ pub(in crate::robot) struct Body {
     /// joints are not among them.
     pub heavy: Vec<String>,
     pub kind: JointKind,
+    /// How it follows a joint of the chain, if it does.
+    pub mimic: Option<Mimic>,
     /// Frame of this joint (its child link) in the frame of the previous body at q = 0.
     pub origin: Isometry3<f64>,
     /// Unit vector of the axis in the joint's frame.
@@ -31,6 +33,15 @@ pub(in crate::robot) struct Body {
     pub reduction: Option<f64>,
     /// Inertia of the rotor on the motor side, kg·m².
     pub rotor_inertia: Option<f64>,
+}
+
+/// An axis moves as ratio · q + offset of a joint of the chain.
+#[derive(Debug)]
+pub(in crate::robot) struct Mimic {
+    /// Name of the joint, which itself follows no other.
+    pub joint: String,
+    pub ratio: f64,
+    pub offset: f64,
 }
 
 /// The movable bodies from the base outwards; gravity points along −z of the base link.

@@ -122,19 +122,23 @@ impl<'a> Reader<'a> {
                 master.get_or_insert(mimic.master);
             }
         }
-        let joint = &tree.joints[index];
+        Err(self.mimics_itself(&tree.joints[index]))
+    }
+
+    /// Returns the refusal of a joint that mimics itself.
+    pub(super) fn mimics_itself(&self, joint: &TreeJoint<'a>) -> RobotError {
         let node = joint.mimic.as_ref().map_or(joint.node, |mimic| mimic.node);
-        Err(self.error(
+        self.error(
             node,
             format!(
                 "joint `{}` mimics itself through other joints; let one of them move by itself",
                 joint.name
             ),
-        ))
+        )
     }
 
     /// Returns the joint that joint `name` mimics.
-    fn master(
+    pub(super) fn master(
         &self,
         tree: &Tree<'a>,
         node: Xml<'a>,

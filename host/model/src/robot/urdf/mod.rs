@@ -6,6 +6,9 @@ mod audit;
 mod chain;
 mod choice;
 mod edits;
+mod geared;
+#[cfg(test)]
+mod geared_test;
 mod locks;
 mod names;
 mod original;
@@ -24,7 +27,7 @@ mod values;
 mod write;
 
 pub use audit::{Audit, AuditCheck, AuditFinding, audit};
-pub(super) use chain::{Body, Chain};
+pub(super) use chain::{Body, Chain, Mimic};
 pub use choice::ChainChoice;
 pub use original::Original;
 pub(super) use read::read;

@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rig_shared::multibody::{COLUMNS, column};
 use roxmltree::Document;
 
-use super::chain::Chain;
+use super::chain::{Body, Chain};
 use super::choice::ChainChoice;
 use super::edits::{Edit, at, put_friction, put_inertia, put_rotor, spliced};
 use super::prefixes::declared;
@@ -103,9 +103,11 @@ impl Original {
         &self.chain.beyond_tip
     }
 
-    /// Returns the link that joint `joint` (from 0) moves.
-    pub fn link(&self, joint: usize) -> Option<&str> {
-        self.chain.bodies.get(joint).map(|body| body.link.as_str())
+    /// Returns the name of link `link` (from 0; those of joints before those of followers).
+    pub fn link(&self, link: usize) -> Option<&str> {
+        let order = self.robot.links_outwards();
+        let axis = order.iter().position(|own| *own == link)?;
+        self.chain.bodies.get(axis).map(|body| body.link.as_str())
     }
 
     /// Returns the file with those inertias and frictions of `robot` that differ, and remarks on what URDF cannot hold.
@@ -126,6 +128,7 @@ impl Original {
         }
         self.level(&document, robot, &mut edits, &mut remarks);
         let rotors: Vec<bool> = (self.chain.bodies.iter())
+            .filter(|body| body.mimic.is_none())
             .map(|body| body.rotor_inertia.is_some())
             .collect();
         robot.left_out(&rows, &rotors, &mut remarks);
@@ -168,30 +171,33 @@ impl Original {
         let mut replaced = Replaced::default();
         let before = self.robot.standard_parameters();
         let (bodies, chosen) = robot.with_bodies();
-        for (k, (joint, body)) in robot.joints.iter().zip(&self.chain.bodies).enumerate() {
-            if let (Some(inertial), Some(written)) = (&joint.inertial, &bodies.joints[k].inertial)
-                && self.robot.joints[k]
-                    .inertial
-                    .as_ref()
-                    .is_none_or(|own| !same(own, inertial))
+        for (axis, k) in robot.links_outwards().into_iter().enumerate() {
+            let body = &self.chain.bodies[axis];
+            if let (Some(inertial), Some(written)) =
+                (robot.link_inertial(k), bodies.link_inertial(k))
+                && (self.robot.link_inertial(k)).is_none_or(|own| !same(own, inertial))
             {
                 // What is behind locked joints stays in its own links.
                 let seen = SpatialInertia::of(written)
-                    .seen_from(&self.links[k].inverse())
+                    .seen_from(&self.links[axis].inverse())
                     .minus(&body.locked);
                 let (link, merged) = put_inertia(document, body, &seen, edits).map_err(|why| {
                     RobotError::NotUrdf {
-                        joint: joint.name.clone(),
+                        joint: robot.link_name(k).to_owned(),
                         why,
                     }
                 })?;
                 replaced.inertias.push(link);
                 remarks.extend(merged);
             }
+            let Some(joint) = robot.joints.get(k) else {
+                continue;
+            };
             let places = [column::VISCOUS, column::COULOMB];
             let [new, old] = [rows, &before].map(|rows| places.map(|place| rows[k][place]));
             if new != old && put_friction(document, &joint.name, new, edits) {
                 replaced.frictions.push(joint.name.as_str());
+                self.without_own_friction(document, &joint.name, edits);
             }
             let [new, old] = [rows, &before].map(|rows| rows[k][column::DRIVE_INERTIA]);
             if body.rotor_inertia.is_some() && new != old {
@@ -210,14 +216,29 @@ impl Original {
         Ok(replaced)
     }
 
-    /// Refuses a description with other joints or frames.
+    /// Removes the friction of the followers of a joint: that of the joint holds it.
+    fn without_own_friction(&self, document: &Document<'_>, joint: &str, edits: &mut Vec<Edit>) {
+        let follows = |body: &&Body| body.mimic.as_ref().is_some_and(|own| own.joint == joint);
+        for body in self.chain.bodies.iter().filter(follows) {
+            if body.friction.is_some() {
+                put_friction(document, &body.joint, [0.0; 2], edits);
+            }
+        }
+    }
+
+    /// Refuses a description with other joints, followers or frames.
     fn same_chain(&self, robot: &Robot) -> Result<(), RobotError> {
         let numbers = |j: &Joint| [j.alpha, j.a, j.theta, j.d];
+        let gears = |robot: &Robot| -> Vec<_> {
+            (robot.followers.iter())
+                .map(|own| (own.name.clone(), own.follows.clone(), own.ratio, own.offset))
+                .collect()
+        };
         let not_representable = |joint: &Joint, why: String| RobotError::NotUrdf {
             joint: joint.name.clone(),
             why,
         };
-        for (joint, own) in robot.joints.iter().zip(&self.robot.joints) {
+        for (joint, own) in robot.axes().iter().zip(&self.robot.axes()) {
             if joint.name != own.name || joint.kind != own.kind {
                 return Err(not_representable(
                     joint,
@@ -234,6 +255,14 @@ impl Original {
                     "has another frame (alpha, a, theta, d) than the one that the URDF file gives it".into(),
                 ));
             }
+        }
+        if gears(robot) != gears(&self.robot)
+            && let Some(own) = robot.followers.first().or(self.robot.followers.first())
+        {
+            return Err(not_representable(
+                &own.as_joint(),
+                "follows a joint in another way than <mimic> of the URDF file says".into(),
+            ));
         }
         let (n, own) = (robot.joints.len(), self.robot.joints.len());
         if let Some(joint) = robot.joints.get(own).or_else(|| self.robot.joints.get(n)) {

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::Isometry3;
 use rig_shared::multibody::MAX_JOINTS;
 
-use super::chain::{Body, Chain};
+use super::chain::{Body, Chain, Mimic};
 use super::choice::ChainChoice;
 use super::locks::Held;
 use super::prefixes::declared;
@@ -35,10 +35,9 @@ pub(in crate::robot) fn read(
         unknown: RefCell::default(),
     };
     let notes = reader.remarks.borrow().clone();
-    Ok(Chain {
-        notes,
-        ..reader.chain(choice)?
-    })
+    let mut chain = reader.chain(choice)?;
+    chain.notes.splice(0..0, notes);
+    Ok(chain)
 }
 
 /// A movable joint of the chain with the pose of its parent link in the frame of the body before it.
@@ -180,6 +179,16 @@ impl<'a> Selected<'_, 'a> {
         Ok((Some((first, pose)), locked))
     }
 
+    /// Returns how an axis follows a joint of the chain, if it does.
+    fn mimic(&self, index: usize) -> Option<Mimic> {
+        let gear = self.selection.followers.get(&index)?;
+        Some(Mimic {
+            joint: self.tree.joints[gear.master].name.to_owned(),
+            ratio: gear.multiplier,
+            offset: gear.offset,
+        })
+    }
+
     fn body(
         &self,
         reader: &Reader<'a>,
@@ -207,6 +216,7 @@ impl<'a> Selected<'_, 'a> {
             link: joint.child.to_owned(),
             heavy: rigid.heavy.iter().map(|name| (*name).to_owned()).collect(),
             kind,
+            mimic: self.mimic(index),
             axis: reader.axis(joint)?.into_inner(),
             origin: to_parent * reader.origin(node)?,
             inertia: rigid.inertia,
@@ -266,6 +276,7 @@ impl<'a> Reader<'a> {
             tip = rigid.tip.unwrap_or_default();
             bodies.push(body);
         }
+        let followers = self.geared(&mut bodies)?;
         self.tell_unknown();
         self.last_link(&bodies);
         self.assumed(&chosen, choice, [told, merged], &used);
@@ -278,7 +289,7 @@ impl<'a> Reader<'a> {
             tip_link: selection.tip.to_owned(),
             beyond_tip: chosen.beyond_tip(self)?,
             remarks: self.remarks.take(),
-            notes: Vec::new(),
+            notes: followers.into_iter().collect(),
         })
     }
 

@@ -66,9 +66,13 @@ fn without_position(message: &str) -> &str {
 
 impl<'a> Reader<'a> {
     pub(super) fn error(&self, node: Xml<'a>, message: String) -> RobotError {
+        self.error_at(self.place(node), message)
+    }
+
+    pub(super) fn error_at(&self, place: Place, message: String) -> RobotError {
         RobotError::Urdf {
             path: self.path.into(),
-            place: self.place(node),
+            place,
             message,
         }
     }

@@ -17,10 +17,20 @@ pub(super) struct Selection<'a> {
     pub base: &'a str,
     /// Link that the chain ends at.
     pub tip: &'a str,
-    /// Joints of the chain, from the base outwards.
+    /// Axes of the chain, from the base outwards: joints, and those that follow one of them.
     pub active: Vec<usize>,
+    /// How axes follow.
+    pub followers: HashMap<usize, Gear>,
     /// Joints that the user holds.
     pub locks: Locks,
+}
+
+/// The axis moves as multiplier · q + offset of a joint of the chain that follows no other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gear {
+    pub master: usize,
+    pub multiplier: f64,
+    pub offset: f64,
 }
 
 /// What hangs on a link.
@@ -172,6 +182,13 @@ fn held_with_followers(tree: &Tree<'_>, locks: &Locks) -> HashSet<usize> {
 fn is_gripper(branches: &[Branch], before: usize) -> bool {
     let independent: usize = branches.iter().map(|branch| branch.independent).sum();
     let mimics: usize = branches.iter().map(|branch| branch.mimics).sum();
+    // One path without branches: what follows there is a gear of the arm.
+    let is_path = |branch: &Branch| branch.deepest == branch.independent + branch.mimics;
+    if let [only] = branches
+        && is_path(only)
+    {
+        return false;
+    }
     let few = independent <= 1 || mimics >= independent && 2 * independent <= before + 1;
     if before > 0 && mimics > 0 && few {
         return true;
@@ -295,7 +312,7 @@ impl<'a> Reader<'a> {
             .copied()
             .filter(|joint| is_movable(joint))
             .collect();
-        let active = self.without_followers(tree, &moving)?;
+        let (active, followers) = self.moved(tree, &locks, &moving)?;
         if active.is_empty() {
             let between = format!("between link `{start}` and link `{tip}`");
             return Err(self.error(self.document.root_element(), format!("the robot has no movable joint {between}; it needs at least one revolute, continuous or prismatic joint")));
@@ -305,35 +322,63 @@ impl<'a> Reader<'a> {
             base: start,
             tip,
             active,
+            followers,
             locks,
         })
     }
 
-    /// Returns the joints of a path without those that follow a joint beside it, which is held. Refuses those that follow
-    /// a joint of the path.
-    fn without_followers(
+    /// Returns the axes of a path without those that follow a joint beside it, which is held, and how the others follow.
+    ///
+    /// # Errors
+    /// A joint mimics one that does not exist, itself, or with a multiplier of 0.
+    fn moved(
         &self,
         tree: &Tree<'a>,
+        locks: &Locks,
         moving: &[usize],
-    ) -> Result<Vec<usize>, RobotError> {
-        let names: HashSet<&str> = moving
-            .iter()
-            .map(|joint| tree.joints[*joint].name)
-            .collect();
-        let mut active = Vec::new();
+    ) -> Result<(Vec<usize>, HashMap<usize, Gear>), RobotError> {
+        let (mut active, mut followers) = (Vec::new(), HashMap::new());
         for &index in moving {
-            let joint = &tree.joints[index];
-            match &joint.mimic {
-                None => active.push(index),
-                Some(mimic) if names.contains(mimic.master) => {
-                    let (name, master) = (joint.name, mimic.master);
-                    return Err(self.error(mimic.node, format!("joint `{name}` mimics joint `{master}`, and both are on the chain, so one motor moves both, but every joint of a robot must move by itself; end the chain before it with --tip {}, hold both with --lock {master}=VALUE, or remove <mimic> if `{name}` has a motor of its own", joint.parent)));
-                }
-                // Its master is held, so it is too.
-                Some(_) => {}
+            if tree.joints[index].mimic.is_none() {
+                active.push(index);
+                continue;
             }
+            let gear = self.gear(tree, locks, index)?;
+            // Its master is held, so it is too.
+            if !moving.contains(&gear.master) {
+                continue;
+            }
+            if gear.multiplier == 0.0 {
+                let joint = &tree.joints[index];
+                return Err(self.error(joint.node, format!("joint `{}` mimics joint `{}` with a multiplier of 0, so it never moves; make it a fixed joint", joint.name, tree.joints[gear.master].name)));
+            }
+            active.push(index);
+            followers.insert(index, gear);
         }
-        Ok(active)
+        Ok((active, followers))
+    }
+
+    /// Returns how a joint moves with the joint that it mimics in the end. A joint that the user holds is one.
+    fn gear(&self, tree: &Tree<'a>, locks: &Locks, index: usize) -> Result<Gear, RobotError> {
+        let mut gear = Gear {
+            master: index,
+            multiplier: 1.0,
+            offset: 0.0,
+        };
+        for _ in 0..=tree.joints.len() {
+            let joint = &tree.joints[gear.master];
+            let Some(mimic) = joint
+                .mimic
+                .as_ref()
+                .filter(|_| !locks.contains_key(&gear.master))
+            else {
+                return Ok(gear);
+            };
+            gear.offset += gear.multiplier * mimic.offset;
+            gear.multiplier *= mimic.multiplier;
+            gear.master = self.master(tree, mimic.node, joint.name, mimic.master)?;
+        }
+        Err(self.mimics_itself(&tree.joints[index]))
     }
 
     /// Returns the refusal of a tree with several arms, with the tips that can be chosen.

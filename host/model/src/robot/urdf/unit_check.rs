@@ -14,11 +14,17 @@ pub(in crate::robot) fn check_units(
     robot: &Robot,
     path: &Path,
 ) -> Result<(), RobotError> {
-    match oversized(&robot.joints).or_else(|| negative_inertia(robot)) {
+    // Bodies stand in the order of the chain, joints before followers in a robot.
+    let axis_of = |(joint, fault)| {
+        let order = robot.links_outwards();
+        let axis = order.iter().position(|link| *link == joint);
+        (axis.unwrap_or(joint), fault)
+    };
+    match oversized(&robot.axes()).or_else(|| negative_inertia(robot).map(axis_of)) {
         None => Ok(()),
-        Some((k, fault)) => Err(RobotError::Value {
+        Some((axis, fault)) => Err(RobotError::Value {
             path: path.into(),
-            place: chain.bodies[k].place,
+            place: chain.bodies[axis].place,
             what: fault.what,
             found: fault.found,
             advice: fault.advice,

@@ -13,6 +13,7 @@ use rig_shared::transmission::DriveKind;
 
 use super::spatial::SpatialInertia;
 use crate::robot::error::RobotError;
+use crate::robot::follower::Follower;
 use crate::robot::frame::{GRAVITY, roll_pitch_yaw, step};
 use crate::robot::joint::{Joint, JointKind, JointLimits};
 use crate::robot::serial_robot::Robot;
@@ -67,22 +68,8 @@ impl Robot {
             );
             body.push_str("  </joint>\n");
         }
-        let mut parent = base;
         let parameters = self.standard_parameters();
-        for (joint, row) in bodies.joints.iter().zip(&parameters) {
-            let link = name(format!("{}_link", escaped(&joint.name)));
-            write_link(&mut body, joint, &link)?;
-            let (viscous, coulomb) = (row[column::VISCOUS], row[column::COULOMB]);
-            write_joint(
-                &mut body,
-                joint,
-                &parent,
-                &link,
-                [viscous, coulomb],
-                &mut remarks,
-            );
-            parent = link;
-        }
+        let parent = self.write_links(&bodies, base, &mut name, &mut body, &mut remarks)?;
         if !self.flange.is_last_joint() {
             let (link, joint) = (name("flange".into()), self.free_name("last_to_flange"));
             let pose = self.flange_pose();
@@ -114,10 +101,66 @@ impl Robot {
         Ok(Urdf { text, remarks })
     }
 
+    /// Writes links and joints from the base outwards. `bodies`: the robot with inertias as they are written; `name`: makes
+    /// a name unique. Returns the last link.
+    fn write_links(
+        &self,
+        bodies: &Self,
+        base: String,
+        name: &mut impl FnMut(String) -> String,
+        out: &mut String,
+        remarks: &mut Vec<String>,
+    ) -> Result<String, RobotError> {
+        let parameters = self.standard_parameters();
+        let mut parent = base;
+        for number in bodies.links_outwards() {
+            let Some(mut joint) = bodies.link_as_joint(number) else {
+                continue;
+            };
+            let follower = (number.checked_sub(self.joints.len())).map(|k| &bodies.followers[k]);
+            if let Some(own) = follower {
+                joint.limits = self.followed_limits(own);
+            }
+            let link = name(format!("{}_link", escaped(&joint.name)));
+            write_link(out, &joint, &link)?;
+            let row = &parameters[number];
+            let (viscous, coulomb) = (row[column::VISCOUS], row[column::COULOMB]);
+            write_joint(
+                out,
+                &joint,
+                follower,
+                [&parent, &link],
+                [viscous, coulomb],
+                remarks,
+            );
+            parent = link;
+        }
+        Ok(parent)
+    }
+
+    /// Returns the limits of the axis of a follower, which are those of its joint.
+    fn followed_limits(&self, follower: &Follower) -> Option<JointLimits> {
+        let joint = self.joint_index(&follower.follows)?;
+        let own = self.joints[joint].limits.as_ref()?;
+        let turned = |[low, high]: [f64; 2]| {
+            let [a, b] = [low, high].map(|q| follower.ratio * q + follower.offset);
+            [a.min(b), a.max(b)]
+        };
+        Some(JointLimits {
+            position: turned(own.position),
+            soft_position: None,
+            velocity: own.velocity * follower.ratio.abs(),
+            acceleration: None,
+            // URDF demands a number; the motor is that of the joint.
+            torque: own.torque,
+        })
+    }
+
     /// Returns a name for a fixed joint that no joint of the robot has.
     fn free_name(&self, wish: &str) -> String {
         let mut name = wish.to_owned();
-        while self.joint_index(&name).is_some() {
+        let taken = |name: &str| (0..self.link_count()).any(|link| self.link_name(link) == name);
+        while taken(&name) {
             name.push('_');
         }
         name
@@ -229,8 +272,8 @@ impl UrdfKind {
 fn write_joint(
     out: &mut String,
     joint: &Joint,
-    parent: &str,
-    link: &str,
+    follower: Option<&Follower>,
+    [parent, link]: [&str; 2],
     [viscous, coulomb]: [f64; 2],
     remarks: &mut Vec<String>,
 ) {
@@ -252,6 +295,15 @@ fn write_joint(
         three(&pose.translation.vector),
         rpy(&pose.rotation.to_rotation_matrix())
     );
+    if let Some(own) = follower {
+        let _ = writeln!(
+            out,
+            "    <mimic joint=\"{}\" multiplier=\"{:?}\" offset=\"{:?}\"/>",
+            escaped(&own.follows),
+            own.ratio,
+            own.offset
+        );
+    }
     let torque = limits.and_then(|l| l.torque);
     if limits.is_some() || kind == UrdfKind::Prismatic {
         let mut unknown = Vec::new();

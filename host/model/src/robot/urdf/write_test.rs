@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rig_shared::multibody::{Chain, column, inverse_dynamics};
+use rig_shared::multibody::{column, inverse_dynamics};
 use rig_shared::transmission::DriveKind;
 
 use crate::robot::{
@@ -105,7 +105,7 @@ fn random(rng: &mut Pcg64) -> Robot {
 }
 
 fn torques(robot: &Robot, coupled: &[bool], [q, qd, qdd]: [&[f64]; 3]) -> Vec<f64> {
-    let chain = Chain::new(&robot.geometry(), robot.gravity).unwrap();
+    let chain = robot.chain().unwrap();
     let mut parameters = robot.standard_parameters();
     for (row, coupled) in parameters.iter_mut().zip(coupled) {
         // URDF holds neither a constant torque nor the inertia of coupled drives.

@@ -32,7 +32,7 @@ impl Impossible {
         // Half-width of the 95 % interval.
         let half = |row: usize| {
             let [value, _, high] = details.free[row];
-            (high - value) * widened(found, details.columns[row])
+            (high - value) * widened(robot, found, details.columns[row])
         };
         let below_zero = |row: usize| details.free[row][0] + CLEARLY * half(row) < 0.0;
         let wrong: Vec<usize> = (0..details.free.len())
@@ -65,14 +65,14 @@ impl Impossible {
             let own = &found.base_parameters[*row];
             let column = details.columns[*row];
             let friction = [column::VISCOUS, column::COULOMB].contains(&(column % COLUMNS));
-            let list = match friction || robot.joints.len() == 1 {
+            let list = match friction || robot.link_count() == 1 {
                 true => &mut refused,
                 false => &mut doubtful,
             };
             list.push(format!(
                 "{} of joint \"{}\" is {} {}, below zero by {} of its standard deviations",
                 own.expression,
-                robot.joints[column / COLUMNS].name,
+                robot.link_name(column / COLUMNS),
                 format_significant(value, 3),
                 format_unit(&own.unit),
                 format_significant(-value * WIDTH / half(*row), 2),
@@ -93,12 +93,16 @@ impl Impossible {
 }
 
 /// Returns the factor by which an interval is wider if no torque is known better than by [`LEAST_ERROR`]. Friction acts
-/// on its own joint alone, a link on all joints before it too.
-fn widened(found: &Identification, column: usize) -> f64 {
+/// on its own joint alone, a link on all joints before it too, and beside axes that follow on others.
+fn widened(robot: &Robot, found: &Identification, column: usize) -> f64 {
     let joint = column / COLUMNS;
     let friction = column % COLUMNS >= column::VISCOUS;
     let first = if friction { joint } else { 0 };
-    (found.joints.iter().take(joint + 1).skip(first))
+    let last = match robot.has_followers() && !friction {
+        true => found.joints.len(),
+        false => joint + 1,
+    };
+    (found.joints.iter().take(last).skip(first))
         .map(|own| LEAST_ERROR / own.train_relative_error)
         .filter(|factor| factor.is_finite())
         .fold(1.0, f64::max)

@@ -13,7 +13,7 @@ pub(super) fn of(
     identified: &Robot,
 ) -> Option<Result<Urdf, RobotError>> {
     let robot = &description.robot;
-    if found.standard_parameters.is_none() && robot.joints.len() != 1 {
+    if found.standard_parameters.is_none() && robot.link_count() != 1 {
         return None;
     }
     let urdf = match &description.urdf {

@@ -53,7 +53,10 @@ pub fn audit(
     limits::limits(&mut audit, &reader, &tree)?;
     match read(text, path, choice) {
         Ok(chain) => {
-            let places: Vec<_> = chain.bodies.iter().map(|body| body.place).collect();
+            let places: Vec<_> = (chain.bodies.iter())
+                .filter(|body| body.mimic.is_none())
+                .map(|body| body.place)
+                .collect();
             let robot = convert(&chain).robot;
             motion::inertia_matrices(&mut audit, &robot, &places, seed);
             scale::gravity(&mut audit, &robot, &places, seed);

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rig_shared::multibody::{self, inertia_matrix};
+use rig_shared::multibody::inertia_matrix;
 
 use super::finding::Audit;
 use crate::robot::error::Place;
@@ -41,7 +41,7 @@ pub(super) fn pose(robot: &Robot, rng: &mut Pcg64) -> Vec<f64> {
 /// stands.
 pub(super) fn inertia_matrices(audit: &mut Audit, robot: &Robot, places: &[Place], seed: u64) {
     let n = robot.joints.len();
-    let Ok(chain) = multibody::Chain::new(&robot.geometry(), robot.gravity) else {
+    let Ok(chain) = robot.chain() else {
         audit
             .unchecked
             .push("The inertia matrix was not checked: the chain has too many joints.".to_owned());

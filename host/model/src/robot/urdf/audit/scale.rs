@@ -2,7 +2,7 @@
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use rig_shared::multibody::{self, gravity_vector};
+use rig_shared::multibody::gravity_vector;
 
 use super::finding::Audit;
 use super::links::LinkBody;
@@ -74,7 +74,7 @@ pub(super) fn gravity(audit: &mut Audit, robot: &Robot, places: &[Place], seed: 
         .map(|joint| joint.limits.as_ref().and_then(|own| own.torque))
         .collect();
     let stated = limits.iter().flatten().count();
-    let Ok(chain) = multibody::Chain::new(&robot.geometry(), robot.gravity) else {
+    let Ok(chain) = robot.chain() else {
         return;
     };
     audit.checked(
