@@ -5,6 +5,9 @@ Writes into --out: robot.urdf (geometry; its inertial values are stand-ins, not 
 (columns t, q1 ..., tau1 ...: SI, joint side), truth.json (engine, noise put in per joint, and what least squares with
 Pinocchio's regressor at the exact motion leaves of the hold-out over that noise: the noise in the data lets no unbiased fit do better on average).
 
+In the arm "mimic" two axes follow a joint (<mimic> in robot.urdf): q of an axis = ratio * q of its joint + offset. The engine
+gets every axis, and the torque of a joint is the sum of ratio * torque of its axes.
+
 The motion is a Fourier series over 20 s per joint, 5 harmonics, other coefficients in the hold-out. The engine gives
 the torque; friction fv*qd + fc*sgn(qd) and a constant are added by this script. Noise of the torque: Gaussian, below
 NOISE_BAND Hz, NOISE_SHARE of the RMS torque of each joint; below the band so that no later low-pass takes it away.
@@ -45,6 +48,28 @@ PANDA = [
     (np.pi / 2, 0.088, 0.0, "revolute", 0.7),
 ]
 
+# Six axes; the third turns against the second, the slide follows the fourth.
+MIMIC = [
+    (0.0, 0.0, 0.3, "revolute", 5.0),
+    (np.pi / 2, 0.1, 0.0, "revolute", 4.0),
+    (0.0, 0.35, 0.0, "revolute", 3.0),
+    (-1.1, 0.1, 0.2, "revolute", 2.5),
+    (0.4, 0.15, 0.1, "prismatic", 1.5),
+    (np.pi / 2, 0.0, 0.1, "revolute", 0.8),
+]
+# By axis: the axis that it follows, ratio and offset.
+GEARS = {"mimic": {2: (1, -1.0, 0.0), 4: (3, 0.5, 0.1)}}
+
+
+def projection(axes, gears):
+    """M and b: positions of the axes are M @ q + b. Also the axes that are joints."""
+    joints = [axis for axis in range(axes) if axis not in gears]
+    matrix, shift = np.zeros((axes, len(joints))), np.zeros(axes)
+    for axis in range(axes):
+        master, ratio, offset = gears.get(axis, (axis, 1.0, 0.0))
+        matrix[axis, joints.index(master)], shift[axis] = ratio, offset
+    return matrix, shift, joints
+
 
 def random_arm(generator):
     """Five joints, the second and the last but one prismatic."""
@@ -67,7 +92,7 @@ def bodies(arm, generator):
     return result
 
 
-def urdf(name, arm, links, effort=None):
+def urdf(name, arm, links, effort=None, gears=None):
     effort = [1e4] * len(arm) if effort is None else effort
     number = lambda values: " ".join(repr(float(v)) for v in values)
     text = [f'<?xml version="1.0"?>\n<robot name="{name}">\n  <link name="base"/>']
@@ -78,7 +103,7 @@ def urdf(name, arm, links, effort=None):
             f'  <joint name="joint{i}" type="{kind}">\n'
             f'    <origin xyz="{number(origin)}" rpy="{number((alpha, 0.0, 0.0))}"/>\n'
             f'    <parent link="{before}"/>\n    <child link="link{i}"/>\n    <axis xyz="0 0 1"/>\n'
-            f'    <limit lower="-3.2" upper="3.2" velocity="20" effort="{float(effort[i - 1])!r}"/>\n  </joint>\n'
+            f'    <limit lower="-3.2" upper="3.2" velocity="20" effort="{float(effort[i - 1])!r}"/>\n{mimic(gears, i - 1)}  </joint>\n'
             f'  <link name="link{i}">\n    <inertial>\n      <mass value="{mass!r}"/>\n'
             f'      <origin xyz="{number(centre)}" rpy="0 0 0"/>\n'
             f'      <inertia ixx="{float(inertia[0, 0])!r}" ixy="{float(inertia[0, 1])!r}" ixz="{float(inertia[0, 2])!r}" '
@@ -88,6 +113,13 @@ def urdf(name, arm, links, effort=None):
         before = f"link{i}"
     text.append("</robot>\n")
     return "\n".join(text)
+
+
+def mimic(gears, axis):
+    if not gears or axis not in gears:
+        return ""
+    master, ratio, offset = gears[axis]
+    return f'    <mimic joint="joint{master + 1}" multiplier="{ratio!r}" offset="{offset!r}"/>\n'
 
 
 def motion(arm, generator):
@@ -129,17 +161,18 @@ def torque_of_pinocchio(text, q, qd, qdd):
     return np.array([pinocchio.rnea(model, data, *row) for row in zip(q, qd, qdd)])
 
 
-def regressor(text, q, qd, qdd):
+def regressor(text, axes, qd, matrix):
     """Inertial parameters of the links, then viscous and Coulomb friction and offset of each joint."""
     import pinocchio
 
     model = pinocchio.buildModelFromXML(text)
     data = model.createData()
-    links = np.array([pinocchio.computeJointTorqueRegressor(model, data, *row) for row in zip(q, qd, qdd)])
-    n = q.shape[1]
-    friction = np.zeros((len(q), n, 3 * n))
+    links = np.array([pinocchio.computeJointTorqueRegressor(model, data, *row) for row in zip(*axes)])
+    links = np.einsum("aj,sac->sjc", matrix, links)
+    n = qd.shape[1]
+    friction = np.zeros((len(qd), n, 3 * n))
     for j in range(n):
-        friction[:, j, 3 * j : 3 * j + 3] = np.column_stack([qd[:, j], np.sign(qd[:, j]), np.ones(len(q))])
+        friction[:, j, 3 * j : 3 * j + 3] = np.column_stack([qd[:, j], np.sign(qd[:, j]), np.ones(len(qd))])
     return np.concatenate([links, friction], axis=2)
 
 
@@ -164,38 +197,43 @@ def noise(generator, rows, joints):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--arm", choices=["ur5", "panda", "random"], required=True)
+    parser.add_argument("--arm", choices=["ur5", "panda", "random", "mimic"], required=True)
     parser.add_argument("--engine", choices=["mujoco", "pinocchio"], required=True)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=pathlib.Path, required=True)
     chosen = parser.parse_args()
     generator = np.random.default_rng(chosen.seed)
-    arm = {"ur5": UR5, "panda": PANDA}.get(chosen.arm) or random_arm(generator)
+    arm = {"ur5": UR5, "panda": PANDA, "mimic": MIMIC}.get(chosen.arm) or random_arm(generator)
     links = bodies(arm, generator)
     text = urdf(chosen.arm, arm, links)
     engine = torque_of_mujoco if chosen.engine == "mujoco" else torque_of_pinocchio
-    n = len(arm)
+    gears = GEARS.get(chosen.arm, {})
+    matrix, shift, joints = projection(len(arm), gears)
+    n = len(joints)
+    own = [arm[axis] for axis in joints]
     viscous, coulomb, offset = generator.uniform(0.5, 3.0, n), generator.uniform(0.5, 3.0, n), generator.uniform(-0.5, 0.5, n)
     chosen.out.mkdir(parents=True, exist_ok=True)
     truth = {"engine": chosen.engine, "arm": chosen.arm, "seed": chosen.seed, "noise_share": NOISE_SHARE, "noise_rms": {}}
     peak = np.zeros(n)
     recorded, sigmas = {}, {}
     for name in ("train", "holdout"):
-        t, q, qd, qdd = motion(arm, generator)
-        torque = engine(text, q, qd, qdd) + viscous * qd + coulomb * np.sign(qd) + offset
+        t, q, qd, qdd = motion(own, generator)
+        axes = (q @ matrix.T + shift, qd @ matrix.T, qdd @ matrix.T)
+        torque = engine(text, *axes) @ matrix + viscous * qd + coulomb * np.sign(qd) + offset
         sigma = NOISE_SHARE * np.sqrt(np.mean(torque**2, axis=0))
         torque = torque + sigma * noise(generator, len(t), n)
         truth["noise_rms"][name] = sigma.tolist()
         few = slice(None, None, int(RATE / (10.0 * NOISE_BAND)))
-        recorded[name], sigmas[name] = (regressor(text, q[few], qd[few], qdd[few]), torque[few]), sigma
+        recorded[name], sigmas[name] = (regressor(text, [x[few] for x in axes], qd[few], matrix), torque[few]), sigma
         peak = np.maximum(peak, np.abs(torque).max(axis=0))
-        count = np.array([2.0 * np.pi / ENCODER if kind == "revolute" else 1.0 / ENCODER for *_, kind, _ in arm])
+        count = np.array([2.0 * np.pi / ENCODER if kind == "revolute" else 1.0 / ENCODER for *_, kind, _ in own])
         table = np.column_stack([t, np.round(q / count) * count, torque])
         header = ",".join(["t"] + [f"q{i}" for i in range(1, n + 1)] + [f"tau{i}" for i in range(1, n + 1)])
         np.savetxt(chosen.out / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.12g")
     truth["exact_least_squares"] = exact_least_squares(recorded, sigmas).tolist()
-    stand_in = [(1.0, np.zeros(3), np.eye(3) * 0.01)] * n
-    (chosen.out / "robot.urdf").write_text(urdf(chosen.arm, arm, stand_in, 2.0 * peak))
+    stand_in = [(1.0, np.zeros(3), np.eye(3) * 0.01)] * len(arm)
+    effort = 2.0 * np.abs(matrix) @ peak
+    (chosen.out / "robot.urdf").write_text(urdf(chosen.arm, arm, stand_in, effort, gears))
     (chosen.out / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
 
 

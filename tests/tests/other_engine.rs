@@ -105,6 +105,13 @@ fn random_arm_with_prismatic_joints_by_both() {
     at_the_noise("random", "pinocchio", 7);
 }
 
+/// Two axes follow a joint: the engine moves all six, the recording has the four joints.
+#[test]
+fn arm_whose_axes_follow_joints_by_both() {
+    at_the_noise("mimic", "mujoco", 8);
+    at_the_noise("mimic", "pinocchio", 9);
+}
+
 /// Pinocchio reads the text with urdfdom; its torques must be those of its own model of the description.
 fn reads_as(python: &Path, robot: &Robot, urdf: &str) {
     let place = tempfile::tempdir().unwrap();

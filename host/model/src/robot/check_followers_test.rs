@@ -93,7 +93,7 @@ fn coupled_drives_and_elastic_gears_are_refused_beside_a_follower() {
         "{message}"
     );
     let elastic = format!(
-        "{TEXT}[[effect]]\njoint = 'a'\nkind = 'joint_elasticity'\nstiffness = 1000.0\nlink_friction = 0.5\n"
+        "{TEXT}[[effect]]\njoint = 'a'\nkind = 'joint_elasticity'\nstiffness = 1000.0\ndamping = 1.0\nlink_friction = 0.5\n"
     );
     let message = read(&elastic).unwrap_err();
     assert!(message.contains("follower `f`"), "{message}");
