@@ -32,6 +32,44 @@ fn check_gravity(robot: &Robot) -> Result<(), Fault> {
     Ok(())
 }
 
+/// Checks that every joint and every follower has a name of its own.
+fn check_names(robot: &Robot) -> Result<(), Fault> {
+    use Step::{At, Key};
+    let mut names = HashSet::new();
+    for (i, joint) in robot.joints.iter().enumerate() {
+        if joint.name.trim().is_empty() {
+            return Err(Fault {
+                key_path: vec![Key("joint"), At(i), Key("name")],
+                what: format!("the name of joint {}", i + 1),
+                found: "empty".into(),
+                advice: "every joint has a name of its own".into(),
+            });
+        }
+        if !names.insert(joint.name.as_str()) {
+            return Err(Fault {
+                key_path: vec![Key("joint"), At(i), Key("name")],
+                what: format!("the name of joint {}", i + 1),
+                found: format!("`{}` again", joint.name),
+                advice: "every joint has a name of its own".into(),
+            });
+        }
+    }
+    for (i, own) in robot.followers.iter().enumerate() {
+        let found = match own.name.trim().is_empty() {
+            true => "empty".to_owned(),
+            false if names.insert(own.name.as_str()) => continue,
+            false => format!("`{}` again", own.name),
+        };
+        return Err(Fault {
+            key_path: vec![Key("follower"), At(i), Key("name")],
+            what: format!("the name of follower {}", i + 1),
+            found,
+            advice: "every joint and every follower has a name of its own".into(),
+        });
+    }
+    Ok(())
+}
+
 /// Returns the first fault of `robot`, if any.
 pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
     use Step::{At, Key};
@@ -56,41 +94,12 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             advice: format!("a robot has at most {MAX_JOINTS}"),
         });
     }
-    let mut names = HashSet::new();
+    check_names(robot)?;
     for (i, joint) in robot.joints.iter().enumerate() {
-        if joint.name.trim().is_empty() {
-            return Err(Fault {
-                key_path: vec![Key("joint"), At(i), Key("name")],
-                what: format!("the name of joint {}", i + 1),
-                found: "empty".into(),
-                advice: "every joint has a name of its own".into(),
-            });
-        }
-        if !names.insert(joint.name.as_str()) {
-            return Err(Fault {
-                key_path: vec![Key("joint"), At(i), Key("name")],
-                what: format!("the name of joint {}", i + 1),
-                found: format!("`{}` again", joint.name),
-                advice: "every joint has a name of its own".into(),
-            });
-        }
         check_joint(joint).map_err(|mut f| {
             f.key_path.splice(0..0, [Key("joint"), At(i)]);
             f
         })?;
-    }
-    for (i, own) in robot.followers.iter().enumerate() {
-        let found = match own.name.trim().is_empty() {
-            true => "empty".to_owned(),
-            false if names.insert(own.name.as_str()) => continue,
-            false => format!("`{}` again", own.name),
-        };
-        return Err(Fault {
-            key_path: vec![Key("follower"), At(i), Key("name")],
-            what: format!("the name of follower {}", i + 1),
-            found,
-            advice: "every joint and every follower has a name of its own".into(),
-        });
     }
     check_followers(robot)?;
     // Identified values may be known only in combinations and are read back unchanged.

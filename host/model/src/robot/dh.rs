@@ -148,14 +148,9 @@ pub(super) fn convert(chain: &Chain) -> Converted {
             turned.extend(joint);
         }
         let d = snap_length((origin - foot).dot(&z));
-        if a.abs().max(d.abs()) > FAR * reach {
-            remarks.push(format!(
-                "{}:{}: about joint `{}` axes are so little off parallel that their common normal lies {} m away; parameters there cannot be told apart. Where the axes are meant parallel, write them so.",
-                chain.file,
-                body.place,
-                body.joint,
-                format_significant(a.abs().max(d.abs()), 3)
-            ));
+        let far = a.abs().max(d.abs());
+        if far > FAR * reach {
+            remarks.push(far_normal(&chain.file, body, far));
         }
         frame = bent * step(0.0, 0.0, theta, d);
         let link = frame.inverse() * poses[i];
@@ -184,6 +179,16 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         remarks,
         notes,
     }
+}
+
+/// Returns a remark on two axes whose common normal lies `far` (m) away.
+fn far_normal(file: &str, body: &Body, far: f64) -> String {
+    format!(
+        "{file}:{}: about joint `{}` axes are so little off parallel that their common normal lies {} m away; parameters there cannot be told apart. Where the axes are meant parallel, write them so.",
+        body.place,
+        body.joint,
+        format_significant(far, 3)
+    )
 }
 
 fn joint(body: &Body, geometry: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joint {

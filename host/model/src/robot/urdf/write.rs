@@ -304,6 +304,30 @@ fn write_joint(
             own.offset
         );
     }
+    write_limits(out, joint, (kind, position), remarks);
+    if let Some([low, high]) = limits.and_then(|l| l.soft_position) {
+        let _ = writeln!(
+            out,
+            "    <safety_controller soft_lower_limit=\"{low:?}\" soft_upper_limit=\"{high:?}\" k_velocity=\"0\"/>"
+        );
+    }
+    if viscous != 0.0 || coulomb != 0.0 {
+        let _ = writeln!(
+            out,
+            "    <dynamics damping=\"{viscous:?}\" friction=\"{coulomb:?}\"/>"
+        );
+    }
+    out.push_str("  </joint>\n");
+}
+
+/// Writes the limits of a joint; for those that are not known, numbers that nothing reaches, and a remark.
+fn write_limits(
+    out: &mut String,
+    joint: &Joint,
+    (kind, position): (UrdfKind, Option<[f64; 2]>),
+    remarks: &mut Vec<String>,
+) {
+    let limits = joint.limits.as_ref();
     let torque = limits.and_then(|l| l.torque);
     if limits.is_some() || kind == UrdfKind::Prismatic {
         let mut unknown = Vec::new();
@@ -339,19 +363,6 @@ fn write_joint(
             ));
         }
     }
-    if let Some([low, high]) = limits.and_then(|l| l.soft_position) {
-        let _ = writeln!(
-            out,
-            "    <safety_controller soft_lower_limit=\"{low:?}\" soft_upper_limit=\"{high:?}\" k_velocity=\"0\"/>"
-        );
-    }
-    if viscous != 0.0 || coulomb != 0.0 {
-        let _ = writeln!(
-            out,
-            "    <dynamics damping=\"{viscous:?}\" friction=\"{coulomb:?}\"/>"
-        );
-    }
-    out.push_str("  </joint>\n");
 }
 
 /// Returns fixed-axis roll, pitch and yaw of a rotation Rz(yaw)·Ry(pitch)·Rx(roll).
