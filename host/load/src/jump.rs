@@ -1,9 +1,14 @@
 //! Jumps of the sensor's bias.
 
+use nalgebra::{DMatrix, DVector};
+use rig_numerics::svd::Svd;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::settle::settled;
-use crate::system::{Fit, Jump, Sensed};
+use crate::system::{Fit, Jump, Nuisance, SegmentMean, Sensed};
+
+/// Drifts of the bias, beside which it may jump.
+pub(crate) const DRIFTS: [Nuisance; 2] = [Nuisance::Drift, Nuisance::Warming];
 
 /// Probability by chance, of all channels and places together, below which the bias is said to jump.
 const JUMPS: f64 = 1e-4;
@@ -12,10 +17,13 @@ const LEAST_SIDE: usize = 3;
 
 /// Finds the clearest jump of the bias between two jumps that are known, or the clearest pair: of two opposite jumps neither
 /// is seen alone. The means of the residuals over the segments beside them differ by more than they differ among themselves
-/// (F test, corrected for all places and channels). Empty if there is none.
+/// (F test, corrected for all places and channels). If the fit has a drift, it is estimated again beside each jump: the bias
+/// of a sensor that drifts and is zeroed is a saw tooth, and a straight line takes a part of each jump. Empty if there is none.
 pub(crate) fn jumps(sensed: &Sensed, fit: &Fit) -> Vec<Jump> {
     let (mut least, mut clearest) = (JUMPS, Vec::new());
-    for (recording, means) in sensed.mean_residuals(fit) {
+    let stretches = sensed.mean_residuals(fit);
+    for (number, (recording, means)) in stretches.iter().enumerate() {
+        let recording = *recording;
         if sensed.recordings[recording].poses {
             let between = means.iter().map(|(segment, _)| *segment);
             if let Some((p, jump)) = between_poses(sensed, fit, recording, between.collect())
@@ -25,24 +33,114 @@ pub(crate) fn jumps(sensed: &Sensed, fit: &Fit) -> Vec<Jump> {
             }
             continue;
         }
+        let course = Course::of(sensed, fit, &stretches, number);
         let places = places(means.len());
-        for channel in 0..6 {
-            let list: Vec<f64> = means.iter().map(|(_, own)| own[channel]).collect();
-            for own in &places {
-                let as_many = places.iter().filter(|other| other.len() == own.len());
-                let p = 6.0 * as_many.count() as f64 * chance_of(&list, own);
-                if p < least {
-                    least = p;
-                    let jump = |place: &usize| Jump {
-                        recording,
-                        segment: means[*place].0,
-                    };
-                    clearest = own.iter().map(jump).collect();
-                }
+        for own in &places {
+            let as_many = places.iter().filter(|other| other.len() == own.len());
+            let p = 6.0 * as_many.count() as f64 * course.chance_of(own);
+            if p < least {
+                least = p;
+                let jump = |place: &usize| Jump {
+                    recording,
+                    segment: means[*place].0,
+                };
+                clearest = own.iter().map(jump).collect();
             }
         }
     }
     clearest
+}
+
+/// Mean residuals of the segments in which a jump is looked for, and what explains them without one.
+struct Course {
+    /// Mean residual of each segment (row) and channel, at right angles to `span`.
+    residuals: DMatrix<f64>,
+    /// Orthonormal columns: one for each stretch between two jumps, and the drift of the fit.
+    span: DMatrix<f64>,
+    /// Row of the first segment of the stretch, and the number of its segments.
+    stretch: [usize; 2],
+}
+
+impl Course {
+    /// Forms the course of stretch `number`. A drift is common to all stretches of a recording, so all tell its slope.
+    fn of(
+        sensed: &Sensed,
+        fit: &Fit,
+        stretches: &[(usize, Vec<SegmentMean>)],
+        number: usize,
+    ) -> Self {
+        let (recording, own) = &stretches[number];
+        let has_slope = DRIFTS.iter().any(|drift| fit.unknowns.has(*drift));
+        let is_used = |k: &usize| *k == number || has_slope && stretches[*k].0 == *recording;
+        let used: Vec<usize> = (0..stretches.len()).filter(is_used).collect();
+        let rows: Vec<(usize, &SegmentMean)> = (used.iter())
+            .flat_map(|k| stretches[*k].1.iter().map(move |mean| (*k, mean)))
+            .collect();
+        let of_stretch = |k: usize| {
+            let is_in = rows
+                .iter()
+                .map(move |(own, _)| f64::from(u8::from(*own == k)));
+            DVector::from_iterator(rows.len(), is_in)
+        };
+        let of_drift = |drift: Nuisance| {
+            let values =
+                (rows.iter()).map(|(_, (segment, _))| sensed.mean_of(drift, *recording, *segment));
+            DVector::from_iterator(rows.len(), values)
+        };
+        let drifts = DRIFTS.iter().filter(|drift| fit.unknowns.has(**drift));
+        let columns: Vec<DVector<f64>> = (used.iter().map(|k| of_stretch(*k)))
+            .chain(drifts.map(|drift| of_drift(*drift)))
+            .collect();
+        let span = orthonormal(&DMatrix::from_columns(&columns));
+        let residuals = DMatrix::from_fn(rows.len(), 6, |r, c| rows[r].1.1[c]);
+        let first = rows.iter().position(|(k, _)| *k == number).unwrap_or(0);
+        Self {
+            residuals: beside(&residuals, &span),
+            span,
+            stretch: [first, own.len()],
+        }
+    }
+
+    /// Returns the probability that jumps at these places of the stretch explain as much of any channel by chance (F test).
+    fn chance_of(&self, places: &[usize]) -> f64 {
+        let [first, count] = self.stretch;
+        let steps = DMatrix::from_fn(self.span.nrows(), places.len(), |row, k| {
+            let is_after = row >= first + places[k] && row < first + count;
+            f64::from(u8::from(is_after))
+        });
+        let steps = orthonormal(&beside(&steps, &self.span));
+        let further = steps.ncols() as f64;
+        let freedom = (self.span.nrows() - self.span.ncols()) as f64 - further;
+        let Ok(by_chance) = FisherSnedecor::new(further, freedom) else {
+            return 1.0;
+        };
+        let explained = steps.tr_mul(&self.residuals);
+        let ratio =
+            (self.residuals.column_iter().zip(explained.column_iter())).map(|(all, own)| {
+                let between = own.norm_squared();
+                let within = (all.norm_squared() - between) / freedom;
+                between / further / within.max(f64::MIN_POSITIVE)
+            });
+        by_chance.sf(ratio.fold(0.0, f64::max))
+    }
+}
+
+/// Relative singular value below which a column is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Returns orthonormal columns that span those of a matrix.
+fn orthonormal(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let svd = Svd::of(columns.clone());
+    let least = ROUNDING * svd.singular_values.max();
+    let kept: Vec<usize> = (0..svd.singular_values.len())
+        .filter(|k| svd.singular_values[*k] > least)
+        .collect();
+    svd.u.select_columns(&kept)
+}
+
+/// Returns the part of columns at right angles to others, which are orthonormal.
+fn beside(columns: &DMatrix<f64>, others: &DMatrix<f64>) -> DMatrix<f64> {
+    columns - others * others.tr_mul(columns)
 }
 
 /// Returns the jump between two poses with which the fit leaves least, and the probability that any such jump leaves as little
@@ -79,18 +177,4 @@ fn places(count: usize) -> Vec<Vec<usize>> {
         all.extend(one(0).flat_map(|first| one(first).map(move |second| vec![first, second])));
     }
     all
-}
-
-/// Returns the probability that groups of values with one mean differ by chance as much (one-way analysis of variance). A
-/// group begins at each place.
-fn chance_of(list: &[f64], places: &[usize]) -> f64 {
-    let squares = rig_numerics::statistics::squares_about_mean;
-    let ends = places.iter().copied().chain([list.len()]);
-    let begins = [0].into_iter().chain(places.iter().copied());
-    let within: f64 = begins.zip(ends).map(|(a, b)| squares(&list[a..b])).sum();
-    let further = places.len() as f64;
-    let freedom = list.len() as f64 - further - 1.0;
-    let between = (squares(list) - within).max(0.0);
-    let ratio = between / further / (within / freedom).max(f64::MIN_POSITIVE);
-    FisherSnedecor::new(further, freedom).map_or(1.0, |d| d.sf(ratio))
 }

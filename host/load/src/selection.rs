@@ -11,7 +11,7 @@ use rig_identify::{LeaveOut, Refit, TriangularFactor};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::estimate::solved;
-use crate::jump::jumps;
+use crate::jump::{DRIFTS, jumps};
 use crate::mounting::Mounting;
 use crate::settle::{DECISIVE, settled};
 use crate::system::{Fit, Nuisance, Sensed};
@@ -176,15 +176,8 @@ pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected 
                 larger.push((Some(nuisance), own));
             }
         }
-        let found = jumps(sensed, &fit);
-        if !found.is_empty() {
-            let mut unknowns = fit.unknowns.clone();
-            unknowns.jumps.extend(found);
-            let own = settled(sensed, &fit.mounting, &unknowns);
-            if is_better(&own, &fit) {
-                larger.push((None, own));
-            }
-        }
+        larger.extend(jumped(sensed, &fit).map(|own| (None, own)));
+        larger.extend(zeroed(sensed, &fit).map(|(drift, own)| (Some(drift), own)));
         larger.sort_by(|a, b| score(&a.1).total_cmp(&score(&b.1)));
         let mut larger = larger.into_iter();
         let Some((nuisance, best)) = larger.next() else {
@@ -196,11 +189,39 @@ pub(crate) fn selected(sensed: &Sensed, fit: Fit, start: &Mounting) -> Selected 
         };
         if let Some(nuisance) = nuisance {
             taken.push(nuisance);
-            let as_good = larger.filter(|(_, own)| own.misfit() < best.misfit() + DECISIVE);
-            alternatives.extend(as_good.filter_map(|(other, _)| Some([nuisance, other?])));
+            // With and without jumps beside it, a drift is the same property.
+            let as_good = larger
+                .filter(|(_, own)| own.misfit() < best.misfit() + DECISIVE)
+                .filter_map(|(other, _)| Some([nuisance, other?]))
+                .filter(|[own, other]| own != other);
+            alternatives.extend(as_good);
         }
         fit = without_needless(sensed, best, start, nuisance);
     }
+}
+
+/// Returns the fit with the clearest jump of the bias, or pair of jumps, if the data show one.
+fn jumped(sensed: &Sensed, fit: &Fit) -> Option<Fit> {
+    let found = jumps(sensed, fit);
+    if found.is_empty() {
+        return None;
+    }
+    let mut unknowns = fit.unknowns.clone();
+    unknowns.jumps.extend(found);
+    let own = settled(sensed, &fit.mounting, &unknowns);
+    is_better(&own, fit).then_some(own)
+}
+
+/// Returns the fits with a drift of the bias and jumps beside it, if the data show both. A sensor that drifts and is zeroed
+/// shows neither alone: a line through its saw tooth is flat, and a step leaves the slopes.
+fn zeroed<'a>(sensed: &'a Sensed, fit: &'a Fit) -> impl Iterator<Item = (Nuisance, Fit)> + 'a {
+    let possible = |drift: &Nuisance| !fit.unknowns.has(*drift) && can_show(sensed, *drift);
+    DRIFTS.into_iter().filter(possible).filter_map(|drift| {
+        let drifts = settled(sensed, &fit.mounting, &fit.unknowns.with(drift));
+        let both = jumped(sensed, &drifts)?;
+        let jumps = settled(sensed, &both.mounting, &both.unknowns.without(drift));
+        shows(sensed, &both, &jumps, drift).then_some((drift, both))
+    })
 }
 
 /// Drops the nuisances beside `newest` that the data do not show any more.

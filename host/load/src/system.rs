@@ -560,6 +560,19 @@ impl Sensed<'_> {
         stretches
     }
 
+    /// Returns the mean over a segment of what a drift of the bias is proportional to; 0 for another property.
+    pub(crate) fn mean_of(&self, drift: Nuisance, recording: usize, segment: usize) -> f64 {
+        let column = match drift {
+            Nuisance::Drift => column::TIME,
+            Nuisance::Warming => column::TEMPERATURE,
+            _ => return 0.0,
+        };
+        let own = &self.recordings[recording].segments[segment];
+        // The columns of a triangle have the scalar products of the rows' columns.
+        let triangle = &own.channels[0];
+        triangle.column(column::ONE).dot(&triangle.column(column)) / own.rows as f64
+    }
+
     /// Returns the places of a nuisance among the unknowns.
     pub(crate) fn place(&self, unknowns: &Unknowns, nuisance: Nuisance) -> Option<Range<usize>> {
         self.layout(unknowns).place(nuisance)

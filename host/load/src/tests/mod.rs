@@ -6,3 +6,4 @@ mod made;
 mod sensor;
 mod torque;
 mod warm_up;
+mod zeroed;
