@@ -343,3 +343,38 @@ fn a_limit_of_a_motor_of_the_wrist_is_refused_by_its_line() {
         );
     }
 }
+
+/// Values of the sensor's temperature that are no numbers are refused by line and text, as those of its forces.
+#[test]
+fn temperatures_that_are_no_numbers_are_refused_by_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = sensed(folder.path());
+    for (written, said) in [
+        ("nan", "\"nan\""),
+        ("", "nothing"),
+        ("warm", "\"warm\""),
+        ("inf", "\"inf\""),
+    ] {
+        let rows: Vec<String> = (0..300)
+            .map(|k| {
+                let temp = if k == 100 { written } else { "25.5" };
+                format!("{},0,-1.5,0,0,{k},1,2,3,4,5,6,{temp}", 0.01 * f64::from(k))
+            })
+            .collect();
+        let data = folder.path().join("run.csv");
+        let header = "t,q1,q2,q3,q4,q5,fx,fy,fz,mx,my,mz,temp";
+        fs::write(&data, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+        let mut command = rig();
+        command
+            .args(["load", "--robot"])
+            .arg(&arm)
+            .arg("--data")
+            .arg(&data);
+        let text = refuse(command.arg("--out").arg(folder.path().join("out")));
+        assert!(
+            text.contains("run.csv:102:") && text.contains("`temp`"),
+            "{text}"
+        );
+        assert!(text.contains(said), "{written}: {text}");
+    }
+}

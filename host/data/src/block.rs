@@ -29,6 +29,9 @@ pub struct JointColumns {
 /// Columns of the wrist sensor: force, N, and moment, N·m, in the sensor's axes.
 pub const WRENCH_COLUMNS: [&str; 6] = ["fx", "fy", "fz", "mx", "my", "mz"];
 
+/// Column of [`Block::extra`] with the temperature of the wrist sensor, in any unit.
+pub const WRENCH_TEMPERATURE: &str = "temp";
+
 /// Column of [`Block::extra`] beside [`WRENCH_COLUMNS`] that were interpolated to the times of the rows: the number of the
 /// sensor's message (1-based, plus ½) at the time of the row, a fraction further between two messages. The ½ tells whole
 /// numbers from a column of states, which are not interpolated.

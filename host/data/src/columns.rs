@@ -209,6 +209,13 @@ pub(super) struct Layout {
 const SINCE_1970: f64 = 1e8;
 
 impl Layout {
+    /// Refuses values of these columns that are no finite numbers.
+    pub(super) fn require_numbers(&mut self, names: &[String]) {
+        for column in &mut self.columns {
+            column.strict |= names.contains(&column.name);
+        }
+    }
+
     /// Takes the unit of times since 1970 from the size of the first one, where nothing states it.
     pub(super) fn guess_unit_of_time(&mut self, raw: &[f64]) {
         let likely = likely_time(raw.get(self.time).copied(), None);

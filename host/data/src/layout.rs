@@ -16,7 +16,7 @@ use super::unit::Unit;
 use rig_model::robot::{JointKind, Origin, Robot};
 use rig_output::listed;
 
-/// Returns the columns of a file for `robot`.
+/// Returns the columns of a file for `robot`. Beside `need` stands whether the rows may be poses at rest.
 ///
 /// # Errors
 /// [`DataError::Header`]: columns that are missing, without a name, there twice, or of no joint of the robot.
@@ -24,7 +24,7 @@ pub(super) fn layout(
     path: &Path,
     described: &Header,
     robot: &Robot,
-    need: EffortNeed,
+    (need, may_rest): (EffortNeed, bool),
 ) -> Result<Layout, DataError> {
     let header = |message: String| DataError::Header {
         path: path.into(),
@@ -33,7 +33,7 @@ pub(super) fn layout(
     };
     let names = described.names.as_slice();
     let joints = robot.joints.len();
-    let time = time_column(path, names).map_err(header)?;
+    let time = time_column(path, names, may_rest).map_err(header)?;
     check_names(names).map_err(header)?;
     let signals = signals(names, robot).map_err(header)?;
     let from_motors = motor_positions(path, names, robot).map_err(header)?;
@@ -139,7 +139,8 @@ fn find(names: &[String], name: &str) -> Option<usize> {
     names.iter().position(|n| n == name)
 }
 
-fn time_column(path: &Path, names: &[String]) -> Result<usize, String> {
+/// Returns the column of time. `may_rest`: the rows may be poses, whose times only have to rise.
+fn time_column(path: &Path, names: &[String], may_rest: bool) -> Result<usize, String> {
     find(names, "t").ok_or_else(|| {
         let only = names.first().map_or("", String::as_str);
         let times: Vec<String> = names.iter().filter(|n| is_time(n)).cloned().collect();
@@ -155,8 +156,12 @@ fn time_column(path: &Path, names: &[String]) -> Result<usize, String> {
             format!("; {}", proposes(path))
         };
         format!(
-            "there is no column `t` (time in s); the columns are {}{hint}",
-            shown(names)
+            "there is no column `t` (time in s); the columns are {}{hint}{}",
+            shown(names),
+            match may_rest {
+                true => ". For poses at rest any number that rises from row to row serves as `t`",
+                false => "",
+            }
         )
     })
 }

@@ -91,7 +91,7 @@ mod unsettled;
 mod unsigned;
 mod writer;
 
-pub use block::{Block, JointColumns, WRENCH_COLUMNS, WRENCH_MESSAGE};
+pub use block::{Block, JointColumns, WRENCH_COLUMNS, WRENCH_MESSAGE, WRENCH_TEMPERATURE};
 pub use columns::EffortNeed;
 pub use compensated::Compensated;
 pub use error::{DataError, Warning};

@@ -22,6 +22,8 @@ pub struct Mapping {
     units: Vec<(String, Unit)>,
     /// True if the axes of a wrist sensor are wanted from a topic of their own.
     pub(super) wants_wrench: bool,
+    /// Columns of no joint that must have a finite number in every row.
+    numbers: Vec<String>,
 }
 
 /// A mapping as it stands in a file.
@@ -120,6 +122,18 @@ impl Mapping {
         }
         self.units.push((column, unit));
         Ok(())
+    }
+
+    /// Wants a finite number in every row of a column that belongs to no joint, if the file has it.
+    #[must_use]
+    pub fn with_numbers(mut self, column: &str) -> Self {
+        self.numbers.push(column.to_owned());
+        self
+    }
+
+    /// Returns the columns of no joint that must have a finite number in every row.
+    pub(super) fn numbers(&self) -> &[String] {
+        &self.numbers
     }
 
     /// Wants the axes of a wrist sensor, also from a topic of their own.

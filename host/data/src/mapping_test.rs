@@ -416,3 +416,23 @@ fn units_before_the_number_of_a_column_count_and_names_of_joints_do_not() {
     let (blocks, warnings) = read(&path, &robot(&["wrist_turn"]), &columns).unwrap();
     assert_eq!(blocks[0].joints[0].q, [1.0, 2.0, 3.0], "{warnings:?}");
 }
+
+/// A column of no joint that must hold numbers, and a recording without a column of time whose rows may be poses.
+#[test]
+fn a_wanted_number_is_refused_by_its_line_and_poses_need_no_clock() {
+    let text = "t,q1,tau1,temp\n0,0.1,1,25\n0.1,0.2,1,nan\n";
+    assert!(of_text(text, &Mapping::default()).is_ok());
+    let wants = Mapping::default().with_wrench().with_numbers("temp");
+    let said = of_text(text, &wants).unwrap_err();
+    assert!(
+        said.contains("log.csv:3: column `temp` holds \"nan\""),
+        "{said}"
+    );
+    let said = of_text("q1,tau1\n0.1,1\n", &wants).unwrap_err();
+    assert!(
+        said.contains("no column `t`") && said.contains("any number that rises"),
+        "{said}"
+    );
+    let said = of_text("q1,tau1\n0.1,1\n", &Mapping::default()).unwrap_err();
+    assert!(!said.contains("any number that rises"), "{said}");
+}

@@ -208,8 +208,9 @@ impl Source {
         let (form, bytes) = Form::of(path)?;
         let joints: Vec<String> = robot.joints.iter().map(|j| j.name.clone()).collect();
         let (mut rows, header) = Rows::open(path, &form, &joints, mapping)?;
-        let mut layout = layout(path, &header, robot, need)
+        let mut layout = layout(path, &header, robot, (need, mapping.wants_wrench))
             .map_err(|error| error.explained(header.remarks.iter().chain(&rows.remarks())))?;
+        layout.require_numbers(mapping.numbers());
         let mut values = vec![0.0; layout.columns.len()];
         let (mut times, mut changes) = (Vec::new(), Changes::of(&layout));
         while times.len() < PROBED_ROWS

@@ -29,6 +29,16 @@ pub enum LoadError {
         /// The first column that is missing.
         column: &'static str,
     },
+    /// A value of the sensor's temperature is no number.
+    #[error(
+        "{label}:{line}: the column `temp` (temperature of the sensor) holds no finite number; give one in every row, or leave the column out."
+    )]
+    NoTemperature {
+        /// Name of the recording.
+        label: String,
+        /// Line or message.
+        line: u64,
+    },
     /// A recording lacks joint torques.
     #[error("{label} has no joint torques (tau<k> or i<k>); record them, or give --by sensor.")]
     NoTorque {

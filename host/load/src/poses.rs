@@ -28,8 +28,9 @@ pub(crate) fn poses(
     (ends, pace): (&Ends, Pace),
 ) -> Result<(Vec<WrenchRow>, Passed), LoadError> {
     let mut poses: Vec<Pose> = Vec::new();
-    let (mut left_out, mut rows) = (0, 0u64);
+    let (mut left_out, mut rows, mut has_temperature) = (0, 0u64, false);
     each_readings(recording, &mut |block, readings| {
+        has_temperature |= temperature(&block.extra).is_some();
         for k in 0..block.len() {
             let now: [f64; 6] = std::array::from_fn(|c| readings[c][k]);
             rows += 1;
@@ -86,6 +87,7 @@ pub(crate) fn poses(
     let passed = Passed {
         saturated: left_out,
         scatter,
+        has_temperature,
         ..Passed::default()
     };
     Ok((found, passed))

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rig_data::prepare::{LowPass, Motion, PrepareError, PreprocessingPlan, Recording, each_motion};
-use rig_data::{Block, WRENCH_COLUMNS, WRENCH_MESSAGE};
+use rig_data::{Block, WRENCH_COLUMNS, WRENCH_MESSAGE, WRENCH_TEMPERATURE};
 use rig_shared::multibody::{Chain, MultibodyError, Pose as Frame, frame_pose, wrench_regressor};
 
 use crate::axes::SensorAxes;
@@ -10,9 +10,6 @@ use crate::error::LoadError;
 use crate::noise_floor::NoiseFloor;
 use crate::pose_noise::Scatter;
 use crate::wrench_row::{ENTRIES, WrenchRow, about, weight};
-
-/// Name of the column with the sensor's temperature.
-const TEMPERATURE: &str = "temp";
 
 /// Least number of poses or rows: with two the mass and a part of the centre are known.
 pub(crate) const LEAST_ROWS: usize = 2;
@@ -32,6 +29,8 @@ pub(crate) struct Passed {
     pub noise: Option<[f64; 2]>,
     /// How the rows of the poses differ.
     pub scatter: Scatter,
+    /// True if it has a column with the sensor's temperature.
+    pub has_temperature: bool,
 }
 
 /// Streams the rows of a recording of motion. Position, regressor and readings pass the same low-pass, so that they
@@ -55,6 +54,7 @@ pub(crate) fn each_row(
     let mut start = None;
     let mut missing = None;
     each_motion(recording, plan, 0, &mut |motion| {
+        passed.has_temperature |= temperature(&motion.extra).is_some();
         let begin = *start.get_or_insert(motion.t.first().copied().unwrap_or(0.0));
         let readings = match readings(&motion.extra) {
             Ok(readings) => readings,
@@ -126,21 +126,34 @@ pub(crate) fn each_readings(
     recording: &dyn Recording,
     take: &mut dyn FnMut(&Block, [&[f64]; 6]) -> Result<(), PrepareError>,
 ) -> Result<(), LoadError> {
-    let mut missing = None;
-    let read = recording.each_block(1 << 14, &mut |block| match readings(&block.extra) {
-        Ok(readings) => take(&block, readings),
-        Err(column) => {
-            missing = Some(column);
-            Err(PrepareError::Stopped("no sensor".to_owned()))
-        }
+    let mut wrong = None;
+    let read = recording.each_block(1 << 14, &mut |block| {
+        let label = || recording.label();
+        let found = match (readings(&block.extra), no_number(&block)) {
+            (Ok(readings), None) => return take(&block, readings),
+            (Err(column), _) => LoadError::NoColumn {
+                label: label(),
+                column,
+            },
+            (_, Some(line)) => LoadError::NoTemperature {
+                label: label(),
+                line,
+            },
+        };
+        wrong = Some(found);
+        Err(PrepareError::Stopped("no sensor".to_owned()))
     });
-    match (read, missing) {
-        (_, Some(column)) => Err(LoadError::NoColumn {
-            label: recording.label(),
-            column,
-        }),
+    match (read, wrong) {
+        (_, Some(error)) => Err(error),
         (read, None) => Ok(read?),
     }
+}
+
+/// Returns the line of the first row whose temperature is no number.
+fn no_number(block: &Block) -> Option<u64> {
+    let list = temperature(&block.extra)?;
+    let at = list.iter().position(|value| !value.is_finite())?;
+    Some(block.first_line + at as u64)
 }
 
 /// Returns the six columns of the sensor; the name of the first that is missing otherwise.
@@ -157,7 +170,7 @@ pub(crate) fn readings(extra: &[(String, Vec<f64>)]) -> Result<[&[f64]; 6], &'st
 
 /// Returns the column of the sensor's temperature.
 pub(crate) fn temperature(columns: &[(String, Vec<f64>)]) -> Option<&[f64]> {
-    extra(columns, TEMPERATURE)
+    extra(columns, WRENCH_TEMPERATURE)
 }
 
 /// Returns the column with this name.

@@ -4,6 +4,7 @@ mod causes;
 mod columns;
 mod made;
 mod sensor;
+mod sentences;
 mod torque;
 mod warm_up;
 mod zeroed;

@@ -15,6 +15,7 @@ use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
 use rig_data::EffortNeed;
+use rig_data::{EffortNeed, WRENCH_TEMPERATURE};
 use rig_data::prepare::{Choice, PrepareOptions};
 use rig_load::{
     By, ControllerNumbers, FEWEST_ROWS, KnownMass, LoadIdentification, LoadOptions, Value,
@@ -177,7 +178,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     let mapping = match args.by {
         Measured::Torque => args.columns.mapping()?,
-        Measured::Sensor | Measured::Both => args.columns.mapping()?.with_wrench(),
+        Measured::Sensor | Measured::Both => {
+            let mapping = args.columns.mapping()?;
+            mapping.with_wrench().with_numbers(WRENCH_TEMPERATURE)
+        }
     };
     let read = |paths| Inputs::read_mapped(&robot, paths, need, &mapping);
     let (with, without) = (read(&args.data)?, read(&args.without)?);

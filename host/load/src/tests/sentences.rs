@@ -1,0 +1,36 @@
+//! Sentences that must fit what was given and what acts.
+
+use super::made::{Moving, Sensor, poses, recorded, tool};
+use super::sensor::{NO_FLAW, irp6};
+use crate::{LoadOptions, identify_load};
+use rig_data::prepare::InMemory;
+
+/// Returns the mean readings of some poses with little noise.
+fn few(moving: &Moving, count: u32) -> InMemory {
+    let list: Vec<Vec<f64>> = (0..count)
+        .map(|k| moving.position(3.1 * f64::from(k)))
+        .collect();
+    let sensor = Sensor {
+        noise: [0.005, 0.0005],
+        ..Sensor::default()
+    };
+    poses(moving, &tool(), &sensor, &list, 7)
+}
+
+/// A temperature that is no number made "0 ± 0 kg".
+#[test]
+fn a_temperature_that_is_no_number_is_refused_with_its_line() {
+    let moving = Moving::new(irp6(), 0.8, 8);
+    let sensor = Sensor::default();
+    let motion = recorded(&moving, &tool(), &sensor, [10.0, 100.0], 1, NO_FLAW);
+    for (mut run, row) in [(motion, 499), (few(&moving, 8), 3)] {
+        let block = &mut run.blocks[0];
+        let mut column = vec![25.0; block.t.len()];
+        column[row] = f64::NAN;
+        block.extra.push(("temp".to_owned(), column));
+        let refused = identify_load(&moving.robot, &[&run], &[], &LoadOptions::default());
+        let text = refused.unwrap_err().to_string();
+        let place = format!("{}:{}: the column `temp`", run.label, row + 2);
+        assert!(text.starts_with(&place), "{text}");
+    }
+}
