@@ -406,10 +406,14 @@ impl Search<'_> {
     }
 }
 
-/// Lists the changes that explain the readings as well as the best one, and what mends them.
+/// Lists the changes that explain the readings as well as the best one, and what mends them. A change that needs a turned
+/// sensor or a leaning base beside it, where the best one needs neither, stands for none of them.
 fn as_good_words(found: &[Explained]) -> [String; 2] {
     let least = found.first().map_or(0.0, |own| own.score);
-    let as_good = found.iter().filter(|own| own.score < least + DECISIVE);
+    let needs_none = found.first().is_some_and(|own| !turns(&own.fit));
+    let as_good = found
+        .iter()
+        .filter(|own| own.score < least + DECISIVE && !(needs_none && turns(&own.fit)));
     let words: Vec<[String; 2]> = as_good.take(KEPT).map(|own| own.change.words()).collect();
     [0, 1].map(|k| {
         let all: Vec<&str> = words.iter().map(|own| own[k].as_str()).collect();

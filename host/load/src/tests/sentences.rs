@@ -2,8 +2,13 @@
 
 use super::made::{Moving, Sensor, poses, recorded, tool};
 use super::sensor::{NO_FLAW, irp6};
-use crate::{LoadOptions, identify_load};
+use crate::{LoadIdentification, LoadOptions, identify_load};
 use rig_data::prepare::InMemory;
+use rig_model::robot::Robot;
+
+fn found(robot: &Robot, recording: &InMemory) -> LoadIdentification {
+    identify_load(robot, &[recording], &[], &LoadOptions::default()).unwrap()
+}
 
 /// Returns the mean readings of some poses with little noise.
 fn few(moving: &Moving, count: u32) -> InMemory {
@@ -32,5 +37,23 @@ fn a_temperature_that_is_no_number_is_refused_with_its_line() {
         let text = refused.unwrap_err().to_string();
         let place = format!("{}:{}: the column `temp`", run.label, row + 2);
         assert!(text.starts_with(&place), "{text}");
+    }
+}
+
+/// sensor is turned as well, does not.
+#[test]
+fn only_a_zero_that_replaces_the_rotation_is_named_beside_it() {
+    let mut moving = Moving::new(irp6(), 0.8, 8);
+    moving.robot.wrist_sensor.as_mut().unwrap().rotation = [0.0, 0.0, 0.4];
+    let run = few(&moving, 6);
+    moving.robot.wrist_sensor.as_mut().unwrap().rotation = [0.0; 3];
+    let text = found(&moving.robot, &run).warnings.join(" ");
+    assert!(text.contains("turned by 22.9 degrees"), "{text}");
+    assert!(
+        text.contains("q5 is counted from another zero (0.4"),
+        "{text}"
+    );
+    for k in 1..5 {
+        assert!(!text.contains(&format!("q{k} is counted")), "{text}");
     }
 }
