@@ -115,7 +115,7 @@ pub enum ExciteError {
     },
     /// Poses without a wrist sensor.
     #[error(
-        "poses are for the readings of a wrist sensor, and robot \"{robot}\" has no [wrist_sensor]; add this table to the TOML description (of a URDF, `rig init --from` writes one), or design a motion (without the number of poses), which finds the load by the joint torques"
+        "poses are for the readings of a wrist sensor, and robot \"{robot}\" has no [wrist_sensor]; write this table into a TOML description (`rig init --from` makes one of a URDF, with the table as a comment to be filled in), or design a motion (without the number of poses), which finds the load by the joint torques"
     )]
     NoSensor {
         /// Name of the robot.

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, Vector3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::PreprocessingPlan;
-use rig_model::robot::{Reads, Robot, WristSensor};
+use rig_model::robot::{Origin, Reads, Robot, WristSensor};
 use rig_output::{capital, format_significant, format_value, listed};
 
 use crate::causes::{is_beyond_scatter, scatter};
@@ -161,13 +161,17 @@ impl Told<'_> {
                 Reads::Load => ["load on the robot", "load"],
                 Reads::Robot => ["robot on the load", "robot"],
             };
+            let stated = match self.robot.origin {
+                Origin::Urdf => format!("give --reads {key}"),
+                Origin::Own => format!("write reads = \"{key}\" into [wrist_sensor]"),
+            };
             format!(
-                "The readings are the wrench of the {whose}, because the mass must be positive; write reads = \"{key}\" into [wrist_sensor] to have this checked."
+                "The readings are the wrench of the {whose}, because the mass must be positive; {stated} to have this checked."
             )
         });
         let biases = self.biases();
-        for bias in &biases {
-            let told = match curve_words(bias) {
+        for (bias, recorded) in biases.iter().zip(self.sensed.recordings) {
+            let told = match curve_words(bias, self.about_temperature(recorded)) {
                 Some(text) => [Some(text), None],
                 None => [jump_words(bias), drift_words(bias, self.fit.noise)],
             };
@@ -227,15 +231,31 @@ impl Told<'_> {
         })
     }
 
-    fn turned(&self, angle: f64, axis: &Vector3<f64>, [roll, pitch, yaw]: [f64; 3]) -> String {
-        format!(
-            "The axes of the sensor are turned by {} degrees about [{:.2}, {:.2}, {:.2}] against the description; the load was identified with the estimated axes.{}",
+    fn turned(&self, angle: f64, axis: &Vector3<f64>, turn: [f64; 3]) -> String {
+        let by = format!(
+            "turned by {} degrees about [{:.2}, {:.2}, {:.2}]",
             format_significant(angle.to_degrees(), 3),
             axis.x,
             axis.y,
-            axis.z,
+            axis.z
+        );
+        let (begin, beside) = match has_no_pose(self.robot) {
+            false => (
+                format!("The axes of the sensor are {by} against the description"),
+                "",
+            ),
+            true => (
+                format!(
+                    "No pose of the sensor was given, so its axes were taken as those of the flange; they are {by}"
+                ),
+                " and its origin by --sensor-position X Y Z (m)",
+            ),
+        };
+        let place = stated_by(self.robot, ("rotation", "--sensor-rotation"), &turn);
+        format!(
+            "{begin}; the load was identified with the estimated axes.{}",
             self.advice(&format!(
-                "If the sensor is turned, write rotation = [{roll:.4}, {pitch:.4}, {yaw:.4}] into [wrist_sensor]. A cable that pulls can look alike."
+                "If the sensor is turned, {place}{beside}. A cable that pulls can look alike."
             ))
         )
     }
@@ -264,8 +284,14 @@ impl Told<'_> {
             "The base leans by {} degrees against the description; the load was identified with the estimated gravity.{}",
             format_significant(turn.angle().to_degrees(), 3),
             self.advice(&format!(
-                "Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into the description. At rest a joint whose zero is off by this angle looks alike.",
-                gravity.x, gravity.y, gravity.z
+                "Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into {}. At rest a joint whose zero is off by this angle looks alike.",
+                gravity.x,
+                gravity.y,
+                gravity.z,
+                match self.robot.origin {
+                    Origin::Urdf => "a TOML description (`rig init --from`)",
+                    Origin::Own => "the description",
+                }
             ))
         ));
         Some(gravity.into())
@@ -294,8 +320,8 @@ impl Told<'_> {
             "The sensor's origin lies {} mm from the described one; the load was identified with the estimated origin.{}",
             format_significant(1e3 * error.norm(), 3),
             self.advice(&format!(
-                "Measure it, or write position = [{:.4}, {:.4}, {:.4}] into [wrist_sensor].",
-                origin.x, origin.y, origin.z
+                "Measure it, or {}.",
+                stated_by(self.robot, ("position", "--sensor-position"), &origin.into())
             ))
         ));
         Some(origin.into())
@@ -338,6 +364,25 @@ impl Told<'_> {
                 temperature: (self.sensed.warming(self.fit)).map(|_| recorded.reference),
             })
             .collect()
+    }
+
+    /// Says what to do about a bias that changes as that of a sensor that warms up.
+    fn about_temperature(&self, recorded: &Recorded) -> &'static str {
+        let follows = self.fit.unknowns.has(Nuisance::Warming);
+        match (recorded.passed.has_temperature, recorded.warms, follows) {
+            (false, ..) => {
+                "Let the sensor warm up before the recording, or record its temperature as the column `temp`."
+            }
+            (true, false, _) => {
+                "The column `temp` is constant, so it does not explain the bias: check what it holds, or let the sensor warm up before the recording."
+            }
+            (true, true, false) => {
+                "The column `temp` does not explain the bias: check that it is the temperature of the sensor in all rows, or let the sensor warm up before the recording."
+            }
+            (true, true, true) => {
+                "The column `temp` explains a part of the bias only: check that it is the temperature of the sensor in all rows, or let the sensor warm up before the recording."
+            }
+        }
     }
 
     /// Says how the bias follows the recorded temperature.
@@ -503,6 +548,23 @@ fn unit_by_lever(lever: f64) -> String {
 /// Share of the residual's power in one of twenty segments from which something happened in it.
 const MOST: f64 = 0.5;
 
+/// Returns true if a URDF describes the robot, and no pose of the sensor was given beside it.
+fn has_no_pose(robot: &Robot) -> bool {
+    let none = WristSensor::default();
+    let is_none =
+        |own: &WristSensor| own.position == none.position && own.rotation == none.rotation;
+    robot.origin == Origin::Urdf && robot.wrist_sensor.as_ref().is_none_or(is_none)
+}
+
+/// Says where a key of the sensor is stated: a URDF has no table for it.
+fn stated_by(robot: &Robot, (key, option): (&str, &str), values: &[f64; 3]) -> String {
+    let list = |between: &str| values.map(|v| format!("{v:.4}")).join(between);
+    match robot.origin {
+        Origin::Urdf => format!("give {option} {}", list(" ")),
+        Origin::Own => format!("write {key} = [{}] into [wrist_sensor]", list(", ")),
+    }
+}
+
 /// Names a property in a sentence.
 fn words(nuisance: Nuisance) -> &'static str {
     match nuisance {
@@ -549,8 +611,8 @@ fn channel_words(values: &[f64; 6], channels: &[usize]) -> String {
     each.join(", ")
 }
 
-/// Says that a bias changes smoothly, and what stands for it in the fit.
-fn curve_words(bias: &Bias) -> Option<String> {
+/// Says that a bias changes smoothly, what stands for it in the fit, and what to do.
+fn curve_words(bias: &Bias, advice: &str) -> Option<String> {
     let curve = bias.curve?;
     let course = match curve.time_constant {
         Some(constant) => format!(
@@ -566,9 +628,10 @@ fn curve_words(bias: &Bias) -> Option<String> {
         (count, Some(_)) => format!("{count} jumps and a linear drift stand"),
     };
     Some(format!(
-        "{}: the bias of the sensor {course} ({} over the recording), as that of a sensor that warms up; {stands} for it in the fit, and a tenth of the recording around each jump was left out. Let the sensor warm up before the recording, or record its temperature as the column `temp`.",
+        "{}: the bias of the sensor {course} ({} over the recording), as that of a sensor that warms up; {stands} for it in the fit, and a tenth of the recording around each jump was left out. {}",
         bias.recording,
-        channel_words(&curve.change, &[0, 1, 2, 3, 4, 5])
+        channel_words(&curve.change, &[0, 1, 2, 3, 4, 5]),
+        advice
     ))
 }
 

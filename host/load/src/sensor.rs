@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::{PreprocessingPlan, Recording, surveyed};
-use rig_model::robot::{Reads, WristSensor};
+use rig_model::robot::{Origin, Reads, WristSensor};
 use rig_output::{capital, format_significant, format_value};
 
 use crate::axes::parameters_from;
@@ -337,8 +337,12 @@ fn weighing(
             Reads::Robot => ["load", "robot"],
         };
         let text = format!(
-            "The load would weigh {} kg: the readings have the sign of reads = \"{is}\", but [wrist_sensor] says reads = \"{says}\". Correct it, or look for a position column with the opposite sign.",
-            format_significant(sensed_mass(&fit), 4)
+            "The load would weigh {} kg: the readings have the sign of reads = \"{is}\", but {} says reads = \"{says}\". Correct it, or look for a position column with the opposite sign.",
+            format_significant(sensed_mass(&fit), 4),
+            match sensing.robot.origin {
+                Origin::Urdf => "--reads",
+                Origin::Own => "[wrist_sensor] or --reads",
+            }
         );
         if !sensing.even_if_wrong {
             return Err(LoadError::Fault(text));

@@ -4,7 +4,7 @@ use super::made::{Moving, Sensor, poses, recorded, tool};
 use super::sensor::{NO_FLAW, irp6};
 use crate::{LoadIdentification, LoadOptions, identify_load};
 use rig_data::prepare::InMemory;
-use rig_model::robot::Robot;
+use rig_model::robot::{Origin, Reads, Robot, WristSensor};
 
 fn found(robot: &Robot, recording: &InMemory) -> LoadIdentification {
     identify_load(robot, &[recording], &[], &LoadOptions::default()).unwrap()
@@ -40,6 +40,46 @@ fn a_temperature_that_is_no_number_is_refused_with_its_line() {
     }
 }
 
+/// A column `temp` that is there is not asked for.
+#[test]
+fn a_temperature_that_explains_nothing_is_not_asked_for_again() {
+    let moving = Moving::new(irp6(), 0.8, 8);
+    let warms = |t: f64, read: [f64; 6]| read.map(|r| r + 1.2 * (1.0 - (-t / 15.0).exp()));
+    let run = recorded(
+        &moving,
+        &tool(),
+        &Sensor::default(),
+        [40.0, 100.0],
+        1,
+        &warms,
+    );
+    let text = |column: Option<&dyn Fn(f64) -> f64>| {
+        let mut run = run.clone();
+        if let Some(temperature) = column {
+            let block = &mut run.blocks[0];
+            let column = block.t.iter().map(|t| temperature(*t)).collect();
+            block.extra.push(("temp".to_owned(), column));
+        }
+        found(&moving.robot, &run).warnings.join(" ")
+    };
+    let without = text(None);
+    assert!(
+        without.contains("or record its temperature as the column `temp`"),
+        "{without}"
+    );
+    let constant = text(Some(&|_| 25.0));
+    assert!(
+        constant.contains("The column `temp` is constant"),
+        "{constant}"
+    );
+    let other = text(Some(&|t| 25.0 + (2.0 * t).sin()));
+    assert!(
+        other.contains("The column `temp` does not explain the bias"),
+        "{other}"
+    );
+    assert!(!constant.contains("or record") && !other.contains("or record"));
+}
+
 /// sensor is turned as well, does not.
 #[test]
 fn only_a_zero_that_replaces_the_rotation_is_named_beside_it() {
@@ -56,4 +96,50 @@ fn only_a_zero_that_replaces_the_rotation_is_named_beside_it() {
     for k in 1..5 {
         assert!(!text.contains(&format!("q{k} is counted")), "{text}");
     }
+}
+
+/// A URDF has no table [wrist_sensor]: the sentences name options.
+#[test]
+fn sentences_for_a_urdf_name_options() {
+    let mut moving = Moving::new(irp6(), 0.8, 8);
+    moving.robot.wrist_sensor = Some(WristSensor {
+        rotation: [0.0, 0.0, 0.4],
+        ..WristSensor::default()
+    });
+    let sensor = Sensor::default();
+    let run = recorded(&moving, &tool(), &sensor, [30.0, 100.0], 1, NO_FLAW);
+    moving.robot.origin = Origin::Urdf;
+    moving.robot.wrist_sensor = None;
+    let own = found(&moving.robot, &run);
+    let mut text = own.warnings.join(" ");
+    text += own.sensor.unwrap().reads_found.as_ref().unwrap();
+    assert!(text.contains("No pose of the sensor was given"), "{text}");
+    assert!(
+        text.contains("--sensor-rotation ") && text.contains("--reads load"),
+        "{text}"
+    );
+    assert!(
+        !text.contains("[wrist_sensor]") && !text.contains("description"),
+        "{text}"
+    );
+    let mut stated = |reads: Reads, origin: Origin| {
+        moving.robot.origin = origin;
+        moving.robot.wrist_sensor = Some(WristSensor {
+            rotation: [0.0, 0.0, 0.4],
+            reads: Some(reads),
+            ..WristSensor::default()
+        });
+        let refused = identify_load(&moving.robot, &[&run], &[], &LoadOptions::default());
+        refused.unwrap_err().to_string()
+    };
+    let text = stated(Reads::Robot, Origin::Urdf);
+    assert!(
+        text.contains("but --reads says reads = \"robot\""),
+        "{text}"
+    );
+    let text = stated(Reads::Robot, Origin::Own);
+    assert!(
+        text.contains("but [wrist_sensor] or --reads says"),
+        "{text}"
+    );
 }

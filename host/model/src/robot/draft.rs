@@ -3,7 +3,7 @@
 use toml_edit::{Item, Table};
 
 use super::error::RobotError;
-use super::joint::Joint;
+use super::joint::{Joint, JointKind};
 use super::serial_robot::Robot;
 use super::written::comments;
 
@@ -21,8 +21,8 @@ const LIMITS: [&str; 4] = ["position", "velocity", "acceleration", "torque"];
 const CONTROLLER: [&str; 3] = ["position_gain", "velocity_gain", "torque_gain"];
 
 impl Robot {
-    /// Returns the description as [`Robot::to_toml`], with commented lines for the limits, the drive and the controller that
-    /// it does not state. They have no values. `head`: sentences for comments at the top.
+    /// Returns the description as [`Robot::to_toml`], with commented lines for the limits, the drive, the controller and the
+    /// wrist sensor that it does not state. They have no values. `head`: sentences for comments at the top.
     ///
     /// # Errors
     /// As [`Robot::to_toml`].
@@ -54,6 +54,9 @@ impl Robot {
         flush(&mut out, &mut pending);
         if let Some(last) = joint {
             out.push_str(&absent_tables(last));
+        }
+        if self.wrist_sensor.is_none() {
+            out.push_str(&absent_sensor());
         }
         Ok(out)
     }
@@ -119,6 +122,20 @@ fn absent_tables(joint: &Joint) -> String {
     out
 }
 
+/// Returns the commented table of the wrist sensor.
+fn absent_sensor() -> String {
+    let comments = comments(JointKind::Revolute);
+    let own = comments.get("wrist_sensor").and_then(Item::as_table);
+    let keys = own.into_iter().flat_map(Table::iter);
+    let lines = keys.map(|(key, meaning)| place(key, meaning.as_str().unwrap_or_default()));
+    format!("# [wrist_sensor]\n{}\n", lines.collect::<String>())
+}
+
+/// Returns a commented line for a key.
+fn place(key: &str, meaning: &str) -> String {
+    format!("# {key} =   # {meaning}\n")
+}
+
 /// Returns a commented line for each key of a table, with its unit.
 fn places(joint: &Joint, table: &str, keys: &[&str]) -> Vec<String> {
     let comments = comments(joint.kind);
@@ -130,7 +147,7 @@ fn places(joint: &Joint, table: &str, keys: &[&str]) -> Vec<String> {
         own.and_then(|own| own.get(key)).and_then(Item::as_str)
     };
     keys.iter()
-        .map(|key| format!("# {key} =   # {}\n", meaning(key).unwrap_or_default()))
+        .map(|key| place(key, meaning(key).unwrap_or_default()))
         .collect()
 }
 
@@ -164,6 +181,10 @@ mod tests {
             .map(|line| {
                 let line = line.strip_prefix("# ").unwrap_or(line);
                 let value = match line.split(" =").next().unwrap_or_default() {
+                    "position" if line.contains("origin of its axes") => "[0.0, 0.0, 0.03]",
+                    "rotation" => "[0.0, 0.0, 0.4]",
+                    "reads" => "\"load\"",
+                    "gain_std" => "0.005",
                     "position" => "[-1.0, 1.0]",
                     _ => "2.5",
                 };
@@ -179,5 +200,9 @@ mod tests {
             assert_eq!(joint.controller.as_ref().unwrap().velocity_gain, 2.5);
         }
         assert_eq!(filled.joints[0].inertial, stated.inertial);
+        let sensor = filled.wrist_sensor.unwrap();
+        assert_eq!(sensor.position, [0.0, 0.0, 0.03]);
+        assert_eq!(sensor.rotation, [0.0, 0.0, 0.4]);
+        assert_eq!(sensor.force_range, Some(2.5));
     }
 }

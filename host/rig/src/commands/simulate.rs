@@ -181,7 +181,7 @@ fn carried(args: &Args, robot: &Robot, ui: &Ui) -> Result<Carried, CommandError>
     let option = args.sensor_option();
     if let (Some(option), None) = (option, &robot.wrist_sensor) {
         return Err(CommandError::Sentence(format!(
-            "{option} has no effect: {} has no [wrist_sensor]; add this table to the TOML description (of a URDF, `rig init --from` writes one), or leave the option out.",
+            "{option} has no effect: {} has no [wrist_sensor]; write this table into a TOML description (`rig init --from` makes one of a URDF, with the table as a comment to be filled in), or leave the option out.",
             args.robot.display()
         )));
     }
