@@ -17,6 +17,29 @@ pub struct ControllerNumbers {
     pub franka: String,
 }
 
+impl ControllerNumbers {
+    /// Returns, by maker, the name, the units and frame of the numbers, and the numbers.
+    pub fn labelled(&self) -> [(&'static str, &'static str, &str); 3] {
+        [
+            (
+                "Universal Robots",
+                "kg, m, kg·m²; the six inertias are Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass; the flange frame is `tool0` of its URDF",
+                &self.universal_robots,
+            ),
+            (
+                "KUKA",
+                "kg, mm, degrees; J in kg·m² about the centre of mass, in the axes A B C",
+                &self.kuka,
+            ),
+            (
+                "Franka",
+                "kg, m; inertia in kg·m² about the centre of mass, column by column",
+                &self.franka,
+            ),
+        ]
+    }
+}
+
 /// Returns the numbers of the identified body for controllers; `None` if the data do not show the mass or the centre of
 /// mass, because a controller would move by a value that nothing supports. An inertia that the data do not show is zero,
 /// which these controllers take as "a point": no number is invented.

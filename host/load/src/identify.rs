@@ -22,7 +22,7 @@ use crate::limits::too_heavy;
 use crate::load_friction;
 use crate::missing::missing;
 use crate::options::{By, LoadOptions};
-use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers};
+use crate::result::{Agreement, LoadIdentification, NotShown, TorqueFindings, numbers, symbol};
 use crate::sensor::by_sensor;
 use crate::torque::{Driven, Equations, equations};
 
@@ -239,6 +239,7 @@ fn described(
         inertia: numbers.inertia,
         inertia_shown: numbers.inertia_shown,
         principal_moments: numbers.principal_moments,
+        principal: numbers.principal,
         principal_axes: numbers.principal_axes,
         body: Load {
             inertia_known: numbers.inertia_shown,
@@ -460,7 +461,7 @@ fn contradiction(agreement: &Agreement) -> Option<String> {
             .map(|k| {
                 format!(
                     "{} {} ± {} by the sensor, {} ± {} by the torques",
-                    COLUMN_NAMES[k],
+                    symbol(COLUMN_NAMES[k]),
                     format_significant(agreement.by_sensor[k], 4),
                     format_significant(agreement.by_sensor_std[k], 2),
                     format_significant(agreement.by_torque[k], 4),
@@ -475,7 +476,7 @@ fn contradiction(agreement: &Agreement) -> Option<String> {
             worst.map_or_else(String::new, |k| {
                 format!(
                     "{} differs most, by {} standard deviations (SI units). ",
-                    COLUMN_NAMES[k],
+                    symbol(COLUMN_NAMES[k]),
                     format_significant(apart(k), 2)
                 )
             })
@@ -498,7 +499,7 @@ fn inconsistent(found: &Estimate, body: &Parameters) -> String {
         );
     let figures = format!(
         "differs most in {} ({} instead of {} in SI units, {size:.1} standard deviations)",
-        COLUMN_NAMES[worst],
+        symbol(COLUMN_NAMES[worst]),
         format_significant(body[worst], 4),
         format_significant(found.values[worst], 4),
     );

@@ -99,7 +99,10 @@ pub use identify::identify_load;
 pub use known_mass::MassCheck;
 pub use load_friction::LoadFriction;
 pub use options::{By, KnownMass, LoadOptions};
-pub use result::{Agreement, LoadIdentification, LoadParameter, NotShown, TorqueFindings, Value};
+pub use result::{
+    Agreement, LoadIdentification, LoadParameter, NotShown, TorqueFindings, Value,
+    parameter_symbols,
+};
 pub use rows::FEWEST_ROWS;
 pub use torque::TorqueTrace;
 pub use urdf_link::urdf_link;

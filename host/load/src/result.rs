@@ -1,6 +1,6 @@
 //! The identified load.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 use rig_data::prepare::PreprocessingPlan;
 use rig_identify::{t_quantile, unit};
 use rig_model::robot::{JointKind, Load};
@@ -38,6 +38,28 @@ pub struct LoadParameter {
     pub value: Value,
     /// True if the data show it: its standard deviation is below half of its plausible size.
     pub shown: bool,
+}
+
+impl LoadParameter {
+    /// Returns the symbol of the parameter for readers.
+    pub fn symbol(&self) -> &'static str {
+        symbol(self.name)
+    }
+}
+
+/// Returns the symbols of parameters for readers, by their names.
+pub fn parameter_symbols(names: &[&'static str]) -> Vec<&'static str> {
+    names.iter().map(|name| symbol(name)).collect()
+}
+
+/// Returns the symbol of a parameter for readers: the names of the first moments are those of the sensor's moments, too.
+pub(crate) fn symbol(name: &'static str) -> &'static str {
+    match name {
+        "mx" => "m·cx",
+        "my" => "m·cy",
+        "mz" => "m·cz",
+        _ => name,
+    }
 }
 
 /// What the joint torques tell beside the load.
@@ -101,6 +123,8 @@ pub struct LoadIdentification {
     pub inertia_shown: bool,
     /// Principal moments about the centre of mass, smallest first, kg·m².
     pub principal_moments: [f64; 3],
+    /// The same with their uncertainty, to first order.
+    pub principal: [Value; 3],
     /// Principal axes in the flange frame, one unit vector each, right-handed.
     pub principal_axes: [[f64; 3]; 3],
     /// The load as a body that can exist: the parameters, or the nearest body if no body has them. What the data do not
@@ -161,6 +185,7 @@ pub(crate) struct Numbers {
     pub inertia: [Value; 6],
     pub inertia_shown: bool,
     pub principal_moments: [f64; 3],
+    pub principal: [Value; 3],
     pub principal_axes: [[f64; 3]; 3],
 }
 
@@ -199,8 +224,19 @@ pub(crate) fn numbers(found: &Estimate) -> Numbers {
         inertia: std::array::from_fn(|k| of(4 + k)),
         inertia_shown: shown[4..].iter().all(|s| *s),
         principal_moments,
+        principal: std::array::from_fn(|k| {
+            let slopes = moment_slopes(&principal_axes[k]);
+            let variance = (slopes.transpose() * spread.fixed_view::<6, 6>(4, 4) * slopes)[0];
+            value(principal_moments[k], variance.max(0.0).sqrt())
+        }),
         principal_axes,
     }
+}
+
+/// Returns the derivatives of the moment of inertia about an axis by Ixx Ixy Ixz Iyy Iyz Izz. An axis that turns changes a
+/// principal moment to second order only.
+fn moment_slopes([x, y, z]: &[f64; 3]) -> SVector<f64, 6> {
+    SVector::from([x * x, 2.0 * x * y, 2.0 * x * z, y * y, 2.0 * y * z, z * z])
 }
 
 /// Returns the principal moments, smallest first, and the axes, right-handed.
@@ -219,4 +255,55 @@ pub(crate) fn principal(inertia: &Matrix3<f64>) -> ([f64; 3], [[f64; 3]; 3]) {
     });
     axes[2] = axes[0].cross(&axes[1]);
     (order.map(|k| eigen.eigenvalues[k]), axes.map(Into::into))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::estimate::{Parameters, Square};
+
+    /// The standard deviation of a principal moment is that of the moments of loads that are drawn from the covariance.
+    #[test]
+    fn principal_moments_spread_as_their_standard_deviations_say() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+        let sizes = crate::estimate::sizes_of(2.0);
+        let root = Square::from_fn(|r, c| {
+            let own = if r == c { 1.0 } else { 0.4 * draw() };
+            3e-3 * sizes[r] * own
+        });
+        let found = Estimate {
+            values: Parameters::from([
+                2.0, 0.06, -0.02, 0.2, 0.03, 0.001, -0.006, 0.028, 0.002, 0.009,
+            ]),
+            covariance: root * root.transpose(),
+            beyond: Square::zeros(),
+            information: Square::zeros(),
+            sizes,
+            degrees_of_freedom: 19,
+        };
+        let stated = numbers(&found).principal;
+        let mut sums = [[0.0; 2]; 3];
+        let count = 20_000;
+        for _ in 0..count {
+            let off = root * Parameters::from_fn(|_, _| draw());
+            let [xx, xy, xz, yy, yz, zz] = {
+                let own = central(&(found.values + off));
+                [4, 5, 6, 7, 8, 9].map(|k| own[k])
+            };
+            let (moments, _) = principal(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
+            for (sum, (moment, own)) in sums.iter_mut().zip(moments.iter().zip(&stated)) {
+                sum[0] += moment - own.value;
+                sum[1] += (moment - own.value).powi(2);
+            }
+        }
+        for ([sum, squares], own) in sums.iter().zip(&stated) {
+            let n = f64::from(count);
+            let std = (squares / n - (sum / n).powi(2)).sqrt();
+            assert!((own.std / std - 1.0).abs() < 0.05, "{} {std}", own.std);
+        }
+    }
 }

@@ -14,12 +14,11 @@ use super::same_file::{is_copy, is_same};
 use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
-use rig_data::EffortNeed;
-use rig_data::{EffortNeed, WRENCH_TEMPERATURE};
 use rig_data::prepare::{Choice, PrepareOptions};
+use rig_data::{EffortNeed, WRENCH_TEMPERATURE};
 use rig_load::{
-    By, ControllerNumbers, FEWEST_ROWS, KnownMass, LoadIdentification, LoadOptions, Value,
-    controller_numbers, identify_load, urdf_link,
+    By, ControllerNumbers, FEWEST_ROWS, KnownMass, LoadIdentification, LoadOptions, NotShown,
+    Value, controller_numbers, identify_load, parameter_symbols, urdf_link,
 };
 use rig_model::robot::{Description, LARGEST_GAIN_STD, Load, Original, Reads, Robot, WristSensor};
 use rig_output::{can_take, folder, format_significant, format_value, write_whole};
@@ -429,7 +428,7 @@ fn lines(
     for missing in &found.not_shown {
         let mut line = format!(
             "not shown by these data: {}. {}",
-            missing.parameters.join(" "),
+            parameter_symbols(&missing.parameters).join(" "),
             missing.experiment
         );
         if let Some(pose) = &missing.pose {
@@ -440,6 +439,15 @@ fn lines(
             line.push_str(&format!(" A pose that would help: {}.", list.join(", ")));
         }
         lines.push(line);
+    }
+    let has_moment = |missing: &NotShown| {
+        missing
+            .parameters
+            .iter()
+            .any(|p| p.starts_with('m') && *p != "m")
+    };
+    if found.not_shown.iter().any(has_moment) {
+        lines.push("(m·cx m·cy m·cz: first moments, mass times centre of mass)".to_owned());
     }
     lines.extend(for_controllers(found, numbers));
     lines
@@ -457,9 +465,7 @@ fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumber
         true => "",
         false => " (inertia not shown, given as zero)",
     };
-    vec![
-        format!("Universal Robots: {}{zero}", numbers.universal_robots),
-        format!("KUKA: {}{zero}", numbers.kuka),
-        format!("Franka: {}{zero}", numbers.franka),
-    ]
+    let lines = numbers.labelled();
+    let lines = lines.map(|(maker, units, own)| format!("{maker} ({units}): {own}{zero}"));
+    lines.into()
 }

@@ -2,7 +2,10 @@
 
 use super::context::Context;
 use super::{parts, treatment};
-use rig_load::{ControllerNumbers, LoadIdentification, SensorFindings, TorqueTrace, Trace, Value};
+use rig_load::{
+    ControllerNumbers, LoadIdentification, SensorFindings, TorqueTrace, Trace, Value,
+    parameter_symbols,
+};
 use rig_output::{format_significant, format_unit, format_value};
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
 
@@ -84,7 +87,7 @@ fn body(found: &LoadIdentification) -> Section {
     let parameters = found.parameters.iter().map(|p| {
         let shown = if p.shown { "yes" } else { "no" };
         vec![
-            p.name.to_owned(),
+            p.symbol().to_owned(),
             half(&p.value),
             format_significant(p.value.std, 2),
             format_unit(p.unit),
@@ -99,10 +102,11 @@ fn body(found: &LoadIdentification) -> Section {
             format_significant(value.std, 2),
         ]
     });
-    let principal = found.principal_moments.iter().zip(&found.principal_axes);
+    let principal = found.principal.iter().zip(&found.principal_axes);
     let principal = principal.map(|(moment, axis)| {
         vec![
-            format_significant(*moment, 4),
+            half(moment),
+            format_significant(moment.std, 2),
             axis.map(|v| format!("{v:.4}")).join(", "),
         ]
     });
@@ -138,11 +142,12 @@ fn body(found: &LoadIdentification) -> Section {
             .with(Block::Table(Table {
                 caption: "Principal moments about the centre of mass".into(),
                 columns: vec![
-                    Column::number("Moment", "kg·m²"),
+                    Column::number("Moment ± half the 95 % interval", "kg·m²"),
+                    Column::number("Standard deviation", "kg·m²"),
                     Column::text("Axis in the flange frame"),
                 ],
                 rows: principal.collect(),
-                note: String::new(),
+                note: "The uncertainty is to first order: it holds where the moments differ by more than it.".into(),
             }));
     }
     section
@@ -162,7 +167,7 @@ fn not_shown(found: &LoadIdentification) -> Option<Section> {
         });
         format!(
             "{}: {}{pose}",
-            missing.parameters.join(", "),
+            parameter_symbols(&missing.parameters).join(", "),
             missing.experiment
         )
     });
@@ -388,7 +393,7 @@ fn agreement(found: &LoadIdentification) -> Option<Section> {
     let both = found.agreement.as_ref()?;
     let rows = found.parameters.iter().enumerate().map(|(k, p)| {
         vec![
-            p.name.to_owned(),
+            p.symbol().to_owned(),
             format_value(both.by_sensor[k], both.by_sensor_std[k]),
             format_value(both.by_torque[k], both.by_torque_std[k]),
             format_unit(p.unit),
@@ -458,8 +463,10 @@ fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumber
             "The flange frame of the description must be that of the controller. The inertia is not shown by the data and is given as zero."
         }
     };
-    Section::new("controllers", "Settings for robot controllers", lead).with(Block::Code(format!(
-        "Universal Robots: {}\nKUKA: {}\nFranka: {}",
-        numbers.universal_robots, numbers.kuka, numbers.franka
-    )))
+    let section = Section::new("controllers", "Settings for robot controllers", lead);
+    (numbers.labelled().into_iter()).fold(section, |section, (maker, units, own)| {
+        section
+            .with(Block::Text(format!("{maker} ({units}):")))
+            .with(Block::Code(own.to_owned()))
+    })
 }
