@@ -91,6 +91,11 @@ impl MassCheck {
                 ],
             },
         };
+        if !confirmed && self.is_in_grams(degrees_of_freedom) {
+            return Ok(Some(format!(
+                "{shown} {factor} times the known mass of {known} kg (± one standard deviation): --mass looks like grams, and it is in kg."
+            )));
+        }
         let end = match confirmed {
             true => format!("; {other} the known mass."),
             false => ", or the known mass is.".to_owned(),
@@ -120,6 +125,12 @@ impl MassCheck {
                 format_significant(sensor.known.mass, 4)
             )
         })
+    }
+
+    /// Returns true if the known mass is a thousand times the identified one, within the accuracy of a sound sensor.
+    fn is_in_grams(&self, degrees_of_freedom: usize) -> bool {
+        let std = (self.std / self.factor).hypot(ACCURACY);
+        chance((1e3 * self.factor - 1.0) / std, degrees_of_freedom) >= CONTRADICTS
     }
 
     /// Returns the units of forces and moments that the factor is that of, within the accuracy of a sound sensor.
@@ -188,6 +199,10 @@ mod tests {
         assert_eq!(said(1.12, 0.05), None);
         let text = said(1.12, 0.01).unwrap();
         assert!(text.contains("1.120 ± 0.010 times"), "{text}");
+        // 2 kg that were given as 2000.
+        let text = said(0.00099995, 1e-7).unwrap();
+        assert!(text.contains("--mass looks like grams"), "{text}");
+        assert!(!said(0.0011, 1e-7).unwrap().contains("grams"));
         // Student's t of 19 degrees of freedom: 3.883 has two tails of 0.001.
         assert!(!check(1.0387, 0.01).contradicts() && check(1.0390, 0.01).contradicts());
     }

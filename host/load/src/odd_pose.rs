@@ -84,12 +84,75 @@ fn told(recorded: &Recorded, poses: &[usize], equations: &[Equations; 2]) -> Str
         1 => ("pose", "does", "it was"),
         _ => ("poses", "do", "they were"),
     };
+    let cause = saturated(recorded, poses, equations).unwrap_or_else(|| {
+        "Look for a contact, a cable that pulls, or a robot that still moved.".to_owned()
+    });
     format!(
-        "{}: the {subject} at t = {} s {verb} not fit the load by all other poses ({}); {object} left out. Look for a contact, a cable that pulls, or a robot that still moved.",
+        "{}: the {subject} at t = {} s {verb} not fit the load by all other poses ({}); {object} left out. {cause}",
         recorded.label,
         listed(&times),
         worst(recorded, poses, equations)
     )
+}
+
+/// Says that a channel is cut in all of these poses: it reads one extreme value exactly, of either sign, in two poses or more,
+/// where the load by the others would read more. Readings with noise agree in no digit but the first ones.
+fn saturated(recorded: &Recorded, poses: &[usize], equations: &[Equations; 2]) -> Option<String> {
+    let size = |pose: usize, channel: usize| recorded.sample[pose].readings[channel].abs();
+    let all = 0..recorded.sample.len();
+    let would = |channel: usize| -> Option<Vec<f64>> {
+        let (errors, _) = equations[channel / 3].deleted(poses)?;
+        let error = |k: usize| errors[3 * k + channel % 3];
+        let rows = poses.iter().enumerate();
+        Some(
+            rows.map(|(k, pose)| recorded.sample[*pose].readings[channel] - error(k))
+                .collect(),
+        )
+    };
+    let is_cut = |channel: usize| {
+        let end = all
+            .clone()
+            .map(|pose| size(pose, channel))
+            .fold(0.0, f64::max);
+        let shared = poses
+            .iter()
+            .filter(|pose| size(**pose, channel) == end)
+            .count();
+        let goes_on = |would: Vec<f64>| {
+            let mut pairs = poses.iter().zip(would);
+            pairs.all(|(pose, would)| {
+                let read = recorded.sample[*pose].readings[channel];
+                read.abs() < end || would * read.signum() > end
+            })
+        };
+        (shared >= 2 && would(channel).is_some_and(goes_on)).then_some((channel, end))
+    };
+    let cut: Vec<(usize, f64)> = (0..6).filter_map(is_cut).collect();
+    let is_told = |pose: &usize| {
+        cut.iter()
+            .any(|(channel, end)| size(*pose, *channel) == *end)
+    };
+    if cut.is_empty() || !poses.iter().all(is_told) {
+        return None;
+    }
+    let each: Vec<String> = (cut.iter())
+        .map(|(channel, end)| {
+            let unit = ["N", "N·m"][channel / 3];
+            let shared = all
+                .clone()
+                .filter(|pose| size(*pose, *channel) == *end)
+                .count();
+            format!(
+                "{} reads exactly ±{} {unit} in {shared} poses and more in none",
+                WRENCH_COLUMNS[*channel],
+                format_significant(*end, 4)
+            )
+        })
+        .collect();
+    Some(format!(
+        "The sensor looks saturated: {}. Check the amplifier, and the range that is set in the sensor.",
+        listed(&each)
+    ))
 }
 
 /// Says which reading of some poses is furthest from the load by the others, in units of what these leave.

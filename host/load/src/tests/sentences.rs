@@ -143,3 +143,35 @@ fn sentences_for_a_urdf_name_options() {
         "{text}"
     );
 }
+
+/// One extreme value that several poses share exactly is a limit, of whichever sign.
+#[test]
+fn poses_at_one_extreme_value_look_saturated() {
+    let moving = Moving::new(irp6(), 0.8, 8);
+    let sound = few(&moving, 12);
+    let extreme = |run: &InMemory| {
+        let fx = &run.blocks[0].extra[0].1;
+        let mut sizes: Vec<f64> = fx.iter().map(|f| f.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        // Between the third and the second of the largest.
+        0.5 * (sizes[sizes.len() - 3] + sizes[sizes.len() - 2])
+    };
+    let limit = extreme(&sound);
+    let mut clipped = sound.clone();
+    let fx = &mut clipped.blocks[0].extra[0].1;
+    fx.iter_mut().for_each(|f| *f = f.clamp(-limit, limit));
+    let text = found(&moving.robot, &clipped).warnings.join(" ");
+    assert!(
+        text.contains("saturated: fx reads exactly") || text.contains("fx are cut at"),
+        "{text}"
+    );
+    // A contact is none.
+    let mut pushed = sound;
+    pushed.blocks[0].extra[0].1[4] += 8.0;
+    pushed.blocks[0].extra[0].1[7] -= 6.0;
+    let text = found(&moving.robot, &pushed).warnings.join(" ");
+    assert!(
+        text.contains("Look for a contact") && !text.contains("saturated"),
+        "{text}"
+    );
+}

@@ -125,7 +125,7 @@ fn body(found: &LoadIdentification) -> Section {
             Column::text("Shown by the data"),
         ],
         rows: parameters.collect(),
-        note: "A parameter is shown if its standard deviation is below half of the size that a load of this mass within 0.1 m of the flange has.".into(),
+        note: "A parameter is shown if its standard deviation is below half of the size that a load of this mass within 0.1 m of the flange has. m·cx m·cy m·cz are the first moments, mass times centre of mass (mx my mz in load.json); the sensor's moments mx my mz are others.".into(),
     }));
     if found.inertia_shown {
         section = section
@@ -191,8 +191,12 @@ fn readings(sensor: &SensorFindings) -> Section {
         }
     }
     section.with(Block::Text(format!(
-        "RMS of the residual over {} rows: {} N ({} % of what the forces read beside the bias) and {} N·m ({} % of the moments). {}What is not modelled: cables that pull, contact, elasticity, gain and crosstalk of the sensor.",
+        "RMS of the residual over {} {}: {} N ({} % of what the forces read beside the bias) and {} N·m ({} % of the moments). {}What is not modelled: cables that pull, contact, elasticity, gain and crosstalk of the sensor.",
         parts::count(sensor.rows),
+        match sensor.prepared {
+            Some(_) => "rows",
+            None => "poses",
+        },
         format_significant(sensor.residual[0], 3),
         format_significant(100.0 * sensor.share[0], 2),
         format_significant(sensor.residual[1], 3),
@@ -423,8 +427,12 @@ fn treated(found: &LoadIdentification) -> Option<Section> {
     let mut section = Section::new("rows", "Filter and rows", "");
     if let Some(sensor) = &found.sensor {
         let mut text = format!(
-            "Sensor: {} rows or poses were used",
-            parts::count(sensor.rows)
+            "Sensor: {} {} were used",
+            parts::count(sensor.rows),
+            match sensor.prepared {
+                Some(_) => "rows",
+                None => "poses",
+            }
         );
         text += &match sensor.saturated {
             0 => ".".to_owned(),
@@ -439,7 +447,7 @@ fn treated(found: &LoadIdentification) -> Option<Section> {
         section = section.with(Block::Text(text));
     }
     if let Some(plan) = found.sensor.as_ref().and_then(|s| s.prepared.as_ref()) {
-        section = section.with(Block::List(treatment::sentences(plan)));
+        section = section.with(Block::List(treatment::sentences_of_motion(plan)));
     }
     if let Some(torque) = &found.torque {
         section = section

@@ -37,24 +37,10 @@ fn over_cutoff(joints: &[Joint], treatment: &PreprocessingPlan) -> Plot {
     )
 }
 
-/// Sentences about the treatment of the data.
+/// Sentences about the treatment of the data of a fit to torques.
 pub(super) fn sentences(treatment: &PreprocessingPlan) -> Vec<String> {
-    let rate = treatment.sample_rate;
-    let mut items = vec![
-        format!(
-            "Position filter: Butterworth, order {}, forward and backward (no phase shift), cut-off {}",
-            treatment.order, treatment.cutoff_reason
-        ),
-        format!("Derivatives: {}", treatment.derivatives),
-        format!("Parallel filter: {}.", treatment.parallel_filter),
-        format!("Decimation: {}", treatment.decimation_reason),
-        format!("Speed thresholds: {}", treatment.speed_reason),
-        format!(
-            "Trimmed: {} rows ({} s) at both ends of every stretch, because the filters have not settled there.",
-            parts::count(treatment.trimmed as u64),
-            format_significant(treatment.trimmed as f64 / rate, 3)
-        ),
-    ];
+    let mut items = sentences_of_motion(treatment);
+    items.push(format!("Speed thresholds: {}", treatment.speed_reason));
     if treatment.torque_lead != 0.0 {
         items.push(format!(
             "Torque lead: a recorded torque is assumed to act {} ms later.",
@@ -62,6 +48,25 @@ pub(super) fn sentences(treatment: &PreprocessingPlan) -> Vec<String> {
         ));
     }
     items
+}
+
+/// Sentences about the treatment of the data of a fit in which no torque and no friction takes part.
+pub(super) fn sentences_of_motion(treatment: &PreprocessingPlan) -> Vec<String> {
+    let rate = treatment.sample_rate;
+    vec![
+        format!(
+            "Position filter: Butterworth, order {}, forward and backward (no phase shift), cut-off {}",
+            treatment.order, treatment.cutoff_reason
+        ),
+        format!("Derivatives: {}", treatment.derivatives),
+        format!("Parallel filter: {}.", treatment.parallel_filter),
+        format!("Decimation: {}", treatment.decimation_reason),
+        format!(
+            "Trimmed: {} rows ({} s) at both ends of every stretch, because the filters have not settled there.",
+            parts::count(treatment.trimmed as u64),
+            format_significant(treatment.trimmed as f64 / rate, 3)
+        ),
+    ]
 }
 
 /// Treatment of the data: sentences, and the spectra behind them.
