@@ -349,7 +349,7 @@ fn walk(page: &str, count: usize) {
 
 #[test]
 fn the_load_is_found_as_the_page_says() {
-    walk("docs/load.md", 2);
+    walk("docs/load.md", 3);
 }
 
 #[test]

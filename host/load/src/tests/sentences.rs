@@ -80,6 +80,7 @@ fn a_temperature_that_explains_nothing_is_not_asked_for_again() {
     assert!(!constant.contains("or record") && !other.contains("or record"));
 }
 
+/// The zero of the last joint stands for a sensor that is turned about its axis. A zero of another joint, beside which the
 /// sensor is turned as well, does not.
 #[test]
 fn only_a_zero_that_replaces_the_rotation_is_named_beside_it() {
