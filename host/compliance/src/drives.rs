@@ -91,6 +91,20 @@ impl Drives {
         }))
     }
 
+    /// Returns the coordinate of each motor where the joints are at a position, in the units of R.
+    ///
+    /// # Errors
+    /// [`ComplianceError::Model`] for a wrong number of joints.
+    pub(crate) fn positions(&self, q: &[f64]) -> Result<Vec<f64>, ComplianceError> {
+        let mut motors = vec![0.0; self.kinds.len()];
+        (self.transmission.motor_position(q, &mut motors))
+            .map_err(|error| ComplianceError::Model(error.to_string()))?;
+        for (k, motor) in motors.iter_mut().enumerate() {
+            *motor /= self.transmission.own_turns(k).unwrap_or(1.0);
+        }
+        Ok(motors)
+    }
+
     /// Returns the motion of each motor per motion of the joints, in the units of R. It vanishes at a dead centre.
     ///
     /// # Errors

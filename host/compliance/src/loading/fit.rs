@@ -56,6 +56,8 @@ pub(super) struct Row {
     pub directions: Vec<f64>,
     /// Number of the window.
     pub window: usize,
+    /// Number of the recording.
+    pub stretch: usize,
 }
 
 /// A significant gap.
@@ -159,6 +161,12 @@ pub(super) fn fit(rows: &[Row], count: usize, search: bool) -> Option<Fit> {
         best = next;
     }
     Some(best)
+}
+
+/// Solves the regression of other readings with the gaps and the friction that were found. `None` for too few rows.
+pub(super) fn refit(rows: &[Row], before: &Fit) -> Option<Fit> {
+    let clear = clear(rows, &before.gaps, &before.friction);
+    solve(&clear, before.count, &before.gaps, &before.friction)
 }
 
 /// Solves the regression of `count` drives without gaps. `None` for too few rows.
@@ -293,7 +301,7 @@ fn regression(
         x.extend(more(i));
         let mut z = x.clone();
         z[..row.z.len()].copy_from_slice(&row.z);
-        all.push(x, z, row.y, row.group);
+        all.push(x, z, row.y, row.group, [row.stretch, row.window]);
     }
     all
 }

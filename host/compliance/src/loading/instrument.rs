@@ -4,6 +4,8 @@
 //! instruments: they share the load but not the noise, if the noise of a window does not reach the next (Söderström &
 //! Stoica 1989). Covariance with correlated residuals: Newey & West 1987.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use rig_numerics::svd::Svd;
 
@@ -18,8 +20,10 @@ pub(crate) struct Regression {
     x: Vec<Vec<f64>>,
     z: Vec<Vec<f64>>,
     y: Vec<f64>,
-    /// Group of each row: residuals of two groups are independent.
+    /// Group of each row: it has an offset of its own.
     group: Vec<usize>,
+    /// Recording and window of each row. The readings of one window share the noise of its load.
+    time: Vec<[usize; 2]>,
 }
 
 /// An estimate.
@@ -39,12 +43,20 @@ impl Estimate {
 }
 
 impl Regression {
-    /// Adds a row.
-    pub(crate) fn push(&mut self, x: Vec<f64>, z: Vec<f64>, y: f64, group: usize) {
+    /// Adds a row. `time`: recording and window.
+    pub(crate) fn push(
+        &mut self,
+        x: Vec<f64>,
+        z: Vec<f64>,
+        y: f64,
+        group: usize,
+        time: [usize; 2],
+    ) {
         self.x.push(x);
         self.z.push(z);
         self.y.push(y);
         self.group.push(group);
+        self.time.push(time);
     }
 
     /// Number of rows.
@@ -75,7 +87,7 @@ impl Regression {
 
     /// Root mean square of the readings about the mean of their group.
     pub(crate) fn signal(&self) -> f64 {
-        let mut groups: std::collections::BTreeMap<usize, Vec<f64>> = Default::default();
+        let mut groups: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         for (group, y) in self.group.iter().zip(&self.y) {
             groups.entry(*group).or_default().push(*y);
         }
@@ -165,22 +177,29 @@ impl Regression {
         })
     }
 
-    /// Sum of z·e·eᵀ·zᵀ over neighbouring rows of a group, with falling weights.
+    /// Sum of z·e·eᵀ·zᵀ over neighbouring windows of a recording, with falling weights. The readings of one window count together:
+    /// the noise of the force moves all axes of the tool point alike.
     fn meat(&self, z: &DMatrix<f64>, residuals: &DVector<f64>) -> DMatrix<f64> {
-        let (rows, count) = (z.nrows(), z.ncols());
+        let count = z.ncols();
+        let mut windows: BTreeMap<[usize; 2], DVector<f64>> = BTreeMap::new();
+        for (r, time) in self.time.iter().enumerate() {
+            let own = (windows.entry(*time)).or_insert_with(|| DVector::zeros(count));
+            *own += z.row(r).transpose() * residuals[r];
+        }
+        let scores: Vec<([usize; 2], DVector<f64>)> = windows.into_iter().collect();
         // Newey & West 1994: the lag grows with the fourth root of the rows and more.
-        let lags = ((rows as f64).powf(1.0 / 3.0) as usize).max(1);
-        let scores = DMatrix::from_fn(rows, count, |r, c| z[(r, c)] * residuals[r]);
-        let mut meat = scores.tr_mul(&scores);
-        for lag in 1..=lags {
-            let weight = 1.0 - lag as f64 / (lags + 1) as f64;
-            let mut cross = DMatrix::zeros(count, count);
-            for r in lag..rows {
-                if self.group[r] == self.group[r - lag] {
-                    cross += scores.row(r).transpose() * scores.row(r - lag);
+        let lags = ((scores.len() as f64).powf(1.0 / 3.0) as usize).max(1);
+        let mut meat = DMatrix::zeros(count, count);
+        for (k, (time, own)) in scores.iter().enumerate() {
+            meat += own * own.transpose();
+            for lag in 1..=lags.min(k) {
+                let (before, other) = &scores[k - lag];
+                if before[0] == time[0] {
+                    let cross = own * other.transpose();
+                    let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+                    meat += weight * (&cross + cross.transpose());
                 }
             }
-            meat += weight * (&cross + cross.transpose());
         }
         meat
     }

@@ -356,6 +356,7 @@ fn rows(windows: &[Window]) -> Vec<Row> {
                 weight: vec![0.0],
                 directions: vec![w.course.direction],
                 window,
+                stretch: w.stretch,
             }
         })
         .collect()

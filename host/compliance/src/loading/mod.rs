@@ -2,6 +2,7 @@
 
 mod advice;
 mod another_reading;
+mod equilibrium;
 mod findings;
 mod fit;
 mod instrument;

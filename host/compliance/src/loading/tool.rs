@@ -4,22 +4,27 @@
 //! compliances 1/c_k and in the hysteresis h_k (rad or m). Only the translation is measured. Movements of the motors are
 //! taken from their encoders. A gap adds a_k·(gap/2)·sign(spring), see [`super::fit`].
 //!
-//! Leaves out: gaps that are crossed at other torques than the described weight tells, if several recordings have several such torques; the change of the weight's torque as the links themselves yield, elasticity of base and links, which counts as that of the drives.
+//! The links yield under weight and wrench, which changes the columns and the torques. The regression keeps those of the motors'
+//! pose. What the balance of the links ([`super::equilibrium`]) displaces beyond them, by the stiffness found so far, is
+//! subtracted from the reading, and the regression is repeated. The twist of a drive whose stiffness is not shown counts as zero
+//! there.
+//!
+//! Leaves out: gaps that are crossed at other torques than the described weight tells, if several recordings have several such torques; elasticity of base and links, which counts as that of the drives.
 
 use std::collections::BTreeMap;
 
 use rig_model::robot::Robot;
 use rig_output::format_significant;
-use rig_shared::multibody::gravity_vector;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::advice::advice;
-use super::fit::{Fit, Lack, Row, fit, shows, without_gaps};
+use super::equilibrium::Equilibrium;
+use super::fit::{Fit, Lack, Row, fit, refit, shows, without_gaps};
 use super::link::{NEGATIVE, NOT_SHOWN};
 use super::result::{Deflection, DriveLoading};
 use super::windows::{Course, Slow, means, noise, range, window_rows};
 use super::wrench::{DISPLACEMENT, torques, wrench};
-use crate::drives::{listed_pose, loaded};
+use crate::drives::listed_pose;
 use crate::error::ComplianceError;
 use crate::sag::TWIST;
 use crate::signals::Signals;
@@ -40,6 +45,10 @@ const MATERIAL: f64 = 0.05;
 const SHOWN_ARM: f64 = 0.3;
 /// Fewest windows.
 const FEWEST: usize = 12;
+/// Regressions at most. Each one leaves the twist, a small angle, times the error of the one before.
+const PASSES: usize = 6;
+/// Relative change of every compliance that ends them.
+const SETTLED: f64 = 1e-6;
 
 /// One stretch at one pose.
 struct Held {
@@ -51,8 +60,15 @@ struct Held {
     slow: Vec<Slow>,
     /// Torque of each drive by the weight at the start; of what is described.
     weight: Vec<f64>,
-    /// Displacement without that of the motors, for each measured axis.
+    /// Displacement as it was read, for each measured axis.
+    read: [Option<Vec<f64>>; 3],
+    /// Displacement by the springs at constant columns and torques.
     displacement: [Option<Vec<f64>>; 3],
+    /// Pose, and position of the motors by window: [window][joint].
+    pose: Vec<f64>,
+    motors: Vec<Vec<f64>>,
+    /// Reading of the wrench by window.
+    force: Vec<[f64; 6]>,
 }
 
 /// Reads all stretches. Returns them, the rows of the regression and the number of windows.
@@ -65,11 +81,15 @@ fn read(
         .map(|signals| hold(tool, signals, size))
         .collect::<Result<Vec<_>, _>>()?;
     refuse_noise(&held, stretches, size)?;
-    let ranges: Vec<f64> = (0..tool.count())
-        .map(|k| range(held.iter().flat_map(|h| &h.slow[k].values)))
-        .collect();
-    let (rows, windows) = rows(&held, &ranges);
+    let (rows, windows) = rows(&held, &ranges(&held, tool.count()));
     Ok((held, rows, windows))
+}
+
+/// Range of the torque of each drive over all stretches.
+fn ranges(held: &[Held], count: usize) -> Vec<f64> {
+    (0..count)
+        .map(|k| range(held.iter().flat_map(|h| &h.slow[k].values)))
+        .collect()
 }
 
 /// How well the springs explain displacements.
@@ -125,8 +145,8 @@ pub(super) fn by_tool(
     stretches: &[&Signals],
 ) -> Result<ByTool, ComplianceError> {
     let n = tool.count();
-    let (held, rows, windows) = read(tool, stretches)?;
-    let found = (windows >= FEWEST)
+    let (mut held, mut rows, windows) = read(tool, stretches)?;
+    let mut found = (windows >= FEWEST)
         .then(|| fit(&rows, n, true))
         .flatten()
         .ok_or_else(|| {
@@ -134,6 +154,9 @@ pub(super) fn by_tool(
                 "The recordings of the loaded tool point have {windows} usable windows, {FEWEST} are needed: change the force slowly, to and fro, and record more rows."
             ))
         })?;
+    if settle(tool, &mut held, &mut rows, found.clone())? {
+        found = fit(&rows, n, true).unwrap_or(found);
+    }
     let told = found.lack.told("m").map(|told| crooked(tool, &told));
     let mut drives = Vec::new();
     for k in 0..n {
@@ -144,6 +167,36 @@ pub(super) fn by_tool(
         lack: found.lack,
         told,
     })
+}
+
+/// Takes the weight's and the wrench's change by the yielding links from the displacements of all stretches, by a first fit of its
+/// rows. Returns false if nothing changed.
+fn settle(
+    tool: &ToolPoint<'_>,
+    held: &mut [Held],
+    rows: &mut Vec<Row>,
+    mut found: Fit,
+) -> Result<bool, ComplianceError> {
+    let n = tool.count();
+    let balance = Equilibrium::new(tool)?;
+    let mut springs = Spring::all(rows, &found, n);
+    for pass in 0..PASSES {
+        if !straighten(&balance, held, &springs)? {
+            return Ok(pass > 0);
+        }
+        *rows = self::rows(held, &ranges(held, n)).0;
+        let Some(next) = refit(rows, &found) else {
+            break;
+        };
+        found = next;
+        let before = std::mem::replace(&mut springs, Spring::all(rows, &found, n));
+        let settled = (before.iter().zip(&springs))
+            .all(|(a, b)| (a.compliance - b.compliance).abs() <= SETTLED * b.compliance);
+        if settled {
+            break;
+        }
+    }
+    Ok(true)
 }
 
 /// Says that the displacement is not that of springs.
@@ -175,6 +228,12 @@ fn hold(tool: &ToolPoint<'_>, signals: &Signals, rows: usize) -> Result<Held, Co
     let (_, per_twist) = tool.per_twist(&pose)?;
     let force = wrench(signals)?.map(|list| means(&list, rows));
     let motors: Vec<Vec<f64>> = signals.joints.iter().map(|j| means(&j.q, rows)).collect();
+    let force: Vec<[f64; 6]> = (0..force[0].len())
+        .map(|i| force.each_ref().map(|list| list[i]))
+        .collect();
+    let motors: Vec<Vec<f64>> = (0..force.len())
+        .map(|i| motors.iter().map(|list| list[i]).collect())
+        .collect();
     let (loads, weight) = loads(tool, &pose, &force, &motors)?;
     for name in DISPLACEMENT {
         let list = signals.column(name).unwrap_or_default();
@@ -186,12 +245,13 @@ fn hold(tool: &ToolPoint<'_>, signals: &Signals, rows: usize) -> Result<Held, Co
         }
     }
     plausible(signals, &jacobian)?;
+    let read = DISPLACEMENT.map(|name| Some(means(signals.column(name)?, rows)));
     let displacement = std::array::from_fn(|axis| {
-        let read = means(signals.column(DISPLACEMENT[axis])?, rows);
+        let read: &Vec<f64> = read[axis].as_ref()?;
         Some(
-            (read.iter().enumerate())
-                .map(|(i, d)| {
-                    let moved = (0..n).map(|j| jacobian[(axis, j)] * (motors[j][i] - pose[j]));
+            (read.iter().zip(&motors))
+                .map(|(d, motors)| {
+                    let moved = (0..n).map(|j| jacobian[(axis, j)] * (motors[j] - pose[j]));
                     d - moved.sum::<f64>()
                 })
                 .collect(),
@@ -203,8 +263,100 @@ fn hold(tool: &ToolPoint<'_>, signals: &Signals, rows: usize) -> Result<Held, Co
         arms,
         loads,
         weight,
+        read,
         displacement,
+        pose,
+        motors,
+        force,
     })
+}
+
+/// What is known of the spring of a drive, in coordinates of its twist.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spring {
+    compliance: f64,
+    hysteresis: f64,
+    /// Half a gap.
+    half: f64,
+    /// Torque at which the gap is crossed.
+    zero: f64,
+    friction: f64,
+}
+
+impl Spring {
+    /// Springs of all drives; rigid where the stiffness is not shown.
+    fn all(rows: &[Row], found: &Fit, count: usize) -> Vec<Self> {
+        let values = &found.estimate.values;
+        (0..count)
+            .map(|k| {
+                let Some(compliance) = determined(rows, found, k) else {
+                    return Self::default();
+                };
+                let gap = found.gap(k);
+                Self {
+                    compliance: compliance.value,
+                    hysteresis: match found.estimate.hidden[count + k] {
+                        true => 0.0,
+                        false => values[count + k],
+                    },
+                    half: gap.map_or(0.0, |(_, column)| values[column]),
+                    zero: gap.map_or(0.0, |(gap, _)| gap.zero),
+                    friction: found.friction(k),
+                }
+            })
+            .collect()
+    }
+
+    /// Twist beside that of the load: `load` decides the side of the gap.
+    fn step(&self, load: f64, direction: f64) -> f64 {
+        let side = (load - self.friction * direction - self.zero).signum();
+        self.half * side - self.hysteresis * direction
+    }
+}
+
+/// Takes from the displacement what the balance of the links displaces beyond the linear regression. Returns false, and changes
+/// nothing, if the springs hold the links nowhere near the motors.
+fn straighten(
+    balance: &Equilibrium<'_, '_>,
+    held: &mut [Held],
+    springs: &[Spring],
+) -> Result<bool, ComplianceError> {
+    let ranges = ranges(held, springs.len());
+    let mut all = Vec::with_capacity(held.len());
+    for own in held.iter() {
+        let mut directions = vec![vec![0.0; springs.len()]; own.force.len()];
+        for (i, direction) in settled(own, &ranges) {
+            directions[i] = direction;
+        }
+        let mut beyond = Vec::with_capacity(own.force.len());
+        let start = balance.place(&own.pose)?;
+        for (i, direction) in directions.iter().enumerate() {
+            let step =
+                |k: usize| springs[k].step(own.slow[k].values[i] - own.weight[k], direction[k]);
+            let twist = |k: usize, load: f64| springs[k].compliance * load + step(k);
+            let Some(links) = balance.links(&own.motors[i], &own.force[i], twist)? else {
+                return Ok(false);
+            };
+            let place = balance.place(&links)?;
+            beyond.push([0, 1, 2].map(|axis| {
+                let linear: f64 = (0..springs.len())
+                    .map(|k| own.arms[axis][k] * twist(k, own.loads[k][i]))
+                    .sum();
+                place[axis] - start[axis] - linear
+            }));
+        }
+        all.push(beyond);
+    }
+    for (own, beyond) in held.iter_mut().zip(&all) {
+        for (axis, read) in own.read.iter().enumerate() {
+            own.displacement[axis] = read.as_ref().map(|read| {
+                (read.iter().zip(beyond))
+                    .map(|(d, beyond)| d - beyond[axis])
+                    .collect()
+            });
+        }
+    }
+    Ok(true)
 }
 
 /// Returns the slow course of each drive's torque, with the width that the most loaded drive needs.
@@ -265,26 +417,17 @@ fn plausible(signals: &Signals, jacobian: &nalgebra::DMatrix<f64>) -> Result<(),
 fn loads(
     tool: &ToolPoint<'_>,
     pose: &[f64],
-    force: &[Vec<f64>; 6],
+    force: &[[f64; 6]],
     motors: &[Vec<f64>],
 ) -> Result<(Vec<Vec<f64>>, Vec<f64>), ComplianceError> {
-    let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
-    let (n, robot) = (tool.count(), tool.robot());
-    let chain = robot.chain().map_err(|e| wrong(&e))?;
-    let parameters = loaded(robot)?;
-    let weight = |q: &[f64]| {
-        let mut torque = vec![0.0; n];
-        gravity_vector(&chain, &parameters, q, &mut torque)
-            .map(|()| torque)
-            .map_err(|e| wrong(&e))
-    };
+    let n = tool.count();
+    let balance = Equilibrium::new(tool)?;
     let inverse = tool.drives().inverse(pose)?;
-    let before = weight(pose)?;
-    let mut loads = vec![Vec::with_capacity(force[0].len()); n];
-    for i in 0..force[0].len() {
-        let place: Vec<f64> = motors.iter().map(|list| list[i]).collect();
-        let pushed = torques(tool, pose, &force.each_ref().map(|list| list[i]))?;
-        let weight = weight(&place)?;
+    let before = balance.weight(pose)?;
+    let mut loads = vec![Vec::with_capacity(force.len()); n];
+    for (force, place) in force.iter().zip(motors) {
+        let pushed = torques(tool, pose, force)?;
+        let weight = balance.weight(place)?;
         for (k, own) in loads.iter_mut().enumerate() {
             // f = R⁻ᵀ·τ.
             let joint = (0..n).map(|j| inverse[(j, k)] * (pushed[j] - weight[j] + before[j]));
@@ -366,8 +509,15 @@ fn row(own: &Held, i: usize, axis: usize, directions: &[f64], group: usize, offs
         weight: own.weight.clone(),
         directions: directions.to_vec(),
         window: 0,
+        stretch: group / 3,
         arms,
     }
+}
+
+/// Returns the compliance of drive `k` if the rows show it.
+fn determined(rows: &[Row], found: &Fit, k: usize) -> Option<Value> {
+    let own = found.value(k);
+    (own.value > 0.0 && own.relative() < NOT_SHOWN && shows(rows, found, k)).then_some(own)
 }
 
 /// Returns what the loading shows of drive `k`.
@@ -386,8 +536,7 @@ fn drive(
     let low = loads.iter().copied().fold(f64::INFINITY, f64::min);
     result.load = [low, low + range(loads.iter())];
     let compliance = found.value(k);
-    let determined = shows(rows, found, k) && compliance.relative() < NOT_SHOWN;
-    if !(determined && compliance.value > 0.0) {
+    if determined(rows, found, k).is_none() {
         let random = found.estimate.std(k) < NOT_SHOWN * compliance.value.abs();
         let told = found.lack.told("m").filter(|_| random);
         let opposite = !found.estimate.hidden[k] && compliance.value < -NEGATIVE * compliance.std;

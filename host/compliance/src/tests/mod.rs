@@ -8,3 +8,4 @@ mod noisy_force;
 mod periodic;
 mod rig;
 mod statics;
+mod weight;

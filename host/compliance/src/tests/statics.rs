@@ -56,7 +56,7 @@ pub(super) fn rest(
 }
 
 /// Returns displacement and rotation of the tool point.
-fn moved(robot: &Robot, q: &[f64], start: &[f64], offset: [f64; 3]) -> [f64; 6] {
+pub(super) fn moved(robot: &Robot, q: &[f64], start: &[f64], offset: [f64; 3]) -> [f64; 6] {
     let unloaded = tool(robot, start, offset);
     let pose = tool(robot, q, offset);
     let shift = pose * Point3::origin() - unloaded * Point3::origin();
