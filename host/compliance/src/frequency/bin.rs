@@ -23,7 +23,7 @@ pub(crate) struct Bin {
     pub link_sign: C,
     /// Torque that a gap takes away, over c and the gap, by a model.
     pub gap: C,
-    /// Torque of gravity on the link less its linear part, by a model.
+    /// Torque of gravity on the link less its linear part, by a model, and that of the other joints' motion.
     pub gravity: C,
 }
 

@@ -40,6 +40,10 @@ pub(super) struct Columns {
     pub(super) gap: Vec<f64>,
     /// Torque of gravity on the link less its linear part; zero until a model predicts the motion of the link.
     pub(super) gravity: Vec<f64>,
+    /// Torque that the motion of the other joints puts on the links.
+    pub(super) coupling: Vec<f64>,
+    /// The same as computed, smooth: it keeps the line through its ends.
+    pushed: Vec<f64>,
     /// Torque as recorded.
     recorded: Vec<f64>,
     /// True if the reference is periodic: the columns have no line through their ends then, but a mean.
@@ -54,12 +58,14 @@ impl Columns {
         let swing = TAU * rate / model.antiresonance();
         let half = ((SPAN * swing).round() as usize).clamp(1, self.moved.len().max(1));
         let velocity = smoothed(&self.moved, rate, half);
+        let pushed = smoothed(&self.pushed, 1.0, half);
         let motion = MotorMotion {
             position: &self.position,
             first: -mean(&self.position),
             moving: &moving(&velocity),
             velocity: &velocity,
             torque: &self.recorded,
+            pushed: &pushed,
             dt: 1.0 / rate,
             smeared: half - 1,
         };
@@ -70,6 +76,12 @@ impl Columns {
         self.link_sign = level(&found.link_friction);
         self.gap = level(&found.gap);
         self.gravity = level(&found.gravity);
+    }
+
+    /// Takes the torque that the motion of the other joints puts on the links.
+    pub(super) fn couple(&mut self, torque: Vec<f64>) {
+        self.coupling = level(&torque, self.periodic);
+        self.pushed = torque;
     }
 }
 
@@ -133,6 +145,8 @@ pub(super) fn columns_of(
         link_sign: vec![0.0; n],
         gap: vec![0.0; n],
         gravity: vec![0.0; n],
+        coupling: vec![0.0; n],
+        pushed: vec![0.0; n],
         position: joint.q[..n].iter().map(|q| q - joint.q[0]).collect(),
         velocity,
         moved,

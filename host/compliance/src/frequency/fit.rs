@@ -370,7 +370,8 @@ fn linear(bands: &[&BandBins<'_>], omega: f64, zeta: f64) -> Option<(f64, TwoMas
             let spring = s * (2.0 * zeta * omega) + omega * omega;
             let link = s * spring / (s * s + spring);
             let r = bin.instrument.conj();
-            torque += r * bin.torque;
+            // The torque on the link acts through the spring.
+            torque += r * (bin.torque - bin.gravity * spring / (s * s + spring));
             power += bin.instrument.norm_sqr();
             let own = [
                 s * bin.velocity,

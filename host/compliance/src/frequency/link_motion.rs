@@ -20,6 +20,8 @@ pub(super) struct MotorMotion<'a> {
     pub(super) velocity: &'a [f64],
     /// Torque of the motor as recorded: a line that is taken off it would be friction of another size at each end.
     pub(super) torque: &'a [f64],
+    /// Torque that the motion of the other joints puts on the link.
+    pub(super) pushed: &'a [f64],
     /// Sign of the velocity by the measured velocity alone: near 0 where noise decides it.
     pub(super) moving: &'a [f64],
     /// Time between rows, s.
@@ -82,6 +84,7 @@ pub(super) fn predict(model: &TwoMass, motor: &MotorMotion<'_>, gravity: &Gravit
             q += 0.5 * h * v;
             let torque = spring_torque(model, rest + motor_position - q, speed - v)
                 - model.link_viscous * v
+                - motor.pushed[row]
                 - gravity.torque(motor.first + q);
             let free = v + h * torque / inertia;
             let stopping = (free * inertia).clamp(-h * size, h * size);

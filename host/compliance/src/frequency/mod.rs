@@ -3,6 +3,7 @@
 mod bands;
 mod bin;
 mod columns;
+mod coupling;
 mod fit;
 mod link_motion;
 mod periodic;

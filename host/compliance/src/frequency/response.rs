@@ -9,10 +9,11 @@ use rig_shared::transmission::DriveKind;
 use serde::Serialize;
 
 use super::bands::{Band, BandBins, bands};
+use super::coupling::coupling;
 use super::fit::{Fitted, Known, frictionless};
 use super::periodic::Periodic;
 use super::search::{Gap, fit_all};
-use super::spectra::{Spectra, spectra};
+use super::spectra::{Spectra, spectra, usable};
 use super::two_mass::{C, Gravity};
 use crate::drives::{Drives, listed_pose, loaded};
 use crate::error::ComplianceError;
@@ -34,7 +35,7 @@ const UNCERTAIN: f64 = 0.1;
 /// Relative difference of an inertia from the described one that is told, beyond three standard deviations.
 const DIFFERS: f64 = 0.15;
 /// Velocity of another joint over that of the joint, RMS, from which the other one is no longer held. On the simulated EDDA with
-/// 600 N·m/rad at the elbow, a shoulder with 0.023 to 0.025 of the elbow's velocity made it 824 and 989.
+/// 600 N·m/rad at the elbow, a shoulder with 0.021 to 0.025 of the elbow's velocity made it 824 to 989 without its torque.
 const HELD: f64 = 0.01;
 /// Share of rows at the highest torque that shows saturation.
 const SATURATED: f64 = 0.01;
@@ -148,6 +149,13 @@ pub(crate) fn respond(
     let mut warnings = Vec::new();
     check_motion(robot, stretches, k, &mut warnings)?;
     let mut spectra = spectra(stretches, k, name, by_reference)?;
+    let coupled = (usable(stretches).into_iter())
+        .map(|stretch| coupling(robot, stretch, k))
+        .collect::<Result<Option<Vec<_>>, _>>()?;
+    warnings.extend(yielding(robot, stretches, k, coupled.is_some())?);
+    if let Some(torques) = coupled {
+        spectra.couple(torques);
+    }
     if by_reference.is_none() && !spectra.by_reference {
         warnings.push(format!(
             "No reference of joint \"{name}\" was recorded (column ref{}): the torque itself is the instrument. With feedback on the torque the response is biased by noise and disturbances.",
@@ -226,7 +234,6 @@ fn check_motion(
                 k + 1
             )));
         }
-        warnings.extend(yielding(robot, stretch, k, &movement));
         let tau = &stretch.joints[k].tau;
         let most = tau.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
         let at = tau.iter().filter(|t| t.abs() >= 0.999 * most).count();
@@ -247,26 +254,42 @@ fn check_motion(
     Ok(())
 }
 
-/// Says that another joint moves along: it belongs to the link's mass then, by its own controller.
+/// Says which other joint moves along most. `coupled`: its torque on the links follows from the description.
+///
+/// # Errors
+/// [`ComplianceError::Recording`]: it moves, and the description lacks an inertia.
 fn yielding(
     robot: &Robot,
-    stretch: &Signals,
+    stretches: &[Signals],
     k: usize,
-    movement: &dyn Fn(usize) -> f64,
-) -> Option<String> {
-    let share = |j: usize| (movement(j) / movement(k)).sqrt();
-    let others = (0..stretch.joints.len())
+    coupled: bool,
+) -> Result<Option<String>, ComplianceError> {
+    let movement = |s: &Signals, j: usize| -> f64 {
+        let q = &s.joints[j].q;
+        q.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum()
+    };
+    let share = |s: &Signals, j: usize| (movement(s, j) / movement(s, k)).sqrt();
+    let others = (0..robot.joints.len())
         .filter(|j| *j != k && robot.joints[*j].kind == robot.joints[k].kind);
-    let most = others.max_by(|a, b| share(*a).total_cmp(&share(*b)))?;
-    (share(most) > HELD).then(|| {
-        format!(
-            "{}: joint \"{}\" moves with {:.1} % of the velocity of joint \"{}\" (RMS). The other joints count as held; where one yields, its controller belongs to the response, and the stiffness can be wrong by tens of per cent. Lock that joint, or use static loading (--static).",
-            stretch.label,
-            robot.joints[most].name,
-            100.0 * share(most),
-            robot.joints[k].name
-        )
-    })
+    let all = others.flat_map(|j| stretches.iter().map(move |s| (s, j)));
+    let most = all.max_by(|a, b| share(a.0, a.1).total_cmp(&share(b.0, b.1)));
+    let Some((stretch, j)) = most.filter(|(s, j)| share(s, *j) > HELD) else {
+        return Ok(None);
+    };
+    let (other, own) = (&robot.joints[j].name, &robot.joints[k].name);
+    let moves = format!(
+        "{}: joint \"{other}\" moves with {:.1} % of the velocity of joint \"{own}\" (RMS).",
+        stretch.label,
+        100.0 * share(stretch, j)
+    );
+    match coupled {
+        true => Ok(Some(format!(
+            "{moves} The torque that this puts on the links of joint \"{own}\" is computed from the recorded positions and the described inertias, and is taken into account; their error reaches the stiffness. Clamp joint \"{other}\", or raise the gains of its position loop, and the stiffness does not depend on them."
+        ))),
+        false => Err(ComplianceError::Recording(format!(
+            "{moves} Its torque on the links of joint \"{own}\" makes the stiffness wrong by tens of per cent, and the description lacks the inertia of a link ([joint.inertial]) that would tell this torque. Describe it, or clamp joint \"{other}\" (brake, higher gains of its position loop) and record again, or use static loading (--static)."
+        ))),
+    }
 }
 
 /// Returns the range of the bands with significant coherence, Hz.

@@ -49,6 +49,14 @@ pub(crate) struct Spectra {
 }
 
 impl Spectra {
+    /// Takes the torque that the motion of the other joints puts on the links, one entry a stretch of [`usable`].
+    pub(crate) fn couple(&mut self, torques: Vec<Vec<f64>>) {
+        for (own, torque) in self.columns.iter_mut().zip(torques) {
+            own.couple(torque);
+        }
+        self.transform();
+    }
+
     /// Predicts friction, backlash and gravity by a model, and transforms them.
     pub(crate) fn predict(&mut self, model: &TwoMass, gravity: &Gravity) {
         let rate = self.rate;
@@ -126,6 +134,11 @@ impl Spectra {
     }
 }
 
+/// Returns the stretches that are long enough.
+pub(super) fn usable(stretches: &[Signals]) -> Vec<&Signals> {
+    stretches.iter().filter(|s| s.len() >= FEWEST).collect()
+}
+
 /// Transforms all stretches for joint `k`.
 ///
 /// # Errors
@@ -140,7 +153,7 @@ pub(crate) fn spectra(
         weight: 1.0,
         ..Spectra::default()
     };
-    let usable: Vec<&Signals> = stretches.iter().filter(|s| s.len() >= FEWEST).collect();
+    let usable = usable(stretches);
     let Some(first) = usable.first() else {
         return Err(ComplianceError::Recording(format!(
             "The recordings of joint \"{name}\" have no stretch of {FEWEST} rows without a gap in time; a frequency response needs a longer one."
@@ -252,7 +265,16 @@ fn segment(
         let _ = plan.process(&mut input, &mut output);
         output.iter().map(|v| v * scale).collect()
     };
-    let [instrument, torque, moved, sign, link_sign, gap, gravity] = [
+    let [
+        instrument,
+        torque,
+        moved,
+        sign,
+        link_sign,
+        gap,
+        gravity,
+        coupling,
+    ] = [
         &columns.instrument,
         &columns.torque,
         &columns.moved,
@@ -260,6 +282,7 @@ fn segment(
         &columns.link_sign,
         &columns.gap,
         &columns.gravity,
+        &columns.coupling,
     ]
     .map(|list| transform(list));
     // Above 0.4 of the rate the difference has little signal.
@@ -277,7 +300,8 @@ fn segment(
             sign: sign[k] / meaned,
             link_sign: link_sign[k] / meaned,
             gap: gap[k],
-            gravity: gravity[k],
+            // A second difference of positions is the acceleration times this squared.
+            gravity: gravity[k] + coupling[k] / (meaned * meaned),
         });
     }
 }

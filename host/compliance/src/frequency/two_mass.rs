@@ -11,8 +11,10 @@
 //! A controller may hold the torque from one row to the next. What the rows show of the motion is then the response at the
 //! frequency and at all its aliases, each by the hold (Åström & Wittenmark 1997, ch. 2 and 7).
 //!
-//! Leaves out: friction that depends on speed, position or load otherwise; modes beyond the first; motion of the other
-//! joints, which count as held; a torque that is held for longer than a row.
+//! The recorded motion of the other joints puts a torque on the link, a further input.
+//!
+//! Leaves out: friction that depends on speed, position or load otherwise; modes beyond the first; a torque that is held for
+//! longer than a row.
 
 use nalgebra::Complex;
 

@@ -9,3 +9,4 @@ mod periodic;
 mod rig;
 mod statics;
 mod weight;
+mod yielding;
