@@ -59,7 +59,7 @@ pub(crate) fn sagging(
         );
         if drive.source == Source::Loading {
             return Err(ComplianceError::Recording(format!(
-                "{text} force and moment must be in N and N·m (a force in kN makes the stiffness 1000 times too small, one in kgf 9.81 times; --unit fz=kN converts it), displacements in m, encoders in rad or m. If the units are right, correct the masses of the description."
+                "{text} force and moment must be in N and N·m (a force in kN makes the stiffness 1000 times too small, one in lbf 4.45 times, one in kgf 9.81 times; --unit fz=kN converts it), displacements in m, encoders in rad or m. If the units are right, correct the masses of the description."
             )));
         }
         all.push(format!(

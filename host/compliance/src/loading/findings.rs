@@ -42,10 +42,10 @@ pub(crate) fn loading(
     }
     if !displaced.is_empty() {
         let mut seen = by_tool(tool, &displaced)?;
-        let other = seen
-            .told
-            .as_ref()
-            .and_then(|_| another_reading(tool, &displaced, &seen.lack));
+        let nothing = seen.drives.iter().all(|drive| drive.stiffness.is_none());
+        let other = (nothing || seen.told.is_some())
+            .then(|| another_reading(tool, &displaced, &seen.lack))
+            .flatten();
         if let Some(other) = &other {
             let drives = seen.drives.iter_mut();
             for drive in drives.filter(|drive| drive.missing.is_some()) {

@@ -138,14 +138,17 @@ impl Fit {
 impl Lack {
     /// Returns the residual in words, if its systematic part matters for the readings.
     pub(super) fn told(&self, unit: &str) -> Option<String> {
-        (self.systematic > TOLD * self.signal).then(|| {
-            format!(
-                "the springs leave {} {unit} (RMS) of {} {unit}, while neighbouring windows differ by a noise of {} {unit}",
-                format_significant(self.residual, 3),
-                format_significant(self.signal, 3),
-                format_significant(self.noise, 2)
-            )
-        })
+        (self.systematic > TOLD * self.signal).then(|| self.words(unit))
+    }
+
+    /// Returns the residual in words.
+    pub(super) fn words(&self, unit: &str) -> String {
+        format!(
+            "the springs leave {} {unit} (RMS) of {} {unit}, while neighbouring windows differ by a noise of {} {unit}",
+            format_significant(self.residual, 3),
+            format_significant(self.signal, 3),
+            format_significant(self.noise, 2)
+        )
     }
 }
 

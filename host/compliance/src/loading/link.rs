@@ -411,7 +411,8 @@ fn estimate(
     result.reverses = found.reverses(&rows(&kept), 0);
     finish(&mut result, &kept, &found);
     if let Some((gap, column)) = found.gap(0) {
-        result.add_gap(found.value(column), gap.zero);
+        let unit = format_unit(robot.joints[k].kind.units().1);
+        result.add_gap(found.value(column), gap.zero, &unit);
     }
     result.windows = found.windows;
     let stretches = kept.iter().map(|w| w.stretch + 1).max().unwrap_or(0);

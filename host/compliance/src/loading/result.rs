@@ -85,14 +85,14 @@ impl DriveLoading {
         }
     }
 
-    /// Adds a gap that is crossed at `zero`, and tells if the described weight does not put it there.
-    pub(crate) fn add_gap(&mut self, half: Value, zero: f64) {
+    /// Adds a gap that is crossed at a torque `zero` of a unit, and tells if the described weight does not put it there.
+    pub(crate) fn add_gap(&mut self, half: Value, zero: f64, unit: &str) {
         self.gap = Some(Value::new(2.0 * half.value, 2.0 * half.std));
         self.gap_torque = Some(zero);
         self.reverses = true;
         if zero.abs() > MISPLACED * (self.load[1] - self.load[0]) {
             self.warnings.push(format!(
-                "The gap of joint \"{}\" is crossed where the load is {} by the description, but a gap is crossed at 0: the described weight of the links is not that of this arm, or the force has a bias, which do not change stiffness and gap; or the force has another unit (N is meant), or the pose or the tool point is not the given one, which change the stiffness.",
+                "The gap of joint \"{}\" is crossed where the load is {} {unit} by the description, but a gap is crossed at 0: the described weight of the links is not that of this arm, or the force has a bias, which do not change stiffness and gap; or the force has another unit (N is meant), or the pose or the tool point is not the given one, which change the stiffness.",
                 self.joint,
                 format_significant(zero, 2)
             ));

@@ -13,8 +13,8 @@
 
 use std::collections::BTreeMap;
 
-use rig_model::robot::Robot;
-use rig_output::format_significant;
+use rig_model::robot::{JointKind, Robot};
+use rig_output::{format_significant, format_unit};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::advice::advice;
@@ -43,6 +43,9 @@ const TRANSITION: f64 = 0.15;
 const MATERIAL: f64 = 0.05;
 /// Share of the largest arm from which on a window is shown in the figure of a drive: over a small arm its residual says nothing.
 const SHOWN_ARM: f64 = 0.3;
+/// Displacement along recorded axes over that along others, of equal springs, below which the wrong axis was recorded. By judgement: an
+/// axis that sees less is no choice of anybody.
+const ACROSS: f64 = 0.02;
 /// Fewest windows.
 const FEWEST: usize = 12;
 /// Regressions at most. Each one leaves the twist, a small angle, times the error of the one before.
@@ -162,6 +165,14 @@ pub(super) fn by_tool(
     for k in 0..n {
         drives.push(drive(tool, k, &held, &rows, &found)?);
     }
+    if let (true, Some(told)) = (
+        drives.iter().all(|own| own.stiffness.is_none()),
+        across(&held),
+    ) {
+        for own in &mut drives {
+            own.missing = Some(told.clone());
+        }
+    }
     Ok(ByTool {
         drives,
         lack: found.lack,
@@ -205,6 +216,33 @@ fn crooked(tool: &ToolPoint<'_>, told: &str) -> String {
     format!(
         "The displacement of the tool point does not follow the force as the springs of the joints do: {told}. Is the tool point, where force and gauge act, at --tool {x} {y} {z} (m, flange frame)? Check axes, signs and units of force and displacement too; elasticity of links and base, drift, and a stiffness that grows with the load leave such a residual as well. The standard deviations contain it."
     )
+}
+
+/// Says that the force moves the tool point along axes of which no displacement was recorded. `None` if it moves it along a recorded
+/// one.
+fn across(held: &[Held]) -> Option<String> {
+    let mut moved = [0.0f64; 3];
+    for own in held {
+        for (axis, moved) in moved.iter_mut().enumerate() {
+            let each = own.arms[axis].iter().zip(&own.slow);
+            let size = |(arm, slow): (&f64, &Slow)| arm.abs() * range(slow.values.iter());
+            *moved = each.map(size).fold(*moved, f64::max);
+        }
+    }
+    let recorded = |axis: &usize| held.iter().any(|own| own.read[*axis].is_some());
+    let (seen, unseen): (Vec<usize>, Vec<usize>) = (0..3).partition(recorded);
+    let most = |list: &[usize]| list.iter().map(|axis| moved[*axis]).fold(0.0, f64::max);
+    if most(&seen) > ACROSS * most(&unseen) {
+        return None;
+    }
+    let best = (unseen.into_iter()).max_by(|a, b| moved[*a].total_cmp(&moved[*b]))?;
+    let axis = ["x", "y", "z"][best];
+    let names: Vec<&str> = seen.iter().map(|axis| DISPLACEMENT[*axis]).collect();
+    Some(format!(
+        "The force moves the tool point along {axis} (base axes), but of its displacement only {} was recorded, along which it hardly moves. Record {}, or check whether the columns of the displacement, or those of the force, are exchanged.",
+        names.join(", "),
+        DISPLACEMENT[best]
+    ))
 }
 
 /// Reads a stretch at one pose.
@@ -538,7 +576,9 @@ fn drive(
     let compliance = found.value(k);
     if determined(rows, found, k).is_none() {
         let random = found.estimate.std(k) < NOT_SHOWN * compliance.value.abs();
-        let told = found.lack.told("m").filter(|_| random);
+        // A systematic residual alone hides it, however small it is beside the whole displacement.
+        let told = (random && shows(rows, found, k) && found.lack.systematic > 0.0)
+            .then(|| found.lack.words("m"));
         let opposite = !found.estimate.hidden[k] && compliance.value < -NEGATIVE * compliance.std;
         result.missing = Some(match (opposite, told) {
             (true, _) => opposite_sign(&result.joint),
@@ -575,7 +615,8 @@ fn drive(
     }
     result.reverses = found.reverses(rows, k);
     if let Some((gap, column)) = found.gap(k) {
-        result.add_gap(found.value(column), gap.zero);
+        let unit = format_unit(robot.joints[k].kind.units().1);
+        result.add_gap(found.value(column), gap.zero, &unit);
     }
     result.points = partial_twists(rows, found, k);
     Ok(result)
@@ -672,10 +713,16 @@ fn missing(tool: &ToolPoint<'_>, robot: &Robot, k: usize) -> Result<String, Comp
             "This loading does not show the stiffness of joint \"{name}\", and no force at the tool point loads it; choose another tool point (--tool), away from its axis, or use a link encoder or the frequency response."
         ),
         Some(found) => {
-            let [x, y, z] = found.direction.map(|v| format!("{v:.2}"));
+            let [x, y, z] = found
+                .direction
+                .map(|v| format!("{:.2}", if v.abs() < 5e-3 { 0.0 } else { v }));
             format!(
-                "This loading does not show the stiffness of joint \"{name}\" apart from the others. A force along ({x}, {y}, {z}) in the base axes at the pose {} would: its arm is {} ({} % of the displacement if all drives were equally stiff).",
+                "This loading does not show the stiffness of joint \"{name}\" apart from the others. A force along ({x}, {y}, {z}) in the base axes at the pose {} ({}) would: its arm is {} ({} % of the displacement if all drives were equally stiff).",
                 listed_pose(&found.pose),
+                match robot.joints.iter().all(|j| j.kind == JointKind::Revolute) {
+                    true => "rad",
+                    false => "rad or m",
+                },
                 format_significant(found.arm, 3),
                 format_significant(100.0 * found.share, 2)
             )

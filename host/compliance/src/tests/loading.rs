@@ -669,3 +669,70 @@ fn forces_in_other_axes_are_told_from_a_loading_that_shows_nothing() {
     let said = complaint(&robot, &runs, &options);
     assert!(said.contains("--wrench base"), "{said}");
 }
+
+/// A horizontal arm of one joint whose end is pulled along z, with chosen columns of the displacement.
+fn pulled(columns: &[(&str, f64)]) -> Block {
+    let rows = 400;
+    let force = |k: usize| 20.0 * (0.0314 * k as f64).sin();
+    let column = |size: f64| (0..rows).map(|k| size * force(k)).collect::<Vec<f64>>();
+    let forces = [("fx", 0.0), ("fy", 0.0), ("fz", 1.0)];
+    Block {
+        t: (0..rows).map(|k| 0.1 * k as f64).collect(),
+        joints: vec![JointColumns {
+            q: vec![0.0; rows],
+            ..JointColumns::default()
+        }],
+        extra: (forces.iter().chain(columns))
+            .map(|(name, size)| ((*name).to_owned(), column(*size)))
+            .collect(),
+        first_line: 2,
+        ..Block::default()
+    }
+}
+
+/// The force was right: another axis of the displacement must be recorded.
+#[test]
+fn a_displacement_along_the_wrong_axis_is_told() {
+    let robot = Robot::from_toml(ONE_LINK_TEMPLATE, "rig.toml".as_ref()).unwrap();
+    let options = ComplianceOptions {
+        tool: OFFSET,
+        ..ComplianceOptions::default()
+    };
+    let size = 0.25 / 1500.0;
+    // The displacement along z in the column dy, and a gauge that sees nothing.
+    for dy in [size, 0.0] {
+        let said = complaint(&robot, &[recording(pulled(&[("dy", dy)]))], &options);
+        assert!(
+            said.contains("along z") && said.contains("Record dz") && said.contains("exchanged"),
+            "{said}"
+        );
+        assert!(!said.contains("A force along"), "{said}");
+    }
+    let run = recording(pulled(&[("dz", size)]));
+    let found = identify(&robot, &[run], OFFSET)[0].stiffness.unwrap();
+    assert!((found.value / 1500.0 - 1.0).abs() < 0.002, "{found:?}");
+}
+
+/// The described sensor is turned so that the forces, read by it, load no joint.
+#[test]
+fn forces_of_the_base_that_load_no_joint_as_readings_of_a_sensor_are_told() {
+    let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, "rig.toml".as_ref()).unwrap();
+    let offset = OFFSET;
+    let options = ComplianceOptions {
+        tool: offset,
+        ..ComplianceOptions::default()
+    };
+    let run = recording(pulled(&[("dx", 0.0), ("dy", 0.0), ("dz", 0.25 / 1500.0)]));
+    // The axis of the joint, and so of no torque, as the flange sees it.
+    let flange = robot.joints[0].pose(0.0).rotation * robot.flange_pose().rotation;
+    let axis = robot.joints[0].pose(0.0).rotation * nalgebra::Vector3::z();
+    let turn = nalgebra::UnitQuaternion::rotation_between(&nalgebra::Vector3::z(), &axis).unwrap();
+    let (roll, pitch, yaw) = (flange.inverse() * turn).euler_angles();
+    robot.wrist_sensor = Some(WristSensor {
+        rotation: [roll, pitch, yaw],
+        reads: Some(Reads::Robot),
+        ..WristSensor::default()
+    });
+    let said = complaint(&robot, &[run], &options);
+    assert!(said.contains("--wrench base"), "{said}");
+}

@@ -92,7 +92,7 @@ fn recorded(arm: &Arm, course: &Course, noise: [f64; 2], seed: u64) -> Vec<InMem
     let rows = 4 * LEVELS;
     let mut runs = Vec::new();
     for (i, levels) in course.iter().enumerate() {
-        let mut columns = vec![Vec::with_capacity(rows); 6];
+        let mut columns = vec![Vec::new(); 6];
         for row in 0..rows {
             let away = row as i64 % (2 * LEVELS) as i64 - LEVELS as i64;
             let (force, place) = levels[away.unsigned_abs() as usize];

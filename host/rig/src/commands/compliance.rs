@@ -14,12 +14,12 @@ use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
 use rig_compliance::{
-    Compliance, ComplianceOptions, DriveStiffness, Value, WrenchFrame, elasticity_text,
+    Compliance, ComplianceOptions, DriveStiffness, WrenchFrame, elasticity_text,
     identify_compliance,
 };
 use rig_data::EffortNeed;
 use rig_model::robot::Robot;
-use rig_output::{can_take, folder, format_significant, format_unit, format_value, write_whole};
+use rig_output::{can_take, folder, format_unit, write_whole};
 
 /// Files that the command writes.
 const FILES: [&str; 3] = ["compliance.json", "compliance.toml", "report.html"];
@@ -256,13 +256,10 @@ fn write(args: &Args, found: &Compliance, context: &Context, ui: &Ui) -> Result<
 fn drive_line(drive: &DriveStiffness) -> String {
     match drive.stiffness {
         None => format!("joint \"{}\": {}", drive.joint, drive.source.words()),
-        Some(Value { value, std }) => format!(
+        Some(own) => format!(
             "joint \"{}\": stiffness {} {} ({})",
             drive.joint,
-            match std > 0.0 {
-                true => format_value(value, std),
-                false => format_significant(value, 5),
-            },
+            own.text(),
             format_unit(drive.unit),
             drive.source.words()
         ),
@@ -276,8 +273,8 @@ fn lines(robot: &Robot, found: &Compliance) -> Vec<String> {
         lines.push(format!(
             "joint \"{}\": antiresonance {} Hz, resonance {} Hz",
             response.joint,
-            format_value(response.antiresonance.value, response.antiresonance.std),
-            format_value(response.resonance.value, response.resonance.std)
+            response.antiresonance.text(),
+            response.resonance.text()
         ));
     }
     for drive in found.loading.iter().flat_map(|l| &l.drives) {
@@ -285,7 +282,7 @@ fn lines(robot: &Robot, found: &Compliance) -> Vec<String> {
             lines.push(format!(
                 "joint \"{}\": backlash of {} {}, kept apart from the stiffness",
                 drive.joint,
-                format_value(gap.value, gap.std),
+                gap.text(),
                 // A stiffness in N/m has a twist in m.
                 match found.drives[drive.index].unit {
                     "N/m" => "m",
@@ -303,15 +300,15 @@ fn lines(robot: &Robot, found: &Compliance) -> Vec<String> {
             lines.push(format!(
                 "at {}: largest displacement {} m/N along {}",
                 list.join(", "),
-                match most.compliance.std > 0.0 {
-                    true => format_value(most.compliance.value, most.compliance.std),
-                    false => format_significant(most.compliance.value, 4),
-                },
+                most.compliance.text(),
                 most.direction
                     .map(|v| format!("{:.3}", if v.abs() < 5e-4 { 0.0 } else { v }))
                     .join(", ")
             ));
         }
+    }
+    if lines.iter().any(|line| line.contains(" ± ")) {
+        lines.push("±: one standard deviation".to_owned());
     }
     lines
 }

@@ -6,7 +6,7 @@ use rig_compliance::{
     Band, Compliance, ComplianceMap, Deflection, DriveLoading, FrequencyResponse, Periodic,
     ToolCompliance, Value, response_pose,
 };
-use rig_output::{format_significant, format_unit, format_value};
+use rig_output::{format_significant, format_unit};
 use rig_report::{
     Axis, Block, Column, Document, Fact, HeatMap, Marker, Plot, Role, Section, Series, Table, Tone,
 };
@@ -54,10 +54,7 @@ pub fn compliance(found: &Compliance, context: &Context) -> Document {
 
 /// Formats a value with its standard deviation, if it has one.
 fn value(value: &Value) -> String {
-    match value.std > 0.0 {
-        true => format_value(value.value, value.std),
-        false => format_significant(value.value, 5),
-    }
+    value.text()
 }
 
 /// Returns true if a force moves the tool point at a pose by more than rounding.
@@ -77,7 +74,10 @@ fn summary(found: &Compliance, context: &Context) -> Vec<Fact> {
             facts.push(
                 Fact::new(format!("Stiffness of {}", drive.joint), value(stiffness))
                     .unit(format_unit(drive.unit))
-                    .note(format!("± standard deviation, by {}", drive.source.words()))
+                    .note(format!(
+                        "± one standard deviation, by {}",
+                        drive.source.words()
+                    ))
                     .tone(Tone::Good),
             );
         }
@@ -88,7 +88,7 @@ fn summary(found: &Compliance, context: &Context) -> Vec<Fact> {
         facts.push(
             Fact::new("Largest displacement per force", value(&most.compliance))
                 .unit("m/N")
-                .note("at the first pose, over all directions"),
+                .note("± one standard deviation; at the first pose, over all directions"),
         );
     }
     facts.push(parts::warning_count(
@@ -380,6 +380,16 @@ fn used_bands(bands: &[Band]) -> Vec<Option<usize>> {
     list
 }
 
+/// Returns all bands from the first to the last used one: a model has no noise that makes a band useless.
+fn whole(used: &[Option<usize>]) -> Vec<Option<usize>> {
+    let mut kept = used.iter().flatten();
+    let Some(first) = kept.next() else {
+        return Vec::new();
+    };
+    let last = kept.next_back().unwrap_or(first);
+    (*first..=*last).map(Some).collect()
+}
+
 /// Returns the values of bands, with NaN where a line breaks.
 fn pick(used: &[Option<usize>], of: impl Fn(usize) -> f64) -> Vec<f64> {
     used.iter().map(|k| k.map_or(f64::NAN, &of)).collect()
@@ -393,6 +403,7 @@ fn marked(plot: Plot, found: &FrequencyResponse) -> Plot {
 
 fn magnitude(found: &FrequencyResponse, used: &[Option<usize>]) -> Plot {
     let x = pick(used, |k| found.bands[k].frequency);
+    let whole = whole(used);
     let plot = Plot::new(
         "Magnitude of the frequency response",
         Axis::log("frequency", "Hz"),
@@ -417,14 +428,14 @@ fn magnitude(found: &FrequencyResponse, used: &[Option<usize>]) -> Plot {
     .with(Series::points(
         "without friction",
         Role::After,
-        x.clone(),
+        x,
         pick(used, |k| found.frictionless[k][0]),
     ))
     .with(Series::line(
         "two masses",
         Role::Model,
-        x,
-        pick(used, |k| found.model[k][0]),
+        pick(&whole, |k| found.bands[k].frequency),
+        pick(&whole, |k| found.model[k][0]),
     ))
     .note("Bands with significant coherence. Without friction: the estimated Coulomb friction is subtracted from the torque; the model is compared with that.");
     marked(plot, found)
@@ -432,6 +443,7 @@ fn magnitude(found: &FrequencyResponse, used: &[Option<usize>]) -> Plot {
 
 fn phase(found: &FrequencyResponse, used: &[Option<usize>]) -> Plot {
     let x = pick(used, |k| found.bands[k].frequency);
+    let whole = whole(used);
     let plot = Plot::new(
         "Phase of the frequency response",
         Axis::log("frequency", "Hz"),
@@ -446,14 +458,14 @@ fn phase(found: &FrequencyResponse, used: &[Option<usize>]) -> Plot {
     .with(Series::points(
         "without friction",
         Role::After,
-        x.clone(),
+        x,
         pick(used, |k| found.frictionless[k][1].to_degrees()),
     ))
     .with(Series::line(
         "two masses",
         Role::Model,
-        x,
-        pick(used, |k| found.model[k][1].to_degrees()),
+        pick(&whole, |k| found.bands[k].frequency),
+        pick(&whole, |k| found.model[k][1].to_degrees()),
     ));
     marked(plot, found)
 }
