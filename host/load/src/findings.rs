@@ -170,18 +170,7 @@ impl Told<'_> {
             )
         });
         let biases = self.biases();
-        for (bias, recorded) in biases.iter().zip(self.sensed.recordings) {
-            let told = match curve_words(bias, self.about_temperature(recorded)) {
-                Some(text) => [Some(text), None],
-                None => [jump_words(bias), drift_words(bias, self.fit.noise)],
-            };
-            let doubt = self.advice("");
-            let doubted = told
-                .into_iter()
-                .flatten()
-                .map(|text| text + doubt.trim_end());
-            warnings.extend(doubted);
-        }
+        warnings.extend(self.bias_words(&biases));
         warnings.extend(self.warming_words());
         SensorFindings {
             reads,
@@ -383,6 +372,21 @@ impl Told<'_> {
                 "The column `temp` explains a part of the bias only: check that it is the temperature of the sensor in all rows, or let the sensor warm up before the recording."
             }
         }
+    }
+
+    /// Says how the bias of each recording changes.
+    fn bias_words(&self, biases: &[Bias]) -> Vec<String> {
+        let doubt = self.advice("");
+        (biases.iter().zip(self.sensed.recordings))
+            .flat_map(|(bias, recorded)| {
+                match curve_words(bias, self.about_temperature(recorded)) {
+                    Some(text) => [Some(text), None],
+                    None => [jump_words(bias), drift_words(bias, self.fit.noise)],
+                }
+            })
+            .flatten()
+            .map(|text| text + doubt.trim_end())
+            .collect()
     }
 
     /// Says how the bias follows the recorded temperature.

@@ -9,7 +9,7 @@
 
 use rig_model::robot::Robot;
 use rig_numerics::statistics::mean;
-use rig_shared::multibody::{Chain, column, inverse_dynamics};
+use rig_shared::multibody::{column, inverse_dynamics};
 
 use crate::drives::loaded;
 use crate::error::ComplianceError;
@@ -30,7 +30,7 @@ pub(super) fn coupling(
     if n < 2 || robot.joints[k..].iter().any(|j| j.inertial.is_none()) {
         return Ok(None);
     }
-    let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+    let chain = robot.chain().map_err(|e| wrong(&e))?;
     let mut parameters = loaded(robot)?;
     for row in &mut parameters {
         for own in [

@@ -31,7 +31,8 @@ impl<'a, 'b> Equilibrium<'a, 'b> {
     /// [`ComplianceError::Model`].
     pub(super) fn new(tool: &'b ToolPoint<'a>) -> Result<Self, ComplianceError> {
         let robot = tool.robot();
-        let chain = Chain::new(&robot.geometry(), robot.gravity)
+        let chain = robot
+            .chain()
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
         Ok(Self {
             tool,

@@ -113,7 +113,7 @@ fn right_angles_of_few_digits_give_the_base_parameters_of_right_angles() {
                     .map(|joint| vec![(*joint).to_owned(), digits.to_owned()])
                     .collect(),
                 (true, _) => {
-                    let largest = format!("{off:.1e} rad off");
+                    let largest = format!("{} rad off", rig_output::format_significant(off, 2));
                     vec![
                         joints
                             .map(str::to_owned)

@@ -101,11 +101,8 @@ fn base_frame(first: Line) -> Isometry3<f64> {
 pub(super) fn convert(chain: &Chain) -> Converted {
     let (poses, mut turned) = squared_poses(chain);
     let mut remarks = Vec::new();
-    let reach: f64 = chain
-        .bodies
-        .iter()
-        .map(|b| b.origin.translation.vector.norm())
-        .sum();
+    let lengths = (chain.bodies.iter()).map(|own| own.origin.translation.vector.norm());
+    let reach: f64 = lengths.sum();
     let axis_of = |i: usize| Line {
         point: poses[i].translation.vector,
         direction: poses[i].rotation * chain.bodies[i].axis,
