@@ -78,6 +78,7 @@ impl Description {
         if extension
             .as_deref()
             .is_some_and(|own| RECORDINGS.contains(&own))
+            && path.is_file()
         {
             return Err(RobotError::Recording { path: path.into() });
         }
