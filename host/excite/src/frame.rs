@@ -31,7 +31,7 @@ pub(super) struct Frame {
     /// Prior parameters, if the description has all of them.
     pub parameters: Option<Vec<[f64; COLUMNS]>>,
     /// Drives that are coupled or have a varying ratio.
-    pub drives: Option<Drives>,
+    pub drives: Option<Box<Drives>>,
     pub bounds: Vec<Bounds>,
     /// Ranges of cranks.
     pub combined: Vec<Combined>,
@@ -92,7 +92,7 @@ impl Frame {
         let width = self.plain.parameter_count();
         let mut own = vec![0.0; n * width];
         differential_regressor(&self.plain, q, qd, qdd, &mut own)?;
-        let motors = motors_at(self.drives.as_ref(), q, qd, qdd)?;
+        let motors = motors_at(self.drives.as_deref(), q, qd, qdd)?;
         Ok(DMatrix::from_fn(n, columns.len(), |j, c| {
             entry(&own, &motors, [n, width], j, columns[c])
         }))

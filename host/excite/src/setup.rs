@@ -231,9 +231,10 @@ pub(super) fn frame_of(
         check_start(robot, start, &bounds, &combined)?;
     }
     let mut model = Model::from_robot(robot)?;
-    let drives = Drives::of(robot, model.motors.take(), &bounds, room.speed)?;
+    // Large, as its transmission holds room for all joints in lanes: not on the stack of every caller.
+    let drives = Drives::of(robot, model.motors.take(), &bounds, room.speed)?.map(Box::new);
     let known = prior(robot, &model);
-    refuse_unreachable(robot, &bounds, &combined, drives.as_ref(), known.is_ok())?;
+    refuse_unreachable(robot, &bounds, &combined, drives.as_deref(), known.is_ok())?;
     let schedule = schedule_of(robot, &bounds, options)?;
     let (parameters, on_torque) = torque_notes(robot, options, &bounds, known);
     notes.extend(on_torque);

@@ -20,7 +20,10 @@ fn wrong(e: TransmissionError) -> ExciteError {
 impl Problem<'_> {
     /// Returns the drives if a motor has limits.
     fn limited_drives(&self) -> Option<&'_ Drives> {
-        self.frame.drives.as_ref().filter(|d| !d.limits.is_empty())
+        self.frame
+            .drives
+            .as_deref()
+            .filter(|d| !d.limits.is_empty())
     }
 
     /// Returns the penalties of the motors' angles and speeds.
