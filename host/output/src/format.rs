@@ -5,25 +5,33 @@ const MINUS: char = '−';
 /// Text for a missing value.
 const NONE: &str = "–";
 
+/// Characters of an exponent, and how each is written raised.
+const RAISED: [(char, char); 11] = [
+    ('0', '⁰'),
+    ('1', '¹'),
+    ('2', '²'),
+    ('3', '³'),
+    ('4', '⁴'),
+    ('5', '⁵'),
+    ('6', '⁶'),
+    ('7', '⁷'),
+    ('8', '⁸'),
+    ('9', '⁹'),
+    ('-', '⁻'),
+];
+
 /// Formats a power of ten: `10⁻⁵`.
 pub fn power_of_ten(exponent: i32) -> String {
-    let mut text = String::from("10");
-    for c in exponent.to_string().chars() {
-        text.push(match c {
-            '-' => '⁻',
-            '1' => '¹',
-            '2' => '²',
-            '3' => '³',
-            '4' => '⁴',
-            '5' => '⁵',
-            '6' => '⁶',
-            '7' => '⁷',
-            '8' => '⁸',
-            '9' => '⁹',
-            _ => '⁰',
-        });
-    }
-    text
+    let raised = |c| RAISED.iter().find(|(plain, _)| *plain == c);
+    let digits = exponent.to_string();
+    let digits = digits.chars().filter_map(|c| raised(c).map(|own| own.1));
+    "10".chars().chain(digits).collect()
+}
+
+/// Returns the digit or minus sign that is written raised as `c`; `None` for any other character.
+pub fn of_exponent(c: char) -> Option<char> {
+    let found = RAISED.iter().find(|(_, raised)| *raised == c);
+    found.map(|(plain, _)| *plain)
 }
 
 /// Formats a number with a fixed count of decimals; never `−0`.

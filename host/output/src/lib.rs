@@ -15,6 +15,6 @@ pub use files::{WriteError, can_take, data_dir, folder, persist, temporary, writ
 pub use finding::{Finding, one_a_kind, worst_first};
 pub use format::{
     capital, fixed, format_interval, format_p_value, format_short, format_significant, format_time,
-    format_trimmed, format_unit, format_value, listed, power_of_ten, spell_units,
+    format_trimmed, format_unit, format_value, listed, of_exponent, power_of_ten, spell_units,
 };
 pub use toml_text::{comment_toml, toml_document, toml_tables};

@@ -225,11 +225,9 @@ fn link_gradient<T: Real>(
 }
 
 /// The weights of Y = Mᵀ·Y_axes are M·W over the axes; the gradients by positions are projected like torques.
-#[cold]
-#[inline(never)]
 fn projected_gradient<T: Real>(
     chain: &Chain<T>,
-    [q, qd, qdd]: [&[T]; 3],
+    states: [&[T]; 3],
     weights: &[T],
     outs: [&mut [T]; 3],
 ) -> Result<(), MultibodyError> {
@@ -238,30 +236,30 @@ fn projected_gradient<T: Real>(
         chain.link_count(),
         chain.parameter_count(),
     );
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    check("qdd", n, qdd.len())?;
-    check("weights", n * width, weights.len())?;
-    for (argument, out) in ["by_q", "by_qd", "by_qdd"].into_iter().zip(&outs) {
-        check(argument, n, out.len())?;
-    }
-    let mut wide = [T::ZERO; REGRESSOR];
-    chain.weights(weights, &mut wide);
-    let [mut by_q, mut by_qd, mut by_qdd] = [[T::ZERO; MAX_JOINTS]; 3];
-    regressor_gradient(
-        &chain.unfolded(),
-        &chain.positions(q)[..all],
-        &chain.rates(qd)[..all],
-        &chain.rates(qdd)[..all],
-        &wide[..all * width],
-        &mut by_q[..all],
-        &mut by_qd[..all],
-        &mut by_qdd[..all],
-    )?;
-    for (own, out) in [by_q, by_qd, by_qdd].iter().zip(outs) {
-        chain.project(&own[..all], out);
-    }
-    Ok(())
+    chain.on_axes(states, |axes, [q, qd, qdd]| {
+        check("weights", n * width, weights.len())?;
+        for (argument, out) in ["by_q", "by_qd", "by_qdd"].into_iter().zip(&outs) {
+            check(argument, n, out.len())?;
+        }
+        let mut wide = [T::ZERO; REGRESSOR];
+        let wide = &mut wide[..all * width];
+        chain.weights(weights, wide);
+        let [mut by_q, mut by_qd, mut by_qdd] = [[T::ZERO; MAX_JOINTS]; 3];
+        regressor_gradient(
+            axes,
+            q,
+            qd,
+            qdd,
+            wide,
+            &mut by_q[..all],
+            &mut by_qd[..all],
+            &mut by_qdd[..all],
+        )?;
+        for (own, out) in [by_q, by_qd, by_qdd].iter().zip(outs) {
+            chain.project(&own[..all], out);
+        }
+        Ok(())
+    })
 }
 
 #[cfg(test)]

@@ -275,19 +275,22 @@ pub struct Follower {
     pub offset: f64,
 }
 
-/// How an axis moves with the coordinates.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Axis<T> {
+/// How an axis moves: its position is ratio·q + offset of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisMotion<T> {
     /// Row of its link's parameters.
-    pub(super) link: usize,
+    pub link: usize,
     /// The joint that it is or follows.
-    pub(super) joint: usize,
-    pub(super) ratio: T,
-    pub(super) offset: T,
-    pub(super) follows: bool,
+    pub joint: usize,
+    /// Position per position of the joint, 1 for a joint: no unit, rad/m or m/rad.
+    pub ratio: T,
+    /// Position at the joint's zero, rad or m; 0 for a joint.
+    pub offset: T,
+    /// True if it is no joint.
+    pub follows: bool,
 }
 
-impl<T: Real> Axis<T> {
+impl<T: Real> AxisMotion<T> {
     pub(super) fn joint(joint: usize) -> Self {
         Self {
             link: joint,
@@ -307,9 +310,12 @@ impl<T: Real> Axis<T> {
             follows: true,
         }
     }
+}
 
+impl<T> AxisMotion<T> {
     /// Returns the number of columns that its link has: without those of a drive if it follows.
-    pub(super) fn columns(&self) -> usize {
+    #[must_use]
+    pub fn columns(&self) -> usize {
         if self.follows {
             column::DRIVE_INERTIA
         } else {
@@ -318,31 +324,19 @@ impl<T: Real> Axis<T> {
     }
 }
 
-/// How an axis moves: its position is ratio·q + offset of a joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisMotion<T> {
-    /// Row of its link's parameters.
-    pub link: usize,
-    /// The joint that it is or follows.
-    pub joint: usize,
-    /// 1 for a joint.
-    pub ratio: T,
-    /// 0 for a joint.
-    pub offset: T,
-    /// True if it is no joint.
-    pub follows: bool,
-}
-
 /// A serial chain: the geometry of its joints and gravity, without masses or friction.
 ///
-/// An axis of the chain is a joint, or a [`Follower`] that the drive of a joint turns too.
+/// An axis of the chain is a joint, or a [`Follower`] that the drive of a joint turns too. Then n stays the number of joints,
+/// that of coordinates and torques; rows of parameters and blocks of 14 columns belong to links, of which there are
+/// [`Self::link_count`]: those of the joints first, then those of the followers. Where a function says that links before a
+/// joint do not load it, its drive may turn an axis before them that they do load.
 #[derive(Clone, Debug)]
 pub struct Chain<T> {
     /// Axes from the base outwards: joints and followers.
     pub(super) joints: Vec<Joint<T>, MAX_JOINTS>,
     pub(super) gravity: Vector3<T>,
     /// How each axis follows a joint; empty if every axis is a joint.
-    pub(super) axes: Vec<Axis<T>, MAX_JOINTS>,
+    pub(super) axes: Vec<AxisMotion<T>, MAX_JOINTS>,
     /// Number of axes that follow.
     pub(super) followers: usize,
 }
@@ -441,18 +435,18 @@ impl<T: Real> Chain<T> {
         let found = joints.len() + followers.len();
         let mut list = Vec::new();
         for place in 0..=joints.len() {
-            let mut push = |geometry: &JointGeometry<f64>, axis: Axis<T>| {
+            let mut push = |geometry: &JointGeometry<f64>, axis: AxisMotion<T>| {
                 list.push(Joint::new(geometry))
                     .and_then(|()| self.axes.push(axis).map_err(|_| Joint::new(geometry)))
                     .map_err(|_| ChainError::TooManyJoints { found })
             };
             for (k, own) in followers.iter().enumerate() {
                 if own.before == place {
-                    push(&own.geometry, Axis::follower(joints.len() + k, own))?;
+                    push(&own.geometry, AxisMotion::follower(joints.len() + k, own))?;
                 }
             }
             if let Some(joint) = joints.get(place) {
-                push(joint, Axis::joint(place))?;
+                push(joint, AxisMotion::joint(place))?;
             }
         }
         self.joints = list;
@@ -521,14 +515,7 @@ impl<T: Real> Chain<T> {
     pub fn axis_motions(&self) -> impl Iterator<Item = AxisMotion<T>> + '_ {
         (0..self.joints.len()).map(|index| {
             let axis = self.axes.get(index).copied();
-            let axis = axis.unwrap_or_else(|| Axis::joint(index));
-            AxisMotion {
-                link: axis.link,
-                joint: axis.joint,
-                ratio: axis.ratio,
-                offset: axis.offset,
-                follows: axis.follows,
-            }
+            axis.unwrap_or_else(|| AxisMotion::joint(index))
         })
     }
 

@@ -3,7 +3,6 @@
 use super::capacity::with_capacity;
 use super::chain::{Chain, MultibodyError, check};
 use super::parameters::{COLUMNS, inertia};
-use super::projection::SQUARE;
 use super::spatial::{Motion, Wrench};
 use crate::scalar::Real;
 
@@ -24,7 +23,10 @@ pub fn coriolis_matrix<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return projected_matrix(chain, parameters, q, qd, out);
+        // C = Mᵀ·C_axes·M: M is constant, so Ȧ − 2C stays skew-symmetric.
+        return chain.matrix(parameters, [q, qd], out, |axes, rows, [q, qd], wide| {
+            coriolis_matrix(axes, rows, q, qd, wide)
+        });
     }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
@@ -73,31 +75,4 @@ fn christoffel<T: Real, const CAPACITY: usize>(
             }
         }
     }
-}
-
-/// C = Mᵀ·C_axes·M: M is constant, so Ȧ − 2C stays skew-symmetric.
-#[cold]
-#[inline(never)]
-fn projected_matrix<T: Real>(
-    chain: &Chain<T>,
-    parameters: &[[T; COLUMNS]],
-    q: &[T],
-    qd: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("parameters", all, parameters.len())?;
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    check("out", n * n, out.len())?;
-    let mut square = [T::ZERO; SQUARE];
-    coriolis_matrix(
-        &chain.unfolded(),
-        &chain.rows(parameters)[..all],
-        &chain.positions(q)[..all],
-        &chain.rates(qd)[..all],
-        &mut square[..all * all],
-    )?;
-    chain.project_square(&square[..all * all], out);
-    Ok(())
 }

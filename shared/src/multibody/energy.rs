@@ -22,7 +22,9 @@ pub fn kinetic_energy_regressor<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return kinetic_of_axes(chain, q, qd, out);
+        return chain.arranged([q, qd], out, |axes, [q, qd], wide| {
+            kinetic_energy_regressor(axes, q, qd, wide)
+        });
     }
     let n = chain.joint_count();
     check("q", n, q.len())?;
@@ -43,7 +45,9 @@ pub fn potential_energy_regressor<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return potential_of_axes(chain, q, out);
+        return chain.arranged([q], out, |axes, [q], wide| {
+            potential_energy_regressor(axes, q, wide)
+        });
     }
     check("q", chain.joint_count(), q.len())?;
     check("out", chain.parameter_count(), out.len())?;
@@ -64,7 +68,9 @@ pub fn energy_regressor<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return energy_of_axes(chain, q, qd, out);
+        return chain.arranged([q, qd], out, |axes, [q, qd], wide| {
+            energy_regressor(axes, q, qd, wide)
+        });
     }
     kinetic_energy_regressor(chain, q, qd, out)?;
     add_potential(chain, q, out);
@@ -107,7 +113,9 @@ pub fn power_regressor<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return power_of_axes(chain, q, qd, qdd, out);
+        return chain.arranged([q, qd, qdd], out, |axes, [q, qd, qdd], wide| {
+            power_regressor(axes, q, qd, qdd, wide)
+        });
     }
     let n = chain.joint_count();
     check("q", n, q.len())?;
@@ -145,7 +153,9 @@ pub fn kinetic_energy<T: Real>(
     qd: &[T],
 ) -> Result<T, MultibodyError> {
     if chain.has_followers() {
-        return kinetic_energy_of_axes(chain, parameters, q, qd);
+        return chain.on_bodies(parameters, [q, qd], |axes, rows, [q, qd]| {
+            kinetic_energy(axes, rows, q, qd)
+        });
     }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
@@ -172,7 +182,9 @@ pub fn potential_energy<T: Real>(
     q: &[T],
 ) -> Result<T, MultibodyError> {
     if chain.has_followers() {
-        return potential_energy_of_axes(chain, parameters, q);
+        return chain.on_bodies(parameters, [q], |axes, rows, [q]| {
+            potential_energy(axes, rows, q)
+        });
     }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
@@ -251,108 +263,4 @@ fn add_potential<T: Real>(chain: &Chain<T>, q: &[T], out: &mut [T]) {
             *entry -= value;
         }
     }
-}
-
-#[cold]
-#[inline(never)]
-fn kinetic_of_axes<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    qd: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    let (q, qd) = (chain.positions(q), chain.rates(qd));
-    chain.arranged(out, |axes, wide| {
-        kinetic_energy_regressor(axes, &q[..all], &qd[..all], wide)
-    })
-}
-
-#[cold]
-#[inline(never)]
-fn potential_of_axes<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    check("q", chain.joint_count(), q.len())?;
-    let (q, all) = (chain.positions(q), chain.link_count());
-    chain.arranged(out, |axes, wide| {
-        potential_energy_regressor(axes, &q[..all], wide)
-    })
-}
-
-#[cold]
-#[inline(never)]
-fn energy_of_axes<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    qd: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    let (q, qd) = (chain.positions(q), chain.rates(qd));
-    chain.arranged(out, |axes, wide| {
-        energy_regressor(axes, &q[..all], &qd[..all], wide)
-    })
-}
-
-#[cold]
-#[inline(never)]
-fn power_of_axes<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    qd: &[T],
-    qdd: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    check("qdd", n, qdd.len())?;
-    let (q, qd, qdd) = (chain.positions(q), chain.rates(qd), chain.rates(qdd));
-    chain.arranged(out, |axes, wide| {
-        power_regressor(axes, &q[..all], &qd[..all], &qdd[..all], wide)
-    })
-}
-
-#[cold]
-#[inline(never)]
-fn kinetic_energy_of_axes<T: Real>(
-    chain: &Chain<T>,
-    parameters: &[[T; COLUMNS]],
-    q: &[T],
-    qd: &[T],
-) -> Result<T, MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("parameters", all, parameters.len())?;
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    kinetic_energy(
-        &chain.unfolded(),
-        &chain.rows(parameters)[..all],
-        &chain.positions(q)[..all],
-        &chain.rates(qd)[..all],
-    )
-}
-
-#[cold]
-#[inline(never)]
-fn potential_energy_of_axes<T: Real>(
-    chain: &Chain<T>,
-    parameters: &[[T; COLUMNS]],
-    q: &[T],
-) -> Result<T, MultibodyError> {
-    let all = chain.link_count();
-    check("parameters", all, parameters.len())?;
-    check("q", chain.joint_count(), q.len())?;
-    potential_energy(
-        &chain.unfolded(),
-        &chain.rows(parameters)[..all],
-        &chain.positions(q)[..all],
-    )
 }

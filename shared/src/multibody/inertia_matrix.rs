@@ -3,7 +3,6 @@
 use super::capacity::with_capacity;
 use super::chain::{Chain, MultibodyError, check};
 use super::parameters::{COLUMNS, column, inertia};
-use super::projection::SQUARE;
 use super::spatial::{Inertia, Transform};
 use crate::scalar::Real;
 
@@ -19,7 +18,9 @@ pub fn inertia_matrix<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return projected_matrix(chain, parameters, q, out);
+        return chain.matrix(parameters, [q], out, |axes, rows, [q], wide| {
+            inertia_matrix(axes, rows, q, wide)
+        });
     }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
@@ -56,27 +57,4 @@ fn composite_bodies<T: Real, const CAPACITY: usize>(
         }
         carried = Some(transforms[i].inertia_to_parent(composite));
     }
-}
-
-#[cold]
-#[inline(never)]
-fn projected_matrix<T: Real>(
-    chain: &Chain<T>,
-    parameters: &[[T; COLUMNS]],
-    q: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("parameters", all, parameters.len())?;
-    check("q", n, q.len())?;
-    check("out", n * n, out.len())?;
-    let mut square = [T::ZERO; SQUARE];
-    inertia_matrix(
-        &chain.unfolded(),
-        &chain.rows(parameters)[..all],
-        &chain.positions(q)[..all],
-        &mut square[..all * all],
-    )?;
-    chain.project_square(&square[..all * all], out);
-    Ok(())
 }

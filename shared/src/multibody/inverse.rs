@@ -69,7 +69,13 @@ pub fn inverse_dynamics<T: Real>(
     tau: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return projected_torque(chain, parameters, q, qd, qdd, tau);
+        let out = ("tau", tau);
+        return chain.torques(
+            parameters,
+            [q, qd, qdd],
+            out,
+            |axes, rows, [q, qd, qdd], wide| inverse_dynamics(axes, rows, q, qd, qdd, wide),
+        );
     }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
@@ -98,7 +104,10 @@ pub fn gravity_vector<T: Real>(
     gravity: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return projected_gravity(chain, parameters, q, gravity);
+        let out = ("gravity", gravity);
+        return chain.torques(parameters, [q], out, |axes, rows, [q], wide| {
+            gravity_vector(axes, rows, q, wide)
+        });
     }
     let n = chain.joint_count();
     check("parameters", n, parameters.len())?;
@@ -161,56 +170,4 @@ fn newton_euler<T: Real, const CAPACITY: usize>(
         tau[i] = joint.project(total);
         carried = transforms[i].wrench_to_parent(total);
     }
-}
-
-#[cold]
-#[inline(never)]
-fn projected_torque<T: Real>(
-    chain: &Chain<T>,
-    parameters: &[[T; COLUMNS]],
-    q: &[T],
-    qd: &[T],
-    qdd: &[T],
-    tau: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("parameters", all, parameters.len())?;
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    check("qdd", n, qdd.len())?;
-    check("tau", n, tau.len())?;
-    let mut out = [T::ZERO; MAX_JOINTS];
-    inverse_dynamics(
-        &chain.unfolded(),
-        &chain.rows(parameters)[..all],
-        &chain.positions(q)[..all],
-        &chain.rates(qd)[..all],
-        &chain.rates(qdd)[..all],
-        &mut out[..all],
-    )?;
-    chain.project(&out[..all], tau);
-    Ok(())
-}
-
-#[cold]
-#[inline(never)]
-fn projected_gravity<T: Real>(
-    chain: &Chain<T>,
-    parameters: &[[T; COLUMNS]],
-    q: &[T],
-    gravity: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("parameters", all, parameters.len())?;
-    check("q", n, q.len())?;
-    check("gravity", n, gravity.len())?;
-    let mut out = [T::ZERO; MAX_JOINTS];
-    gravity_vector(
-        &chain.unfolded(),
-        &chain.rows(parameters)[..all],
-        &chain.positions(q)[..all],
-        &mut out[..all],
-    )?;
-    chain.project(&out[..all], gravity);
-    Ok(())
 }

@@ -19,7 +19,9 @@ pub fn point_position<T: Real>(
     jacobian: &mut [[T; 3]],
 ) -> Result<[T; 3], MultibodyError> {
     if chain.has_followers() {
-        return point_behind_followers(chain, q, link, point, jacobian);
+        return behind_followers(chain, (q, link), jacobian, |axes, q, axis, own| {
+            point_position(axes, q, axis, point, own)
+        });
     }
     check_link(chain, q, link, jacobian.len())?;
     jacobian.fill([T::ZERO; 3]);
@@ -86,7 +88,9 @@ pub fn frame_pose<T: Real>(
     jacobian: &mut [[T; 6]],
 ) -> Result<Pose<T>, MultibodyError> {
     if chain.has_followers() {
-        return pose_behind_followers(chain, q, link, fixed, jacobian);
+        return behind_followers(chain, (q, link), jacobian, |axes, q, axis, own| {
+            frame_pose(axes, q, axis, fixed, own)
+        });
     }
     check_link(chain, q, link, jacobian.len())?;
     jacobian.fill([T::ZERO; 6]);
@@ -125,74 +129,34 @@ fn six<T: Copy>(linear: Vector3<T>, angular: Vector3<T>) -> [T; 6] {
     [x, y, z, a, b, c]
 }
 
-/// Checks the arguments of a pose of link `link`, and returns its axis.
-fn axis_checked<T: Real>(
+/// Returns what `of_axes` computes of the axis of link `link` with the chain of all axes and their positions, and adds the
+/// columns of its Jacobian to those of the joints that the axes follow.
+fn behind_followers<T: Real, R, const N: usize>(
     chain: &Chain<T>,
-    q: &[T],
-    link: usize,
-    jacobian: usize,
-) -> Result<usize, MultibodyError> {
-    let n = chain.joint_count();
-    check("q", n, q.len())?;
-    check("jacobian", n, jacobian)?;
-    if link >= chain.link_count() {
-        return Err(MultibodyError::WrongLength {
-            argument: "q",
-            expected: link + 1,
-            found: n,
-        });
-    }
-    Ok(chain.axis_of_link(link))
-}
-
-/// Adds the columns of a Jacobian over the axes to those of the joints that they follow.
-fn project_jacobian<T: Real, const N: usize>(
-    chain: &Chain<T>,
-    of_axes: &[[T; N]],
+    (q, link): (&[T], usize),
     jacobian: &mut [[T; N]],
-) {
-    jacobian.fill([T::ZERO; N]);
-    for (column, axis) in of_axes.iter().zip(&chain.axes) {
-        for (to, value) in jacobian[axis.joint].iter_mut().zip(column) {
-            *to += axis.ratio * *value;
+    of_axes: impl FnOnce(&Chain<T>, &[T], usize, &mut [[T; N]]) -> Result<R, MultibodyError>,
+) -> Result<R, MultibodyError> {
+    let (n, all) = (chain.joint_count(), chain.link_count());
+    chain.on_axes([q], |axes, [q]| {
+        check("jacobian", n, jacobian.len())?;
+        if link >= all {
+            return Err(MultibodyError::WrongLength {
+                argument: "q",
+                expected: link + 1,
+                found: n,
+            });
         }
-    }
-}
-
-#[cold]
-#[inline(never)]
-fn point_behind_followers<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    link: usize,
-    point: [T; 3],
-    jacobian: &mut [[T; 3]],
-) -> Result<[T; 3], MultibodyError> {
-    let axis = axis_checked(chain, q, link, jacobian.len())?;
-    let all = chain.link_count();
-    let mut own = [[T::ZERO; 3]; MAX_JOINTS];
-    let (axes, q) = (chain.unfolded(), chain.positions(q));
-    let place = point_position(&axes, &q[..all], axis, point, &mut own[..all])?;
-    project_jacobian(chain, &own, jacobian);
-    Ok(place)
-}
-
-#[cold]
-#[inline(never)]
-fn pose_behind_followers<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    link: usize,
-    fixed: &Pose<T>,
-    jacobian: &mut [[T; 6]],
-) -> Result<Pose<T>, MultibodyError> {
-    let axis = axis_checked(chain, q, link, jacobian.len())?;
-    let all = chain.link_count();
-    let mut own = [[T::ZERO; 6]; MAX_JOINTS];
-    let (axes, q) = (chain.unfolded(), chain.positions(q));
-    let pose = frame_pose(&axes, &q[..all], axis, fixed, &mut own[..all])?;
-    project_jacobian(chain, &own, jacobian);
-    Ok(pose)
+        let mut wide = [[T::ZERO; N]; MAX_JOINTS];
+        let found = of_axes(axes, q, chain.axis_of_link(link), &mut wide[..all])?;
+        jacobian.fill([T::ZERO; N]);
+        for (column, axis) in wide.iter().zip(&chain.axes) {
+            for (to, value) in jacobian[axis.joint].iter_mut().zip(column) {
+                *to += axis.ratio * *value;
+            }
+        }
+        Ok(found)
+    })
 }
 
 #[cfg(test)]

@@ -28,7 +28,9 @@ pub fn momentum_regressor<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return projected_momentum(chain, q, qd, out);
+        return chain.projected([q, qd], out, |axes, [q, qd], wide| {
+            momentum_regressor(axes, q, qd, wide)
+        });
     }
     let n = chain.joint_count();
     check("q", n, q.len())?;
@@ -50,7 +52,9 @@ pub fn momentum_loss_regressor<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return projected_loss(chain, q, qd, out);
+        return chain.projected([q, qd], out, |axes, [q, qd], wide| {
+            momentum_loss_regressor(axes, q, qd, wide)
+        });
     }
     let n = chain.joint_count();
     check("q", n, q.len())?;
@@ -142,38 +146,4 @@ fn loss<T: Real, const CAPACITY: usize>(chain: &Chain<T>, q: &[T], qd: &[T], out
         out[own + column::COULOMB] = qd[i].sgn();
         out[own + column::OFFSET] = T::ONE;
     }
-}
-
-#[cold]
-#[inline(never)]
-fn projected_momentum<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    qd: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    let (q, qd) = (chain.positions(q), chain.rates(qd));
-    chain.projected(out, |axes, wide| {
-        momentum_regressor(axes, &q[..all], &qd[..all], wide)
-    })
-}
-
-#[cold]
-#[inline(never)]
-fn projected_loss<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    qd: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    let (q, qd) = (chain.positions(q), chain.rates(qd));
-    chain.projected(out, |axes, wide| {
-        momentum_loss_regressor(axes, &q[..all], &qd[..all], wide)
-    })
 }

@@ -23,7 +23,9 @@ pub fn differential_regressor<T: Real>(
     out: &mut [T],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return projected_regressor(chain, q, qd, qdd, out);
+        return chain.projected([q, qd, qdd], out, |axes, [q, qd, qdd], wide| {
+            differential_regressor(axes, q, qd, qdd, wide)
+        });
     }
     let n = chain.joint_count();
     check("q", n, q.len())?;
@@ -94,23 +96,4 @@ pub(super) fn link_columns<T: Real>(motion: &LinkMotion<T>, axis: &Motion<T>, bl
     for (entry, value) in block.iter_mut().zip(values) {
         *entry = value;
     }
-}
-
-#[cold]
-#[inline(never)]
-fn projected_regressor<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    qd: &[T],
-    qdd: &[T],
-    out: &mut [T],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    check("qdd", n, qdd.len())?;
-    let (q, qd, qdd) = (chain.positions(q), chain.rates(qd), chain.rates(qdd));
-    chain.projected(out, |axes, wide| {
-        differential_regressor(axes, &q[..all], &qd[..all], &qdd[..all], wide)
-    })
 }

@@ -28,7 +28,9 @@ pub fn wrench_regressor<T: Real>(
     out: &mut [T; 6 * INERTIAL_PARAMETERS],
 ) -> Result<(), MultibodyError> {
     if chain.has_followers() {
-        return last_wrench(chain, q, qd, qdd, out);
+        return chain.on_axes([q, qd, qdd], |axes, [q, qd, qdd]| {
+            wrench_regressor(axes, q, qd, qdd, out)
+        });
     }
     let n = chain.joint_count();
     check("q", n, q.len())?;
@@ -57,28 +59,6 @@ pub fn wrench_regressor<T: Real>(
         link_columns(&motion, &along, row);
     }
     Ok(())
-}
-
-#[cold]
-#[inline(never)]
-fn last_wrench<T: Real>(
-    chain: &Chain<T>,
-    q: &[T],
-    qd: &[T],
-    qdd: &[T],
-    out: &mut [T; 6 * INERTIAL_PARAMETERS],
-) -> Result<(), MultibodyError> {
-    let (n, all) = (chain.joint_count(), chain.link_count());
-    check("q", n, q.len())?;
-    check("qd", n, qd.len())?;
-    check("qdd", n, qdd.len())?;
-    wrench_regressor(
-        &chain.unfolded(),
-        &chain.positions(q)[..all],
-        &chain.rates(qd)[..all],
-        &chain.rates(qdd)[..all],
-        out,
-    )
 }
 
 #[cfg(test)]

@@ -131,7 +131,7 @@ impl<T: Number> Gears<T> {
         let width = self.axes.len() * COLUMNS;
         for joint in 0..self.joints {
             for axis in &self.axes {
-                for place in 0..self.used(axis) {
+                for place in 0..axis.columns() {
                     let c = joint * width + axis.link * COLUMNS + place;
                     if !self.is_zero(joint, axis.link * COLUMNS + place) && place != column::OFFSET
                     {
@@ -144,7 +144,7 @@ impl<T: Number> Gears<T> {
             for (i, axis) in self.axes.iter().enumerate().skip(a) {
                 // Drive and friction are columns of the axis itself; that of the offset is not computed.
                 let own = if i == a {
-                    self.used(axis)
+                    axis.columns()
                 } else {
                     column::DRIVE_INERTIA
                 };
@@ -163,17 +163,9 @@ impl<T: Number> Gears<T> {
         out.fill(T::ZERO);
         for (a, axis) in self.axes.iter().enumerate() {
             let block = COLUMNS * samples;
-            let used = self.used(axis) * samples;
+            let used = axis.columns() * samples;
             let to = &mut out[axis.link * block..][..used];
             to.copy_from_slice(&of_axes[a * block..][..used]);
-        }
-    }
-
-    /// Returns the number of columns of an axis: a follower has none of a drive.
-    fn used(&self, axis: &AxisMotion<T>) -> usize {
-        match axis.follows {
-            true => column::DRIVE_INERTIA,
-            false => COLUMNS,
         }
     }
 }

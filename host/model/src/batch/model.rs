@@ -405,11 +405,11 @@ impl<T: Number> ModelBatch<T> {
         };
         let qdd: Vec<Vec<T>> = qdd.chunks(count.max(1)).map(<[T]>::to_vec).collect();
         self.inverse_dynamics_derivatives(&plain(q), &plain(qd), &qdd, out)?;
-        let mut matrix = vec![T::ZERO; n * n];
+        let [mut matrix, mut inverse] = [(); 2].map(|()| vec![T::ZERO; n * n]);
         let mut x = vec![T::ZERO; n];
         for sample in 0..count {
             let triangle = &*out.input;
-            let mut inverse = vec![T::ZERO; n * n];
+            inverse.fill(T::ZERO);
             for (j, column) in inverse.chunks_exact_mut(n).enumerate() {
                 square(triangle, count, sample, &mut matrix);
                 column[j] = T::ONE;

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::error::CommandError;
 use super::overwrite::refuse_file;
 use super::ui::Ui;
-use rig_output::{format_unit, format_value, write_whole};
+use rig_output::{format_unit, format_value, of_exponent, write_whole};
 
 /// Schema of the results that are read.
 const SCHEMA: &str = "rig-identification/1";
@@ -219,17 +219,10 @@ fn symbol(name: &str) -> String {
 
 /// Returns `1.235 ± 0.020` and `(1.2 ± 0.1)·10⁻⁵` in mathematics.
 fn number(text: &str) -> String {
-    const DIGITS: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";
     let mut out = String::new();
     let mut is_raised = false;
     for c in text.chars() {
-        let raised = match c {
-            '⁻' => Some('-'),
-            c => DIGITS
-                .chars()
-                .position(|d| d == c)
-                .and_then(|k| char::from_digit(k as u32, 10)),
-        };
+        let raised = of_exponent(c);
         if raised.is_some() != is_raised {
             out.push_str(if is_raised { "}" } else { "^{" });
             is_raised = !is_raised;

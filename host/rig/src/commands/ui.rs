@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::error::CommandError;
-use rig_output::spell_units;
+use rig_output::{of_exponent, spell_units};
 
 /// Longest list that is printed without `--verbose`: with the answer behind it, it fits a terminal of 24 lines.
 pub(crate) const LISTED: usize = 14;
@@ -241,9 +241,9 @@ pub fn plain(text: &str) -> String {
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         let end = (part.char_indices())
-            .find(|(_, c)| raised(*c).is_none())
+            .find(|(_, c)| of_exponent(*c).is_none())
             .map_or(part.len(), |(at, _)| at);
-        let exponent: String = part[..end].chars().filter_map(raised).collect();
+        let exponent: String = part[..end].chars().filter_map(of_exponent).collect();
         match (
             exponent.is_empty(),
             out.ends_with(|c: char| c.is_ascii_digit()),
@@ -255,12 +255,6 @@ pub fn plain(text: &str) -> String {
         out += &part[end..];
     }
     out
-}
-
-/// Returns the digit or sign that is written as an exponent.
-fn raised(c: char) -> Option<char> {
-    let at = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻".chars().position(|own| own == c)?;
-    "0123456789-".chars().nth(at)
 }
 
 /// Puts a word in quotation marks if a shell needs them.
