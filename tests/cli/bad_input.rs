@@ -364,7 +364,8 @@ fn files_of_other_programs_are_named() {
         ),
         (b"SQLite format 3\0", ["SQLite", "ros2 bag convert"]),
         (b"\x1f\x8b\x08", ["gzip", "decompress"]),
-        (b"PAR1\x15", ["Parquet", "to_csv"]),
+        (b"PAR1\x15", ["Parquet", "close the writer"]),
+        (b"FEA1\x15", ["Feather", "to_parquet"]),
     ] {
         fs::write(&path, bytes).unwrap();
         names(&sentence(&path), &["recording.csv", words[0], words[1]]);

@@ -82,3 +82,25 @@ fn a_look_into_a_file_eight_times_as_long_needs_no_more_memory() {
     println!("peak memory: {small} KiB for 0.1 million rows, {large} KiB for 0.8 million");
     assert!(large < small + small / 4, "{small} KiB grew to {large} KiB");
 }
+
+#[test]
+fn parquet_is_written_and_read_in_groups_of_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    // Groups of 131 072 rows: two and twelve of them.
+    let [small, large] = [260_000, 1_560_000].map(|rows| {
+        let [text, path] =
+            ["csv", "parquet"].map(|own| folder.path().join(format!("{rows}.{own}")));
+        write(&text, rows);
+        let mut convert = rig();
+        convert.arg("convert").arg(&text).arg(&path);
+        let mut inspect = rig();
+        inspect.arg("inspect").arg(&path);
+        [peak(convert), peak(inspect)]
+    });
+    println!(
+        "peak memory of convert and inspect: {small:?} KiB for 2 groups, {large:?} KiB for 12"
+    );
+    for (small, large) in small.into_iter().zip(large) {
+        assert!(large < small + small / 4, "{small} KiB grew to {large} KiB");
+    }
+}

@@ -52,22 +52,8 @@ pub(super) fn columns(arrays: Vec<Array>) -> Columns {
                 continue;
             }
         };
-        for k in 0..count {
-            let bare = Unit::split(&array.name).map_or(array.name.as_str(), |(bare, _)| bare);
-            let unit = array.name.strip_prefix(bare).unwrap_or_default();
-            let gap = match bare.ends_with(|c: char| c.is_ascii_digit()) {
-                true => "_",
-                false => "",
-            };
-            let numbered = format!("{bare}{gap}{}{unit}", k + 1);
-            // `q` of a robot with one joint is `q1`, but `t` stays `t`, and `q1` stays `q1`.
-            let is_short = gap.is_empty()
-                && Signal::split(&format!("{bare}1")).is_some()
-                && !names.contains(&numbered);
-            found.names.push(match count > 1 || is_short {
-                true => numbered,
-                false => array.name.clone(),
-            });
+        for (k, name) in names_of(&array.name, count, &names).into_iter().enumerate() {
+            found.names.push(name);
             let at = |row: usize| {
                 if is_across {
                     row * count + k
@@ -80,6 +66,28 @@ pub(super) fn columns(arrays: Vec<Array>) -> Columns {
         }
     }
     found
+}
+
+/// Returns the names of the columns of an array: `q_deg` gives `q1_deg`, `q2_deg` and so on. `names` are those of all arrays.
+pub(super) fn names_of(array: &str, count: usize, names: &[String]) -> Vec<String> {
+    let bare = Unit::split(array).map_or(array, |(bare, _)| bare);
+    let unit = array.strip_prefix(bare).unwrap_or_default();
+    let gap = match bare.ends_with(|c: char| c.is_ascii_digit()) {
+        true => "_",
+        false => "",
+    };
+    let of = |k: usize| {
+        let numbered = format!("{bare}{gap}{}{unit}", k + 1);
+        // `q` of a robot with one joint is `q1`, but `t` stays `t`, and `q1` stays `q1`.
+        let is_short = gap.is_empty()
+            && Signal::split(&format!("{bare}1")).is_some()
+            && !names.contains(&numbered);
+        match count > 1 || is_short {
+            true => numbered,
+            false => array.to_owned(),
+        }
+    };
+    (0..count).map(of).collect()
 }
 
 #[cfg(test)]

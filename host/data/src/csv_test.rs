@@ -296,7 +296,7 @@ fn files_of_other_programs_are_named_by_their_first_bytes() {
         (zip("a.csv"), "zip archive"),
         (matlab, "MATLAB file"),
         (b"\x89HDF\r\n\x1a\n\0\0".to_vec(), "HDF5"),
-        (b"PAR1\x15\x04".to_vec(), "pandas.read_parquet"),
+        (b"PAR1\x15\x04".to_vec(), "Parquet file is cut off"),
         (b"\x80\x04\x95\x00".to_vec(), "pickle"),
         (
             wide,

@@ -204,7 +204,7 @@ pub enum DataError {
         source: std::io::Error,
     },
     /// The file extension names no known format.
-    #[error("cannot tell the format of {} from its name; end it in .csv or .mcap", path.display())]
+    #[error("cannot tell the format of {} from its name; end it in .csv, .mcap or .parquet", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,

@@ -57,11 +57,11 @@ pub enum ForeignFormat {
         "an HDF5 file; write its columns to CSV, for instance with `pandas.DataFrame.to_csv(\"out.csv\", index=False)`"
     )]
     Hdf5,
-    /// Parquet, Feather, Arrow.
+    /// Feather, Arrow.
     #[error(
-        "a {0} file; write it to CSV with `pandas.read_{1}(\"in\").to_csv(\"out.csv\", index=False)`"
+        "a Feather file; write it as Parquet with `pandas.read_feather(\"in\").to_parquet(\"out.parquet\")`"
     )]
-    Arrow(&'static str, &'static str),
+    Arrow,
     /// Pickle.
     #[error(
         "a Python pickle; write its columns to CSV, for instance with `pandas.DataFrame.to_csv(\"out.csv\", index=False)`"
@@ -114,7 +114,7 @@ impl ForeignFormat {
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         let is = |magic: &[u8]| head.starts_with(magic);
         let holds = |part: &[u8]| head.windows(part.len()).any(|w| w == part);
-        const MAGICS: [(&[u8], ForeignFormat); 25] = [
+        const MAGICS: [(&[u8], ForeignFormat); 24] = [
             (b"#ROSBAG", ForeignFormat::RosBag),
             (b"\x1f\x8b", ForeignFormat::Compressed("gzip")),
             (b"\xfd7zXZ\0", ForeignFormat::Compressed("xz")),
@@ -126,9 +126,8 @@ impl ForeignFormat {
             (b"\x93NUMPY", ForeignFormat::NumPy),
             (b"MATLAB ", ForeignFormat::Matlab),
             (b"\x89HDF\r\n\x1a\n", ForeignFormat::Hdf5),
-            (b"PAR1", ForeignFormat::Arrow("Parquet", "parquet")),
-            (b"ARROW1", ForeignFormat::Arrow("Feather", "feather")),
-            (b"FEA1", ForeignFormat::Arrow("Feather", "feather")),
+            (b"ARROW1", ForeignFormat::Arrow),
+            (b"FEA1", ForeignFormat::Arrow),
             (b"\x80\x02", ForeignFormat::Pickle),
             (b"\x80\x03", ForeignFormat::Pickle),
             (b"\x80\x04", ForeignFormat::Pickle),

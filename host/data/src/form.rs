@@ -9,6 +9,7 @@ use super::error::DataError;
 use super::foreign::{ForeignFormat, HEAD};
 use super::mat;
 use super::mcap_records::MAGIC;
+use super::parquet;
 use super::sqlite;
 
 /// A file of arrays.
@@ -27,6 +28,8 @@ pub(super) enum Form {
     Csv,
     /// Arrays in one file.
     Arrays(Arrays),
+    /// Parquet file.
+    Parquet,
     /// Files of messages, MCAP or SQLite, in the order of recording.
     Messages(Vec<PathBuf>),
 }
@@ -81,6 +84,8 @@ fn file(path: &Path) -> Result<(Form, u64), DataError> {
         Form::Messages(vec![path.into()])
     } else if is(mat::MAGIC) {
         Form::Arrays(Arrays::Matlab)
+    } else if is(parquet::MAGIC) {
+        Form::Parquet
     } else {
         match ForeignFormat::of(&start) {
             None => Form::Csv,

@@ -1,6 +1,6 @@
 //! Recordings: columns with units, checked line by line and read in blocks of constant memory.
 //!
-//! [`Source`] reads CSV and MCAP repeatedly; [`RecordingWriter`] writes both. [`plausibility`] detects wrong units
+//! [`Source`] reads CSV, MCAP and others repeatedly; [`RecordingWriter`] writes CSV, MCAP and Parquet. [`plausibility`] detects wrong units
 //! before they lead to wrong parameters. [`prepare`] filters, differentiates and decimates recordings. [`runs`] holds
 //! them in memory at the full rate, and [`Compensated`] subtracts the torques that a description already explains.
 //!
@@ -61,6 +61,7 @@ mod npz;
 mod npz_writer;
 mod number;
 mod own_names;
+mod parquet;
 mod place;
 mod plain_rows;
 mod plausibility;
@@ -90,6 +91,7 @@ mod unit;
 mod unsettled;
 mod unsigned;
 mod writer;
+mod written_rows;
 
 pub use block::{Block, JointColumns, WRENCH_COLUMNS, WRENCH_MESSAGE, WRENCH_TEMPERATURE};
 pub use columns::EffortNeed;
@@ -98,6 +100,7 @@ pub use error::{DataError, Warning};
 pub use foreign::ForeignFormat;
 pub use mapping::Mapping;
 pub use npz_writer::write_npz;
+pub use parquet::ParquetWriter;
 pub use place::Place;
 pub use plain_rows::PlainRows;
 pub use plausibility::{Implausible, JUDGED_ROWS, implausible_positions, plausibility};
@@ -110,7 +113,8 @@ pub use remark::Remark;
 pub use sampling::Sampling;
 pub use source::{Blocks, KEPT_WARNINGS, Source, column_names};
 pub use unit::Unit;
-pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
+pub use writer::{CsvWriter, McapWriter, RecordingWriter};
+pub use written_rows::Column;
 
 #[cfg(test)]
 mod bag_table_test;

@@ -4,7 +4,7 @@ use super::columns::Signal;
 use super::csv_header::ROW_NUMBER;
 use super::error::DataError;
 use super::source::{Rows, Source};
-use super::writer::Column;
+use super::written_rows::Column;
 use rig_model::robot::{JointKind, Robot};
 
 /// A recording as rows of all its columns.

@@ -192,6 +192,12 @@ pub enum Remark {
         /// Names, with shapes of those that have another number of rows.
         names: String,
     },
+    /// Columns of a Parquet file that hold no numbers.
+    #[error("these columns are not read: {names}")]
+    OtherColumns {
+        /// Names, with what they hold.
+        names: String,
+    },
     /// Rows without a value of another topic.
     #[error(
         "{rows} rows are left out, because topic {topic} has no message before, after or near them; the first is message {first}"
@@ -250,7 +256,10 @@ pub enum Remark {
 impl Remark {
     /// Returns true if it tells why a column may be missing.
     pub(super) fn is_about_missing_columns(&self) -> bool {
-        matches!(self, Self::OtherArrays { .. } | Self::UnknownUnit { .. })
+        matches!(
+            self,
+            Self::OtherArrays { .. } | Self::OtherColumns { .. } | Self::UnknownUnit { .. }
+        )
     }
 
     /// Returns the number of its kind, from 0.
@@ -283,6 +292,7 @@ impl Remark {
             Self::UnitsRow { .. } => 24,
             Self::RowUnit { .. } => 25,
             Self::RowNumbers => 26,
+            Self::OtherColumns { .. } => 27,
         }
     }
 }

@@ -13,6 +13,7 @@ use super::joined_rows::JoinedRows;
 use super::layout::layout;
 use super::mapping::Mapping;
 use super::motors::{MotorPass, MotorSide};
+use super::parquet::ParquetRows;
 use super::place::Place;
 use super::quantity::Quantity;
 use super::remark::Remark;
@@ -46,6 +47,7 @@ enum Reader {
     Csv(Box<CsvRows>),
     Messages(Box<JoinedRows>),
     Arrays(Box<TableRows>),
+    Parquet(Box<ParquetRows>),
 }
 
 /// Rows of a recording of any format, without exact copies of the row before.
@@ -82,6 +84,12 @@ impl Rows {
                 renamed.map_err(|error| error.explained(&rows.remarks()))?;
                 (Reader::Arrays(Box::new(rows)), header)
             }
+            Form::Parquet => {
+                let (rows, mut header) = ParquetRows::open(path)?;
+                let renamed = mapping.rename(path, &mut header);
+                renamed.map_err(|error| error.explained(&rows.remarks()))?;
+                (Reader::Parquet(Box::new(rows)), header)
+            }
         };
         let rows = Self {
             reader,
@@ -100,6 +108,7 @@ impl Rows {
             Reader::Csv(r) => r.remarks(),
             Reader::Messages(r) => r.remarks(),
             Reader::Arrays(r) => r.remarks(),
+            Reader::Parquet(r) => r.remarks(),
         };
         remarks.extend(self.first_copy.map(|first| Remark::Copies {
             rows: self.copies,
@@ -113,7 +122,7 @@ impl Rows {
         match &self.reader {
             Reader::Csv(_) => Place::Line(row),
             Reader::Messages(_) => Place::Message(row),
-            Reader::Arrays(_) => Place::Row(row),
+            Reader::Arrays(_) | Reader::Parquet(_) => Place::Row(row),
         }
     }
 
@@ -159,6 +168,7 @@ impl Rows {
                 Reader::Csv(r) => r.next_row(layout, values),
                 Reader::Messages(r) => r.next_row(layout, values),
                 Reader::Arrays(r) => r.next_row(layout, values),
+                Reader::Parquet(r) => r.next_row(layout, values),
             };
             let Some(row) = read? else {
                 return Ok(None);
@@ -181,6 +191,7 @@ impl Rows {
             Reader::Csv(r) => r.bytes_read(),
             Reader::Messages(r) => r.bytes_read(),
             Reader::Arrays(r) => r.bytes_read(),
+            Reader::Parquet(r) => r.bytes_read(),
         }
     }
 }
@@ -331,7 +342,7 @@ impl Source {
         match self.form {
             Form::Messages(_) => Place::Message(row),
             Form::Csv => Place::Line(row),
-            Form::Arrays(_) => Place::Row(row),
+            Form::Arrays(_) | Form::Parquet => Place::Row(row),
         }
     }
 

@@ -475,10 +475,10 @@ fn awkward_rows() -> Vec<[f64; 4]> {
 }
 
 #[test]
-fn csv_and_mcap_read_back_bit_for_bit_and_are_deterministic() {
+fn recordings_read_back_bit_for_bit_and_are_deterministic() {
     let folder = Folder::new();
     let rows = awkward_rows();
-    for ending in ["csv", "mcap"] {
+    for ending in ["csv", "mcap", "parquet"] {
         let (first, second) = (
             folder.path(&format!("1.{ending}")),
             folder.path(&format!("2.{ending}")),
@@ -504,7 +504,7 @@ fn csv_and_mcap_read_back_bit_for_bit_and_are_deterministic() {
         }
     }
     // No other file remained in the folder.
-    assert_eq!(std::fs::read_dir(folder.0.path()).unwrap().count(), 4);
+    assert_eq!(std::fs::read_dir(folder.0.path()).unwrap().count(), 6);
 }
 
 #[test]
@@ -601,7 +601,7 @@ fn writers_refuse_what_readers_would() {
         create("none/a.csv", &columns()),
         Err(DataError::Write { .. })
     ));
-    for name in ["a.csv", "a.mcap"] {
+    for name in ["a.csv", "a.mcap", "a.parquet"] {
         let mut writer = create(name, &columns()).unwrap();
         let message = writer
             .push_row(&[0.0, 1.0, f64::NAN, 0.0])
@@ -800,7 +800,7 @@ fn real_recordings_are_accepted_without_false_alarm() {
 fn reading_speed() {
     let folder = Folder::new();
     for (joints, rows) in [(1, 2_000_000_usize), (6, 400_000)] {
-        for ending in ["csv", "mcap"] {
+        for ending in ["csv", "mcap", "parquet"] {
             let path = folder.path(&format!("s{joints}.{ending}"));
             let mut columns = vec![Column::new("t", "s")];
             for k in 1..=joints {

@@ -3,34 +3,17 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use ::mcap::records::MessageHeader;
 use tempfile::NamedTempFile;
 
 use super::error::DataError;
 use super::mcap_rows::TOPIC;
+use super::parquet::ParquetWriter;
+use super::written_rows::{Column, Rows};
 use rig_output::format_short;
 use rig_output::{persist, temporary};
-
-/// A column to write.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Column {
-    /// Name as in the contract, for instance `tau1`.
-    pub name: String,
-    /// Unit, for instance `N*m`.
-    pub unit: String,
-}
-
-impl Column {
-    /// Creates a column from name and unit.
-    pub fn new(name: &str, unit: &str) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-        }
-    }
-}
 
 /// Writer of one recording; the file gets its name in [`RecordingWriter::finish`].
 pub enum RecordingWriter {
@@ -38,12 +21,14 @@ pub enum RecordingWriter {
     Csv(CsvWriter),
     /// `.mcap`
     Mcap(Box<McapWriter>),
+    /// `.parquet`
+    Parquet(Box<ParquetWriter>),
 }
 
 impl RecordingWriter {
     /// Starts a recording in the format of the file extension; the first column must be `t`.
     ///
-    /// MCAP stores units and metadata; CSV has only a header line and cannot.
+    /// MCAP and Parquet store units and metadata; CSV has only a header line and cannot.
     pub fn create(
         path: &Path,
         columns: &[Column],
@@ -58,6 +43,9 @@ impl RecordingWriter {
             Some("mcap") => {
                 McapWriter::create(path, columns, metadata).map(|w| Self::Mcap(Box::new(w)))
             }
+            Some("parquet") => {
+                ParquetWriter::create(path, columns, metadata).map(|w| Self::Parquet(Box::new(w)))
+            }
             _ => Err(DataError::UnknownFormat { path: path.into() }),
         }
     }
@@ -67,6 +55,7 @@ impl RecordingWriter {
         match self {
             Self::Csv(w) => w.push_row(row),
             Self::Mcap(w) => w.push_row(row),
+            Self::Parquet(w) => w.push_row(row),
         }
     }
 
@@ -76,6 +65,7 @@ impl RecordingWriter {
         match self {
             Self::Csv(w) => &w.rows.hidden,
             Self::Mcap(w) => &w.rows.hidden,
+            Self::Parquet(w) => &w.rows.hidden,
         }
     }
 
@@ -84,76 +74,7 @@ impl RecordingWriter {
         match self {
             Self::Csv(w) => w.finish(),
             Self::Mcap(w) => w.finish(),
-        }
-    }
-}
-
-/// Common part of both formats: names, row counter and checks.
-struct Rows {
-    path: PathBuf,
-    /// Temporary file until the recording is complete.
-    hidden: PathBuf,
-    names: Vec<String>,
-    count: u64,
-    text: String,
-}
-
-impl Rows {
-    fn new(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
-        let names: Vec<String> = columns.iter().map(|c| c.name.clone()).collect();
-        let mut sorted = names.clone();
-        sorted.sort();
-        sorted.dedup();
-        let plain =
-            |n: &String| !n.is_empty() && !n.contains([',', '"', '\n', '\r']) && n.trim() == n;
-        if names.first().map(String::as_str) != Some("t")
-            || sorted.len() != names.len()
-            || !names.iter().all(plain)
-        {
-            return Err(DataError::Header {
-                path: path.into(),
-                place: None,
-                message: format!(
-                    "columns cannot be called {names:?}; the first must be `t`, and all need different names without commas and quotes"
-                ),
-            });
-        }
-        Ok(Self {
-            path: path.into(),
-            hidden: PathBuf::new(),
-            names,
-            count: 0,
-            text: String::new(),
-        })
-    }
-
-    fn accept(&mut self, row: &[f64]) -> Result<(), DataError> {
-        self.count += 1;
-        let bad = |message| DataError::BadRow {
-            path: self.path.clone(),
-            row: self.count,
-            message,
-        };
-        if row.len() != self.names.len() {
-            return Err(bad(format!(
-                "it has {} values, but there are {} columns",
-                row.len(),
-                self.names.len()
-            )));
-        }
-        match self.names.iter().zip(row).find(|(_, v)| !v.is_finite()) {
-            Some((name, value)) => Err(bad(format!(
-                "column `{name}` is {}, but a recording holds finite numbers only",
-                format_short(*value)
-            ))),
-            None => Ok(()),
-        }
-    }
-
-    fn failed(&self, source: io::Error) -> DataError {
-        DataError::Write {
-            path: self.path.clone(),
-            source,
+            Self::Parquet(w) => w.finish(),
         }
     }
 }

@@ -129,6 +129,10 @@ fn time(topic: &Topic, proposal: &mut Proposal) {
     let stated = Unit::split(name).map(|(_, unit)| unit.name);
     let stated = stated.or(topic.time.unit);
     let guessed = likely_time(topic.time.first, topic.time.period);
+    let (stated, guessed) = match topic.time.is_clock {
+        true => (None, None),
+        false => (stated, guessed),
+    };
     let unit = stated.or(guessed.map(|(unit, _)| unit));
     let why = match (stated, guessed) {
         (Some(_), _) if topic.time.unit.is_some() => {

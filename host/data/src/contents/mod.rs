@@ -10,6 +10,7 @@ mod names;
 mod picture;
 mod proposal;
 mod read;
+mod stored_columns;
 mod table;
 mod text;
 mod topic;

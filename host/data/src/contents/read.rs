@@ -5,6 +5,7 @@ use std::path::Path;
 use super::intake::refusal;
 use super::likely::propose;
 use super::messages::messages;
+use super::stored_columns::stored_columns;
 use super::table::table;
 use super::text::text;
 use super::topic::Contents;
@@ -39,6 +40,10 @@ pub fn contents(
                 Arrays::Matlab => "MATLAB file",
             };
             (format, vec![topic], remarks, Vec::new())
+        }
+        Form::Parquet => {
+            let (topic, remarks) = stored_columns(path, advance)?;
+            ("Parquet file", vec![topic], remarks, Vec::new())
         }
         Form::Messages(files) => {
             let found = messages(path, files, advance)?;

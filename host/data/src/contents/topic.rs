@@ -174,6 +174,9 @@ pub struct Time {
     pub first_not_growing: Option<Step>,
     /// Number of rows without a time.
     pub missing: u64,
+    /// True if the times are seconds by the type of their column, whatever its name states.
+    #[serde(skip)]
+    pub(super) is_clock: bool,
     #[serde(skip)]
     probed: Vec<f64>,
     /// Intervals that were seen before the period was known.

@@ -19,13 +19,13 @@ use rig_model::robot::Robot;
 ///
 /// Every column of the file is kept, also those without a meaning, unless it is text; a motor current stays a current.
 /// The joints of messages are those of --robot, in its order, else those in the file. The format is that of the name:
-/// .csv, .mcap (a message a row) or .npz for NumPy (arrays t, q, tau … with a column a joint; held in memory).
+/// .csv, .mcap (a message a row), .parquet, or .npz for NumPy (arrays t, q, tau … with a column a joint; held in memory).
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
-    /// The recording: CSV, MCAP, .npz, .mat or a folder of rosbag2
+    /// The recording: CSV, MCAP, .parquet, .npz, .mat or a folder of rosbag2
     #[arg(value_name = "IN")]
     file: PathBuf,
-    /// File to write: .csv, .mcap or .npz
+    /// File to write: .csv, .mcap, .npz or .parquet
     #[arg(value_name = "OUT")]
     out: PathBuf,
     /// Robot description, TOML, URDF or MJCF: its joints are read, in its order
@@ -58,15 +58,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .extension()
         .map(|e| e.to_string_lossy().to_lowercase());
     let extension = extension.unwrap_or_default();
-    if !["csv", "mcap", "npz"].contains(&extension.as_str()) {
-        let parquet = match extension.as_str() {
-            "parquet" => {
-                " For Parquet, write .csv and use `pandas.read_csv(\"log.csv\").to_parquet(\"log.parquet\")`."
-            }
-            _ => "",
-        };
+    if !["csv", "mcap", "npz", "parquet"].contains(&extension.as_str()) {
         return Err(CommandError::Sentence(format!(
-            "The format of {} is not known; end its name in .csv, .mcap or .npz.{parquet}",
+            "The format of {} is not known; end its name in .csv, .mcap, .npz or .parquet.",
             args.out.display()
         )));
     }
@@ -215,7 +209,7 @@ fn each(
     Ok(())
 }
 
-/// Writes CSV or MCAP.
+/// Writes CSV, MCAP or Parquet.
 fn rows(
     source: &Source,
     kept: &Kept,

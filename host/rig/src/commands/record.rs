@@ -71,7 +71,7 @@ pub(crate) struct Args {
     /// Replace the recording if it exists
     #[arg(long)]
     pub(crate) force: bool,
-    /// File to write, .csv or .mcap
+    /// File to write, .csv, .mcap or .parquet
     #[arg(long)]
     out: PathBuf,
 }

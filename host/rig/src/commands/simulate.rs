@@ -40,7 +40,7 @@ pub(crate) struct Args {
     /// Trajectory written by `rig excite` (.toml or .csv), or a recording whose reference is repeated
     #[arg(long)]
     pub(crate) trajectory: PathBuf,
-    /// Recording to write (.csv or .mcap)
+    /// Recording to write (.csv, .mcap or .parquet)
     #[arg(long)]
     pub(crate) out: PathBuf,
     /// Sample rate, Hz; samples of another rate are interpolated [default: 1000 for a .toml trajectory, else that of the file]
