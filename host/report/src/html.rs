@@ -269,7 +269,7 @@ impl Page {
         let _ = write!(
             self.body,
             "<div class=\"table\" role=\"region\" aria-label=\"Table {number}\" tabindex=\"0\"><table>\n\
-             <caption><b>Table {number}</b> {}</caption>\n<thead><tr>",
+             <caption><span><b>Table {number}</b> {}</span></caption>\n<thead><tr>",
             text(&table.caption)
         );
         for column in &table.columns {

@@ -63,7 +63,7 @@ pub enum RobotError {
         path: PathBuf,
     },
     /// By its name the file is a recording.
-    #[error("{} is a recording by its name, but a robot description (.toml, .urdf or .xml) is wanted here; are --robot and --data exchanged?", path.display())]
+    #[error("{} is a recording by its name, but a robot description (.toml, .urdf or .xml) is wanted here; are two files exchanged?", path.display())]
     Recording {
         /// The file.
         path: PathBuf,

@@ -583,7 +583,7 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         args.robot.display(),
         args.out.display()
     ));
-    for line in judged(args.load, &found, robot, ui) {
+    for line in judged(args, &found, robot, ui) {
         ui.say(&line);
     }
     ui.say(NOT_LOOKED_AT);
@@ -645,9 +645,9 @@ fn verdict(condition: f64) -> String {
 }
 
 /// Describes how well the designed motion identifies.
-fn judged(load: bool, found: &Design, robot: &Robot, ui: &Ui) -> [String; 2] {
+fn judged(args: &Args, found: &Design, robot: &Robot, ui: &Ui) -> [String; 2] {
     let values = &found.values;
-    let kind = match (load, &robot.wrist_sensor) {
+    let kind = match (args.load, &robot.wrist_sensor) {
         (false, _) => "base parameters",
         (true, Some(_)) => "parameters of a load at the sensor, with six unknown biases:",
         (true, None) => "parameters of a load, by the joint torques:",
@@ -663,9 +663,16 @@ fn judged(load: bool, found: &Design, robot: &Robot, ui: &Ui) -> [String; 2] {
             ),
         },
         format!(
-            "condition number {} with columns scaled to their largest sizes ({} in SI units), {}; smallest singular value {:.3}, mean {:.3}.",
-            number(values.condition_number),
-            number(values.si_condition_number),
+            "condition number {}, {}; smallest singular value {:.3}, mean {:.3}.",
+            match args.scaling {
+                Some(ScalingArg::None) =>
+                    format!("{} in SI units", number(values.condition_number)),
+                None | Some(ScalingArg::Sizes) => format!(
+                    "{} with columns scaled to their largest sizes ({} in SI units)",
+                    number(values.condition_number),
+                    number(values.si_condition_number)
+                ),
+            },
             verdict(values.condition_number),
             values.smallest_singular_value,
             values.mean_singular_value
