@@ -180,6 +180,25 @@ fn a_gripper_is_merged_as_one_body_at_its_nearest_limit() {
     assert!((body.inertia - inertia).amax() < 1e-15);
 }
 
+/// A gripper of one drive and five joints that mimic it, as of the Robotiq 2F-85, is behind the last joint of arms of any
+/// length: however many joints follow in it, the joints before it are those of the arm.
+#[test]
+fn an_arm_ends_before_its_gripper_however_large_that_is() {
+    for count in [1, 3, 5, 6, 7] {
+        let last = format!("jl{count}");
+        let mut text = arm("j", "base", count) + &link("palm", 0.5, [0.0, 0.0, 0.03], 1e-3);
+        text += &joint("flange", "fixed", [&last, "palm"], "");
+        text += &finger("drive", "drive_pad", "palm", 0.02, "");
+        for k in 1..=5 {
+            let [name, pad] = ["m", "mp"].map(|stem| format!("{stem}{k}"));
+            text += &finger(&name, &pad, "palm", -0.02, "<mimic joint='drive'/>");
+        }
+        let original = read(&robot(&text), &ChainChoice::default()).unwrap();
+        let expected: Vec<String> = (1..=count).map(|k| format!("j{k}")).collect();
+        assert_eq!(names(&original), expected);
+    }
+}
+
 /// The full chain with a joint at rest has the torques of the chain in which this joint is locked: in the middle, before
 /// the base, and as a whole end beyond the tip.
 #[test]

@@ -85,6 +85,15 @@ impl<'s, 'a> Search<'s, 'a> {
         self.tree.joints[joint].motion.is_single() && !self.held.contains(&joint)
     }
 
+    /// Returns true if a joint mimics another, or another mimics it.
+    fn is_geared(&self, joint: usize) -> bool {
+        let own = &self.tree.joints[joint];
+        let follows = |other: &TreeJoint<'_>| {
+            (other.mimic.as_ref()).is_some_and(|mimic| mimic.master == own.name)
+        };
+        own.mimic.is_some() || self.tree.joints.iter().any(follows)
+    }
+
     /// Returns what a joint moves, itself included.
     fn branch(&self, joint: usize) -> Branch {
         let own = &self.tree.joints[joint];
@@ -129,7 +138,9 @@ impl<'s, 'a> Search<'s, 'a> {
             let Some((first, others)) = branches.split_first() else {
                 return Ok(link);
             };
-            if is_gripper(&branches, before) {
+            // A joint alone that is in no gear is one of the arm, whatever follows it.
+            let is_of_arm = matches!(outgoing[..], [only] if !self.is_geared(only));
+            if !is_of_arm && is_gripper(&branches, before) {
                 return Ok(link);
             }
             let second = others.first().map_or(0, |branch| branch.deepest);
