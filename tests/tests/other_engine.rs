@@ -13,7 +13,7 @@ use std::process::Command;
 use rig_data::Source;
 use rig_data::prepare::Recording;
 use rig_identify::{Estimator, ModelKind, Options, identified_robot, identify};
-use rig_model::robot::{Description, IRP6_TEMPLATE, Robot};
+use rig_model::robot::{Description, EDDA_TEMPLATE, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Robot};
 use rig_output::data_dir;
 use rig_tests::engines::{self, printed, scripts};
 
@@ -179,6 +179,94 @@ fn urdf_of_an_identified_arm_loads_in_a_standard_parser() {
         &identified,
         &original.with_values(&identified).unwrap().text,
     );
+}
+
+/// `tests/sdf/load.cpp` built with sdformat, the parser of Gazebo (Debian: libsdformat-dev), if that is here.
+fn gazebo(place: &Path) -> Option<PathBuf> {
+    let library = (12..=16)
+        .map(|version| format!("sdformat{version}"))
+        .find(|name| {
+            let found = Command::new("pkg-config").args(["--exists", name]).status();
+            found.is_ok_and(|status| status.success())
+        });
+    let Some(library) = library else {
+        println!(
+            "SKIPPED: sdformat, the parser of Gazebo, is not here; on Debian, apt-get install g++ pkg-config libsdformat-dev."
+        );
+        return None;
+    };
+    let flags = printed(Command::new("pkg-config").args(["--cflags", "--libs", &library]));
+    let (source, program) = (
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("sdf/load.cpp"),
+        place.join("load"),
+    );
+    printed(
+        Command::new("c++")
+            .args(["-std=c++17", "-o"])
+            .args([&program, &source])
+            .args(flags.split_whitespace()),
+    );
+    Some(program)
+}
+
+/// All joints, the masses, and the frames at zero positions in a level world must be those of the description.
+fn gazebo_reads(program: &Path, place: &Path, robot: &Robot) {
+    let file = place.join("robot.urdf");
+    let urdf = robot.to_urdf().unwrap();
+    std::fs::write(&file, &urdf.text).unwrap();
+    let said = printed(Command::new(program).arg(&file));
+    let mut links = said.lines().filter_map(|line| line.strip_prefix("link "));
+    // Down is -z in Gazebo: the same turn brings it there for each frame.
+    let down = nalgebra::Vector3::from(robot.gravity).normalize();
+    let mut frame = nalgebra::Isometry3::identity();
+    for joint in &robot.joints {
+        frame *= joint.pose(0.0);
+        let fields: Vec<&str> = links.next().unwrap().split(' ').collect();
+        assert_eq!(fields[0], format!("{}_link", joint.name));
+        let numbers: Vec<f64> = fields[1..].iter().map(|f| f.parse().unwrap()).collect();
+        let mass = joint.inertial.as_ref().map_or(numbers[0], |own| own.mass);
+        assert!((numbers[0] - mass).abs() < 1e-9 * mass);
+        let [x, y, z, w, i, j, k] = *numbers.last_chunk().unwrap();
+        let own = nalgebra::Isometry3::from_parts(
+            nalgebra::Translation3::new(x, y, z),
+            nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, i, j, k)),
+        );
+        // What a bubble level and a plumb line on the link show.
+        let level = own.rotation.inverse() * -nalgebra::Vector3::z();
+        let height = own.translation.vector.z + frame.translation.vector.dot(&down);
+        assert!(
+            (level - frame.rotation.inverse() * down).norm() < 1e-9,
+            "{}",
+            joint.name
+        );
+        assert!(height.abs() < 1e-9, "{}", joint.name);
+        assert!((own.translation.vector.norm() - frame.translation.vector.norm()).abs() < 1e-9);
+        let kind = said
+            .lines()
+            .find_map(|line| line.strip_prefix(&format!("joint {} ", joint.name)));
+        assert!(kind.is_some(), "{} in {said}", joint.name);
+    }
+    assert!(links.next().is_none(), "{said}");
+}
+
+/// Gazebo passes over a link without inertia and what it carries, and refuses masses and inertias that no body has.
+#[test]
+fn gazebo_takes_written_urdf_files() {
+    let place = tempfile::tempdir().unwrap();
+    let Some(program) = gazebo(place.path()) else {
+        return;
+    };
+    for (name, text) in [
+        ("one-link", ONE_LINK_TEMPLATE),
+        ("irp6", IRP6_TEMPLATE),
+        ("edda", EDDA_TEMPLATE),
+    ] {
+        let robot = Robot::from_toml(text, Path::new(name)).unwrap();
+        gazebo_reads(&program, place.path(), &robot);
+        let mut leaning = robot.clone();
+        leaning.gravity = [1.0, -2.0, -(9.81f64.powi(2) - 5.0).sqrt()];
+        gazebo_reads(&program, place.path(), &leaning);
+    }
 }
 
 /// `tests/mjcf/load.py` gives the fragment to MuJoCo, at joints of the same names.

@@ -7,7 +7,7 @@
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
-use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use rig_shared::multibody::column;
 use rig_shared::transmission::DriveKind;
 
@@ -47,29 +47,23 @@ impl Robot {
             name
         };
         let mut body = String::new();
-        let base = name("base_link".into());
+        // Gazebo passes over a base without inertia and all behind it, unless it is the world.
+        let base = name("world".into());
         let tilt = levelled(Vector3::from(self.gravity), &mut remarks);
         // Writing to a String cannot fail.
         let _ = writeln!(body, "  <link name=\"{base}\"/>");
-        if let Some(rotation) = tilt {
-            let fixed = self.free_name("world_to_base");
-            remarks.push(format!("Gravity is not along -z of {base}: link world is level, and the joint {fixed} holds how {base} stands in it."));
-            let world = name("world".into());
-            let _ = writeln!(body, "  <link name=\"{world}\"/>");
-            let _ = writeln!(body, "  <joint name=\"{fixed}\" type=\"fixed\">");
+        if let Some(rotation) = &tilt {
+            let (fixed, frame) = (self.free_name("world_to_base"), name("base_link".into()));
+            remarks.push(format!("Gravity is not along -z of the base: link {base} is level, and frame 0 of the description stands in it as link {frame}."));
             let _ = writeln!(
                 body,
-                "    <parent link=\"{world}\"/>\n    <child link=\"{base}\"/>"
+                "  <link name=\"{frame}\"/>\n  <joint name=\"{fixed}\" type=\"fixed\">\n    <parent link=\"{base}\"/>\n    <child link=\"{frame}\"/>\n    <origin xyz=\"0 0 0\" rpy=\"{}\"/>\n  </joint>",
+                rpy(rotation)
             );
-            let _ = writeln!(
-                body,
-                "    <origin xyz=\"0 0 0\" rpy=\"{}\"/>",
-                rpy(&rotation)
-            );
-            body.push_str("  </joint>\n");
         }
+        let lean = tilt.unwrap_or_else(Rotation3::identity);
         let parameters = self.standard_parameters();
-        let parent = self.write_links(&bodies, base, &mut name, &mut body, &mut remarks)?;
+        let parent = self.write_links(&bodies, (base, lean), &mut name, &mut body, &mut remarks)?;
         if !self.flange.is_last_joint() {
             let (link, joint) = (name("flange".into()), self.free_name("last_to_flange"));
             let pose = self.flange_pose();
@@ -101,18 +95,19 @@ impl Robot {
         Ok(Urdf { text, remarks })
     }
 
-    /// Writes links and joints from the base outwards. `bodies`: the robot with inertias as they are written; `name`: makes
-    /// a name unique. Returns the last link.
+    /// Writes links and joints outwards from the world, in which frame 0 leans. `bodies`: the robot with inertias as they are
+    /// written; `name`: makes a name unique. Returns the last link.
     fn write_links(
         &self,
         bodies: &Self,
-        base: String,
+        (world, lean): (String, Rotation3<f64>),
         name: &mut impl FnMut(String) -> String,
         out: &mut String,
         remarks: &mut Vec<String>,
     ) -> Result<String, RobotError> {
         let parameters = self.standard_parameters();
-        let mut parent = base;
+        let mut parent = world;
+        let mut before = Isometry3::from_parts(Translation3::identity(), lean.into());
         for number in bodies.links_outwards() {
             let Some(mut joint) = bodies.link_as_joint(number) else {
                 continue;
@@ -125,9 +120,11 @@ impl Robot {
             write_link(out, &joint, &link)?;
             let row = &parameters[number];
             let (viscous, coulomb) = (row[column::VISCOUS], row[column::COULOMB]);
+            let pose = before * step(joint.alpha, joint.a, joint.theta, joint.d);
+            before = Isometry3::identity();
             write_joint(
                 out,
-                &joint,
+                (&joint, pose),
                 follower,
                 [&parent, &link],
                 [viscous, coulomb],
@@ -271,7 +268,7 @@ impl UrdfKind {
 
 fn write_joint(
     out: &mut String,
-    joint: &Joint,
+    (joint, pose): (&Joint, Isometry3<f64>),
     follower: Option<&Follower>,
     [parent, link]: [&str; 2],
     [viscous, coulomb]: [f64; 2],
@@ -286,7 +283,6 @@ fn write_joint(
         (JointKind::Revolute, Some(_)) => UrdfKind::Revolute,
         (JointKind::Revolute, None) => UrdfKind::Continuous,
     };
-    let pose = step(joint.alpha, joint.a, joint.theta, joint.d);
     let _ = writeln!(
         out,
         "  <joint name=\"{}\" type=\"{}\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{link}\"/>\n    <origin xyz=\"{}\" rpy=\"{}\"/>\n    <axis xyz=\"0 0 1\"/>",
