@@ -3,6 +3,7 @@
 //
 //     g++ -std=c++17 load.cpp -o load $(pkg-config --cflags --libs sdformat12) && ./load robot.urdf
 #include <cstdio>
+#include <type_traits>
 #include <sdf/sdf.hh>
 
 int main(int count, char **arguments)
@@ -13,7 +14,7 @@ int main(int count, char **arguments)
     for (uint64_t k = 0; model && k < model->LinkCount(); ++k)
     {
         const sdf::Link &link = *model->LinkByIndex(k);
-        ignition::math::Pose3d pose;
+        std::decay_t<decltype(link.RawPose())> pose;
         for (const sdf::Error &error : link.SemanticPose().Resolve(pose, "__model__"))
             errors.push_back(error);
         std::printf("link %s %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g\n", link.Name().c_str(),
