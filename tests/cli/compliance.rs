@@ -56,6 +56,17 @@ fn a_stiffness_is_identified_by_a_chirp_and_read_again() {
     assert_eq!(found["schema"], "rig-compliance/1");
     let stiffness = found["drives"][0]["stiffness"]["value"].as_f64().unwrap();
     assert!((stiffness / 1200.0 - 1.0).abs() < 0.05, "{stiffness}");
+    // A clock in milliseconds makes every frequency a thousandth.
+    let text = fs::read_to_string(at("run.csv")).unwrap();
+    let late = |(row, line): (usize, &str)| match (row, line.split_once(',')) {
+        (0, _) | (_, None) => line.to_owned(),
+        (_, Some((t, rest))) => format!("{},{rest}", 1e3 * t.parse::<f64>().unwrap()),
+    };
+    let lines: Vec<String> = text.lines().enumerate().map(late).collect();
+    fs::write(at("late.csv"), lines.join("\n") + "\n").unwrap();
+    let mut command = compliance(&rigid, &at("late"));
+    let said = refuse(command.arg("--frequency").arg(at("late.csv")));
+    assert!(said.contains("t looks like milliseconds"), "{said}");
     // The blocks belong into a description, and are read from there.
     let blocks = fs::read_to_string(at("found/compliance.toml")).unwrap();
     let text = fs::read_to_string(&rigid).unwrap();
