@@ -77,6 +77,14 @@ impl Signals {
         Some(own)
     }
 
+    /// Returns the same signals with the opposite sign of one column; `None` if it is missing.
+    pub(crate) fn reversed(&self, name: &str) -> Option<Self> {
+        let mut own = self.clone();
+        let (_, values) = own.extra.iter_mut().find(|(own, _)| own == name)?;
+        values.iter_mut().for_each(|value| *value = -*value);
+        Some(own)
+    }
+
     /// Returns the same signals without some columns.
     pub(crate) fn without_columns(&self, names: &[&str]) -> Self {
         let mut own = self.clone();

@@ -1,5 +1,5 @@
-//! Another reading of recordings whose displacement does not follow the force: exchanged axes, the axes of a sensor or of
-//! the base, angles in degrees.
+//! Another reading of recordings whose displacement does not follow the force: exchanged axes, a reversed axis, the axes of a
+//! sensor or of the base, angles in degrees.
 //!
 //! Each reading is a regression of its own, without gaps. One counts if it explains what the recorded reading leaves: its
 //! own lack of fit is not told, its residual is less than half, and every stiffness that it shows is positive. Simple
@@ -47,6 +47,7 @@ pub(super) fn another_reading(
 ) -> Option<String> {
     let simple = exchanges(tool, stretches)
         .into_iter()
+        .chain(reversals(tool, stretches))
         .chain(degrees(tool, stretches))
         .chain(frames(tool, stretches));
     let mut best = simple.fold(None, |best, found| better(best, found, lack));
@@ -122,6 +123,20 @@ fn exchanges(tool: &ToolPoint<'_>, stretches: &[&Signals]) -> Vec<Reading> {
         }
     }
     all
+}
+
+/// One axis of the force or of the displacement with the opposite sign.
+fn reversals(tool: &ToolPoint<'_>, stretches: &[&Signals]) -> Vec<Reading> {
+    (FORCE.iter().chain(&DISPLACED))
+        .filter_map(|column| {
+            let judged = changed(tool, stretches, |signals| signals.reversed(column))?;
+            Some(Reading {
+                words: format!("{column} reversed"),
+                remedy: "Correct the sign of this column in the recordings.",
+                judged,
+            })
+        })
+        .collect()
 }
 
 /// Positions of revolute joints in degrees.

@@ -3,6 +3,7 @@
 use super::another_reading::another_reading;
 use super::link::by_links;
 use super::result::LoadingFindings;
+use super::stuck::refuse_stuck;
 use super::tool::by_tool;
 use super::wrench::{has_displacement, has_wrench};
 use crate::error::ComplianceError;
@@ -39,6 +40,7 @@ pub(crate) fn loading(
                 signals.other_columns()
             )));
         }
+        refuse_stuck(signals)?;
     }
     if !displaced.is_empty() {
         let mut seen = by_tool(tool, &displaced)?;
@@ -55,6 +57,7 @@ pub(crate) fn loading(
         found.drives.extend(seen.drives);
         found.residual = Some(seen.lack.residual);
         found.warnings.extend(other.or(seen.told));
+        found.warnings.extend(seen.unused);
     }
     if !linked.is_empty() {
         found.drives.extend(by_links(tool, &linked)?);

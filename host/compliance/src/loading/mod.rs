@@ -8,6 +8,7 @@ mod fit;
 mod instrument;
 mod link;
 mod result;
+mod stuck;
 mod tool;
 mod windows;
 mod wrench;

@@ -137,6 +137,8 @@ pub(super) struct ByTool {
     pub lack: Lack,
     /// Says that the displacement is not that of springs.
     pub told: Option<String>,
+    /// Names the recordings that are too short.
+    pub unused: Vec<String>,
 }
 
 /// Finds the stiffness of all drives from displacements of the tool point.
@@ -165,19 +167,35 @@ pub(super) fn by_tool(
     for k in 0..n {
         drives.push(drive(tool, k, &held, &rows, &found)?);
     }
-    if let (true, Some(told)) = (
+    if let (true, Some(reason)) = (
         drives.iter().all(|own| own.stiffness.is_none()),
         across(&held),
     ) {
         for own in &mut drives {
-            own.missing = Some(told.clone());
+            own.missing = Some(reason.clone());
         }
     }
     Ok(ByTool {
         drives,
         lack: found.lack,
         told,
+        unused: unused(stretches, &rows),
     })
+}
+
+/// Names the recordings that are too short for any row to count.
+fn unused(stretches: &[&Signals], rows: &[Row]) -> Vec<String> {
+    let counts = |s: usize| rows.iter().any(|row| row.stretch == s);
+    (stretches.iter().enumerate())
+        .filter(|(s, signals)| signals.len() < FEWEST && !counts(*s))
+        .map(|(_, signals)| {
+            format!(
+                "{} is not used: it has too few rows ({}) for a force that changes slowly, to and fro.",
+                signals.label,
+                signals.len()
+            )
+        })
+        .collect()
 }
 
 /// Takes the weight's and the wrench's change by the yielding links from the displacements of all stretches, by a first fit of its
@@ -576,9 +594,10 @@ fn drive(
     let compliance = found.value(k);
     if determined(rows, found, k).is_none() {
         let random = found.estimate.std(k) < NOT_SHOWN * compliance.value.abs();
-        // A systematic residual alone hides it, however small it is beside the whole displacement.
-        let told = (random && shows(rows, found, k) && found.lack.systematic > 0.0)
-            .then(|| found.lack.words("m"));
+        // A systematic residual alone hides it, however small it is beside the whole displacement. One that is not small makes the
+        // random part wide, too: its windows are correlated.
+        let lacking = found.lack.systematic > 0.0 && (random || found.lack.told("m").is_some());
+        let told = (lacking && shows(rows, found, k)).then(|| found.lack.words("m"));
         let opposite = !found.estimate.hidden[k] && compliance.value < -NEGATIVE * compliance.std;
         result.missing = Some(match (opposite, told) {
             (true, _) => opposite_sign(&result.joint),
