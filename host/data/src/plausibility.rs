@@ -23,7 +23,8 @@ pub const JUDGED_ROWS: usize = 100_000;
 pub enum Implausible {
     /// Position of a revolute joint in degrees.
     #[error(
-        "q{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad, or name its unit with --unit q{joint}=deg{or}"
+        "q{joint} looks like degrees ({}, while the joint reaches {limit:.4} rad); give it in rad, or name its unit with --unit q{joint}=deg{or}",
+        range_words(*lowest, *highest)
     )]
     Degrees {
         /// Joint, 1-based.
@@ -39,7 +40,8 @@ pub enum Implausible {
     },
     /// Position far outside the limits.
     #[error(
-        "q{joint} lies far outside the joint's range ({lowest:.4} to {highest:.4}, while the limits are {lower} to {upper} {unit}); give it in {unit} or correct the limits{or}"
+        "q{joint} lies far outside the joint's range ({}, while the limits are {lower} to {upper} {unit}); give it in {unit} or correct the limits{or}",
+        range_words(*lowest, *highest)
     )]
     Position {
         /// Joint, 1-based.
@@ -358,6 +360,14 @@ fn changes(column: &str, joints: &[usize]) -> String {
         "change"
     };
     format!("{} {verb}", columns_of(column, joints))
+}
+
+/// Says between which values a position lies.
+fn range_words(lowest: f64, highest: f64) -> String {
+    match lowest == highest {
+        true => format!("it is {lowest:.4}"),
+        false => format!("range {lowest:.4} to {highest:.4}"),
+    }
 }
 
 /// "second row", "third row", "10th row".

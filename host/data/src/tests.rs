@@ -639,6 +639,15 @@ fn wrong_units_are_named_and_right_ones_are_not() {
         scaled(&|b| all(&mut b.joints[0].q, 57.296))
             .contains("q1 looks like degrees (range 0.0000 to 57")
     );
+    // One pose has no range.
+    let mut pose = block.clone();
+    pose.joints[0].q.fill(-142.4433);
+    let said = implausible_positions(&pose, &rig());
+    let said = said.first().map_or(String::new(), ToString::to_string);
+    assert!(
+        said.starts_with("q1 looks like degrees (it is -142.4433, while"),
+        "{said}"
+    );
     assert!(scaled(&|b| all(&mut b.joints[0].q, 1000.0)).contains("far outside"));
     assert!(
         scaled(&|b| all(b.joints[0].qd.as_mut().unwrap(), 57.296))

@@ -70,6 +70,14 @@ impl Load {
             path: path.into(),
             source,
         })?;
+        if text.trim_start().starts_with('{') {
+            return Err(RobotError::Toml {
+                path: path.into(),
+                place: Place::of(&text, 0),
+                message: "this is JSON; give the load as TOML (`rig load` writes load.toml beside load.json)"
+                    .to_owned(),
+            });
+        }
         let load: Self = toml::from_str(&text).map_err(|error| RobotError::Toml {
             path: path.into(),
             place: Place::of(&text, error.span().map_or(0, |s| s.start)),
@@ -231,6 +239,10 @@ mod tests {
                 ":2:1:",
             ),
             ("mass = 1.0", "first_moment"),
+            (
+                "{\n  \"schema\": \"rig-load/1\"\n}",
+                "this is JSON; give the load as TOML (`rig load` writes load.toml beside load.json)",
+            ),
         ] {
             std::fs::write(&path, text).unwrap();
             let message = Load::read(&path).unwrap_err().to_string();
