@@ -103,7 +103,7 @@ pub use structure::independent::{Independent, independent_columns};
 pub use treatment::decide::treatment_for;
 pub use uncertainty::estimate::Ellipse;
 pub use uncertainty::estimate::Estimate;
-pub use uncertainty::estimate::t_quantile;
+pub use uncertainty::estimate::{f_p_value, t_quantile};
 pub use uncertainty::jackknife::{LeaveOut, Refit};
 pub use uncertainty::residual::{Dependence, LEAST_ERROR, ResidualReport, Series};
 pub use uncertainty::torque_residuals::torque_residuals;

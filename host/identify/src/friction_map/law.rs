@@ -1,10 +1,9 @@
 //! Laws of friction over speed, fitted to the points, and the choice between them.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::map::{FrictionFit, FrictionPoint};
-use crate::uncertainty::estimate::t_quantile;
+use crate::uncertainty::estimate::{f_p_value, t_quantile};
 
 /// p-value below which the Stribeck term is accepted. Its velocity exists only if the term does, so the F distribution
 /// is too optimistic (Davies 1977); a thousandth allows for that.
@@ -54,7 +53,7 @@ pub(super) fn decide(points: &[FrictionPoint]) -> Option<Decision> {
     let freedom = points.len() as f64 - 5.0;
     let p_value = best.as_ref().and_then(|b| {
         let f = ((simple.squares - b.squares) / 2.0) / (b.squares / freedom).max(f64::MIN_POSITIVE);
-        Some(FisherSnedecor::new(2.0, freedom).ok()?.sf(f.max(0.0)))
+        f_p_value(f, [2.0, freedom])
     });
     let warranted = match (&best, p_value) {
         (Some(b), Some(p)) => {

@@ -12,9 +12,9 @@
 use nalgebra::{DMatrix, DVector};
 use rig_numerics::svd::Svd;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::rows::factor::TriangularFactor;
+use crate::uncertainty::estimate::f_p_value;
 
 /// Ratio of the largest to the smallest relative standard deviation at which elimination ends; the literature uses 10
 /// to 30.
@@ -197,7 +197,7 @@ pub(crate) fn essential(
         let variance = known.variance(first.squares, size);
         let chance = |grown: f64, removed: f64| {
             let f = grown / removed / variance.max(f64::MIN_POSITIVE);
-            FisherSnedecor::new(removed, freedom).map_or(1.0, |d| d.sf(f.max(0.0)))
+            f_p_value(f, [removed, freedom]).unwrap_or(1.0)
         };
         let removed = (size - fewer.len()) as f64;
         let p = chance(next.squares - current.squares, 1.0)

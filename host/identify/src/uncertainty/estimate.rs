@@ -101,6 +101,19 @@ pub struct Ellipse {
     pub second: [f64; 2],
 }
 
+/// Returns the probability that a ratio of two variances with these degrees of freedom, the numerator's first, is as large by
+/// chance (F test). A denominator of zero makes the ratio infinite, and leaves no chance; a ratio that is no number shows
+/// nothing. `None` if the degrees of freedom are not above zero.
+pub fn f_p_value(ratio: f64, [numerator, denominator]: [f64; 2]) -> Option<f64> {
+    let law = FisherSnedecor::new(numerator, denominator).ok()?;
+    let ratio = ratio.max(0.0);
+    // The law multiplies the ratio by the degrees of freedom, which must not overflow.
+    Some(match (ratio * numerator).is_finite() {
+        true => law.sf(ratio),
+        false => 0.0,
+    })
+}
+
 /// Returns Student's t quantile for a two-sided 95 % interval; the degrees of freedom need not be whole, and count as 1 at
 /// least.
 pub fn t_quantile(degrees_of_freedom: f64) -> f64 {
@@ -139,5 +152,27 @@ impl Estimate {
             first: [plus * sa, plus * sb],
             second: [minus * sa, -minus * sb],
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// F with one degree of freedom each exceeds x with the probability 1 − 2/π·atan √x.
+    #[test]
+    fn every_ratio_of_variances_has_a_probability() {
+        for x in [0.0, 0.3, 1.0, 40.0, 1e9] {
+            let truth = 1.0 - std::f64::consts::FRAC_2_PI * f64::sqrt(x).atan();
+            assert!((f_p_value(x, [1.0, 1.0]).unwrap() - truth).abs() < 1e-9);
+        }
+        for endless in [f64::INFINITY, f64::MAX, 1e308] {
+            assert_eq!(f_p_value(endless, [3.0, 12.0]), Some(0.0));
+        }
+        for nothing in [-1.0, f64::NAN] {
+            assert_eq!(f_p_value(nothing, [3.0, 12.0]), Some(1.0));
+        }
+        assert_eq!(f_p_value(1.0, [3.0, 0.0]), None);
     }
 }

@@ -1,10 +1,10 @@
 //! Tests of candidate columns beside a fit.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::fit::evidence::Evidence;
 use crate::fit::least_squares::{Beside, Fit};
+use rig_identify::f_p_value;
 use rig_numerics::vector::{axpy, dot};
 
 impl Fit<'_> {
@@ -54,8 +54,7 @@ impl Fit<'_> {
         let wald = beta.dot(&covariance.cholesky()?.solve(&beta));
         let freedom = (g - k as f64).max(1.0);
         let statistic = wald / k as f64 * freedom / (g - 1.0).max(1.0);
-        let p_value = FisherSnedecor::new(k as f64, freedom)
-            .map(|f| f.sf(statistic.max(0.0)))
+        let p_value = f_p_value(statistic, [k as f64, freedom])
             .unwrap_or(1.0)
             .max(f64::MIN_POSITIVE);
         let (plain, more) = self.cross_validated(columns)?;
