@@ -5,8 +5,8 @@
 //! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit or gain has one, a turned
 //! sensor three.
 
+use rig_identify::f_p_value;
 use rig_model::robot::{Reads, WristSensor};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::candidates::{exchanged, exchanged_and_scaled, scaled, turned};
 use crate::error::LoadError;
@@ -24,7 +24,7 @@ use crate::units::named;
 const ABOUT: f64 = 2.0;
 /// Residual as a share of what the readings change by, up to which a fit counts as exact: sensors resolve no less.
 const EXACT: f64 = 1e-3;
-/// The same for recordings that tell no noise, as poses: a wrong cause leaves half of the readings or more.
+/// The same for poses, unless they leave about their noise: a wrong cause leaves half of the readings or more.
 const EXPLAINED: f64 = 0.22;
 /// Ratio to the least residual of the forces beyond which a cause is not looked at further. Delays, leaning bases and jumps
 /// change what all causes leave.
@@ -347,8 +347,26 @@ pub(crate) fn explains(sensed: &Sensed, fit: &Fit) -> bool {
     let residual = fit.noise;
     match noise_floor(sensed.recordings) {
         Some(noise) => (0..2).all(|k| residual[k] <= ABOUT * noise[k] || share[k] <= EXACT),
-        None => share.iter().all(|share| *share <= EXPLAINED),
+        None => explains_poses(sensed, fit, share),
     }
+}
+
+/// Returns true if a fit of poses leaves a small share of what the forces and what the moments read, or about their noise: a
+/// load whose centre of mass is near the sensor has moments that are noise. The rows of the poses tell the noise; without
+/// them forces and moments tell it of each other.
+fn explains_poses(sensed: &Sensed, fit: &Fit, share: [f64; 2]) -> bool {
+    let is_small = |kind: usize| share[kind] <= EXPLAINED;
+    let by_other = |kind: usize| {
+        let other = 1 - kind;
+        let own = [1.0 / sensed.lever, sensed.lever][kind];
+        is_small(other).then_some(fit.noise[other] * own)
+    };
+    let rows = scatter(sensed).noise();
+    let is_noise = |kind: usize| {
+        let noise = rows.map_or_else(|| by_other(kind), |(noise, _)| Some(noise[kind]));
+        noise.is_some_and(|noise| fit.noise[kind] <= ABOUT * noise)
+    };
+    (0..2).all(|kind| is_small(kind) || is_noise(kind))
 }
 
 /// Returns −2·ln of the likelihood with the noise by degrees of freedom, each unknown counted as the information criterion of
@@ -467,8 +485,7 @@ impl Trial<'_> {
         let freedom = 0.5 * fit.equations as f64 - own - 1.0;
         let [before, after] = [self.plain, fit].map(|fit| fit.squares[kind]);
         let ratio = (before - after) * freedom / after.max(f64::MIN_POSITIVE);
-        let chance = FisherSnedecor::new(1.0, freedom).map(|f| f.sf(ratio.max(0.0)));
-        chance.is_ok_and(|p| 6.0 * p < BY_CHANCE)
+        f_p_value(ratio, [1.0, freedom]).is_some_and(|p| 6.0 * p < BY_CHANCE)
     }
 }
 
@@ -504,8 +521,7 @@ pub(crate) fn is_beyond_scatter(sensed: &Sensed, fit: &Fit) -> bool {
     let own = (0.5 * fit.freedom()).max(1.0);
     let is_more = |kind: usize| {
         let ratio = (fit.noise[kind] / noise[kind].max(f64::MIN_POSITIVE)).powi(2);
-        let by_chance = FisherSnedecor::new(own, freedom);
-        by_chance.is_ok_and(|all| 2.0 * all.sf(ratio) < BEYOND_BY_CHANCE)
+        f_p_value(ratio, [own, freedom]).is_some_and(|p| 2.0 * p < BEYOND_BY_CHANCE)
     };
     is_more(0) || is_more(1)
 }

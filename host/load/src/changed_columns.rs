@@ -234,6 +234,7 @@ impl Search<'_> {
             recordings,
             to_axes: self.like.to_axes,
             gravity: self.like.gravity,
+            lever: self.like.lever,
         }
     }
 

@@ -7,6 +7,7 @@ use rig_output::{format_short, format_significant};
 
 use crate::clipping::{Pile, Suspect};
 use crate::error::LoadError;
+use crate::frozen::Frozen;
 use crate::pace::{Pace, Steps};
 use crate::rows::{Ends, FEWEST_ROWS, LEAST_ROWS, each_readings};
 
@@ -179,6 +180,8 @@ pub(crate) struct Judged {
     pub suspects: Vec<Suspect>,
     /// Says which row of a channel is a spike.
     pub spike: Option<String>,
+    /// Says which channels are frozen in a motion, and where.
+    pub frozen: Option<String>,
 }
 
 /// Finds the ends of the channels: the described range of the sensor, and values at which readings were cut.
@@ -206,7 +209,9 @@ pub(crate) fn judge(
     // A short recording of a motion is searched for rests as well: the readings of a motion need its acceleration.
     let poses = poses || pace == Pace::Listed || rows < FEWEST_ROWS as u64;
     refuse_dead(recording, &channels)?;
-    let found = counted(recording, &channels)?;
+    let (found, frozen) = counted(recording, &channels)?;
+    let reach = channels.each_ref().map(|own| [own.low, own.high]);
+    let frozen = (!poses).then(|| frozen.words(&recording.label(), &reach));
     let mut ends = [[f64::NEG_INFINITY, f64::INFINITY]; 6];
     let (mut cut, mut suspects, mut spike) = (Vec::new(), Vec::new(), None);
     for (c, end) in ends.iter_mut().enumerate() {
@@ -261,17 +266,22 @@ pub(crate) fn judge(
         cut,
         suspects,
         spike,
+        frozen: frozen.flatten(),
     })
 }
 
-/// Counts the rows at and near the ends of each channel.
-fn counted(recording: &dyn Recording, channels: &[Channel; 6]) -> Result<[[End; 2]; 6], LoadError> {
-    let mut found = [[End::default(); 2]; 6];
+/// Counts the rows at and near the ends of each channel, and follows how long each stays on one value.
+fn counted(
+    recording: &dyn Recording,
+    channels: &[Channel; 6],
+) -> Result<([[End; 2]; 6], Frozen), LoadError> {
+    let (mut found, mut frozen) = ([[End::default(); 2]; 6], Frozen::default());
     let widths = channels.each_ref().map(|channel| {
         let near = (NEIGHBOURHOOD * (channel.high - channel.low)).max(1.5 * channel.step);
         (channel, near, channel.width())
     });
     each_readings(recording, &mut |block, readings| {
+        frozen.push(block, readings);
         for k in 0..block.len() {
             let all = found.iter_mut().zip(&widths).zip(readings);
             for ((end, (channel, near, width)), list) in all {
@@ -285,7 +295,7 @@ fn counted(recording: &dyn Recording, channels: &[Channel; 6]) -> Result<[[End; 
         }
         Ok(())
     })?;
-    Ok(found)
+    Ok((found, frozen))
 }
 
 /// Refuses a channel that has one value throughout.

@@ -2,11 +2,10 @@
 
 use nalgebra::SymmetricEigen;
 use rig_data::prepare::Recording;
-use rig_identify::{chain_of, least_eigenvalue};
+use rig_identify::{chain_of, f_p_value, least_eigenvalue};
 use rig_model::robot::{Joint, Load, Robot};
 use rig_output::{format_p_value, format_significant, format_unit, listed};
 use rig_shared::multibody::{COLUMN_NAMES, Chain, INERTIAL_PARAMETERS};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::axes::parameters_from;
 use crate::body::body;
@@ -433,7 +432,7 @@ fn agreement(a: &Estimate, b: &Estimate) -> Agreement {
             let count = f64::from(directions);
             let freedom = a.degrees_of_freedom.min(b.degrees_of_freedom) as f64 - count + 1.0;
             let ratio = squares * freedom / (count * (freedom + count - 1.0));
-            FisherSnedecor::new(count, freedom.max(1.0)).map_or(1.0, |d| d.sf(ratio))
+            f_p_value(ratio, [count, freedom.max(1.0)]).unwrap_or(1.0)
         }
     };
     Agreement {

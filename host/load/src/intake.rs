@@ -49,7 +49,11 @@ pub(crate) fn judged(sensing: &Sensing, sensor: &WristSensor) -> Result<Vec<Judg
         judge(*recording, sensing.robot, sensor, sensing.poses)
     };
     let judged: Vec<Judged> = (sensing.recordings.iter().map(judge)).collect::<Result<_, _>>()?;
-    match judged.iter().find_map(|own| own.spike.clone()) {
+    let faults = judged
+        .iter()
+        .flat_map(|own| own.spike.iter().chain(&own.frozen));
+    let fault = faults.cloned().next();
+    match fault {
         Some(text) if !sensing.even_if_wrong => Err(LoadError::Fault(text)),
         _ => Ok(judged),
     }
@@ -224,7 +228,7 @@ impl<'a> Intake<'a> {
                 }
             };
             let recorded = collector.finish(label, *loaded, poses, passed);
-            warnings.extend(judged.spike.clone());
+            warnings.extend(judged.spike.iter().chain(&judged.frozen).cloned());
             saturation(&recorded, judged, sensing.even_if_wrong, warnings)?;
             recordings.push(recorded);
         }

@@ -1,8 +1,8 @@
 //! Jumps of the sensor's bias.
 
 use nalgebra::{DMatrix, DVector};
+use rig_identify::f_p_value;
 use rig_numerics::svd::Svd;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::settle::settled;
 use crate::system::{Fit, Jump, Nuisance, SegmentMean, Sensed};
@@ -111,9 +111,6 @@ impl Course {
         let steps = orthonormal(&beside(&steps, &self.span));
         let further = steps.ncols() as f64;
         let freedom = (self.span.nrows() - self.span.ncols()) as f64 - further;
-        let Ok(by_chance) = FisherSnedecor::new(further, freedom) else {
-            return 1.0;
-        };
         let explained = steps.tr_mul(&self.residuals);
         let ratio =
             (self.residuals.column_iter().zip(explained.column_iter())).map(|(all, own)| {
@@ -121,7 +118,7 @@ impl Course {
                 let within = (all.norm_squared() - between) / freedom;
                 between / further / within.max(f64::MIN_POSITIVE)
             });
-        by_chance.sf(ratio.fold(0.0, f64::max))
+        f_p_value(ratio.fold(0.0, f64::max), [further, freedom]).unwrap_or(1.0)
     }
 }
 

@@ -11,9 +11,9 @@ use rand::SeedableRng;
 use rand::seq::index::sample;
 use rand_pcg::Pcg64;
 use rig_data::WRENCH_COLUMNS;
+use rig_identify::f_p_value;
 use rig_numerics::svd::Svd;
 use rig_output::{format_significant, listed};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use statrs::function::factorial::ln_binomial;
 
 use crate::statistics::Recorded;
@@ -291,9 +291,7 @@ impl Equations {
         let explained = residual.dot(&errors);
         let left = self.residual.norm_squared() - explained;
         let ratio = explained / further / (left / freedom).max(f64::MIN_POSITIVE);
-        let chance = FisherSnedecor::new(further, freedom)
-            .ok()?
-            .sf(ratio.max(0.0));
+        let chance = f_p_value(ratio, [further, freedom])?;
         Some((errors, chance))
     }
 }

@@ -7,8 +7,7 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
-use rig_identify::{LeaveOut, Refit, TriangularFactor};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use rig_identify::{LeaveOut, Refit, TriangularFactor, f_p_value};
 
 use crate::estimate::solved;
 use crate::jump::{DRIFTS, jumps};
@@ -80,7 +79,7 @@ fn shows(sensed: &Sensed, fit: &Fit, without: &Fit, nuisance: Nuisance) -> bool 
         return false;
     };
     let ratio = squares * freedom / (count * (freedom + count - 1.0));
-    FisherSnedecor::new(count, freedom).is_ok_and(|d| d.sf(ratio) < TAKEN_IN)
+    f_p_value(ratio, [count, freedom]).is_some_and(|p| p < TAKEN_IN)
 }
 
 /// Returns the standard deviation of a nuisance with one unknown: for a motion by refits with one segment left out, for

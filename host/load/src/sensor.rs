@@ -3,21 +3,24 @@
 use nalgebra::{Matrix3, Rotation3};
 use rig_data::WRENCH_COLUMNS;
 use rig_data::prepare::{PreprocessingPlan, Recording, surveyed};
-use rig_model::robot::{Origin, Reads, WristSensor};
+use rig_model::robot::{Origin, Reads, Robot, WristSensor};
 use rig_output::{capital, format_significant, format_value};
 
 use crate::axes::parameters_from;
 use crate::causes::{Cause, Compared, Tried, compared, explains};
 use crate::changed_columns::{Columns, changed_columns};
 use crate::error::LoadError;
-use crate::estimate::{CERTAIN, Estimate, Spread, Square, estimate};
+use crate::estimate::{CERTAIN, Estimate, PLAUSIBLE_DISTANCE, Spread, Square, estimate};
 use crate::faulty_rows::FaultyRows;
 use crate::findings::{SensorFindings, Told};
+use crate::frozen::identical_poses;
 use crate::gain_error::{self, ACCURACY};
+use crate::hanging::{hanging, remedy};
 use crate::intake::{Intake, Sensing, judged, moving};
 use crate::mounting::{Channels, Mounting};
 use crate::selection::{deviation, selected};
 use crate::settle::settled;
+use crate::statistics::Recorded;
 use crate::system::{Fit, Nuisance, Sensed, Unknowns};
 use crate::units::{alternatives, named};
 
@@ -54,10 +57,12 @@ pub(crate) fn by_sensor(
     loop {
         let mut said = Vec::new();
         let recordings = faulty.left_out(&intake, delay, &mut said)?;
+        refuse_identical(&recordings, sensing, &mut said)?;
         let sensed = Sensed {
             recordings: &recordings,
             to_axes: &to_axes,
             gravity: robot.gravity.into(),
+            lever: lever(&sensor),
         };
         let mut compared = compared(&sensed, &sensor)?;
         // Columns that are wrong make poses that look faulty. They are compared in a motion once its delay is known.
@@ -106,6 +111,35 @@ pub(crate) fn by_sensor(
     }
 }
 
+/// Returns the lever by which the noise of a sensor's moments is that of its forces, m: both go with the ranges. Without these
+/// it is the distance of a plausible load.
+fn lever(sensor: &WristSensor) -> f64 {
+    match (sensor.force_range, sensor.moment_range) {
+        (Some(force), Some(moment)) if force > 0.0 => moment / force,
+        _ => PLAUSIBLE_DISTANCE,
+    }
+}
+
+/// Refuses recordings of poses that have identical readings.
+///
+/// # Errors
+/// [`LoadError::Fault`] with the poses, unless the user goes on.
+fn refuse_identical(
+    recordings: &[Recorded],
+    sensing: &Sensing,
+    warnings: &mut Vec<String>,
+) -> Result<(), LoadError> {
+    let gravity = sensing.robot.gravity.into();
+    let mut found = (recordings.iter()).filter_map(|own| identical_poses(own, &gravity));
+    match found.next() {
+        Some(text) if !sensing.even_if_wrong => Err(LoadError::Fault(text)),
+        text => {
+            warnings.extend(text.into_iter().chain(found));
+            Ok(())
+        }
+    }
+}
+
 /// Filters the positions lower if the robot hardly moves beside their noise, and says so.
 fn lower_cutoff(
     intake: &mut Intake,
@@ -119,6 +153,7 @@ fn lower_cutoff(
             recordings,
             to_axes,
             gravity,
+            lever: lever(sensor),
         };
         let unknowns = Unknowns {
             tool: recordings.iter().any(|own| !own.loaded),
@@ -328,28 +363,57 @@ fn weighing(
         }
         warnings.push(text);
     }
-    if sensed_mass(&fit) >= 0.0 {
-        return Ok(fit);
-    }
-    if let Some(stated) = sensor.reads {
-        let [is, says] = match stated {
-            Reads::Load => ["robot", "load"],
-            Reads::Robot => ["load", "robot"],
-        };
-        let text = format!(
-            "The load would weigh {} kg: the readings have the sign of reads = \"{is}\", but {} says reads = \"{says}\". Correct it, or look for a position column with the opposite sign.",
-            format_significant(sensed_mass(&fit), 4),
-            match sensing.robot.origin {
-                Origin::Urdf => "--reads",
-                Origin::Own => "[wrist_sensor] or --reads",
-            }
-        );
-        if !sensing.even_if_wrong {
-            return Err(LoadError::Fault(text));
+    let (mass, stated) = (sensed_mass(&fit), sensor.reads);
+    let start = Mounting::of(stated.unwrap_or(Reads::Load).sign());
+    let hangs = match mass < 0.0 || !explains(sensed, &fit) {
+        true => hanging(sensed, &fit, &start, stated.is_some()),
+        false => None,
+    };
+    let (text, fit) = match (hangs, mass < 0.0, stated) {
+        (Some(hangs), ..) => (Some(hanging_words(&hangs, sensing.robot)), hangs),
+        (None, false, _) => (None, fit),
+        (None, true, stated) => {
+            let text = stated.map(|stated| wrong_sense(mass, sensed, sensing.robot, stated));
+            let fit = settled(sensed, &fit.mounting.opposite(), &fit.unknowns);
+            (text, fit)
         }
-        warnings.push(text);
+    };
+    match text {
+        Some(text) if !sensing.even_if_wrong => Err(LoadError::Fault(text)),
+        text => {
+            warnings.extend(text);
+            Ok(fit)
+        }
     }
-    Ok(settled(sensed, &fit.mounting.opposite(), &fit.unknowns))
+}
+
+/// Says that gravity points the other way than described.
+fn hanging_words(fit: &Fit, robot: &Robot) -> String {
+    format!(
+        "Gravity points the other way than the description says, as for a robot that hangs: weight and inertia of the load agree then ({} kg). If it hangs, {}.",
+        format_significant(sensed_mass(fit), 4),
+        remedy(robot)
+    )
+}
+
+/// Says that the readings have another sign than is stated. At rest reversed gravity is the same.
+fn wrong_sense(mass: f64, sensed: &Sensed, robot: &Robot, stated: Reads) -> String {
+    let [is, says] = match stated {
+        Reads::Load => ["robot", "load"],
+        Reads::Robot => ["load", "robot"],
+    };
+    let hangs = match sensed.recordings.iter().all(|own| own.poses) {
+        true => format!(" If the robot hangs, {} instead.", remedy(robot)),
+        false => String::new(),
+    };
+    format!(
+        "The load would weigh {} kg: the readings have the sign of reads = \"{is}\", but {} says reads = \"{says}\". Correct it, or look for a position column with the opposite sign.{hangs}",
+        format_significant(mass, 4),
+        match robot.origin {
+            Origin::Urdf => "--reads",
+            Origin::Own => "[wrist_sensor] or --reads",
+        }
+    )
 }
 
 /// Refuses readings in which nothing weighs.

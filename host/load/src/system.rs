@@ -12,9 +12,8 @@ use std::ops::Range;
 use nalgebra::{
     DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, OMatrix, Rotation3, SMatrix, U3, Vector3,
 };
-use rig_identify::TriangularFactor;
+use rig_identify::{TriangularFactor, f_p_value};
 use rig_shared::multibody::INERTIAL_PARAMETERS;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::estimate::{Parameters, solved};
 use crate::mounting::Mounting;
@@ -195,6 +194,8 @@ pub(crate) struct Sensed<'a> {
     pub to_axes: &'a SMatrix<f64, INERTIAL_PARAMETERS, INERTIAL_PARAMETERS>,
     /// Gravity as described, in the base frame, m/s².
     pub gravity: Vector3<f64>,
+    /// Noise of the moments over that of the forces, m, where the rows do not tell it.
+    pub lever: f64,
 }
 
 /// A fit of the sensor's equations.
@@ -250,8 +251,7 @@ impl Fit {
         // Fits of unlike many equations are compared by equation.
         let before = smaller.squares_over(self) * self.equations as f64 / smaller.equations as f64;
         let ratio = (before - own) / further / (own / freedom);
-        let chance = FisherSnedecor::new(further, freedom).ok()?;
-        Some(chance.sf(ratio.max(0.0)))
+        f_p_value(ratio, [further, freedom])
     }
 }
 

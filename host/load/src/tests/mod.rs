@@ -2,6 +2,7 @@
 
 mod causes;
 mod columns;
+mod frozen;
 mod made;
 mod sensor;
 mod sentences;
