@@ -11,6 +11,7 @@ use crate::curved_bias::{Curve, curve};
 use crate::error::LoadError;
 use crate::estimate::Estimate;
 use crate::gain_error::GainError;
+use crate::hanging::remedy;
 use crate::mounting::Channels;
 use crate::statistics::{Recorded, noise_floor};
 use crate::system::{Fit, Nuisance, Sensed};
@@ -92,6 +93,24 @@ pub struct SensorFindings {
     pub prepared: Option<PreprocessingPlan>,
 }
 
+impl SensorFindings {
+    /// Says what no recording of this kind checks of the sensor. `is_unweighed` if no known mass was compared.
+    pub fn assumed(&self, is_unweighed: bool) -> String {
+        let weigh = match is_unweighed {
+            true => "; weigh the load: --mass checks the forces",
+            false => "",
+        };
+        match self.prepared {
+            Some(_) => format!(
+                "assumed: forces in N; a factor of all six readings shows in no motion{weigh}"
+            ),
+            None => format!(
+                "assumed: forces in N, moments in N·m and of the sign of the forces, about the described origin of the sensor; none of it shows at rest{weigh}, a motion the rest"
+            ),
+        }
+    }
+}
+
 /// A fit, with what is needed to tell it.
 pub(crate) struct Told<'a> {
     pub sensed: &'a Sensed<'a>,
@@ -165,8 +184,13 @@ impl Told<'_> {
                 Origin::Urdf => format!("give --reads {key}"),
                 Origin::Own => format!("write reads = \"{key}\" into [wrist_sensor]"),
             };
+            // At rest a robot that hangs reads the opposite as well.
+            let hangs = match (reads, self.sensed.recordings.iter().all(|own| own.poses)) {
+                (Reads::Robot, true) => format!(" If the robot hangs, {} instead.", remedy(self.robot)),
+                _ => String::new(),
+            };
             format!(
-                "The readings are the wrench of the {whose}, because the mass must be positive; {stated} to have this checked."
+                "The readings are the wrench of the {whose}, because the mass must be positive; {stated} to have this checked.{hangs}"
             )
         });
         let biases = self.biases();
@@ -205,15 +229,21 @@ impl Told<'_> {
     /// Says what explains the readings as well as what was found.
     fn alternative_words(&self) -> impl Iterator<Item = String> {
         self.alternatives.iter().map(|[found, other]| {
-            let factor = self.scale.filter(|_| *other == Nuisance::Scale);
-            let factor = factor.map_or_else(String::new, |[scale, std]| {
+            let scale = self.scale.filter(|_| *other == Nuisance::Scale);
+            let factor = scale.map_or_else(String::new, |[scale, std]| {
                 format!(
                     " ({} times, ± one standard deviation)",
                     format_value(scale, std)
                 )
             });
+            let forces = scale.map_or_else(String::new, |[scale, _]| {
+                format!(
+                    " Forces that read {} times their true size look the same, and the mass is then wrong by this factor: weigh the load, and give --mass.",
+                    format_significant(1.0 / scale, 3)
+                )
+            });
             format!(
-                "{}{factor} explains the readings as well as {}: poses in more directions, or a livelier motion, tell them apart.",
+                "{}{factor} explains the readings as well as {}: poses in more directions, or a livelier motion, tell them apart.{forces}",
                 capital(words(*other)),
                 words(*found)
             )

@@ -56,7 +56,7 @@ pub(crate) struct Args {
     #[arg(long)]
     poses: bool,
     /// A known load (load.toml) that is mounted as well, and is subtracted
-    #[arg(long, value_name = "FILE", conflicts_with = "without", alias = "tool")]
+    #[arg(long, value_name = "FILE", conflicts_with = "without")]
     subtract: Option<PathBuf>,
     /// Mass of the load as weighed, kg: a contradiction to the identified mass tells a wrong unit of the forces, or a wrong
     /// scale of forces or torques. It enters no fit
@@ -414,6 +414,7 @@ fn lines(
             format_significant(sensor.residual[1], 3)
         ));
         lines.push(sensor.gain_error.words());
+        lines.push(sensor.assumed(found.mass_checks.is_empty()));
     }
     lines.extend(found.mass_checks.iter().map(|check| {
         let whose = match check.by {

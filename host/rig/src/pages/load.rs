@@ -6,7 +6,7 @@ use rig_load::{
     ControllerNumbers, LoadIdentification, SensorFindings, TorqueTrace, Trace, Value,
     parameter_symbols,
 };
-use rig_output::{format_significant, format_unit, format_value};
+use rig_output::{capital, format_significant, format_unit, format_value};
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
 
 /// Names of the channels of the wrist sensor.
@@ -24,7 +24,7 @@ pub fn load(
     sections.push(body(found));
     sections.extend(not_shown(found));
     if let Some(sensor) = &found.sensor {
-        sections.push(readings(sensor));
+        sections.push(readings(sensor, found.mass_checks.is_empty()));
         sections.push(biases(sensor));
     }
     sections.extend(torques(found));
@@ -178,7 +178,7 @@ fn not_shown(found: &LoadIdentification) -> Option<Section> {
 }
 
 /// Readings over time beside the fit.
-fn readings(sensor: &SensorFindings) -> Section {
+fn readings(sensor: &SensorFindings, is_unweighed: bool) -> Section {
     let mut section = Section::new(
         "readings",
         "Readings and fit",
@@ -212,9 +212,10 @@ fn readings(sensor: &SensorFindings) -> Section {
         )),
     )))
     .with(Block::Text(format!(
-        "Gains of the sensor, one standard deviation: {}.",
+        "Gains of the sensor (deviations are one standard deviation), {}.",
         sensor.gain_error.words()
     )))
+    .with(Block::Text(format!("{}.", capital(&sensor.assumed(is_unweighed)))))
 }
 
 /// Draws one kind of readings with the fit; poses (`still`) are not joined by lines, because nothing was recorded between.
