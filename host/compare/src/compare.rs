@@ -169,6 +169,15 @@ fn tested_causes(
     let Some(mut found) = found else {
         return Ok(None);
     };
+    let torques = contradicting(zeros.sets);
+    if !torques.is_empty() && torques.len() < zeros.sets.len() {
+        found.named = None;
+        found.sentence = format!(
+            "The torques of the joints of {} contradict each other (see the warnings): first correct them, or leave out the set; no other cause can be told beside it.",
+            torques.join(" and of ")
+        );
+        return Ok(Some(found));
+    }
     found.corrected = corrected(zeros, &found, names, &options.identify)?;
     let second = (found.corrected.as_ref()).and_then(|own| own.named.as_ref());
     if found.named.is_none() && second.is_some() {

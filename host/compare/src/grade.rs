@@ -87,6 +87,9 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
     reasons.extend_from_slice(of.drifting);
     let grade = match (differ, matters) {
         (true, _) if !decided_without_short(of) => Grade::Undecided,
+        // The errors of such a set are so large that its parameters agree with any others. All sets may share a wrong gear
+        // ratio of the description.
+        (false, _) if (1..of.names.len()).contains(&of.contradicting.len()) => Grade::Undecided,
         (false, false) => Grade::Agree,
         (false, true) => Grade::Undecided,
         (true, false) => Grade::DifferWithoutEffect,

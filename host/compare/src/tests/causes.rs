@@ -63,7 +63,8 @@ fn a_torque_constant_that_changed_by_three_per_cent_is_named_scale() {
     );
 }
 
-/// A factor at one joint makes the set's own equations contradict each other, and its errors large.
+/// A factor at one joint makes the set's own equations contradict each other, and its errors large: that is no agreement, and
+/// no other cause is named.
 #[test]
 fn a_torque_constant_of_one_joint_is_told_with_its_set() {
     for draw in 0..DRAWS {
@@ -78,6 +79,10 @@ fn a_torque_constant_of_one_joint_is_told_with_its_set() {
         };
         assert_eq!(told(&list), Vec::<String>::new(), "draw {draw}");
         list[2].0.reads[1] = 1.10;
+        let found = compared(&list);
+        assert_ne!(found.grade, Grade::Agree, "{:?}", found.reasons);
+        let named = found.causes.and_then(|own| own.named);
+        assert_eq!(named, None, "draw {draw}");
         let said = told(&list);
         let [said] = &said[..] else {
             panic!("draw {draw}: {said:?}");
