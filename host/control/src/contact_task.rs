@@ -38,6 +38,9 @@ const FASTEST: f64 = 4.0;
 pub(crate) const MOBILE: f64 = 1e-4;
 /// Time between contact, slide and end, s.
 const SETTLE: f64 = 3.0;
+/// Time for the force to settle on a soft surface after the way into it at the speed of the approach, s. The force loop needs
+/// five times 1/(2π·10 Hz) and the measures half a second.
+const RESTED: f64 = 1.5;
 /// Time of the impedance's approach, as a share of that before the slide.
 const IMPEDANCE_SHARE: f64 = 0.6;
 /// Highest speed of a fifth-degree motion over its mean.
@@ -81,6 +84,9 @@ pub struct ContactTask {
     pub inertia: Vec<f64>,
     /// Wanted force, N.
     pub force: f64,
+    /// Force that the torque limits allow in the start pose, N; infinite without limits.
+    #[serde(skip)]
+    pub largest_force: f64,
     /// Planned highest speed of the hybrid law's approach, m/s.
     pub approach: f64,
     /// Bandwidth of the force loop, Hz.
@@ -200,7 +206,8 @@ impl ContactTask {
         let directions = directions(&mobility, normal);
         let count = directions.len();
         let inertia = inertias(&mobility, &directions)?;
-        let force = force(model, &pose, &matrix, normal, options.force, &mut notes)?;
+        let [force, largest_force] =
+            force(model, &pose, &matrix, normal, options.force, &mut notes)?;
         if let Some(rate) = needed_rate(&surface, inertia[0], settings) {
             notes.push(format!(
                 "The measured force is late on this stiff surface for a tool of {:.3} kg, and the force settles slowly: give --rate {rate:.0}, or a softer surface.",
@@ -214,7 +221,9 @@ impl ContactTask {
         let approach = stiffest.min(damped).min(APPROACH);
         let speed = planned_speed(approach, force, &surface, settings);
         let way = surface.gap + depth(force, &targets, &surface);
-        let slide_start = (1.2 * surface.gap / speed + SETTLE)
+        // The approach's speed is a bound inside a soft surface, too.
+        let into = force / (surface.stiffness * speed);
+        let slide_start = (1.2 * surface.gap / speed + SETTLE.max(into + RESTED))
             .max(QUINTIC_PEAK * way / (IMPEDANCE_SHARE * damped));
         if !(slide_start < LONGEST) {
             return Err(ControlError::Unreachable(format!(
@@ -235,6 +244,7 @@ impl ContactTask {
             targets,
             inertia,
             force,
+            largest_force,
             approach,
             force_bandwidth: force_bandwidth(settings),
             slide: if slides { options.slide } else { 0.0 },
@@ -341,7 +351,7 @@ fn quintic(distance: f64, duration: f64, t: f64) -> Reference<f64> {
     }
 }
 
-/// Chooses the force, and checks that the torque limits allow it in the start pose.
+/// Chooses the force, and checks that the torque limits allow it in the start pose. Returns the largest one, too.
 fn force(
     model: &LawModel,
     pose: &[f64],
@@ -349,7 +359,7 @@ fn force(
     normal: Vector3<f64>,
     given: Option<f64>,
     notes: &mut Vec<String>,
-) -> Result<f64, ControlError> {
+) -> Result<[f64; 2], ControlError> {
     let mut gravity = vec![0.0; pose.len()];
     gravity_vector(&model.chain, &model.parameters, pose, &mut gravity)
         .map_err(|error| at_start(error.into()))?;
@@ -377,5 +387,5 @@ fn force(
             "A force of {force} N is not possible: in the start pose the torque limits allow more than 0 and less than {most:.3} N; give another --press or --pose."
         )));
     }
-    Ok(force)
+    Ok([force, most])
 }

@@ -86,6 +86,8 @@ pub(crate) struct ForceMeasures {
     pub overshoot_before_slide: f64,
     pub settling: Option<f64>,
     pub steady_error: f64,
+    /// Standard deviation of the force at rest before the slide, N.
+    pub scatter: f64,
     pub slide_force: Option<f64>,
     pub slide_peak: Option<f64>,
     pub slide_error: Option<f64>,
@@ -152,6 +154,11 @@ pub(crate) fn force(
         overshoot_before_slide: beyond(before),
         settling,
         steady_error: mean_or_zero(steady) - task.force,
+        scatter: {
+            let mean = mean_or_zero(steady);
+            let away: Vec<f64> = steady.iter().map(|f| f - mean).collect();
+            rms(&away)
+        },
         slide_force: (task.slide > 0.0).then(|| {
             let off: Vec<f64> = after.iter().map(|f| f - task.force).collect();
             rms(&off)

@@ -21,6 +21,11 @@ const OVERSHOOT: f64 = 0.1;
 /// depends on the last digits: on the IRp-6 it was 0.76 N with 5 N, and up to 0.80 N with 8 N (29 November 2026).
 const MARGIN: f64 = 1.5;
 
+/// Standard deviations of the force at rest that noise of the sensor reaches during a slide, 1.
+const REACHED: f64 = 3.0;
+/// Share of a peak from which that noise makes it, 1: more than anything else.
+const BY_NOISE: f64 = 0.5;
+
 /// Returns a sentence about each limit that the motion left or stayed at.
 pub(crate) fn of_motion(robot: &Robot, trace: &Trace, on_surface: bool) -> Vec<String> {
     let mut warnings = PositionLimits::of(robot).left(&trace.q, trace.period);
@@ -71,7 +76,7 @@ pub(crate) fn of_force(
     task: &ContactTask,
     settings: &Settings,
 ) -> Vec<String> {
-    let contact = at_contact(found, task);
+    let contact = at_contact(found, task, settings);
     contact
         .into_iter()
         .chain(in_slide(law, found, task, settings))
@@ -116,15 +121,61 @@ pub(crate) fn of_failures(draws: &Robustness) -> Option<String> {
     ))
 }
 
-fn at_contact(found: &ForceMeasures, task: &ContactTask) -> Option<String> {
+/// Returns a sentence on a peak of the slide that is within the limit by chance.
+fn near_limit(
+    during: f64,
+    found: &ForceMeasures,
+    task: &ContactTask,
+    settings: &Settings,
+) -> String {
+    let why = match by_noise(during * task.force, found, task, settings) {
+        Some(_) => "the noise of the sensor makes it",
+        None => "which joint begins to move first depends on the last digits of the model",
+    };
+    format!(
+        "the force peaks {:.1} % above {:.1} N during the slide, near the limit of {:.0} %: {why}, and the next motion may peak higher. Give --wrong 0.01 to see how much the peak varies.",
+        100.0 * during,
+        task.force,
+        100.0 * OVERSHOOT,
+    )
+}
+
+/// Returns a sentence if the noise of the sensor makes a peak of `peak` (N) above the wanted force.
+fn by_noise(
+    peak: f64,
+    found: &ForceMeasures,
+    task: &ContactTask,
+    settings: &Settings,
+) -> Option<String> {
+    let reached = REACHED * found.scatter;
+    (settings.force_noise > 0.0 && reached > BY_NOISE * peak).then(|| {
+        format!(
+            "the force peaks at {:.1} N of {:.1} N: the noise of the sensor ({} N) makes it. The law follows the noise: the force has a standard deviation of {} N already at rest, before the slide. Give {}a sensor with less noise.",
+            task.force + peak,
+            task.force,
+            format_significant(settings.force_noise, 3),
+            format_significant(found.scatter, 2),
+            match (MARGIN * peak / OVERSHOOT).ceil() {
+                more if more < task.largest_force => format!("--press {more:.0}, or "),
+                _ => String::new(),
+            },
+        )
+    })
+}
+
+fn at_contact(found: &ForceMeasures, task: &ContactTask, settings: &Settings) -> Option<String> {
     let before = found.overshoot_before_slide;
-    (before > OVERSHOOT).then(|| {
+    if before <= OVERSHOOT {
+        return None;
+    }
+    by_noise(before * task.force, found, task, settings).or_else(|| {
+        Some(
         format!(
             "the force peaks at {:.1} N of {:.1} N after the contact at {:.4} m/s. Give a better model, a larger --press, or a softer or less damped surface.",
             (1.0 + before) * task.force,
             task.force,
             found.impact_speed
-        )
+        ))
     })
 }
 
@@ -136,7 +187,8 @@ fn in_slide(
 ) -> Option<String> {
     let during = found.slide_peak? / task.force - 1.0;
     if during <= OVERSHOOT {
-        return None;
+        return (law == LawKind::Hybrid && MARGIN * during > OVERSHOOT)
+            .then(|| near_limit(during, found, task, settings));
     }
     if law != LawKind::Hybrid {
         return Some(format!(
@@ -152,13 +204,21 @@ fn in_slide(
     // Friction of the joints makes the peak, so it hardly grows with the force, but for the smallest forces. On a surface with
     // damping this was not measured.
     let peak = during * task.force;
-    let larger = match task.surface.damping > 0.0 {
-        true => String::new(),
-        false => format!(
-            " If the peak of {} N does not grow with the force, it is less than {:.0} % from --press {:.0} on.",
+    if let Some(noise) = by_noise(peak, found, task, settings) {
+        return Some(noise);
+    }
+    let more = (MARGIN * peak / OVERSHOOT).ceil();
+    let larger = match (task.surface.damping > 0.0, more < task.largest_force) {
+        (true, _) => String::new(),
+        (false, true) => format!(
+            " If the peak of {} N does not grow with the force, it is less than {:.0} % from --press {more:.0} on.",
             format_significant(peak, 2),
             100.0 * OVERSHOOT,
-            (MARGIN * peak / OVERSHOOT).ceil(),
+        ),
+        (false, false) => format!(
+            " The peak of {} N is less than {:.0} % only of a force of {more:.0} N, which is more than the torque limits allow.",
+            format_significant(peak, 2),
+            100.0 * OVERSHOOT,
         ),
     };
     let inertia = |k: usize| format_significant(task.inertia[k], 3);

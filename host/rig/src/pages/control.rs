@@ -101,7 +101,9 @@ fn summary(found: &Evaluation, warned: usize) -> Vec<Fact> {
                 .tone(tone(best.warnings.is_empty())),
         );
     }
-    for own in found.tracking.iter().take(3) {
+    // The smallest of one law is that law's.
+    let several = found.tracking.iter().filter(|_| found.tracking.len() > 1);
+    for own in several.take(3) {
         facts.push(
             Fact::new(own.law.name(), short(1e3 * own.tool_rms))
                 .unit("mm RMS")
