@@ -205,6 +205,14 @@ pub enum ExciteError {
         /// Number of joints.
         joints: usize,
     },
+    /// A sampled trajectory whose units are not those of the robot.
+    #[error("{}: {what}", path.display())]
+    Units {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with which column, and what would be right.
+        what: String,
+    },
     /// A sampled trajectory with uneven sampling.
     #[error("{}, row {row}: the samples of a trajectory must be evenly spaced in time, without gaps; sample it at one rate", path.display())]
     Uneven {

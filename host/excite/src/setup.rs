@@ -13,12 +13,25 @@ use crate::workspace::planes_of;
 use crate::wrist_chain::WristChain;
 use crate::{ExciteError, Options, Parameters, Scaling};
 use rig_identify::{Base, ModelKind};
-use rig_model::robot::{Robot, WristSensor};
+use rig_model::robot::{JointKind, Robot, WristSensor};
 use rig_model::simulate::{Model, SimulateError};
 
 /// Noise of a wrist sensor's moments over that of its forces, m, if neither noise nor ranges are known: the order of
 /// the sensor's radius, over which it measures both as strains.
 const MOMENT_SHARE: f64 = 0.05;
+
+/// Returns a hint, after a semicolon, if a start is outside its bounds and inside them as degrees; else nothing.
+pub(crate) fn degrees(kind: JointKind, start: f64, [low, high]: [f64; 2]) -> String {
+    let inside = |q: f64| low < q && q < high;
+    let turned = kind == JointKind::Revolute && start.abs() > std::f64::consts::TAU;
+    match turned && !inside(start) && inside(start.to_radians()) {
+        true => format!(
+            "; it looks like degrees: {start} degrees are {:.4} rad",
+            start.to_radians()
+        ),
+        false => String::new(),
+    }
+}
 
 /// Rejects a start outside the limits of the joints or of the cranks.
 fn check_start(
@@ -45,8 +58,11 @@ fn check_start(
                 "start",
                 value.to_string(),
                 format!(
-                    "it must lie strictly between {} and {} for joint \"{}\": a motion swings to both sides of its start",
-                    low, high, joint.name
+                    "it must lie strictly between {} and {} for joint \"{}\": a motion swings to both sides of its start{}",
+                    low,
+                    high,
+                    joint.name,
+                    degrees(joint.kind, *value, [b.low, b.high])
                 ),
             ));
         }

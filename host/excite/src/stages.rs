@@ -14,6 +14,7 @@ use crate::feasible::refuse_unreachable;
 use crate::instants::{Instants, MOTOR_STEPS, TORQUE_STEPS};
 use crate::motor_limits::exceeded;
 use crate::quintic_move::{micros, move_time};
+use crate::setup::degrees;
 use crate::torque_share::torque_share;
 use crate::{ExciteError, JointTrajectory, TrajectoryFile};
 use rig_model::robot::{JointKind, Robot};
@@ -346,10 +347,11 @@ fn distance_of(
     bounds: &Bounds,
     combined: &[Combined],
     start: &[f64],
-    moving: usize,
+    (moving, kind): (usize, JointKind),
 ) -> Result<f64, String> {
     let at = start[moving];
-    let mut room = (bounds.high - at).min(at - bounds.low);
+    let own = (bounds.high - at).min(at - bounds.low);
+    let mut room = own;
     for limit in combined {
         let now = limit.at(start.iter().copied());
         let turn = limit.weights[moving].abs();
@@ -361,9 +363,13 @@ fn distance_of(
     let share = if options.margin.is_some() { 1.0 } else { SHARE };
     let most = share * room;
     if most.is_nan() || most <= 0.0 {
+        let where_to = match own > 0.0 {
+            true => "within the range of a crank".to_owned(),
+            false => format!("between {} and {}", bounds.low, bounds.high),
+        };
         return Err(format!(
-            "it starts at {at}, which leaves nothing between {} and {} or within the range of a crank; start it elsewhere",
-            bounds.low, bounds.high
+            "it starts at {at}, which leaves nothing {where_to}; start it elsewhere{}",
+            degrees(kind, at, [bounds.low, bounds.high])
         ));
     }
     match options.amplitude {
@@ -496,7 +502,7 @@ impl<'a> Prepared<'a> {
             &ready.bounds[moving],
             &combined,
             &ready.start,
-            moving,
+            (moving, robot.joints[moving].kind),
         )
         .map_err(|why| ready.no_room(why))?;
         Ok(ready)

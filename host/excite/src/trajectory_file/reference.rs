@@ -6,14 +6,21 @@ use super::content::TrajectoryFile;
 use super::samples::{SampledReference, check_rate};
 use crate::ExciteError;
 use crate::interpolation::Samples;
-use rig_data::{EffortNeed, JointColumns, Source};
+use rig_data::{
+    Block, EffortNeed, Implausible, JointColumns, Source, implausible_positions, unit_of_steps,
+};
 use rig_model::robot::Robot;
+use rig_numerics::statistics::median;
 
 /// Share of a joint's motion that every second sample may miss of the others. At 10 % a sine has 7.4 samples a period: the
 /// interpolation of all samples is within 0.2 % of its position and 2 % of its velocity.
 const MISSED: f64 = 0.1;
 /// Distance from the interpolation that counts as noise, rad or m: ten steps of the encoder that `rig control` assumes.
 const NOISE: f64 = 1e-4;
+/// Median step from which t may be in milliseconds, s: the rule of recordings, which come at more than 5 Hz.
+const LONG_STEP: f64 = 0.2;
+/// Highest speed of a robot's joint without a described limit, rad/s or m/s.
+const FASTEST: f64 = 100.0;
 /// Relative difference of two rates that are the same.
 const SAME_RATE: f64 = 1e-6;
 
@@ -101,6 +108,12 @@ pub fn load_reference(
     };
     let mut designed = true;
     let blocks = source.read_all()?.0;
+    if let Some(what) = blocks.first().and_then(|all| wrong_unit(all, robot)) {
+        return Err(ExciteError::Units {
+            path: path.into(),
+            what,
+        });
+    }
     for (k, block) in blocks.iter().enumerate() {
         if source.sampling().irregular || k > 0 {
             return Err(uneven(block.first_line));
@@ -123,4 +136,56 @@ pub fn load_reference(
         return Err(uneven(1));
     }
     Ok(sampled)
+}
+
+/// Returns what is wrong with the units of a trajectory, by the checks of recordings; `None` if nothing is.
+fn wrong_unit(block: &Block, robot: &Robot) -> Option<String> {
+    let wanted = Block {
+        t: block.t.clone(),
+        joints: (block.joints.iter())
+            .map(|own| JointColumns {
+                q: own.reference.as_ref().unwrap_or(&own.q).clone(),
+                ..JointColumns::default()
+            })
+            .collect(),
+        ..Block::default()
+    };
+    let column = |joint: usize| match block.joints[joint - 1].reference {
+        Some(_) => "ref",
+        None => "q",
+    };
+    implausible_positions(&wanted, robot)
+        .into_iter()
+        .find_map(|own| match own {
+            Implausible::Degrees {
+                joint,
+                lowest,
+                highest,
+                limit,
+                ..
+            } => Some(format!(
+                "{}{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad",
+                column(joint)
+            )),
+            _ => None,
+        })
+        .or_else(|| long_steps(&wanted, robot))
+}
+
+/// Returns a sentence if t is in milliseconds or less: its steps are long, and the motion is possible in a thousandth of
+/// the time. A motion that is sampled as seldom and is possible in seconds alone is left.
+fn long_steps(block: &Block, robot: &Robot) -> Option<String> {
+    let steps: Vec<f64> = block.t.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let step = median(steps).filter(|step| *step >= LONG_STEP)?;
+    let possible = (block.joints.iter().zip(&robot.joints)).all(|(own, joint)| {
+        let limit = joint.limits.as_ref().map_or(FASTEST, |own| own.velocity);
+        let largest = (own.q.windows(2)).fold(0.0f64, |most, q| most.max((q[1] - q[0]).abs()));
+        largest / (1e-3 * step) <= 10.0 * limit
+    });
+    possible.then(|| {
+        format!(
+            "t looks like {} (its steps are {step:.4}); give it in s, or at more than 5 Hz if it is in s",
+            unit_of_steps(step)
+        )
+    })
 }
