@@ -194,12 +194,8 @@ pub(crate) fn judge(
     sensor: &WristSensor,
     poses: bool,
 ) -> Result<Judged, LoadError> {
-    let Seen {
-        rows,
-        length,
-        channels,
-        pace,
-    } = seen(recording, robot)?;
+    let seen = seen(recording, robot)?;
+    let (rows, channels, pace) = (seen.rows, seen.channels, seen.pace);
     if rows < LEAST_ROWS as u64 {
         return Err(LoadError::TooFew {
             rows: rows as usize,
@@ -261,7 +257,7 @@ pub(crate) fn judge(
         rows,
         pace,
         poses,
-        length,
+        length: seen.length,
         ends,
         cut,
         suspects,
