@@ -208,3 +208,26 @@ fn a_sampled_motion_is_simulated_at_the_rate_that_is_asked_for() {
         "{said}"
     );
 }
+
+#[test]
+fn a_trajectory_in_milliseconds_or_degrees_is_refused_and_one_in_si_units_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.csv");
+    let with = |name: &str, time: f64, angle: f64| {
+        let path = folder.path().join(name);
+        let mut text = String::from("t,q1,q2\n");
+        for k in 0..300 {
+            let t = 0.01 * f64::from(k);
+            let (a, b) = (0.8 * t.sin(), 0.6 * (1.3 * t).sin());
+            text += &format!("{},{},{}\n", time * t, angle * a, angle * b);
+        }
+        fs::write(&path, text).unwrap();
+        simulate(&robot("edda.toml"), &path, &out)
+    };
+    let said = refuse(&mut with("ms.csv", 1e3, 1.0));
+    assert!(said.contains("ms.csv: t looks like milliseconds"), "{said}");
+    let said = refuse(&mut with("deg.csv", 1.0, 57.3));
+    assert!(said.contains("deg.csv: q1 looks like degrees"), "{said}");
+    assert!(!out.exists());
+    succeed(&mut with("si.csv", 1.0, 1.0));
+}
