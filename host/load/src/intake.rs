@@ -49,10 +49,10 @@ pub(crate) fn judged(sensing: &Sensing, sensor: &WristSensor) -> Result<Vec<Judg
         judge(*recording, sensing.robot, sensor, sensing.poses)
     };
     let judged: Vec<Judged> = (sensing.recordings.iter().map(judge)).collect::<Result<_, _>>()?;
-    let faults = judged
+    let mut faults = judged
         .iter()
         .flat_map(|own| own.spike.iter().chain(&own.frozen));
-    let fault = faults.cloned().next();
+    let fault = faults.next().cloned();
     match fault {
         Some(text) if !sensing.even_if_wrong => Err(LoadError::Fault(text)),
         _ => Ok(judged),

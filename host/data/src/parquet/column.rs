@@ -144,7 +144,8 @@ impl ColumnReader {
 
 impl Decoded {
     fn read<T: Numeric>(&mut self, pages: &mut ColumnReaderImpl<T>) -> Result<(), ParquetError> {
-        (self.repetition.clear(), self.definition.clear());
+        self.repetition.clear();
+        self.definition.clear();
         let mut values = Vec::with_capacity(ROWS);
         let levels = (&mut self.definition, &mut self.repetition);
         let (_, _, count) =
