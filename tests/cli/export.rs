@@ -87,24 +87,17 @@ fn a_recording_is_the_same_in_every_format() {
     assert!((values[1][0] - std::f64::consts::PI).abs() < 1e-12);
 }
 
-/// NumPy itself, where it is installed.
-#[test]
-fn numpy_reads_what_is_converted() {
+/// Runs a script with the files that `made` makes, if a Python with these modules is installed.
+fn read_by_python(modules: &str, script: &str, made: impl FnOnce() -> Vec<PathBuf>) {
     let python = std::env::var("RIG_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let has_numpy = Command::new(&python).args(["-c", "import numpy"]).output();
-    if !has_numpy.is_ok_and(|output| output.status.success()) {
-        println!("SKIPPED: {python} has no NumPy; RIG_PYTHON names one that has.");
+    let import = format!("import {modules}");
+    let found = Command::new(&python).args(["-c", &import]).output();
+    if !found.is_ok_and(|output| output.status.success()) {
+        println!("SKIPPED: {python} has no {modules}; RIG_PYTHON names one that has.");
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("log.npz");
-    succeed(&mut convert(&of_others("bag_mcap"), &path));
-    let script = "import sys, numpy\nf = numpy.load(sys.argv[1])\nassert f['q'].shape == (200, 3) and f['t'].shape == (200,), f['q'].shape\nt = f['t']\nassert abs(f['q'][:, 1] - 0.5 * numpy.sin(3 * t)).max() < 1e-9\nassert abs(f['tau'][:, 1] - 2 * f['q'][:, 1]).max() < 1e-9\n";
-    let output = Command::new(&python)
-        .args(["-c", script])
-        .arg(&path)
-        .output()
-        .unwrap();
+    let mut run = Command::new(&python);
+    let output = run.args(["-c", script]).args(made()).output().unwrap();
     assert!(
         output.status.success(),
         "{}",
@@ -112,33 +105,30 @@ fn numpy_reads_what_is_converted() {
     );
 }
 
+/// NumPy itself, where it is installed.
+#[test]
+fn numpy_reads_what_is_converted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.npz");
+    let script = "import sys, numpy\nf = numpy.load(sys.argv[1])\nassert f['q'].shape == (200, 3) and f['t'].shape == (200,), f['q'].shape\nt = f['t']\nassert abs(f['q'][:, 1] - 0.5 * numpy.sin(3 * t)).max() < 1e-9\nassert abs(f['tau'][:, 1] - 2 * f['q'][:, 1]).max() < 1e-9\n";
+    read_by_python("numpy", script, || {
+        succeed(&mut convert(&of_others("bag_mcap"), &path));
+        vec![path]
+    });
+}
+
 /// pyarrow itself, where it is installed.
 #[test]
 fn pyarrow_reads_what_is_converted() {
-    let python = std::env::var("RIG_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let has_pyarrow = Command::new(&python)
-        .args(["-c", "import numpy, pyarrow"])
-        .output();
-    if !has_pyarrow.is_ok_and(|output| output.status.success()) {
-        println!("SKIPPED: {python} has no pyarrow; RIG_PYTHON names one that has.");
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("log.parquet");
-    let csv = folder.path().join("log.csv");
-    succeed(&mut convert(&of_others("bag_mcap"), &path));
-    succeed(&mut convert(&of_others("bag_mcap"), &csv));
+    let files = ["log.parquet", "log.csv"].map(|name| folder.path().join(name));
     let script = "import sys, json, numpy, pyarrow.parquet\nf = pyarrow.parquet.read_table(sys.argv[1])\nlines = open(sys.argv[2]).read().split()\nassert f.column_names == lines[0].split(','), f.column_names\nwant = numpy.array([line.split(',') for line in lines[1:]], dtype=float)\nown = numpy.array([c.to_numpy() for c in f.columns]).T\nassert own.shape == want.shape and (own == want).all()\nassert json.loads(f.schema.metadata[b'units'])['tau1'] == 'N*m'\n";
-    let output = Command::new(&python)
-        .args(["-c", script])
-        .args([&path, &csv])
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    read_by_python("numpy, pyarrow", script, || {
+        for path in &files {
+            succeed(&mut convert(&of_others("bag_mcap"), path));
+        }
+        files.to_vec()
+    });
 }
 
 #[test]

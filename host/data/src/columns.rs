@@ -209,6 +209,14 @@ pub(super) struct Layout {
 const SINCE_1970: f64 = 1e8;
 
 impl Layout {
+    /// Returns the first column whose value is no measurement, if it must be one, with its place and that value.
+    pub(super) fn refused(&self, values: &[f64]) -> Option<(usize, &FileColumn, f64)> {
+        let all = self.columns.iter().zip(values).enumerate();
+        let mut all = all.map(|(k, (column, value))| (k, column, *value));
+        // A value that is no number is not below the bound.
+        all.find(|(_, column, value)| column.strict && !(value.abs() <= column.largest()))
+    }
+
     /// Refuses values of these columns that are no finite numbers.
     pub(super) fn require_numbers(&mut self, names: &[String]) {
         for column in &mut self.columns {

@@ -302,12 +302,12 @@ impl JoinedRows {
 
     /// Checks the values of mapped columns.
     fn check(&self, layout: &Layout, values: &[f64], number: u64) -> Result<(), DataError> {
-        for (column, value) in layout.columns.iter().zip(values) {
-            if column.strict && !(value.abs() <= column.largest()) {
-                return Err(column.no_measurement(&self.path, Place::Message(number), *value));
+        match layout.refused(values) {
+            Some((_, column, value)) => {
+                Err(column.no_measurement(&self.path, Place::Message(number), value))
             }
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 

@@ -104,7 +104,7 @@ pub use parquet::ParquetWriter;
 pub use place::Place;
 pub use plain_rows::PlainRows;
 pub use plausibility::{Implausible, JUDGED_ROWS, implausible_positions, plausibility};
-pub use plausibility::{sign_of_steps, strange_rates, unit_of_steps, velocity_scale};
+pub use plausibility::{long_step, sign_of_steps, strange_rates, unit_of_steps, velocity_scale};
 pub use position_jump::has_position_jump;
 pub use quantity::Quantity;
 pub use reference::reference_scale;

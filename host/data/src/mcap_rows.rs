@@ -365,10 +365,8 @@ impl McapRows {
             Some((_, Samples::JointStates(states))) => states.row(self.log_time, values),
             None => return Ok(None),
         }
-        for (value, column) in values.iter().zip(&layout.columns) {
-            if column.strict && !(value.abs() <= column.largest()) {
-                return Err(self.bad_value(column, *value));
-            }
+        if let Some((_, column, value)) = layout.refused(values) {
+            return Err(self.bad_value(column, value));
         }
         let time = values.get(layout.time).copied().unwrap_or(f64::NAN);
         self.given = (self.given.0 + 1, time);

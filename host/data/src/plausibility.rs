@@ -379,19 +379,17 @@ fn nth(rows: usize) -> String {
     }
 }
 
+/// Returns the median step of times if it is so long that their unit may be less than a second. Motion sampled at 5 Hz or less
+/// cannot be identified, and 0.2 is also a step of 0.2 ms in milliseconds.
+pub fn long_step(times: &[f64]) -> Option<f64> {
+    let steps = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    median(steps).filter(|step| *step >= 0.2)
+}
+
 /// Returns all columns in `block` that cannot be in SI units for `robot`; empty if there are none.
 pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     let mut found = Vec::new();
-    let steps: Vec<f64> = block
-        .t
-        .iter()
-        .zip(block.t.iter().skip(1))
-        .map(|(a, b)| b - a)
-        .collect();
-    // Motion sampled at 5 Hz or less cannot be identified; 0.2 is also a step of 0.2 ms in milliseconds.
-    if let Some(step) = median(steps)
-        && step >= 0.2
-    {
+    if let Some(step) = long_step(&block.t) {
         found.push(Implausible::NotSeconds { step });
     }
     for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {

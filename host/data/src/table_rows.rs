@@ -96,17 +96,14 @@ impl TableRows {
         }
         self.next += 1;
         let number = self.next as u64;
-        for ((place, own), column) in values
-            .iter_mut()
-            .zip(&self.columns.values)
-            .zip(&layout.columns)
-        {
-            let value = own.get(row).copied().unwrap_or(f64::NAN);
-            *place = value;
-            if column.strict && !(value.abs() <= column.largest()) {
-                return Err(column.no_measurement(&self.path, Place::Row(number), value));
-            }
+        for (place, own) in values.iter_mut().zip(&self.columns.values) {
+            *place = own.get(row).copied().unwrap_or(f64::NAN);
         }
-        Ok(Some(number))
+        match layout.refused(values) {
+            Some((_, column, value)) => {
+                Err(column.no_measurement(&self.path, Place::Row(number), value))
+            }
+            None => Ok(Some(number)),
+        }
     }
 }

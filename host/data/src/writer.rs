@@ -13,7 +13,7 @@ use super::mcap_rows::TOPIC;
 use super::parquet::ParquetWriter;
 use super::written_rows::{Column, Rows};
 use rig_output::format_short;
-use rig_output::{persist, temporary};
+use rig_output::persist;
 
 /// Writer of one recording; the file gets its name in [`RecordingWriter::finish`].
 pub enum RecordingWriter {
@@ -88,9 +88,7 @@ pub struct CsvWriter {
 impl CsvWriter {
     /// Starts the file; see [`RecordingWriter::create`].
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
-        let mut rows = Rows::new(path, columns)?;
-        let file = temporary(path).map_err(|e| rows.failed(e))?;
-        rows.hidden = file.path().to_path_buf();
+        let (rows, file) = Rows::start(path, columns)?;
         let mut out = BufWriter::with_capacity(1 << 17, file);
         writeln!(out, "{}", rows.names.join(",")).map_err(|e| rows.failed(e))?;
         Ok(Self { rows, out })
@@ -150,9 +148,7 @@ impl McapWriter {
         columns: &[Column],
         metadata: &BTreeMap<String, String>,
     ) -> Result<Self, DataError> {
-        let mut rows = Rows::new(path, columns)?;
-        let file = temporary(path).map_err(|e| rows.failed(e))?;
-        rows.hidden = file.path().to_path_buf();
+        let (rows, file) = Rows::start(path, columns)?;
         let schema = schema(columns);
         let begin = || -> ::mcap::McapResult<_> {
             let mut out = ::mcap::WriteOptions::new()

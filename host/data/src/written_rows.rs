@@ -3,8 +3,10 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use tempfile::NamedTempFile;
+
 use super::error::DataError;
-use rig_output::format_short;
+use rig_output::{format_short, temporary};
 
 /// A column to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,7 +39,18 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    pub(crate) fn new(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
+    /// Checks the columns, and opens the file that takes the name `path` when the recording is complete.
+    pub(crate) fn start(
+        path: &Path,
+        columns: &[Column],
+    ) -> Result<(Self, NamedTempFile), DataError> {
+        let mut rows = Self::new(path, columns)?;
+        let file = temporary(path).map_err(|e| rows.failed(e))?;
+        rows.hidden = file.path().to_path_buf();
+        Ok((rows, file))
+    }
+
+    fn new(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
         let names: Vec<String> = columns.iter().map(|c| c.name.clone()).collect();
         let mut sorted = names.clone();
         sorted.sort();

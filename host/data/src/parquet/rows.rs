@@ -190,22 +190,19 @@ impl ParquetRows {
         let Some(row) = self.next_values(values)? else {
             return Ok(None);
         };
-        for (k, (value, column)) in values.iter().zip(&layout.columns).enumerate() {
-            if !column.strict || value.abs() <= column.largest() {
-                continue;
-            }
-            let place = Place::Row(row);
-            return Err(match self.missing.contains(&k) {
-                true => DataError::NotANumber {
-                    path: self.path.clone(),
-                    place,
-                    column: column.label.clone(),
-                    found: "nothing".into(),
-                },
-                false => column.no_measurement(&self.path, place, *value),
-            });
-        }
-        Ok(Some(row))
+        let Some((k, column, value)) = layout.refused(values) else {
+            return Ok(Some(row));
+        };
+        let place = Place::Row(row);
+        Err(match self.missing.contains(&k) {
+            true => DataError::NotANumber {
+                path: self.path.clone(),
+                place,
+                column: column.label.clone(),
+                found: "nothing".into(),
+            },
+            false => column.no_measurement(&self.path, place, value),
+        })
     }
 
     /// Reads the next row whatever it holds; a missing value is NaN.

@@ -15,7 +15,7 @@ use tempfile::NamedTempFile;
 
 use crate::error::DataError;
 use crate::written_rows::{Column, Rows};
-use rig_output::{persist, temporary};
+use rig_output::persist;
 
 /// Rows of a group: 1 MiB a column, as other writers take.
 const GROUP: usize = 1 << 17;
@@ -35,9 +35,7 @@ impl ParquetWriter {
         columns: &[Column],
         metadata: &BTreeMap<String, String>,
     ) -> Result<Self, DataError> {
-        let mut rows = Rows::new(path, columns)?;
-        let file = temporary(path).map_err(|e| rows.failed(e))?;
-        rows.hidden = file.path().to_path_buf();
+        let (rows, file) = Rows::start(path, columns)?;
         let out = start(file, columns, metadata).map_err(|e| rows.failed(other(e)))?;
         Ok(Self {
             values: vec![Vec::new(); columns.len()],

@@ -7,18 +7,16 @@ use super::samples::{SampledReference, check_rate};
 use crate::ExciteError;
 use crate::interpolation::Samples;
 use rig_data::{
-    Block, EffortNeed, Implausible, JointColumns, Source, implausible_positions, unit_of_steps,
+    Block, EffortNeed, Implausible, JointColumns, Source, implausible_positions, long_step,
+    unit_of_steps,
 };
 use rig_model::robot::Robot;
-use rig_numerics::statistics::median;
 
 /// Share of a joint's motion that every second sample may miss of the others. At 10 % a sine has 7.4 samples a period: the
 /// interpolation of all samples is within 0.2 % of its position and 2 % of its velocity.
 const MISSED: f64 = 0.1;
 /// Distance from the interpolation that counts as noise, rad or m: ten steps of the encoder that `rig control` assumes.
 const NOISE: f64 = 1e-4;
-/// Median step from which t may be in milliseconds, s: the rule of recordings, which come at more than 5 Hz.
-const LONG_STEP: f64 = 0.2;
 /// Highest speed of a robot's joint without a described limit, rad/s or m/s.
 const FASTEST: f64 = 100.0;
 /// Relative difference of two rates that are the same.
@@ -175,8 +173,7 @@ fn wrong_unit(block: &Block, robot: &Robot) -> Option<String> {
 /// Returns a sentence if t is in milliseconds or less: its steps are long, and the motion is possible in a thousandth of
 /// the time. A motion that is sampled as seldom and is possible in seconds alone is left.
 fn long_steps(block: &Block, robot: &Robot) -> Option<String> {
-    let steps: Vec<f64> = block.t.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let step = median(steps).filter(|step| *step >= LONG_STEP)?;
+    let step = long_step(&block.t)?;
     let possible = (block.joints.iter().zip(&robot.joints)).all(|(own, joint)| {
         let limit = joint.limits.as_ref().map_or(FASTEST, |own| own.velocity);
         let largest = (own.q.windows(2)).fold(0.0f64, |most, q| most.max((q[1] - q[0]).abs()));
