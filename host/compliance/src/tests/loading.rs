@@ -638,6 +638,24 @@ fn forces_in_other_axes_are_told_from_a_loading_that_shows_nothing() {
             "{said}"
         );
     }
+    for (k, words) in [
+        "With fx reversed they",
+        "With fy reversed they",
+        "With fz reversed they",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let turned = with_force(&runs, |mut f, _| {
+            f[k] = -f[k];
+            f
+        });
+        let said = complaint(&robot, &turned, &options);
+        assert!(
+            said.contains(words) && !said.contains("A force along"),
+            "{said}"
+        );
+    }
     // A sensor on the flange that the description lacks, with a bias.
     let mount = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), 0.7);
     let flange = |q: &[f64]| {
