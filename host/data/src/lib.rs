@@ -47,6 +47,7 @@ mod joint_names;
 mod joint_states;
 mod json_samples;
 mod layout;
+mod library_panic;
 mod likely_time;
 mod lost_rows;
 mod mapping;

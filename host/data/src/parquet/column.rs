@@ -1,7 +1,6 @@
 //! Values of one column, one behind the other, with some hundred rows and a page in memory.
 
 use std::fs::File;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use parquet::column::reader::{ColumnReader as Typed, ColumnReaderImpl};
@@ -14,6 +13,7 @@ use parquet::file::serialized_reader::SerializedRowGroupReader;
 use super::footer::{DAMAGED, refusal};
 use super::number::{Numeric, Stored};
 use super::schema::Leaf;
+use crate::library_panic::caught;
 
 /// Rows that are decoded at a time.
 const ROWS: usize = 512;
@@ -111,7 +111,7 @@ impl ColumnReader {
         (self.at, self.value) = (0, 0);
         let (decoded, pages) = (&mut self.decoded, &mut self.pages);
         // The crate panics at some damages, for instance at values of a dictionary that is missing (`parquet` 59.3).
-        let read = catch_unwind(AssertUnwindSafe(|| match pages {
+        let read = caught(|| match pages {
             Some(Typed::BoolColumnReader(pages)) => decoded.read(pages),
             Some(Typed::Int32ColumnReader(pages)) => decoded.read(pages),
             Some(Typed::Int64ColumnReader(pages)) => decoded.read(pages),
@@ -119,10 +119,10 @@ impl ColumnReader {
             Some(Typed::FloatColumnReader(pages)) => decoded.read(pages),
             Some(Typed::DoubleColumnReader(pages)) => decoded.read(pages),
             _ => Err(ParquetError::NYI("a column without numbers".into())),
-        }));
+        });
         match read {
-            Ok(Ok(())) => Ok(self.decoded.count > 0),
-            Ok(Err(_)) | Err(_) => Err(DAMAGED.into()),
+            Some(Ok(())) => Ok(self.decoded.count > 0),
+            Some(Err(_)) | None => Err(DAMAGED.into()),
         }
     }
 
