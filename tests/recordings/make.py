@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Writes the recordings in this folder with the programs that people use: rosbags, mcap, NumPy and SciPy.
 
-    pip install rosbags mcap mcap-ros2-support numpy scipy
+    pip install rosbags mcap mcap-ros2-support numpy scipy h5py hdf5storage
     python3 tests/recordings/make.py
 
-The signals are those of `signal` below; the tests of `rig-data` compute them too. Versions: rosbags 0.11, mcap 1.6.
+The signals are those of `signal` below; the tests of `rig-data` compute them too. Versions: rosbags 0.11, mcap 1.6,
+hdf5storage 0.2.
 """
 
 import json
@@ -13,6 +14,7 @@ import shutil
 import sqlite3
 from pathlib import Path
 
+import hdf5storage
 import numpy
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import StoragePlugin, Writer as BagWriter
@@ -152,6 +154,12 @@ def arrays():
     savemat(HERE / "arrays.mat", table, do_compression=True)
     log = {"t": table["t"], "q": table["q"].T, "tau": table["tau"].T, "rate": 500.0, "note": "a text"}
     savemat(HERE / "structure.mat", {"log": log}, do_compression=False)
+    # Version 7.3, as MATLAB writes it: numbers compressed by parts.
+    small = hdf5storage.Options(matlab_compatible=True, compress_size_threshold=1000)
+    for name in ["arrays_73.mat", "structure_73.mat"]:
+        (HERE / name).unlink(missing_ok=True)
+    hdf5storage.writes(table, filename=str(HERE / "arrays_73.mat"), options=small)
+    hdf5storage.writes({"log": log}, filename=str(HERE / "structure_73.mat"), options=small)
 
 
 if __name__ == "__main__":

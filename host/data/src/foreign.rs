@@ -47,9 +47,9 @@ pub enum ForeignFormat {
         "a MATLAB file of version 4; save it with `save('out.mat', 't', 'q', 'tau', '-v7')` (in Python: `scipy.io.savemat(\"out.mat\", {{\"t\": t, \"q\": q, \"tau\": tau}})`)"
     )]
     Matlab4,
-    /// MATLAB of version 7.3; versions 5 to 7.2 are read.
+    /// MATLAB of a version that is neither 5 to 7.2 nor 7.3.
     #[error(
-        "a MATLAB file of version 7.3, which is HDF5; save it with `save('out.mat', 't', 'q', 'tau', '-v7')`"
+        "a MATLAB file of an unknown version; save it with `save('out.mat', 't', 'q', 'tau', '-v7')`"
     )]
     Matlab,
     /// HDF5.

@@ -8,6 +8,7 @@ use super::bag::bag_files;
 use super::error::DataError;
 use super::foreign::{ForeignFormat, HEAD};
 use super::mat;
+use super::mat73;
 use super::mcap_records::MAGIC;
 use super::parquet;
 use super::sqlite;
@@ -19,6 +20,8 @@ pub(super) enum Arrays {
     NumPy,
     /// MATLAB file of version 5 to 7.2.
     Matlab,
+    /// MATLAB file of version 7.3.
+    Matlab73,
 }
 
 /// How the samples are stored.
@@ -84,6 +87,8 @@ fn file(path: &Path) -> Result<(Form, u64), DataError> {
         Form::Messages(vec![path.into()])
     } else if is(mat::MAGIC) {
         Form::Arrays(Arrays::Matlab)
+    } else if is(mat73::MAGIC) {
+        Form::Arrays(Arrays::Matlab73)
     } else if is(parquet::MAGIC) {
         Form::Parquet
     } else {

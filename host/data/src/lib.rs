@@ -52,6 +52,7 @@ mod likely_time;
 mod lost_rows;
 mod mapping;
 mod mat;
+mod mat73;
 mod mcap_index;
 mod mcap_messages;
 mod mcap_records;

@@ -326,7 +326,12 @@ fn chunks_in_another_order_are_sorted_by_their_time() {
 #[test]
 fn arrays_of_numpy_and_matlab_are_columns() {
     let robot = robot(&["elbow", "shoulder"]);
-    for name in ["arrays.npz", "compressed.npz", "arrays.mat"] {
+    for name in [
+        "arrays.npz",
+        "compressed.npz",
+        "arrays.mat",
+        "arrays_73.mat",
+    ] {
         let (blocks, warnings) = read(&of_others(name), &robot, &Mapping::default()).unwrap();
         assert_eq!(
             (blocks.len(), blocks[0].len()),
@@ -342,16 +347,17 @@ fn arrays_of_numpy_and_matlab_are_columns() {
         }
     }
     // In a structure and lying; a scalar beside it is no column. Cut off it is named.
-    let (blocks, warnings) =
-        read(&of_others("structure.mat"), &robot, &Mapping::default()).unwrap();
-    assert_eq!(blocks[0].len(), 200);
-    near(blocks[0].joints[1].q[199], truth(199).1[1]);
-    assert!(
-        warnings
-            .iter()
-            .any(|w| w.contains("rate (1 × 1)") && w.contains("note")),
-        "{warnings:?}"
-    );
+    for name in ["structure.mat", "structure_73.mat"] {
+        let (blocks, warnings) = read(&of_others(name), &robot, &Mapping::default()).unwrap();
+        assert_eq!(blocks[0].len(), 200);
+        near(blocks[0].joints[1].q[199], truth(199).1[1]);
+        assert!(
+            warnings
+                .iter()
+                .any(|w| w.contains("rate (1 × 1)") && w.contains("note")),
+            "{warnings:?}"
+        );
+    }
     // They are named as well where a column is missing.
     let three = crate::made_for_tests::robot(&["elbow", "shoulder", "wrist"]);
     for (robot, mapping) in [
@@ -365,7 +371,7 @@ fn arrays_of_numpy_and_matlab_are_columns() {
         );
     }
     let folder = tempfile::tempdir().unwrap();
-    for name in ["arrays.npz", "arrays.mat"] {
+    for name in ["arrays.npz", "arrays.mat", "arrays_73.mat"] {
         let path = folder.path().join(name);
         let bytes = std::fs::read(of_others(name)).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 700]).unwrap();
@@ -374,6 +380,38 @@ fn arrays_of_numpy_and_matlab_are_columns() {
             .to_string();
         assert!(error.contains("cut off or damaged"), "{error}");
     }
+}
+
+/// hdf5storage wrote the file. A damage is an error, or numbers that still are columns; no cut leaves numbers out silently.
+#[test]
+fn damaged_files_of_matlab_73_are_errors() {
+    let robot = robot(&["elbow", "shoulder"]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.mat");
+    let bytes = std::fs::read(of_others("arrays_73.mat")).unwrap();
+    let read_back = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        read(&path, &robot, &Mapping::default())
+    };
+    for length in (0..bytes.len()).step_by(101) {
+        match read_back(&bytes[..length]) {
+            Ok((blocks, _)) => near(blocks[0].joints[1].q[199], truth(199).1[1]),
+            Err(error) => assert!(
+                length < 20 || error.to_string().contains("log.mat"),
+                "{error}"
+            ),
+        }
+    }
+    let mut refused = 0;
+    for at in (512..bytes.len()).step_by(13) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x55;
+        if let Err(error) = read_back(&damaged) {
+            assert!(error.to_string().contains("log.mat"), "{error}");
+            refused += 1;
+        }
+    }
+    assert!(refused > 100, "{refused}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::form::Arrays;
 use super::header::Header;
 use super::place::Place;
 use super::remark::Remark;
-use super::{mat, npz};
+use super::{mat, mat73, npz};
 
 /// Reader of rows.
 pub(super) struct TableRows {
@@ -21,13 +21,16 @@ pub(super) struct TableRows {
 
 /// Reads the columns of a file of arrays.
 pub(super) fn table(path: &Path, form: Arrays) -> Result<(Columns, u64), DataError> {
-    let file = std::fs::read(path).map_err(|source| DataError::Read {
+    let failed = |source| DataError::Read {
         path: path.into(),
         source,
-    })?;
+    };
+    let file = std::fs::read(path).map_err(failed)?;
+    let bytes = file.len() as u64;
     let read = match form {
         Arrays::NumPy => npz::arrays(&file),
         Arrays::Matlab => mat::arrays(&file),
+        Arrays::Matlab73 => mat73::arrays(file),
     };
     let (arrays, others) = read.map_err(|message| DataError::Bag {
         path: path.into(),
@@ -42,12 +45,12 @@ pub(super) fn table(path: &Path, form: Arrays) -> Result<(Columns, u64), DataErr
                 "the {} holds no arrays of numbers that could be columns; give arrays t, q and tau of equally many rows",
                 match form {
                     Arrays::NumPy => "NumPy archive",
-                    Arrays::Matlab => "MATLAB file",
+                    Arrays::Matlab | Arrays::Matlab73 => "MATLAB file",
                 }
             ),
         });
     }
-    Ok((found, file.len() as u64))
+    Ok((found, bytes))
 }
 
 impl TableRows {

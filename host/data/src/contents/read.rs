@@ -37,7 +37,7 @@ pub fn contents(
             let (topic, remarks) = table(path, *form)?;
             let format = match form {
                 Arrays::NumPy => "NumPy archive",
-                Arrays::Matlab => "MATLAB file",
+                Arrays::Matlab | Arrays::Matlab73 => "MATLAB file",
             };
             (format, vec![topic], remarks, Vec::new())
         }
