@@ -1,33 +1,52 @@
 //! NumPy arrays as signals: one row a sample, one column a joint.
 
 use numpy::ndarray::{ArrayView2, Axis};
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 use crate::error::Error;
 
+/// A number that signals consist of: `f64` or `f32`.
+pub(crate) trait Float: Element {
+    /// NumPy's name of the type.
+    const NAME: &'static str;
+}
+
+impl Float for f64 {
+    const NAME: &'static str = "float64";
+}
+
+impl Float for f32 {
+    const NAME: &'static str = "float32";
+}
+
+/// Returns true if all values are arrays of float32 of this machine.
+pub(crate) fn are_single(values: &[&Bound<'_, PyAny>]) -> bool {
+    (values.iter()).all(|value| value.cast::<PyArrayDyn<f32>>().is_ok())
+}
+
 /// A signal of all joints, borrowed from NumPy.
-pub(crate) struct Signal<'py> {
-    array: PyReadonlyArrayDyn<'py, f64>,
+pub(crate) struct Signal<'py, T: Element> {
+    array: PyReadonlyArrayDyn<'py, T>,
     name: &'static str,
-    joints: usize,
     /// True if the array is one sample, of shape (joints,).
     single: bool,
 }
 
 /// Reads an array of shape (n, joints), or (joints,) for one sample.
 ///
-/// An aligned float64 array of any strides is read in place. Other arrays of real numbers, and lists, are copied to
-/// float64.
+/// An aligned array of `T` of any strides is read in place. Other arrays of real numbers, and lists, are copied to `T`.
 ///
 /// # Errors
 /// No array of numbers, or another shape.
-pub(crate) fn signal<'py>(
+pub(crate) fn signal<'py, T: Float>(
     name: &'static str,
     value: &Bound<'py, PyAny>,
     joints: usize,
-) -> PyResult<Signal<'py>> {
+) -> PyResult<Signal<'py, T>> {
     let array = floats(name, value)?;
     let shape = array.shape().to_vec();
     let single = match shape[..] {
@@ -44,20 +63,19 @@ pub(crate) fn signal<'py>(
     Ok(Signal {
         array,
         name,
-        joints,
         single,
     })
 }
 
-/// Borrows a float64 array of any shape; copies what has another type.
+/// Borrows an array of `T` of any shape; copies what has another type.
 ///
 /// # Errors
 /// No array of real numbers.
-pub(crate) fn floats<'py>(
+pub(crate) fn floats<'py, T: Float>(
     name: &str,
     value: &Bound<'py, PyAny>,
-) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
-    if let Ok(array) = value.cast::<PyArrayDyn<f64>>()
+) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    if let Ok(array) = value.cast::<PyArrayDyn<T>>()
         && array.getattr("flags")?.getattr("aligned")?.is_truthy()?
     {
         return borrowed(name, array);
@@ -73,8 +91,8 @@ pub(crate) fn floats<'py>(
             array.getattr("dtype")?
         )));
     }
-    let copy = numbers.call_method1("array", (array, "float64"))?;
-    borrowed(name, copy.cast::<PyArrayDyn<f64>>()?)
+    let copy = numbers.call_method1("array", (array, T::NAME))?;
+    borrowed(name, copy.cast::<PyArrayDyn<T>>()?)
 }
 
 fn not_numbers(name: &str, value: &Bound<'_, PyAny>) -> String {
@@ -85,10 +103,10 @@ fn not_numbers(name: &str, value: &Bound<'_, PyAny>) -> String {
     format!("{name} is a {kind} from which NumPy makes no array; give an array of numbers.")
 }
 
-fn borrowed<'py>(
+fn borrowed<'py, T: Element>(
     name: &str,
-    array: &Bound<'py, PyArrayDyn<f64>>,
-) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    array: &Bound<'py, PyArrayDyn<T>>,
+) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     array
         .try_readonly()
         .map_err(|error| Error::new_err(format!("{name} cannot be read: {error}.")))
@@ -103,12 +121,12 @@ fn shown(shape: &[usize]) -> String {
     }
 }
 
-impl Signal<'_> {
+impl<T: Element> Signal<'_, T> {
     /// Returns the signal as rows of samples; one row for a single sample.
     ///
     /// # Errors
     /// None for a checked shape.
-    pub(crate) fn rows(&self) -> PyResult<ArrayView2<'_, f64>> {
+    pub(crate) fn rows(&self) -> PyResult<ArrayView2<'_, T>> {
         let all = self.array.as_array();
         let all = if self.single {
             all.insert_axis(Axis(0))
@@ -118,18 +136,13 @@ impl Signal<'_> {
         all.into_dimensionality()
             .map_err(|error| Error::new_err(format!("{} cannot be read: {error}.", self.name)))
     }
-
-    /// Returns the number of joints.
-    pub(crate) fn joints(&self) -> usize {
-        self.joints
-    }
 }
 
 /// Checks that all signals have the shape of the first.
 ///
 /// # Errors
 /// A sentence with both shapes.
-pub(crate) fn same_shape(signals: &[&Signal<'_>]) -> PyResult<()> {
+pub(crate) fn same_shape<T: Element>(signals: &[Signal<'_, T>]) -> PyResult<()> {
     let Some((first, others)) = signals.split_first() else {
         return Ok(());
     };
@@ -153,10 +166,10 @@ pub(crate) fn same_shape(signals: &[&Signal<'_>]) -> PyResult<()> {
 ///
 /// # Errors
 /// A shape that does not have as many numbers.
-pub(crate) fn array<'py>(
+pub(crate) fn array<'py, T: Element>(
     py: Python<'py>,
-    numbers: Vec<f64>,
-    like: &Signal<'_>,
+    numbers: Vec<T>,
+    like: &Signal<'_, T>,
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut whole = shape.to_vec();
@@ -170,9 +183,9 @@ pub(crate) fn array<'py>(
 ///
 /// # Errors
 /// A shape that does not have as many numbers.
-pub(crate) fn shaped<'py>(
+pub(crate) fn shaped<'py, T: Element>(
     py: Python<'py>,
-    numbers: Vec<f64>,
+    numbers: Vec<T>,
     shape: Vec<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     Ok(PyArray1::from_vec(py, numbers).reshape(shape)?.into_any())

@@ -1,12 +1,14 @@
 //! Dynamics of many samples that lie row by row, as NumPy stores them.
 //!
 //! The batches of `rig-model` take one column a joint. Rows are transposed in blocks that stay in the cache, so that an
-//! array is never copied as a whole.
+//! array is never copied as a whole. All of it exists for `f64` and for `f32`.
 
 use numpy::ndarray::{ArrayView2, Axis, Slice};
 use rig_data::prepare::{each_of, threads};
-use rig_model::batch::{BatchError, ChainBatch, Derivatives, ModelBatch, RegressorBlock, lower};
-use rig_shared::multibody::COLUMNS;
+use rig_model::batch::{
+    BatchError, ChainBatch, Derivatives, ModelBatch, Number, RegressorBlock, lower,
+};
+use rig_shared::multibody::{COLUMNS, Chain};
 
 /// Samples that are transposed at once: three signals of seven joints take 43 KiB.
 const ROWS: usize = 256;
@@ -14,23 +16,23 @@ const ROWS: usize = 256;
 const LEAST: usize = 16 * ROWS;
 
 /// Signals of a block, one column a joint.
-type Columns = [Vec<f64>];
+type Columns<T> = [Vec<T>];
 
 /// Computes a block: signals in, rows of the output out.
-trait Kernel {
-    fn compute(&mut self, signals: &[Vec<Vec<f64>>], out: &mut [f64]) -> Result<(), BatchError>;
+trait Kernel<T> {
+    fn compute(&mut self, signals: &[Vec<Vec<T>>], out: &mut [T]) -> Result<(), BatchError>;
 }
 
 /// Computes `width` numbers a sample from signals with one row a sample; `kernel` makes the kernel of each thread.
 /// `wanted` threads; 0 for all processors. The result does not depend on it.
-fn over_rows<K: Kernel>(
-    signals: &[ArrayView2<'_, f64>],
+fn over_rows<T: Number, K: Kernel<T>>(
+    signals: &[ArrayView2<'_, T>],
     width: usize,
     wanted: usize,
     kernel: impl Fn() -> K + Sync,
-) -> Result<Vec<f64>, BatchError> {
+) -> Result<Vec<T>, BatchError> {
     let samples = signals.first().map_or(0, |signal| signal.nrows());
-    let mut out = vec![0.0; samples * width];
+    let mut out = vec![T::ZERO; samples * width];
     if samples == 0 {
         return Ok(out);
     }
@@ -48,14 +50,14 @@ fn over_rows<K: Kernel>(
 }
 
 /// Computes the samples from `start` on that `out` has room for.
-fn one_stretch(
-    signals: &[ArrayView2<'_, f64>],
+fn one_stretch<T: Number>(
+    signals: &[ArrayView2<'_, T>],
     start: usize,
     width: usize,
-    out: &mut [f64],
-    kernel: &mut impl Kernel,
+    out: &mut [T],
+    kernel: &mut impl Kernel<T>,
 ) -> Result<(), BatchError> {
-    let mut columns: Vec<Vec<Vec<f64>>> = signals
+    let mut columns: Vec<Vec<Vec<T>>> = signals
         .iter()
         .map(|signal| vec![Vec::with_capacity(ROWS); signal.ncols()])
         .collect();
@@ -88,7 +90,7 @@ fn shifted(error: BatchError, first: usize) -> BatchError {
 }
 
 /// Writes columns of `rows` samples as rows.
-fn transpose(columns: &[f64], rows: usize, out: &mut [f64]) {
+fn transpose<T: Copy>(columns: &[T], rows: usize, out: &mut [T]) {
     let width = out.len() / rows;
     for (c, column) in columns.chunks_exact(rows).enumerate() {
         for (row, value) in out.chunks_exact_mut(width).zip(column) {
@@ -98,30 +100,32 @@ fn transpose(columns: &[f64], rows: usize, out: &mut [f64]) {
 }
 
 /// A function of a batch from signals to columns of a fixed number.
-struct ByColumns<F> {
+struct ByColumns<T, F> {
     function: F,
     columns: usize,
-    scratch: Vec<f64>,
+    scratch: Vec<T>,
 }
 
-impl<F: FnMut(&[Vec<Vec<f64>>], &mut [f64]) -> Result<(), BatchError>> ByColumns<F> {
+impl<T: Number, F: FnMut(&[Vec<Vec<T>>], &mut [T]) -> Result<(), BatchError>> ByColumns<T, F> {
     /// Returns the columns of the function and the number of samples.
-    fn evaluated(&mut self, signals: &[Vec<Vec<f64>>]) -> Result<(&[f64], usize), BatchError> {
+    fn evaluated(&mut self, signals: &[Vec<Vec<T>>]) -> Result<(&[T], usize), BatchError> {
         let rows = samples(signals);
-        self.scratch.resize(self.columns * rows, 0.0);
+        self.scratch.resize(self.columns * rows, T::ZERO);
         (self.function)(signals, &mut self.scratch)?;
         Ok((&self.scratch, rows))
     }
 }
 
 /// Returns the number of samples of a block.
-fn samples(signals: &[Vec<Vec<f64>>]) -> usize {
-    let first: Option<&Columns> = signals.first().map(Vec::as_slice);
+fn samples<T>(signals: &[Vec<Vec<T>>]) -> usize {
+    let first: Option<&Columns<T>> = signals.first().map(Vec::as_slice);
     first.and_then(<[_]>::first).map_or(0, Vec::len)
 }
 
-impl<F: FnMut(&[Vec<Vec<f64>>], &mut [f64]) -> Result<(), BatchError>> Kernel for ByColumns<F> {
-    fn compute(&mut self, signals: &[Vec<Vec<f64>>], out: &mut [f64]) -> Result<(), BatchError> {
+impl<T: Number, F: FnMut(&[Vec<Vec<T>>], &mut [T]) -> Result<(), BatchError>> Kernel<T>
+    for ByColumns<T, F>
+{
+    fn compute(&mut self, signals: &[Vec<Vec<T>>], out: &mut [T]) -> Result<(), BatchError> {
         let (columns, rows) = self.evaluated(signals)?;
         transpose(columns, rows, out);
         Ok(())
@@ -129,13 +133,15 @@ impl<F: FnMut(&[Vec<Vec<f64>>], &mut [f64]) -> Result<(), BatchError>> Kernel fo
 }
 
 /// Lower triangles, written as full symmetric matrices.
-struct Symmetric<F> {
-    triangle: ByColumns<F>,
+struct Symmetric<T, F> {
+    triangle: ByColumns<T, F>,
     size: usize,
 }
 
-impl<F: FnMut(&[Vec<Vec<f64>>], &mut [f64]) -> Result<(), BatchError>> Kernel for Symmetric<F> {
-    fn compute(&mut self, signals: &[Vec<Vec<f64>>], out: &mut [f64]) -> Result<(), BatchError> {
+impl<T: Number, F: FnMut(&[Vec<Vec<T>>], &mut [T]) -> Result<(), BatchError>> Kernel<T>
+    for Symmetric<T, F>
+{
+    fn compute(&mut self, signals: &[Vec<Vec<T>>], out: &mut [T]) -> Result<(), BatchError> {
         let n = self.size;
         let (columns, rows) = self.triangle.evaluated(signals)?;
         for (k, matrix) in out.chunks_exact_mut(n * n).enumerate() {
@@ -146,7 +152,7 @@ impl<F: FnMut(&[Vec<Vec<f64>>], &mut [f64]) -> Result<(), BatchError>> Kernel fo
 }
 
 /// Writes sample `k` of the columns of a lower triangle as a full matrix.
-fn fill_symmetric(columns: &[f64], rows: usize, k: usize, n: usize, matrix: &mut [f64]) {
+fn fill_symmetric<T: Copy>(columns: &[T], rows: usize, k: usize, n: usize, matrix: &mut [T]) {
     for i in 0..n {
         for j in 0..=i {
             let value = columns[lower(i, j) * rows + k];
@@ -157,22 +163,22 @@ fn fill_symmetric(columns: &[f64], rows: usize, k: usize, n: usize, matrix: &mut
 }
 
 /// Derivatives by position, velocity and input: three n×n matrices a sample.
-struct Matrices<F> {
+struct Matrices<T, F> {
     function: F,
     size: usize,
-    columns: [Vec<f64>; 3],
+    columns: [Vec<T>; 3],
 }
 
-impl<F: FnMut(&[Vec<Vec<f64>>], &mut Derivatives<'_>) -> Result<(), BatchError>> Kernel
-    for Matrices<F>
+impl<T: Number, F: FnMut(&[Vec<Vec<T>>], &mut Derivatives<'_, T>) -> Result<(), BatchError>>
+    Kernel<T> for Matrices<T, F>
 {
-    fn compute(&mut self, signals: &[Vec<Vec<f64>>], out: &mut [f64]) -> Result<(), BatchError> {
+    fn compute(&mut self, signals: &[Vec<Vec<T>>], out: &mut [T]) -> Result<(), BatchError> {
         let n = self.size;
         let rows = samples(signals);
         let [position, velocity, input] = &mut self.columns;
-        position.resize(n * n * rows, 0.0);
-        velocity.resize(n * n * rows, 0.0);
-        input.resize(lower(n, 0) * rows, 0.0);
+        position.resize(n * n * rows, T::ZERO);
+        velocity.resize(n * n * rows, T::ZERO);
+        input.resize(lower(n, 0) * rows, T::ZERO);
         let mut derivatives = Derivatives {
             position,
             velocity,
@@ -194,13 +200,13 @@ impl<F: FnMut(&[Vec<Vec<f64>>], &mut Derivatives<'_>) -> Result<(), BatchError>>
 }
 
 /// The regressor: 14 columns a joint.
-struct Regressor<'a> {
-    batch: &'a ChainBatch,
-    block: RegressorBlock,
+struct Regressor<'a, T> {
+    batch: &'a ChainBatch<T>,
+    block: RegressorBlock<T>,
 }
 
-impl Kernel for Regressor<'_> {
-    fn compute(&mut self, signals: &[Vec<Vec<f64>>], out: &mut [f64]) -> Result<(), BatchError> {
+impl<T: Number> Kernel<T> for Regressor<'_, T> {
+    fn compute(&mut self, signals: &[Vec<Vec<T>>], out: &mut [T]) -> Result<(), BatchError> {
         let n = self.batch.joint_count();
         let [q, qd, qdd] = signals else {
             return Ok(());
@@ -221,7 +227,7 @@ impl Kernel for Regressor<'_> {
 }
 
 /// Makes a kernel of a function of a batch.
-fn by_columns<F>(columns: usize, function: F) -> ByColumns<F> {
+fn by_columns<T, F>(columns: usize, function: F) -> ByColumns<T, F> {
     ByColumns {
         function,
         columns,
@@ -229,111 +235,120 @@ fn by_columns<F>(columns: usize, function: F) -> ByColumns<F> {
     }
 }
 
-/// Torques of a motion, one row a sample: `[q, qd, qdd]`.
-pub(crate) fn inverse(
-    model: &ModelBatch,
-    signals: [ArrayView2<'_, f64>; 3],
-    wanted: usize,
-) -> Result<Vec<f64>, BatchError> {
-    let n = model.joint_count();
-    over_rows(&signals, n, wanted, || {
-        by_columns(n, |s: &[Vec<Vec<f64>>], out: &mut [f64]| {
-            model.inverse_dynamics(&s[0], &s[1], &s[2], out)
+/// The dynamics of a robot in numbers of one kind.
+pub(crate) struct Dynamics<T> {
+    model: ModelBatch<T>,
+    batch: ChainBatch<T>,
+}
+
+/// A quantity of many samples, and the signals that it is a function of.
+#[derive(Clone, Copy)]
+pub(crate) enum Quantity {
+    /// Torques of a motion: q, qd, qdd.
+    Inverse,
+    /// Accelerations under torques: q, qd, tau.
+    Forward,
+    /// Derivatives of the torques of a motion by position, velocity and acceleration: q, qd, qdd.
+    InverseDerivatives,
+    /// Derivatives of the accelerations by position, velocity and torque: q, qd, tau.
+    ForwardDerivatives,
+    /// Inertia matrices: q.
+    MassMatrix,
+    /// Torques that hold the links against gravity: q.
+    Gravity,
+    /// Regressors: q, qd, qdd.
+    Regressor,
+}
+
+impl<T: Number> Dynamics<T> {
+    /// Prepares the dynamics of a chain.
+    ///
+    /// # Errors
+    /// Another number of rows of parameters than links.
+    pub(crate) fn new(
+        chain: &Chain<f64>,
+        parameters: &[[f64; COLUMNS]],
+    ) -> Result<Self, BatchError> {
+        Ok(Self {
+            model: ModelBatch::new(chain, parameters)?,
+            batch: ChainBatch::new(chain),
         })
-    })
+    }
+
+    /// Returns the shape of a quantity of one sample.
+    pub(crate) fn shape(&self, quantity: Quantity) -> Vec<usize> {
+        let n = self.batch.joint_count();
+        match quantity {
+            Quantity::Inverse | Quantity::Forward | Quantity::Gravity => vec![n],
+            Quantity::InverseDerivatives | Quantity::ForwardDerivatives => vec![3, n, n],
+            Quantity::MassMatrix => vec![n, n],
+            Quantity::Regressor => vec![n, self.batch.link_count() * COLUMNS],
+        }
+    }
+
+    /// Computes a quantity from its signals, one row a sample, on `wanted` threads; 0 for all processors.
+    ///
+    /// # Errors
+    /// Signals of other lengths; an inertia matrix that is not positive definite.
+    pub(crate) fn computed(
+        &self,
+        quantity: Quantity,
+        signals: &[ArrayView2<'_, T>],
+        wanted: usize,
+    ) -> Result<Vec<T>, BatchError> {
+        let (model, n) = (&self.model, self.model.joint_count());
+        match quantity {
+            Quantity::Inverse => torques(n, signals, wanted, |s, out| {
+                model.inverse_dynamics(&s[0], &s[1], &s[2], out)
+            }),
+            Quantity::Forward => torques(n, signals, wanted, |s, out| {
+                model.forward_dynamics(&s[0], &s[1], &s[2], out)
+            }),
+            Quantity::Gravity => torques(n, signals, wanted, |s, out| model.gravity(&s[0], out)),
+            Quantity::InverseDerivatives => matrices(n, signals, wanted, |s, out| {
+                model.inverse_dynamics_derivatives(&s[0], &s[1], &s[2], out)
+            }),
+            Quantity::ForwardDerivatives => matrices(n, signals, wanted, |s, out| {
+                model.forward_dynamics_derivatives(&s[0], &s[1], &s[2], out)
+            }),
+            Quantity::MassMatrix => over_rows(signals, n * n, wanted, || Symmetric {
+                triangle: by_columns(lower(n, 0), |s: &[Vec<Vec<T>>], out: &mut [T]| {
+                    model.inertia_matrix(&s[0], out)
+                }),
+                size: n,
+            }),
+            Quantity::Regressor => {
+                let batch = &self.batch;
+                let width = n * batch.link_count() * COLUMNS;
+                over_rows(signals, width, wanted, || Regressor {
+                    batch,
+                    block: batch.block(ROWS),
+                })
+            }
+        }
+    }
 }
 
-/// Accelerations under torques, one row a sample: `[q, qd, tau]`.
-pub(crate) fn forward(
-    model: &ModelBatch,
-    signals: [ArrayView2<'_, f64>; 3],
+/// Computes one number a joint and sample.
+fn torques<T: Number>(
+    n: usize,
+    signals: &[ArrayView2<'_, T>],
     wanted: usize,
-) -> Result<Vec<f64>, BatchError> {
-    let n = model.joint_count();
-    over_rows(&signals, n, wanted, || {
-        by_columns(n, |s: &[Vec<Vec<f64>>], out: &mut [f64]| {
-            model.forward_dynamics(&s[0], &s[1], &s[2], out)
-        })
-    })
+    function: impl Fn(&[Vec<Vec<T>>], &mut [T]) -> Result<(), BatchError> + Sync,
+) -> Result<Vec<T>, BatchError> {
+    over_rows(signals, n, wanted, || by_columns(n, &function))
 }
 
-/// Derivatives of the torques of a motion by position, velocity and acceleration, 3·n·n numbers a sample:
-/// `[q, qd, qdd]`.
-pub(crate) fn inverse_derivatives(
-    model: &ModelBatch,
-    signals: [ArrayView2<'_, f64>; 3],
+/// Computes three matrices a sample.
+fn matrices<T: Number>(
+    n: usize,
+    signals: &[ArrayView2<'_, T>],
     wanted: usize,
-) -> Result<Vec<f64>, BatchError> {
-    matrices(model, signals, wanted, |s, out| {
-        model.inverse_dynamics_derivatives(&s[0], &s[1], &s[2], out)
-    })
-}
-
-/// Derivatives of the accelerations by position, velocity and torque, 3·n·n numbers a sample: `[q, qd, tau]`.
-pub(crate) fn forward_derivatives(
-    model: &ModelBatch,
-    signals: [ArrayView2<'_, f64>; 3],
-    wanted: usize,
-) -> Result<Vec<f64>, BatchError> {
-    matrices(model, signals, wanted, |s, out| {
-        model.forward_dynamics_derivatives(&s[0], &s[1], &s[2], out)
-    })
-}
-
-fn matrices(
-    model: &ModelBatch,
-    signals: [ArrayView2<'_, f64>; 3],
-    wanted: usize,
-    function: impl Fn(&[Vec<Vec<f64>>], &mut Derivatives<'_>) -> Result<(), BatchError> + Sync,
-) -> Result<Vec<f64>, BatchError> {
-    let n = model.joint_count();
-    over_rows(&signals, 3 * n * n, wanted, || Matrices {
+    function: impl Fn(&[Vec<Vec<T>>], &mut Derivatives<'_, T>) -> Result<(), BatchError> + Sync,
+) -> Result<Vec<T>, BatchError> {
+    over_rows(signals, 3 * n * n, wanted, || Matrices {
         function: &function,
         size: n,
         columns: Default::default(),
-    })
-}
-
-/// Torques that hold the links against gravity, one row a sample.
-pub(crate) fn gravity(
-    model: &ModelBatch,
-    q: ArrayView2<'_, f64>,
-    wanted: usize,
-) -> Result<Vec<f64>, BatchError> {
-    let n = model.joint_count();
-    over_rows(&[q], n, wanted, || {
-        by_columns(n, |s: &[Vec<Vec<f64>>], out: &mut [f64]| {
-            model.gravity(&s[0], out)
-        })
-    })
-}
-
-/// Inertia matrices, n·n numbers a sample.
-pub(crate) fn mass_matrix(
-    model: &ModelBatch,
-    q: ArrayView2<'_, f64>,
-    wanted: usize,
-) -> Result<Vec<f64>, BatchError> {
-    let n = model.joint_count();
-    over_rows(&[q], n * n, wanted, || Symmetric {
-        triangle: by_columns(lower(n, 0), |s: &[Vec<Vec<f64>>], out: &mut [f64]| {
-            model.inertia_matrix(&s[0], out)
-        }),
-        size: n,
-    })
-}
-
-/// Regressors, n·14·n numbers a sample: `[q, qd, qdd]`.
-pub(crate) fn regressor(
-    batch: &ChainBatch,
-    signals: [ArrayView2<'_, f64>; 3],
-    wanted: usize,
-) -> Result<Vec<f64>, BatchError> {
-    let n = batch.joint_count();
-    over_rows(&signals, n * batch.link_count() * COLUMNS, wanted, || {
-        Regressor {
-            batch,
-            block: batch.block(ROWS),
-        }
     })
 }

@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyType};
 use rig::commands::{CommandError, refuse_file};
 use rig_identify::{chain_of, column_name, unit};
-use rig_model::batch::{BatchError, ChainBatch, ModelBatch};
+use rig_model::batch::{BatchError, Number};
 use rig_model::robot::{self, Description};
 use rig_output::write_whole;
 use rig_shared::multibody::COLUMNS;
 
-use crate::array::{Signal, array, same_shape, shaped, signal};
-use crate::dynamics;
+use crate::array::{Float, are_single, array, same_shape, shaped, signal};
+use crate::dynamics::{Dynamics, Quantity};
 use crate::error::{Error, refused, warn};
 
 /// A robot description with its dynamics.
@@ -26,15 +26,20 @@ use crate::error::{Error, refused, warn};
 /// screws act between joints; :func:`simulate` has both.
 ///
 /// Arrays have the shape (n, joints), or (joints,) for one sample. The unit of a position is rad for a revolute joint and
-/// m for a prismatic one; the unit of a torque is N*m or N. An aligned float64 array of any strides is read in place,
-/// without a copy. Lists and arrays of other real numbers are copied to float64. Other Python threads run during the
-/// computation. ``threads`` is the number of threads; 0 uses all processors, and the result does not depend on it.
+/// m for a prismatic one; the unit of a torque is N*m or N. Aligned float64 arrays of any strides are read in place,
+/// without a copy. If all arrays of a call are float32, they are read in place too, the dynamics are computed in float32,
+/// and the results are float32. Lists and arrays of other real numbers, and float32 beside float64, are copied to float64.
+/// Other Python threads run during the computation. ``threads`` is the number of threads; 0 uses all processors, and the
+/// result does not depend on it.
 #[pyclass(frozen, module = "rig_dynamics")]
 pub(crate) struct Robot {
     description: Arc<Description>,
-    model: ModelBatch,
-    batch: ChainBatch,
+    double: Dynamics<f64>,
+    single: Dynamics<f32>,
 }
+
+/// A named argument.
+type Argument<'a, 'py> = (&'static str, &'a Bound<'py, PyAny>);
 
 impl Robot {
     /// Prepares the dynamics of a description.
@@ -43,10 +48,10 @@ impl Robot {
     /// Geometry that is not a chain.
     pub(crate) fn of(description: Description) -> PyResult<Self> {
         let chain = chain_of(&description.robot).map_err(refused)?;
-        let model = ModelBatch::new(&chain, &description.robot.standard_parameters());
+        let parameters = description.robot.standard_parameters();
         Ok(Self {
-            model: model.map_err(failed)?,
-            batch: ChainBatch::new(&chain),
+            double: Dynamics::new(&chain, &parameters).map_err(failed)?,
+            single: Dynamics::new(&chain, &parameters).map_err(failed)?,
             description: Arc::new(description),
         })
     }
@@ -77,31 +82,53 @@ impl Robot {
         self.robot().joints.len()
     }
 
-    fn signal<'py>(&self, name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Signal<'py>> {
-        signal(name, value, self.joint_count())
+    /// Computes a quantity of signals of the same samples, in single precision if all of them are.
+    fn computed<'py>(
+        &self,
+        py: Python<'py>,
+        quantity: Quantity,
+        arguments: &[Argument<'_, 'py>],
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let values: Vec<_> = arguments.iter().map(|(_, value)| *value).collect();
+        if are_single(&values) {
+            self.computed_in(&self.single, py, quantity, arguments, threads)
+        } else {
+            self.computed_in(&self.double, py, quantity, arguments, threads)
+        }
     }
 
-    /// Reads three signals of the same samples.
-    fn signals<'py>(
+    fn computed_in<'py, T: Float + Number>(
         &self,
-        [a, b, c]: [(&'static str, &Bound<'py, PyAny>); 3],
-    ) -> PyResult<[Signal<'py>; 3]> {
-        let all = [
-            self.signal(a.0, a.1)?,
-            self.signal(b.0, b.1)?,
-            self.signal(c.0, c.1)?,
-        ];
-        same_shape(&all.each_ref())?;
-        Ok(all)
+        dynamics: &Dynamics<T>,
+        py: Python<'py>,
+        quantity: Quantity,
+        arguments: &[Argument<'_, 'py>],
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let signals = (arguments.iter())
+            .map(|(name, value)| signal::<T>(name, value, self.joint_count()))
+            .collect::<PyResult<Vec<_>>>()?;
+        same_shape(&signals)?;
+        let rows = (signals.iter())
+            .map(|own| own.rows())
+            .collect::<PyResult<Vec<_>>>()?;
+        let out = py
+            .detach(|| dynamics.computed(quantity, &rows, threads))
+            .map_err(failed)?;
+        array(py, out, &signals[0], &dynamics.shape(quantity))
     }
 }
 
+/// The derivatives by three arguments.
+type Matrices<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+
 /// Returns the three matrices of each sample as views of one array.
-fn three_matrices(all: Bound<'_, PyAny>) -> PyResult<[Bound<'_, PyAny>; 3]> {
+fn three_matrices(all: Bound<'_, PyAny>) -> PyResult<Matrices<'_>> {
     let py = all.py();
     let whole = PySlice::full(py);
     let view = |k: usize| all.get_item((py.Ellipsis(), k, &whole, &whole));
-    Ok([view(0)?, view(1)?, view(2)?])
+    Ok((view(0)?, view(1)?, view(2)?))
 }
 
 /// Makes the exception of a batch.
@@ -257,12 +284,8 @@ impl Robot {
         qdd: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let [q, qd, qdd] = self.signals([("q", q), ("qd", qd), ("qdd", qdd)])?;
-        let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
-        let out = py
-            .detach(|| dynamics::inverse(&self.model, signals, threads))
-            .map_err(failed)?;
-        array(py, out, &q, &[q.joints()])
+        let arguments = [("q", q), ("qd", qd), ("qdd", qdd)];
+        self.computed(py, Quantity::Inverse, &arguments, threads)
     }
 
     /// Return the accelerations under the torques ``tau``, shape (n, joints), rad/s^2 or m/s^2.
@@ -277,12 +300,8 @@ impl Robot {
         tau: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let [q, qd, tau] = self.signals([("q", q), ("qd", qd), ("tau", tau)])?;
-        let signals = [q.rows()?, qd.rows()?, tau.rows()?];
-        let out = py
-            .detach(|| dynamics::forward(&self.model, signals, threads))
-            .map_err(failed)?;
-        array(py, out, &q, &[q.joints()])
+        let arguments = [("q", q), ("qd", qd), ("tau", tau)];
+        self.computed(py, Quantity::Forward, &arguments, threads)
     }
 
     /// Return the derivatives of the torques of a motion by q, qd and qdd: three arrays of shape (n, joints, joints).
@@ -297,13 +316,9 @@ impl Robot {
         qd: &Bound<'py, PyAny>,
         qdd: &Bound<'py, PyAny>,
         threads: usize,
-    ) -> PyResult<[Bound<'py, PyAny>; 3]> {
-        let [q, qd, qdd] = self.signals([("q", q), ("qd", qd), ("qdd", qdd)])?;
-        let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
-        let out = py
-            .detach(|| dynamics::inverse_derivatives(&self.model, signals, threads))
-            .map_err(failed)?;
-        three_matrices(array(py, out, &q, &[3, q.joints(), q.joints()])?)
+    ) -> PyResult<Matrices<'py>> {
+        let arguments = [("q", q), ("qd", qd), ("qdd", qdd)];
+        three_matrices(self.computed(py, Quantity::InverseDerivatives, &arguments, threads)?)
     }
 
     /// Return the derivatives of the accelerations by q, qd and tau: three arrays of shape (n, joints, joints).
@@ -318,13 +333,9 @@ impl Robot {
         qd: &Bound<'py, PyAny>,
         tau: &Bound<'py, PyAny>,
         threads: usize,
-    ) -> PyResult<[Bound<'py, PyAny>; 3]> {
-        let [q, qd, tau] = self.signals([("q", q), ("qd", qd), ("tau", tau)])?;
-        let signals = [q.rows()?, qd.rows()?, tau.rows()?];
-        let out = py
-            .detach(|| dynamics::forward_derivatives(&self.model, signals, threads))
-            .map_err(failed)?;
-        three_matrices(array(py, out, &q, &[3, q.joints(), q.joints()])?)
+    ) -> PyResult<Matrices<'py>> {
+        let arguments = [("q", q), ("qd", qd), ("tau", tau)];
+        three_matrices(self.computed(py, Quantity::ForwardDerivatives, &arguments, threads)?)
     }
 
     /// Return the mass matrices with drive inertias on the diagonal, shape (n, joints, joints), kg*m^2, kg*m or kg.
@@ -335,12 +346,8 @@ impl Robot {
         q: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let q = self.signal("q", q)?;
-        let rows = q.rows()?;
-        let out = py
-            .detach(|| dynamics::mass_matrix(&self.model, rows, threads))
-            .map_err(failed)?;
-        array(py, out, &q, &[q.joints(), q.joints()])
+        let arguments = [("q", q)];
+        self.computed(py, Quantity::MassMatrix, &arguments, threads)
     }
 
     /// Return the torques that hold the links against gravity, shape (n, joints), N*m or N.
@@ -351,12 +358,8 @@ impl Robot {
         q: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let q = self.signal("q", q)?;
-        let rows = q.rows()?;
-        let out = py
-            .detach(|| dynamics::gravity(&self.model, rows, threads))
-            .map_err(failed)?;
-        array(py, out, &q, &[q.joints()])
+        let arguments = [("q", q)];
+        self.computed(py, Quantity::Gravity, &arguments, threads)
     }
 
     /// Return the regressor Y with tau = Y @ parameters.ravel(), shape (n, joints, 14 * links).
@@ -371,13 +374,8 @@ impl Robot {
         qdd: &Bound<'py, PyAny>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let [q, qd, qdd] = self.signals([("q", q), ("qd", qd), ("qdd", qdd)])?;
-        let signals = [q.rows()?, qd.rows()?, qdd.rows()?];
-        let out = py
-            .detach(|| dynamics::regressor(&self.batch, signals, threads))
-            .map_err(failed)?;
-        let columns = self.robot().link_count() * COLUMNS;
-        array(py, out, &q, &[q.joints(), columns])
+        let arguments = [("q", q), ("qd", qd), ("qdd", qdd)];
+        self.computed(py, Quantity::Regressor, &arguments, threads)
     }
 
     fn __repr__(&self) -> String {

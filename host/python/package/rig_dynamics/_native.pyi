@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, Union, final
+from typing import Any, Literal, Union, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,7 @@ __all__ = [
 ]
 
 _Floats = NDArray[np.float64]
+_Singles = NDArray[np.float32]
 _Path = Union[str, "PathLike[str]"]
 _Columns = Mapping[str, ArrayLike]
 _OneRecording = Union["Recording", _Path, _Columns]
@@ -58,9 +59,11 @@ class Robot:
     screws act between joints; :func:`simulate` has both.
 
     Arrays have the shape (n, joints), or (joints,) for one sample. The unit of a position is rad for a revolute joint and
-    m for a prismatic one; the unit of a torque is N*m or N. An aligned float64 array of any strides is read in place,
-    without a copy. Lists and arrays of other real numbers are copied to float64. Other Python threads run during the
-    computation. ``threads`` is the number of threads; 0 uses all processors, and the result does not depend on it.
+    m for a prismatic one; the unit of a torque is N*m or N. Aligned float64 arrays of any strides are read in place,
+    without a copy. If all arrays of a call are float32, they are read in place too, the dynamics are computed in float32,
+    and the results are float32. Lists and arrays of other real numbers, and float32 beside float64, are copied to float64.
+    Other Python threads run during the computation. ``threads`` is the number of threads; 0 uses all processors, and the
+    result does not depend on it.
     """
 
     @classmethod
@@ -119,18 +122,29 @@ class Robot:
     def save(self, path: _Path, *, force: bool = False) -> None:
         """Write the description as .toml or .urdf. An existing file is replaced only with ``force``."""
 
+    @overload
+    def inverse_dynamics(self, q: _Singles, qd: _Singles, qdd: _Singles, *, threads: int = 0) -> _Singles: ...  # type: ignore[overload-overlap]
+    @overload
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int = 0) -> _Floats:
         """Return the torques of a motion, shape (n, joints), N*m or N.
 
         ``q``, ``qd``, ``qdd``: position, velocity and acceleration, (n, joints) or (joints,).
         """
 
+    @overload
+    def forward_dynamics(self, q: _Singles, qd: _Singles, tau: _Singles, *, threads: int = 0) -> _Singles: ...  # type: ignore[overload-overlap]
+    @overload
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, *, threads: int = 0) -> _Floats:
         """Return the accelerations under the torques ``tau``, shape (n, joints), rad/s^2 or m/s^2.
 
         Raises ``Error`` with the first sample (from 0) whose mass matrix is not positive definite.
         """
 
+    @overload
+    def inverse_dynamics_derivatives(  # type: ignore[overload-overlap]
+        self, q: _Singles, qd: _Singles, qdd: _Singles, *, threads: int = 0
+    ) -> tuple[_Singles, _Singles, _Singles]: ...
+    @overload
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int = 0
     ) -> tuple[_Floats, _Floats, _Floats]:
@@ -140,6 +154,11 @@ class Robot:
         Coulomb friction counts as constant.
         """
 
+    @overload
+    def forward_dynamics_derivatives(  # type: ignore[overload-overlap]
+        self, q: _Singles, qd: _Singles, tau: _Singles, *, threads: int = 0
+    ) -> tuple[_Singles, _Singles, _Singles]: ...
+    @overload
     def forward_dynamics_derivatives(
         self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, *, threads: int = 0
     ) -> tuple[_Floats, _Floats, _Floats]:
@@ -149,12 +168,21 @@ class Robot:
         friction takes part; Coulomb friction counts as constant. Raises ``Error`` as :meth:`forward_dynamics`.
         """
 
+    @overload
+    def mass_matrix(self, q: _Singles, *, threads: int = 0) -> _Singles: ...  # type: ignore[overload-overlap]
+    @overload
     def mass_matrix(self, q: ArrayLike, *, threads: int = 0) -> _Floats:
         """Return the mass matrices with drive inertias on the diagonal, shape (n, joints, joints), kg*m^2, kg*m or kg."""
 
+    @overload
+    def gravity(self, q: _Singles, *, threads: int = 0) -> _Singles: ...  # type: ignore[overload-overlap]
+    @overload
     def gravity(self, q: ArrayLike, *, threads: int = 0) -> _Floats:
         """Return the torques that hold the links against gravity, shape (n, joints), N*m or N."""
 
+    @overload
+    def regressor(self, q: _Singles, qd: _Singles, qdd: _Singles, *, threads: int = 0) -> _Singles: ...  # type: ignore[overload-overlap]
+    @overload
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int = 0) -> _Floats:
         """Return the regressor Y with tau = Y @ parameters.ravel(), shape (n, joints, 14 * links).
 
