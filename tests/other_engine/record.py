@@ -231,9 +231,11 @@ def main():
         header = ",".join(["t"] + [f"q{i}" for i in range(1, n + 1)] + [f"tau{i}" for i in range(1, n + 1)])
         np.savetxt(chosen.out / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.12g")
     truth["exact_least_squares"] = exact_least_squares(recorded, sigmas).tolist()
+    truth["friction"] = {"viscous": viscous.tolist(), "coulomb": coulomb.tolist(), "offset": offset.tolist()}
     stand_in = [(1.0, np.zeros(3), np.eye(3) * 0.01)] * len(arm)
     effort = 2.0 * np.abs(matrix) @ peak
     (chosen.out / "robot.urdf").write_text(urdf(chosen.arm, arm, stand_in, effort, gears))
+    (chosen.out / "true.urdf").write_text(urdf(chosen.arm, arm, links, effort, gears))
     (chosen.out / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
 
 
