@@ -53,21 +53,28 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Predicts friction, backlash and gravity by a model of two masses.
-    pub(super) fn predict(&mut self, model: &TwoMass, gravity: &Gravity, rate: f64) {
-        let swing = TAU * rate / model.antiresonance();
+    /// Predicts friction, backlash and gravity by a model of two masses, in steps of another one that hardly differs.
+    pub(super) fn predict(
+        &mut self,
+        model: &TwoMass,
+        steps: &TwoMass,
+        gravity: &Gravity,
+        rate: f64,
+    ) {
+        let swing = TAU * rate / steps.antiresonance();
         let half = ((SPAN * swing).round() as usize).clamp(1, self.moved.len().max(1));
         let velocity = smoothed(&self.moved, rate, half);
-        let pushed = smoothed(&self.pushed, 1.0, half);
         let motion = MotorMotion {
             position: &self.position,
             first: -mean(&self.position),
             moving: &moving(&velocity),
             velocity: &velocity,
             torque: &self.recorded,
-            pushed: &pushed,
+            // Noise of second differences is small where the link follows it.
+            pushed: &self.pushed,
             dt: 1.0 / rate,
-            smeared: half - 1,
+            smeared: half,
+            swing: steps.antiresonance(),
         };
         let found = predict(model, &motion, gravity);
         // The torque has lost the line through its ends, and so must what it balances there.

@@ -14,8 +14,9 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use rig_numerics::optimise::levenberg_marquardt::{LeastSquares, Settings};
 use rig_numerics::statistics::sum_of_squares;
 
-use super::bands::BandBins;
+use super::bands::{BandBins, bands};
 use super::bin::Bin;
+use super::spectra::Spectra;
 use super::two_mass::{C, Gravity, TwoMass};
 use crate::value::Value;
 
@@ -46,6 +47,15 @@ const SETTINGS: Settings = Settings {
     first_steps: 10,
     settled: 1e-8,
     stiffest: 1e9,
+};
+
+/// Settings of the descent of the whole prediction.
+const WHOLE: Settings = Settings {
+    difference: 1e-4,
+    steps: 8,
+    first_steps: 8,
+    settled: 1e-5,
+    stiffest: 1e5,
 };
 
 /// A fitted model.
@@ -92,7 +102,7 @@ pub(crate) struct Known {
 }
 
 /// Fits the model to the used bands, from a first model if there is one; only then the friction of the link is estimated.
-/// `None` if no start has positive inertias.
+/// The nonlinear torques are those of the bands. `None` if no start has positive inertias.
 pub(crate) fn fit(
     bands: &[BandBins<'_>],
     known: &Known,
@@ -103,68 +113,130 @@ pub(crate) fn fit(
         Some(model) => *model,
         None => start(&used)?,
     };
-    let mut theta = theta_of(&start, known.rate);
-    for (place, inertia) in [(LINK, known.link_inertia), (MOTOR, known.motor_inertia)] {
-        theta[place] = inertia.map_or(theta[place], f64::ln);
-    }
+    let mut unknowns = Unknowns::of(&start, known, first.is_some());
     if first.is_none() {
-        theta[DELAY] = 0.05;
+        unknowns.theta[DELAY] = 0.05;
     }
-    let free: Vec<usize> = (0..COUNT)
-        .filter(|p| *p != LINK || known.link_inertia.is_none())
-        .filter(|p| *p != MOTOR || known.motor_inertia.is_none())
-        .filter(|p| *p < LINK_FRICTION || first.is_some())
-        .filter(|p| *p != GAP || start.gap > 0.0)
-        .collect();
-    let wide = |at: f64| [at - 12.0, at + 12.0];
-    let mut bounds: Vec<[f64; 2]> = theta[..4].iter().map(|at| wide(*at)).collect();
-    bounds.push([f64::MIN / 4.0, f64::MAX / 4.0]);
-    // Dry friction brakes.
-    bounds.push([0.0, f64::MAX]);
-    bounds.push([-20.0, 20.0]);
-    bounds.extend([[0.0, f64::MAX]; 3]);
     let mut noise: Vec<f64> = used.iter().map(|b| b.noise).collect();
     for round in 0..ROUNDS {
         if round > 0 {
-            let model = model(&theta, known);
+            let model = model(&unknowns.theta, known);
             noise = used.iter().map(|b| left(b, &model)).collect();
         }
-        let search = LeastSquares {
-            residual: |theta: &[f64]| residual(&used, &noise, &model(theta, known)),
-            free: &free,
-            bounds: &bounds,
-            settings: SETTINGS,
-        };
-        theta = search.fit(&[&theta]);
+        unknowns.search(SETTINGS, |theta| {
+            residual(&used, &noise, &model(theta, known))
+        });
     }
-    let residual_at = |theta: &[f64]| residual(&used, &noise, &model(theta, known));
-    let at = residual_at(&theta)?;
-    let slopes = slopes(&theta, &free, &residual_at)?;
-    let inverse = slopes.tr_mul(&slopes).try_inverse()?;
-    let misfit = sum_of_squares(&at) / at.len().saturating_sub(free.len()).max(1) as f64;
-    let scale = misfit.max(1.0) * correlation(&slopes, &at, &inverse, misfit);
-    let mut covariance = DMatrix::zeros(COUNT, COUNT);
-    for (a, p) in free.iter().enumerate() {
-        for (b, r) in free.iter().enumerate() {
-            covariance[(*p, *r)] = inverse[(a, b)] * scale;
-        }
-    }
-    let model = model(&theta, known);
-    let unrecorded = (model.antiresonance() / known.rate).powi(2) / 24.0;
-    // Another gain of the torque changes them alike.
-    let scaled: Vec<usize> = free.iter().copied().filter(|p| *p <= MOTOR).collect();
-    for p in &scaled {
-        for r in &scaled {
-            covariance[(*p, *r)] += unrecorded * unrecorded;
-        }
-    }
-    Some(Fitted {
-        model,
-        covariance,
-        misfit,
-        rigid_misfit: rigid(&used, &noise, &model, known)?,
-        deviance: deviance(&used, &model),
+    unknowns.fitted(&used, &noise, known, 1e-4, |theta| {
+        residual(&used, &noise, &model(theta, known))
     })
+}
+
+/// Fits the model with the nonlinear torques of each trial: the least squares of the whole prediction. With torques that a step
+/// takes as given, the fit ends where the residual is orthogonal to other slopes than its own, which is no minimum: what the
+/// model leaves reaches the parameters enlarged, and their covariance is that of another estimate.
+pub(crate) fn refit(spectra: &Spectra, known: &Known, first: &Fitted) -> Option<Fitted> {
+    let own = bands(spectra);
+    let used: Vec<&BandBins<'_>> = own.iter().filter(|b| b.band.used).collect();
+    let noise: Vec<f64> = used.iter().map(|b| left(b, &first.model)).collect();
+    let whole = |theta: &[f64]| {
+        let trial = model(theta, known);
+        let predicted = spectra.predicted(&trial, &first.model, &known.gravity);
+        let bands = bands(&predicted);
+        let used: Vec<&BandBins<'_>> = bands.iter().filter(|b| b.band.used).collect();
+        residual(&used, &noise, &trial)
+    };
+    let mut unknowns = Unknowns::of(&first.model, known, true);
+    unknowns.search(WHOLE, whole);
+    let found = model(&unknowns.theta, known);
+    let predicted = spectra.predicted(&found, &first.model, &known.gravity);
+    let bands = bands(&predicted);
+    let used: Vec<&BandBins<'_>> = bands.iter().filter(|b| b.band.used).collect();
+    unknowns.fitted(&used, &noise, known, 1e-3, whole)
+}
+
+/// The parameters of a fit.
+struct Unknowns {
+    theta: Vec<f64>,
+    free: Vec<usize>,
+    bounds: Vec<[f64; 2]>,
+}
+
+impl Unknowns {
+    /// Begins at a model; the friction of the link is estimated only if it is predicted.
+    fn of(start: &TwoMass, known: &Known, predicted: bool) -> Self {
+        let mut theta = theta_of(start, known.rate);
+        for (place, inertia) in [(LINK, known.link_inertia), (MOTOR, known.motor_inertia)] {
+            theta[place] = inertia.map_or(theta[place], f64::ln);
+        }
+        let free: Vec<usize> = (0..COUNT)
+            .filter(|p| *p != LINK || known.link_inertia.is_none())
+            .filter(|p| *p != MOTOR || known.motor_inertia.is_none())
+            .filter(|p| *p < LINK_FRICTION || predicted)
+            .filter(|p| *p != GAP || start.gap > 0.0)
+            .collect();
+        let wide = |at: f64| [at - 12.0, at + 12.0];
+        let mut bounds: Vec<[f64; 2]> = theta[..4].iter().map(|at| wide(*at)).collect();
+        bounds.push([f64::MIN / 4.0, f64::MAX / 4.0]);
+        // Dry friction brakes.
+        bounds.push([0.0, f64::MAX]);
+        bounds.push([-20.0, 20.0]);
+        bounds.extend([[0.0, f64::MAX]; 3]);
+        Self {
+            theta,
+            free,
+            bounds,
+        }
+    }
+
+    fn search(&mut self, settings: Settings, residual: impl Fn(&[f64]) -> Option<Vec<f64>>) {
+        let search = LeastSquares {
+            residual,
+            free: &self.free,
+            bounds: &self.bounds,
+            settings,
+        };
+        self.theta = search.fit(&[&self.theta]);
+    }
+
+    /// Returns the model of these parameters with its covariance, by differences of the residual over a relative `step`.
+    fn fitted(
+        &self,
+        used: &[&BandBins<'_>],
+        noise: &[f64],
+        known: &Known,
+        step: f64,
+        residual_at: impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) -> Option<Fitted> {
+        let Self { theta, free, .. } = self;
+        let at = residual_at(theta)?;
+        let slopes = slopes(theta, free, step, &residual_at)?;
+        let inverse = slopes.tr_mul(&slopes).try_inverse()?;
+        let misfit = sum_of_squares(&at) / at.len().saturating_sub(free.len()).max(1) as f64;
+        let scale = misfit.max(1.0) * correlation(&slopes, &at, &inverse, misfit);
+        let mut covariance = DMatrix::zeros(COUNT, COUNT);
+        for (a, p) in free.iter().enumerate() {
+            for (b, r) in free.iter().enumerate() {
+                covariance[(*p, *r)] = inverse[(a, b)] * scale;
+            }
+        }
+        let model = model(theta, known);
+        let unrecorded = (model.antiresonance() / known.rate).powi(2) / 24.0;
+        // Another gain of the torque changes them alike.
+        let scaled: Vec<usize> = free.iter().copied().filter(|p| *p <= MOTOR).collect();
+        for p in &scaled {
+            for r in &scaled {
+                covariance[(*p, *r)] += unrecorded * unrecorded;
+            }
+        }
+        Some(Fitted {
+            model,
+            covariance,
+            misfit,
+            rigid_misfit: rigid(used, noise, &model, known)?,
+            deviance: deviance(used, &model),
+        })
+    }
 }
 
 /// Returns the misfit of the best rigid joint: total inertia, friction and delay.
@@ -319,12 +391,13 @@ fn residual(bands: &[&BandBins<'_>], noise: &[f64], model: &TwoMass) -> Option<V
 fn slopes(
     theta: &[f64],
     free: &[usize],
+    relative: f64,
     residual: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
 ) -> Option<DMatrix<f64>> {
     let rows = residual(theta)?.len();
     let mut slopes = DMatrix::zeros(rows, free.len());
     for (column, p) in free.iter().enumerate() {
-        let step = 1e-4 * theta[*p].abs().max(1e-3);
+        let step = relative * theta[*p].abs().max(1e-3);
         let at = |side: f64| {
             let mut moved = theta.to_vec();
             moved[*p] += side;

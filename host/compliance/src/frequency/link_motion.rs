@@ -4,10 +4,14 @@ use rig_numerics::statistics::mean;
 
 use super::two_mass::{Gravity, TwoMass};
 
-/// Phase of the link's own swing per step, rad.
-const PHASE: f64 = 0.05;
+/// Phase of the link's own swing per step, rad. At its antiresonance the link enlarges errors as it does the motion, some tenfold.
+const PHASE: f64 = 0.02;
 /// Sign of the velocity, 0 to 1, from which on the velocity is beyond its noise: 3 standard deviations.
 const CLEAR: f64 = 0.9;
+/// Steps of the motor in half the time of a row: it changes its direction, or stops, between two rows.
+const HALF_STEPS: usize = 8;
+/// Predictions of the friction, each with a better constant torque. Friction that holds the motor at rest has a mean.
+const OFFSETS: usize = 4;
 /// Friction below this share of the largest spring torque counts as none: only the sign of the velocity is returned.
 const NONE: f64 = 1e-6;
 
@@ -28,6 +32,8 @@ pub(super) struct MotorMotion<'a> {
     pub(super) dt: f64,
     /// Rows on either side of a standstill whose velocity it changes.
     pub(super) smeared: usize,
+    /// Antiresonance that the steps are made for, rad/s.
+    pub(super) swing: f64,
 }
 
 /// Nonlinear torques by a model, at each row.
@@ -51,10 +57,7 @@ pub(super) fn predict(model: &TwoMass, motor: &MotorMotion<'_>, gravity: &Gravit
     let inertia = model.link_inertia;
     let (position, velocity, dt) = (motor.position, motor.velocity, motor.dt);
     // An even number: the friction of a row is the mean over half a row on either side.
-    let steps = 2.0
-        * (0.5 * dt * model.antiresonance() / PHASE)
-            .ceil()
-            .clamp(1.0, 100.0);
+    let steps = 2.0 * (0.5 * dt * motor.swing / PHASE).ceil().clamp(1.0, 100.0);
     let h = dt / steps;
     // At rest the spring carries the weight: the twist is counted from there.
     let preload = gravity.torque(motor.first);
@@ -67,7 +70,6 @@ pub(super) fn predict(model: &TwoMass, motor: &MotorMotion<'_>, gravity: &Gravit
     let mut before = 0.0;
     for row in 0..position.len() {
         let mut halves = [0.0; 2];
-        let next = (row + 1).min(position.len() - 1);
         let (twist, rate) = (position[row] - q, velocity[row] - v);
         let linear = model.stiffness * twist + model.damping * rate;
         let torque = spring_torque(model, rest + twist, rate) - preload;
@@ -77,18 +79,29 @@ pub(super) fn predict(model: &TwoMass, motor: &MotorMotion<'_>, gravity: &Gravit
             true => (torque - linear) / (model.stiffness * model.gap),
             false => 0.0,
         });
+        let course = course(position, row);
+        let next = (row + 1).min(position.len() - 1);
+        let pushed = [motor.pushed[row], motor.pushed[next]];
         for step in 0..steps as usize {
             let share = (step as f64 + 0.5) / steps;
-            let motor_position = position[row] + share * (position[next] - position[row]);
-            let speed = velocity[row] + share * (velocity[next] - velocity[row]);
+            let [motor_position, moved] = course(share);
+            let speed = moved / dt;
             q += 0.5 * h * v;
-            let torque = spring_torque(model, rest + motor_position - q, speed - v)
+            let pull = spring_torque(model, rest + motor_position - q, speed - v);
+            let torque = pull
                 - model.link_viscous * v
-                - motor.pushed[row]
+                - (pushed[0] + share * (pushed[1] - pushed[0]))
                 - gravity.torque(motor.first + q);
-            let free = v + h * torque / inertia;
-            let stopping = (free * inertia).clamp(-h * size, h * size);
-            v = free - stopping / inertia;
+            // Damping by the mean velocity of the step: that of its start would be late, and the link seem stiffer.
+            let damping = if model.gap > 0.0 && pull == 0.0 {
+                0.0
+            } else {
+                model.damping
+            };
+            let damped = inertia + 0.5 * h * (damping + model.link_viscous);
+            let free = v + h * torque / damped;
+            let stopping = (free * damped).clamp(-h * size, h * size);
+            v = free - stopping / damped;
             q += 0.5 * h * v;
             halves[usize::from(share > 0.5)] += stopping;
         }
@@ -97,6 +110,37 @@ pub(super) fn predict(model: &TwoMass, motor: &MotorMotion<'_>, gravity: &Gravit
     }
     found.motor_friction = motor_friction(model, motor, &spring);
     found
+}
+
+/// Returns the course of a position from a row to the next and its slope per row, by the share of the time: a cubic with the
+/// slopes of the neighbours at both rows.
+fn course(position: &[f64], row: usize) -> impl Fn(f64) -> [f64; 2] {
+    let last = position.len() - 1;
+    let at = |k: usize| position[k.min(last)];
+    let (now, next) = (at(row), at(row + 1));
+    let first = 0.5 * (next - at(row.saturating_sub(1)));
+    let second = 0.5 * (at(row + 2) - now);
+    let way = next - now;
+    move |share| {
+        let rest = 1.0 - share;
+        let (early, late) = (first - way, second - way);
+        [
+            now + share * (way + rest * (early * rest - late * share)),
+            way + early * rest * (rest - 2.0 * share) + late * share * (share - 2.0 * rest),
+        ]
+    }
+}
+
+/// Returns what the mean velocity over `half` rows on either side has beyond that of the row itself, by the course of the torque
+/// that accelerates, per inertia and time of a row.
+fn averaged_away(torque: impl Fn(usize) -> f64, row: usize, half: usize, last: usize) -> f64 {
+    if row < half || row + half > last {
+        return 0.0;
+    }
+    let pair = |j: usize| torque(row + j) - torque(row - j);
+    // ∫ (half − s)·torque ds over a torque that is linear between rows.
+    let inner: f64 = (1..half).map(|j| (half - j) as f64 * pair(j)).sum();
+    (inner + pair(half) / 6.0) / (2 * half) as f64
 }
 
 /// Returns the torque of the spring at a twist from the middle of its gap.
@@ -116,9 +160,26 @@ fn motor_friction(model: &TwoMass, motor: &MotorMotion<'_>, spring: &[f64]) -> V
     if model.coulomb <= 0.0 {
         return motor.moving.to_vec();
     }
-    // Friction has no mean over a motion to and fro.
-    let offset = mean(motor.torque) - mean(spring);
-    let (inertia, h) = (model.motor_inertia, 0.5 * motor.dt);
+    // What the torque holds beside spring and friction has no mean over a motion that begins and ends at rest.
+    let constant = mean(motor.torque) - mean(spring);
+    let mut found = Vec::new();
+    let mut offset = constant;
+    for _ in 0..OFFSETS {
+        found = friction_beside(model, motor, spring, offset);
+        offset = constant - model.coulomb * mean(&found);
+    }
+    found
+}
+
+/// Returns the friction of the motor over its size beside a constant torque, N·m.
+fn friction_beside(
+    model: &TwoMass,
+    motor: &MotorMotion<'_>,
+    spring: &[f64],
+    offset: f64,
+) -> Vec<f64> {
+    let (inertia, h) = (model.motor_inertia, 0.5 * motor.dt / HALF_STEPS as f64);
+    let most = h * model.coulomb;
     let last = spring.len() - 1;
     let mut found = Vec::with_capacity(spring.len());
     let (mut v, mut before) = (0.0, 0.0);
@@ -128,20 +189,23 @@ fn motor_friction(model: &TwoMass, motor: &MotorMotion<'_>, spring: &[f64]) -> V
         let sign = motor.moving[row].signum();
         let is_clear = near.iter().all(|moving| moving * sign > CLEAR);
         if is_clear {
-            v = motor.velocity[row];
+            let push = |k: usize| motor.torque[k] - spring[k] - model.viscous * motor.velocity[k];
+            v = motor.velocity[row]
+                - averaged_away(push, row, motor.smeared, last) * motor.dt / inertia;
         }
         let next = (row + 1).min(last);
         let at_end = motor.torque[if model.hold > 0.0 { row } else { next }];
         let [own, next] = [motor.torque[row] - spring[row], at_end - spring[next]];
         let [own, next] = [own - offset, next - offset];
         // The two halves of the time to the next row.
-        let halves = [0.25, 0.75].map(|share| {
+        let mut halves = [0.0; 2];
+        for step in 0..2 * HALF_STEPS {
+            let share = (step as f64 + 0.5) / (2 * HALF_STEPS) as f64;
             let torque = own + share * (next - own) - model.viscous * v;
-            let most = h * model.coulomb;
             let impulse = (inertia * v + h * torque).clamp(-most, most);
             v += (h * torque - impulse) / inertia;
-            impulse / most
-        });
+            halves[step / HALF_STEPS] += impulse / (most * HALF_STEPS as f64);
+        }
         found.push(match is_clear {
             true => sign,
             false => 0.5 * (before + halves[0]),

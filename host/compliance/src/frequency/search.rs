@@ -10,7 +10,7 @@
 //! Leaves out: gaps beyond the twist, where impacts decide the motion of the link; the response then bounds the stiffness.
 
 use super::bands::bands;
-use super::fit::{Fitted, Known, fit};
+use super::fit::{Fitted, Known, fit, refit};
 use super::spectra::Spectra;
 
 /// Predictions of the friction; four more change the stiffness by less than a twentieth of its standard deviation.
@@ -71,7 +71,8 @@ pub(super) fn fit_all(
 }
 
 /// Returns the most likely fit without a gap, of a torque that acts as recorded at each instant, or that is held from row to
-/// row; leaves the spectra as it predicts them. One of the two is enough.
+/// row; leaves the spectra as it predicts them. One of the two is enough. The more likely one is then fitted by the whole
+/// prediction.
 fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
     let mut start = fit(&bands(spectra), known, None)?;
     let with_hold = |hold: f64| {
@@ -88,7 +89,11 @@ fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
     let both = [0.0, 1.0 / known.rate].map(with_hold).into_iter().flatten();
     let (known, found, own) = both.min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))?;
     *spectra = own;
-    Some((known, found))
+    let Some(whole) = refit(spectra, &known, &found) else {
+        return Some((known, found));
+    };
+    *spectra = spectra.predicted(&whole.model, &found.model, &known.gravity);
+    Some((known, whole))
 }
 
 /// Returns the most likely fit with a gap, and leaves the spectra as it predicts them.

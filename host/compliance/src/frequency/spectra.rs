@@ -61,9 +61,21 @@ impl Spectra {
     pub(crate) fn predict(&mut self, model: &TwoMass, gravity: &Gravity) {
         let rate = self.rate;
         for own in &mut self.columns {
-            own.predict(model, gravity, rate);
+            own.predict(model, model, gravity, rate);
         }
         self.transform();
+    }
+
+    /// Returns the spectra with friction, backlash and gravity by a model. What depends on the model in steps alone (the time over
+    /// which the velocity is taken, the length of a step) is that of another one.
+    pub(super) fn predicted(&self, model: &TwoMass, steps: &TwoMass, gravity: &Gravity) -> Self {
+        let mut own = self.clone();
+        let rate = self.rate;
+        for columns in &mut own.columns {
+            columns.predict(model, steps, gravity, rate);
+        }
+        own.transform();
+        own
     }
 
     /// Returns what whole periods of the reference show, by a model; `None` if there are none.

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod frequency;
+mod friction;
 mod loading;
 mod noisy_force;
 mod periodic;
