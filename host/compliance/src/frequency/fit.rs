@@ -359,6 +359,17 @@ fn left(band: &BandBins<'_>, model: &TwoMass) -> f64 {
     squares.sum::<f64>() / band.bins.len() as f64
 }
 
+/// Returns the velocity that a model does not explain over the velocity, RMS over the used bands.
+pub(crate) fn unexplained(bands: &[BandBins<'_>], model: &TwoMass) -> f64 {
+    let used = bands.iter().filter(|band| band.band.used);
+    let (mut left, mut whole) = (0.0, 0.0);
+    for bin in used.flat_map(|band| band.bins) {
+        left += error(bin, model).norm_sqr();
+        whole += bin.velocity.norm_sqr();
+    }
+    (left / whole).sqrt()
+}
+
 /// Returns -2·ln(likelihood) of a model, but for a constant: each band has an unknown noise.
 fn deviance(bands: &[&BandBins<'_>], model: &TwoMass) -> f64 {
     (bands.iter())

@@ -115,3 +115,27 @@ fn noise_and_distortion_are_told_apart() {
     let ratio = noisy.odd.unwrap() / noisy.noise;
     assert!((0.6..1.6).contains(&ratio), "{ratio}");
 }
+
+/// A gap that is large against the twist: the mean over the periods is that of a softer spring, but it repeats what no model of two
+/// masses explains. With more motion the gap is found.
+#[test]
+fn a_gap_that_distorts_every_period_is_refused() {
+    let with = |gap: f64, size: f64| {
+        let mut rig = Rig::new(1200.0, 0.6).with_plain_friction().with_gap(gap);
+        rig.config.motor.friction.coulomb *= 0.25;
+        rig.config.mechanism.friction.coulomb *= 0.25;
+        let run = recording(rig.run(42.0, multisine(5, size), |_| 0.0, 1));
+        identify_compliance(&rig.robot(), &[], &[&run], &ComplianceOptions::default())
+    };
+    let said = with(2e-3, 1.0).unwrap_err().to_string();
+    println!("{said}");
+    assert!(
+        said.contains("repeats in every period") && said.contains("chirp"),
+        "{said}"
+    );
+    let found = with(1e-3, 3.0).unwrap().frequency.unwrap();
+    let off = found.stiffness.value / 1200.0 - 1.0;
+    assert!(off.abs() < 0.05, "{off}");
+    let gap = found.backlash.unwrap();
+    assert!((gap / 1e-3 - 1.0).abs() < 0.35, "{gap}");
+}
