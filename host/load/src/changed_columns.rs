@@ -1,12 +1,15 @@
-//! Position columns that are exchanged or reversed, or have another zero, and forces that are exchanged with moments.
+//! Position columns that are exchanged or reversed, or have another zero or scale; forces that are exchanged with moments;
+//! and readings in the axes of the base, as the controllers of arms give them.
 //!
 //! Each change is undone and the load fitted again. It is believed by the criterion of the other causes: it leaves about the
 //! noise, and decisively less than what was found without it. A change that explains the readings as well as a leaning base
 //! or a turned sensor is named beside that. Leaves out: several changes at once.
 
+use nalgebra::Vector3;
 use rig_data::{Block, WRENCH_COLUMNS};
 use rig_model::robot::{JointKind, WristSensor};
 use rig_output::{capital, format_significant};
+use rig_shared::multibody::Chain;
 
 use crate::axes::SensorAxes;
 use crate::causes::{Cause, Compared, Tried, explains, is_beyond_scatter, leaves_less, score};
@@ -15,6 +18,7 @@ use crate::error::LoadError;
 use crate::faulty_rows::FaultyRows;
 use crate::intake::{Intake, Sampled};
 use crate::motion_sample::JointState;
+use crate::rows::base_axes;
 use crate::selection::selected;
 use crate::settle::DECISIVE;
 use crate::statistics::Recorded;
@@ -29,8 +33,13 @@ const HALVINGS: i32 = 12;
 const KEPT: usize = 3;
 /// Most times that the readings are shifted by a delay found beside a change.
 const MOST_SHIFTS: usize = 3;
-/// Half of the angle over which the residual is taken for a parabola, rad.
+/// Half of the change over which the residual is taken for a parabola: of a zero, rad, or of a scale.
 const PARABOLA: f64 = 2e-3;
+/// Step of the scales that are tried, and their number on either side of 1. Over a range of 2 rad the outermost ones move
+/// the end by 0.5 rad, so that there is one minimum of the residual between them. Counts or a ratio that are further off
+/// are another unit, which the check of the limits names.
+const SCALE_STEP: f64 = 0.0625;
+const SCALES: i32 = 4;
 
 /// A change of the position columns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +50,10 @@ enum Change {
     Reversed(usize),
     /// The position of a joint is counted from another zero: the angle to add, rad.
     Zero(usize, f64),
+    /// The position of a joint has another scale: the factor to apply.
+    Scale(usize, f64),
+    /// Forces and moments are in the axes of the base.
+    Base,
     /// Two channels of the sensor are exchanged, a force and a moment.
     Channels(usize, usize),
     /// All forces are exchanged with the moments.
@@ -66,6 +79,20 @@ impl Change {
                 ),
                 format!("check the zero of q{}", j + 1),
             ],
+            Self::Scale(j, factor) => [
+                format!(
+                    "q{} has another scale ({} times it fits)",
+                    j + 1,
+                    format_significant(factor, 4)
+                ),
+                format!("check the gear ratio and the counts of the encoder of q{}", j + 1),
+            ],
+            Self::Base => [
+                "forces and moments are in the axes of the base, not in those of the sensor"
+                    .to_owned(),
+                "record them in the axes of the sensor, or turn them there by the rotation of the sensor in each row"
+                    .to_owned(),
+            ],
             Self::Channels(a, b) => {
                 let [a, b] = [a, b].map(|c| WRENCH_COLUMNS[c]);
                 [
@@ -82,7 +109,7 @@ impl Change {
 
     /// Returns true for a change of the columns of the sensor.
     fn is_of_sensor(self) -> bool {
-        matches!(self, Self::Channels(..) | Self::Kinds)
+        matches!(self, Self::Channels(..) | Self::Kinds | Self::Base)
     }
 
     /// Returns the channel that is recorded in the column of another.
@@ -96,16 +123,19 @@ impl Change {
     }
 
     /// Takes the change out of a block.
-    fn undo(self, block: &mut Block) {
+    fn undo(self, block: &mut Block, axes: &SensorAxes, chain: &Chain<f64>) {
+        let mut multiply = |j: usize, factor: f64| {
+            let joint = &mut block.joints[j];
+            let rates = [&mut joint.qd, &mut joint.qdd].into_iter().flatten();
+            let columns = std::iter::once(&mut joint.q).chain(rates);
+            columns.flatten().for_each(|value| *value *= factor);
+        };
         match self {
             Self::Exchanged(a, b) => block.joints.swap(a, b),
-            Self::Reversed(j) => {
-                let joint = &mut block.joints[j];
-                let rates = [&mut joint.qd, &mut joint.qdd].into_iter().flatten();
-                let columns = std::iter::once(&mut joint.q).chain(rates);
-                columns.flatten().for_each(|value| *value = -*value);
-            }
+            Self::Reversed(j) => multiply(j, -1.0),
+            Self::Scale(j, factor) => multiply(j, factor),
             Self::Zero(j, angle) => block.joints[j].q.iter_mut().for_each(|q| *q += angle),
+            Self::Base => turn_block(block, axes, chain),
             Self::Channels(..) | Self::Kinds => {
                 for (name, _) in &mut block.extra {
                     if let Some(column) = WRENCH_COLUMNS.iter().position(|own| own == name) {
@@ -117,17 +147,63 @@ impl Change {
     }
 
     /// Takes the change out of the states of the joints and the readings at one instant.
-    fn undo_state(self, joints: &mut [JointState], readings: &mut [f64; 6]) {
+    fn undo_state(
+        self,
+        joints: &mut [JointState],
+        readings: &mut [f64; 6],
+        (axes, chain): (&SensorAxes, &Chain<f64>),
+    ) {
         match self {
             Self::Channels(..) | Self::Kinds => {
                 let own = *readings;
                 *readings = std::array::from_fn(|c| own[self.channel(c)]);
             }
+            Self::Base => {
+                let q: Vec<f64> = joints.iter().map(|own| own[0]).collect();
+                *readings = turned_to_sensor(*readings, &q, axes, chain);
+            }
             Self::Exchanged(a, b) => joints.swap(a, b),
             Self::Reversed(j) => joints[j] = joints[j].map(|value| -value),
+            Self::Scale(j, factor) => joints[j] = joints[j].map(|value| value * factor),
             Self::Zero(j, angle) => joints[j][0] += angle,
         }
     }
+}
+
+/// Turns the readings of a block from the axes of the base to those of the sensor.
+fn turn_block(block: &mut Block, axes: &SensorAxes, chain: &Chain<f64>) {
+    let place = |name: &str| block.extra.iter().position(|(own, _)| own == name);
+    let places: Option<Vec<usize>> = WRENCH_COLUMNS.iter().map(|name| place(name)).collect();
+    let Some(places) = places else {
+        return;
+    };
+    for k in 0..block.t.len() {
+        let q: Vec<f64> = block.joints.iter().map(|own| own.q[k]).collect();
+        let readings = std::array::from_fn(|c| block.extra[places[c]].1[k]);
+        let turned = turned_to_sensor(readings, &q, axes, chain);
+        for (at, value) in places.iter().zip(turned) {
+            block.extra[*at].1[k] = value;
+        }
+    }
+}
+
+/// Returns the readings in the axes of the sensor, of readings in those of the base; as they are without a pose.
+fn turned_to_sensor(
+    readings: [f64; 6],
+    q: &[f64],
+    axes: &SensorAxes,
+    chain: &Chain<f64>,
+) -> [f64; 6] {
+    let Ok(base) = base_axes(chain, q) else {
+        return readings;
+    };
+    let of = |first: usize| -> Vector3<f64> {
+        let own = base.iter().enumerate();
+        own.map(|(k, axis)| axes.seen(axis) * readings[first + k])
+            .sum()
+    };
+    let (force, moment) = (of(0), of(3));
+    [force.x, force.y, force.z, moment.x, moment.y, moment.z]
 }
 
 /// What the readings say of the columns.
@@ -240,7 +316,7 @@ impl Search<'_> {
 
     /// Reads the recordings without a change, the readings `delay` seconds later than the positions.
     fn read(&self, change: Change, delay: f64) -> Result<Vec<Recorded>, LoadError> {
-        let undo = |block: &mut Block| change.undo(block);
+        let undo = |block: &mut Block| change.undo(block, &self.axes, self.intake.chain());
         (self.faulty).left_out_changed(self.intake, delay, &mut Vec::new(), &undo)
     }
 
@@ -250,7 +326,7 @@ impl Search<'_> {
             None => self.read(change, 0.0)?,
             Some(samples) => {
                 let undo = |joints: &mut [JointState], readings: &mut [f64; 6]| {
-                    change.undo_state(joints, readings);
+                    change.undo_state(joints, readings, (&self.axes, self.intake.chain()));
                 };
                 let read = |(sample, label, loaded): &Sampled| {
                     let own = (label.clone(), *loaded);
@@ -286,9 +362,10 @@ impl Search<'_> {
             if joint.kind == JointKind::Revolute {
                 found.push(self.zero(a)?);
             }
+            found.push(self.scale(a)?);
         }
         let pairs = (0..9).map(|k| Change::Channels(k / 3, 3 + k % 3));
-        for change in pairs.chain([Change::Kinds]) {
+        for change in pairs.chain([Change::Kinds, Change::Base]) {
             found.push((self.misfit(change)?, change));
         }
         found.retain(|own| own.0.is_finite());
@@ -299,25 +376,44 @@ impl Search<'_> {
 
     /// Returns the zero of a joint that leaves least beside load and bias, before its misfit.
     fn zero(&self, joint: usize) -> Result<(f64, Change), LoadError> {
-        let at = |angle: f64| -> Result<(f64, f64), LoadError> {
-            Ok((self.misfit(Change::Zero(joint, angle))?, angle))
-        };
-        let nearer = |a: (f64, f64), b: (f64, f64)| if b.0 < a.0 { b } else { a };
-        let mut step = std::f64::consts::TAU / f64::from(ZEROS);
-        let mut best = (f64::INFINITY, 0.0);
+        let step = std::f64::consts::TAU / f64::from(ZEROS);
         // Half a turn further the load is that of the opposite reading.
         let reach = if self.has_sign { ZEROS / 2 } else { ZEROS / 4 };
-        for k in 1 - reach..=reach {
-            best = nearer(best, at(step * f64::from(k))?);
+        let angles = (1 - reach..=reach).map(|k| step * f64::from(k));
+        self.least((angles, step), &|angle| Change::Zero(joint, angle))
+    }
+
+    /// Returns the scale of a joint's position that leaves least beside load and bias, before its misfit.
+    fn scale(&self, joint: usize) -> Result<(f64, Change), LoadError> {
+        let factors = (-SCALES..=SCALES).map(|k| 1.0 + SCALE_STEP * f64::from(k));
+        self.least((factors, SCALE_STEP), &|factor| {
+            Change::Scale(joint, factor)
+        })
+    }
+
+    /// Returns the change with one value that leaves least beside load and bias, before its misfit: the best of the starts,
+    /// which lie a step apart, and from there by halving the step.
+    fn least(
+        &self,
+        (starts, mut step): (impl Iterator<Item = f64>, f64),
+        change: &dyn Fn(f64) -> Change,
+    ) -> Result<(f64, Change), LoadError> {
+        let at = |value: f64| -> Result<(f64, f64), LoadError> {
+            Ok((self.misfit(change(value))?, value))
+        };
+        let nearer = |a: (f64, f64), b: (f64, f64)| if b.0 < a.0 { b } else { a };
+        let mut best = (f64::INFINITY, 0.0);
+        for start in starts {
+            best = nearer(best, at(start)?);
         }
         for _ in 0..HALVINGS {
             step *= 0.5;
             let middle = best.1;
-            for angle in [middle - step, middle + step] {
-                best = nearer(best, at(angle)?);
+            for value in [middle - step, middle + step] {
+                best = nearer(best, at(value)?);
             }
         }
-        Ok((best.0, Change::Zero(joint, best.1)))
+        Ok((best.0, change(best.1)))
     }
 
     /// Fits everything that the readings show beside a change.
@@ -347,16 +443,18 @@ impl Search<'_> {
         }
     }
 
-    /// Returns a zero that was found by samples as all rows show it: at the least of a parabola through three misfits.
+    /// Returns a zero or scale that was found by samples as all rows show it: at the least of a parabola through three misfits.
     fn refined(&self, change: Change) -> Result<Change, LoadError> {
-        let Change::Zero(joint, angle) = change else {
-            return Ok(change);
+        let moved = |by: f64| match change {
+            Change::Zero(joint, angle) => Some(Change::Zero(joint, angle + by)),
+            Change::Scale(joint, factor) => Some(Change::Scale(joint, factor + by)),
+            _ => None,
         };
-        if self.samples.is_none() {
+        if self.samples.is_none() || moved(0.0).is_none() {
             return Ok(change);
         }
         let squares = |by: f64| -> Result<[f64; 2], LoadError> {
-            let recordings = self.read(Change::Zero(joint, angle + by), 0.0)?;
+            let recordings = self.read(moved(by).unwrap_or(change), 0.0)?;
             Ok(self
                 .sensed(&recordings)
                 .fit(&self.described.start, &self.unknowns)
@@ -367,10 +465,8 @@ impl Search<'_> {
         let bend = over(before) - 2.0 * over(here) + over(after);
         let slope = over(after) - over(before);
         let step = -0.5 * PARABOLA * slope / bend;
-        Ok(match step.abs() < 2.0 * PARABOLA {
-            true => Change::Zero(joint, angle + step),
-            false => change,
-        })
+        let is_near = step.abs() < 2.0 * PARABOLA;
+        Ok(moved(step).filter(|_| is_near).unwrap_or(change))
     }
 
     /// Decides between the changes that explain the readings, best first, and what was found without one.

@@ -83,6 +83,57 @@ fn position_columns_that_are_wrong_are_named_in_a_motion() {
     }
 }
 
+/// Controllers give the wrench at the flange in the axes of the base. It was said to weigh nothing in a motion, and to have the
+/// opposite sign at rest.
+#[test]
+fn readings_in_the_axes_of_the_base_are_named() {
+    let points = tool();
+    for (text, seed) in [(IRP6_TEMPLATE, 5), (TX40, 6)] {
+        let moving = Moving::new(robot(text), 0.8, seed);
+        let sensor = Sensor::default();
+        let motion = recorded(&moving, &points, &sensor, [20.0, 100.0], seed, NO_FLAW);
+        let list: Vec<Vec<f64>> = (0..16)
+            .map(|k| moving.position(3.1 * f64::from(k)))
+            .collect();
+        let rest = poses(&moving, &points, &sensor, &list, seed);
+        for sound in [motion, rest] {
+            let text = said(&moving.robot, &moving.in_base_axes(&sound));
+            assert!(
+                text.contains("REFUSED The sensor's channels look wrong: forces and moments are in the axes of the base, not in those of the sensor. As recorded"),
+                "{text}"
+            );
+        }
+    }
+}
+
+/// A ratio or number of counts that is 3 % off.
+#[test]
+fn a_scale_of_a_position_that_is_off_is_named_with_its_size() {
+    let points = tool();
+    for (text, seed) in [(IRP6_TEMPLATE, 5), (TX40, 6)] {
+        let moving = Moving::new(robot(text), 0.8, seed);
+        let sensor = Sensor::default();
+        let sound = recorded(&moving, &points, &sensor, [20.0, 100.0], seed, NO_FLAW);
+        for joint in [1, 2, 3] {
+            let mut wrong = sound.clone();
+            let q = &mut wrong.blocks[0].joints[joint].q;
+            q.iter_mut().for_each(|q| *q *= 1.03);
+            let text = said(&moving.robot, &wrong);
+            let begin = format!("q{} has another scale (", joint + 1);
+            let factor = text
+                .split(&begin)
+                .nth(1)
+                .and_then(|rest| rest.split(' ').next());
+            let factor: f64 = factor.and_then(|own| own.parse().ok()).unwrap_or(f64::NAN);
+            assert!((factor * 1.03 - 1.0).abs() < 2e-3, "q{}: {text}", joint + 1);
+            assert!(
+                text.contains("REFUSED The positions look wrong: q"),
+                "{text}"
+            );
+        }
+    }
+}
+
 /// The rows of poses tell their noise: a zero that is off leaves more, though it leaves little of the readings.
 #[test]
 fn a_zero_that_is_off_is_named_by_the_noise_of_the_poses() {

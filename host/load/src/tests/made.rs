@@ -154,6 +154,25 @@ impl Moving {
         [force.x, force.y, force.z, moment.x, moment.y, moment.z]
     }
 
+    /// Returns a recording with forces and moments in the axes of the base instead of those of the sensor.
+    pub(super) fn in_base_axes(&self, recording: &InMemory) -> InMemory {
+        let robot = &self.robot;
+        let sensor = robot.flange_pose() * robot.wrist_sensor.clone().unwrap_or_default().pose();
+        let mut turned = recording.clone();
+        for block in &mut turned.blocks {
+            for k in 0..block.t.len() {
+                let q: Vec<f64> = block.joints.iter().map(|own| own.q[k]).collect();
+                let axes = self.pose(&q, &sensor).1;
+                for first in [0, 3] {
+                    let read = Vector3::from_fn(|c, _| block.extra[first + c].1[k]);
+                    let read = axes * read;
+                    (0..3).for_each(|c| block.extra[first + c].1[k] = read[c]);
+                }
+            }
+        }
+        turned
+    }
+
     /// Returns the torques of the joints that carry the points: the virtual work of each point (d'Alembert).
     pub(super) fn torques(&self, points: &Points, t: f64) -> Vec<f64> {
         let robot = &self.robot;
