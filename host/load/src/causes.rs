@@ -10,6 +10,7 @@ use rig_model::robot::{Reads, WristSensor};
 
 use crate::candidates::{exchanged, exchanged_and_scaled, scaled, turned};
 use crate::error::LoadError;
+use crate::hanging::reversed;
 use crate::mounting::{Channels, Mounting};
 use crate::pose_noise::Scatter;
 use crate::rows::LEAST_ROWS;
@@ -62,6 +63,8 @@ pub(crate) enum Cause {
     Dead(usize),
     /// A channel reads the load with another gain.
     Gain(usize),
+    /// Gravity points the other way: the robot hangs.
+    Hanging,
 }
 
 impl Cause {
@@ -322,7 +325,8 @@ fn without_special_cases(sensed: &Sensed, mut all: Vec<Tried>) -> Vec<Tried> {
     });
     let order = |own: &Tried| match own.cause {
         Cause::Described => 0,
-        Cause::Channels(_) => 1,
+        // Neither has an unknown.
+        Cause::Channels(_) | Cause::Hanging => 1,
         Cause::Scale => 2,
         Cause::Turned => 3,
         Cause::ScaleAndTurned => 4,
@@ -431,6 +435,7 @@ impl Trial<'_> {
             let fit = sensed.fit(&start, unknowns);
             all.push((Cause::Channels(channels), start, fit));
         }
+        all.extend(self.hanging(unknowns, sign_stated));
         let can_scale = sensed.recordings.iter().any(|r| !r.poses);
         let scaling = unknowns.with(Nuisance::Scale);
         if can_scale {
@@ -466,6 +471,20 @@ impl Trial<'_> {
             }
         }
         all
+    }
+
+    /// Fits reversed gravity; `None` if the load would then have a negative mass by readings of a stated sign.
+    fn hanging(&self, unknowns: &Unknowns, sign_stated: bool) -> Option<(Cause, Mounting, Fit)> {
+        let mut start = reversed(self.sensed, self.mounting)?;
+        let mut fit = self.sensed.fit(&start, unknowns);
+        if fit.values.first().is_some_and(|mass| *mass < 0.0) {
+            if sign_stated {
+                return None;
+            }
+            start = start.opposite();
+            fit = self.sensed.fit(&start, unknowns);
+        }
+        Some((Cause::Hanging, start, fit))
     }
 
     /// Returns true unless a gain of a channel of poses leaves less by chance (F test for the channels of its kind, all six

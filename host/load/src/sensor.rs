@@ -206,12 +206,13 @@ fn believed(
     if is_turned {
         return Ok(fitted(causes.remove(0), as_recorded));
     }
-    let text = match causes.first().filter(|own| is_accurate(own)) {
-        Some(own) => format!(
+    let text = match causes.first() {
+        Some(own) if is_accurate(own) => format!(
             "{}. A sound sensor may do this.",
             capital(&words_of(sensed, own)[0])
         ),
-        None => fault_of(sensed, &described.selected.fit, &causes),
+        Some(own) if own.cause == Cause::Hanging => hanging_words(&own.selected.fit, sensing.robot),
+        _ => fault_of(sensed, &described.selected.fit, &causes),
     };
     if !sensing.even_if_wrong && !is_accurate(&causes[0]) {
         return Err(LoadError::Fault(text));
@@ -224,7 +225,7 @@ fn believed(
             ));
             fitted(first, channels)
         }
-        Cause::Turned => {
+        Cause::Turned | Cause::Hanging => {
             warnings.push(text);
             fitted(first, as_recorded)
         }
@@ -503,6 +504,10 @@ fn words_of(sensed: &Sensed, tried: &Tried) -> [String; 2] {
     let fit = &tried.selected.fit;
     match &tried.cause {
         Cause::Described => [String::new(), String::new()],
+        Cause::Hanging => [
+            "the robot hangs, so that gravity points the other way".to_owned(),
+            "correct gravity in the description".to_owned(),
+        ],
         Cause::Channels(channels) => {
             let or = match channels.is_opposite_rotation() {
                 true => " (or the sensor is turned and `reads` has the other value)",
