@@ -110,6 +110,30 @@ pub fn controller_numbers(load: &LoadIdentification) -> Option<ControllerNumbers
     })
 }
 
+/// Returns what the data show of the numbers that a controller asks for, marked incomplete; `None` if they show the mass and
+/// the centre of mass, or no mass.
+pub fn incomplete_numbers(load: &LoadIdentification) -> Option<String> {
+    let centre = load.centre_shown();
+    if !load.mass_shown() || !centre.contains(&false) {
+        return None;
+    }
+    let of = |wanted: bool| -> Vec<String> {
+        let axes = ["x", "y", "z"].iter().zip(&load.centre).zip(centre);
+        let own = axes.filter(|(_, shown)| *shown == wanted);
+        own.map(|((axis, value), _)| match wanted {
+            true => format!(", centre of mass {axis} {} m", number(value.value)),
+            false => (*axis).to_owned(),
+        })
+        .collect()
+    };
+    Some(format!(
+        "incomplete for a controller: mass {} kg{} in the flange frame; the data do not show {} of the centre of mass, so set it by a drawing",
+        number(load.mass.value),
+        of(true).concat(),
+        of(false).join(" and ")
+    ))
+}
+
 /// Returns six significant digits as a controller reads them: ASCII, without an exponent.
 fn number(value: f64) -> String {
     if value == 0.0 {

@@ -76,6 +76,7 @@ mod options;
 mod pace;
 mod pose_noise;
 mod poses;
+mod reach;
 mod result;
 mod rows;
 mod selection;
@@ -92,7 +93,7 @@ mod units;
 mod urdf_link;
 mod wrench_row;
 
-pub use controllers::{ControllerNumbers, controller_numbers};
+pub use controllers::{ControllerNumbers, controller_numbers, incomplete_numbers};
 pub use curved_bias::Curve;
 pub use error::LoadError;
 pub use findings::{Bias, SensorFindings, Trace};

@@ -7,6 +7,7 @@ use rig_shared::multibody::{COLUMN_NAMES, Chain, INERTIAL_PARAMETERS, wrench_reg
 
 use crate::estimate::{Estimate, Square};
 use crate::options::By;
+use crate::reach::{Movement, shown_by};
 use crate::result::NotShown;
 use crate::wrench_row::{ENTRIES, about};
 
@@ -27,40 +28,52 @@ pub(crate) fn missing(
     by: By,
 ) -> Vec<NotShown> {
     let shown = found.shown();
-    let of = |range: std::ops::Range<usize>| -> Vec<&'static str> {
-        range
-            .filter(|k| !shown[*k])
-            .map(|k| COLUMN_NAMES[k])
-            .collect()
+    let can = |movement: Movement| shown_by(robot, chain, to_joint, (by, movement));
+    let (Ok(by_motion), Ok(by_poses)) = (can(Movement::Any), can(Movement::Rest)) else {
+        return Vec::new();
     };
-    let mut all = Vec::new();
-    let still = of(0..4);
-    if !still.is_empty() {
-        let (experiment, pose) = match by {
-            By::Torque => (
-                "Record a motion that turns the load about other axes, so that gravity and acceleration act on it in other directions; `rig excite --load` designs one.".to_owned(),
-                None,
-            ),
-            By::Sensor | By::Both => (
-                "Add a pose in which gravity has another direction in the sensor; `rig excite --load --poses 6` designs a set.".to_owned(),
-                further_pose(robot, chain, to_joint, found),
-            ),
-        };
-        all.push(NotShown {
-            parameters: still,
-            experiment,
-            pose,
-        });
-    }
-    let moving = of(4..INERTIAL_PARAMETERS);
-    if !moving.is_empty() {
-        all.push(NotShown {
-            parameters: moving,
+    let of = |range: std::ops::Range<usize>, is_shown_by: &dyn Fn(usize) -> bool| {
+        let own = range.filter(|k| !shown[*k] && is_shown_by(*k));
+        own.map(|k| COLUMN_NAMES[k]).collect::<Vec<_>>()
+    };
+    let is_still = |k: usize| by != By::Torque && by_poses[k];
+    let all = [
+        NotShown {
+            parameters: of(0..4, &|k| is_still(k)),
+            experiment: "Add a pose in which gravity has another direction in the sensor; `rig excite --load --poses 6` designs a set.".to_owned(),
+            pose: further_pose(robot, chain, to_joint, found),
+        },
+        NotShown {
+            parameters: of(0..4, &|k| by_motion[k] && !is_still(k)),
+            experiment: "Record a motion that turns the load about other axes, so that gravity and acceleration act on it in other directions; `rig excite --load` designs one.".to_owned(),
+            pose: None,
+        },
+        NotShown {
+            parameters: of(4..INERTIAL_PARAMETERS, &|k| by_motion[k]),
             experiment: "Inertia shows only while the load turns and accelerates about its axes: record a livelier motion of the wrist; `rig excite --load` designs one.".to_owned(),
             pose: None,
-        });
-    }
-    all
+        },
+        NotShown {
+            parameters: of(0..INERTIAL_PARAMETERS, &|k| !by_motion[k]),
+            experiment: no_motion(by),
+            pose: None,
+        },
+    ];
+    all.into_iter()
+        .filter(|own| !own.parameters.is_empty())
+        .collect()
+}
+
+/// Says that no motion of the robot shows a parameter.
+fn no_motion(by: By) -> String {
+    let [what, beside] = match by {
+        By::Torque => ["the joint torques", ""],
+        By::Sensor => ["the readings", " or the biases"],
+        By::Both => ["the readings and the joint torques", " or the biases"],
+    };
+    format!(
+        "No motion of this robot shows them: they have no effect on {what}, or only one that other parameters{beside} have too. Take them from a drawing of the load, or identify it on a robot that turns it about other axes."
+    )
 }
 
 /// Returns the pose that leaves the least uncertainty of mass and centre of mass.

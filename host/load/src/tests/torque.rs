@@ -332,3 +332,50 @@ fn torques_that_saturate_are_left_out_and_counted() {
         }
     }
 }
+
+/// A horizontal arm of two upright axes neither lifts its load nor tilts it, whatever its motion is.
+#[test]
+fn what_no_motion_of_a_planar_arm_shows_is_said() {
+    let text = rig_model::robot::EDDA_TEMPLATE.to_owned();
+    let mut robot = Robot::from_toml(&text, "edda.toml".as_ref()).unwrap();
+    for joint in &mut robot.joints {
+        joint.drive = None;
+        joint.inertial = None;
+        joint.friction = None;
+    }
+    let moving = Moving::new(robot, 0.7, 31);
+    let part = tool();
+    let without = driven(&moving, &Points::new(), 0.8, 1);
+    let with = driven(&moving, &part, 0.8, 2);
+    let options = LoadOptions {
+        by: By::Torque,
+        ..LoadOptions::default()
+    };
+    let found = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+    let never = found.not_shown.last().unwrap();
+    // The weight and what tilting it would take act along the axes' bearings only.
+    assert_eq!(never.parameters, ["mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz"]);
+    assert!(
+        never
+            .experiment
+            .starts_with("No motion of this robot shows them"),
+        "{}",
+        never.experiment
+    );
+    assert_eq!(found.not_shown.len(), 1, "{:?}", found.not_shown);
+    let truth = parameters(&part);
+    assert!(
+        (found.mass.value / truth[0] - 1.0).abs() < 0.03,
+        "{:?}",
+        found.mass
+    );
+    assert!(crate::controller_numbers(&found).is_none());
+    let text = crate::incomplete_numbers(&found).unwrap();
+    assert!(
+        text.starts_with("incomplete for a controller: mass 2.")
+            && text.contains("centre of mass x 0.0")
+            && text
+                .ends_with("the data do not show z of the centre of mass, so set it by a drawing"),
+        "{text}"
+    );
+}

@@ -18,7 +18,7 @@ use rig_data::prepare::{Choice, PrepareOptions};
 use rig_data::{EffortNeed, WRENCH_TEMPERATURE};
 use rig_load::{
     By, ControllerNumbers, FEWEST_ROWS, KnownMass, LoadIdentification, LoadOptions, NotShown,
-    Value, controller_numbers, identify_load, parameter_symbols, urdf_link,
+    Value, controller_numbers, identify_load, incomplete_numbers, parameter_symbols, urdf_link,
 };
 use rig_model::robot::{Description, LARGEST_GAIN_STD, Load, Original, Reads, Robot, WristSensor};
 use rig_output::{can_take, folder, format_significant, format_value, write_whole};
@@ -457,10 +457,10 @@ fn lines(
 /// Returns the printed numbers for controllers.
 fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumbers>) -> Vec<String> {
     let Some(numbers) = numbers else {
-        return vec![
-            "numbers for controllers: none, because these data do not show mass and centre of mass"
-                .to_owned(),
-        ];
+        let none = "numbers for controllers: none that are complete, because these data do not show the mass and the whole centre of mass";
+        return std::iter::once(none.to_owned())
+            .chain(incomplete_numbers(found))
+            .collect();
     };
     let zero = match found.inertia_shown {
         true => "",

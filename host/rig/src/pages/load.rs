@@ -4,7 +4,7 @@ use super::context::Context;
 use super::{parts, treatment};
 use rig_load::{
     ControllerNumbers, LoadIdentification, SensorFindings, TorqueTrace, Trace, Value,
-    parameter_symbols,
+    incomplete_numbers, parameter_symbols,
 };
 use rig_output::{capital, format_significant, format_unit, format_value};
 use rig_report::{Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone};
@@ -460,11 +460,14 @@ fn treated(found: &LoadIdentification) -> Option<Section> {
 
 fn for_controllers(found: &LoadIdentification, numbers: Option<&ControllerNumbers>) -> Section {
     let Some(numbers) = numbers else {
-        return Section::new(
+        let section = Section::new(
             "controllers",
             "Settings for robot controllers",
-            "These data do not show mass and centre of mass, so there are no numbers for a controller.",
+            "These data do not show the mass and the whole centre of mass, so there are no complete numbers for a controller.",
         );
+        let shown =
+            incomplete_numbers(found).map(|text| Block::Text(format!("{}.", capital(&text))));
+        return shown.into_iter().fold(section, Section::with);
     };
     let lead = match found.inertia_shown {
         true => "The flange frame of the description must be that of the controller.",
