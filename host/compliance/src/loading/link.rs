@@ -1,6 +1,7 @@
 //! Twist of the drives by encoders on the links.
 //!
-//! twist = R·(q − ql), and twist = (f − fh·direction)/c + offset. In slow motion f is the torque of the motor, R⁻ᵀ·τ, and fh
+//! twist = R·(q − ql) in motion, and Ψ(q) − Ψ(ql) with the motors held, where Ψ is the position of the drives: the ratio R of a
+//! screw changes on the way. It is modelled as twist = (f − fh·direction)/c + offset. In slow motion f is the torque of the motor, R⁻ᵀ·τ, and fh
 //! the Coulomb friction between motor and spring, whose sign is that of the motion; the torque that accelerates the described
 //! motor is subtracted. With the motors held f is the torque
 //! of the described weight and of the wrench at the tool point, R⁻ᵀ·(g − Jᵀ·w), and fh the hysteresis of the gear, whose sign is that of the load's change.
@@ -13,14 +14,13 @@
 
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_unit};
-use rig_shared::multibody::gravity_vector;
 use rig_shared::transmission::DriveKind;
 
+use super::equilibrium::Equilibrium;
 use super::fit::{Fit, Row, fit, shows};
 use super::result::{Deflection, DriveLoading};
 use super::windows::{Course, Slow, TURN, courses, is_within_run, means, range, window_rows};
 use super::wrench::{has_wrench, torques, wrench};
-use crate::drives::loaded;
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 use crate::tool_point::ToolPoint;
@@ -93,15 +93,34 @@ pub(super) fn by_links(
             let twist: Vec<f64> = (found.iter())
                 .map(|own| own.as_ref().and_then(|own| own.first[s]).unwrap_or(0.0))
                 .collect();
-            let pose: Vec<f64> = (signals.joints.iter())
+            let motors: Vec<f64> = (signals.joints.iter())
                 .map(|j| j.q.first().copied().unwrap_or(0.0))
                 .collect();
-            let inverse = tool.drives().inverse(&pose)?;
-            for (j, own) in first.iter_mut().enumerate() {
-                *own = (0..n).map(|k| inverse[(j, k)] * twist[k]).sum();
-            }
+            yielded(tool, &motors, &twist, first)?;
         }
     }
+}
+
+/// Corrects what the joints yield by, motor minus link, where the drives have a twist: one step of Newton's method, because the ratio of a
+/// screw changes on the way.
+fn yielded(
+    tool: &ToolPoint<'_>,
+    motors: &[f64],
+    twist: &[f64],
+    yields: &mut [f64],
+) -> Result<(), ComplianceError> {
+    let drives = tool.drives();
+    let links: Vec<f64> = (motors.iter().zip(yields.iter()))
+        .map(|(motor, own)| motor - own)
+        .collect();
+    let (held, at) = (drives.positions(motors)?, drives.positions(&links)?);
+    let inverse = drives.inverse(&links)?;
+    for (j, own) in yields.iter_mut().enumerate() {
+        *own += (0..twist.len())
+            .map(|k| inverse[(j, k)] * (twist[k] - (held[k] - at[k])))
+            .sum::<f64>();
+    }
+    Ok(())
 }
 
 /// Finds the stiffness of drive `k`. `first`: motor minus link of each joint in the first window of each stretch. `None` if no
@@ -258,10 +277,7 @@ impl Series {
                 signals.label
             )));
         }
-        let chain = (tool.robot())
-            .chain()
-            .map_err(|error| ComplianceError::Model(error.to_string()))?;
-        let parameters = loaded(tool.robot())?;
+        let balance = Equilibrium::new(tool)?;
         let count = q.first().map_or(0, Vec::len);
         let mut own = Self {
             load: Vec::with_capacity(count),
@@ -281,9 +297,7 @@ impl Series {
                             None => pose[j],
                         })
                         .collect();
-                    let mut load = vec![0.0; n];
-                    gravity_vector(&chain, &parameters, &place, &mut load)
-                        .map_err(|error| ComplianceError::Model(error.to_string()))?;
+                    let mut load = balance.weight(&place)?;
                     let pushed = torques(tool, &place, &force.each_ref().map(|list| list[i]))?;
                     for (weight, pushed) in load.iter_mut().zip(&pushed) {
                         *weight -= pushed;
@@ -295,11 +309,12 @@ impl Series {
             // f = R⁻ᵀ·τ.
             let driven = |list: &[f64]| (0..n).map(|j| inverse[(j, k)] * list[j]).sum::<f64>();
             let load = driven(&joint);
-            own.twist.push(
-                (0..n)
+            own.twist.push(match &force {
+                Some(_) => tool.drives().positions(&pose)?[k] - tool.drives().positions(&at)?[k],
+                None => (0..n)
                     .filter_map(|j| Some(map[(k, j)] * (pose[j] - link[j].as_ref()?[i])))
                     .sum(),
-            );
+            });
             if i > 0 {
                 travelled += (0..n)
                     .map(|j| map[(k, j)] * (q[j][i] - q[j][i - 1]))
