@@ -1,6 +1,6 @@
 //! An estimate with its uncertainty.
 
-use rig_output::{format_significant, format_value};
+use rig_output::{format_interval, format_significant, format_value};
 use serde::Serialize;
 
 /// Standard deviations that half of a 95 % interval has, for many degrees of freedom.
@@ -30,6 +30,17 @@ impl Value {
         [self.value - half, self.value + half]
     }
 
+    /// Returns the 95 % interval, rounded as the value is by its standard deviation; a dash for a value that has none.
+    pub fn interval_text(&self) -> String {
+        if self.std == 0.0 {
+            return "–".to_owned();
+        }
+        match self.relative() < EXACT {
+            true => "less than 0.002 % about the value".to_owned(),
+            false => format_interval(self.interval(), self.value, self.std),
+        }
+    }
+
     /// Returns the reciprocal with its standard deviation to first order.
     pub fn reciprocal(&self) -> Self {
         Self::new(1.0 / self.value, self.std / (self.value * self.value))
@@ -49,5 +60,19 @@ impl Value {
     /// Standard deviation over the magnitude.
     pub fn relative(&self) -> f64 {
         self.std / self.value.abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Value;
+
+    #[test]
+    fn an_interval_has_the_digits_of_its_width() {
+        let of = |value: f64, std: f64| Value::new(value, std).interval_text();
+        assert_eq!(of(1499.903, 0.043), "1499.819 to 1499.987");
+        assert_eq!(of(25113.0, 58.0), "24999 to 25227");
+        assert_eq!(of(1500.0, 0.0), "–");
+        assert_eq!(of(1500.0, 1e-3), "less than 0.002 % about the value");
     }
 }

@@ -110,3 +110,28 @@ pub struct LoadingFindings {
     /// What to know about the result.
     pub warnings: Vec<String>,
 }
+
+impl LoadingFindings {
+    /// Says which units were taken for granted, what another one would do, and what checks it; `None` if the motors' torques gave
+    /// the load.
+    pub fn assumed(&self) -> Option<String> {
+        let is_by = |by: Deflection| self.drives.iter().any(|own| own.by == by);
+        let (what, other, check) = match (is_by(Deflection::Tool), is_by(Deflection::LinkByWrench))
+        {
+            (true, _) => (
+                "forces in N and displacements in m",
+                "kgf make all stiffnesses 9.8 times too small, and inches 39 times",
+                "read the force of a known weight, and the displacement of a feeler gauge",
+            ),
+            (false, true) => (
+                "forces in N",
+                "kgf make all stiffnesses 9.8 times too small",
+                "read the force of a known weight",
+            ),
+            (false, false) => return None,
+        };
+        Some(format!(
+            "assumed: {what}; another unit shows in no such recording ({other}): {check}"
+        ))
+    }
+}

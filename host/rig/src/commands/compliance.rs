@@ -14,7 +14,7 @@ use super::ui::Ui;
 use crate::pages;
 use crate::pages::Context;
 use rig_compliance::{
-    Compliance, ComplianceOptions, DriveStiffness, WrenchFrame, elasticity_text,
+    Compliance, ComplianceOptions, DriveStiffness, LoadingFindings, WrenchFrame, elasticity_text,
     identify_compliance,
 };
 use rig_data::EffortNeed;
@@ -293,6 +293,7 @@ fn lines(robot: &Robot, found: &Compliance) -> Vec<String> {
         }
         lines.extend(drive.missing.clone());
     }
+    lines.extend(found.loading.iter().filter_map(LoadingFindings::assumed));
     for pose in &found.poses {
         let list: Vec<String> = (robot.joints.iter().zip(&pose.pose))
             .map(|(joint, q)| format!("{} {q:.3} {}", joint.name, joint.kind.units().0))

@@ -3,10 +3,10 @@
 use super::context::Context;
 use super::parts;
 use rig_compliance::{
-    Band, Compliance, ComplianceMap, Deflection, DriveLoading, FrequencyResponse, Periodic,
-    ToolCompliance, Value, response_pose,
+    Band, Compliance, ComplianceMap, Deflection, DriveLoading, FrequencyResponse, LoadingFindings,
+    Periodic, ToolCompliance, Value, response_pose,
 };
-use rig_output::{format_significant, format_unit};
+use rig_output::{capital, format_significant, format_unit};
 use rig_report::{
     Axis, Block, Column, Document, Fact, HeatMap, Marker, Plot, Role, Section, Series, Table, Tone,
 };
@@ -100,15 +100,7 @@ fn summary(found: &Compliance, context: &Context) -> Vec<Fact> {
 /// The stiffness of all drives.
 fn drives(found: &Compliance) -> Section {
     let rows = found.drives.iter().map(|drive| {
-        let [low, high] = drive.stiffness.unwrap_or_default().interval();
-        let interval = match drive.stiffness {
-            Some(own) if own.std > 0.0 => format!(
-                "{} to {}",
-                format_significant(low, 4),
-                format_significant(high, 4)
-            ),
-            _ => "–".to_owned(),
-        };
+        let interval = drive.stiffness.unwrap_or_default().interval_text();
         vec![
             drive.joint.clone(),
             drive.stiffness.as_ref().map_or("rigid".into(), value),
@@ -136,9 +128,21 @@ fn drives(found: &Compliance) -> Section {
     }))
 }
 
+/// Units of stiffness, torque and twist of the drives of a table.
+fn units(found: &Compliance, loading: &LoadingFindings) -> [&'static str; 3] {
+    let is_linear = |drive: &DriveLoading| found.drives[drive.index].unit == "N/m";
+    let linear = loading.drives.iter().filter(|own| is_linear(own)).count();
+    match linear {
+        0 => ["N·m/rad", "N·m", "rad"],
+        count if count == loading.drives.len() => ["N/m", "N", "m"],
+        _ => ["N·m/rad or N/m", "N·m or N", "rad or m"],
+    }
+}
+
 /// Static loading.
 fn loading(found: &Compliance) -> Option<Section> {
     let loading = found.loading.as_ref()?;
+    let [stiffness, torque, twist] = units(found, loading);
     let optional = |own: &Option<Value>, none: &str| own.as_ref().map_or(none.into(), value);
     let rows = loading.drives.iter().map(|drive| {
         vec![
@@ -168,10 +172,10 @@ fn loading(found: &Compliance) -> Option<Section> {
         columns: vec![
             Column::text("Joint"),
             Column::text("Measurement"),
-            Column::number("Stiffness", ""),
-            Column::number("Hysteresis", "N·m or N"),
-            Column::number("Backlash", "rad or m"),
-            Column::number("Load", "N·m or N"),
+            Column::number("Stiffness", stiffness),
+            Column::number("Hysteresis", torque),
+            Column::number("Backlash", twist),
+            Column::number("Load", torque),
         ],
         rows: rows.collect(),
         note: "Values ± one standard deviation. Backlash shows only where the torque of the spring changes its sign.".into(),
@@ -180,7 +184,15 @@ fn loading(found: &Compliance) -> Option<Section> {
         section
             .blocks
             .extend(drive.missing.as_ref().map(parts::warning));
-        section.blocks.extend(curve(drive).map(Block::Plot));
+        let is_linear = found.drives[drive.index].unit == "N/m";
+        section
+            .blocks
+            .extend(curve(drive, is_linear).map(Block::Plot));
+    }
+    if let Some(text) = loading.assumed() {
+        section
+            .blocks
+            .push(Block::Text(format!("{}.", capital(&text))));
     }
     if let Some(residual) = loading.residual {
         section.blocks.push(Block::Text(format!(
@@ -192,14 +204,24 @@ fn loading(found: &Compliance) -> Option<Section> {
 }
 
 /// Twist over torque, if there are points.
-fn curve(drive: &DriveLoading) -> Option<Plot> {
+fn curve(drive: &DriveLoading, is_linear: bool) -> Option<Plot> {
     if drive.points.iter().all(Vec::is_empty) {
         return None;
     }
+    let (torque, twist) = match is_linear {
+        true => (
+            Axis::new("force of the spring", "N"),
+            Axis::new("deflection", "m"),
+        ),
+        false => (
+            Axis::new("torque of the spring", "N·m"),
+            Axis::new("twist", "rad"),
+        ),
+    };
     let mut plot = Plot::new(
         format!("{}: twist over torque", drive.joint),
-        Axis::new("torque of the spring", "N·m"),
-        Axis::new("twist", "rad"),
+        torque,
+        twist,
     )
     .note(match drive.by {
         Deflection::Tool => "Each dot is one window: the deflection of the tool point over the arm of this joint, less what the other joints explain. The line has the slope of the estimated stiffness, without friction.",
