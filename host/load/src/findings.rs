@@ -614,7 +614,7 @@ fn words(nuisance: Nuisance) -> &'static str {
 }
 
 /// Names what a rigid load was compared with in vain.
-const NO_CAUSE: &str = "Exchanged or reversed channels, a dead channel or one with another gain, readings that are cut, another unit, a turned or displaced sensor, readings in the axes of the base, a delay, a base that leans, reversed gravity, positions that are exchanged or reversed or have another zero or scale, a drift of the bias (also with the temperature) and jumps of it were tried: none of them explains it.";
+const NO_CAUSE: &str = "Exchanged or reversed channels, a dead channel or one with another gain, readings that are cut, another unit, a turned or displaced sensor, readings in the axes of the base, a delay, a base that leans, reversed gravity, position columns with another order, sign, zero or scale, a drift of the bias (also with the temperature) and jumps of it were tried: none of them explains it.";
 
 /// Says that a bias drifts, with the change of each channel that is above its noise.
 fn drift_words(bias: &Bias, noise: [f64; 2]) -> Option<String> {
