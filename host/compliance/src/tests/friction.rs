@@ -9,7 +9,7 @@ use rig_data::prepare::InMemory;
 use rig_data::{Block, JointColumns};
 use rig_model::robot::{EDDA_TEMPLATE, Robot};
 
-use crate::{ComplianceOptions, identify_compliance};
+use crate::{ComplianceOptions, FrequencyResponse, identify_compliance};
 
 /// Rows per second.
 const RATE: f64 = 1000.0;
@@ -34,10 +34,11 @@ fn reference(t: f64) -> f64 {
     edge * edge * (3.0 - 2.0 * edge) * size * phase.sin()
 }
 
-/// The elbow of the EDDA behind a spring, under a position loop: 0.8 N·m of Coulomb friction at the motor, by steps of 25 µs. It
+/// The elbow of the EDDA behind a spring, under a position loop: Coulomb friction of motor and link in N·m, by steps of 25 µs. It
 /// shares no code with the estimator.
-fn elbow() -> JointColumns {
-    let (link, motor, damping, viscous, coulomb) = (0.2434, 0.04, 2.0, 0.12, 0.8);
+fn elbow([of_motor, of_link]: [f64; 2]) -> JointColumns {
+    let (link, motor, damping, viscous) = (0.2434, 0.04, 2.0, 0.12);
+    let braked = |free: f64, most: f64| free - most.min(free.abs()) * free.signum();
     let step = 1.0 / (RATE * STEPS as f64);
     let ([mut q, mut v], [mut ql, mut vl]) = ([0.0f64; 2], [0.0f64; 2]);
     let mut joint = JointColumns::default();
@@ -51,63 +52,85 @@ fn elbow() -> JointColumns {
         }
         let spring = STIFFNESS * (q - ql) + damping * (v - vl);
         let free = v + step * (torque - spring - viscous * v) / motor;
-        v = free - (coulomb * step / motor).min(free.abs()) * free.signum();
-        vl += step * spring / link;
+        v = braked(free, of_motor * step / motor);
+        vl = braked(vl + step * spring / link, of_link * step / link);
         q += step * v;
         ql += step * vl;
     }
     joint
 }
 
-/// The spring came out 0.8 % too stiff, five standard deviations: the damping of the predicted link was late by half a step, which
-/// the antiresonance enlarges, and the velocity before a reversal was a mean over rows that curve.
-#[test]
-fn friction_that_stops_the_motor_does_not_stiffen_the_spring() {
+/// Adds noise of 1 µrad and 0.05 N·m, and identifies the spring.
+fn identified(quiet: &JointColumns, seed: u64) -> FrequencyResponse {
     let robot = Robot::from_toml(EDDA_TEMPLATE, "edda.toml".as_ref()).unwrap();
     let options = ComplianceOptions {
         joint: 1,
         ..ComplianceOptions::default()
     };
-    let quiet = elbow();
-    let (seeds, mut covered, mut sum, mut told) = (8, 0, 0.0, 0.0);
-    for seed in 0..seeds {
-        let mut dice = Pcg64Mcg::seed_from_u64(seed);
-        let mut noisy = |list: &[f64], std: f64| -> Vec<f64> {
-            let mut drawn = || -> f64 { StandardNormal.sample(&mut dice) };
-            list.iter().map(|own| own + std * drawn()).collect()
-        };
-        let own = JointColumns {
-            q: noisy(&quiet.q, 1e-6),
-            tau: noisy(&quiet.tau, 0.05),
-            reference: quiet.reference.clone(),
-            ..JointColumns::default()
-        };
-        let still = vec![0.0; own.q.len()];
-        let shoulder = JointColumns {
-            q: still.clone(),
-            tau: still.clone(),
-            reference: Some(still),
-            ..JointColumns::default()
-        };
-        let block = Block {
-            t: (0..own.q.len()).map(|row| row as f64 / RATE).collect(),
-            joints: vec![shoulder, own],
-            first_line: 2,
-            ..Block::default()
-        };
-        let run = InMemory {
-            label: "elbow.csv".into(),
-            blocks: vec![block],
-        };
-        let found = identify_compliance(&robot, &[], &[&run], &options).unwrap();
-        let own = found.frequency.unwrap().stiffness;
-        let [low, high] = own.interval();
-        covered += usize::from(low <= STIFFNESS && STIFFNESS <= high);
-        sum += own.value / seeds as f64;
-        told += own.std / seeds as f64;
+    let mut dice = Pcg64Mcg::seed_from_u64(seed);
+    let mut noisy = |list: &[f64], std: f64| -> Vec<f64> {
+        let mut drawn = || -> f64 { StandardNormal.sample(&mut dice) };
+        list.iter().map(|own| own + std * drawn()).collect()
+    };
+    let own = JointColumns {
+        q: noisy(&quiet.q, 1e-6),
+        tau: noisy(&quiet.tau, 0.05),
+        reference: quiet.reference.clone(),
+        ..JointColumns::default()
+    };
+    let still = vec![0.0; own.q.len()];
+    let shoulder = JointColumns {
+        q: still.clone(),
+        tau: still.clone(),
+        reference: Some(still),
+        ..JointColumns::default()
+    };
+    let block = Block {
+        t: (0..own.q.len()).map(|row| row as f64 / RATE).collect(),
+        joints: vec![shoulder, own],
+        first_line: 2,
+        ..Block::default()
+    };
+    let run = InMemory {
+        label: "elbow.csv".into(),
+        blocks: vec![block],
+    };
+    let found = identify_compliance(&robot, &[], &[&run], &options).unwrap();
+    found.frequency.unwrap()
+}
+
+/// The spring came out 0.8 % too stiff, five standard deviations: the damping of the predicted link was late by half a step, which
+/// the antiresonance enlarges, and the velocity before a reversal was a mean over rows that curve. With friction of the link, a
+/// torque that the controller does not hold was taken as held, and the spring came out 1.8 % too stiff.
+#[test]
+fn friction_that_stops_the_motor_does_not_stiffen_the_spring() {
+    for (friction, seeds) in [([0.8, 0.0], 8), ([0.4, 0.4], 2)] {
+        let quiet = elbow(friction);
+        let (mut covered, mut sum) = (0, 0.0);
+        for seed in 0..seeds {
+            let found = identified(&quiet, seed);
+            let [low, high] = found.stiffness.interval();
+            covered += usize::from(low <= STIFFNESS && STIFFNESS <= high);
+            sum += found.stiffness.value / seeds as f64;
+        }
+        println!("friction {friction:?}: {covered} of {seeds} intervals cover; mean {sum:.2}");
+        assert!(covered >= seeds as usize - 1, "{covered} of {seeds}");
+        // The means have a standard deviation of 0.06 and 0.2 %.
+        let most = if seeds == 8 { 0.0025 } else { 0.006 };
+        assert!((sum / STIFFNESS - 1.0).abs() < most, "{sum}");
     }
-    println!("friction: {covered} of {seeds} intervals cover; mean {sum:.2}, told {told:.2}");
-    assert!(covered >= seeds as usize - 1, "{covered} of {seeds}");
-    // The mean of 8 has a standard deviation of 0.06 %.
-    assert!((sum / STIFFNESS - 1.0).abs() < 0.0025, "{sum}");
+}
+
+/// The fit of this case ends at no damping and a spring that is 1 to 2 % too soft, which must be said.
+#[test]
+fn a_damping_that_comes_out_as_zero_is_told() {
+    let found = identified(&elbow([0.5, 0.3]), 0);
+    let told = |said: &str| found.warnings.iter().any(|own| own.contains(said));
+    let off = (found.stiffness.value / STIFFNESS - 1.0).abs();
+    println!("{:?} {:?}", found.stiffness, found.damping);
+    assert!(
+        told("has no damping") || off < 0.006,
+        "{:?}",
+        found.warnings
+    );
 }
