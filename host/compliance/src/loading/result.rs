@@ -131,7 +131,7 @@ impl LoadingFindings {
             (false, false) => return None,
         };
         Some(format!(
-            "assumed: {what}; another unit shows in no such recording ({other}): {check}"
+            "assumed where no --unit was given: {what}; another unit shows in no such recording ({other}): {check}"
         ))
     }
 }

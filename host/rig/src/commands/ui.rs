@@ -308,13 +308,16 @@ impl Progress {
                 self.started = None;
                 let share = done as f64 / self.bar.length().unwrap_or(0).max(1) as f64;
                 let left = passed.as_secs_f64() * (1.0 / share.max(1e-9) - 1.0);
-                eprintln!(
-                    "rig: note: {}: {:.1} % after {:.0} s; about {} left.",
-                    self.bar.message(),
-                    100.0 * share,
-                    passed.as_secs_f64(),
-                    in_words(left)
-                );
+                let (what, passed) = (self.bar.message(), passed.as_secs_f64());
+                match share < 1.0 {
+                    true => eprintln!(
+                        "rig: note: {what}: {:.1} % after {passed:.0} s; about {} left.",
+                        100.0 * share,
+                        in_words(left)
+                    ),
+                    // The steps were an estimate, and it was too small.
+                    false => eprintln!("rig: note: {what}: still at work after {passed:.0} s."),
+                }
             }
             _ => {}
         }

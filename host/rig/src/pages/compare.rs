@@ -46,8 +46,13 @@ pub fn compare(found: &Comparison, context: &Context) -> Document {
 /// Returns what the grade `differ-without-effect` means.
 pub(crate) fn same_torque(found: &Comparison) -> String {
     let most = found.torque.worst().map_or(0.0, |(share, ..)| share);
+    let corrected = (found.causes.as_ref()).is_some_and(|causes| causes.corrected.is_some());
+    let advice = match corrected {
+        true => "correct the zero of the joint in the recordings and compare again",
+        false => "use whichever set",
+    };
     format!(
-        "The parameters differ by more than their errors, but the torque that they predict is the same within {} %: use whichever set.",
+        "The parameters differ by more than their errors, but the torque that they predict is the same within {} %: {advice}.",
         parts::percent(most)
     )
 }
