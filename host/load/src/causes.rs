@@ -10,7 +10,6 @@ use rig_model::robot::{Reads, WristSensor};
 
 use crate::candidates::{exchanged, exchanged_and_scaled, scaled, turned};
 use crate::error::LoadError;
-use crate::hanging::reversed;
 use crate::mounting::{Channels, Mounting};
 use crate::pose_noise::Scatter;
 use crate::rows::LEAST_ROWS;
@@ -475,7 +474,7 @@ impl Trial<'_> {
 
     /// Fits reversed gravity; `None` if the load would then have a negative mass by readings of a stated sign.
     fn hanging(&self, unknowns: &Unknowns, sign_stated: bool) -> Option<(Cause, Mounting, Fit)> {
-        let mut start = reversed(self.sensed, self.mounting)?;
+        let mut start = self.sensed.reversed_gravity(self.mounting)?;
         let mut fit = self.sensed.fit(&start, unknowns);
         if fit.values.first().is_some_and(|mass| *mass < 0.0) {
             if sign_stated {

@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::{
-    DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, OMatrix, Rotation3, SMatrix, U3, Vector3,
+    DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, OMatrix, Rotation3, SMatrix, U3, Unit,
+    Vector3,
 };
 use rig_identify::{TriangularFactor, f_p_value};
 use rig_shared::multibody::INERTIAL_PARAMETERS;
@@ -261,6 +262,20 @@ impl Sensed<'_> {
             unknowns,
             recordings: self.recordings.len(),
         }
+    }
+
+    /// Returns a mounting with gravity reversed; `None` if there are poses, which do not tell it from the opposite reading.
+    pub(crate) fn reversed_gravity(&self, start: &Mounting) -> Option<Mounting> {
+        if self.recordings.iter().any(|own| own.poses) || self.gravity == Vector3::zeros() {
+            return None;
+        }
+        let down = start.gravity * self.gravity;
+        let level = Unit::new_normalize(down.cross(&Vector3::ith(down.iamin(), 1.0)));
+        let half_turn = Rotation3::from_axis_angle(&level, std::f64::consts::PI);
+        Some(Mounting {
+            gravity: half_turn * start.gravity,
+            ..start.clone()
+        })
     }
 
     /// Calls `take` with each segment that is used, and the place of its recording's bias.
