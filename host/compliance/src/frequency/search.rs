@@ -71,10 +71,10 @@ pub(super) fn fit_all(
 }
 
 /// Returns the most likely fit without a gap, of a torque that acts as recorded at each instant, or that is held from row to
-/// row; leaves the spectra as it predicts them. One of the two is enough. Both are fitted by the whole prediction before they
-/// are compared: before it, the one that was predicted more often has the smaller deviance.
+/// row; leaves the spectra as it predicts them. One of the two is enough. Both begin alike, as further predictions alone make a
+/// deviance smaller; the more likely one is then fitted by the whole prediction.
 fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
-    let mut start = fit(&bands(spectra), known, None)?;
+    let start = fit(&bands(spectra), known, None)?;
     let with_hold = |hold: f64| {
         let known = Known { hold, ..*known };
         let (mut own, mut found) = (spectra.clone(), start.clone());
@@ -82,18 +82,16 @@ fn fit_plain(spectra: &mut Spectra, known: &Known) -> Option<(Known, Fitted)> {
             own.predict(&found.model, &known.gravity);
             found = fit(&bands(&own), &known, Some(&found.model))?;
         }
-        // The next one begins where this one ends.
-        start.clone_from(&found);
-        if let Some(whole) = refit(&own, &known, &found) {
-            own = own.predicted(&whole.model, &found.model, &known.gravity);
-            found = whole;
-        }
         Some((known, found, own))
     };
     let both = [0.0, 1.0 / known.rate].map(with_hold).into_iter().flatten();
     let (known, found, own) = both.min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))?;
     *spectra = own;
-    Some((known, found))
+    let Some(whole) = refit(spectra, &known, &found) else {
+        return Some((known, found));
+    };
+    *spectra = spectra.predicted(&whole.model, &found.model, &known.gravity);
+    Some((known, whole))
 }
 
 /// Returns the most likely fit with a gap, and leaves the spectra as it predicts them.
