@@ -430,6 +430,7 @@ impl<T: Scalar> Compensation<T> {
             );
             (&mut state.planned, planned)
         };
+        instant.travel = instant.velocity * instant.period;
         // Dry friction gives no torque where the direction is 0, for any hidden state.
         let at_rest = one.role == Role::DryFriction && instant.direction.abs().le(T::ZERO);
         if let Some(contact_deflection) = contact_deflection {

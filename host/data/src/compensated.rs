@@ -146,6 +146,8 @@ struct Scratch {
     /// Friction of the effects that act through the contact over the joint's own friction, 1. Presliding uses the
     /// previous row.
     beside: Vec<f64>,
+    /// Travel since the previous row.
+    travel: Vec<f64>,
 }
 
 impl Scratch {
@@ -156,6 +158,7 @@ impl Scratch {
             behind: zeros(),
             slid: zeros(),
             beside: zeros(),
+            travel: zeros(),
         }
     }
 }
@@ -196,6 +199,9 @@ impl Compensated<'_> {
             for (j, s) in seen.iter().enumerate() {
                 (row[0][j], row[1][j], row[2][j]) = (s.q[r], s.qd[r], s.qdd[r]);
                 drive[j] = s.torque.get(r).copied().unwrap_or(0.0);
+                let before = r.checked_sub(1).map(|before| s.q[before]);
+                running.scratch.travel[j] =
+                    before.map_or(s.qd[r] * self.period, |before| s.q[r] - before);
             }
             for ((to, now), first) in warming
                 .iter_mut()
@@ -256,6 +262,7 @@ impl Compensated<'_> {
             behind,
             slid,
             beside,
+            travel,
         } = scratch;
         let placed = self.effects.placed();
         for (j, p) in self.effects.standard().iter().take(at.qd.len()).enumerate() {
@@ -283,6 +290,7 @@ impl Compensated<'_> {
                 instant.direction = if through { 1.0 } else { at.qd[p.joint].sgn() };
                 if kind.is_presliding() {
                     instant.extra_friction_ratio = beside[p.joint];
+                    instant.travel = travel[p.joint];
                 }
                 let mut torque = p.effect.torque(&mut memory[k], &instant);
                 if kind.is_presliding() {

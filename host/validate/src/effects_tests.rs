@@ -117,12 +117,14 @@ fn books(robot: &Robot, dt: f64, seconds: f64) -> ([f64; 2], f64, f64) {
             friction: fv * mean + fc * mean.sgn(),
             time: (k as f64 + 0.5) * dt,
             period: 0.5 * dt,
+            travel: 0.5 * dt * mean,
             ..Instant::default()
         };
         let effect = robot.effects.first().map(|e| e.effect);
         let extra = effect.filter(|e| e.kind != Kind::Payload).map_or(0.0, |e| {
             let torque = e.torque(&mut memory.clone(), &instant);
             instant.period = dt;
+            instant.travel = dt * mean;
             e.torque(&mut memory, &instant);
             torque
         });

@@ -84,6 +84,7 @@ impl<T: Real> Inputs<T> {
             temperature_rise: self.temperature_rise,
             other: [T::ZERO; 3],
             period: self.period,
+            travel: T::ZERO,
             extra_friction_ratio: T::ZERO,
         }
     }

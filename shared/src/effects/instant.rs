@@ -33,18 +33,15 @@ pub struct Instant<T> {
     pub other: [T; 3],
     /// Time since the last instant, s.
     pub period: T,
+    /// Travel of the contact since the last instant, rad or m. A controller takes the velocity times the period; between
+    /// samples of a recording that would be half a period late, and a fitted stroke too long by it.
+    pub travel: T,
     /// Ratio of other effects' friction that acts through the joint's contact to the model's friction, 1. The contact
     /// bends farther by this ratio before it slides.
     pub extra_friction_ratio: T,
 }
 
 impl<T: Real> Instant<T> {
-    /// Returns the travel of the contact since the last instant, rad.
-    #[inline(always)]
-    pub(super) fn travel(&self) -> T {
-        self.velocity * self.period
-    }
-
     /// Returns the ratio of all friction that acts through the joint's contact to the model's friction, 1.
     #[inline(always)]
     pub(super) fn friction_ratio(&self) -> T {

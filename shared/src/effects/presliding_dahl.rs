@@ -56,8 +56,8 @@ impl Law for PreslidingDahl {
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS] {
-        // Exact over a period of constant velocity, so that any step is stable.
-        let travel = at.travel();
+        // Exact along a travel in one direction, so that any step is stable.
+        let travel = at.travel;
         let (sign, ratio) = (travel.sgn(), at.friction_ratio());
         let kept = (-(travel.abs() / (shapes[0] * ratio))).exp();
         let goal = sign * ratio;

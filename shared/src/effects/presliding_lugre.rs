@@ -89,8 +89,8 @@ impl Law for PreslidingLugre {
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS] {
-        // Exact over a period of constant velocity, so that any step is stable.
-        let travel = at.travel();
+        // Exact along a travel at constant velocity, so that any step is stable.
+        let travel = at.travel;
         let (sign, ratio) = (travel.sgn(), at.friction_ratio());
         let level = T::ONE + shapes[1] * (-(at.velocity / shapes[2]).squared()).exp();
         let kept = (-(travel.abs() / (shapes[0] * level * ratio))).exp();

@@ -80,7 +80,7 @@ impl Law for PreslidingMaxwell {
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS] {
-        let (travel, ratio) = (at.travel(), at.friction_ratio());
+        let (travel, ratio) = (at.travel, at.friction_ratio());
         let mut yield_at = shapes[0];
         let mut terms = [T::ZERO; GAINS];
         for (state, term) in memory.iter_mut().zip(&mut terms).rev() {

@@ -37,6 +37,7 @@ fn along(q: &[f64], period: f64) -> Vec<Instant<f64>> {
                 time: k as f64 * period,
                 temperature_rise: 5.0,
                 period,
+                travel: pair[1] - pair[0],
                 ..Instant::default()
             }
         })
@@ -165,6 +166,7 @@ fn terms_beyond_the_gains_are_zero_and_no_gain_is_without_a_term() {
         other: [0.3, 0.6, -1.5],
         extra_friction_ratio: 0.2,
         period: 1e-3,
+        travel: -0.4e-3,
     };
     for &kind in Kind::ALL {
         let effect = example(kind);
@@ -280,14 +282,14 @@ proptest! {
         let at = Instant {
             position, velocity, acceleration: 3.0 * velocity, direction: velocity.sgn(), motor_angle: 50.0 * position,
             drive_torque: torque, drive_rate: 30.0 * velocity, load: 0.8 * torque, friction: 0.3 * velocity.sgn(), gravity: 9.0, time: 60.0,
-            temperature_rise: 4.0, other: [0.1, velocity, -velocity], extra_friction_ratio: 0.2, period: 1e-3,
+            temperature_rise: 4.0, other: [0.1, velocity, -velocity], extra_friction_ratio: 0.2, period: 1e-3, travel: 1e-3 * velocity,
         };
         let near = Instant {
             position: at.position as f32, velocity: at.velocity as f32, acceleration: at.acceleration as f32,
             direction: at.direction as f32, motor_angle: at.motor_angle as f32,
             drive_torque: at.drive_torque as f32, drive_rate: at.drive_rate as f32, load: at.load as f32, friction: at.friction as f32,
             gravity: at.gravity as f32, time: at.time as f32, temperature_rise: at.temperature_rise as f32,
-            other: at.other.map(|x| x as f32), extra_friction_ratio: 0.2, period: at.period as f32,
+            other: at.other.map(|x| x as f32), extra_friction_ratio: 0.2, period: at.period as f32, travel: at.travel as f32,
         };
         for &kind in Kind::ALL {
             let shapes = example(kind).shapes;
@@ -441,6 +443,7 @@ fn a_contact_is_bent_from_one_direction_to_the_other() {
                 velocity,
                 direction: velocity.sgn(),
                 period: 1e-3,
+                travel: velocity * 1e-3,
                 ..Instant::default()
             };
             let mut step = || {
@@ -493,6 +496,7 @@ fn heat_outlasts_a_pause_and_nothing_else_does() {
             friction: 0.5 * velocity.sgn(),
             time: 30.0,
             period: 1e-3,
+            travel: velocity * 1e-3,
             ..Instant::default()
         };
         let mut memory = Memory::default();
@@ -533,6 +537,7 @@ fn other_friction_bends_the_contact_farther() {
                 velocity,
                 direction: velocity.sgn(),
                 period,
+                travel: velocity * period,
                 extra_friction_ratio: if widened { extra_friction_ratio } else { 0.0 },
                 ..Instant::default()
             };
@@ -594,6 +599,7 @@ fn friction_through_a_contact_never_gives_more_than_it_has_taken() {
                     let at = Instant {
                         velocity,
                         period,
+                        travel: velocity * period,
                         extra_friction_ratio,
                         ..Instant::default()
                     };

@@ -168,6 +168,7 @@ impl<'a> Motion<'a> {
             load: self.load[k],
             time: self.t[k],
             period: 1.0 / RATE,
+            travel: self.joint.qd[k] / RATE,
             ..Instant::default()
         }
     }

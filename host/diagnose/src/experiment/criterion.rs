@@ -79,6 +79,7 @@ impl Course {
                         temperature_rise: 0.0,
                         other: [0.0; 3],
                         period,
+                        travel: at.velocity * period,
                         extra_friction_ratio: 0.0,
                     }
                 })

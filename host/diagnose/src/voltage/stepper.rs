@@ -252,6 +252,7 @@ impl<'a> Stepper<'a> {
             gravity: wave(&self.plant.per_moment),
             time: now,
             period: dt,
+            travel: speed * dt,
             ..Instant::default()
         };
         let weight = wave(&self.plant.gravity);
@@ -278,6 +279,7 @@ impl<'a> Stepper<'a> {
         self.q += 0.5 * dt * (self.v + next);
         self.v = next;
         at.velocity = next;
+        at.travel = next * dt;
         at.direction = next.sgn();
         at.friction = self.sliding(next);
         for part in self.parts.iter_mut().filter(|part| part.remembers) {

@@ -197,7 +197,7 @@ impl Effects {
     }
 
     /// Returns the inputs of the law of effect `k`, without load and direction. Friction is in the velocity's
-    /// direction.
+    /// direction; the travel since the last instant is that of a constant velocity.
     pub fn instant(&self, k: usize, at: &State<'_>) -> Instant<f64> {
         let Placed { joint, other, .. } = self.placed[k];
         Instant {
@@ -212,6 +212,7 @@ impl Effects {
             temperature_rise: at.warming.get(joint).copied().unwrap_or(0.0),
             other: other.map_or([0.0; 3], |o| [at.q[o], at.qd[o], at.qdd[o]]),
             period: at.period,
+            travel: at.qd[joint] * at.period,
             ..Instant::default()
         }
     }

@@ -49,6 +49,7 @@ fn motion(seed: u64, rows: usize) -> Vec<Instant<f64>> {
                 sum(&|[a, _, p]| a * p),
             ],
             period,
+            travel: velocity * period,
             extra_friction_ratio: 0.3 * (5.0 * t).sin(),
             ..Instant::default()
         }

@@ -4,8 +4,9 @@ use rig_shared::effects::{Effect, Instant, Kind, Memory};
 
 use crate::DiagnoseError;
 use crate::columns::candidate::Candidate;
-use crate::columns::effect_columns::{DELAY, Source, add};
+use crate::columns::effect_columns::{DELAY, Source, add, travel};
 use crate::search::fitted_candidate::FittedCandidate;
+use rig_data::runs::JointRun;
 use rig_model::effects::over_coulomb;
 
 /// Effects whose drive torque is predicted with all effects in the model. For a ripple the nominal torque is enough:
@@ -18,19 +19,20 @@ const OWN_ROUNDS: usize = 6;
 const MOST_LOST: f64 = 0.5;
 
 /// Returns the contact deflection of a presliding effect along a run. `beside` is other friction there.
-fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -> Vec<f64> {
+fn bent(effect: &Effect<f64>, joint: &JointRun, beside: &[f64], rate: f64) -> Vec<f64> {
     let mut memory = Memory::default();
-    let along = |(&velocity, &beside): (&f64, &f64)| {
+    let along = |(k, &beside): (usize, &f64)| {
         let at = Instant {
-            velocity,
-            period,
+            velocity: joint.qd[k],
+            period: 1.0 / rate,
+            travel: travel(joint, k, rate),
             extra_friction_ratio: beside,
             ..Instant::default()
         };
         effect.torque(&mut memory, &at);
         effect.contact_deflection(&memory, beside)
     };
-    velocities.iter().zip(beside).map(along).collect()
+    beside.iter().enumerate().map(along).collect()
 }
 
 impl Source<'_> {
@@ -56,7 +58,7 @@ impl Source<'_> {
                 let effect = Effect::new(kind, own, &profile.shapes);
                 for (r, run) in self.runs.iter().enumerate() {
                     let beside = self.beside(joint, r, chosen, gains);
-                    let bent = bent(&effect, &run.joints[joint].qd, &beside, 1.0 / run.rate);
+                    let bent = bent(&effect, &run.joints[joint], &beside, run.rate);
                     self.bent.insert((r, joint), bent);
                     self.beside.insert((r, joint), beside);
                 }
