@@ -114,7 +114,7 @@ impl Family {
             DEGREE + 1
         };
         let mut thin = vec![Vec::new(); count];
-        for (run, values) in source.runs.iter().zip(&self.values) {
+        for (r, (run, values)) in source.runs.iter().zip(&self.values).enumerate() {
             let mut functions = vec![Vec::with_capacity(values.len()); count];
             let own = &run.joints[joint];
             for (k, value) in values.iter().enumerate() {
@@ -132,7 +132,9 @@ impl Family {
                     function.push(factor * x);
                 }
             }
-            for (to, signal) in thin.iter_mut().zip(source.thinning.thinned_raw(&functions)) {
+            let left_out = vec![source.left_out[r][joint].as_slice(); count];
+            let rows = source.thinning.thinned_raw(&functions, &left_out);
+            for (to, signal) in thin.iter_mut().zip(rows) {
                 to.extend(signal);
             }
         }

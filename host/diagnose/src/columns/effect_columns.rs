@@ -39,6 +39,8 @@ pub(crate) struct Source<'a> {
     pub(crate) nominal: &'a Nominal,
     /// Filter and decimation of the columns.
     pub(crate) thinning: &'a Thinning,
+    /// Samples that the rows leave out, run by run and joint by joint.
+    pub(crate) left_out: &'a [Vec<Vec<bool>>],
     /// Predictions of the present model, run by run.
     pub(crate) predicted: Vec<Predicted>,
     /// Identified base parameters.
@@ -131,10 +133,13 @@ impl Source<'_> {
                     }
                 }
             }
+            let left_out: Vec<&[bool]> = (places.iter())
+                .map(|&(.., j)| self.left_out[r][j].as_slice())
+                .collect();
             let thinned = if OF_THE_FILTERED_MOTION.contains(&candidate.kind) {
-                self.thinning.thinned(&signals)
+                self.thinning.thinned(&signals, &left_out)
             } else {
-                self.thinning.thinned_raw(&signals)
+                self.thinning.thinned_raw(&signals, &left_out)
             };
             for ((s, g, j), thin) in places.into_iter().zip(thinned) {
                 columns[s][g][j] = Some(thin);

@@ -331,6 +331,8 @@ pub(crate) struct Motion<'m> {
     pub(crate) robot: &'m Robot,
     /// Filter and decimation.
     pub(crate) thinning: &'m Thinning,
+    /// Samples that the rows leave out, run by run and joint by joint.
+    pub(crate) left_out: &'m [Vec<Vec<bool>>],
     /// The joint.
     pub(crate) joint: usize,
     /// True for used rows.
@@ -380,8 +382,10 @@ impl Motion<'_> {
         signals: &mut dyn FnMut(&Run, &Predicted) -> Vec<Vec<f64>>,
     ) -> Vec<Vec<f64>> {
         let mut columns = vec![Vec::new(); count];
-        for (run, predicted) in self.runs.iter().zip(self.predicted) {
-            let rows = self.thinning.thinned_raw(&signals(run, predicted));
+        let runs = self.runs.iter().zip(self.predicted).zip(self.left_out);
+        for ((run, predicted), left_out) in runs {
+            let left_out = vec![left_out[self.joint].as_slice(); count];
+            let rows = (self.thinning).thinned_raw(&signals(run, predicted), &left_out);
             columns
                 .iter_mut()
                 .zip(rows)

@@ -12,8 +12,7 @@ use crate::DiagnoseError;
 use crate::acceptance::coordinates::since_reversal;
 use crate::columns::candidate::Candidate;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
-use crate::rows::nominal_torque::Predicted;
-use crate::rows::regression::{Column, Rows, spoilt};
+use crate::rows::regression::{Column, Rows};
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::shapes::searched;
 use crate::search::stepwise::Search;
@@ -99,13 +98,13 @@ impl<'a> JointColumns<'a> {
     ) -> Result<Self, DiagnoseError> {
         let rows = &prepared.rows;
         let averaging = Averaging::of(rows, &prepared.runs);
-        let recorded = without_standstill(prepared, &search.source.predicted, joint);
+        let recorded = &rows.torque[joint];
         let nominal = nominal_columns(context, rows, joint);
-        let residual = residual_of(&nominal, &recorded, &rows.keep[joint]);
+        let residual = residual_of(&nominal, recorded, &rows.keep[joint]);
         let left = left.unwrap_or_else(|| averaging.averaged(&residual));
         let noise = Noise::of(&averaging, &residual, &rows.keep[joint], &left);
-        let torque = noise.whitened(&averaging.averaged(&recorded));
-        let size = (mean_square(&averaging.averaged(&rows.torque[joint]))).sqrt() / noise.deviation;
+        let torque = noise.whitened(&averaging.averaged(recorded));
+        let size = (mean_square(&averaging.averaged(recorded))).sqrt() / noise.deviation;
         let fastest = std::f64::consts::PI / rows.period;
         let stiffest = fastest.powi(2) * search.source.mass(joint, 0)?;
         let mut own = Self {
@@ -156,6 +155,7 @@ impl<'a> JointColumns<'a> {
             predicted: &self.search.source.predicted,
             robot: context.robot,
             thinning: &rows.thinning,
+            left_out: &rows.left_out,
             joint: self.joint,
             keep: &rows.keep[self.joint],
         };
@@ -286,29 +286,6 @@ impl<'a> JointColumns<'a> {
         first.is_some_and(|first| first.scale == Scale::Logarithmic)
             && shapes[0] <= least * ABOVE_THE_END
     }
-}
-
-/// Returns the torque rows of a joint with the samples near standstill replaced by the prediction of the nominal model.
-/// Dry friction there lies anywhere between its values in both directions, and the low-pass would spread that error
-/// over the rows around.
-fn without_standstill(prepared: &PreparedData, predicted: &[Predicted], joint: usize) -> Vec<f64> {
-    let rows = &prepared.rows;
-    let mut torque = rows.torque[joint].clone();
-    for ((run, predicted), start) in prepared.runs.iter().zip(predicted).zip(&rows.starts) {
-        let own = &run.joints[joint];
-        let spoilt = spoilt(own, joint, &prepared.treatment);
-        let wrong: Vec<f64> = (own.tau.iter().zip(&predicted.torque[joint]).zip(&spoilt))
-            .map(|((tau, predicted), spoilt)| spoilt * (tau - predicted))
-            .collect();
-        let mut leaked = Vec::new();
-        rows.thinning.push_raw(&wrong, &mut leaked);
-        let end = (start + leaked.len()).min(torque.len());
-        torque[*start..end]
-            .iter_mut()
-            .zip(leaked)
-            .for_each(|(t, l)| *t -= l);
-    }
-    torque
 }
 
 /// Returns the free directions of the nominal model that a joint shows, with their columns.

@@ -82,6 +82,7 @@ impl Equation {
                 keep: vec![vec![true; count]],
                 legible: Vec::new(),
                 clear: Vec::new(),
+                left_out: Vec::new(),
                 nominal: collected.nominal.into_iter().map(one).collect(),
             },
             constants: collected.recordings.len(),
@@ -144,7 +145,7 @@ impl Filters<'_> {
     /// Appends the rows of a signal that was computed from unfiltered data.
     fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
         let smooth = self.band.zero_phase(&self.position.zero_phase(signal));
-        self.thinning.push(&smooth, out);
+        self.thinning.push(&smooth, &[], out);
     }
 }
 
@@ -203,7 +204,7 @@ impl Collected {
         };
         let thinning = filters.thinning;
         let apart: Vec<f64> = own.q.iter().zip(q).map(|(a, b)| a - b).collect();
-        thinning.push(&apart, &mut self.x);
+        thinning.push(&apart, &[], &mut self.x);
         let before = self.starts.last().copied().unwrap_or(0);
         let rows = self.x.len() - before;
         let constants = self.recordings.len();
@@ -211,10 +212,14 @@ impl Collected {
             let one = f64::from(u8::from(*recording == run.recording));
             column.extend(std::iter::repeat_n(one, rows));
         }
-        thinning.push(q, &mut self.nominal[constants]);
-        thinning.push(v, &mut self.nominal[constants + 1]);
-        thinning.push(load, &mut self.load);
-        thinning.push(&central_difference(load, 1.0 / run.rate), &mut self.change);
+        thinning.push(q, &[], &mut self.nominal[constants]);
+        thinning.push(v, &[], &mut self.nominal[constants + 1]);
+        thinning.push(load, &[], &mut self.load);
+        thinning.push(
+            &central_difference(load, 1.0 / run.rate),
+            &[],
+            &mut self.change,
+        );
         let signs: Vec<f64> = v.iter().map(|v| sign(*v)).collect();
         filters.push(&signs, &mut self.direction);
         for (level, side) in self.levels.iter_mut().zip(&self.sides) {
@@ -340,7 +345,7 @@ fn parts_of(
                     parts.push((k, vec![0.0; before]));
                     parts.len() - 1
                 });
-                (prepared.rows.thinning).push(&band.zero_phase(values), &mut parts[place].1);
+                (prepared.rows.thinning).push(&band.zero_phase(values), &[], &mut parts[place].1);
             })?;
         before += prepared.rows.starts[r + 1] - prepared.rows.starts[r];
     }

@@ -99,6 +99,7 @@ impl<'e> Transmitted<'e> {
                 nominal: Vec::new(),
                 legible: Vec::new(),
                 clear: Vec::new(),
+                left_out: Vec::new(),
                 thinning: equation.rows.thinning.clone(),
                 starts: equation.rows.starts.clone(),
                 keep: equation.rows.keep.clone(),
@@ -126,9 +127,9 @@ impl<'e> Transmitted<'e> {
                 .collect();
             let [position, band] = &equation.filters;
             let smooth = band.zero_phase(&position.zero_phase(&beyond));
-            equation.rows.thinning.push(&smooth, &mut bend);
+            equation.rows.thinning.push(&smooth, &[], &mut bend);
             let change = central_difference(&smooth, 1.0 / rows_rate);
-            equation.rows.thinning.push(&change, &mut rate);
+            equation.rows.thinning.push(&change, &[], &mut rate);
         }
         [vec![Some(bend)], vec![Some(rate)]]
     }

@@ -103,6 +103,7 @@ impl Equation {
                 keep: vec![collected.keep],
                 legible: Vec::new(),
                 clear: Vec::new(),
+                left_out: Vec::new(),
                 nominal: collected.columns.map(one).into(),
             },
             dead_zones: collected.dead_zones.map(one).into(),
@@ -191,31 +192,32 @@ impl Collected {
             |signal: &[f64]| -> Vec<f64> { signal.iter().map(|x| drive.gear_ratio * x).collect() };
         let omega = scaled(&joint.qd);
         let columns = &mut self.columns;
-        thinning.push_raw(u, &mut self.voltage);
-        thinning.push_raw(&i, &mut columns[CURRENT]);
+        thinning.push_raw(u, &[], &mut self.voltage);
+        thinning.push_raw(&i, &[], &mut columns[CURRENT]);
         thinning.push_raw(
             &central_difference(&i, 1.0 / run.rate),
+            &[],
             &mut columns[CHANGE],
         );
-        thinning.push(&omega, &mut columns[SPEED]);
-        thinning.push(&scaled(&joint.qdd), &mut columns[ACCELERATION]);
-        thinning.push(&vec![1.0; i.len()], &mut columns[CONSTANT]);
+        thinning.push(&omega, &[], &mut columns[SPEED]);
+        thinning.push(&scaled(&joint.qdd), &[], &mut columns[ACCELERATION]);
+        thinning.push(&vec![1.0; i.len()], &[], &mut columns[CONSTANT]);
         // Sign of the current without its noise.
         let smooth = thinning.smooth(&i);
         let saturated: Vec<f64> = (smooth.iter().zip(&omega))
             .map(|(i, omega)| i * i * omega)
             .collect();
-        thinning.push_raw(&saturated, &mut columns[SATURATION]);
+        thinning.push_raw(&saturated, &[], &mut columns[SATURATION]);
         for (dead, fade) in self.dead_zones.iter_mut().zip(FADES) {
             let lost: Vec<f64> = smooth.iter().map(|i| lost(*i, fade)).collect();
-            thinning.push_raw(&lost, dead);
+            thinning.push_raw(&lost, &[], dead);
         }
         let mut coasts = vec![0.0; i.len()];
         for own in &run.coasting {
             coasts[own.clone()].fill(1.0);
         }
         let mut share = Vec::new();
-        thinning.push_raw(&coasts, &mut share);
+        thinning.push_raw(&coasts, &[], &mut share);
         self.keep.extend(share.iter().map(|s| s.abs() < COASTS));
         thinning.pick(&smooth, &mut self.current);
         thinning.pick(&omega, &mut self.speed);

@@ -63,8 +63,8 @@ pub(crate) struct DiagnosisContext<'a> {
     /// Which of them are free.
     pub(crate) anchor: ParameterPrior,
     treatment: PreprocessingPlan,
-    /// Joints whose rows near standstill are used.
-    pub(crate) rests: Vec<usize>,
+    /// Joints whose rows near standstill are used; None before they are known.
+    pub(crate) rests: Option<Vec<usize>>,
     /// Joints that move in one direction only. Their constant torques are held.
     pub(crate) one_way: Vec<OneWay>,
 }
@@ -88,7 +88,7 @@ impl<'a> DiagnosisContext<'a> {
             anchor,
             nominal,
             treatment: treatment_of(training, robot)?,
-            rests: Vec::new(),
+            rests: None,
             one_way: Vec::new(),
         })
     }
@@ -162,10 +162,12 @@ impl<'a> DiagnosisContext<'a> {
         runs: Vec<Run>,
         treatment: &PreprocessingPlan,
     ) -> Result<PreparedData, DiagnoseError> {
-        let mut rows = Rows::of(&runs, &self.nominal, treatment)?;
+        let mut rows = Rows::of(&runs, &self.nominal, treatment, &|joint| {
+            self.rests_count(joint)
+        })?;
         let held = self.anchor.held_torque(&rows);
         take_off(&mut rows.torque, &held);
-        for &joint in &self.rests {
+        for &joint in self.rests.iter().flatten() {
             rows.use_rests(joint);
         }
         for own in &self.one_way {
@@ -176,6 +178,12 @@ impl<'a> DiagnosisContext<'a> {
             rows,
             treatment: treatment.clone(),
         })
+    }
+
+    /// Returns true if the samples of a joint near standstill count. Where it moves in one direction only, so does friction.
+    fn rests_count(&self, joint: usize) -> bool {
+        let one_way = || self.one_way.iter().any(|own| own.joint == joint);
+        (self.rests.as_ref()).is_none_or(|rests| rests.contains(&joint) || one_way())
     }
 
     /// Returns the sample rate of the training data, Hz.
@@ -211,6 +219,7 @@ impl<'a> DiagnosisContext<'a> {
             runs: &prepared.runs,
             nominal: &self.nominal,
             thinning: &prepared.rows.thinning,
+            left_out: &prepared.rows.left_out,
             predicted,
             values: values.to_vec(),
             free_constants: (0..self.robot.joints.len())

@@ -153,13 +153,14 @@ fn turned(
     let (rows, nominal) = (&held_out.rows, &context.nominal);
     let torque = |by: f64| -> Result<Vec<f64>, DiagnoseError> {
         let mut thin = Vec::new();
-        for run in &held_out.runs {
+        for (run, left_out) in held_out.runs.iter().zip(&rows.left_out) {
             let mut elsewhere = run.clone();
             for q in elsewhere.joints.iter_mut().flat_map(|joint| &mut joint.q) {
                 *q -= by;
             }
             let told = predict(nominal, context.robot, values, &elsewhere)?;
-            rows.thinning.push_raw(&told.torque[0], &mut thin);
+            rows.thinning
+                .push_raw(&told.torque[0], &left_out[0], &mut thin);
         }
         Ok(thin)
     };
@@ -191,7 +192,9 @@ fn shifted(source: &Source, recording: Option<usize>) -> Result<Vec<f64>, Diagno
         let one = vec![f64::from(u8::from(there)); run.len()];
         let torque = source.slopes(0, r)?.misread(&one, 1.0 / run.rate);
         for from in torque.iter().flatten() {
-            source.thinning.push(from, &mut column);
+            source
+                .thinning
+                .push(from, &source.left_out[r][0], &mut column);
         }
     }
     Ok(column)

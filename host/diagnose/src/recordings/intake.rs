@@ -113,14 +113,18 @@ pub(crate) fn intake<'a>(
     }
     let readings = one_way_held(&mut context, readings)?;
     let (readings, open, alike) = undetermined_held(&mut context, readings)?;
-    let Readings {
-        training: mut prepared,
-        held_out,
-    } = rests_used(&mut context, readings)?;
-    let touches = without_touches(&context, &mut prepared)?;
+    let mut readings = rests_used(&mut context, readings)?;
+    let touches = without_touches(&context, &mut readings.training)?;
     if !touches.is_empty() {
-        prepared = context.rows(prepared.runs, &prepared.treatment)?;
+        // A joint that something holds stands still under any torque.
+        context.rests = None;
+        readings = readings.with_new_rows(&context)?;
+        readings = rests_used(&mut context, readings)?;
     }
+    let Readings {
+        training: prepared,
+        held_out,
+    } = readings;
     Ok(Intake::Fit(Box::new(Material {
         context,
         prepared,
@@ -181,15 +185,13 @@ fn undetermined_held(
     Ok((readings, open, alike))
 }
 
-/// Uses the rows near standstill of the joints that show more there than dry friction.
+/// Uses the rows near standstill of the joints that show more there than dry friction, and leaves the samples near
+/// standstill out of the rows of the others.
 fn rests_used(
     context: &mut DiagnosisContext,
     readings: Readings,
 ) -> Result<Readings, DiagnoseError> {
-    context.rests = joints_loud_at_rest(context, &readings.training)?;
-    if context.rests.is_empty() {
-        return Ok(readings);
-    }
+    context.rests = Some(joints_loud_at_rest(context, &readings.training)?);
     readings.with_new_rows(context)
 }
 

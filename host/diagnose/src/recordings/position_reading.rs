@@ -143,11 +143,12 @@ fn left(
         [&smooth, &read].map(|run| predict(source.nominal, source.robot, &source.values, run));
     let (before, after) = (before?, after?);
     let keep = &rows.keep;
-    Ok((after.torque.iter().zip(&before.torque).zip(keep))
-        .map(|((after, before), keep)| {
+    let joints = keep.iter().zip(&rows.left_out[0]);
+    Ok((after.torque.iter().zip(&before.torque).zip(joints))
+        .map(|((after, before), (keep, left_out))| {
             let apart: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
             let mut thin = Vec::new();
-            source.thinning.push(&apart, &mut thin);
+            source.thinning.push(&apart, left_out, &mut thin);
             statistics::rms_of_kept(&thin, keep)
         })
         .collect())

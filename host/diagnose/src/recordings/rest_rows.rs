@@ -3,7 +3,8 @@
 use crate::DiagnoseError;
 use crate::fit::refit::Refit;
 use crate::recordings::context::{DiagnosisContext, PreparedData};
-use crate::rows::regression::{ILLEGIBLE, combined, take_off};
+use crate::rows::regression::{ILLEGIBLE, Rows, combined, take_off};
+use rig_numerics::statistics;
 
 /// Ratio of the mean squares near standstill to the expected ones above which these rows are used.
 const LOUD: f64 = 1.2;
@@ -20,7 +21,7 @@ pub(crate) fn joints_loud_at_rest(
     let rows = &prepared.rows;
     let refit = Refit::of(context, rows)?;
     let values = &refit.before.values;
-    let source = context.source(prepared, &context.anchor.values(values))?;
+    let all = context.anchor.values(values);
     let known = combined(rows.joints(), refit.free.iter().zip(values.iter().copied()));
     let mut residual = rows.torque.clone();
     take_off(&mut residual, &known);
@@ -28,7 +29,19 @@ pub(crate) fn joints_loud_at_rest(
         let Some([about, elsewhere]) = rows.about_rests(*j, &residual[*j]) else {
             return true;
         };
-        about > LOUD * (elsewhere + (ILLEGIBLE * source.coulomb(*j)).powi(2))
+        let unknown = ILLEGIBLE * dry_friction(context, rows, &all, *j);
+        about > LOUD * (elsewhere + unknown.powi(2))
     };
     Ok((0..rows.joints()).filter(loud).collect())
+}
+
+/// Returns the dry friction in the torque of a joint, also that of motors which move several joints.
+fn dry_friction(context: &DiagnosisContext, rows: &Rows, values: &[f64], joint: usize) -> f64 {
+    (rows.nominal.iter().zip(values).enumerate())
+        .filter(|(k, _)| context.nominal.is_coulomb(*k))
+        .filter_map(|(_, (column, value))| {
+            let own = column[joint].as_ref()?;
+            Some(value.max(0.0) * statistics::rms(own))
+        })
+        .sum()
 }

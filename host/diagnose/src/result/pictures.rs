@@ -303,7 +303,8 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let Stretch { run: r, from, to } = busiest(found, joint)?;
     let run = &drawn.runs[r];
     let (mut torque, mut time) = (Vec::new(), Vec::new());
-    rows.thinning.push_raw(&run.joints[joint].tau, &mut torque);
+    rows.thinning
+        .push_raw(&run.joints[joint].tau, &[], &mut torque);
     rows.thinning.pick(&run.t, &mut time);
     let step = (to - from).div_ceil(MOST_POINTS);
     let picked: Vec<usize> = (from..to).step_by(step).collect();
@@ -319,7 +320,7 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let [first, last] = &drawn.motion;
     let shown = |q: &[f64]| -> Vec<f64> {
         let mut thinned = Vec::new();
-        rows.thinning.push(q, &mut thinned);
+        rows.thinning.push(q, &[], &mut thinned);
         picked.iter().map(|k| thinned[k - start]).collect()
     };
     let simulated = |all: &[Positions]| all.get(r).map_or(Vec::new(), |run| shown(&run[joint]));

@@ -7,4 +7,5 @@ pub(crate) mod nominal_torque;
 pub(crate) mod one_way;
 pub(crate) mod regression;
 pub(crate) mod row_weights;
+pub(crate) mod standstill;
 pub(crate) mod thinning;

@@ -3,13 +3,13 @@
 use crate::DiagnoseError;
 use crate::rows::motion::motion_of;
 use crate::rows::nominal::Nominal;
+use crate::rows::standstill::Doubtful;
 use crate::rows::thinning::Thinning;
 use rig_data::prepare::PreprocessingPlan;
-use rig_data::runs::{JointRun, Run};
+use rig_data::runs::Run;
 
 /// Share of slow or saturated samples around a row above which the row is not used. It is the low-passed indicator of
-/// such samples. Before a reversal, stiction may lie anywhere between the Coulomb friction of both directions. So a
-/// kept row may have an error of twice this share of the dry friction.
+/// such samples.
 const SPOILT: f64 = 0.03;
 /// The same share above which a row near standstill is not usable either.
 pub(crate) const ILLEGIBLE: f64 = 0.1;
@@ -69,6 +69,8 @@ pub(crate) struct Rows {
     pub(crate) legible: Vec<Vec<bool>>,
     /// True if no standstill or reversal leaks into the row through the filters, joint by joint; empty if none is near.
     pub(crate) clear: Vec<Vec<bool>>,
+    /// Samples that the rows leave out, run by run and joint by joint.
+    pub(crate) left_out: Vec<Vec<Vec<bool>>>,
     /// Nominal columns, one per base parameter.
     pub(crate) nominal: Vec<Column>,
 }
@@ -80,7 +82,7 @@ pub(crate) struct Rows {
 fn push_nominal(
     nominal: &Nominal,
     run: &Run,
-    thinning: &Thinning,
+    (thinning, left_out): (&Thinning, &[Vec<bool>]),
     before: usize,
     columns: &mut [Column],
 ) -> Result<(), DiagnoseError> {
@@ -92,32 +94,21 @@ fn push_nominal(
         }
         let list = columns[k][j].get_or_insert_with(|| vec![0.0; before]);
         if nominal.is_coulomb(k) {
-            thinning.push_raw(values, list);
+            thinning.push_raw(values, &left_out[j], list);
         } else {
-            thinning.push(values, list);
+            thinning.push(values, &left_out[j], list);
         }
     })?;
-    if let Some([q, qd, qdd]) = &wide {
-        nominal.columns([q, qd, qdd], &mut |k, j, values| {
-            if !nominal.is_drive(k) {
-                let list = columns[k][j].get_or_insert_with(|| vec![0.0; before]);
-                thinning.push_raw(values, list);
-            }
-        })?;
-    }
+    let Some([q, qd, qdd]) = &wide else {
+        return Ok(());
+    };
+    nominal.columns([q, qd, qdd], &mut |k, j, values| {
+        if !nominal.is_drive(k) {
+            let list = columns[k][j].get_or_insert_with(|| vec![0.0; before]);
+            thinning.push_raw(values, &left_out[j], list);
+        }
+    })?;
     Ok(())
-}
-
-/// Returns 1 for the samples of a joint that stand still or saturate, and 0 for the others.
-pub(crate) fn spoilt(joint: &JointRun, j: usize, treatment: &PreprocessingPlan) -> Vec<f64> {
-    let threshold = treatment.speed_threshold.get(j).copied().unwrap_or(0.0);
-    let [low, high] = treatment.saturation.get(j).copied().unwrap_or_default();
-    (joint.qd.iter().zip(joint.recorded().iter()))
-        .map(|(v, tau)| {
-            let limited = low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h);
-            f64::from(u8::from(v.abs() < threshold || limited))
-        })
-        .collect()
 }
 
 /// Masks of a joint's rows, as in [`Rows`].
@@ -129,20 +120,19 @@ struct Masks {
 }
 
 impl Masks {
-    /// Adds the rows of a run, whose `spoilt` samples are 1.
-    fn push(&mut self, thinning: &Thinning, joint: &JointRun, mut spoilt: Vec<f64>) {
-        let mut share = Vec::new();
-        thinning.push_raw(&spoilt, &mut share);
+    /// Adds the rows of a joint in a run.
+    fn push(&mut self, thinning: &Thinning, doubtful: &Doubtful, joint: usize) {
+        let share_of = |samples: &[bool]| {
+            let ones: Vec<f64> = samples.iter().map(|s| f64::from(u8::from(*s))).collect();
+            let mut share = Vec::new();
+            thinning.push_raw(&ones, &[], &mut share);
+            share
+        };
+        let share = share_of(&doubtful.spoilt[joint]);
         // The low-pass rings, so a share below 0 counts like one above.
         self.keep.extend(share.iter().map(|s| s.abs() < SPOILT));
         self.legible.extend(share.iter().map(|s| *s < ILLEGIBLE));
-        for (spoilt, (v, a)) in spoilt.iter_mut().zip(joint.qd.iter().zip(&joint.qdd)) {
-            if v.abs() < a.abs() * thinning.smear() {
-                *spoilt = 1.0;
-            }
-        }
-        share.clear();
-        thinning.push_raw(&spoilt, &mut share);
+        let share = share_of(&doubtful.blurred[joint]);
         self.clear.extend(share.iter().map(|s| s.abs() < CLEAR));
     }
 
@@ -159,7 +149,7 @@ impl Masks {
 }
 
 impl Rows {
-    /// Computes torque, masks and nominal columns of all runs.
+    /// Computes torque, masks and nominal columns of all runs. `rests_count` is as in [`Doubtful::left_out`].
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -167,6 +157,7 @@ impl Rows {
         runs: &[Run],
         nominal: &Nominal,
         treatment: &PreprocessingPlan,
+        rests_count: &dyn Fn(usize) -> bool,
     ) -> Result<Self, DiagnoseError> {
         let thinning = Thinning::of(treatment)?;
         let n = nominal.joints();
@@ -174,24 +165,20 @@ impl Rows {
         let mut torque = vec![Vec::new(); n];
         let mut masks = vec![Masks::default(); n];
         let mut columns: Vec<Column> = vec![vec![None; n]; nominal.base.len()];
+        let mut left_out = Vec::with_capacity(runs.len());
         for run in runs {
-            let motors = nominal.slow_motors(run, &treatment.speed_threshold)?;
+            let doubtful = Doubtful::of(run, nominal, treatment, thinning.smear())?;
             let before = starts.last().copied().unwrap_or(0);
             let rows = thinning.kept(run.len()).count();
-            for (j, joint) in run.joints.iter().enumerate() {
-                thinning.push_raw(&joint.tau, &mut torque[j]);
-                let mut spoilt = spoilt(joint, j, treatment);
-                for (spoilt, slow) in spoilt.iter_mut().zip(motors.get(j).into_iter().flatten()) {
-                    if *slow {
-                        *spoilt = 1.0;
-                    }
-                }
-                for part in &run.left_out {
-                    spoilt[part.clone()].fill(1.0);
-                }
-                masks[j].push(&thinning, joint, spoilt);
+            for (j, masks) in masks.iter_mut().enumerate() {
+                masks.push(&thinning, &doubtful, j);
             }
-            push_nominal(nominal, run, &thinning, before, &mut columns)?;
+            let out = doubtful.left_out(rests_count);
+            for (j, joint) in run.joints.iter().enumerate() {
+                thinning.push_raw(&joint.tau, &out[j], &mut torque[j]);
+            }
+            push_nominal(nominal, run, (&thinning, &out), before, &mut columns)?;
+            left_out.push(out);
             starts.push(before + rows);
         }
         let [keep, legible, clear] = Masks::by_kind(masks);
@@ -204,6 +191,7 @@ impl Rows {
             keep,
             legible,
             clear,
+            left_out,
             nominal: columns,
         })
     }
@@ -278,6 +266,7 @@ impl Rows {
             keep: vec![vec![true; count]],
             legible: vec![vec![true; count]],
             clear: vec![vec![true; count]],
+            left_out: vec![vec![Vec::new()]],
             nominal,
         }
     }

@@ -116,19 +116,36 @@ impl Thinning {
         self.sound(samples).step_by(self.step)
     }
 
-    /// Appends the rows of a full-rate signal to `out`. The signal must be linear in the filtered motion.
-    pub(crate) fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
+    /// Appends the rows of a full-rate signal to `out`. The signal must be linear in the filtered motion. Samples where
+    /// `left_out` is true count as 0 before every filter; an empty `left_out` leaves none out.
+    ///
+    /// Such a signal has passed the position filter, so that this filter must pass what is left out as well. There the
+    /// filtered motion stands for the motion.
+    pub(crate) fn push(&self, signal: &[f64], left_out: &[bool], out: &mut Vec<f64>) {
+        if left_out.is_empty() {
+            self.push_filtered(signal, out);
+        } else if self.filter_matters {
+            let gone = self.position.zero_phase_even(&only(signal, left_out, true));
+            let rest: Vec<f64> = signal.iter().zip(gone).map(|(x, gone)| x - gone).collect();
+            self.push_filtered(&rest, out);
+        } else {
+            self.push_filtered(&only(signal, left_out, false), out);
+        }
+    }
+
+    /// The same for a signal that has not passed the position filter.
+    pub(crate) fn push_raw(&self, signal: &[f64], left_out: &[bool], out: &mut Vec<f64>) {
+        let rest = only(signal, left_out, false);
+        match self.filter_matters {
+            true => self.push_filtered(&self.position.zero_phase_even(&rest), out),
+            false => self.push_filtered(&rest, out),
+        }
+    }
+
+    fn push_filtered(&self, signal: &[f64], out: &mut Vec<f64>) {
         let sound = signal.get(self.sound(signal.len())).unwrap_or_default();
         let smooth = self.low_pass.zero_phase_even(sound);
         out.extend(smooth.into_iter().step_by(self.step));
-    }
-
-    /// Appends the rows of a signal that has not passed the position filter.
-    pub(crate) fn push_raw(&self, signal: &[f64], out: &mut Vec<f64>) {
-        match self.filter_matters {
-            true => self.push(&self.position.zero_phase_even(signal), out),
-            false => self.push(signal, out),
-        }
     }
 
     /// Applies the position filter, without decimation.
@@ -141,38 +158,42 @@ impl Thinning {
         self.low_pass.zero_phase(signal)
     }
 
-    /// Returns the rows of signals of equal length that are linear in the filtered motion.
-    pub(crate) fn thinned(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        self.thinned_behind(None, signals)
+    /// Returns the rows of signals of equal length that are linear in the filtered motion. `left_out` is as in
+    /// [`Self::push`], signal by signal.
+    pub(crate) fn thinned(&self, signals: &[Vec<f64>], left_out: &[&[bool]]) -> Vec<Vec<f64>> {
+        self.thinned_abreast(signals, left_out, &|four| {
+            if !self.filter_matters {
+                return four.only(false);
+            }
+            let gone = self.position.zero_phase_even(&four.only(true));
+            let mut rest = four.all();
+            rest.iter_mut().zip(gone).for_each(|(x, gone)| *x -= gone);
+            rest
+        })
     }
 
-    /// Returns the rows of signals that have not passed the position filter.
-    pub(crate) fn thinned_raw(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        self.thinned_behind(self.filter_matters.then_some(&self.position), signals)
+    /// The same for signals that have not passed the position filter.
+    pub(crate) fn thinned_raw(&self, signals: &[Vec<f64>], left_out: &[&[bool]]) -> Vec<Vec<f64>> {
+        self.thinned_abreast(signals, left_out, &|four| match self.filter_matters {
+            true => self.position.zero_phase_even(&four.only(false)),
+            false => four.only(false),
+        })
     }
 
-    fn thinned_behind(&self, before: Option<&LowPass>, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    fn thinned_abreast(
+        &self,
+        signals: &[Vec<f64>],
+        left_out: &[&[bool]],
+        filtered: &dyn Fn(&Abreast) -> Vec<Lanes<ABREAST>>,
+    ) -> Vec<Vec<f64>> {
         let mut thin = Vec::with_capacity(signals.len());
-        for four in signals.chunks(ABREAST) {
-            let samples = four[0].len();
-            let lane = |k: usize, s: usize| four.get(s).map_or(0.0, |signal| signal[k]);
-            let abreast = |range: Range<usize>| -> Vec<Lanes<ABREAST>> {
-                range
-                    .map(|k| Lanes(std::array::from_fn(|s| lane(k, s))))
-                    .collect()
-            };
-            let sound = self.sound(samples);
-            let sound = match before {
-                Some(filter) => {
-                    let mut all = filter.zero_phase_even(&abreast(0..samples));
-                    all.truncate(sound.end);
-                    all.drain(..sound.start.min(all.len()));
-                    all
-                }
-                None => abreast(sound),
-            };
+        for (signals, left_out) in signals.chunks(ABREAST).zip(left_out.chunks(ABREAST)) {
+            let mut sound = filtered(&Abreast { signals, left_out });
+            let range = self.sound(sound.len());
+            sound.truncate(range.end);
+            sound.drain(..range.start.min(sound.len()));
             let smooth = self.low_pass.zero_phase_even(&sound);
-            thin.extend((0..four.len()).map(|s| {
+            thin.extend((0..signals.len()).map(|s| {
                 let kept = smooth.iter().step_by(self.step);
                 kept.map(|row| row.0[s]).collect::<Vec<f64>>()
             }));
@@ -189,6 +210,51 @@ impl Thinning {
     /// Appends the kept samples without the low-pass.
     pub(crate) fn pick(&self, signal: &[f64], out: &mut Vec<f64>) {
         out.extend(self.kept(signal.len()).map(|k| signal[k]));
+    }
+}
+
+/// Returns the signal with zeros except where `left_out` is `which`. An empty `left_out` is false throughout.
+fn only(signal: &[f64], left_out: &[bool], which: bool) -> Vec<f64> {
+    let out = |k: usize| left_out.get(k).copied().unwrap_or(false);
+    (signal.iter().enumerate())
+        .map(|(k, x)| if out(k) == which { *x } else { 0.0 })
+        .collect()
+}
+
+/// Up to [`ABREAST`] signals of equal length side by side.
+struct Abreast<'s> {
+    signals: &'s [Vec<f64>],
+    left_out: &'s [&'s [bool]],
+}
+
+impl Abreast<'_> {
+    fn lanes(&self, value: impl Fn(usize, usize) -> f64) -> Vec<Lanes<ABREAST>> {
+        let lane = |s: usize, k: usize| {
+            if s < self.signals.len() {
+                value(s, k)
+            } else {
+                0.0
+            }
+        };
+        (0..self.signals[0].len())
+            .map(|k| Lanes(std::array::from_fn(|s| lane(s, k))))
+            .collect()
+    }
+
+    fn all(&self) -> Vec<Lanes<ABREAST>> {
+        self.lanes(|s, k| self.signals[s][k])
+    }
+
+    /// The same as [`only`].
+    fn only(&self, which: bool) -> Vec<Lanes<ABREAST>> {
+        self.lanes(|s, k| {
+            let out = self.left_out[s].get(k).copied().unwrap_or(false);
+            if out == which {
+                self.signals[s][k]
+            } else {
+                0.0
+            }
+        })
     }
 }
 
@@ -210,12 +276,23 @@ fn wide(treatment: &PreprocessingPlan) -> Option<(f64, LowPass)> {
 impl Thinning {
     /// Creates filters for rows that are samples.
     pub(crate) fn of_rows() -> Self {
+        let low_pass = || LowPass::butterworth(2, 0.1, 1.0).unwrap();
+        Self::of_filters(low_pass(), low_pass(), false, 1)
+    }
+
+    /// Creates rows `step` samples apart behind these filters.
+    pub(crate) fn of_filters(
+        low_pass: LowPass,
+        position: LowPass,
+        filter_matters: bool,
+        step: usize,
+    ) -> Self {
         Self {
-            low_pass: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
-            position: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
-            filter_matters: false,
+            low_pass,
+            position,
+            filter_matters,
             wide: None,
-            step: 1,
+            step,
             spoilt: 0,
             smear: 0.0,
         }

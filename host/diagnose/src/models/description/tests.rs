@@ -100,8 +100,8 @@ fn a_tilted_base_is_gravity_turned() {
     assert!((pull.after / truth - 1.0).abs() < 0.03, "{pull:?} {truth}");
     let [_, after] = diagnosis.steps[0].train_rms;
     let own = left(&model, &made);
-    // The diagnosis excludes rows near rests, which this includes …
-    assert!((own / after - 1.0).abs() < 0.08, "{own} {after}");
+    // The diagnosis leaves out the samples near rests, which this includes: 9 % …
+    assert!((own / after - 1.0).abs() < 0.1, "{own} {after}");
     // … unlike the diagnosis of the resulting description.
     let again = frozen(&model, &made);
     assert!((again / after - 1.0).abs() < 1e-3, "{again} {after}");
