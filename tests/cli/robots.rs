@@ -264,3 +264,79 @@ fn an_audit_names_link_and_line_and_succeeds() {
     let said = succeed(&mut run(&["urdf", "--audit", "--robot", "dual.urdf"]));
     assert!(said.contains("6 masses of links"), "{said}");
 }
+
+/// The arm of tests/mimic with friction at every axis: that of an axis that follows acts on its joint, by the square of the ratio if
+/// viscous.
+fn geared(folder: &Path) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/mimic/robot.urdf");
+    let text = (fs::read_to_string(path).unwrap())
+        .replace("effort=\"10000.0\"", "effort=\"400\"")
+        .replace("velocity=\"20\"", "velocity=\"3\"")
+        .replace(
+            "</joint>",
+            "<dynamics damping=\"0.5\" friction=\"1.2\"/></joint>",
+        );
+    fs::write(folder.join("arm.urdf"), text).unwrap();
+}
+
+/// `joint5` moves by half of `joint4`: its drive has 1.2 + 0.5·1.2 N·m of Coulomb and 0.5 + 0.25·0.5 N·m·s/rad of viscous friction.
+#[test]
+fn an_arm_whose_axes_follow_joints_goes_through_the_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    geared(folder.path());
+    let run = |line: &str| {
+        let mut command = rig();
+        let words = line.split_whitespace();
+        succeed(command.args(words).current_dir(folder.path()))
+    };
+    let read = |name: &str| -> serde_json::Value {
+        let text = fs::read_to_string(folder.path().join(name)).unwrap();
+        serde_json::from_str(&text).unwrap()
+    };
+    run("excite --robot arm.urdf --starts 2 --periods 2 --out motion.csv");
+    run(
+        "excite --robot arm.urdf --kind sweep --joint joint4 --speeds 4 --speed 0.1,2 --out sweep.csv",
+    );
+    let noise = "--noise-torque 0.05 --noise-position 1e-5";
+    for (motion, seed, out) in [
+        ("motion", 1, "a"),
+        ("motion", 2, "b"),
+        ("sweep", 3, "sweep-run"),
+    ] {
+        run(&format!(
+            "simulate --robot arm.urdf --trajectory {motion}.csv {noise} --seed {seed} --out {out}.csv"
+        ));
+    }
+    run(
+        "friction-map --robot arm.urdf --data a.csv --sweep sweep-run.csv --joint joint4 --out map",
+    );
+    for point in read("map/friction-map.json")["points"].as_array().unwrap() {
+        let [speed, friction] = ["speed", "friction"].map(|key| point[key].as_f64().unwrap());
+        let expected = 1.8 * speed.signum() + 0.625 * speed;
+        assert!(
+            (friction - expected).abs() < 0.02,
+            "{speed}: {friction} for {expected}"
+        );
+    }
+    run("compare --robot arm.urdf --data a.csv b.csv --out compared");
+    assert_eq!(read("compared/compare.json")["grade"], "agree");
+    run(
+        "control --robot arm.urdf --law pid computed-torque adaptive --duration 4 --no-delay --out laws",
+    );
+    let laws = read("laws/control.json");
+    let error = |k: usize| laws["tracking"][k]["tool_rms"].as_f64().unwrap();
+    // The model of both laws is exact: they leave what sampling leaves.
+    assert!(
+        error(1) < 0.2 * error(0) && error(2) < 0.2 * error(0),
+        "{} {} {}",
+        error(0),
+        error(1),
+        error(2)
+    );
+    run("header --robot arm.urdf --out friction.h");
+    let header = fs::read_to_string(folder.path().join("friction.h")).unwrap();
+    assert!(
+        header.contains("Joint 4, joint6") && header.contains("(rig_real)0.625 * velocity"),
+        "{header}"
+    );
+}

@@ -66,13 +66,13 @@ pub(crate) fn changes(
     columns: &[usize],
     robot: &Robot,
 ) -> [(&'static str, &'static str, DMatrix<f64>); 4] {
-    let joints = robot.joints.len();
+    let links = robot.link_count();
     let own: Vec<usize> = common.parameters.iter().map(|&k| columns[k]).collect();
     let units = |of: &dyn Fn(usize) -> bool| {
         let chosen: Vec<usize> = (0..own.len()).filter(|&k| of(own[k])).collect();
         DMatrix::identity(own.len(), own.len()).select_columns(&chosen)
     };
-    let motor = |c: usize| c.checked_sub(COLUMNS * joints).map(|m| m % MOTOR_COLUMNS);
+    let motor = |c: usize| c.checked_sub(COLUMNS * links).map(|m| m % MOTOR_COLUMNS);
     let friction = units(&|c| match motor(c) {
         Some(which) => which != motor_column::INERTIA,
         None => matches!(c % COLUMNS, column::VISCOUS | column::COULOMB),
@@ -81,7 +81,7 @@ pub(crate) fn changes(
     let gravity = units(&|c| {
         motor(c).is_none() && (c % COLUMNS == column::OFFSET || (1..=3).contains(&(c % COLUMNS)))
     });
-    let last = COLUMNS * (joints - 1);
+    let last = COLUMNS * robot.last_link();
     let payload = combination
         .select_rows(&common.parameters)
         .columns(last, INERTIAL_PARAMETERS)

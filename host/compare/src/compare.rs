@@ -36,9 +36,6 @@ pub fn compare(
     sets: &[RecordingSet],
     options: &CompareOptions,
 ) -> Result<Comparison, CompareError> {
-    robot
-        .without_followers("The comparison of sets")
-        .map_err(Box::new)?;
     if sets.len() < 2 {
         return Err(CompareError::TooFew(sets.len()));
     }

@@ -3,7 +3,7 @@
 //! A zero error ε of a joint adds ε to all its positions. The parameters that a set shows then change along D·ε, and D is
 //! found by shifting the recorded positions and solving the least-squares problem again. One set keeps its zero; the shifts
 //! of the others make all sets agree as well as they can (Gauss and Newton). A zero of the first joint and a base that leans
-//! about its axis are the same.
+//! about its axis are the same, unless other axes follow joints.
 //!
 //! Leaves out: zeros of several joints at once; the zero that all sets share; estimators other than weighted least squares,
 //! whose change with the zero counts as that of weighted least squares.
@@ -96,9 +96,9 @@ impl Zeros<'_> {
                 (own.variances[s] + own.variances[0]).sqrt(),
             ],
         };
-        // The first joint's axis does not move.
+        // The first joint's axis does not move, and no axis beyond it turns with it.
         let or = match joint {
-            0 => ", or a base that leans about its axis",
+            0 if !self.robot.has_followers() => ", or a base that leans about its axis",
             _ => "",
         };
         let what = format!(

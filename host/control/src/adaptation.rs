@@ -7,7 +7,7 @@ use super::error::ControlError;
 use super::law_model::LawModel;
 use super::settings::Settings;
 use rig_identify::{Base, ModelKind};
-use rig_shared::control::arm::{PassiveRegressor, REGRESSOR_WORKSPACE};
+use rig_shared::control::arm::PassiveRegressor;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::trajectory::Reference;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
@@ -44,8 +44,8 @@ pub(crate) struct Parameters {
 }
 
 /// Kinds of columns: mass, first moment, inertia, drive inertia, viscous, Coulomb, offset.
-fn kind(column: usize, joints: usize) -> usize {
-    match column.checked_sub(COLUMNS * joints) {
+fn kind(column: usize, links: usize) -> usize {
+    match column.checked_sub(COLUMNS * links) {
         Some(motor) => [3, 4, 5][motor % MOTOR_COLUMNS] + 10,
         None => match column % COLUMNS {
             column::MASS => 0,
@@ -56,8 +56,8 @@ fn kind(column: usize, joints: usize) -> usize {
     }
 }
 
-fn is_friction(column: usize, joints: usize) -> bool {
-    match column.checked_sub(COLUMNS * joints) {
+fn is_friction(column: usize, links: usize) -> bool {
+    match column.checked_sub(COLUMNS * links) {
         Some(motor) => motor % MOTOR_COLUMNS != motor_column::INERTIA,
         None => matches!(column % COLUMNS, column::VISCOUS | column::COULOMB),
     }
@@ -77,28 +77,28 @@ impl Parameters {
         [derivative, torque]: [&[f64]; 2],
         settings: &Settings,
     ) -> Result<Self, ControlError> {
-        let n = derivative.len();
+        let links = model.chain.link_count();
         let base = Base::structural(&model.robot, ModelKind::Differential, settings.seed)?;
         let values = values(&base, model);
         let mut largest = [0.0_f64; 20];
         for (&c, value) in base.columns.iter().zip(&values) {
-            let own = &mut largest[kind(c, n)];
+            let own = &mut largest[kind(c, links)];
             *own = own.max(value.abs());
         }
         let (mut size, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new());
         for (&c, value) in base.columns.iter().zip(&values) {
-            let joint = match c.checked_sub(COLUMNS * n) {
+            let joint = match c.checked_sub(COLUMNS * links) {
                 Some(motor) => motor / MOTOR_COLUMNS,
-                None => c / COLUMNS,
+                None => (model.robot.joint_of_link(c / COLUMNS)).unwrap_or_default(),
             };
             // A kind whose parameters are all zero: a constant torque or friction that the model does not have.
-            let least = match largest[kind(c, n)] {
+            let least = match largest[kind(c, links)] {
                 0.0 => LEAST_SIZE * torque[joint],
                 some => LEAST_SIZE * some,
             };
             let own = value.abs().max(least);
             size.push(own);
-            lower.push(if is_friction(c, n) {
+            lower.push(if is_friction(c, links) {
                 0.0
             } else {
                 value - BOUND * own
@@ -180,7 +180,7 @@ fn each_regressor(
 ) -> Result<(), ControlError> {
     let n = reference.len();
     let mut out = vec![0.0; n * regressor.width()];
-    let mut workspace = vec![0.0; REGRESSOR_WORKSPACE * n * n];
+    let mut workspace = vec![0.0; regressor.workspace_length()];
     for k in (0..reference[0].len()).step_by(stride) {
         let pick = |which: fn(&Reference<f64>) -> f64| -> Vec<f64> {
             reference.iter().map(|series| which(&series[k])).collect()

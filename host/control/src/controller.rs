@@ -13,9 +13,7 @@ use rig_output::format_significant;
 use rig_shared::control::arm::hybrid::{Axis, ForceGains};
 use rig_shared::control::arm::impedance::Target;
 use rig_shared::control::arm::pid::PidGains;
-use rig_shared::control::arm::{
-    ControlFault, Inputs, Law, Limited, Operational, PassiveRegressor, REGRESSOR_WORKSPACE,
-};
+use rig_shared::control::arm::{ControlFault, Inputs, Law, Limited, Operational, PassiveRegressor};
 use rig_shared::control::arm::{adaptive, computed_torque, hybrid, impedance, pid};
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::trajectory::Reference;
@@ -379,7 +377,7 @@ fn adapting(
         dead_zone: steps.collect(),
         theta: parameters.values(model),
         regressor: vec![0.0; n * view.width()],
-        workspace: vec![0.0; REGRESSOR_WORKSPACE * n * n],
+        workspace: vec![0.0; view.workspace_length()],
         parameters,
     })
 }

@@ -34,7 +34,7 @@ pub(crate) struct Inertias {
 
 /// Returns the inertia matrix at some positions, in joint or in motor coordinates.
 fn matrix(model: &LawModel, q: &[f64], of_motors: bool) -> Result<Vec<f64>, ControlError> {
-    let n = model.parameters.len();
+    let n = model.chain.joint_count();
     let mut matrix = vec![0.0; n * n];
     (model.view())
         .inertia_matrix(q, &mut matrix)
@@ -55,7 +55,7 @@ pub(crate) fn inertias(
     positions: &[Vec<f64>],
     of_motors: bool,
 ) -> Result<Inertias, ControlError> {
-    let n = model.parameters.len();
+    let n = model.chain.joint_count();
     let matrices = (positions.iter())
         .map(|q| matrix(model, q, of_motors))
         .collect::<Result<Vec<_>, _>>()?;

@@ -61,6 +61,11 @@ pub enum ControlError {
         /// Joints of the description.
         found: usize,
     },
+    /// Other axes follow the joints in the model than in the robot.
+    #[error(
+        "The axes that follow joints in {0} are not those of the robot (joint, ratio, offset); describe the same robot."
+    )]
+    OtherFollowers(String),
     /// A joint of the model is of another kind than the robot's.
     #[error(
         "{what} describes another robot: its joint \"{name}\" is {found}, and the robot's joint {place} (\"{own}\") is {expected}; give a description of the same robot."

@@ -41,8 +41,8 @@ impl Mounted {
     fn placed(&self, chain: &Chain<f64>, q: &[f64]) -> Result<Pose<f64>, ControlError> {
         let mut jacobian = [[0.0; 6]; MAX_JOINTS];
         let jacobian = &mut jacobian[..q.len().min(MAX_JOINTS)];
-        let last = q.len().saturating_sub(1);
-        frame_pose(chain, q, last, &self.pose, jacobian).map_err(|e| at_start(e.into()))
+        frame_pose(chain, q, chain.last_link(), &self.pose, jacobian)
+            .map_err(|e| at_start(e.into()))
     }
 
     /// Returns force and moment about the origin in the sensor's axes, of a force at a point of the base frame.

@@ -7,7 +7,7 @@ use super::error::ControlError;
 use rig_model::robot::{JointKind, Robot};
 use rig_model::simulate::{Model, Motors, controllers};
 use rig_shared::control::arm::{ArmModel, ArmMotors};
-use rig_shared::multibody::{COLUMNS, Chain, column};
+use rig_shared::multibody::{COLUMNS, Chain, Follower, JointKind as ChainKind, column};
 
 /// The model that a law uses.
 #[derive(Clone)]
@@ -33,15 +33,17 @@ fn kind_name(kind: JointKind) -> &'static str {
     }
 }
 
+/// Returns what an axis follows: its kind, joint, ratio and offset.
+fn gear(own: &Follower) -> (ChainKind, usize, f64, f64) {
+    (own.geometry.kind, own.master, own.ratio, own.offset)
+}
+
 impl LawModel {
     /// Builds the model of a description.
     ///
     /// # Errors
     /// [`ControlError::Simulate`] if it is no valid chain.
     pub fn of(robot: &Robot) -> Result<Self, ControlError> {
-        robot
-            .without_followers("The simulation of control laws")
-            .map_err(Box::new)?;
         let Model {
             chain,
             parameters,
@@ -50,7 +52,7 @@ impl LawModel {
         } = Model::from_robot(robot)?;
         Ok(Self {
             chain,
-            friction: (parameters.iter())
+            friction: (parameters.iter().take(robot.joints.len()))
                 .map(|row| [row[column::COULOMB], row[column::VISCOUS]])
                 .collect(),
             parameters,
@@ -77,6 +79,14 @@ impl LawModel {
                 expected: robot.joints.len(),
                 found: other.joints.len(),
             });
+        }
+        if other
+            .follower_axes()
+            .iter()
+            .map(gear)
+            .ne(robot.follower_axes().iter().map(gear))
+        {
+            return Err(ControlError::OtherFollowers(what.to_owned()));
         }
         let pairs = || other.joints.iter().zip(&robot.joints);
         if let Some((k, (found, own))) = (pairs().enumerate()).find(|(_, (a, b))| a.kind != b.kind)
@@ -153,7 +163,7 @@ impl LawModel {
         }
     }
 
-    /// Returns all standard parameters: 14 a joint, then 3 a motor with coupled drives.
+    /// Returns all standard parameters: 14 a link, then 3 a motor with coupled drives.
     pub fn standard(&self) -> Vec<f64> {
         let motors = self.motors.iter().flat_map(|m| m.parameters.as_flattened());
         (self.parameters.as_flattened().iter().chain(motors))

@@ -102,13 +102,11 @@ fn best_rank(model: &LawModel, tool: [f64; 3]) -> Result<usize, ControlError> {
 /// # Errors
 /// [`ControlError`] if the model is no valid chain.
 pub fn tool_point(model: &LawModel, notes: &mut Vec<String>) -> Result<[f64; 3], ControlError> {
-    let own = model
-        .parameters
-        .last()
-        .map_or([0.0; 4], |row| [0, 1, 2, 3].map(|k| row[column::MASS + k]));
+    let last = model.parameters.get(model.chain.last_link());
+    let own = last.map_or([0.0; 4], |row| [0, 1, 2, 3].map(|k| row[column::MASS + k]));
     let [mass, x, y, z] = own;
     let at_origin = best_rank(model, [0.0; 3])?;
-    if mass > 0.0 && at_origin < model.parameters.len().min(3) {
+    if mass > 0.0 && at_origin < model.chain.joint_count().min(3) {
         let end = [x, y, z].map(|moment| 2.0 * moment / mass);
         if best_rank(model, end)? > at_origin {
             notes.push(format!(
@@ -124,7 +122,7 @@ pub fn tool_point(model: &LawModel, notes: &mut Vec<String>) -> Result<[f64; 3],
 
 /// Checks a given start pose.
 fn check_pose(model: &LawModel, pose: &[f64]) -> Result<(), ControlError> {
-    let n = model.parameters.len();
+    let n = model.chain.joint_count();
     if pose.len() != n {
         return Err(ControlError::Unreachable(format!(
             "--pose has {} numbers; give one for each of the {n} joints.",

@@ -14,6 +14,9 @@ fn robot(name: &str) -> Robot {
     Robot::load(&folder.join(name)).unwrap()
 }
 
+/// An arm with two axes that follow joints, one of them a slide.
+const MIMIC: &str = "../../tests/mimic/robot.urdf";
+
 /// The same robot without dry friction, of joints and of motors.
 fn slippery(name: &str) -> Robot {
     let mut robot = robot(name);

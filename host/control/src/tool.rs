@@ -16,8 +16,7 @@ pub(crate) fn tool_pose(
         position: tool,
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
     };
-    let last = q.len().saturating_sub(1);
-    frame_pose(chain, q, last, &fixed, jacobian)
+    frame_pose(chain, q, chain.last_link(), &fixed, jacobian)
         .map(|pose| pose.position)
         .map_err(|error| at_start(error.into()))
 }

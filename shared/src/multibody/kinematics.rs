@@ -124,6 +124,50 @@ pub fn frame_pose<T: Real>(
     })
 }
 
+/// Computes the acceleration of the origin of a frame that is fixed in link `link` at constant velocities of the joints, m/s²,
+/// in the base frame: J̇·q̇. `fixed` is the pose of the frame in the frame of the link.
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`], also for a `link` that the chain does not have.
+pub fn convective_acceleration<T: Real>(
+    chain: &Chain<T>,
+    state: [&[T]; 2],
+    link: usize,
+    fixed: &Pose<T>,
+) -> Result<[T; 3], MultibodyError> {
+    if chain.has_followers() {
+        // The axes of followers turn as well: the sum goes over all axes.
+        let axis = chain.axis_of_link(link);
+        return chain.on_axes(state, |axes, own| {
+            convective_acceleration(axes, own, axis, fixed)
+        });
+    }
+    let [q, qd] = state;
+    check("qd", chain.joint_count(), qd.len())?;
+    let mut jacobian = [[T::ZERO; 6]; MAX_JOINTS];
+    let jacobian = &mut jacobian[..qd.len()];
+    frame_pose(chain, q, link, fixed, jacobian)?;
+    Ok(convective(jacobian, qd))
+}
+
+/// Returns Σ q̇_i·q̇_j·∂J_j/∂q_i of the linear velocity: ∂J_j/∂q_i is z_i × J_j if joint i is not beyond joint j, and
+/// z_j × J_i otherwise (z of a sliding joint is zero).
+pub(crate) fn convective<T: Real>(jacobian: &[[T; 6]], qd: &[T]) -> [T; 3] {
+    let mut sum = [T::ZERO; 3];
+    for (j, own) in jacobian.iter().enumerate() {
+        for (i, other) in jacobian.iter().enumerate() {
+            let (axis, arm) = if i <= j { (other, own) } else { (own, other) };
+            let [x, y, z, ..] = *arm;
+            let [_, _, _, a, b, c] = *axis;
+            let weight = qd[i] * qd[j];
+            sum[0] += weight * (b * z - c * y);
+            sum[1] += weight * (c * x - a * z);
+            sum[2] += weight * (a * y - b * x);
+        }
+    }
+    sum
+}
+
 fn six<T: Copy>(linear: Vector3<T>, angular: Vector3<T>) -> [T; 6] {
     let ([x, y, z], [a, b, c]) = (linear.0, angular.0);
     [x, y, z, a, b, c]

@@ -66,7 +66,8 @@ pub use energy::{
 pub use forward::{forward_dynamics, solve_positive_definite};
 pub use inertia_matrix::inertia_matrix;
 pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
-pub use kinematics::{Pose, frame_pose, point_position};
+pub(crate) use kinematics::convective;
+pub use kinematics::{Pose, convective_acceleration, frame_pose, point_position};
 pub use momentum::{momentum_loss_regressor, momentum_regressor};
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;

@@ -435,3 +435,32 @@ fn impossible_followers_are_refused() {
     let wrong = inverse_dynamics(&chain, &all.parameters, &all.q, &all.qd, &all.qdd, &mut tau);
     assert!(wrong.is_err());
 }
+
+#[test]
+fn the_acceleration_at_constant_velocities_is_the_rate_of_the_jacobian() {
+    let fixed = Pose {
+        position: [0.1, -0.2, 0.3],
+        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    };
+    for (seed, (axes, gears)) in (300..).zip(CASES) {
+        let own = Geared::new(axes, gears, seed);
+        let n = own.q.len();
+        let last = own.chain.last_link();
+        let velocity = |at: f64, axis: usize| {
+            let mut jacobian = vec![[0.0; 6]; n];
+            let q = moved(&own.q, &own.qd, at);
+            frame_pose(&own.chain, &q, last, &fixed, &mut jacobian).unwrap();
+            let columns = jacobian.iter().zip(&own.qd);
+            columns.map(|(column, v)| column[axis] * v).sum::<f64>()
+        };
+        let found = convective_acceleration(&own.chain, [&own.q, &own.qd], last, &fixed).unwrap();
+        for axis in 0..3 {
+            let expected = slope(|at| velocity(at, axis), 1e-5);
+            let off = (found[axis] - expected).abs();
+            assert!(
+                off < 1e-5 * (1.0 + expected.abs()),
+                "{seed}: {found:?} {expected}"
+            );
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Passivity of the adaptive law, by energies.
 
-use super::slippery;
+use super::{MIMIC, slippery};
 use crate::closed_loop::closed_loop;
 use crate::controller::Controller;
 use crate::{LawKind, LawModel, Settings, default_reference, references};
@@ -13,7 +13,7 @@ fn doubled_energy(model: &LawModel, q: &[f64], s: &[f64]) -> f64 {
     let n = q.len();
     let mut sum = 2.0 * kinetic_energy(&model.chain, &model.parameters, q, s).unwrap();
     // Rotors count here if the function leaves them out: compare with a chain that has only rotors.
-    let mut rotors = vec![[0.0; 14]; n];
+    let mut rotors = vec![[0.0; 14]; model.parameters.len()];
     for (own, row) in rotors.iter_mut().zip(&model.parameters) {
         own[column::DRIVE_INERTIA] = row[column::DRIVE_INERTIA];
     }
@@ -41,6 +41,7 @@ fn lyapunov_function_of_the_adaptive_law_does_not_rise() {
         ("one-link.toml", 5000.0),
         ("edda.toml", 5000.0),
         ("irp6.toml", 4000.0),
+        (MIMIC, 4000.0),
     ] {
         let robot = slippery(name);
         let truth = Model::from_robot(&robot).unwrap();

@@ -1,6 +1,6 @@
 //! Tracking against closed forms of linear error dynamics.
 
-use super::{robot, slippery};
+use super::{MIMIC, robot, slippery};
 use crate::{Bench, ControlError, LawKind, LawModel, Settings, default_reference, references};
 use rig_model::robot::Robot;
 use rig_model::simulate::Model;
@@ -48,7 +48,7 @@ fn bench<'a>(
 #[test]
 fn computed_torque_gives_the_designed_error_dynamics() {
     // Double pole at −ω: a step of d leaves the error d·(1 + ω·t)·exp(−ω·t) in every joint, coupled drives or not.
-    for name in ["one-link.toml", "edda.toml", "irp6.toml"] {
+    for name in ["one-link.toml", "edda.toml", "irp6.toml", MIMIC] {
         let robot = slippery(name);
         let truth = Model::from_robot(&robot).unwrap();
         let settings = continuous();

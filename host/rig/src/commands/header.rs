@@ -35,7 +35,6 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_file(&args.out, args.force)?;
     let robot = args.robot.load(ui)?;
-    robot.without_followers("A C header")?;
     let from = args.robot.path().file_name().unwrap_or_default();
     let header = c_header(&robot, &from.to_string_lossy());
     write_whole(&args.out, header.text.as_bytes())?;

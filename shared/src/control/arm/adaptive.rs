@@ -48,7 +48,7 @@ pub struct State<'a, T> {
     pub theta: &'a mut [T],
     /// Length n × [`PassiveRegressor::width`].
     pub regressor: &'a mut [T],
-    /// Length [`REGRESSOR_WORKSPACE`](super::REGRESSOR_WORKSPACE)·n².
+    /// Length [`workspace_length`](super::PassiveRegressor::workspace_length) of the regressor.
     pub workspace: &'a mut [T],
 }
 

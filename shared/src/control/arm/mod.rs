@@ -36,5 +36,5 @@ pub use fault::ControlFault;
 pub use input::{Inputs, Law, Limited};
 pub use model::{ArmModel, ArmMotors};
 pub use operational::Operational;
-pub use regressor::{PassiveRegressor, REGRESSOR_WORKSPACE};
+pub use regressor::PassiveRegressor;
 pub use task::{AXES, Task, TaskMotion};

@@ -14,12 +14,12 @@ pub struct ArmMotors<'a, T> {
     pub parameters: &'a [[T; MOTOR_COLUMNS]],
 }
 
-/// The model of an arm: the geometry of its chain, one row of parameters a joint, and its coupled drives.
+/// The model of an arm: the geometry of its chain, one row of parameters a link, and its coupled drives.
 #[derive(Clone, Copy, Debug)]
 pub struct ArmModel<'a, T> {
     /// Geometry and gravity.
     pub chain: &'a Chain<T>,
-    /// Parameters, one row a joint.
+    /// Parameters, one row a link: joints first, then axes that follow.
     pub parameters: &'a [[T; COLUMNS]],
     /// Drives that move several joints or have a changing ratio; `None` if there is no such drive.
     pub motors: Option<ArmMotors<'a, T>>,

@@ -10,7 +10,7 @@ use crate::transmission::{MOTOR_COLUMNS, Transmission, motor_column};
 ///
 /// C is the matrix of Christoffel symbols, for which Ȧ − 2C is skew-symmetric. C(q, a)·b is symmetric in a and b, so it is
 /// a difference of two regressors: C(q, a)·b = c((a + b)/2) − c((a − b)/2) with c(v) = C(q, v)·v. The same holds for the
-/// motors' inertia Jᵀ·I·J̇. Columns are those of the standard parameters, 14 a joint, then 3 a motor with coupled drives.
+/// motors' inertia Jᵀ·I·J̇. Columns are those of the standard parameters, 14 a link, then 3 a motor with coupled drives.
 #[derive(Clone, Copy, Debug)]
 pub struct PassiveRegressor<'a, T> {
     /// Geometry and gravity.
@@ -22,19 +22,22 @@ pub struct PassiveRegressor<'a, T> {
     pub velocity_threshold: T,
 }
 
-/// Length of the workspace of [`PassiveRegressor::evaluate`], in units of n².
-pub const REGRESSOR_WORKSPACE: usize = COLUMNS + MOTOR_COLUMNS;
-
 impl<T: Real> PassiveRegressor<'_, T> {
     /// Returns the number of columns.
     pub fn width(&self) -> usize {
         let n = self.chain.joint_count();
         let motors = self.transmission.map_or(0, |_| MOTOR_COLUMNS * n);
-        COLUMNS * n + motors
+        self.chain.parameter_count() + motors
     }
 
-    /// Computes Y into `out` (n × [`Self::width`]): the n × 14n block of the links first, then the n × 3n block of the
-    /// motors, both row-major. `workspace` has the length [`REGRESSOR_WORKSPACE`]·n².
+    /// Returns the length of the workspace of [`Self::evaluate`].
+    pub fn workspace_length(&self) -> usize {
+        let n = self.chain.joint_count();
+        n * (self.chain.parameter_count() + MOTOR_COLUMNS * n)
+    }
+
+    /// Computes Y into `out` (n × [`Self::width`]): the block of the links first, n × 14 for each link, then the n × 3n block
+    /// of the motors, both row-major. `workspace` has the length [`Self::workspace_length`].
     ///
     /// # Errors
     /// [`ControlFault`] on wrong lengths.
@@ -49,7 +52,7 @@ impl<T: Real> PassiveRegressor<'_, T> {
         let n = self.chain.joint_count();
         check("qd", n, qd.len())?;
         check("v", n, v.len())?;
-        check("workspace", REGRESSOR_WORKSPACE * n * n, workspace.len())?;
+        check("workspace", self.workspace_length(), workspace.len())?;
         check("out", n * self.width(), out.len())?;
         let half = T::from_f64(0.5);
         let (mut mean, mut off) = ([T::ZERO; MAX_JOINTS], [T::ZERO; MAX_JOINTS]);
@@ -60,8 +63,9 @@ impl<T: Real> PassiveRegressor<'_, T> {
         let (mean, off) = (&mean[..n], &off[..n]);
         let still = [T::ZERO; MAX_JOINTS];
         let still = &still[..n];
-        let (links, motors) = out.split_at_mut(n * n * COLUMNS);
-        let (other, other_motors) = workspace.split_at_mut(n * n * COLUMNS);
+        let width = self.chain.parameter_count();
+        let (links, motors) = out.split_at_mut(n * width);
+        let (other, other_motors) = workspace.split_at_mut(n * width);
         differential_regressor(self.chain, q, mean, vd, links)?;
         differential_regressor(self.chain, q, off, still, other)?;
         subtract(links, other);
@@ -69,7 +73,6 @@ impl<T: Real> PassiveRegressor<'_, T> {
         for (own, &more) in links.iter_mut().zip(&*other) {
             *own += more;
         }
-        let width = COLUMNS * n;
         for j in 0..n {
             let own = j * width + j * COLUMNS;
             let direction = precompensation::direction(v[j], T::ZERO, self.velocity_threshold);
@@ -107,7 +110,7 @@ impl<T: Real> PassiveRegressor<'_, T> {
     #[inline(always)]
     pub fn entry(&self, out: &[T], joint: usize, column: usize) -> T {
         let n = self.chain.joint_count();
-        let links = COLUMNS * n;
+        let links = self.chain.parameter_count();
         match column.checked_sub(links) {
             None => out[joint * links + column],
             Some(motor) => out[n * links + joint * MOTOR_COLUMNS * n + motor],

@@ -1,7 +1,7 @@
 //! The task frame: directions along which a tool moves and presses.
 
 use super::fault::{ControlFault, check};
-use crate::multibody::{Chain, MAX_JOINTS, Pose, frame_pose};
+use crate::multibody::{Chain, MAX_JOINTS, Pose, convective, convective_acceleration, frame_pose};
 use crate::scalar::Real;
 
 /// Most directions of a task: those of a point.
@@ -65,8 +65,12 @@ impl<T: Real> Task<'_, T> {
         };
         let mut jacobian = [[T::ZERO; 6]; MAX_JOINTS];
         let jacobian = &mut jacobian[..n];
-        let pose = frame_pose(chain, q, n - 1, &fixed, jacobian)?;
-        let bend = convective(jacobian, qd);
+        let last = chain.last_link();
+        let pose = frame_pose(chain, q, last, &fixed, jacobian)?;
+        let bend = match chain.has_followers() {
+            false => convective(jacobian, qd),
+            true => convective_acceleration(chain, [q, qd], last, &fixed)?,
+        };
         let mut motion = TaskMotion {
             position: [T::ZERO; AXES],
             velocity: [T::ZERO; AXES],
@@ -88,22 +92,4 @@ impl<T: Real> Task<'_, T> {
         }
         Ok(motion)
     }
-}
-
-/// Returns Σ q̇_i·q̇_j·∂J_j/∂q_i of the linear velocity: ∂J_j/∂q_i is z_i × J_j if joint i is not beyond joint j, and
-/// z_j × J_i otherwise (z of a sliding joint is zero).
-fn convective<T: Real>(jacobian: &[[T; 6]], qd: &[T]) -> [T; 3] {
-    let mut sum = [T::ZERO; 3];
-    for (j, own) in jacobian.iter().enumerate() {
-        for (i, other) in jacobian.iter().enumerate() {
-            let (axis, arm) = if i <= j { (other, own) } else { (own, other) };
-            let [x, y, z, ..] = *arm;
-            let [_, _, _, a, b, c] = *axis;
-            let weight = qd[i] * qd[j];
-            sum[0] += weight * (b * z - c * y);
-            sum[1] += weight * (c * x - a * z);
-            sum[2] += weight * (a * y - b * x);
-        }
-    }
-    sum
 }

@@ -7,17 +7,54 @@ use std::vec::Vec;
 use super::computed_torque;
 use super::input::{Inputs, Law};
 use super::model::ArmModel;
-use super::regressor::{PassiveRegressor, REGRESSOR_WORKSPACE};
+use super::regressor::PassiveRegressor;
 use super::task::Task;
 use crate::control::{ControlKind, Gains, law};
 use crate::link::LinkParameters;
 use crate::multibody::samples::Sample;
 use crate::multibody::{
-    COLUMNS, Chain, JointGeometry, JointKind, column, coriolis_matrix, gravity_vector,
+    COLUMNS, Chain, Follower, JointGeometry, JointKind, column, coriolis_matrix, gravity_vector,
     inertia_matrix,
 };
 use crate::precompensation::PrecompensationSettings;
 use crate::trajectory::Reference;
+
+/// Compares the regressor of passivity-based laws with the matrices of the motion.
+fn compare_with_matrices(chain: &Chain<f64>, parameters: &[[f64; COLUMNS]], states: [&[f64]; 4]) {
+    let [q, qd, v, vd] = states;
+    let n = q.len();
+    let view = PassiveRegressor {
+        chain,
+        transmission: None,
+        velocity_threshold: 1e-3,
+    };
+    let mut out = vec![f64::NAN; n * view.width()];
+    let mut workspace = vec![f64::NAN; view.workspace_length()];
+    view.evaluate(q, qd, [v, vd], &mut workspace, &mut out)
+        .unwrap();
+    let (mut mass, mut coriolis) = (vec![0.0; n * n], vec![0.0; n * n]);
+    let mut weight = vec![0.0; n];
+    inertia_matrix(chain, parameters, q, &mut mass).unwrap();
+    coriolis_matrix(chain, parameters, q, qd, &mut coriolis).unwrap();
+    gravity_vector(chain, parameters, q, &mut weight).unwrap();
+    let values = parameters.as_flattened();
+    for j in 0..n {
+        let own = &parameters[j];
+        let mut expected = weight[j] + own[column::OFFSET] + own[column::VISCOUS] * v[j];
+        expected += own[column::COULOMB] * libm::tanh(v[j] / 2e-5);
+        for k in 0..n {
+            expected += mass[j * n + k] * vd[k] + coriolis[j * n + k] * v[k];
+        }
+        let found: f64 = (values.iter().enumerate())
+            .map(|(c, value)| view.entry(&out, j, c) * value)
+            .sum();
+        let off = (found - expected).abs();
+        assert!(
+            off < 1e-9 * (1.0 + expected.abs()),
+            "{j}: {found} {expected}"
+        );
+    }
+}
 
 #[test]
 fn passive_regressor_gives_the_christoffel_matrix_times_the_reference_velocity() {
@@ -25,38 +62,27 @@ fn passive_regressor_gives_the_christoffel_matrix_times_the_reference_velocity()
         let n = 1 + seed as usize % 7;
         let s = Sample::random(n, seed);
         let other = Sample::random(n, seed + 100);
-        let (chain, v, vd) = (s.chain(), &other.qd, &other.qdd);
-        let view = PassiveRegressor {
-            chain: &chain,
-            transmission: None,
-            velocity_threshold: 1e-3,
+        let states = [&s.q[..], &s.qd, &other.qd, &other.qdd];
+        compare_with_matrices(&s.chain(), &s.parameters, states);
+    }
+}
+
+#[test]
+fn passive_regressor_has_the_columns_of_axes_that_follow() {
+    for seed in 0..20 {
+        let s = Sample::random(5, seed);
+        let other = Sample::random(3, seed + 100);
+        let follower = |axis: usize, before: usize, master: usize, ratio: f64| Follower {
+            geometry: s.geometry[axis],
+            before,
+            master,
+            ratio,
+            offset: 0.2,
         };
-        let mut out = vec![f64::NAN; n * view.width()];
-        let mut workspace = vec![f64::NAN; REGRESSOR_WORKSPACE * n * n];
-        view.evaluate(&s.q, &s.qd, [v, vd], &mut workspace, &mut out)
-            .unwrap();
-        let (mut mass, mut coriolis) = (vec![0.0; n * n], vec![0.0; n * n]);
-        let mut weight = vec![0.0; n];
-        inertia_matrix(&chain, &s.parameters, &s.q, &mut mass).unwrap();
-        coriolis_matrix(&chain, &s.parameters, &s.q, &s.qd, &mut coriolis).unwrap();
-        gravity_vector(&chain, &s.parameters, &s.q, &mut weight).unwrap();
-        let values = s.parameters.as_flattened();
-        for j in 0..n {
-            let own = &s.parameters[j];
-            let mut expected = weight[j] + own[column::OFFSET] + own[column::VISCOUS] * v[j];
-            expected += own[column::COULOMB] * libm::tanh(v[j] / 2e-5);
-            for k in 0..n {
-                expected += mass[j * n + k] * vd[k] + coriolis[j * n + k] * v[k];
-            }
-            let found: f64 = (0..COLUMNS * n)
-                .map(|c| view.entry(&out, j, c) * values[c])
-                .sum();
-            let off = (found - expected).abs();
-            assert!(
-                off < 1e-9 * (1.0 + expected.abs()),
-                "{seed} {j}: {found} {expected}"
-            );
-        }
+        let followers = [follower(3, 1, 0, -1.0), follower(4, 3, 1, 0.5)];
+        let chain = Chain::with_followers(&s.geometry[..3], &followers, s.gravity).unwrap();
+        let states = [&s.q[..3], &s.qd[..3], &other.qd, &other.qdd];
+        compare_with_matrices(&chain, &s.parameters, states);
     }
 }
 
