@@ -3,7 +3,7 @@
 use nalgebra::SymmetricEigen;
 use rig_data::prepare::Recording;
 use rig_identify::{chain_of, f_p_value, least_eigenvalue};
-use rig_model::robot::{Joint, Load, Robot};
+use rig_model::robot::{Load, Robot};
 use rig_output::{format_p_value, format_significant, format_unit, listed};
 use rig_shared::multibody::{COLUMN_NAMES, Chain, INERTIAL_PARAMETERS};
 
@@ -47,9 +47,6 @@ pub fn identify_load(
     without: &[&dyn Recording],
     options: &LoadOptions,
 ) -> Result<LoadIdentification, LoadError> {
-    robot
-        .without_followers("The identification of a load")
-        .map_err(Box::new)?;
     let to_joint = parameters_from(&robot.flange_pose());
     let chain = chain_of(robot)?;
     let mut warnings = Vec::new();
@@ -296,8 +293,8 @@ fn unused(torque: &TorqueFindings) -> Option<String> {
 /// # Errors
 /// [`LoadError::Model`]: no link of the description has a mass.
 fn by_description(robot: &Robot) -> Result<String, LoadError> {
-    let weighs = |joint: &Joint| joint.inertial.as_ref().is_some_and(|own| own.mass != 0.0);
-    if !robot.joints.iter().any(weighs) {
+    let weighs = |link: usize| (robot.link_inertial(link)).is_some_and(|own| own.mass != 0.0);
+    if !(0..robot.link_count()).any(weighs) {
         return Err(LoadError::Model(format!(
             "{} describes no link with a mass, so the torque of the robot without the load is unknown; record it (--without), or identify the robot first (`rig identify`)",
             robot.name

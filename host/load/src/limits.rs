@@ -34,8 +34,14 @@ pub(crate) fn too_heavy(
         recording.each_block(1 << 14, &mut |block| {
             for k in (0..block.len()).step_by(STRIDE) {
                 let q: Vec<f64> = block.joints.iter().map(|joint| joint.q[k]).collect();
-                point_position(chain, &q, count - 1, point.coords.into(), &mut slopes)
-                    .map_err(|e| PrepareError::Read(e.to_string()))?;
+                point_position(
+                    chain,
+                    &q,
+                    chain.last_link(),
+                    point.coords.into(),
+                    &mut slopes,
+                )
+                .map_err(|e| PrepareError::Read(e.to_string()))?;
                 for (most, slope) in highest.iter_mut().zip(&slopes) {
                     *most = most.max((mass * gravity.dot(&Vector3::from(*slope))).abs());
                 }

@@ -70,8 +70,8 @@ pub(crate) struct Carried<'a> {
     pub joints: Vec<usize>,
     /// Columns of the model in each row: those of the robot.
     pub robot: &'a [usize],
-    /// Number of joints of the robot.
-    pub count: usize,
+    /// Number of links of the robot.
+    pub links: usize,
     /// Values of the load, and of the robot's columns, by the fit before.
     pub load: Vec<f64>,
     pub values: Vec<f64>,
@@ -88,7 +88,7 @@ impl Carried<'_> {
         let load = row[..INERTIAL_PARAMETERS].iter().zip(&self.load);
         let mut carried: f64 = load.map(|(x, value)| x * value).sum();
         for ((c, x), value) in self.robot.iter().zip(own).zip(&self.values) {
-            let is_of_body = *c < COLUMNS * self.count && c % COLUMNS < INERTIAL_PARAMETERS;
+            let is_of_body = *c < COLUMNS * self.links && c % COLUMNS < INERTIAL_PARAMETERS;
             if is_of_body {
                 carried += x * value;
             }

@@ -52,7 +52,7 @@ pub(crate) fn shown_by(
     // One matrix a channel, one row a state.
     let mut channels: Vec<Vec<f64>> = vec![Vec::new(); 6 + joints];
     let mut regressor = [0.0; ENTRIES];
-    let mut torques = vec![0.0; joints * joints * COLUMNS];
+    let mut torques = vec![0.0; joints * chain.parameter_count()];
     for _ in 0..STATES {
         let [q, qd, qdd] = [draw(std::f64::consts::PI), draw(speed), draw(3.0 * speed)];
         if by != By::Torque {
@@ -63,8 +63,8 @@ pub(crate) fn shown_by(
         }
         if by != By::Sensor {
             differential_regressor(chain, &q, &qd, &qdd, &mut torques)?;
-            let of_last = torques.chunks(joints * COLUMNS).map(|row| {
-                let first = (joints - 1) * COLUMNS;
+            let of_last = torques.chunks(chain.parameter_count()).map(|row| {
+                let first = chain.last_link() * COLUMNS;
                 &row[first..first + INERTIAL_PARAMETERS]
             });
             (channels[6..].iter_mut().zip(of_last)).for_each(|(own, row)| own.extend(row));

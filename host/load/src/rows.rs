@@ -103,7 +103,7 @@ pub(crate) fn parallel_low_pass(band: &PreprocessingPlan) -> Result<LowPass, Pre
         })
 }
 
-/// Returns the axes of the base in the axes of the last joint.
+/// Returns the axes of the base in the axes of the last link.
 pub(crate) fn base_axes(
     chain: &Chain<f64>,
     q: &[f64],
@@ -113,8 +113,7 @@ pub(crate) fn base_axes(
         rotation: Matrix3::identity().into(),
     };
     let mut unused = vec![[0.0; 6]; q.len()];
-    let link = q.len().saturating_sub(1);
-    let pose = frame_pose(chain, q, link, &own, &mut unused)?;
+    let pose = frame_pose(chain, q, chain.last_link(), &own, &mut unused)?;
     Ok(pose.rotation.map(Vector3::from))
 }
 

@@ -106,8 +106,8 @@ struct Columns {
 
 /// Returns true for a column that may differ with the load: Coulomb and viscous friction. If the description gives the
 /// torque of the unloaded robot (`described`), constant torques and drive inertia may differ from it, too.
-fn may_differ(c: usize, joints: usize, described: bool) -> bool {
-    match c.checked_sub(COLUMNS * joints) {
+fn may_differ(c: usize, links: usize, described: bool) -> bool {
+    match c.checked_sub(COLUMNS * links) {
         Some(motor) => described || motor % MOTOR_COLUMNS != motor_column::INERTIA,
         None => match c % COLUMNS {
             column::VISCOUS | column::COULOMB => true,
@@ -123,7 +123,7 @@ fn may_differ(c: usize, joints: usize, described: bool) -> bool {
 /// [`LoadError`]: recordings that cannot be prepared, a robot without a model, joints that all rest.
 pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
     let robot = driven.robot;
-    let joints = robot.joints.len();
+    let (joints, links) = (robot.joints.len(), robot.link_count());
     let all: Vec<&dyn Recording> = driven.with.iter().chain(driven.without).copied().collect();
     let (surveys, usable) = surveyed(&all, joints)?;
     let usable = as_recordings(&usable);
@@ -134,14 +134,14 @@ pub(crate) fn equations(driven: &Driven) -> Result<Equations, LoadError> {
     // Drive inertia may be regrouped with that of the links, and is then no base parameter of its own.
     let mut own = base.columns.clone();
     let all = 0..base.combination.ncols();
-    let changed: Vec<usize> = all.filter(|c| may_differ(*c, joints, !estimated)).collect();
+    let changed: Vec<usize> = all.filter(|c| may_differ(*c, links, !estimated)).collect();
     own.extend(changed.iter().filter(|c| !base.columns.contains(c)));
     let unknowns = Columns {
         robot: if estimated { base.len() } else { 0 },
         changed,
     };
     // All columns of the rows: those of the robot, then the ten of a body on the last link.
-    let last = COLUMNS * (joints - 1);
+    let last = COLUMNS * robot.last_link();
     let mut columns = own.clone();
     columns.extend(last..last + INERTIAL_PARAMETERS);
     let plan = Plan {
@@ -397,7 +397,7 @@ impl Assembly<'_> {
         Carried {
             joints: joints.to_vec(),
             robot: self.robot,
-            count: self.driven.robot.joints.len(),
+            links: self.driven.robot.link_count(),
             load: load.to_vec(),
             values: match self.known.is_empty() {
                 true => others[..self.unknowns.robot].to_vec(),

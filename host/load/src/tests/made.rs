@@ -113,7 +113,7 @@ impl Moving {
 
     /// Returns the pose of a frame of the last link in the base at joint positions.
     fn pose(&self, q: &[f64], frame: &Isometry3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        let last = q.len() - 1;
+        let last = self.chain.last_link();
         let at = |p: Vector3<f64>| {
             let mut unused = vec![[0.0; 3]; q.len()];
             Vector3::from(point_position(&self.chain, q, last, p.into(), &mut unused).unwrap())
@@ -183,7 +183,8 @@ impl Moving {
             let in_joint = robot.flange_pose() * nalgebra::Point3::from(*point);
             let at = |k: f64, slopes: &mut Vec<[f64; 3]>| {
                 let q = self.position(t + k * STEP);
-                let p = point_position(&self.chain, &q, n - 1, in_joint.coords.into(), slopes);
+                let last = self.chain.last_link();
+                let p = point_position(&self.chain, &q, last, in_joint.coords.into(), slopes);
                 Vector3::from(p.unwrap())
             };
             let mut unused = vec![[0.0; 3]; n];

@@ -17,8 +17,24 @@ fn hand() -> Points {
 }
 
 fn arm() -> Robot {
-    let text = TX40.to_owned();
-    let mut robot = Robot::from_toml(&text, "tx40.toml".as_ref()).unwrap();
+    bare(Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap())
+}
+
+/// An arm with two axes that follow joints, one of them a slide.
+fn geared() -> Robot {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/mimic/robot.urdf");
+    let mut robot = bare(Robot::load(path.as_ref()).unwrap());
+    for joint in &mut robot.joints {
+        joint.limits.as_mut().unwrap().velocity = 3.0;
+    }
+    assert!(!robot.followers.is_empty());
+    robot
+}
+
+fn bare(mut robot: Robot) -> Robot {
+    for own in &mut robot.followers {
+        own.inertial = None;
+    }
     for joint in &mut robot.joints {
         joint.drive = None;
         joint.inertial = None;
@@ -107,6 +123,40 @@ fn load_is_what_the_torques_with_it_show_beyond_those_without_it() {
         panic!("{:?}", found.warnings);
     };
     assert!(said.contains("the known mass looks wrong"), "{said}");
+}
+
+/// One drive turns several axes: its torque carries the load by all of them.
+#[test]
+fn a_load_beyond_axes_that_follow_joints_is_found() {
+    let moving = Moving::new(geared(), 0.5, 21);
+    let part = tool();
+    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
+    let without = driven(&moving, &hand(), 0.8, 1);
+    let with = driven(&moving, &both, 0.9, 2);
+    let options = LoadOptions {
+        by: By::Both,
+        ..LoadOptions::default()
+    };
+    let found = identify_load(&moving.robot, &[&with], &[&without], &options).unwrap();
+    let truth = parameters(&part);
+    let agreement = found.agreement.as_ref().unwrap();
+    assert!(
+        agreement.chance > 1e-3 && agreement.directions >= 4,
+        "{agreement:?}"
+    );
+    for (k, truth) in truth.iter().enumerate() {
+        for (value, std) in [
+            (agreement.by_sensor[k], agreement.by_sensor_std[k]),
+            (agreement.by_torque[k], agreement.by_torque_std[k]),
+        ] {
+            assert!(
+                (value - truth).abs() < 4.0 * std,
+                "{k}: {value} ± {std}, truth {truth}"
+            );
+        }
+    }
+    assert!((found.mass.value / truth[0] - 1.0).abs() < 0.01);
+    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
 }
 
 /// The description gives the torque of the unloaded arm; the position is noisy, and heavy rotors multiply its noise.
