@@ -34,6 +34,13 @@ pub(crate) fn loaded(robot: &Robot) -> Result<Vec<[f64; COLUMNS]>, ComplianceErr
     Ok(rows)
 }
 
+/// Returns true if the description states the inertia of all links that joint `k` carries.
+pub(crate) fn are_links_described(robot: &Robot, k: usize) -> bool {
+    let links = robot.links_outwards().into_iter();
+    let mut carried = links.skip_while(|link| *link != k);
+    carried.all(|link| robot.link_inertial(link).is_some())
+}
+
 /// The drives of a robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Drives {

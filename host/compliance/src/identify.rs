@@ -144,6 +144,7 @@ pub fn identify_compliance(
     if options.stiffness.is_empty() {
         warnings.extend(rigid(&drives));
     }
+    warnings.extend(not_described(robot, &drives));
     let (computed, map) = at_poses(&tool, &drives, options, &mut warnings)?;
     warnings.extend(sagging(&tool, &drives, &poses)?);
     Ok(Compliance {
@@ -283,6 +284,14 @@ fn rigid(drives: &[DriveStiffness]) -> Option<String> {
             "The stiffness of joint {} is unknown: these drives count as rigid, so the tool point is more compliant than computed.",
             rigid.join(", ")
         )
+    })
+}
+
+/// Says that the description cannot take measured values as effects.
+fn not_described(robot: &Robot, drives: &[DriveStiffness]) -> Option<String> {
+    let is_measured = drives.iter().any(|own| own.source.is_measured());
+    (robot.has_followers() && is_measured).then(|| {
+        "A description with axes that follow joints cannot hold the effects of compliance.toml; give the stiffness with --stiffness instead.".to_owned()
     })
 }
 

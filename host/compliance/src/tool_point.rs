@@ -83,9 +83,6 @@ impl<'a> ToolPoint<'a> {
     /// # Errors
     /// [`ComplianceError::Model`].
     pub fn new(robot: &'a Robot, offset: [f64; 3]) -> Result<Self, ComplianceError> {
-        robot
-            .without_followers("The compliance")
-            .map_err(Box::new)?;
         let chain = robot
             .chain()
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
@@ -201,7 +198,7 @@ impl<'a> ToolPoint<'a> {
             )));
         }
         let mut columns = vec![[0.0; 6]; n];
-        let pose = frame_pose(&self.chain, q, n - 1, fixed, &mut columns)
+        let pose = frame_pose(&self.chain, q, self.chain.last_link(), fixed, &mut columns)
             .map_err(|error| ComplianceError::Model(error.to_string()))?;
         Ok((pose, DMatrix::from_fn(6, n, |r, j| columns[j][r])))
     }

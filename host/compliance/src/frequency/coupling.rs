@@ -11,7 +11,7 @@ use rig_model::robot::Robot;
 use rig_numerics::statistics::mean;
 use rig_shared::multibody::{column, inverse_dynamics};
 
-use crate::drives::loaded;
+use crate::drives::{are_links_described, loaded};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 
@@ -27,7 +27,7 @@ pub(super) fn coupling(
 ) -> Result<Option<Vec<f64>>, ComplianceError> {
     let wrong = |error: &dyn std::fmt::Display| ComplianceError::Model(error.to_string());
     let n = robot.joints.len();
-    if n < 2 || robot.joints[k..].iter().any(|j| j.inertial.is_none()) {
+    if n < 2 || !are_links_described(robot, k) {
         return Ok(None);
     }
     let chain = robot.chain().map_err(|e| wrong(&e))?;

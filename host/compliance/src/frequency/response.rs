@@ -15,7 +15,7 @@ use super::periodic::Periodic;
 use super::search::{Gap, fit_all};
 use super::spectra::{Spectra, spectra, usable};
 use super::two_mass::{C, Gravity};
-use crate::drives::{Drives, listed_pose, loaded};
+use crate::drives::{Drives, are_links_described, listed_pose, loaded};
 use crate::error::ComplianceError;
 use crate::signals::Signals;
 use crate::value::Value;
@@ -149,9 +149,11 @@ pub(crate) fn respond(
     by_reference: Option<bool>,
 ) -> Result<FrequencyResponse, ComplianceError> {
     let name = &robot.joints[k].name;
-    if drives.kind(k) != DriveKind::Simple {
+    // The inertia of the links would change with the joint's position if further axes followed it.
+    let is_followed = robot.followers.iter().any(|own| own.follows == *name);
+    if drives.kind(k) != DriveKind::Simple || is_followed {
         return Err(ComplianceError::Recording(format!(
-            "The drive of joint \"{name}\" is coupled to other joints or turns a screw, so its two masses are not those of one joint; identify its stiffness by static loading (--static)."
+            "The drive of joint \"{name}\" is coupled to other joints, moves further axes or turns a screw, so its two masses are not those of one joint; identify its stiffness by static loading (--static)."
         )));
     }
     let mut warnings = Vec::new();
@@ -402,7 +404,7 @@ fn described(robot: &Robot, pose: &[f64], k: usize) -> Result<Described, Complia
         gravity_vector(&chain, &rows, &q, &mut torque).map_err(|e| wrong(&e))?;
         Ok(torque[k])
     };
-    let complete = robot.joints[k..].iter().all(|j| j.inertial.is_some());
+    let complete = are_links_described(robot, k);
     let link = inertia[k * n + k];
     Ok(Described {
         unit: match robot.joints[k].kind {

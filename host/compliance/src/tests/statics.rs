@@ -15,11 +15,7 @@ use crate::{
 
 /// Place of the tool point and its axes.
 fn tool(robot: &Robot, q: &[f64], offset: [f64; 3]) -> Isometry3<f64> {
-    let mut pose = Isometry3::identity();
-    for (joint, q) in robot.joints.iter().zip(q) {
-        pose *= joint.pose(*q);
-    }
-    pose * nalgebra::Translation3::from(Vector3::from(offset))
+    robot.last_pose(q) * robot.flange_pose() * nalgebra::Translation3::from(Vector3::from(offset))
 }
 
 /// Twist of each drive, in the coordinate of its stiffness, from motor positions.
@@ -225,6 +221,18 @@ fn a_prismatic_joint_bends_as_statics_says() {
         &[8.0e4, 3.0e3, 5.0e4],
         1.0,
     );
+}
+
+/// One drive turns two axes, one of them a slide: behind its spring both move.
+#[test]
+fn axes_that_follow_joints_bend_with_them() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/mimic/robot.urdf");
+    let robot = Robot::load(path.as_ref()).unwrap();
+    assert!(robot.has_followers());
+    let stiffness = [2.0e4, 2.5e4, 1.2e4, 4.0e3];
+    for pose in [[0.3, -0.5, 1.2, 0.4], [-1.2, 0.4, 0.9, -0.7]] {
+        compare(&robot, &pose, [0.02, 0.01, 0.12], &stiffness, 1.0);
+    }
 }
 
 /// The lower arm of the IRp-6 holds the upper arm absolutely: a torque about the elbow alone loads the screw of the upper arm,
