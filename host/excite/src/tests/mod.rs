@@ -4,6 +4,7 @@
 mod coupled;
 mod design;
 mod files;
+mod followers;
 mod load_motion;
 mod load_poses;
 mod motors;
