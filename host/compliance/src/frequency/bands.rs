@@ -7,7 +7,6 @@
 use std::f64::consts::TAU;
 
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::bin::{Bin, EXCITED};
 use super::spectra::Spectra;
@@ -17,6 +16,8 @@ use super::two_mass::C;
 const AVERAGES: f64 = 8.0;
 /// Relative width of a band.
 const WIDTH: f64 = 0.025;
+/// Probability that the true response lies outside of the circle about a band's.
+const OUTSIDE: f64 = 0.05;
 /// Probability by which a coherence is beyond that of unrelated noise.
 const CERTAIN: f64 = 0.99;
 
@@ -103,8 +104,8 @@ fn band(bins: &[Bin], weight: f64, by_reference: bool) -> Option<BandBins<'_>> {
     let noise = power(&|b| b.velocity - response * b.torque) / count * averages / (averages - 1.0);
     // Variance of H by an instrument; with r = τ it is that of Bendat & Piersol.
     let variance = noise * instrument / cross_torque.norm_sqr() * count / averages;
-    let quantile =
-        FisherSnedecor::new(2.0, 2.0 * (averages - 1.0)).map_or(f64::NAN, |f| f.inverse_cdf(0.95));
+    // The quantile of F with 2 and 2·(n − 1) degrees of freedom in closed form.
+    let quantile = (averages - 1.0) * (OUTSIDE.powf(-1.0 / (averages - 1.0)) - 1.0);
     let chance = 1.0 - (1.0 - CERTAIN).powf(1.0 / (averages - 1.0));
     Some(BandBins {
         band: Band {

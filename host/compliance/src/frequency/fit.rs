@@ -135,21 +135,21 @@ pub(crate) fn fit(
 /// Fits the model with the nonlinear torques of each trial: the least squares of the whole prediction. With torques that a step
 /// takes as given, the fit ends where the residual is orthogonal to other slopes than its own, which is no minimum: what the
 /// model leaves reaches the parameters enlarged, and their covariance is that of another estimate.
-pub(crate) fn refit(spectra: &Spectra, known: &Known, first: &Fitted) -> Option<Fitted> {
+pub(crate) fn refit(spectra: &Spectra, known: &Known, first: &TwoMass) -> Option<Fitted> {
     let own = bands(spectra);
     let used: Vec<&BandBins<'_>> = own.iter().filter(|b| b.band.used).collect();
-    let noise: Vec<f64> = used.iter().map(|b| left(b, &first.model)).collect();
+    let noise: Vec<f64> = used.iter().map(|b| left(b, first)).collect();
     let whole = |theta: &[f64]| {
         let trial = model(theta, known);
-        let predicted = spectra.predicted(&trial, &first.model, &known.gravity);
+        let predicted = spectra.predicted(&trial, first, &known.gravity);
         let bands = bands(&predicted);
         let used: Vec<&BandBins<'_>> = bands.iter().filter(|b| b.band.used).collect();
         residual(&used, &noise, &trial)
     };
-    let mut unknowns = Unknowns::of(&first.model, known, true);
+    let mut unknowns = Unknowns::of(first, known, true);
     unknowns.search(WHOLE, whole);
     let found = model(&unknowns.theta, known);
-    let predicted = spectra.predicted(&found, &first.model, &known.gravity);
+    let predicted = spectra.predicted(&found, first, &known.gravity);
     let bands = bands(&predicted);
     let used: Vec<&BandBins<'_>> = bands.iter().filter(|b| b.band.used).collect();
     unknowns.fitted(&used, &noise, known, 1e-3, whole)

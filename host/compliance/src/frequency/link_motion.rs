@@ -162,13 +162,22 @@ fn motor_friction(model: &TwoMass, motor: &MotorMotion<'_>, spring: &[f64]) -> V
     }
     // What the torque holds beside spring and friction has no mean over a motion that begins and ends at rest.
     let constant = mean(motor.torque) - mean(spring);
+    let clear: Vec<bool> = (0..spring.len()).map(|row| is_clear(motor, row)).collect();
     let mut found = Vec::new();
     let mut offset = constant;
     for _ in 0..OFFSETS {
-        found = friction_beside(model, motor, spring, offset);
+        found = friction_beside(model, motor, spring, &clear, offset);
         offset = constant - model.coulomb * mean(&found);
     }
     found
+}
+
+/// Returns true if the velocity of a row is beyond its noise, in one direction over the rows that a standstill changes.
+fn is_clear(motor: &MotorMotion<'_>, row: usize) -> bool {
+    let end = (row + motor.smeared + 1).min(motor.moving.len());
+    let sign = motor.moving[row].signum();
+    (motor.moving[row.saturating_sub(motor.smeared)..end].iter())
+        .all(|moving| moving * sign > CLEAR)
 }
 
 /// Returns the friction of the motor over its size beside a constant torque, N·m.
@@ -176,6 +185,7 @@ fn friction_beside(
     model: &TwoMass,
     motor: &MotorMotion<'_>,
     spring: &[f64],
+    clear: &[bool],
     offset: f64,
 ) -> Vec<f64> {
     let (inertia, h) = (model.motor_inertia, 0.5 * motor.dt / HALF_STEPS as f64);
@@ -184,16 +194,18 @@ fn friction_beside(
     let mut found = Vec::with_capacity(spring.len());
     let (mut v, mut before) = (0.0, 0.0);
     for row in 0..=last {
-        let near = &motor.moving
-            [row.saturating_sub(motor.smeared)..(row + motor.smeared + 1).min(last + 1)];
+        let next = (row + 1).min(last);
         let sign = motor.moving[row].signum();
-        let is_clear = near.iter().all(|moving| moving * sign > CLEAR);
-        if is_clear {
+        // The motion from here to a row whose velocity is measured is not used.
+        if clear[row] && clear[next] {
+            found.push(sign);
+            continue;
+        }
+        if clear[row] {
             let push = |k: usize| motor.torque[k] - spring[k] - model.viscous * motor.velocity[k];
             v = motor.velocity[row]
                 - averaged_away(push, row, motor.smeared, last) * motor.dt / inertia;
         }
-        let next = (row + 1).min(last);
         let at_end = motor.torque[if model.hold > 0.0 { row } else { next }];
         let [own, next] = [motor.torque[row] - spring[row], at_end - spring[next]];
         let [own, next] = [own - offset, next - offset];
@@ -206,7 +218,7 @@ fn friction_beside(
             v += (h * torque - impulse) / inertia;
             halves[step / HALF_STEPS] += impulse / (most * HALF_STEPS as f64);
         }
-        found.push(match is_clear {
+        found.push(match clear[row] {
             true => sign,
             false => 0.5 * (before + halves[0]),
         });

@@ -53,8 +53,6 @@ const UNUSABLE: f64 = 0.1;
 const SOFTER: f64 = 0.01;
 /// Multiple of the noise that the model leaves which is told.
 const MISFIT: f64 = 4.0;
-/// Damping over the antiresonance and the link's inertia below which there is none: the fit has gone to the end of its range.
-const UNDAMPED: f64 = 1e-4;
 /// Largest number of points in the figure of the signals.
 const SHOWN: usize = 4000;
 
@@ -514,8 +512,7 @@ fn doubts(
             ));
         }
     }
-    let usual = found.model.antiresonance() * found.model.link_inertia;
-    if found.model.damping < UNDAMPED * usual {
+    if found.model.is_undamped() {
         doubts.push(format!(
             "By the fit joint \"{name}\" has no damping, and no joint is like that: the model does not describe this recording. The stiffness and the inertias may be wrong by several standard deviations (1 to 4 % with friction of motor and link together in simulations). Record with a larger amplitude, or measure the stiffness by static loading (--static)."
         ));

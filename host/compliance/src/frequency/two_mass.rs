@@ -74,6 +74,9 @@ pub(crate) struct TwoMass {
 /// an inertia by less than a thousandth.
 const ALIASES: [(f64, i32); 3] = [(0.1, 1), (0.2, 2), (f64::INFINITY, 4)];
 
+/// Damping over the antiresonance and the link's inertia below which there is none.
+const UNDAMPED: f64 = 1e-4;
+
 impl TwoMass {
     /// Returns velocity per recorded torque at an angular frequency, rad/s: that of the torque which acts, or of one that is
     /// held from row to row.
@@ -130,6 +133,11 @@ impl TwoMass {
     /// Antiresonance, rad/s.
     pub(crate) fn antiresonance(&self) -> f64 {
         ((self.stiffness + self.gravity) / self.link_inertia).sqrt()
+    }
+
+    /// Returns true if there is no damping: a fit has gone to the end of its range.
+    pub(crate) fn is_undamped(&self) -> bool {
+        self.damping < UNDAMPED * self.antiresonance() * self.link_inertia
     }
 
     /// Resonance, rad/s: the upper natural frequency of both masses without damping.

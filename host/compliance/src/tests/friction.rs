@@ -34,30 +34,54 @@ fn reference(t: f64) -> f64 {
     edge * edge * (3.0 - 2.0 * edge) * size * phase.sin()
 }
 
-/// The elbow of the EDDA behind a spring, under a position loop: Coulomb friction of motor and link in N·m, by steps of 25 µs. It
-/// shares no code with the estimator.
-fn elbow([of_motor, of_link]: [f64; 2]) -> JointColumns {
-    let (link, motor, damping, viscous) = (0.2434, 0.04, 2.0, 0.12);
-    let braked = |free: f64, most: f64| free - most.min(free.abs()) * free.signum();
-    let step = 1.0 / (RATE * STEPS as f64);
-    let ([mut q, mut v], [mut ql, mut vl]) = ([0.0f64; 2], [0.0f64; 2]);
-    let mut joint = JointColumns::default();
-    for k in 0..((LENGTH + 2.0 * REST) * RATE) as usize * STEPS {
-        let wanted = reference(k as f64 * step);
-        let torque = 400.0 * (wanted - q) - 8.0 * v;
-        if k.is_multiple_of(STEPS) {
-            joint.q.push(q);
-            joint.tau.push(torque);
-            joint.reference.get_or_insert_default().push(wanted);
+/// The elbow of the EDDA behind a spring, under a position loop.
+#[derive(Clone, Copy, Debug)]
+struct Elbow {
+    /// Coulomb friction of motor and link, N·m.
+    coulomb: [f64; 2],
+    /// Viscous friction of the link, N·m·s/rad.
+    link_viscous: f64,
+    /// True if the controller holds the torque from row to row.
+    held: bool,
+}
+
+impl Elbow {
+    fn with_friction(coulomb: [f64; 2]) -> Self {
+        Self {
+            coulomb,
+            link_viscous: 0.0,
+            held: false,
         }
-        let spring = STIFFNESS * (q - ql) + damping * (v - vl);
-        let free = v + step * (torque - spring - viscous * v) / motor;
-        v = braked(free, of_motor * step / motor);
-        vl = braked(vl + step * spring / link, of_link * step / link);
-        q += step * v;
-        ql += step * vl;
     }
-    joint
+
+    /// Records the elbow by steps of 25 µs. It shares no code with the estimator.
+    fn record(&self) -> JointColumns {
+        let (link, motor, damping, viscous) = (0.2434, 0.04, 2.0, 0.12);
+        let braked = |free: f64, most: f64| free - most.min(free.abs()) * free.signum();
+        let step = 1.0 / (RATE * STEPS as f64);
+        let [of_motor, of_link] = self.coulomb;
+        let ([mut q, mut v], [mut ql, mut vl]) = ([0.0f64; 2], [0.0f64; 2]);
+        let (mut joint, mut torque) = (JointColumns::default(), 0.0);
+        for k in 0..((LENGTH + 2.0 * REST) * RATE) as usize * STEPS {
+            let wanted = reference(k as f64 * step);
+            if !self.held || k.is_multiple_of(STEPS) {
+                torque = 400.0 * (wanted - q) - 8.0 * v;
+            }
+            if k.is_multiple_of(STEPS) {
+                joint.q.push(q);
+                joint.tau.push(torque);
+                joint.reference.get_or_insert_default().push(wanted);
+            }
+            let spring = STIFFNESS * (q - ql) + damping * (v - vl);
+            let free = v + step * (torque - spring - viscous * v) / motor;
+            let driven = vl + step * (spring - self.link_viscous * vl) / link;
+            v = braked(free, of_motor * step / motor);
+            vl = braked(driven, of_link * step / link);
+            q += step * v;
+            ql += step * vl;
+        }
+        joint
+    }
 }
 
 /// Adds noise of 1 µrad and 0.05 N·m, and identifies the spring.
@@ -105,7 +129,7 @@ fn identified(quiet: &JointColumns, seed: u64) -> FrequencyResponse {
 #[test]
 fn friction_that_stops_the_motor_does_not_stiffen_the_spring() {
     for (friction, seeds) in [([0.8, 0.0], 8), ([0.4, 0.4], 2)] {
-        let quiet = elbow(friction);
+        let quiet = Elbow::with_friction(friction).record();
         let (mut covered, mut sum) = (0, 0.0);
         for seed in 0..seeds {
             let found = identified(&quiet, seed);
@@ -121,16 +145,30 @@ fn friction_that_stops_the_motor_does_not_stiffen_the_spring() {
     }
 }
 
-/// The fit of this case ends at no damping and a spring that is 1 to 2 % too soft, which must be said.
+/// With dry and viscous friction of the link the torque was taken as held, 1.7 % too stiff. With more friction of the motor the
+/// fits ended in a local minimum without damping, 1 to 4 % too soft.
 #[test]
-fn a_damping_that_comes_out_as_zero_is_told() {
-    let found = identified(&elbow([0.5, 0.3]), 0);
-    let told = |said: &str| found.warnings.iter().any(|own| own.contains(said));
-    let off = (found.stiffness.value / STIFFNESS - 1.0).abs();
-    println!("{:?} {:?}", found.stiffness, found.damping);
-    assert!(
-        told("has no damping") || off < 0.006,
-        "{:?}",
-        found.warnings
-    );
+fn friction_of_motor_and_link_hides_neither_the_hold_nor_the_damping() {
+    for (coulomb, link_viscous, held) in [
+        ([0.4, 0.4], 0.05, false),
+        ([0.5, 0.3], 0.0, false),
+        ([0.5, 0.3], 0.0, true),
+    ] {
+        let case = Elbow {
+            coulomb,
+            link_viscous,
+            held,
+        };
+        let found = identified(&case.record(), 0);
+        println!("{case:?}: {:?} {:?}", found.stiffness, found.damping);
+        assert_eq!(found.held, held, "{case:?}");
+        let off = (found.stiffness.value - STIFFNESS) / found.stiffness.std;
+        assert!(off.abs() < 2.5, "{case:?}: {:?}", found.stiffness);
+        assert!(
+            (found.damping.value - 2.0).abs() < 0.3,
+            "{:?}",
+            found.damping
+        );
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    }
 }
