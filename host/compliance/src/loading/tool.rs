@@ -433,14 +433,19 @@ fn refuse_noise(
     let all =
         (held.iter().enumerate()).flat_map(|(s, own)| (0..own.slow.len()).map(move |k| (s, k)));
     let most = all.max_by(|a, b| size((&held[a.0], a.1)).total_cmp(&size((&held[b.0], b.1))));
-    let Some((s, _)) = most.filter(|(s, k)| !held[*s].slow[*k].is_clear()) else {
+    let Some((s, k)) = most.filter(|(s, k)| !held[*s].slow[*k].is_clear()) else {
         return Ok(());
     };
     let force = wrench(stretches[s])?.map(|list| noise(&means(&list, window)));
+    let (own, rows) = (stretches[s], stretches[s].len());
+    // Over a longer time as many windows more are averaged.
+    let needed = held[s].slow[k].shortage() * rows as f64;
     Err(ComplianceError::Recording(format!(
-        "{}: the force is too noisy, or changes too fast: it has a noise of {} N (standard deviation of the mean of {window} rows) beside its slow course, and its turning points are not seen. Change it more slowly or further, record more rows a second, or filter force and displacement alike.",
-        stretches[s].label,
-        format_significant(force[..3].iter().copied().fold(0.0, f64::max), 2)
+        "{}: the force is too noisy for a recording of {rows} rows ({} s), or changes too fast: it has a noise of {} N (standard deviation of the mean of {window} rows) beside its slow course, and its turning points are not seen. Load in the same way for longer ({} rows or more at this noise), change the force further, or filter force and displacement alike.",
+        own.label,
+        format_significant(rows as f64 / own.rate(), 3),
+        format_significant(force[..3].iter().copied().fold(0.0, f64::max), 2),
+        format_significant(needed, 2)
     )))
 }
 
@@ -454,9 +459,15 @@ fn plausible(signals: &Signals, jacobian: &nalgebra::DMatrix<f64>) -> Result<(),
     let arm: f64 = (jacobian.column_iter())
         .map(|c| c.fixed_rows::<3>(0).norm())
         .sum();
+    if arm <= ARMLESS {
+        return Err(ComplianceError::Recording(format!(
+            "{}: the tool point lies on the axes of all joints, so a force there turns no joint and no twist moves it. Give --tool X Y Z, the point in the flange frame (m) at which the force acts and the displacement is measured.",
+            signals.label
+        )));
+    }
     for name in DISPLACEMENT {
         let moved = range(signals.column(name).unwrap_or_default().iter());
-        if arm > ARMLESS && moved > TWIST * arm {
+        if moved > TWIST * arm {
             return Err(ComplianceError::Recording(format!(
                 "{}: {name} changes by {} m, but a twist of {TWIST} rad (m) of every joint moves the tool point by {} m at most at this pose. Record the displacement in metres (1 mm is 0.001), and check --tool.",
                 signals.label,

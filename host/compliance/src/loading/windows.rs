@@ -104,6 +104,11 @@ impl Slow {
         NOISE_RANGE * self.noise <= MOST_NOISE * range(self.values.iter())
     }
 
+    /// Returns how many times as many windows must be averaged for the noise to be small beside the range.
+    pub(crate) fn shortage(&self) -> f64 {
+        (NOISE_RANGE * self.noise / (MOST_NOISE * range(self.values.iter()))).powi(2)
+    }
+
     /// Returns the course of each window of `values`, even and odd ones apart. `range` is that of the load over all stretches.
     /// Windows so near to a turning point that their neighbours lie on both sides of it have no direction; nor have windows beside
     /// a step, whose neighbours have another load by more than noise.

@@ -20,6 +20,18 @@ fn found(
     seed: u64,
     scale: f64,
 ) -> Result<Value, String> {
+    found_at([ARM, 0.0, 0.0], force, hysteresis, noise, seed, scale)
+}
+
+/// The same with another tool point in the options than the one at which the force acts.
+fn found_at(
+    tool: [f64; 3],
+    force: &[f64],
+    hysteresis: f64,
+    noise: [f64; 2],
+    seed: u64,
+    scale: f64,
+) -> Result<Value, String> {
     let mut dice = Pcg64Mcg::seed_from_u64(seed);
     let mut normal =
         |std: f64| -> f64 { std * Distribution::<f64>::sample(&StandardNormal, &mut dice) };
@@ -49,7 +61,7 @@ fn found(
         ..Block::default()
     };
     let options = ComplianceOptions {
-        tool: [ARM, 0.0, 0.0],
+        tool,
         ..ComplianceOptions::default()
     };
     identify_compliance(&robot, &[&recording(block)], &[], &options)
@@ -62,6 +74,26 @@ fn swing(middle: f64, size: f64) -> Vec<f64> {
     (0..400)
         .map(|k| middle - size * (std::f64::consts::TAU * f64::from(k) / 200.0).cos())
         .collect()
+}
+
+/// A tool point that was not given is the origin of the flange frame, here on the axis: this was told as noise.
+#[test]
+fn a_tool_point_on_the_axis_is_named() {
+    let said = found_at([0.0; 3], &swing(0.0, 20.0), 0.0, [0.05, 1e-5], 1, 1.0).unwrap_err();
+    assert!(said.contains("--tool") && !said.contains("nois"), "{said}");
+}
+
+/// The first 40 rows of a loading show no turning point at a noise that the whole recording bears: the length is named.
+#[test]
+fn a_recording_that_is_too_short_is_named() {
+    let whole = swing(0.0, 20.0);
+    let short = |seed| found(&whole[40..80], 0.0, [1.0, 1e-5], seed, 1.0);
+    let said: Vec<String> = (0..8).filter_map(|seed| short(seed).err()).collect();
+    assert!(
+        said.iter().any(|own| own.contains("of 40 rows")),
+        "{said:?}"
+    );
+    assert!(found(&whole, 0.0, [1.0, 1e-5], 1, 1.0).is_ok());
 }
 
 /// A noisy regressor and a choice of windows by its own noise both bias a slope; intervals tell.
