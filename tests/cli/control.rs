@@ -334,3 +334,26 @@ fn the_described_sensor_and_the_limits_of_motors_are_heeded() {
         "{warnings}"
     );
 }
+
+/// A heavier model gives larger gains, so that PID follows better with it; the right model gives the better computed torque.
+#[test]
+fn a_wrong_model_that_tracks_better_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let text = fs::read_to_string(robot("one-link.toml")).unwrap();
+    let heavy = text
+        .replace("mass = 1.0 ", "mass = 1.5 ")
+        .replace("[0.3, 0.0, 0.0]", "[0.45, 0.0, 0.0]")
+        .replace("0.0, 0.12]", "0.0, 0.2]");
+    assert_ne!(text, heavy);
+    fs::write(at("heavy.toml"), heavy).unwrap();
+    let mut command = control("one-link.toml", &["--duration", "3"], &at("out"));
+    command.arg("--model").arg(robot("one-link.toml"));
+    let run = command.arg(at("heavy.toml")).output().unwrap();
+    let said = String::from_utf8(run.stderr).unwrap();
+    assert!(
+        said.contains("pid tracks better with heavy.toml than with one-link.toml"),
+        "{said}"
+    );
+    assert!(!said.contains("computed-torque tracks better"), "{said}");
+}

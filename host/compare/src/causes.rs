@@ -250,7 +250,7 @@ fn answer(list: &[Hypothesis], names: &[String], robot: &Robot) -> (Option<Strin
         several => (
             None,
             format!(
-                "Several causes explain the difference about equally well: {}. The odds against the last of them are {:.1} to 1.",
+                "Several causes explain the difference about equally well: {}. The first is {:.1} times as likely as the last.",
                 several.iter().map(|h| with_sizes(h, names, robot)).collect::<Vec<_>>().join("; "),
                 several.last().map_or(best.odds_against, |h| h.odds_against)
             ),

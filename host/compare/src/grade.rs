@@ -39,31 +39,9 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
         .filter(|p| p.test.is_some_and(|t| t.differs))
         .map(|p| p.expression.as_str())
         .collect();
-    let tested = of.parameters.iter().filter(|p| p.test.is_some()).count();
-    let mut reasons = vec![
-        format!(
-            "{} of {tested} tested parameters differ by more than their errors (level {} after Holm's correction){}",
-            differing.len(),
-            TEST_LEVEL,
-            match differing.is_empty() {
-                true => ".".to_owned(),
-                false => format!(": {}.", differing.join(", ")),
-            }
-        ),
-        format!(
-            "All parameters together: χ² {:.1} with {} degrees of freedom, p {}; the sets {} (level {}).",
-            joint.chi2,
-            joint.degrees_of_freedom,
-            written(joint.p),
-            if joint.differs {
-                "differ"
-            } else {
-                "do not differ significantly"
-            },
-            TEST_LEVEL
-        ),
-    ];
     let differ = joint.differs || !differing.is_empty();
+    let unknown = differ && !decided_without_short(of);
+    let mut reasons = tests(of, joint, &differing, unknown);
     if differ {
         reasons.extend(outlier(of));
     }
@@ -80,13 +58,16 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
             100.0 * of.tolerance
         ));
     }
-    if differ && let Some(causes) = of.causes {
+    if differ
+        && !unknown
+        && let Some(causes) = of.causes
+    {
         reasons.push(causes.sentence.clone());
         reasons.extend(causes.corrected.iter().map(|own| own.sentence.clone()));
     }
     reasons.extend_from_slice(of.drifting);
     let grade = match (differ, matters) {
-        (true, _) if !decided_without_short(of) => Grade::Undecided,
+        _ if unknown => Grade::Undecided,
         // The errors of such a set are so large that its parameters agree with any others. All sets may share a wrong gear
         // ratio of the description.
         (false, _) if (1..of.names.len()).contains(&of.contradicting.len()) => Grade::Undecided,
@@ -107,6 +88,35 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
         reasons.push("The errors of the parameters are too large to tell whether the sets differ: longer or livelier recordings would decide it.".into());
     }
     (grade, reasons)
+}
+
+/// Says what the tests of the parameters give; `unknown`: whether not all of their errors are known.
+fn tests(of: &Graded, joint: &JointTest, differing: &[&str], unknown: bool) -> Vec<String> {
+    let tested = of.parameters.iter().filter(|p| p.test.is_some()).count();
+    vec![
+        format!(
+            "{} of {tested} tested parameters differ by more than their {}errors (level {} after Holm's correction){}",
+            differing.len(),
+            if unknown { "computed " } else { "" },
+            TEST_LEVEL,
+            match differing.is_empty() {
+                true => ".".to_owned(),
+                false => format!(": {}.", differing.join(", ")),
+            }
+        ),
+        format!(
+            "All parameters together: χ² {:.1} with {} degrees of freedom, p {}; {} (level {}).",
+            joint.chi2,
+            joint.degrees_of_freedom,
+            written(joint.p),
+            match (unknown, joint.differs) {
+                (true, _) => "this decides nothing, as not all of these errors are known",
+                (false, true) => "the sets differ",
+                (false, false) => "the sets do not differ significantly",
+            },
+            TEST_LEVEL
+        ),
+    ]
 }
 
 /// Returns false if a difference may be that of sets whose errors are not known: no others are left to compare, or the
@@ -182,6 +192,9 @@ mod tests {
         let (grade, reasons) = graded(&short, &[]);
         assert_eq!(grade, Grade::Undecided);
         assert!(reasons.contains(&short[0].1), "{reasons:?}");
+        let says = |reasons: &[String], what: &str| reasons.iter().any(|own| own.contains(what));
+        assert!(!says(&reasons, "the sets differ"), "{reasons:?}");
+        assert!(says(&graded(&[], &[]).1, "the sets differ"));
         assert_eq!(graded(&short, &[true, true, false]).0, Grade::Undecided);
         assert_eq!(
             graded(&short, &[true, true, true]).0,

@@ -1,6 +1,6 @@
 //! Warnings of the identifications, in full and one of each kind; friction that changes during a recording.
 
-use rig_identify::{LEAST_STRETCHES, MEMORIES, Warning};
+use rig_identify::{LEAST_STRETCHES, Warning};
 use rig_model::robot::Robot;
 use rig_output::{format_significant, format_value, worst_first};
 
@@ -80,19 +80,19 @@ pub(crate) fn too_short(sets: &[IdentifiedSet]) -> Vec<(usize, String)> {
     let short = |set: &IdentifiedSet| {
         let mut own = set.found.warnings.iter();
         own.find_map(|warning| match warning {
-            Warning::FewStretches { memory, stretches } => Some((*memory, *stretches)),
+            Warning::FewStretches { stretches, .. } => Some(*stretches),
             _ => None,
         })
     };
     (sets.iter().enumerate())
         .filter_map(|(k, set)| {
-            let (memory, stretches) = short(set)?;
-            let needed = LEAST_STRETCHES * MEMORIES * memory;
+            let stretches = short(set)?;
+            // Rows near reversals and at the ends are not used, so a time by the used rows would be too short.
+            let longer = (10.0 * LEAST_STRETCHES / stretches).ceil() / 10.0;
             Some((k, format!(
-                "{} is too short: its errors come from {} independent stretches instead of {LEAST_STRETCHES} or more, so whether it differs is not decided. Record at least {} s for it, or leave it out.",
+                "{} is too short: its errors come from {} independent stretches instead of {LEAST_STRETCHES} or more, so whether it differs is not decided. Record it at least {longer} times as long, or leave it out.",
                 set.name,
                 format_significant(stretches, 2),
-                format_significant(needed, 2)
             )))
         })
         .collect()

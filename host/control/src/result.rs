@@ -2,6 +2,7 @@
 
 use super::contact_task::ContactTask;
 use super::settings::{LawKind, Settings};
+use rig_output::format_significant;
 use serde::Serialize;
 
 /// What came out of all closed loops of a robot.
@@ -40,6 +41,27 @@ impl Evaluation {
         let failed =
             failed.map(|own| format!("{} with {}: {}", own.law.name(), own.model, own.reason));
         failed.chain(tracking).chain(contact).collect()
+    }
+
+    /// Returns a sentence for each law that tracks better with a wrong model than with `right`, that of the simulated robot.
+    pub fn better_when_wrong(&self, right: &str) -> Vec<String> {
+        let with_right = self.tracking.iter().filter(|own| own.model == right);
+        let pairs = with_right.flat_map(|own| {
+            let of_law = self.tracking.iter().filter(|other| other.law == own.law);
+            of_law.map(move |other| (own, other))
+        });
+        pairs
+            .filter(|(own, other)| other.model != right && other.tool_rms < own.tool_rms)
+            .map(|(own, other)| {
+                let [wrong, right_rms] =
+                    [other, own].map(|run| format_significant(1e3 * run.tool_rms, 3));
+                format!(
+                    "{} tracks better with {} than with {right}, the simulated robot itself ({wrong} and {right_rms} mm RMS of the tool). This does not make it the better model: at the same --bandwidth a model with too large an inertia has larger gains, and with them less margin of stability.",
+                    own.law.name(),
+                    other.model,
+                )
+            })
+            .collect()
     }
 }
 

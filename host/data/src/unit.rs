@@ -22,13 +22,15 @@ const CURRENT: &str = "current";
 const VOLTAGE: &str = "voltage";
 
 /// Names, the first of which is printed; factor to SI; quantity.
-const UNITS: [(&[&str], f64, &str); 34] = [
+const UNITS: [(&[&str], f64, &str); 38] = [
     (&["rad"], 1.0, ANGLE),
     (&["mrad"], 1e-3, ANGLE),
     (&["deg", "degree", "degrees", "°"], PI / 180.0, ANGLE),
     (&["rev", "turn", "turns"], TAU, ANGLE),
     (&["m"], 1.0, LENGTH),
     (&["mm"], 1e-3, LENGTH),
+    (&["in", "inch", "inches"], 0.0254, LENGTH),
+    (&["ft", "foot", "feet"], 0.3048, LENGTH),
     (&["s", "sec", "secs", "seconds"], 1.0, TIME),
     (&["ms", "msec", "millis", "milliseconds"], 1e-3, TIME),
     (
@@ -43,6 +45,8 @@ const UNITS: [(&[&str], f64, &str); 34] = [
     (&["rev/s", "rps"], TAU, SPEED),
     (&["m/s"], 1.0, SPEED),
     (&["mm/s"], 1e-3, SPEED),
+    (&["in/s"], 0.0254, SPEED),
+    (&["ft/s"], 0.3048, SPEED),
     (&["Nm", "N·m", "N*m", "N.m"], 1.0, EFFORT),
     (
         &["mNm", "mN·m", "mN*m", "mN.m", "Nmm", "N·mm", "N*mm"],
@@ -55,12 +59,16 @@ const UNITS: [(&[&str], f64, &str); 34] = [
     // A kilogram-force is 9.80665 N, a pound-force 4.4482216152605 N and a foot 0.3048 m by definition.
     (&["kgfm", "kgf·m", "kgf*m"], 9.806_65, EFFORT),
     (
-        &["lbfft", "lbf·ft", "lbf*ft", "ft·lbf", "ft-lb", "lb-ft"],
+        &[
+            "lbfft", "lbf·ft", "lbf*ft", "ft·lbf", "ft*lbf", "ft-lbf", "lbf-ft", "ft-lb", "lb-ft",
+        ],
         1.355_817_948_331_400_4,
         EFFORT,
     ),
     (
-        &["lbfin", "lbf·in", "lbf*in", "in·lbf", "in-lb", "lb-in"],
+        &[
+            "lbfin", "lbf·in", "lbf*in", "in·lbf", "in*lbf", "in-lbf", "lbf-in", "in-lb", "lb-in",
+        ],
         0.112_984_829_027_616_7,
         EFFORT,
     ),
@@ -102,7 +110,7 @@ impl Unit {
     }
 
     /// Splits `q1 [deg]`, `q1 (deg)`, `q1/deg` and `q1_deg` into name and unit. A part behind `_` counts only if it has
-    /// two letters or more, because `pos_m` may be a motor.
+    /// two letters or more, because `pos_m` may be a motor, and is neither `in` nor `ft`: an input, a force and torque sensor.
     pub fn split(name: &str) -> Option<(&str, Self)> {
         let name = name.trim();
         for (open, close) in [('[', ']'), ('(', ')')] {
@@ -112,7 +120,7 @@ impl Unit {
             }
         }
         let (before, unit) = name.rsplit_once(['_', '/', ' '])?;
-        let is_long = unit.chars().count() > 1;
+        let is_long = unit.chars().count() > 1 && !["in", "ft"].contains(&unit);
         (is_long && !before.is_empty())
             .then(|| Self::named(unit).map(|unit| (before.trim_end(), unit)))
             .flatten()
@@ -140,7 +148,7 @@ impl Unit {
         match self.of {
             LENGTH => Some(true),
             ANGLE => Some(false),
-            SPEED => Some(self.name.starts_with('m')),
+            SPEED => Some(["m/s", "mm/s", "in/s", "ft/s"].contains(&self.name)),
             EFFORT => Some(self.name.ends_with(['N', 'f'])),
             _ => None,
         }
@@ -167,11 +175,23 @@ mod tests {
             ("tau1 [N·m]", "tau1", "Nm"),
             ("speed_rpm", "speed", "rpm"),
             ("q1/rad", "q1", "rad"),
+            ("dx [in]", "dx", "in"),
+            ("q2 (ft)", "q2", "ft"),
+            ("mx [in*lbf]", "mx", "lbfin"),
         ] {
             let (found, own) = Unit::split(text).unwrap();
             assert_eq!((found, own.name), (name, unit), "{text}");
         }
-        for text in ["q1", "q_m", "position_2", "tau_J", "i [x]", "_deg"] {
+        for text in [
+            "q1",
+            "q_m",
+            "position_2",
+            "tau_J",
+            "i [x]",
+            "_deg",
+            "u_in",
+            "fx_ft",
+        ] {
             assert!(Unit::split(text).is_none(), "{text}");
         }
         assert_eq!(Unit::unknown("q1 [grad]"), Some(("q1", "grad")));
@@ -188,13 +208,25 @@ mod tests {
             assert!(Unit::stated(text).is_none(), "{text}");
         }
         let linear = |name| Unit::named(name).unwrap().is_linear();
-        for name in ["m", "mm", "m/s", "mm/s", "N", "mN", "kN", "kgf", "lbf"] {
+        for name in [
+            "m", "mm", "in", "ft", "m/s", "mm/s", "in/s", "N", "mN", "kN", "kgf", "lbf",
+        ] {
             assert_eq!(linear(name), Some(true), "{name}");
         }
         for name in ["rad", "deg/s", "rpm", "Nm", "kgcm", "kgfm", "lbfft"] {
             assert_eq!(linear(name), Some(false), "{name}");
         }
         assert!(Unit::named("MN").is_none());
+        // By definition an inch is 0.0254 m, a foot 12 of them, and a pound-force 0.45359237 kg times 9.80665 m/s².
+        let factor = |name| Unit::named(name).unwrap().factor;
+        for (name, exact) in [
+            ("feet", 12.0 * factor("inch")),
+            ("lbf", 0.453_592_37 * 9.806_65),
+            ("ft*lbf", factor("lbf") * factor("ft")),
+            ("in*lbf", factor("lbf") * factor("in")),
+        ] {
+            assert!((factor(name) / exact - 1.0).abs() < 1e-14, "{name}");
+        }
         assert!((Unit::named("rpm").unwrap().factor * 60.0 - TAU).abs() < 1e-15);
     }
 }

@@ -5,6 +5,8 @@
 //! fewer unknowns leaves as little. An exchange of channels has no unknown, another unit or gain has one, a turned
 //! sensor three.
 
+use std::f64::consts::FRAC_PI_2;
+
 use rig_identify::f_p_value;
 use rig_model::robot::{Reads, WristSensor};
 
@@ -148,6 +150,14 @@ fn compare(
         plain: &plain,
     };
     let described = trial.taken_in(Cause::Described, mounting, plain.clone());
+    if let Some(hangs) = trial.hanging_instead(&described, unknowns, sign_stated) {
+        return Compared {
+            delay: sensed.delay(&hangs.selected.fit),
+            causes: vec![hangs],
+            described,
+            columns: f64::INFINITY,
+        };
+    }
     let fit = &described.selected.fit;
     // Jumps of the bias and a wrong position of the sensor can stand for other causes.
     let is_plain = fit.unknowns.jumps.is_empty() && !fit.unknowns.has(Nuisance::Origin);
@@ -484,6 +494,24 @@ impl Trial<'_> {
             fit = self.sensed.fit(&start, unknowns);
         }
         Some((Cause::Hanging, start, fit))
+    }
+
+    /// Returns reversed gravity if the description explains the readings only with a base that leans by more than a right angle,
+    /// and reversed gravity does as well without a lean: a robot that hangs, which has no unknown.
+    fn hanging_instead(
+        &self,
+        described: &Tried,
+        unknowns: &Unknowns,
+        sign_stated: bool,
+    ) -> Option<Tried> {
+        if described.selected.fit.mounting.gravity.angle() < FRAC_PI_2 {
+            return None;
+        }
+        let (cause, start, fit) = self.hanging(unknowns, sign_stated)?;
+        let own = self.taken_in(cause, &start, fit);
+        let fit = &own.selected.fit;
+        let is_as_good = own.score <= described.score + DECISIVE && explains(self.sensed, fit);
+        (is_as_good && !fit.unknowns.has(Nuisance::Lean)).then_some(own)
     }
 
     /// Returns true unless a gain of a channel of poses leaves less by chance (F test for the channels of its kind, all six

@@ -19,6 +19,8 @@ use crate::units::{alternatives, by_lever};
 
 /// Angle below which the axes of the sensor are those described, rad: rounding.
 const LEAST_TURN: f64 = 1e-6;
+/// Turn of gravity from which on the robot is mounted otherwise than described, rad: no base on a floor leans by 45 degrees.
+const MOUNTED: f64 = std::f64::consts::FRAC_PI_4;
 /// Distance of the centre of mass from the sensor that no load has, m.
 const FARTHEST: f64 = 3.0;
 
@@ -299,11 +301,18 @@ impl Told<'_> {
             return None;
         }
         let gravity = turn * self.sensed.gravity;
+        let [what, remedy] = match turn.angle() < MOUNTED {
+            true => ["The base leans by", "Level the base, or write"],
+            false => [
+                "Gravity is turned by",
+                "For a robot at a wall or a ceiling write",
+            ],
+        };
         warnings.push(format!(
-            "The base leans by {} degrees against the description; the load was identified with the estimated gravity.{}",
+            "{what} {} degrees against the description; the load was identified with the estimated gravity.{}",
             format_significant(turn.angle().to_degrees(), 3),
             self.advice(&format!(
-                "Level the base, or write gravity = [{:.4}, {:.4}, {:.4}] into {}. At rest a joint whose zero is off by this angle looks alike.",
+                "{remedy} gravity = [{:.4}, {:.4}, {:.4}] into {}. At rest a joint whose zero is off by this angle looks alike.",
                 gravity.x,
                 gravity.y,
                 gravity.z,

@@ -4,7 +4,7 @@ use rig_data::prepare::InMemory;
 use rig_model::robot::{Reads, Robot};
 
 use super::made::{Moving, Points, Sensor, poses, recorded, tool};
-use super::sensor::{NO_FLAW, irp6};
+use super::sensor::{NO_FLAW, irp6, tx40};
 use crate::{LoadIdentification, LoadOptions, identify_load};
 
 fn run(
@@ -178,6 +178,19 @@ fn a_robot_that_hangs_is_named() {
                 found.mass.value
             );
         }
+    }
+    // A lively motion lets a base that leans by 180 degrees stand for it, with two unknowns more.
+    for seed in 5..8 {
+        let moving = Moving::new(tx40(), 0.7, seed);
+        let sensor = Sensor::default();
+        let motion = recorded(&moving, &tool(), &sensor, [40.0, 200.0], seed, NO_FLAW);
+        let mut robot = tx40();
+        robot.gravity = robot.gravity.map(|g| -g);
+        let text = run(&robot, &motion, false).unwrap_err();
+        assert!(
+            text.contains("write gravity = [0, 0, -9.81] into the description"),
+            "{seed}: {text}"
+        );
     }
     // The opposite sign of a sensor on the floor is told from it in a motion, and is not at rest.
     let on_floor = Moving::new(floor.clone(), 0.8, 71);

@@ -17,7 +17,7 @@ pub(super) fn irp6() -> Robot {
     robot
 }
 
-fn tx40() -> Robot {
+pub(super) fn tx40() -> Robot {
     let mut robot = Robot::from_toml(TX40, "tx40.toml".as_ref()).unwrap();
     robot.wrist_sensor = Some(WristSensor::default());
     robot

@@ -290,6 +290,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     if !pressing.is_empty() {
         whole.press(&pressing, settings, &mut evaluation, &mut motions, ui)?;
     }
+    if args.model.iter().any(|own| own == args.robot.path()) {
+        let better = evaluation.better_when_wrong(&file_name(args.robot.path()));
+        evaluation.notes.extend(better);
+    }
     refuse_all_failed(&evaluation)?;
     for note in &evaluation.notes {
         ui.note(note);
@@ -612,6 +616,12 @@ fn settings(args: &Args) -> Result<Settings, CommandError> {
     Ok(settings)
 }
 
+/// Returns the name of a file without its folder.
+fn file_name(path: &Path) -> String {
+    let file = path.file_name().unwrap_or(path.as_os_str());
+    file.to_string_lossy().into_owned()
+}
+
 /// Returns the models of the laws with their names. Adds sentences about them to `notes`.
 fn models(
     args: &Args,
@@ -619,19 +629,15 @@ fn models(
     notes: &mut Vec<String>,
     ui: &Ui,
 ) -> Result<Vec<(String, LawModel)>, CommandError> {
-    let name = |path: &Path| {
-        let file = path.file_name().unwrap_or(path.as_os_str());
-        file.to_string_lossy().into_owned()
-    };
     let mut models = Vec::new();
     if args.model.is_empty() {
-        models.push((name(args.robot.path()), LawModel::of(robot)?));
+        models.push((file_name(args.robot.path()), LawModel::of(robot)?));
     }
     for path in &args.model {
         let other = described(path, args.robot.chain(), ui)?.robot;
         let (model, note) = LawModel::of_same(&other, robot, &path.display().to_string())?;
         notes.extend(note);
-        models.push((name(path), model));
+        models.push((file_name(path), model));
     }
     for (name, model) in &mut models {
         if (args.scale - 1.0).abs() > 0.0 {

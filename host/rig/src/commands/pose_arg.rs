@@ -27,7 +27,16 @@ pub(crate) fn with_poses_joined<T: Into<OsString>>(
             false => format!("{POSE}={}", values.join(",")).into(),
         });
     }
-    out
+    out.into_iter().map(with_whole_part).collect()
+}
+
+/// Writes `-.5` as `-0.5`: for clap a number has a digit before its point.
+fn with_whole_part(word: OsString) -> OsString {
+    let digits = word.to_str().and_then(|text| text.strip_prefix("-."));
+    match digits.filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
+        Some(digits) => format!("-0.{digits}").into(),
+        None => word,
+    }
 }
 
 /// Returns true unless a word is an option.
@@ -72,6 +81,11 @@ mod tests {
         assert_eq!(with_poses_joined(kept.split(' ')).join(" ".as_ref()), *kept);
         let two = with_poses_joined("--pose 1 2 --pose .5 nan".split(' '));
         assert_eq!(two, ["--pose=1,2", "--pose=.5,nan"]);
+        let bias = with_poses_joined("--sensor-bias 3 -.1 -.25 .2 -1 -.x".split(' '));
+        assert_eq!(
+            bias,
+            ["--sensor-bias", "3", "-0.1", "-0.25", ".2", "-1", "-.x"]
+        );
         assert_eq!(positions("-1.5, 0.25").unwrap(), [-1.5, 0.25]);
         assert!(positions("1,,2").is_err());
     }

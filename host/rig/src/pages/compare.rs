@@ -414,7 +414,7 @@ fn causes(found: &Comparison) -> Option<Section> {
         vec![
             Column::text("Hypothesis"),
             Column::text("Explains"),
-            Column::number("Odds against the best", ""),
+            Column::number("Times less likely than the first", ""),
             Column::number("p of the remainder", ""),
             Column::number("Remainder χ² (degrees of freedom)", ""),
             Column::number("Free values", ""),
@@ -427,7 +427,7 @@ fn causes(found: &Comparison) -> Option<Section> {
             columns: columns(),
             rows: list.iter().map(hypothesis).collect(),
             note: format!(
-                "A cause is named if its remainder is consistent with chance (p of {} or more) and the odds against every other such hypothesis are {ODDS} or more. Odds: exp(half the difference of Akaike's criterion).",
+                "A cause is named if its remainder is consistent with chance (p of {} or more) and every other such hypothesis is at least {ODDS} times less likely: exp(half the difference of Akaike's criterion).",
                 found.family_level
             ),
         })
