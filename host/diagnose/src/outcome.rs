@@ -279,10 +279,11 @@ pub struct Detectable {
     pub joint: String,
     /// Parameter of the size.
     pub parameter: String,
-    /// Size, SI: the median over the tested shapes of the effect's law.
+    /// Size, SI: the median over the tested shapes of the effect's law; infinite (null in JSON) if no torque up to the
+    /// joint's largest would show.
     pub size: f64,
-    /// The same at the least detectable shape, such as a breakaway at a speed that the motion hardly reaches; none if
-    /// the law has one shape.
+    /// The same at the least detectable shape, such as a breakaway at a speed that the motion hardly reaches; none
+    /// (absent in JSON) if the law has one shape.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_at_worst: Option<f64>,
     /// Unit, ASCII.

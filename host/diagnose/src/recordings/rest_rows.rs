@@ -41,7 +41,10 @@ fn dry_friction(context: &DiagnosisContext, rows: &Rows, values: &[f64], joint: 
         .filter(|(k, _)| context.nominal.is_coulomb(*k))
         .filter_map(|(_, (column, value))| {
             let own = column[joint].as_ref()?;
-            Some(value.max(0.0) * statistics::rms(own))
+            // Away from standstill; near it the column is smaller.
+            let used = own.iter().zip(&rows.keep[joint]).filter(|(_, keep)| **keep);
+            let size = statistics::median(used.map(|(x, _)| x.abs()).collect())?;
+            Some(value.max(0.0) * size)
         })
         .sum()
 }

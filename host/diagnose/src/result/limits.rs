@@ -21,6 +21,7 @@ use crate::search::chosen::with;
 use crate::search::fitted_candidate::FittedCandidate;
 use crate::search::shapes::grid;
 use crate::{DiagnoseError, experiment};
+use rig_data::runs::Run;
 use rig_model::robot::Robot;
 use rig_model::simulate::Model;
 use rig_numerics::vector::norm_squared;
@@ -113,7 +114,8 @@ fn places(kind: Kind) -> impl Iterator<Item = usize> {
 }
 
 /// Returns the smallest detectable size of each effect that was tested and not found: the median gain over its shapes.
-/// Such a gain gives the minimum RMS reduction and is significant nine times in ten.
+/// Such a gain gives the minimum RMS reduction and is significant nine times in ten. A shape at which only more than the
+/// largest torque of the joint would show is not seen: its size is infinite.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -136,6 +138,7 @@ pub(crate) fn detectable(
         if hidden || taken || !is_first_law(candidate.kind) || is_gear(candidate.kind) {
             continue;
         }
+        let most = largest_torque(found, candidate.joint);
         let mut sizes: Vec<(f64, usize)> = Vec::new();
         let points = found.search.grid_within(candidate)?;
         let columns = found.search.cached(c, &points)?;
@@ -149,7 +152,9 @@ pub(crate) fn detectable(
             sizes.extend(
                 (projected.iter().enumerate())
                     .filter_map(|(g, column)| {
-                        Some((smallest(&last, column, projected.len(), trials)?, g))
+                        let size = smallest(&last, column, projected.len(), trials)?;
+                        let hidden = gains[g].unit == "N*m" && size > most;
+                        Some((if hidden { f64::INFINITY } else { size }, g))
                     })
                     .max_by(|a, b| a.0.total_cmp(&b.0)),
             );
@@ -169,6 +174,15 @@ pub(crate) fn detectable(
         }
     }
     Ok(list)
+}
+
+/// Returns the largest recorded torque of a joint, N·m or N.
+fn largest_torque(found: &Found, joint: usize) -> f64 {
+    let of_run = |most: f64, run: &Run| {
+        let recorded = run.joints[joint].recorded();
+        recorded.iter().fold(most, |most, tau| tau.abs().max(most))
+    };
+    found.search.source.runs.iter().fold(0.0, of_run)
 }
 
 /// Returns the smallest accepted gain of a projected column; `count` columns are tested together.

@@ -125,18 +125,26 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
                     words::name(&d.effect),
                     words::or_dash(&d.joint),
                     d.parameter.clone(),
-                    format_significant(d.size, 2),
-                    d.size_at_worst.map_or_else(|| "–".to_owned(), |size| format_significant(size, 2)),
+                    size(d.size),
+                    d.size_at_worst.map_or_else(|| "–".to_owned(), size),
                     parts::unit(&d.unit),
                 ]
             })
             .collect(),
-        note: "A smaller effect may be present without being found. If a law has a speed, a period or a time as parameter, the smallest size is the median over its values, and the worst case is the value that this motion shows least.".into(),
+        note: "A smaller effect may be present without being found. If a law has a speed, a period or a time as parameter, the smallest size is the median over its values, and the worst case is the value that this motion shows least; at \"not seen\" nothing up to the joint's largest torque would show.".into(),
     };
     Some(section.with(folded(
         "The smallest sizes that would have been found",
         table,
     )))
+}
+
+/// Returns the text of a smallest size.
+fn size(value: f64) -> String {
+    match value.is_finite() {
+        true => format_significant(value, 2),
+        false => "not seen".to_owned(),
+    }
 }
 
 /// Folds a long table behind a summary line.
