@@ -5,8 +5,8 @@
 //! over rows up to five rows away. On a TX40 that was simulated from its exact description (24 ms of standstill at each
 //! reversal), it was up to a sixth of the dry friction there, and three times the noise in all rows of a joint.
 //!
-//! The model is linear in its columns at every sample. So a sample is left out of torque and columns alike, before the
-//! low-pass: what remains is still linear in the same parameters, and nothing of the sample reaches any row. The columns
+//! The model is linear in its columns at every sample. So a sample is left out of torque and columns alike, before every
+//! filter: what remains is still linear in the same parameters, and nothing of the sample reaches any row. The columns
 //! are those of the whole motion; effects with a memory run through.
 //!
 //! Such samples say nothing. Joints keep all samples but saturated and disturbed ones where more is lost near standstill
