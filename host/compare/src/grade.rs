@@ -1,6 +1,6 @@
 //! The grade of a comparison.
 
-use crate::result::{Causes, Grade, JointTest, PooledParameter, TorqueMatrix};
+use crate::result::{Causes, Comparison, Grade, JointTest, PooledParameter, TorqueMatrix};
 use crate::significance::{FAMILY_LEVEL, TEST_LEVEL};
 
 /// What a grade is given on.
@@ -27,6 +27,20 @@ pub(crate) struct Graded<'a> {
     pub tolerance: f64,
 }
 
+/// Returns true if the test of all parameters, or of any one, says that the sets differ.
+fn differ(joint: &JointTest, parameters: &[PooledParameter]) -> bool {
+    let mut tests = parameters.iter().filter_map(|own| own.test);
+    joint.differs || tests.any(|test| test.differs)
+}
+
+impl Comparison {
+    /// Returns true if a test of the parameters says that the sets differ. Where errors are not known that decides nothing.
+    pub fn tests_differ(&self) -> bool {
+        let joint = self.joint_test.as_ref();
+        joint.is_some_and(|joint| differ(joint, &self.parameters))
+    }
+}
+
 /// Returns the grade and its reasons.
 pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
     let Some(joint) = of.joint else {
@@ -39,7 +53,7 @@ pub(crate) fn grade(of: &Graded) -> (Grade, Vec<String>) {
         .filter(|p| p.test.is_some_and(|t| t.differs))
         .map(|p| p.expression.as_str())
         .collect();
-    let differ = joint.differs || !differing.is_empty();
+    let differ = differ(joint, of.parameters);
     let unknown = differ && !decided_without_short(of);
     let mut reasons = tests(of, joint, &differing, unknown);
     if differ {

@@ -271,16 +271,13 @@ fn write(
 
 /// Returns the answer in a sentence.
 fn grade(found: &Comparison) -> String {
-    let tests = found.parameters.iter().filter_map(|own| own.test);
-    let mut differ = tests.map(|test| test.differs);
-    let joint = found.joint_test.as_ref();
     match found.grade {
         Grade::Agree => "The sets agree.".into(),
         Grade::DifferWithoutEffect => pages::same_torque(found),
         Grade::DifferAndMatter => {
             "The sets differ, and the difference matters for the torque.".into()
         }
-        Grade::Undecided if joint.is_some_and(|test| test.differs) || differ.any(|own| own) => {
+        Grade::Undecided if found.tests_differ() => {
             "Whether the sets differ is not decided: the errors of a set are not known.".into()
         }
         Grade::Undecided => {
