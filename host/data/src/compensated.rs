@@ -9,6 +9,7 @@ use crate::prepare::{
     LowPass, Piece, PrepareError, PreprocessingPlan, Recording, central_difference, each_piece,
     later, second_difference, stretch,
 };
+use crate::runs::travel;
 use rig_model::effects::{Effects, State, Turn, is_torque, outruns, shifted};
 
 /// Rows that are processed together.
@@ -199,9 +200,7 @@ impl Compensated<'_> {
             for (j, s) in seen.iter().enumerate() {
                 (row[0][j], row[1][j], row[2][j]) = (s.q[r], s.qd[r], s.qdd[r]);
                 drive[j] = s.torque.get(r).copied().unwrap_or(0.0);
-                let before = r.checked_sub(1).map(|before| s.q[before]);
-                running.scratch.travel[j] =
-                    before.map_or(s.qd[r] * self.period, |before| s.q[r] - before);
+                running.scratch.travel[j] = travel([&s.q, &s.qd], r, self.period);
             }
             for ((to, now), first) in warming
                 .iter_mut()

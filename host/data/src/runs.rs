@@ -244,6 +244,13 @@ pub fn blurred(runs: &[Run], joint: usize, time: f64) -> f64 {
         .unwrap_or(0.0)
 }
 
+/// Returns the travel of a joint since the sample before, rad or m, from its positions and velocities at samples `period` s
+/// apart; at the first sample that of its velocity.
+pub fn travel([q, qd]: [&[f64]; 2], sample: usize, period: f64) -> f64 {
+    let before = sample.checked_sub(1).map(|before| q[before]);
+    before.map_or(qd[sample] * period, |before| q[sample] - before)
+}
+
 /// Band of the difference between motor-side and link-side encoder, Hz. Twist and backlash are slow compared with the
 /// encoder counts. At a higher cut-off, the second derivative of the counts would dominate the computed torque.
 const ACROSS_BAND: f64 = 25.0;

@@ -20,7 +20,7 @@ use crate::rows::nominal::Nominal;
 use crate::rows::nominal_torque::Predicted;
 use crate::rows::regression::Column;
 use crate::rows::thinning::Thinning;
-use rig_data::runs::{JointRun, Run};
+use rig_data::runs::{Run, travel};
 use rig_identify::FieldTorque;
 use rig_model::batch::each_by;
 use rig_model::effects::outruns;
@@ -316,7 +316,7 @@ impl Source<'_> {
                     .map_or(0.0, |t| t[k] - first_temperature),
                 other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
                 period: 1.0 / run.rate,
-                travel: travel(joint, k, run.rate),
+                travel: travel([&joint.q, &joint.qd], k, 1.0 / run.rate),
                 extra_friction_ratio: beside.map_or(0.0, |beside| beside[k]),
                 // Delays and payloads have separate columns.
                 drive_rate: 0.0,
@@ -431,12 +431,6 @@ fn add(to: &mut [Vec<f64>], from: &[Vec<f64>]) {
             *to += x;
         }
     }
-}
-
-/// Returns the travel of a joint from the sample before `k`.
-fn travel(joint: &JointRun, k: usize, rate: f64) -> f64 {
-    let before = k.checked_sub(1).map(|before| joint.q[before]);
-    before.map_or(joint.qd[k] / rate, |before| joint.q[k] - before)
 }
 
 /// Delays a signal by `samples` (fractional). The first value fills the start.

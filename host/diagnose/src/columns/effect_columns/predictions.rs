@@ -4,9 +4,9 @@ use rig_shared::effects::{Effect, Instant, Kind, Memory};
 
 use crate::DiagnoseError;
 use crate::columns::candidate::Candidate;
-use crate::columns::effect_columns::{DELAY, Source, add, travel};
+use crate::columns::effect_columns::{DELAY, Source, add};
 use crate::search::fitted_candidate::FittedCandidate;
-use rig_data::runs::JointRun;
+use rig_data::runs::{JointRun, travel};
 use rig_model::effects::over_coulomb;
 
 /// Effects whose drive torque is predicted with all effects in the model. For a ripple the nominal torque is enough:
@@ -19,13 +19,13 @@ const OWN_ROUNDS: usize = 6;
 const MOST_LOST: f64 = 0.5;
 
 /// Returns the contact deflection of a presliding effect along a run. `beside` is other friction there.
-fn bent(effect: &Effect<f64>, joint: &JointRun, beside: &[f64], rate: f64) -> Vec<f64> {
+fn bent(effect: &Effect<f64>, joint: &JointRun, beside: &[f64], period: f64) -> Vec<f64> {
     let mut memory = Memory::default();
     let along = |(k, &beside): (usize, &f64)| {
         let at = Instant {
             velocity: joint.qd[k],
-            period: 1.0 / rate,
-            travel: travel(joint, k, rate),
+            period,
+            travel: travel([&joint.q, &joint.qd], k, period),
             extra_friction_ratio: beside,
             ..Instant::default()
         };
@@ -58,7 +58,7 @@ impl Source<'_> {
                 let effect = Effect::new(kind, own, &profile.shapes);
                 for (r, run) in self.runs.iter().enumerate() {
                     let beside = self.beside(joint, r, chosen, gains);
-                    let bent = bent(&effect, &run.joints[joint], &beside, run.rate);
+                    let bent = bent(&effect, &run.joints[joint], &beside, 1.0 / run.rate);
                     self.bent.insert((r, joint), bent);
                     self.beside.insert((r, joint), beside);
                 }
