@@ -69,7 +69,7 @@ pub(crate) struct Rows {
     pub(crate) legible: Vec<Vec<bool>>,
     /// True if no standstill or reversal leaks into the row through the filters, joint by joint; empty if none is near.
     pub(crate) clear: Vec<Vec<bool>>,
-    /// Samples that the rows leave out, run by run and joint by joint.
+    /// Samples that the rows leave out, run by run and joint by joint; empty for none.
     pub(crate) left_out: Vec<Vec<Vec<bool>>>,
     /// Nominal columns, one per base parameter.
     pub(crate) nominal: Vec<Column>,

@@ -64,11 +64,12 @@ impl Doubtful {
         Ok(all)
     }
 
-    /// Returns the samples that the rows leave out, joint by joint. `rests_count` is true for a joint whose samples near
-    /// standstill count.
+    /// Returns the samples that the rows leave out, joint by joint; empty for none. `rests_count` is true for a joint whose
+    /// samples near standstill count.
     pub(crate) fn left_out(self, rests_count: &dyn Fn(usize) -> bool) -> Vec<Vec<bool>> {
         (self.wrong.into_iter().zip(self.blurred).enumerate())
             .map(|(j, (wrong, blurred))| if rests_count(j) { wrong } else { blurred })
+            .map(|out| if out.contains(&true) { out } else { Vec::new() })
             .collect()
     }
 }

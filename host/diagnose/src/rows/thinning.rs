@@ -162,7 +162,7 @@ impl Thinning {
     /// [`Self::push`], signal by signal.
     pub(crate) fn thinned(&self, signals: &[Vec<f64>], left_out: &[&[bool]]) -> Vec<Vec<f64>> {
         self.thinned_abreast(signals, left_out, &|four| {
-            if !self.filter_matters {
+            if !self.filter_matters || left_out.iter().all(|own| own.is_empty()) {
                 return four.only(false);
             }
             let gone = self.position.zero_phase_even(&four.only(true));
@@ -215,10 +215,15 @@ impl Thinning {
 
 /// Returns the signal with zeros except where `left_out` is `which`. An empty `left_out` is false throughout.
 fn only(signal: &[f64], left_out: &[bool], which: bool) -> Vec<f64> {
-    let out = |k: usize| left_out.get(k).copied().unwrap_or(false);
-    (signal.iter().enumerate())
-        .map(|(k, x)| if out(k) == which { *x } else { 0.0 })
-        .collect()
+    let one = |(k, x): (usize, &f64)| match is_out(left_out, k) == which {
+        true => *x,
+        false => 0.0,
+    };
+    signal.iter().enumerate().map(one).collect()
+}
+
+fn is_out(left_out: &[bool], sample: usize) -> bool {
+    left_out.get(sample).copied().unwrap_or(false)
 }
 
 /// Up to [`ABREAST`] signals of equal length side by side.
@@ -248,8 +253,7 @@ impl Abreast<'_> {
     /// The same as [`only`].
     fn only(&self, which: bool) -> Vec<Lanes<ABREAST>> {
         self.lanes(|s, k| {
-            let out = self.left_out[s].get(k).copied().unwrap_or(false);
-            if out == which {
+            if is_out(self.left_out[s], k) == which {
                 self.signals[s][k]
             } else {
                 0.0
