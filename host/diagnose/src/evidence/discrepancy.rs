@@ -341,7 +341,8 @@ pub(crate) struct Motion<'m> {
 
 impl Motion<'_> {
     /// Returns the columns of the discrepancy along one coordinate, on the rows. Their squares have mean sum one over
-    /// the used rows. Empty if the joint has no such coordinate.
+    /// the used rows. Empty if the joint has no such coordinate, or no used row shows it: all samples about the slowest
+    /// reversals may be left out.
     pub(crate) fn columns(&self, along: Along) -> Vec<Vec<f64>> {
         let ratio = self.robot.joints[self.joint].gear_ratio();
         if along == Along::MotorAngle && ratio.abs() <= 1.0 {
@@ -370,7 +371,10 @@ impl Motion<'_> {
         };
         let used = self.keep.iter().filter(|k| **k).count().max(1) as f64;
         let squares: f64 = columns.iter().map(|c| squares_of_kept(c, self.keep)).sum();
-        let scale = (used / squares.max(f64::MIN_POSITIVE)).sqrt();
+        let scale = (used / squares).sqrt();
+        if !scale.is_finite() {
+            return Vec::new();
+        }
         columns.iter_mut().flatten().for_each(|x| *x *= scale);
         columns
     }
