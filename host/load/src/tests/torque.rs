@@ -72,14 +72,20 @@ fn rubbing(moving: &Moving, points: &Points, rubs: f64, grows: &[f64; 6], seed: 
     recording
 }
 
+/// Records a motion with the tool in the hand, and without it. The gears rub more under load.
+fn with_and_without_tool(moving: &Moving) -> [InMemory; 2] {
+    let both: Points = hand().into_iter().chain(tool()).collect();
+    [
+        driven(moving, &both, 0.9, 2),
+        driven(moving, &hand(), 0.8, 1),
+    ]
+}
+
 #[test]
 fn load_is_what_the_torques_with_it_show_beyond_those_without_it() {
     let moving = Moving::new(arm(), 0.7, 21);
     let part = tool();
-    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
-    let without = driven(&moving, &hand(), 0.8, 1);
-    // The gears rub more under load.
-    let with = driven(&moving, &both, 0.9, 2);
+    let [with, without] = with_and_without_tool(&moving);
     let options = LoadOptions {
         by: By::Torque,
         ..LoadOptions::default()
@@ -130,9 +136,7 @@ fn load_is_what_the_torques_with_it_show_beyond_those_without_it() {
 fn a_load_beyond_axes_that_follow_joints_is_found() {
     let moving = Moving::new(geared(), 0.5, 21);
     let part = tool();
-    let both: Points = hand().into_iter().chain(part.iter().copied()).collect();
-    let without = driven(&moving, &hand(), 0.8, 1);
-    let with = driven(&moving, &both, 0.9, 2);
+    let [with, without] = with_and_without_tool(&moving);
     let options = LoadOptions {
         by: By::Both,
         ..LoadOptions::default()
