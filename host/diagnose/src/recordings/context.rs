@@ -162,17 +162,7 @@ impl<'a> DiagnosisContext<'a> {
         runs: Vec<Run>,
         treatment: &PreprocessingPlan,
     ) -> Result<PreparedData, DiagnoseError> {
-        let mut rows = Rows::of(&runs, &self.nominal, treatment, &|joint| {
-            self.rests_count(joint)
-        })?;
-        let held = self.anchor.held_torque(&rows);
-        take_off(&mut rows.torque, &held);
-        for &joint in self.rests.iter().flatten() {
-            rows.use_rests(joint);
-        }
-        for own in &self.one_way {
-            own.leave_out_rests(&mut rows);
-        }
+        let rows = self.rows_of(&runs, treatment, self.rests.as_deref())?;
         Ok(PreparedData {
             runs,
             rows,
@@ -180,10 +170,35 @@ impl<'a> DiagnosisContext<'a> {
         })
     }
 
-    /// Returns true if the samples of a joint near standstill count. Where it moves in one direction only, so does friction.
-    fn rests_count(&self, joint: usize) -> bool {
-        let one_way = || self.one_way.iter().any(|own| own.joint == joint);
-        (self.rests.as_ref()).is_none_or(|rests| rests.contains(&joint) || one_way())
+    /// Returns the rows of prepared recordings with all samples near standstill.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn rows_with_rests(&self, prepared: &PreparedData) -> Result<Rows, DiagnoseError> {
+        self.rows_of(&prepared.runs, &prepared.treatment, None)
+    }
+
+    /// Returns rows, with the samples near standstill of the joints `rests`. None: with those of all joints, whose rows near
+    /// standstill are not used.
+    fn rows_of(
+        &self,
+        runs: &[Run],
+        treatment: &PreprocessingPlan,
+        rests: Option<&[usize]>,
+    ) -> Result<Rows, DiagnoseError> {
+        // Where a joint moves in one direction only, so does friction.
+        let one_way = |joint| self.one_way.iter().any(|own| own.joint == joint);
+        let count = |joint| rests.is_none_or(|rests| rests.contains(&joint) || one_way(joint));
+        let mut rows = Rows::of(runs, &self.nominal, treatment, &count)?;
+        let held = self.anchor.held_torque(&rows);
+        take_off(&mut rows.torque, &held);
+        for &joint in rests.into_iter().flatten() {
+            rows.use_rests(joint);
+        }
+        for own in &self.one_way {
+            own.leave_out_rests(&mut rows);
+        }
+        Ok(rows)
     }
 
     /// Returns the sample rate of the training data, Hz.

@@ -189,9 +189,15 @@ fn undetermined_held(
 /// standstill out of the rows of the others.
 fn rests_used(
     context: &mut DiagnosisContext,
-    readings: Readings,
+    mut readings: Readings,
 ) -> Result<Readings, DiagnoseError> {
-    context.rests = Some(joints_loud_at_rest(context, &readings.training)?);
+    context.rests = Some(Vec::new());
+    readings = readings.with_new_rows(context)?;
+    let loud = joints_loud_at_rest(context, &readings.training)?;
+    if loud.is_empty() {
+        return Ok(readings);
+    }
+    context.rests = Some(loud);
     readings.with_new_rows(context)
 }
 

@@ -180,6 +180,37 @@ fn presliding_is_itself_at_any_sample_rate() {
     }
 }
 
+/// At standstill the breakaway of Stribeck friction is as unknown as Coulomb friction. Samples there that counted as the law at
+/// the velocity of their noise pulled it, to 0.51 ± 0.09 N·m at this elbow.
+#[test]
+fn breakaway_is_not_bent_by_the_samples_at_standstill() {
+    for (name, joint, [breakaway, velocity]) in
+        [("edda", 1, [0.8, 0.1]), ("one-link", 0, [0.4, 0.06])]
+    {
+        let robot = Robot::from_toml(template(name).unwrap(), Path::new("arm.toml")).unwrap();
+        let mut real = robot.clone();
+        real.effects.push(RobotEffect {
+            joint: Some(robot.joints[joint].name.clone()),
+            other: None,
+            effect: Effect::new(Kind::Stribeck, &[breakaway], &[velocity]),
+        });
+        let recordings = [1, 2].map(|seed| simulated(&real, [2e-3, 6.3], [2e-6, 0.02], seed));
+        let found = of_simulated(&robot, &recordings);
+        told(name, &found);
+        let left = &found.left[joint];
+        assert!(left.after < 1.1 * left.floor, "{left:?}");
+        assert_eq!(
+            named(&found),
+            [("stribeck", robot.joints[joint].name.as_str())]
+        );
+        for (name, truth) in [("breakaway", breakaway), ("velocity", velocity)] {
+            let value = &found.steps[0].parameters[name];
+            let is_sound = (value.value - truth).abs() < 2.5 * value.std;
+            assert!(is_sound && value.std < 0.1 * truth, "{name} {value:?}");
+        }
+    }
+}
+
 /// A payload is a verdict: its mass and its place, wherever on the link, within what is said of them, and the joints that show it.
 #[test]
 fn a_payload_on_an_arm_is_told_with_mass_and_place() {
