@@ -14,13 +14,11 @@ use crate::gain_error::GainError;
 use crate::hanging::remedy;
 use crate::mounting::Channels;
 use crate::statistics::{Recorded, noise_floor};
-use crate::system::{Fit, Nuisance, Sensed};
+use crate::system::{Fit, MOUNTED, Nuisance, Sensed};
 use crate::units::{alternatives, by_lever};
 
 /// Angle below which the axes of the sensor are those described, rad: rounding.
 const LEAST_TURN: f64 = 1e-6;
-/// Turn of gravity from which on the robot is mounted otherwise than described, rad: no base on a floor leans by 45 degrees.
-const MOUNTED: f64 = std::f64::consts::FRAC_PI_4;
 /// Distance of the centre of mass from the sensor that no load has, m.
 const FARTHEST: f64 = 3.0;
 
@@ -308,8 +306,15 @@ impl Told<'_> {
                 "For a robot at a wall or a ceiling write",
             ],
         };
+        let other = match (self.sensed.is_of_either_sign(self.fit), self.sensor.reads) {
+            (true, None) => format!(
+                " At rest gravity = [{:.4}, {:.4}, {:.4}] explains the readings as well, with the other sign of `reads`.",
+                -gravity.x, -gravity.y, -gravity.z
+            ),
+            _ => String::new(),
+        };
         warnings.push(format!(
-            "{what} {} degrees against the description; the load was identified with the estimated gravity.{}",
+            "{what} {} degrees against the description; the load was identified with the estimated gravity.{}{other}",
             format_significant(turn.angle().to_degrees(), 3),
             self.advice(&format!(
                 "{remedy} gravity = [{:.4}, {:.4}, {:.4}] into {}. At rest a joint whose zero is off by this angle looks alike.",

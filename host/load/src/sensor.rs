@@ -373,6 +373,10 @@ fn weighing(
     let (text, fit) = match (hangs, mass < 0.0, stated) {
         (Some(hangs), ..) => (Some(hanging_words(&hangs, sensing.robot)), hangs),
         (None, false, _) => (None, fit),
+        (None, true, _) if sensed.is_of_either_sign(&fit) => {
+            let reversed = sensed.upside_down(&fit.mounting);
+            (None, settled(sensed, &reversed, &fit.unknowns))
+        }
         (None, true, stated) => {
             let text = stated.map(|stated| wrong_sense(mass, sensed, sensing.robot, stated));
             let fit = settled(sensed, &fit.mounting.opposite(), &fit.unknowns);

@@ -256,6 +256,9 @@ impl Fit {
     }
 }
 
+/// Turn of gravity from which on the robot is mounted otherwise than described, rad: no base on a floor leans by 45 degrees.
+pub(crate) const MOUNTED: f64 = std::f64::consts::FRAC_PI_4;
+
 impl Sensed<'_> {
     fn layout<'a>(&self, unknowns: &'a Unknowns) -> Layout<'a> {
         Layout {
@@ -269,13 +272,24 @@ impl Sensed<'_> {
         if self.recordings.iter().any(|own| own.poses) || self.gravity == Vector3::zeros() {
             return None;
         }
+        Some(self.upside_down(start))
+    }
+
+    /// Returns a mounting with gravity reversed.
+    pub(crate) fn upside_down(&self, start: &Mounting) -> Mounting {
         let down = start.gravity * self.gravity;
         let level = Unit::new_normalize(down.cross(&Vector3::ith(down.iamin(), 1.0)));
         let half_turn = Rotation3::from_axis_angle(&level, std::f64::consts::PI);
-        Some(Mounting {
+        Mounting {
             gravity: half_turn * start.gravity,
             ..start.clone()
-        })
+        }
+    }
+
+    /// Returns true if gravity is so far off that at rest a fit may take the opposite gravity and the opposite readings.
+    pub(crate) fn is_of_either_sign(&self, fit: &Fit) -> bool {
+        let far = fit.mounting.gravity.angle() >= MOUNTED;
+        far && fit.unknowns.has(Nuisance::Lean) && self.recordings.iter().all(|own| own.poses)
     }
 
     /// Calls `take` with each segment that is used, and the place of its recording's bias.

@@ -1003,6 +1003,47 @@ fn a_leaning_base_is_no_turned_sensor_and_both_are_told_together() {
     }
 }
 
+/// For a robot at a wall the fit begins a quarter turn off, and may end at the opposite gravity, with which the readings at rest
+/// agree by the opposite sign.
+#[test]
+fn gravity_a_quarter_turn_off_is_found_with_the_sign_of_the_sensor() {
+    let points = tool();
+    let moving = Moving::new(tx40(), 0.9, 3);
+    let list: Vec<Vec<f64>> = (0..8)
+        .map(|k| moving.position(3.1 * f64::from(k) + 5.0))
+        .collect();
+    let still = poses(&moving, &points, &Sensor::default(), &list, 5);
+    let found = |gravity: [f64; 3], reads: Option<Reads>| {
+        let mut robot = moving.robot.clone();
+        robot.gravity = gravity;
+        if let Some(sensor) = &mut robot.wrist_sensor {
+            sensor.reads = reads;
+        }
+        identify_load(&robot, &[&still], &[], &LoadOptions::default()).unwrap()
+    };
+    let near = found([0.855, 0.0, -9.7727], None);
+    let reads = near.sensor.as_ref().unwrap().reads;
+    for (gravity, stated) in [
+        ([9.81, 0.0, 0.0], None),
+        ([-9.81, 0.0, 0.0], Some(reads)),
+        ([0.0, -9.81, 0.0], Some(reads)),
+    ] {
+        let far = found(gravity, stated);
+        let sensor = far.sensor.as_ref().unwrap();
+        assert_eq!(sensor.reads, reads);
+        assert!(sensor.gravity.is_some_and(|g| g[2] < -9.8), "{sensor:?}");
+        let either = far
+            .warnings
+            .iter()
+            .any(|w| w.contains("with the other sign"));
+        assert_eq!(either, stated.is_none(), "{:?}", far.warnings);
+        for (near, far) in near.parameters.iter().zip(&far.parameters) {
+            let off = (near.value.value - far.value.value).abs() / near.value.std;
+            assert!(off < 0.05, "{near:?} {far:?}");
+        }
+    }
+}
+
 #[test]
 fn a_sensor_that_is_late_or_early_is_no_turned_one() {
     let points = tool();
