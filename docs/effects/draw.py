@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/effects.md.
+"""Draws the pictures of docs/effects/.
 
 Hides each effect in recordings of the emulated rig (rig-bench), diagnoses them with the program, and keeps the figure of the
 effect. The coupling of two joints is simulated with the description of EDDA. Prints the verdict of each rig.

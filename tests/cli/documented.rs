@@ -227,6 +227,21 @@ fn links_of(line: &str) -> Vec<&str> {
         .collect()
 }
 
+/// The links of a page to pages in the folder of its name, each once.
+fn below(page: &Path, link: &str) -> Vec<String> {
+    let folder = format!("{}/", link.trim_end_matches(".md"));
+    let mut found = Vec::new();
+    for line in fs::read_to_string(page).unwrap().lines() {
+        let links = links_of(line).into_iter().map(str::to_owned);
+        for own in links.filter(|own| own.starts_with(&folder) && own.ends_with(".md")) {
+            if !found.contains(&own) {
+                found.push(own);
+            }
+        }
+    }
+    found
+}
+
 /// The contents of the book are the guide's groups and links with the titles of the pages, and the guide has every page.
 #[test]
 fn the_summary_of_the_book_is_made_from_the_guide() {
@@ -244,6 +259,13 @@ fn the_summary_of_the_book_is_made_from_the_guide() {
             for link in links_of(line) {
                 let page = docs.join(link);
                 summary += &format!("- [{}]({link})\n", title(&page));
+                for below in below(&page, link) {
+                    let page = docs.join(&below);
+                    if !guide.contains(&below) {
+                        summary += &format!("  - [{}]({below})\n", title(&page));
+                        linked.push(page);
+                    }
+                }
                 linked.push(page);
             }
         }

@@ -1,4 +1,4 @@
-//! The page of effects in `docs/` is made from the laws of the library, with a picture each.
+//! The pages of effects in `docs/`, an index and one for each, are made from the laws of the library, with a picture each.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,19 +8,24 @@ use rig_shared::effects::{Confusion, Kind, Need};
 
 use crate::documented::made_page;
 
-/// Head of the page.
-const HEAD: &str = "# Which effects are known, and what do they look like?
+/// Says what the pages are made from.
+const MADE: &str = "<!-- Made from shared/src/effects/: RIG_WRITE_DOCS=1 cargo test -p rig --test cli the_pages_of_effects -->";
 
-<!-- Made from shared/src/effects/: RIG_WRITE_DOCS=1 cargo test -p rig --test cli the_page_of_effects -->
-
-An effect is physics beyond rigid bodies, Coulomb and viscous friction. `rig diagnose` searches for the effects of this page,
-`rig simulate` computes them, and the firmware compensates most of those that are torques ([firmware.md](firmware.md#effects)). Each
-section has the equation, what the effect looks like, what it is mistaken for, and the experiment that separates the two.
+/// Head of the index, behind its title.
+const HEAD: &str = "An effect is physics beyond rigid bodies, Coulomb and viscous friction. `rig diagnose` searches for the effects of this page,
+`rig simulate` computes them, and the firmware compensates most of those that are torques ([firmware.md](firmware.md#effects)). The
+page of each has the equation, what the effect looks like, what it is mistaken for, and the experiment that separates the two.
 The keys of a description are in [formats.md](formats.md#effects). [measured.md](diagnosis/measured.md) says how often each is found.
 
-θm is the angle of the motor and q that of the joint. Units are those of a revolute joint.
+| effect | is | picture |
+| --- | --- | --- |
+";
 
-## How to read the pictures
+/// End of the index.
+const END: &str = "
+## How to read the pages
+
+θm is the angle of the motor and q that of the joint. Units are those of a revolute joint.
 
 Each picture is a figure of a diagnosis. The emulated rig has the effect, by equations that it does not share with the
 search; the coupling of two joints is simulated by `rig simulate`. The model lacks the effect at first. The picture shows the mean
@@ -33,7 +38,6 @@ The pictures were made by this script, which also prints the verdict on each rig
 ```sh
 python3 docs/effects/draw.py
 ```
-
 ";
 
 /// Returns a requirement on a recording.
@@ -67,8 +71,8 @@ fn escaped(text: &str) -> String {
     (text.replace('*', "\\*").replace('_', "\\_")).replace('|', "\\|")
 }
 
-/// Returns the titles of the sections, in the order of the registry, with the laws of each.
-fn sections() -> Vec<(&'static str, Vec<Kind>)> {
+/// Returns the names of the effects, in the order of the registry, with the laws of each.
+fn effects() -> Vec<(&'static str, Vec<Kind>)> {
     let mut list: Vec<(&str, Vec<Kind>)> = Vec::new();
     for kind in Kind::ALL {
         let name = kind.about().name;
@@ -117,14 +121,14 @@ fn confusions(name: &str, kinds: &[Kind]) -> Vec<(&'static str, Confusion)> {
     list
 }
 
-/// Adds the section of an effect.
-fn section(name: &str, kinds: &[Kind], page: &mut String) {
-    let about = kinds[0].about();
-    let _ = writeln!(page, "## `{name}`\n\n{}.\n", capital(about.title));
+/// Returns the page of an effect.
+fn page_of(name: &str, kinds: &[Kind]) -> String {
+    let title = capital(kinds[0].about().title);
+    let mut page = format!("# {title}: `{name}`\n\n{MADE}\n\n");
     for kind in kinds {
-        law(*kind, page);
+        law(*kind, &mut page);
     }
-    let _ = writeln!(page, "![{}](effects/{name}.svg)\n", capital(about.title));
+    let _ = writeln!(page, "![{title}]({name}.svg)\n");
     let mut signatures: Vec<&str> = kinds.iter().map(|k| k.about().signature).collect();
     signatures.dedup();
     let _ = writeln!(
@@ -141,36 +145,47 @@ fn section(name: &str, kinds: &[Kind], page: &mut String) {
     }
     let _ = writeln!(page, "**A recording needs:** {}.\n", needs.join("; "));
     let rivals = confusions(name, kinds);
-    if rivals.is_empty() {
-        *page += "No entry of the library is mistaken for it.\n\n";
-        return;
-    }
-    *page += "| mistaken for | what separates the two |\n| --- | --- |\n";
+    page += match rivals.is_empty() {
+        true => "No entry of the library is mistaken for it.\n",
+        false => "| mistaken for | experiment that separates the two |\n| --- | --- |\n",
+    };
     for (rival, entry) in rivals {
         let exact = match entry.exact {
             true => "one function of torque and motor position for every motion: ",
             false => "",
         };
-        let _ = writeln!(
-            page,
-            "| [`{rival}`](#{rival}) | {exact}{} |",
-            escaped(entry.separated_by)
-        );
+        let separated = escaped(entry.separated_by);
+        let _ = writeln!(page, "| [`{rival}`]({rival}.md) | {exact}{separated} |");
     }
-    *page += "\n";
+    page + "\n[All effects, and how to read the page](../effects.md)\n"
+}
+
+/// Returns the index and the page of each effect: the path of each, and its text.
+fn made() -> Vec<(String, String)> {
+    let mut index =
+        format!("# Which effects are known, and what do they look like?\n\n{MADE}\n\n{HEAD}");
+    let mut pages = Vec::new();
+    for (name, kinds) in effects() {
+        let title = capital(kinds[0].about().title);
+        let _ = writeln!(
+            index,
+            "| [`{name}`](effects/{name}.md) | {title} | <img src=\"effects/{name}.svg\" alt=\"{title}\" width=\"240\"> |"
+        );
+        pages.push((format!("docs/effects/{name}.md"), page_of(name, &kinds)));
+    }
+    pages.push(("docs/effects.md".to_owned(), index + END));
+    pages
 }
 
 #[test]
-fn the_page_of_effects_has_what_the_library_has() {
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
-    let mut page = HEAD.to_owned();
-    for (name, kinds) in sections() {
-        section(name, &kinds, &mut page);
+fn the_pages_of_effects_have_what_the_library_has() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for (page, text) in made() {
+        let picture = root.join(&page).with_extension("svg");
         assert!(
-            docs.join(format!("effects/{name}.svg")).exists(),
-            "docs/effects/draw.py makes the picture of {name}"
+            page == "docs/effects.md" || picture.exists(),
+            "docs/effects/draw.py makes the picture of {page}"
         );
+        made_page(&page, &text, "the_pages_of_effects");
     }
-    let page = format!("{}\n", page.trim_end());
-    made_page("docs/effects.md", &page, "the_page_of_effects");
 }
