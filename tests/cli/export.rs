@@ -58,7 +58,11 @@ fn a_recording_is_the_same_in_every_format() {
     succeed(&mut convert(&own("bag.csv"), &own("bag.npz")));
     succeed(&mut convert(&own("bag.npz"), &own("bag.parquet")));
     succeed(&mut convert(&own("bag.parquet"), &own("bag.mcap")));
-    succeed(&mut convert(&own("bag.mcap"), &own("back.csv")));
+    let mut named = rig();
+    named.arg("convert").arg(own("bag.mcap"));
+    let none = refuse(&mut named);
+    assert!(none.contains("OUT"), "{none}");
+    succeed(named.arg("--out").arg(own("back.csv")));
     let (names_back, back) = columns(&own("back.csv"));
     assert_eq!(names_back.len(), names.len());
     for (k, name) in names.iter().enumerate() {

@@ -26,8 +26,11 @@ pub(crate) struct Args {
     #[arg(value_name = "IN")]
     file: PathBuf,
     /// File to write: .csv, .mcap, .npz or .parquet
-    #[arg(value_name = "OUT")]
-    out: PathBuf,
+    #[arg(value_name = "OUT", required_unless_present = "out")]
+    to: Option<PathBuf>,
+    /// The same as OUT
+    #[arg(long, value_name = "FILE", conflicts_with = "to")]
+    out: Option<PathBuf>,
     /// Robot description, TOML, URDF or MJCF: its joints are read, in its order
     #[arg(long, value_name = "FILE")]
     robot: Option<PathBuf>,
@@ -38,6 +41,14 @@ pub(crate) struct Args {
     /// Replace the file if it exists
     #[arg(long)]
     force: bool,
+}
+
+impl Args {
+    /// Returns the file to write, by either of its names.
+    fn out(&self) -> &Path {
+        let given = self.out.as_deref().or(self.to.as_deref());
+        given.unwrap_or(Path::new(""))
+    }
 }
 
 /// Columns that are written.
@@ -53,18 +64,16 @@ struct Kept {
 /// # Errors
 /// A sentence that names the file, the line or the column at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let extension = args
-        .out
-        .extension()
-        .map(|e| e.to_string_lossy().to_lowercase());
+    let out = args.out();
+    let extension = out.extension().map(|e| e.to_string_lossy().to_lowercase());
     let extension = extension.unwrap_or_default();
     if !["csv", "mcap", "npz", "parquet"].contains(&extension.as_str()) {
         return Err(CommandError::Sentence(format!(
             "The format of {} is not known; end its name in .csv, .mcap, .npz or .parquet.",
-            args.out.display()
+            out.display()
         )));
     }
-    refuse_file(&args.out, args.force)?;
+    refuse_file(out, args.force)?;
     let robot = match &args.robot {
         Some(path) => described(path, &args.chain, ui)?.robot,
         None => joints_in(&args.file, ui)?,
@@ -79,15 +88,15 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let kept = kept(&source, &robot, ui, &mut at)?;
     let mut at = |bytes| at(source.bytes() + bytes);
     match extension.as_str() {
-        "npz" => archive(&source, &kept, &args.out, &mut at)?,
-        _ => rows(&source, &kept, &args.out, &mut at)?,
+        "npz" => archive(&source, &kept, out, &mut at)?,
+        _ => rows(&source, &kept, out, &mut at)?,
     }
-    ui.file(&args.out);
+    ui.file(out);
     ui.fact("rows", kept.rows);
     ui.fact("columns", names(&kept));
     ui.answer(&format!(
         "{}: {} rows of {}",
-        args.out.display(),
+        out.display(),
         kept.rows,
         names(&kept).join(", ")
     ));

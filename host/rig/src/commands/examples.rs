@@ -61,7 +61,10 @@ const EXAMPLES: [(&str, &[&str]); 27] = [
     ),
     (
         "convert",
-        &["rig convert bag log.csv", "rig convert log.csv log.npz"],
+        &[
+            "rig convert bag --out log.csv",
+            "rig convert log.csv --out log.npz",
+        ],
     ),
     (
         "urdf",

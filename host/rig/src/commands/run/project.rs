@@ -190,10 +190,7 @@ fn step(
             values,
         });
     }
-    step.words.push(match argument(&described, "out") {
-        Some(out) if out.is_positional() => step.out.clone(),
-        _ => format!("--out={}", step.out),
-    });
+    step.words.push(format!("--out={}", step.out));
     Ok(step)
 }
 
@@ -385,7 +382,7 @@ mod tests {
             [
                 "identify --unit=q=deg --unit=t=ms --robot=arm.urdf --data=1.csv --data=2.csv --lock=finger=-0.5 --as-described --out=a",
                 "excite --robot=arm.urdf --start=-1.5,0 --out=b.toml",
-                "convert --unit=q=deg --unit=t=ms 1.csv c.npz",
+                "convert --unit=q=deg --unit=t=ms 1.csv --out=c.npz",
                 "control --robot=arm.urdf --pose=-1.5,0 --out=e",
                 "compliance --unit=q=deg --unit=t=ms --robot=arm.urdf --pose=-1.5,0 --pose=1,2 --out=f",
                 "compare --unit=q=deg --unit=t=ms --robot=arm.urdf --set=cold=1.csv,2.csv --out=d",
