@@ -1,14 +1,14 @@
 //! What README and pages of `docs/` show: every command exists with its options, the walkthroughs run, and they print what the
 //! page says.
 
+mod walks;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::{CommandFactory, Parser};
 use rig::commands::Cli;
-
-use crate::run::{rig, succeed};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -331,134 +331,4 @@ fn the_book_builds_without_a_warning_and_its_links_lead_somewhere() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(count > 300, "only {count} links were found");
-}
-
-/// As [`walk_in`], in an empty folder.
-fn walk(page: &str, count: usize) {
-    walk_in(tempfile::tempdir().unwrap().path(), page, count);
-}
-
-/// Runs the first `count` blocks of shell commands of a page in a folder, one after the other. A block without a language
-/// after them holds lines of the output; … stands for text that is left out.
-fn walk_in(folder: &Path, page: &str, count: usize) {
-    let program = Path::new(env!("CARGO_BIN_EXE_rig")).parent().unwrap();
-    let path = std::env::join_paths(
-        std::iter::once(program.to_owned())
-            .chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
-    )
-    .unwrap();
-    let mut said = String::new();
-    let mut ran = 0;
-    for (language, block) in blocks(&root().join(page)) {
-        match language.as_str() {
-            "sh" if ran == count => break,
-            "sh" => {
-                ran += 1;
-                let output = Command::new("sh")
-                    .args(["-e", "-c", &block])
-                    .env("PATH", &path)
-                    .current_dir(folder)
-                    .output()
-                    .unwrap();
-                said = String::from_utf8(output.stdout).unwrap();
-                let errors = String::from_utf8_lossy(&output.stderr);
-                assert!(output.status.success(), "{page}: {block}\n{said}\n{errors}");
-            }
-            "" if ran > 0 => {
-                for line in block.lines() {
-                    let is_printed = line.split('…').all(|part| said.contains(part));
-                    assert!(is_printed, "{page} has:\n{line}\nprinted:\n{said}");
-                }
-            }
-            _ => {}
-        }
-    }
-    assert_eq!(ran, count, "{page}");
-}
-
-#[test]
-fn the_load_is_found_as_the_page_says() {
-    walk("docs/load.md", 3);
-}
-
-#[test]
-fn four_days_are_compared_as_the_page_says() {
-    walk("docs/compare.md", 1);
-}
-
-#[test]
-fn the_stiffness_is_found_as_the_page_says() {
-    walk("docs/compliance.md", 3);
-}
-
-#[test]
-fn the_exercise_runs_as_the_page_says() {
-    walk("docs/exercise.md", 5);
-}
-
-#[test]
-fn control_laws_run_as_the_page_says() {
-    walk("docs/control.md", 1);
-}
-
-#[test]
-fn an_arm_with_worn_gears_is_simulated_as_the_page_says() {
-    walk("docs/simulate.md", 3);
-}
-
-#[test]
-fn the_tutorial_runs_as_the_page_says() {
-    walk("docs/tutorial.md", 6);
-}
-
-#[test]
-fn the_demonstration_prints_what_the_page_says() {
-    walk("docs/demo.md", 1);
-}
-
-#[test]
-fn motions_of_one_joint_and_for_a_load_are_designed_as_the_page_says() {
-    walk("docs/excitation.md", 4);
-}
-
-#[test]
-fn a_log_is_read_as_the_page_says() {
-    let folder = tempfile::tempdir().unwrap();
-    let place = |name: &str| folder.path().join(name);
-    let recordings = root().join("tests/recordings");
-    fs::copy(recordings.join("other.mcap"), place("log.mcap")).unwrap();
-    fs::create_dir(place("bag_folder")).unwrap();
-    for name in ["bag_mcap.mcap", "metadata.yaml"] {
-        let from = recordings.join("bag_mcap").join(name);
-        fs::copy(from, place("bag_folder").join(name)).unwrap();
-    }
-    let run = |line: &str| {
-        let mut command = rig();
-        succeed(
-            command
-                .args(line.split_whitespace())
-                .current_dir(folder.path()),
-        )
-    };
-    run("init edda --out edda.toml");
-    run("urdf --robot edda.toml --out arm.urdf");
-    run("excite --robot edda.toml --starts 2 --out motion.toml");
-    run(
-        "simulate --robot edda.toml --trajectory motion.toml --noise-torque 0.1 --noise-position 1e-5 --out run.csv",
-    );
-    // As another program writes it: positions in degrees, that of the first joint under a name of its own.
-    let made = fs::read_to_string(place("run.csv")).unwrap();
-    let mut lines = made.lines();
-    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let at = |name: &str| header.iter().position(|own| *own == name).unwrap();
-    let columns = ["t", "q1", "q2", "tau1", "tau2"].map(at);
-    let mut log = "t,angle,q2,tau1,tau2\n".to_owned();
-    for line in lines {
-        let row: Vec<f64> = line.split(',').map(|own| own.parse().unwrap()).collect();
-        let [t, q1, q2, tau1, tau2] = columns.map(|k| row[k]);
-        let [q1, q2] = [q1, q2].map(f64::to_degrees);
-        log += &format!("{t},{q1},{q2},{tau1},{tau2}\n");
-    }
-    fs::write(place("log.csv"), log).unwrap();
-    walk_in(folder.path(), "docs/logs.md", 1);
 }

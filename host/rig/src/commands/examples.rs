@@ -49,8 +49,8 @@ const EXAMPLES: [(&str, &[&str]); 27] = [
     (
         "record",
         &[
-            "rig record --emulated --trajectory motion.toml --out train.csv",
-            "rig record --port /dev/ttyACM0 --trajectory motion.toml --out train.csv",
+            "rig record --emulated --home -1.5708 --trajectory motion.toml --out train.csv",
+            "rig record --port /dev/ttyACM0 --home -1.5708 --trajectory motion.toml --out train.csv",
         ],
     ),
     (
@@ -86,12 +86,12 @@ const EXAMPLES: [(&str, &[&str]); 27] = [
         &[
             "rig identify --robot arm.urdf --data log.csv --out found",
             "rig identify --robot arm.toml --data one.csv two.csv --holdout three.csv --out found",
-            "rig identify --robot arm.urdf --data bag --map q1=joint_states/position/shoulder --out found",
+            "rig identify --robot arm.urdf --data foreign.csv --map q1=angle --out found",
         ],
     ),
     (
         "friction-map",
-        &["rig friction-map --robot rig.toml --data sweep.csv --sweep sweep.toml --out map"],
+        &["rig friction-map --robot rig.toml --data log.csv --sweep sweep.csv --out map"],
     ),
     (
         "validate",
