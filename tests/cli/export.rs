@@ -91,6 +91,44 @@ fn a_recording_is_the_same_in_every_format() {
     assert!((values[1][0] - std::f64::consts::PI).abs() < 1e-12);
 }
 
+/// The sensor of the recording (tests/recordings/clocks.py) stamps by a clock of its own; its force along x is 10 t.
+#[test]
+fn topics_with_clocks_of_their_own_are_named_and_read_by_the_clock_of_the_recorder() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = |name: &str| folder.path().join(name);
+    let mapped = |more: &[&str]| {
+        let mut command = convert(&of_others("clocks.mcap"), &own("clocks.csv"));
+        command.arg("--robot").arg(robot("edda.toml"));
+        command.args(["--map", "q1=joint_states/position/shoulder"]);
+        command.args(["--map", "q2=joint_states/position/elbow"]);
+        command.args(["--map", "fx=ft_sensor/wrench/wrench/force/x"]);
+        command.arg("--force").args(more);
+        command
+    };
+    let apart = refuse(&mut mapped(&[]));
+    for words in [
+        "/ft_sensor/wrench",
+        "from 5.001000000 to 5.391000000 s",
+        "from 1700000000.000000000 to 1700000000.398000000 s",
+        "--clock log",
+    ] {
+        assert!(apart.contains(words), "{words}: {apart}");
+    }
+    fs::write(own("clock.toml"), "clock = \"log\"\n").unwrap();
+    let mapping = own("clock.toml").to_str().unwrap().to_owned();
+    for more in [["--clock", "log"], ["--mapping", &mapping]] {
+        succeed(&mut mapped(&more));
+        let (names, values) = columns(&own("clocks.csv"));
+        let at = |name: &str| names.iter().position(|own| own == name).unwrap();
+        let (t, fx) = (&values[at("t")], &values[at("fx")]);
+        assert_eq!(t.len(), 195);
+        assert!(t.iter().zip(fx).all(|(t, fx)| (fx - 10.0 * t).abs() < 1e-9));
+    }
+    fs::write(own("clock.toml"), "clock = \"sensor\"\n").unwrap();
+    let unknown = refuse(&mut mapped(&["--mapping", &mapping]));
+    assert!(unknown.contains("is no clock"), "{unknown}");
+}
+
 /// Runs a script with the files that `made` makes, if a Python with these modules is installed.
 fn read_by_python(modules: &str, script: &str, made: impl FnOnce() -> Vec<PathBuf>) {
     let python = std::env::var("RIG_PYTHON").unwrap_or_else(|_| "python3".to_owned());

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::clock::{Clock, UNWANTED};
 use super::decoder::decoder;
 use super::error::DataError;
 use super::flat_message::{Decoder, FlatMessage};
@@ -37,18 +38,20 @@ pub(super) struct FlatRows {
     pub time: i128,
     /// True if the time of a message is its header stamp, otherwise its log time.
     pub is_stamped: bool,
-    /// True if the first message has a header stamp, which may be zero.
-    pub has_stamp: bool,
+    /// Why it is not, if it is not.
+    pub why_logged: &'static str,
+    clock: Clock,
 }
 
 impl FlatRows {
     /// Opens the files of a recording for the channels `wanted` of a topic. Its time is the header stamp if the first message
-    /// has one, otherwise the log time.
+    /// has one and `clock` is that of the stamps, otherwise the log time.
     pub(super) fn open(
         path: &Path,
         files: &[PathBuf],
         topic: &str,
         wanted: Vec<String>,
+        clock: Clock,
     ) -> Result<Self, DataError> {
         Ok(Self {
             path: path.into(),
@@ -62,7 +65,8 @@ impl FlatRows {
             number: 0,
             time: 0,
             is_stamped: true,
-            has_stamp: true,
+            why_logged: "",
+            clock,
         })
     }
 
@@ -141,8 +145,12 @@ impl FlatRows {
         }
         let stamp = self.flat.stamp.filter(|stamp| *stamp != (0, 0));
         if number == 1 {
-            self.is_stamped = stamp.is_some();
-            self.has_stamp = self.flat.stamp.is_some();
+            self.is_stamped = stamp.is_some() && self.clock == Clock::Stamp;
+            self.why_logged = match self.flat.stamp {
+                None => "is missing",
+                Some((0, 0)) => "is zero",
+                Some(_) => UNWANTED,
+            };
         }
         match (self.is_stamped, stamp) {
             (true, Some(stamp)) => Ok(in_nanoseconds(stamp)),

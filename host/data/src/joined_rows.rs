@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::block::WRENCH_COLUMNS;
+use super::clock::Clock;
 use super::columns::{Layout, shown};
 use super::decoder::decoder;
 use super::error::DataError;
@@ -62,6 +63,11 @@ pub(super) struct JoinedRows {
     sides: Vec<SideRows>,
     /// Assumptions at the start.
     remarks: Vec<Remark>,
+    clock: Clock,
+    /// True if a row had a value of every topic beside it.
+    is_met: bool,
+    /// Until then, times of the first and of the last row, ns.
+    alone: Option<(i128, i128)>,
 }
 
 /// A topic of a file.
@@ -97,12 +103,15 @@ impl JoinedRows {
         if !mapping.columns().is_empty() {
             return Self::open_mapped(path, files, mapping);
         }
-        let (rows, mut header) = McapRows::open(path, files, joints)?;
+        let (rows, mut header) = McapRows::open(path, files, joints, mapping.clock)?;
         let mut joined = Self {
             path: path.into(),
             main: Main::Plain(Box::new(rows)),
             sides: Vec::new(),
             remarks: Vec::new(),
+            clock: mapping.clock,
+            is_met: false,
+            alone: None,
         };
         if mapping.wants_wrench && !header.names.iter().any(|name| name == WRENCH_COLUMNS[0]) {
             joined.add_wrench(files, &mut header)?;
@@ -161,7 +170,8 @@ impl JoinedRows {
             });
         }
         let time = time.or_else(|| main.add_own_time());
-        let rows = FlatRows::open(path, files, &main.topic, main.channels.clone())?;
+        let channels = main.channels.clone();
+        let rows = FlatRows::open(path, files, &main.topic, channels, mapping.clock)?;
         let named = |list: &[String]| {
             let time = time.is_none().then(|| "t".to_owned());
             time.into_iter().chain(list.iter().cloned()).collect()
@@ -181,6 +191,9 @@ impl JoinedRows {
             })),
             sides: Vec::new(),
             remarks: Vec::new(),
+            clock: mapping.clock,
+            is_met: false,
+            alone: None,
         };
         for side in wanted {
             joined.add_side(files, side, &mut header)?;
@@ -194,7 +207,10 @@ impl JoinedRows {
         wanted: Wanted,
         header: &mut Header,
     ) -> Result<(), DataError> {
-        let open = || FlatRows::open(&self.path, files, &wanted.topic, wanted.channels.clone());
+        let open = || {
+            let channels = wanted.channels.clone();
+            FlatRows::open(&self.path, files, &wanted.topic, channels, self.clock)
+        };
         let (rows, probe) = (open()?, open()?);
         let topic = wanted.topic.trim_start_matches('/');
         // Columns before these, of joint states, state no units.
@@ -257,21 +273,64 @@ impl JoinedRows {
                 Main::Mapped(rows) => rows.next_row(&mut values[..own])?,
             };
             let Some(number) = found else {
-                return Ok(None);
+                return self.refuse_apart().map(|()| None);
             };
             if self.beside(number, &mut values[own..])? {
                 self.check(layout, values, number)?;
+                (self.is_met, self.alone) = (true, None);
                 return Ok(Some(number));
+            }
+            if !self.is_met {
+                let time = self.time().0;
+                let first = self.alone.map_or(time, |(first, _)| first);
+                self.alone = Some((first, time));
             }
         }
     }
 
-    /// Writes the columns of the other topics; returns false if one of them has none for this row.
-    fn beside(&mut self, number: u64, values: &mut [f64]) -> Result<bool, DataError> {
-        let (time, is_stamped) = match &self.main {
+    /// Returns the time of the last row, ns, and whether it is a header stamp.
+    fn time(&self) -> (i128, bool) {
+        match &self.main {
             Main::Plain(rows) => rows.time(),
             Main::Mapped(own) => (own.last(), own.rows.is_stamped),
+        }
+    }
+
+    /// Refuses topics that have no time in common.
+    fn refuse_apart(&mut self) -> Result<(), DataError> {
+        let Some(rows) = self.alone else {
+            return Ok(());
         };
+        for side in &mut self.sides {
+            let Some((from, to)) = side.range()?.filter(|own| own.0 > rows.1 || own.1 < rows.0)
+            else {
+                continue;
+            };
+            let (times, remedy) = match side.is_stamped() {
+                true => (
+                    "header stamps",
+                    "; their clocks are not the same: give --clock log, which takes the times at which messages were logged (stamps of one clock are better where you can record again)",
+                ),
+                false => ("log times", "; record both at the same time"),
+            };
+            return Err(DataError::Mapping {
+                message: format!(
+                    "{}: no row has a value of {}, whose {times} run from {} to {} s, while those of the rows run from {} to {} s{remedy}",
+                    self.path.display(),
+                    side.topic(),
+                    seconds(from),
+                    seconds(to),
+                    seconds(rows.0),
+                    seconds(rows.1),
+                ),
+            });
+        }
+        Ok(())
+    }
+
+    /// Writes the columns of the other topics; returns false if one of them has none for this row.
+    fn beside(&mut self, number: u64, values: &mut [f64]) -> Result<bool, DataError> {
+        let (time, is_stamped) = self.time();
         let mut start = 0;
         let mut is_whole = true;
         for side in &mut self.sides {
@@ -285,7 +344,7 @@ impl JoinedRows {
                 };
                 return Err(DataError::Mapping {
                     message: format!(
-                        "{}: the messages on {} have {}, but the rows have {}, so their times cannot be compared; record both with stamps",
+                        "{}: the messages on {} have {}, but the rows have {}, so their times cannot be compared; give --clock log, which takes the log times of both, or record both with stamps",
                         self.path.display(),
                         side.topic(),
                         of(side.is_stamped()),
@@ -351,18 +410,21 @@ impl MappedRows {
     /// Returns where the time comes from.
     fn remark(&self) -> Option<Remark> {
         let origin = self.origin.filter(|_| self.time.is_none())?;
-        let origin = format!("{}.{:09}", origin / 1_000_000_000, origin % 1_000_000_000);
+        let origin = seconds(origin);
         Some(match self.rows.is_stamped {
             true => Remark::Stamp { origin },
             false => Remark::LogTime {
                 origin,
-                stamp: match self.rows.has_stamp {
-                    true => "is zero",
-                    false => "is missing",
-                },
+                stamp: self.rows.why_logged,
             },
         })
     }
+}
+
+/// Returns a time in nanoseconds as text in seconds, without loss of digits.
+fn seconds(time: i128) -> String {
+    let (whole, rest) = (time / 1_000_000_000, time % 1_000_000_000);
+    format!("{whole}.{:09}", rest.abs())
 }
 
 /// Returns the topics of the first messages, with the channels of each.

@@ -1,5 +1,6 @@
 //! Converts ROS `sensor_msgs/JointState` to rows; names are matched with the robot's joints.
 
+use super::clock::{Clock, UNWANTED};
 use super::flat_rows::in_nanoseconds;
 use super::remark::Remark;
 use super::ros_layout::Field;
@@ -27,6 +28,7 @@ pub(super) struct JointStates {
     places: Vec<usize>,
     has_velocity: bool,
     has_effort: bool,
+    clock: Clock,
     is_logged_time: bool,
     /// Time of the first message, whole seconds and nanoseconds.
     origin: (i64, i64),
@@ -37,9 +39,10 @@ pub(super) struct JointStates {
 const PARTING: [char; 5] = ['/', '_', '.', ':', '-'];
 
 impl JointStates {
-    pub(super) fn new(joints: &[String]) -> Self {
+    pub(super) fn new(joints: &[String], clock: Clock) -> Self {
         Self {
             joints: joints.to_vec(),
+            clock,
             ..Self::default()
         }
     }
@@ -89,11 +92,16 @@ impl JointStates {
     fn begin(&mut self, log_time: u64) {
         let sample = &self.sample;
         self.has_first = true;
-        self.is_logged_time = (sample.seconds, sample.nanoseconds) == (0, 0);
+        self.is_logged_time = self.is_zero() || self.clock == Clock::Log;
         self.origin = self.time(log_time);
         self.has_effort = !sample.effort.is_empty();
         self.has_velocity = !sample.velocity.is_empty()
             && self.places.iter().all(|k| !sample.velocity[*k].is_nan());
+    }
+
+    /// Returns true if the last message has no header stamp.
+    fn is_zero(&self) -> bool {
+        (self.sample.seconds, self.sample.nanoseconds) == (0, 0)
     }
 
     /// Returns true if the messages have torques.
@@ -176,7 +184,7 @@ impl JointStates {
         remarks.push(if self.is_logged_time {
             Remark::LogTime {
                 origin,
-                stamp: "is zero",
+                stamp: if self.is_zero() { "is zero" } else { UNWANTED },
             }
         } else {
             Remark::Stamp { origin }

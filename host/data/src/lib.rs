@@ -28,6 +28,7 @@ mod binary_number;
 mod block;
 mod bursts;
 mod channel;
+mod clock;
 mod columns;
 mod compensated;
 pub mod contents;

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::block::WRENCH_COLUMNS;
+use super::clock::Clock;
 use super::columns::{Signal, shown};
 use super::error::DataError;
 use super::header::Header;
@@ -22,6 +23,8 @@ pub struct Mapping {
     units: Vec<(String, Unit)>,
     /// True if the axes of a wrist sensor are wanted from a topic of their own.
     pub(super) wants_wrench: bool,
+    /// Clock of messages with header stamps.
+    pub(super) clock: Clock,
     /// Columns of no joint that must have a finite number in every row.
     numbers: Vec<String>,
 }
@@ -30,6 +33,7 @@ pub struct Mapping {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Written {
+    clock: Option<String>,
     columns: toml::Table,
     units: toml::Table,
 }
@@ -53,11 +57,14 @@ impl Mapping {
                 format!("line {}: ", before.matches('\n').count() + 1)
             });
             wrong(format!(
-                "{}{}; a mapping has the tables [columns] and [units]",
+                "{}{}; a mapping has the tables [columns] and [units], and before them clock = \"log\" or \"stamp\"",
                 line.unwrap_or_default(),
                 e.message()
             ))
         })?;
+        if let Some(clock) = &written.clock {
+            self.set_clock(clock).map_err(wrong)?;
+        }
         for (table, is_unit) in [(&written.columns, false), (&written.units, true)] {
             for (column, value) in table {
                 let Some(value) = value.as_str() else {
@@ -73,6 +80,15 @@ impl Mapping {
                 added.map_err(wrong)?;
             }
         }
+        Ok(())
+    }
+
+    /// Sets the clock of messages as the option `--clock` has it: `stamp` or `log`.
+    ///
+    /// # Errors
+    /// What is wrong, one clause.
+    pub fn set_clock(&mut self, name: &str) -> Result<(), String> {
+        self.clock = Clock::named(name)?;
         Ok(())
     }
 

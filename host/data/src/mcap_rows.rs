@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::channel;
+use super::clock::Clock;
 use super::columns::{FileColumn, Layout};
 use super::error::DataError;
 use super::header::Header;
@@ -68,6 +69,7 @@ pub(super) struct McapRows {
     topics: Vec<Topic>,
     /// Names of the robot's joints.
     joints: Vec<String>,
+    clock: Clock,
     /// Topic of the recording and its reader, after its first message.
     chosen: Option<(usize, Samples)>,
     message: Vec<u8>,
@@ -90,6 +92,7 @@ impl McapRows {
         path: &Path,
         files: &[PathBuf],
         joints: &[String],
+        clock: Clock,
     ) -> Result<(Self, Header), DataError> {
         let mut rows = Self {
             path: path.into(),
@@ -97,6 +100,7 @@ impl McapRows {
             channels: BTreeMap::new(),
             topics: Vec::new(),
             joints: joints.to_vec(),
+            clock,
             chosen: None,
             message: Vec::new(),
             number: 0,
@@ -298,7 +302,7 @@ impl McapRows {
                 if let Some((_, Samples::Json(_))) = &self.chosen {
                     return Ok(false);
                 }
-                let mut fresh = JointStates::new(&self.joints);
+                let mut fresh = JointStates::new(&self.joints, self.clock);
                 let states = match &mut self.chosen {
                     Some((_, Samples::JointStates(states))) if another.is_none() => states,
                     _ => &mut fresh,

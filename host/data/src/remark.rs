@@ -80,7 +80,7 @@ pub enum Remark {
     LogTime {
         /// Log time of the first message, seconds and nanoseconds.
         origin: String,
-        /// Why the stamp is not used: "is zero" or "is missing".
+        /// Why the stamp is not used: "is zero", "is missing" or "is not used".
         stamp: &'static str,
     },
     /// Joint names with a prefix.

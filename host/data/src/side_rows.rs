@@ -33,6 +33,8 @@ pub(super) struct SideRows {
     rows: FlatRows,
     /// Names of the columns; [`WRENCH_MESSAGE`] is the last one of a wrist sensor.
     columns: Vec<String>,
+    /// Time of the first message, ns.
+    first: Option<i128>,
     before: Option<Timed>,
     after: Option<Timed>,
     /// Usual interval between messages, ns.
@@ -67,6 +69,7 @@ impl SideRows {
         Ok(Self {
             rows,
             columns,
+            first,
             before: None,
             after,
             usual,
@@ -86,6 +89,12 @@ impl SideRows {
 
     pub(super) fn topic(&self) -> &str {
         self.rows.topic()
+    }
+
+    /// Reads the topic to its end; returns the times of its first and last message, ns.
+    pub(super) fn range(&mut self) -> Result<Option<(i128, i128)>, DataError> {
+        while self.rows.next_time()?.is_some() {}
+        Ok(self.first.map(|first| (first, self.rows.time)))
     }
 
     /// Writes the values at a time, ns, which must not be earlier than that of the call before. Returns false if there is no

@@ -13,7 +13,11 @@ pub(crate) struct UnitArg {
     /// Unit of a column (q1=deg, t=ms), or of that column of all joints (q=deg); repeat for several
     #[arg(long, value_name = "COLUMN=UNIT", help_heading = "Columns")]
     unit: Vec<String>,
-    /// File with channels and units: TOML with the tables [columns] and [units]
+    /// Clock of the messages of MCAP files and bags: their header stamps, or the time at which each was logged, for
+    /// topics that are stamped by several clocks [default: stamp]
+    #[arg(long, value_name = "CLOCK", value_parser = ["stamp", "log"], help_heading = "Columns")]
+    clock: Option<String>,
+    /// File with channels and units: TOML with the tables [columns] and [units], and clock
     #[arg(long, value_name = "FILE", help_heading = "Columns")]
     mapping: Option<PathBuf>,
 }
@@ -38,6 +42,10 @@ impl UnitArg {
         let mut mapping = Mapping::default();
         if let Some(path) = &self.mapping {
             mapping.add_file(path)?;
+        }
+        if let Some(clock) = &self.clock {
+            let set = mapping.set_clock(clock);
+            set.map_err(|why| CommandError::Sentence(format!("--clock {clock}: {why}.")))?;
         }
         for entry in &self.unit {
             let added = mapping.add_unit(entry);
