@@ -13,6 +13,7 @@ mod excitation;
 mod identification;
 mod inputs;
 mod json;
+mod load;
 mod recording;
 mod robot;
 mod simulation;
@@ -32,6 +33,8 @@ mod _native {
     use super::excitation::excite;
     #[pymodule_export]
     use super::identification::{BaseParameter, Identification, JointFit, identify};
+    #[pymodule_export]
+    use super::load::{LoadIdentification, identify_load};
     #[pymodule_export]
     use super::recording::Recording;
     #[pymodule_export]

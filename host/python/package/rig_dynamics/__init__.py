@@ -18,6 +18,7 @@ from ._native import (
     Error,
     Identification,
     JointFit,
+    LoadIdentification,
     Recording,
     Remark,
     Robot,
@@ -28,6 +29,7 @@ from ._native import (
     diagnose,
     excite,
     identify,
+    identify_load,
     simulate,
 )
 
@@ -38,6 +40,7 @@ __all__ = [
     "Error",
     "Identification",
     "JointFit",
+    "LoadIdentification",
     "Recording",
     "Remark",
     "Robot",
@@ -48,5 +51,6 @@ __all__ = [
     "diagnose",
     "excite",
     "identify",
+    "identify_load",
     "simulate",
 ]

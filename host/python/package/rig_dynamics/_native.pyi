@@ -14,6 +14,7 @@ __all__ = [
     "Error",
     "Identification",
     "JointFit",
+    "LoadIdentification",
     "Recording",
     "Remark",
     "Robot",
@@ -24,6 +25,7 @@ __all__ = [
     "diagnose",
     "excite",
     "identify",
+    "identify_load",
     "simulate",
 ]
 
@@ -400,6 +402,94 @@ def identify(
     ``cutoff``: low-pass on the position, Hz; ``decimation``: keep every n-th row; ``min_speed``: leave out slower rows,
     rad/s or m/s; None chooses each from the data. ``window``: of the integral model, s. ``torque_lead``: s.
     ``even_if_wrong``: fit although columns look wrong. ``progress``: called with the share of the work, 0 to 1.
+
+    Ctrl-C ends the call at once. Raises ``Error`` or ``OSError``.
+    """
+
+@final
+class LoadIdentification:
+    """The result of :func:`identify_load`, in the flange frame. ``to_dict()`` has the keys of ``load.json`` (docs/load.md)."""
+
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+
+    @property
+    def mass_std(self) -> float:
+        """Standard deviation of the mass, kg."""
+
+    @property
+    def centre(self) -> _Floats:
+        """Centre of mass, m, shape (3,)."""
+
+    @property
+    def centre_std(self) -> _Floats:
+        """Standard deviations of the centre of mass, m, shape (3,)."""
+
+    @property
+    def inertia(self) -> _Floats:
+        """Inertia about the centre of mass in the axes of the flange, kg*m^2, shape (3, 3)."""
+
+    @property
+    def inertia_std(self) -> _Floats:
+        """Standard deviations of the inertia, kg*m^2, shape (3, 3)."""
+
+    @property
+    def parameters(self) -> _Floats:
+        """m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz; the inertia about the flange's origin; SI, shape (10,)."""
+
+    @property
+    def covariance(self) -> _Floats:
+        """Covariance of ``parameters``, shape (10, 10)."""
+
+    @property
+    def shown(self) -> list[str]:
+        """Names of the parameters that the data show."""
+
+    @property
+    def not_shown(self) -> list[dict[str, Any]]:
+        """What the data do not show: ``parameters``, ``experiment``, ``pose``."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences; also issued as :class:`Remark`."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the contents of ``load.json``."""
+
+    def save(self, folder: _Path, *, force: bool = False) -> None:
+        """Write load.toml, load.urdf, load.json and report.html.
+
+        A folder with earlier results is refused unless ``force``.
+        """
+
+def identify_load(
+    robot: Robot,
+    data: _Recordings,
+    without: _Recordings | None = None,
+    *,
+    by: Literal["sensor", "torque", "both"] = "sensor",
+    poses: bool = False,
+    subtract: _Path | None = None,
+    mass: float | None = None,
+    mass_std: float = 0.0,
+    sensor_position: Sequence[float] | None = None,
+    sensor_rotation: Sequence[float] | None = None,
+    reads: Literal["load", "robot"] | None = None,
+    gain_std: float | None = None,
+    cutoff: float | None = None,
+    even_if_wrong: bool = False,
+) -> LoadIdentification:
+    """Identify a load at the flange, as ``rig load``.
+
+    ``data``: recordings with the load; ``without``: recordings without it. Each is a :class:`Recording`, a path, a dict of
+    columns, or a list of these. ``by``: "sensor" for the columns fx fy fz (N) and mx my mz (N*m) of a wrist sensor, in its
+    axes; "torque" for the joint torques; "both". ``poses``: every row is a pose at rest. ``subtract``: load.toml of a known
+    load that is mounted as well. ``mass``, ``mass_std``: the mass as weighed, kg; it enters no fit.
+    ``sensor_position``, ``sensor_rotation``: pose of the sensor in the flange frame, m and rad (roll, pitch, yaw);
+    ``reads``: "load" for the wrench of the load on the robot, "robot" for its opposite; ``gain_std``: relative standard
+    deviation of the sensor's gains. None takes each from the description. ``cutoff``: low-pass on the position, Hz.
+    ``even_if_wrong``: go on with the best explanation if channels look wrong.
 
     Ctrl-C ends the call at once. Raises ``Error`` or ``OSError``.
     """

@@ -87,6 +87,7 @@ pub use error::CommandError;
 use examples::with_examples;
 pub use identify::{Compare, Impossible, write_identification};
 pub use input::{Faults, Inputs, Watched, recordings, refuse_shared, refuse_twice};
+pub use load::{LoadRequest, Measured, ReadsArg, load_json, write_load};
 pub use overwrite::{refuse_file, refuse_folder};
 pub use ui::plain;
 use ui::{Ui, Wanted};
