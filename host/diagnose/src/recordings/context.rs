@@ -170,12 +170,21 @@ impl<'a> DiagnosisContext<'a> {
         })
     }
 
-    /// Returns the rows of prepared recordings with all samples near standstill.
+    /// Returns the rows of prepared recordings with all samples near standstill, of a joint alone if one is given. Its rows near
+    /// standstill are then used.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(crate) fn rows_with_rests(&self, prepared: &PreparedData) -> Result<Rows, DiagnoseError> {
-        self.rows_of(&prepared.runs, &prepared.treatment, None)
+    pub(crate) fn rows_with_rests(
+        &self,
+        prepared: &PreparedData,
+        joint: Option<usize>,
+    ) -> Result<Rows, DiagnoseError> {
+        self.rows_of(
+            &prepared.runs,
+            &prepared.treatment,
+            joint.as_ref().map(std::slice::from_ref),
+        )
     }
 
     /// Returns rows, with the samples near standstill of the joints `rests`. None: with those of all joints, whose rows near

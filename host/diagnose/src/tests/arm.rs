@@ -211,6 +211,33 @@ fn breakaway_is_not_bent_by_the_samples_at_standstill() {
     }
 }
 
+/// Presliding makes the torque near standstill known: these rows are used, also beside Stribeck friction, which they show best.
+#[test]
+fn presliding_beside_weakening_friction_keeps_the_rows_near_standstill() {
+    let robot = Robot::from_toml(template("edda").unwrap(), Path::new("arm.toml")).unwrap();
+    let mut real = robot.clone();
+    let law = |kind, gains: &[f64], shapes: &[f64]| RobotEffect {
+        joint: Some(robot.joints[0].name.clone()),
+        other: None,
+        effect: Effect::new(kind, gains, shapes),
+    };
+    let truth = [0.5, 0.05];
+    real.effects = vec![
+        law(Kind::PreslidingDahl, &[1.0], &[0.002]),
+        law(Kind::Stribeck, &truth[..1], &truth[1..]),
+    ];
+    let recordings = [1, 2].map(|seed| simulated(&real, [2e-3, 6.3], [2e-6, 0.02], seed));
+    let found = of_simulated(&robot, &recordings);
+    told("pair", &found);
+    let joint = robot.joints[0].name.as_str();
+    assert_eq!(named(&found), [("presliding", joint), ("stribeck", joint)]);
+    for (name, truth) in ["breakaway", "velocity"].into_iter().zip(truth) {
+        let value = &found.steps[1].parameters[name];
+        let is_sound = (value.value - truth).abs() < 2.5 * value.std;
+        assert!(is_sound && value.std < 0.2 * truth, "{name} {value:?}");
+    }
+}
+
 /// A payload is a verdict: its mass and its place, wherever on the link, within what is said of them, and the joints that show it.
 #[test]
 fn a_payload_on_an_arm_is_told_with_mass_and_place() {
