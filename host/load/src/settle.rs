@@ -38,7 +38,7 @@ impl Step {
     }
 
     /// Returns the mounting after this step, which is shortened to 1 (rad): a longer one points nowhere.
-    fn from(&self, mounting: &Mounting) -> Mounting {
+    fn taken_from(&self, mounting: &Mounting) -> Mounting {
         let share = (1.0 / self.size()).min(1.0);
         let [sensor, gravity] = self.turns.map(|by| by * share);
         let mut next = (mounting.turned(&sensor, &gravity)).scaled((share * self.scale).exp());
@@ -62,7 +62,7 @@ pub(crate) fn settled(sensed: &Sensed, start: &Mounting, unknowns: &Unknowns) ->
         if size < SETTLED {
             break;
         }
-        let next = sensed.fit(&step.from(&fit.mounting), unknowns);
+        let next = sensed.fit(&step.taken_from(&fit.mounting), unknowns);
         let next_step = Step::of(sensed, &next);
         // Likelihoods are sums over many rows: less than one is rounding and the curvature of the rotation.
         let is_worse = next.misfit() > fit.misfit() + 1.0;

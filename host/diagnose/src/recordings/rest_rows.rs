@@ -6,9 +6,10 @@ use crate::columns::effect_columns::Source;
 use crate::fit::refit::Refit;
 use crate::fit::solution::{Solution, solve};
 use crate::recordings::context::{DiagnosisContext, PreparedData};
-use crate::rows::regression::{Column, ILLEGIBLE, Rows, combined, take_off};
+use crate::rows::regression::{Column, ILLEGIBLE, Rows};
 use crate::search::shapes::{falls_throughout, grid};
 use rig_numerics::statistics;
+use rig_numerics::vector::axpy;
 use rig_shared::effects::{Kind, SHAPES};
 
 /// Ratio of the mean squares near standstill to the expected ones above which these rows are used.
@@ -36,6 +37,7 @@ pub(crate) fn joints_loud_at_rest(
     let judged = Judged {
         context,
         prepared,
+        free: context.anchor.columns(&whole),
         whole,
     };
     let mut loud = Vec::new();
@@ -63,23 +65,27 @@ struct Judged<'j, 'a> {
     prepared: &'j PreparedData,
     /// Rows with all samples.
     whole: Rows,
+    /// Columns of the free nominal directions on these rows.
+    free: Vec<Column>,
 }
 
 impl Judged<'_, '_> {
     /// Returns true if a joint's residual near standstill is more than unknown friction. `values` are the coefficients of the
     /// nominal columns, and of the column of a `law`, if any; `breakaway` is the friction of that law that is unknown at standstill.
     fn is_loud(&self, joint: usize, values: &[f64], law: Option<&Column>, breakaway: f64) -> bool {
-        let (rows, context) = (&self.whole, self.context);
-        let free = context.anchor.columns(rows);
-        let columns = free.iter().chain(law);
-        let known = combined(rows.joints(), columns.zip(values.iter().copied()));
-        let mut residual = rows.torque.clone();
-        take_off(&mut residual, &known);
-        let Some([about, elsewhere]) = rows.about_rests(joint, &residual[joint]) else {
+        let rows = &self.whole;
+        let mut residual = rows.torque[joint].clone();
+        for (column, value) in self.free.iter().chain(law).zip(values) {
+            if let Some(own) = &column[joint] {
+                axpy(-value, own, &mut residual);
+            }
+        }
+        let Some([about, elsewhere]) = rows.about_rests(joint, &residual) else {
             return true;
         };
-        let nominal = context.anchor.values(&values[..free.len()]);
-        let unknown = ILLEGIBLE * (dry_friction(context, rows, &nominal, joint) + breakaway);
+        let nominal = self.context.anchor.values(&values[..self.free.len()]);
+        let dry = dry_friction(self.context, rows, &nominal, joint);
+        let unknown = ILLEGIBLE * (dry + breakaway);
         about > LOUD * (elsewhere + unknown.powi(2))
     }
 
@@ -114,9 +120,8 @@ impl Judged<'_, '_> {
         let Some(law) = best(&source, &refit, &[Kind::PreslidingDahl], (joint, 0.0))? else {
             return Ok(false);
         };
-        let quiet = with_law(&refit, &law)
-            .is_some_and(|s| !self.is_loud(joint, &s.values, Some(&law.column), 0.0));
-        Ok(quiet)
+        let is_quiet = |s: Solution| !self.is_loud(joint, &s.values, Some(&law.column), 0.0);
+        Ok(with_law(&refit, &law).is_some_and(is_quiet))
     }
 
     fn source<'s>(&'s self, refit: &Refit, rows: &'s Rows) -> Result<Source<'s>, DiagnoseError> {
