@@ -39,7 +39,7 @@ pub struct LoadRequest {
     #[arg(long, value_name = "KG", requires = "mass", default_value_t = 0.0)]
     pub mass_std: f64,
     /// Standard deviation of the gain of a channel of the sensor, relative (0.005 for 0.5 %): it is counted in the standard
-    /// deviations of the load [default: gain_std of [wrist_sensor]; without it gains count as exact]
+    /// deviations of the load [default: gain_std of the table wrist_sensor; without it gains count as exact]
     #[arg(long, value_name = "SHARE")]
     pub gain_std: Option<f64>,
     /// Origin of the sensor in the flange frame, m
