@@ -219,3 +219,20 @@ impl<'a> Reader<'a> {
 pub(super) fn child<'a>(node: Xml<'a>, tag: &str) -> Option<Xml<'a>> {
     node.children().find(|n| n.has_tag_name(tag))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_before_the_declaration_is_said() {
+        for before in ["\n", "  ", "\r\n\r\n", "\t\n "] {
+            let text = format!("{before}<?xml version=\"1.0\"?>\n<robot name=\"r\"/>");
+            let said = parsed(&text, Path::new("a.urdf")).map_err(|e| e.to_string());
+            let said = said.err().unwrap_or_default();
+            assert!(said.starts_with("a.urdf:"), "{said}");
+            assert!(said.contains("remove the empty line or the blanks"), "{said}");
+        }
+        assert!(parsed("<?xml version=\"1.0\"?>\n<robot/>", Path::new("a.urdf")).is_ok());
+    }
+}
