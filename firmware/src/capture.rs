@@ -48,8 +48,9 @@ pub struct Capture {
     next: usize,
     filled: usize,
     phase: Phase,
-    /// The last tick kept, unpacked.
-    last: SnapshotSample,
+    /// Number and position of the last tick kept: copying all of it takes longer.
+    last_tick: u64,
+    last_position: i64,
 }
 
 impl Default for Capture {
@@ -75,14 +76,8 @@ impl Capture {
             next: 0,
             filled: 0,
             phase: Phase::Running,
-            last: SnapshotSample {
-                tick: 0,
-                position: 0,
-                current: 0.0,
-                duty: 0.0,
-                supply: 0.0,
-                reference: 0.0,
-            },
+            last_tick: 0,
+            last_position: 0,
         }
     }
 
@@ -107,7 +102,7 @@ impl Capture {
                 supply: quantise(SUPPLY_STEPS * sample.supply),
             };
         }
-        self.last = *sample;
+        (self.last_tick, self.last_position) = (sample.tick, sample.position);
         self.next = if self.next + 1 < CAPTURE_TICKS {
             self.next + 1
         } else {
@@ -176,10 +171,10 @@ impl Capture {
             slot - CAPTURE_TICKS
         })?;
         let age = (self.filled - 1 - index) as u64;
-        let back = (self.last.position as i32).wrapping_sub(packed.counts);
+        let back = (self.last_position as i32).wrapping_sub(packed.counts);
         Some(SnapshotSample {
-            tick: self.last.tick.saturating_sub(age),
-            position: self.last.position - i64::from(back),
+            tick: self.last_tick.saturating_sub(age),
+            position: self.last_position - i64::from(back),
             current: packed.current,
             duty: (f32::from(packed.duty) - DUTY_ZERO) / DUTY_STEPS,
             supply: f32::from(packed.supply) / SUPPLY_STEPS,

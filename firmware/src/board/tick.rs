@@ -90,7 +90,7 @@ impl Tick {
             encoder_wrong: motion.error,
             // Not in the tick of the estimator's update, an even one with a high load.
             encoder_open: self.wire_check.check(self.state.tick & 1 != 0),
-            stack_left: stack::near_end(),
+            stack_left: stack::near_end(self.state.tick),
         };
         let output = step(self.config, self.state, sample);
         self.bridge.apply(output.command);

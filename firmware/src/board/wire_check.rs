@@ -21,6 +21,8 @@ pub(crate) struct WireCheck {
     turn: usize,
     pull_up: [bool; 2],
     agreements: [u8; 2],
+    /// True if a channel is undriven.
+    open: bool,
 }
 
 impl WireCheck {
@@ -31,6 +33,7 @@ impl WireCheck {
             turn: 0,
             pull_up: [true; 2],
             agreements: [0; 2],
+            open: false,
         }
     }
 
@@ -40,7 +43,7 @@ impl WireCheck {
         if turn {
             self.check_channel();
         }
-        self.agreements[0].max(self.agreements[1]) >= MIN_AGREEMENTS
+        self.open
     }
 
     #[inline(always)]
@@ -53,6 +56,7 @@ impl WireCheck {
             0
         };
         self.agreements[channel] = agreements;
+        self.open = self.agreements[0].max(self.agreements[1]) >= MIN_AGREEMENTS;
         if channel == 0 {
             let feedback = (self.sequence >> 6 ^ self.sequence >> 5) & 1;
             self.sequence = (self.sequence << 1 | feedback) & 0x7F;
