@@ -3,7 +3,7 @@
 use rig_shared::compensation::{self, Compensation};
 use rig_shared::control::{current, law};
 use rig_shared::encoder;
-use rig_shared::estimation::{OneLinkEstimator, SettingsFault, one_link};
+use rig_shared::estimation::{OneLinkEstimator, RowCounter, SettingsFault, one_link};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
 use rig_shared::trajectory::{Extremes, PreparedTrajectory, Reference};
@@ -87,6 +87,8 @@ pub struct State {
     pub(crate) estimation: Window,
     /// The estimator's previous window: its regressor belongs to the instant between two.
     pub(crate) previous_window: Option<Window>,
+    /// Rows of the estimator by what became of them.
+    pub(crate) rows: RowCounter,
     /// The estimator must restart.
     pub(crate) restart_due: bool,
     pub(crate) updates_since_report: u16,
@@ -221,6 +223,7 @@ impl State {
             telemetry: Window::default(),
             estimation: Window::default(),
             previous_window: None,
+            rows: RowCounter::default(),
             restart_due: false,
             updates_since_report: 0,
             report_due: false,

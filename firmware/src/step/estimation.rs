@@ -1,5 +1,6 @@
 //! Inputs of the on-line estimator, and its reports.
 
+use rig_shared::estimation::Learning;
 use rig_shared::link::PARAMETER_COUNT;
 use rig_shared::safety::{Limit, Mode};
 use rig_shared::wire::message::Estimate;
@@ -37,17 +38,27 @@ fn accumulate(config: &Config, state: &mut State, tick: &Tick) {
         state.restart_due = false;
         state.previous_window = None;
         state.estimator.restart();
+        state.rows.restart();
         return;
     }
     // With the bridge off a hand may move the link, after a fault the readings are in doubt, and a current that has not
     // settled is biased: none of them is information on the rig's parameters. The filter starts anew after them, because
     // its memory would keep their bias.
-    if !state.mode.drives() || window.limits.has(Limit::Unsettled) {
+    let drives = state.mode.drives();
+    let outcome = if !drives || window.limits.has(Limit::Unsettled) {
         state.previous_window = None;
         state.estimator.interrupt();
+        if drives {
+            Learning::CurrentUnsettled
+        } else {
+            Learning::BridgeOff
+        }
     } else if let Some(previous) = state.previous_window.replace(window) {
-        update_estimate(config, state, &previous, &window);
-    }
+        update_estimate(config, state, &previous, &window)
+    } else {
+        Learning::FilterSettling
+    };
+    state.rows.count(outcome);
     if state.mode == Mode::Calibrating {
         return;
     }
@@ -59,11 +70,16 @@ fn accumulate(config: &Config, state: &mut State, tick: &Tick) {
     state.report_due = true;
 }
 
-/// Runs one update from two consecutive windows.
+/// Runs one update from two consecutive windows; returns what became of the row.
 ///
 /// Not inlined: one tick in ten runs it, and `firmware/fast_code.list` ranks it apart from the rest of the tick.
 #[inline(never)]
-fn update_estimate(config: &Config, state: &mut State, previous: &Window, window: &Window) {
+fn update_estimate(
+    config: &Config,
+    state: &mut State,
+    previous: &Window,
+    window: &Window,
+) -> Learning {
     let ticks = f32::from(config.rates.estimator_decimation);
     let per_count = state.derived.radians_per_count / ticks;
     let errors = [previous, window].map(|w| w.mean(w.position_error));
@@ -76,18 +92,21 @@ fn update_estimate(config: &Config, state: &mut State, previous: &Window, window
     // Torque explained by effects is removed; otherwise the model's parameters would absorb it.
     let explained = 0.5 * (window.mean(window.explained) + previous.mean(previous.explained));
     let torque = (current - state.current_error) * state.derived.torque_per_ampere - explained;
-    state.estimator.step(q, qd, torque);
+    state.estimator.step(q, qd, torque).into()
 }
 
 /// Returns the estimate in wire format.
-fn estimate_report(state: &State) -> Estimate {
+fn estimate_report(state: &mut State) -> Estimate {
     let report = state.estimator.report();
+    let (rows, learning) = state.rows.report();
     let mut estimate = Estimate {
         tick: state.tick,
         value: [0.0; PARAMETER_COUNT],
         std: [0.0; PARAMETER_COUNT],
         trusted: [false; PARAMETER_COUNT],
         residual_rms: report.residual_rms,
+        rows,
+        learning,
     };
     estimate.value = report.value;
     estimate.std = report.std;
@@ -107,12 +126,12 @@ mod tests {
     use crate::nameplate::one_link;
     use rig_shared::safety::LimitSet;
 
-    /// Returns the estimator after four seconds of a motion under a consistent current, in which some ticks have another
+    /// Returns the state after four seconds of a motion under a consistent current, in which some ticks have another
     /// current, A, and a mark if `marked`.
-    fn learnt(other: f32, marked: bool) -> rig_shared::estimation::OneLinkEstimator<f32> {
+    fn moved(other: f32, marked: bool, mode: Mode) -> State {
         let (config, settings) = one_link();
         let mut state = State::new(&config, settings).unwrap();
-        state.mode = Mode::Running;
+        state.mode = mode;
         for k in 0..40_000_u32 {
             state.tick = u64::from(k);
             let t = 1e-4 * k as f32;
@@ -131,8 +150,37 @@ mod tests {
             };
             accumulate(&config, &mut state, &tick);
         }
-        assert_ne!(state.estimator.report().value, [0.0; PARAMETER_COUNT]);
-        state.estimator
+        state
+    }
+
+    fn learnt(other: f32, marked: bool) -> rig_shared::estimation::OneLinkEstimator<f32> {
+        let estimator = moved(other, marked, Mode::Running).estimator;
+        assert_ne!(estimator.report().value, [0.0; PARAMETER_COUNT]);
+        estimator
+    }
+
+    /// Each window counts once. Windows with a mark are left out with those in which the filter starts anew, and all are
+    /// while the bridge is off.
+    #[test]
+    fn every_window_is_counted_by_what_became_of_it() {
+        let windows = (40_000 - 5) / 10;
+        let counts = |mut state: State| {
+            let (rows, learning) = state.rows.report();
+            let sum = rows.used + rows.masked + rows.uninformative;
+            assert_eq!(sum, windows);
+            (rows, learning)
+        };
+        let (sound, learning) = counts(moved(0.0, false, Mode::Running));
+        assert_eq!(learning, Learning::Active);
+        let (marked, _) = counts(moved(0.0, true, Mode::Running));
+        // Marked ticks come forty times, and the filter has a memory of 27 windows.
+        assert!(
+            marked.masked > sound.masked + 20 * 40,
+            "{sound:?} {marked:?}"
+        );
+        let (off, learning) = counts(moved(0.0, false, Mode::Disarmed));
+        assert_eq!(learning, Learning::BridgeOff);
+        assert_eq!(off.masked, windows);
     }
 
     /// What the current of a marked tick is, makes no difference to the estimator in any bit. Without the mark it does.

@@ -227,7 +227,17 @@ function viewChanged() {
   $("cursors").hidden = view.cursors[0] == null && view.cursors[1] == null;
 }
 
+// Which rows the estimator has used, and why it learns nothing.
+function learning() {
+  const e = estimates[estimates.length - 1];
+  if (!e) { $("learning").textContent = ""; return; }
+  const [used, masked, uninformative, state] = e.slice(-4), all = used + masked + uninformative;
+  $("learning").textContent = (state ? "Nothing is learnt now: " + hello.learning[state] + ". " : "The estimator learns. ") +
+    used + " of " + all + " rows used; " + masked + " left out, because the model does not describe them; " + uninformative + " showed nothing new.";
+}
+
 function readings() {
+  learning();
   if (!ring || !ring.count) return;
   const at = view.hover != null ? view.hover : view.end != null ? view.to : Infinity, k = ring.nearest(at);
   $("place").textContent = (view.hover != null ? "at " : "t = ") + fixed(ring.at(0, k), 3) + " s";

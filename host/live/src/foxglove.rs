@@ -219,6 +219,10 @@ fn field_name(name: &str) -> String {
     name.to_ascii_lowercase()
 }
 
+/// Names of what an estimate says of its rows: counts since the estimator's last restart, and the number of
+/// [`Learning`](rig_shared::estimation::Learning).
+const LEARNING_FIELDS: [&str; 4] = ["rows_used", "rows_masked", "rows_uninformative", "learning"];
+
 /// Returns the names of an estimate's values, in the order of
 /// [`EstimateValues`](super::packet::EstimateValues).
 pub(crate) fn estimate_fields() -> Vec<String> {
@@ -229,5 +233,6 @@ pub(crate) fn estimate_fields() -> Vec<String> {
         .chain(each(""))
         .chain(each("_std"))
         .chain(each("_trusted"))
+        .chain(LEARNING_FIELDS.map(field_name))
         .collect()
 }

@@ -2,7 +2,8 @@
 //!
 //! A binary message of the page: kind (`u32`, 1 samples, 2 estimate), count (`u32`), number of the first sample
 //! (`f64`), then columns of `count` `f64` each; little-endian. Samples have the columns of [`COLUMNS`]. An estimate is
-//! one column: time, residual RMS, values, standard deviations, and 1 or 0 for trusted or not.
+//! one column: time, residual RMS, values, standard deviations, 1 or 0 for trusted or not, rows (used, masked,
+//! uninformative), and the number of [`Learning`](rig_shared::estimation::Learning).
 
 use axum::body::Bytes;
 use rig_link::{COLUMNS, Row};
@@ -10,7 +11,7 @@ use rig_shared::link::PARAMETER_COUNT;
 use rig_shared::wire::message::Estimate;
 
 /// Number of values of an estimate.
-pub(crate) const ESTIMATE_VALUES: usize = 2 + 3 * PARAMETER_COUNT;
+pub(crate) const ESTIMATE_VALUES: usize = 2 + 3 * PARAMETER_COUNT + 4;
 
 /// One message to every client, encoded once.
 #[derive(Clone, Debug)]
@@ -28,7 +29,7 @@ pub(crate) struct Samples {
     pub bytes: Bytes,
 }
 
-/// An on-line estimate: time (s), residual RMS (N·m), values, standard deviations, trusted.
+/// An on-line estimate: time (s), residual RMS (N·m), values, standard deviations, trusted, rows, learning.
 #[derive(Clone, Debug)]
 pub(crate) struct EstimateValues {
     pub values: [f64; ESTIMATE_VALUES],
@@ -53,6 +54,13 @@ impl Packet {
     pub(crate) fn estimate(estimate: &Estimate, control_rate: f64) -> Self {
         let mut values = [0.0; ESTIMATE_VALUES];
         let trusted = estimate.trusted.map(|yes| f64::from(u8::from(yes)));
+        let rows = estimate.rows;
+        let learning = [
+            rows.used,
+            rows.masked,
+            rows.uninformative,
+            estimate.learning as u32,
+        ];
         let all = [
             estimate.tick as f64 / control_rate,
             estimate.residual_rms.into(),
@@ -60,7 +68,8 @@ impl Packet {
         .into_iter()
         .chain(estimate.value.map(f64::from))
         .chain(estimate.std.map(f64::from))
-        .chain(trusted);
+        .chain(trusted)
+        .chain(learning.map(f64::from));
         for (place, value) in values.iter_mut().zip(all) {
             *place = value;
         }

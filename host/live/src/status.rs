@@ -1,6 +1,7 @@
 //! The state of the rig as the page shows it: always sent whole, so that a lost message is healed by the next.
 
-use rig_link::{COLUMNS, UNITS};
+use rig_link::{COLUMNS, UNITS, describe_learning};
+use rig_shared::estimation::Learning;
 use rig_shared::link::PARAMETER_NAMES;
 use rig_shared::safety::{Limit, Mode};
 use serde::Serialize;
@@ -27,6 +28,8 @@ pub(crate) struct Hello {
     pub limits: Vec<(u8, &'static str)>,
     pub parameters: [&'static str; PARAMETER_NAMES.len()],
     pub parameter_units: [&'static str; PARAMETER_NAMES.len()],
+    /// Why the estimator learns nothing, by the number of [`Learning`].
+    pub learning: [&'static str; Learning::ALL.len()],
     /// The parameters of the description that was sent to the rig.
     pub described: Option<[f32; PARAMETER_NAMES.len()]>,
 }
@@ -54,6 +57,7 @@ impl Hello {
             limits: (Limit::ALL.map(|limit| (limit as u8, limit.name()))).to_vec(),
             parameters: PARAMETER_NAMES,
             parameter_units: PARAMETER_UNITS,
+            learning: Learning::ALL.map(describe_learning),
             described: None,
         }
     }

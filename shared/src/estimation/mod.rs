@@ -5,6 +5,7 @@ pub mod least_squares;
 pub mod one_link;
 pub mod recursive;
 mod report;
+mod rows;
 mod settings;
 pub mod ud;
 pub mod uncertainty;
@@ -16,4 +17,5 @@ mod tests;
 
 pub use one_link::OneLinkEstimator;
 pub use report::{Report, Update};
+pub use rows::{Learning, RowCounter, RowCounts};
 pub use settings::{EstimatorKind, EstimatorSettings, SettingsFault};

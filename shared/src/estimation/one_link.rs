@@ -104,7 +104,11 @@ pub fn step<T: Real<Mask = bool>>(
     }
     let filtered = filtered::step(&config.filter, &mut state.filter, q, qd, tau);
     if !filtered.valid {
-        return Update::Masked;
+        return if filtered.fast {
+            Update::Masked
+        } else {
+            Update::Slow
+        };
     }
     recursive::update(
         &config.estimator,

@@ -7,6 +7,8 @@ pub enum Update {
     Used,
     /// The row carried too little information for its noise: nothing was changed.
     Uninformative,
+    /// Slower than the slip velocity: the Coulomb column is not valid.
+    Slow,
     /// Too soon after a reversal, standstill or the start: the Coulomb column is not valid yet.
     Masked,
     /// Not finite, or beyond the range of any rig: nothing was changed.

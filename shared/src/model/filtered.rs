@@ -126,6 +126,8 @@ pub struct Filtered<T: Real> {
     pub row: Row<T>,
     /// Torque through the same filter, N·m.
     pub torque: T,
+    /// True if the speed is above the slip velocity in this sample.
+    pub fast: T::Mask,
     /// True if the Coulomb column is valid and the filter's start is forgotten.
     pub valid: T::Mask,
 }
@@ -177,6 +179,7 @@ pub fn step<T: Real>(config: &Config<T>, state: &mut State<T>, q: T, qd: T, tau:
             T::ONE,
         ],
         torque: state.torque.step(config, tau),
+        fast,
         valid: config.memory.lt(state.steady),
     }
 }

@@ -16,7 +16,7 @@ use super::message::*;
 use super::{MAX_FRAME, MessageDecoder, encode};
 use crate::control::{ControlKind, Gains};
 use crate::effects::{Effect, Kind};
-use crate::estimation::{EstimatorKind, EstimatorSettings};
+use crate::estimation::{EstimatorKind, EstimatorSettings, Learning, RowCounts};
 use crate::friction::Friction;
 use crate::link::LinkParameters;
 use crate::precompensation::PrecompensationSettings;
@@ -212,9 +212,15 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 value: [0.12, 2.9, -0.1, 0.3, 0.4, 0.01],
                 std: [0.001, 0.02, 0.02, 0.003, 0.004, 0.0005],
                 trusted: [true, true, false, true, false, true],
-                residual_rms: 0.05
+                residual_rms: 0.05,
+                rows: RowCounts {
+                    used: 1500,
+                    masked: 300,
+                    uninformative: 7
+                },
+                learning: Learning::TooSlow
             }),
-            "3603a01f8fc2f53d9a993940cdccccbd9a99993ecdcccc3e0ad7233c6f12833a0ad7a33c0ad7a33ca69b443b6f12833b6f12033a010102010a01cdcc4c3d0d371fd600"
+            "3603a01f8fc2f53d9a993940cdccccbd9a99993ecdcccc3e0ad7233c6f12833a0ad7a33c0ad7a33ca69b443b6f12833b6f12033a010102011001cdcc4c3ddc0bac0207033e5b721e00"
         ),
         (
             "Fault",

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::compensation::EFFECTS;
 use crate::control::{ControlKind, Gains};
 use crate::effects::{Effect, Kind};
-use crate::estimation::EstimatorSettings;
+use crate::estimation::{EstimatorSettings, Learning, RowCounts};
 use crate::friction::Friction;
 use crate::link::LinkParameters;
 use crate::precompensation::PrecompensationSettings;
@@ -322,6 +322,10 @@ pub struct Estimate {
     pub trusted: [bool; PARAMETERS],
     /// RMS of the torque residual, N·m.
     pub residual_rms: f32,
+    /// Rows since the estimator's last restart.
+    pub rows: RowCounts,
+    /// Whether the estimator has learnt since the last report, and otherwise why not.
+    pub learning: Learning,
 }
 
 /// Part of a fault snapshot.

@@ -10,7 +10,7 @@ use crate::trajectory::{AMPLITUDES, HARMONICS, LEVELS, SPEEDS};
 ///
 /// Raise it if a frame or an exchange changes its meaning. A change of a type alone need not raise it, because
 /// [`schema`] changes by itself. By convention it is raised too if a released rig would misunderstand.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// Fingerprint of every message type: names and types of all fields and variants, and all capacities.
 ///

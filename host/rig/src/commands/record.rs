@@ -20,7 +20,7 @@ use rig_excite::{JointTrajectory, TrajectoryFile};
 use rig_link::experiment::{Experiment, run as run_experiment};
 use rig_link::serial::DEFAULT_BAUD;
 use rig_link::{
-    COLUMNS, Converter, EmulatedPort, Event, LossReport, Port, SerialLine, Session,
+    COLUMNS, Converter, EmulatedPort, Event, LearningLog, LossReport, Port, SerialLine, Session,
     SessionSettings, UNITS, describe_fault,
 };
 use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
@@ -348,6 +348,7 @@ fn record<P: Port>(
                 ending.mode = samples.last().map_or(ending.mode, |sample| sample.mode);
                 progress.at(ending.done);
             }
+            Event::Estimate(estimate) => ending.learning.add(estimate),
             Event::Fault(record) => ending.fault = Some(*record),
             _ => {}
         }
@@ -376,6 +377,9 @@ fn record<P: Port>(
     if let Some(sentence) = ending.unsettled_sentence() {
         ui.warn(&sentence);
     }
+    if let Some(sentence) = ending.learning.sentence() {
+        ui.note(&sentence);
+    }
     ending.judge(out, more, f64::from(greeting.control_rate_hz))?;
     Ok(losses)
 }
@@ -388,6 +392,7 @@ struct Ending {
     done: u64,
     /// Samples with a current that was read before its amplifier had settled.
     unsettled: u64,
+    learning: LearningLog,
 }
 
 impl Default for Ending {
@@ -397,6 +402,7 @@ impl Default for Ending {
             mode: Mode::Disarmed,
             done: 0,
             unsettled: 0,
+            learning: LearningLog::default(),
         }
     }
 }

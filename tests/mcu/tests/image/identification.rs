@@ -13,6 +13,7 @@ use rig_link::experiment::Experiment;
 use rig_mcu::board::BoardFaults;
 use rig_mcu::time::from_seconds;
 use rig_shared::effects::{Effect, Kind};
+use rig_shared::estimation::{Learning, RowCounts};
 use rig_shared::friction::Friction;
 use rig_shared::link::{LinkParameters, PARAMETER_NAMES};
 use rig_shared::safety::Mode;
@@ -355,4 +356,68 @@ fn the_ripple_of_the_current_leaves_its_mean_alone() {
     );
     // Noise alone makes some 0.1 µs of it.
     assert!(spread.sqrt() > 4e3 && delay.abs() < 0.4e-6, "{delay} s");
+}
+
+/// Rows of two reports, and what they say between.
+fn grown(before: &Estimate, after: &Estimate) -> RowCounts {
+    RowCounts {
+        used: after.rows.used - before.rows.used,
+        masked: after.rows.masked - before.rows.masked,
+        uninformative: after.rows.uninformative - before.rows.uninformative,
+    }
+}
+
+/// Every window of the estimator counts once. While the rig creeps below the slip velocity of 0.2 rad/s it says so, with the
+/// bridge off it says that, and in an excitation it learns.
+#[test]
+fn the_estimate_says_what_it_has_used_and_why_it_learns_nothing() {
+    let mut line = bench(61);
+    let estimates = |line: &mut BoardSession, motion| driven(line, vec![], motion, 0.3).estimates;
+    let creep = SlowReversals::new(0.2, 0.1, &[0.05], 2).unwrap();
+    let slow = estimates(&mut line, Trajectory::SlowReversals(creep));
+    let (config, _) = nameplate::one_link();
+    for pair in slow.windows(2) {
+        let RowCounts {
+            used,
+            masked,
+            uninformative,
+        } = grown(&pair[0], &pair[1]);
+        let ticks = (pair[1].tick - pair[0].tick) as u32;
+        let windows = ticks / u32::from(config.rates.estimator_decimation);
+        assert_eq!(used + masked + uninformative, windows, "{pair:?}");
+        assert_eq!(used == 0, pair[1].learning != Learning::Active, "{pair:?}");
+    }
+    let said = |list: &[Estimate], learning| list.iter().filter(|e| e.learning == learning).count();
+    let creeping = said(&slow, Learning::TooSlow);
+    println!(
+        "{creeping} of {} reports say that the rig creeps",
+        slow.len()
+    );
+    // At this speed friction sticks and slips, and for moments the joint is faster than 0.2 rad/s.
+    assert!(
+        creeping > 2 * slow.len() / 3,
+        "{creeping} of {}",
+        slow.len()
+    );
+    let RowCounts {
+        used,
+        masked,
+        uninformative,
+    } = grown(&slow[0], slow.last().unwrap());
+    println!(
+        "creeping: {used} of {} rows used",
+        used + masked + uninformative
+    );
+    assert!(20 * used < used + masked + uninformative);
+    wait(&mut line, 0.5);
+    let off = crate::awaited(&mut line, |report| match report {
+        rig_shared::wire::message::Report::Estimate(estimate) => Some(*estimate),
+        _ => None,
+    });
+    assert_eq!(off.learning, Learning::BridgeOff);
+    let fast = estimates(&mut line, excitation(61, 5, 1));
+    let all = grown(&fast[0], fast.last().unwrap());
+    println!("excitation: {all:?}");
+    assert!(said(&fast, Learning::Active) > fast.len() / 2);
+    assert!(all.used > all.masked + all.uninformative, "{all:?}");
 }
