@@ -2,7 +2,7 @@
 
 use rig_shared::safety::{FaultRecord, SnapshotSample};
 use rig_shared::wire::message::{
-    Acknowledge, Crash, Estimate, Health, ResetCause, SettingsOrigin, StateSample,
+    Acknowledge, Crash, Estimate, Health, ResetCause, SettingsOrigin, StateSample, StopSwitchState,
 };
 
 /// One event to report to the host.
@@ -49,6 +49,8 @@ pub struct BoardMeasurement {
     pub line_errors: u32,
     /// As [`Health::dropped`].
     pub dropped: u32,
+    /// As [`Health::stop_switch`].
+    pub stop_switch: StopSwitchState,
 }
 
 /// What the board found at its start.
@@ -82,6 +84,7 @@ impl BoardStart {
             bad_requests: measured.bad_requests,
             line_errors: measured.line_errors,
             dropped: measured.dropped,
+            stop_switch: measured.stop_switch,
             crash: self.crash,
         }
     }

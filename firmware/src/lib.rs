@@ -27,6 +27,7 @@ pub mod session;
 pub mod settings_storage;
 pub mod state;
 pub mod step;
+mod stop_switch;
 pub mod tick_session;
 pub mod urgent_request;
 pub mod validation;

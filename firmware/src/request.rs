@@ -158,6 +158,9 @@ fn arm(config: &Config, state: &mut State) -> Result<(), Refusal> {
             if let Some(part) = state.failed_test {
                 return Err(Refusal::SelfTestFailed(part));
             }
+            if !(state.stop_switch).has_settled(state.tick, state.derived.period) {
+                return Err(Refusal::StopSwitchOpen);
+            }
             let idle = state.mean_current(IDLE_TICKS);
             at_most(Bounded::IdleCurrent, idle.abs(), config.largest_offset)?;
             validation::arming(&state.settings.limits, state.position, state.velocity)?;

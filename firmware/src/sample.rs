@@ -37,6 +37,8 @@ pub struct Sample {
     pub encoder_wrong: Option<i32>,
     /// One of the encoder's wires is undriven.
     pub encoder_open: bool,
+    /// The stop switch is open, or its wire is broken. Never true if no switch is fitted.
+    pub stop_switch_open: bool,
     /// Remaining bytes if the stack is near its end.
     pub stack_left: Option<u32>,
 }

@@ -13,6 +13,7 @@ use crate::config::{Config, Settings};
 use crate::derived::Derived;
 use crate::motor_brake::MotorBrake;
 use crate::reference::Braking;
+use crate::stop_switch::StopSwitch;
 use crate::window::Window;
 
 /// Control ticks that the fault snapshot keeps.
@@ -101,6 +102,7 @@ pub struct State {
     pub(crate) run: Run,
     /// Present if the motor brakes after a fault.
     pub(crate) motor_brake: Option<MotorBrake>,
+    pub(crate) stop_switch: StopSwitch,
     /// Part of the protection that failed the self-test at the start: the rig is not armed.
     pub(crate) failed_test: Option<SelfTest>,
 }
@@ -231,6 +233,7 @@ impl State {
             marks: LimitSet::default(),
             run: Run::default(),
             motor_brake: None,
+            stop_switch: StopSwitch::default(),
             failed_test: None,
         }
     }

@@ -49,13 +49,17 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         &readings,
     )
     .or_else(|| board_fault(&sample));
-    state.fault_cause_active = fault.is_some();
+    state.fault_cause_active = fault.is_some() || sample.stop_switch_open;
     let fault = fault
         .or_else(|| {
             let calibrating = state.mode == Mode::Calibrating;
             calibrating.then(|| calibrate(config, state, sample.current, readings.temperature))?
         })
-        .or_else(|| check_host(config, state));
+        .or_else(|| check_host(config, state))
+        .or_else(|| {
+            let stops = sample.stop_switch_open || state.stop_switch.stopping;
+            stops.then(|| check_stop_switch(state, sample.stop_switch_open))?
+        });
     if let Some((fault, value)) = fault {
         output.fault = latch_fault(state, fault, value);
     }
@@ -187,6 +191,24 @@ fn check_host(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
     }
     (silent > silent_limit + u64::from(config.host_lost_ticks))
         .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
+}
+
+/// Ends the motion of a rig whose stop switch is open, or was opened during this motion: first by a controlled stop, then
+/// by the fault. Not inlined because it is rare.
+#[inline(never)]
+fn check_stop_switch(state: &mut State, is_open: bool) -> Option<(Fault, f32)> {
+    if is_open {
+        state.stop_switch.closed_since = state.tick + 1;
+    }
+    state.stop_switch.stopping = matches!(state.mode, Mode::Running | Mode::Stopping);
+    match state.mode {
+        Mode::Running => {
+            brake(state);
+            None
+        }
+        Mode::Holding => Some((Fault::StopSwitch, 0.0)),
+        Mode::Stopping | Mode::Calibrating | Mode::Disarmed | Mode::Fault => None,
+    }
 }
 
 /// Returns the duty cycle while the motor brakes, from its current, A, the supply, V, and the joint's velocity, rad/s. Ends
@@ -460,6 +482,51 @@ mod tests {
             fault = fault.or(output.fault);
         }
         assert_eq!(fault.map(|record| record.fault), Some(Fault::OverCurrent));
+    }
+
+    /// One open reading begins the controlled stop in its own tick, from the present speed of the reference. The switch
+    /// closes again in the next tick, and the fault follows all the same once the reference rests.
+    #[test]
+    fn one_open_reading_acts_in_its_own_tick() {
+        let (mut config, settings) = one_link();
+        // The motor of these samples stands still whatever its voltage.
+        config.monitor.voltage.floor = f32::INFINITY;
+        let mut state = State::new(&config, settings).unwrap();
+        // A code that changes: the brake ends if the converter may be stuck.
+        let sample = |tick: u64, stop_switch_open| Sample {
+            current: AdcCode(2048 + (tick % 3) as u16),
+            supply: AdcCode((24.0 / config.scaling.supply_per_code) as u16),
+            temperature: AdcCode(900),
+            stop_switch_open,
+            ..Sample::default()
+        };
+        while state.mode == Mode::Calibrating {
+            let tick = state.tick;
+            step(&config, &mut state, sample(tick, false));
+        }
+        state.mode = Mode::Running;
+        state.reference = Reference {
+            velocity: 1.5,
+            ..Reference::default()
+        };
+        let begin = state.tick;
+        step(&config, &mut state, sample(begin, true));
+        assert_eq!(state.mode, Mode::Stopping);
+        let deceleration = state.settings().limits.acceleration;
+        let change = deceleration * state.derived.period;
+        assert!((state.reference.velocity - (1.5 - change)).abs() < 1e-6);
+        assert_eq!(state.reference.acceleration.round(), -deceleration);
+        let mut fault = None;
+        while fault.is_none() {
+            let tick = state.tick;
+            fault = step(&config, &mut state, sample(tick, false)).fault;
+            assert!(state.tick < begin + 2000);
+        }
+        let record = fault.unwrap();
+        assert_eq!(record.fault, Fault::StopSwitch);
+        // v/a = 25 ms.
+        assert!((250..=253).contains(&(record.tick - begin)), "{record:?}");
+        assert!(state.brakes() && state.mode == Mode::Fault);
     }
 
     /// The samples of a tick follow the last edge of the pulse that acted during the tick before. Its duty decides, in both

@@ -379,6 +379,29 @@ fn a_silent_host_brings_a_controlled_stop_and_then_the_fault() {
 }
 
 #[test]
+fn an_open_stop_switch_brings_a_controlled_stop_and_then_the_fault() {
+    let mut line = moving(9);
+    inject(&mut line, |f| f.stop_switch_open = true);
+    line.port_mut().device_mut().tick();
+    line.port_mut().device_mut().tick();
+    assert_eq!(mode(&line), Mode::Stopping);
+    wait(&mut line, 0.3);
+    assert_eq!(latched(&line), Some(Fault::StopSwitch));
+    assert!(line.port().device().state().brakes());
+    assert_eq!(
+        refused(&mut line, RequestBody::ClearFault),
+        Refusal::CauseActing
+    );
+    inject(&mut line, |f| f.stop_switch_open = false);
+    wait(&mut line, 0.01);
+    line.request(RequestBody::ClearFault).unwrap();
+    assert_eq!(
+        refused(&mut line, RequestBody::Arm),
+        Refusal::StopSwitchOpen
+    );
+}
+
+#[test]
 fn what_cannot_be_used_is_refused_and_changes_nothing() {
     let (mut line, plant) = bench(7);
     let good = nameplate(&plant).settings;

@@ -4,9 +4,10 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_stm32::pac::RCC;
 use rig_firmware::event::BoardMeasurement;
-use rig_shared::wire::message::ResetCause;
+use rig_shared::wire::message::{ResetCause, StopSwitchState};
 
 use super::clock;
+use super::pins::StopInput;
 use super::stack;
 
 /// Damaged requests; counted by the command task.
@@ -39,8 +40,8 @@ impl HealthMonitor {
     pub(crate) fn record_tick(
         &mut self,
         cycles: u32,
-        tick: u64,
-        dropped: u32,
+        (tick, dropped): (u64, u32),
+        stop_switch: &StopInput,
     ) -> Option<BoardMeasurement> {
         self.ticks += 1;
         // Of a second: a tick is shorter than its period, so the sum is far below 2³².
@@ -58,6 +59,11 @@ impl HealthMonitor {
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
             line_errors: LINE_ERRORS.load(Ordering::Relaxed),
             dropped,
+            stop_switch: match (stop_switch.is_fitted(), stop_switch.is_open()) {
+                (false, _) => StopSwitchState::NotFitted,
+                (true, false) => StopSwitchState::Closed,
+                (true, true) => StopSwitchState::Open,
+            },
         };
         *self = Self::new(self.report_ticks);
         Some(measured)

@@ -5,9 +5,11 @@ use embassy_stm32::pac::gpio::vals::{Idr, Pupdr};
 use embassy_stm32::pac::{GPIOA, GPIOB};
 use embassy_stm32::peripherals::{
     DMA1_CH1, DMA1_CH2, IWDG, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB0, PB5, PB12,
-    PC0, PC1, PC2,
+    PB14, PB15, PC0, PC1, PC2,
 };
 use embassy_stm32::{Peri, Peripherals};
+
+use super::clock::CORE_HZ;
 
 /// TIM1 and its break input on PA8, PA9 and PB12 (STM32G474 data sheet DS12288, "Alternate function").
 const AF_TIM1: u8 = 6;
@@ -49,6 +51,7 @@ pub(crate) struct Pins {
     pub(crate) bridge: BridgePins,
     pub(crate) encoder: EncoderPins,
     pub(crate) analog: AnalogPins,
+    pub(crate) stop: StopPins,
     pub(crate) link: LinkPins,
     pub(crate) led: Output<'static>,
     pub(crate) watchdog: Peri<'static, IWDG>,
@@ -59,6 +62,54 @@ pub(crate) struct EncoderPins {
     a: Peri<'static, PA0>,
     b: Peri<'static, PA1>,
     index: Peri<'static, PA15>,
+}
+
+/// The stop switch, and the strap that says that one is fitted; both against ground.
+pub(crate) struct StopPins {
+    switch: Peri<'static, PB14>,
+    strap: Peri<'static, PB15>,
+}
+
+/// Time in which an open line is pulled high, µs: 55 kΩ (DS12288, R_PU at most) and 10 nF, nine time constants.
+const STOP_SETTLING_US: u32 = 5000;
+/// The switch's pin, PB14, in GPIOB.
+const STOP_PIN: u32 = 14;
+
+impl StopPins {
+    /// Sets both pins up, and finds out whether a switch is fitted: the strap says so, or the switch is closed now. Waits
+    /// 5 ms.
+    pub(crate) fn connect(self) -> StopInput {
+        let [switch, strap] = [Flex::new(self.switch), Flex::new(self.strap)].map(|mut pin| {
+            pin.set_as_input(Pull::Up);
+            pin
+        });
+        cortex_m::asm::delay(STOP_SETTLING_US * (CORE_HZ / 1_000_000));
+        let fitted = strap.is_low() || switch.is_low();
+        // A dropped `Flex` disconnects its pin.
+        core::mem::forget((switch, strap));
+        StopInput {
+            open: u32::from(fitted) << STOP_PIN,
+        }
+    }
+}
+
+/// The input of the stop switch.
+pub(crate) struct StopInput {
+    /// Bit of its pin in GPIOB, which is high if the switch is open; 0 if no switch is fitted.
+    open: u32,
+}
+
+impl StopInput {
+    /// Returns true if a fitted switch is open. One reading, the same cycles whether one is fitted or not.
+    #[inline(always)]
+    pub(crate) fn is_open(&self) -> bool {
+        GPIOB.idr().read().0 & self.open != 0
+    }
+
+    /// Returns true if a switch is fitted.
+    pub(crate) fn is_fitted(&self) -> bool {
+        self.open != 0
+    }
 }
 
 /// Current, supply, temperature.
@@ -93,6 +144,10 @@ impl Pins {
                 current_again: p.PB0,
                 supply: p.PC0,
                 temperature: p.PC2,
+            },
+            stop: StopPins {
+                switch: p.PB14,
+                strap: p.PB15,
             },
             link: LinkPins {
                 uart: p.LPUART1,

@@ -105,6 +105,7 @@ pub(crate) fn run() -> ! {
         converter,
         encoder,
         wire_check: WireCheck::new(),
+        stop_input: pins.stop.connect(),
         entered: 0,
         next_waiting: false,
         health_monitor: HealthMonitor::new(config.rates.control_hz),

@@ -23,6 +23,7 @@ use super::cycles;
 use super::encoder::EncoderTimer;
 use super::health::HealthMonitor;
 use super::heat;
+use super::pins::StopInput;
 use super::pwm::{Break, Bridge};
 use super::queue::{Numbered, QueueReceiver, QueueSender, URGENT_WAITS};
 use super::return_barrier::finish_stores;
@@ -54,6 +55,7 @@ pub(crate) struct Tick {
     pub(crate) converter: Converter,
     pub(crate) encoder: EncoderTimer,
     pub(crate) wire_check: WireCheck,
+    pub(crate) stop_input: StopInput,
     pub(crate) entered: u32,
     pub(crate) next_waiting: bool,
     pub(crate) health_monitor: HealthMonitor,
@@ -90,6 +92,7 @@ impl Tick {
             encoder_wrong: motion.error,
             // Not in the tick of the estimator's update, an even one with a high load.
             encoder_open: self.wire_check.check(self.state.tick & 1 != 0),
+            stop_switch_open: self.stop_input.is_open(),
             stack_left: stack::near_end(self.state.tick),
         };
         let output = step(self.config, self.state, sample);
@@ -100,8 +103,9 @@ impl Tick {
         self.serve();
         check_in(Task::Tick);
         let cycles = cycles::now().wrapping_sub(entered);
-        let (tick, dropped) = (self.state.tick, self.tick_session.dropped_windows());
-        if let Some(measured) = self.health_monitor.record_tick(cycles, tick, dropped) {
+        let counts = (self.state.tick, self.tick_session.dropped_windows());
+        let measured = (self.health_monitor).record_tick(cycles, counts, &self.stop_input);
+        if let Some(measured) = measured {
             self.events.push(Event::Health(measured));
         }
         self.next_waiting = self.converter.is_waiting();

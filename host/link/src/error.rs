@@ -166,6 +166,9 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
         Refusal::SelfTestFailed(SelfTest::LowerComparator) => {
             "the self-test at the start found that negative over-current would not switch the outputs off; check the wire of the current sense at PB0, then reset the board"
         }
+        Refusal::StopSwitchOpen => {
+            "the stop switch is open or was open a moment ago, or its wire is broken; close it and try again"
+        }
         Refusal::Overtaken => "a disarm or stop that was sent later came first",
         Refusal::NotCompensable(kind) => {
             let about = kind.about();

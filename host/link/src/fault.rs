@@ -65,6 +65,9 @@ fn happened(fault: Fault, value: f64) -> String {
         Fault::EncoderSignal => {
             format!("The index pulse of the encoder came {number} counts from where it belongs")
         }
+        Fault::StopSwitch => {
+            "The stop switch was opened, or its wire is broken; the motion was stopped".to_owned()
+        }
         Fault::Stack => {
             format!(
                 "The memory for the program's stack was nearly used up: {number} bytes were left"
@@ -107,6 +110,9 @@ fn remedy(fault: Fault) -> &'static str {
         Fault::Overload => {
             "Let the motor cool to half of its rating. Then run a slower or smaller motion, or free the link if it was blocked."
         }
+        Fault::StopSwitch => {
+            "Close the switch and clear the fault. If nobody opened it, check its wire and the strap."
+        }
         Fault::Deadline | Fault::Stack => {
             "This is an error of the firmware: please report it with the control ticks around the fault."
         }
@@ -123,7 +129,7 @@ fn remedy(fault: Fault) -> &'static str {
 mod tests {
     use super::*;
 
-    const ALL: [(Fault, &str); 15] = [
+    const ALL: [(Fault, &str); 16] = [
         (Fault::Driver, ""),
         (Fault::OverCurrent, "1.471 A"),
         (Fault::AdcStuck, "code 1.471"),
@@ -139,6 +145,7 @@ mod tests {
         (Fault::HostSilent, "1.471 s"),
         (Fault::EncoderSignal, "1.471 counts"),
         (Fault::Stack, "1.471 bytes"),
+        (Fault::StopSwitch, ""),
     ];
 
     #[test]

@@ -19,6 +19,8 @@ pub struct Faults {
     pub supply: Option<f64>,
     /// The driver reports a fault and its outputs are off.
     pub driver: bool,
+    /// The stop switch is open.
+    pub stop_switch_open: bool,
     /// The last control tick did not finish in its period.
     pub overrun: bool,
     /// An additional body on the link. It is attached with the speed of the link.

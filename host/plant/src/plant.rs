@@ -224,6 +224,7 @@ impl Plant {
             driver_fault: faults.driver,
             comparator: false,
             late_ticks: u8::from(faults.overrun),
+            stop_switch_open: faults.stop_switch_open,
             // The plant has no board.
             encoder_wrong: None,
             encoder_open: false,

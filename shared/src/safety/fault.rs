@@ -38,6 +38,8 @@ pub enum Fault {
     EncoderSignal,
     /// The stack is nearly full; the value is the free bytes.
     Stack,
+    /// The stop switch was opened, or its wire has broken. The motion was stopped under control.
+    StopSwitch,
 }
 
 /// What the bridge does after a fault. Neither is a safety function: both need a working program.
@@ -69,7 +71,8 @@ impl Fault {
             | Self::Overload
             | Self::Deadline
             | Self::HostSilent
-            | Self::Stack => Reaction::Brake,
+            | Self::Stack
+            | Self::StopSwitch => Reaction::Brake,
         }
     }
 
@@ -91,6 +94,7 @@ impl Fault {
             Self::HostSilent => "HostSilent",
             Self::EncoderSignal => "EncoderSignal",
             Self::Stack => "Stack",
+            Self::StopSwitch => "StopSwitch",
         }
     }
 }

@@ -318,6 +318,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 bad_requests: 1,
                 line_errors: 2,
                 dropped: 8,
+                stop_switch: StopSwitchState::Closed,
                 crash: Some(Crash {
                     kind: CrashKind::ProcessorFault,
                     pc: 0x0800_1234,
@@ -329,7 +330,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                     silent: 2,
                 }),
             }),
-            "2808904e030380fd875101018827b817a09c010102080101b4a4804081828040808402808080800419726d776172652f7372632f626f6172642f6c696e6b2e72730101010602658dd7d900"
+            "2908904e030380fd875101018827b817a09c01010208010101b4a4804081828040808402808080800419726d776172652f7372632f626f6172642f6c696e6b2e72730101010602bcc1494c00"
         ),
     ]
 }

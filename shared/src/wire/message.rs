@@ -275,6 +275,8 @@ pub enum Refusal {
     },
     /// The self-test of the protection failed at the start.
     SelfTestFailed(SelfTest),
+    /// The stop switch is open, or was open a moment ago.
+    StopSwitchOpen,
 }
 
 /// Consecutive state samples, oldest first.
@@ -445,6 +447,17 @@ impl Crash {
     }
 }
 
+/// The stop switch of the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum StopSwitchState {
+    /// None is fitted, as the board found at its start.
+    NotFitted,
+    /// Closed: the rig may move.
+    Closed,
+    /// Open: the rig is stopped and not armed.
+    Open,
+}
+
 /// State of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Health {
@@ -473,6 +486,8 @@ pub struct Health {
     pub line_errors: u32,
     /// Telemetry windows dropped for lack of room since power on.
     pub dropped: u32,
+    /// The stop switch.
+    pub stop_switch: StopSwitchState,
     /// The failure of the program before the last start; `None` if there was none, or if the power was off since.
     pub crash: Option<Crash>,
 }

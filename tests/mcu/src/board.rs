@@ -139,6 +139,10 @@ pub struct Board {
     pub comparator_delay: f64,
     /// Largest error of the place at which the encoder makes an edge, counts: another one each time.
     pub edge_jitter: f64,
+    /// A closed stop switch connects PB14 to ground. Otherwise nothing drives it.
+    pub stop_switch_closed: bool,
+    /// The strap at PB15 connects it to ground.
+    pub stop_strap: bool,
     /// Chance for the jitter.
     chance: Pcg64Mcg,
 }
@@ -180,6 +184,8 @@ impl Board {
             amplifier: None,
             comparator_delay: COMPARATOR_DELAY,
             edge_jitter: 0.0,
+            stop_switch_closed: false,
+            stop_strap: false,
             chance: Pcg64Mcg::seed_from_u64(seed ^ 0x0E0D_E500),
         }
     }

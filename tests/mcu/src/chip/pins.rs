@@ -18,9 +18,19 @@ impl Chip {
         }
     }
 
-    /// Sets the pins that the board drives: the receiving line idle, the fault line.
+    /// Sets the levels of the stop switch (PB14) and its strap (PB15): ground, or the chip's own pull.
+    fn set_stop_pins(&mut self) {
+        let grounded = [self.board.stop_switch_closed, self.board.stop_strap];
+        for (pin, grounded) in [14, 15].into_iter().zip(grounded) {
+            let high = !grounded && self.gpio[1].pulls_up(pin);
+            self.gpio[1].set_outside(pin, high);
+        }
+    }
+
+    /// Sets the pins that the board drives: the receiving line idle, the fault line, the stop switch.
     pub(super) fn set_pins(&mut self) {
         self.gpio[0].set_outside(3, true);
+        self.set_stop_pins();
         let fault = self.board.fault_pin(self.work.now);
         self.gpio[1].set_outside(12, fault);
     }
@@ -42,6 +52,7 @@ impl Chip {
 
     /// Updates the pins that the board drives.
     pub(super) fn update_pins(&mut self) {
+        self.set_stop_pins();
         let high = self.board.fault_pin(self.work.now);
         if self.gpio[1].set_outside(12, high) && self.syscfg.port_of(12) == 1 {
             self.exti.edge(12, high);

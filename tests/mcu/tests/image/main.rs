@@ -17,6 +17,7 @@ mod ill;
 mod line;
 mod requests;
 mod self_test;
+mod stop_switch;
 mod storage;
 mod wires;
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use rig_shared::wire::message::{
-    Crash, CrashKind, Greeting, Health, Report, SettingsOrigin, WATCHED_PARTS,
+    Crash, CrashKind, Greeting, Health, Report, SettingsOrigin, StopSwitchState, WATCHED_PARTS,
 };
 
 use super::super::error::CommandError;
@@ -53,7 +53,8 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
          clock           {:.3} MHz, {}{}\n\
          control tick    {:.1} % of its time on average, {:.1} % at most in the last second\n\
          stack           {} bytes never used\n\
-         line            {} damaged requests, {} line errors, {} telemetry samples without room",
+         line            {} damaged requests, {} line errors, {} telemetry samples without room\n\
+         stop switch     {}",
         greeting.firmware,
         health.tick as f64 / f64::from(greeting.control_rate_hz),
         health.reset,
@@ -74,6 +75,11 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
         health.bad_requests,
         health.line_errors,
         health.dropped,
+        match health.stop_switch {
+            StopSwitchState::NotFitted => "not fitted",
+            StopSwitchState::Closed => "closed",
+            StopSwitchState::Open => "OPEN, or its wire is broken: the rig is not armed",
+        },
     ) + &health.crash.map_or(String::new(), |crash| {
         format!("\nlast failure    {}", describe_crash(&crash))
     })
