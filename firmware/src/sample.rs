@@ -1,5 +1,6 @@
 //! Interface between the control application and the board or emulated rig.
 
+use rig_shared::safety::monitor::Breaks;
 use rig_shared::units::{AdcCode, Duty, EncoderCount};
 
 /// Clock of the timer that captures the encoder's edges, Hz.
@@ -26,10 +27,8 @@ pub struct Sample {
     pub supply: AdcCode,
     /// Motor temperature, converter code.
     pub temperature: AdcCode,
-    /// The driver, or a fault inside the chip, has pulled the break input.
-    pub driver_fault: bool,
-    /// A comparator has pulled the break input: over-current.
-    pub comparator: bool,
+    /// What has switched the bridge's outputs off.
+    pub breaks: Breaks,
     /// Control ticks that were missed since the last one, or finished after the next was due.
     pub late_ticks: u8,
     /// Counts by which the encoder's index disagrees, or 0 if both channels changed at once; `None` without

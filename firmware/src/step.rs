@@ -151,8 +151,7 @@ fn convert(config: &Config, state: &mut State, sample: Sample) -> Readings {
     state.temperature_rise = temperature - state.start_temperature;
     // The checks use the sensor readings, the laws the corrected values.
     Readings {
-        driver_fault: sample.driver_fault,
-        comparator: sample.comparator,
+        breaks: sample.breaks,
         late_ticks: sample.late_ticks,
         current_code: sample.current.0,
         current_at_rail: sample.current.at_rail(),

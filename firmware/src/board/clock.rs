@@ -117,7 +117,7 @@ fn tree(crystal: bool) -> rcc::Config {
     tree.apb2_pre = APBPrescaler::DIV1;
     tree.mux.adc12sel = mux::Adcsel::SYS;
     tree.mux.lpuart1sel = mux::Uartsel::PCLK1;
-    // The watchdog starts its own oscillator.
+    // The watchdog has started its own oscillator, which no program can stop (RM0440, RCC, "LSI clock").
     tree.ls = LsConfig::off();
     tree
 }

@@ -1,6 +1,7 @@
 //! COMP3 and COMP4: over-current protection in hardware. COMP3 compares the current sense with a threshold above its
-//! middle, COMP4 with one below. Either acts on TIM1's break input without processor or clock, about 0.1 µs after the
-//! current gets there (DS12288, comparator: t_D 17 ns typical; the amplifier before it takes 1 µs and more).
+//! middle, COMP4 with one below. Either acts on TIM1's second break input without the processor, 0.75 µs later (its filter).
+//! The comparator itself acts about 0.1 µs after the current gets there (DS12288, comparator: t_D 17 ns typical; the amplifier
+//! before it takes 1 µs and more).
 //!
 //! The two channels of DAC3 give the thresholds (RM0440, COMP, "inverting input assignment": DAC3_CH1 to COMP3,
 //! DAC3_CH2 to COMP4). DAC and converter have one reference, so a threshold is a code of the converter.

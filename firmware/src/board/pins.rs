@@ -4,8 +4,8 @@ use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::pac::gpio::vals::{Idr, Pupdr};
 use embassy_stm32::pac::{GPIOA, GPIOB};
 use embassy_stm32::peripherals::{
-    DMA1_CH1, DMA1_CH2, IWDG, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB0, PB5, PB12,
-    PB14, PB15, PC0, PC1, PC2,
+    DMA1_CH1, DMA1_CH2, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB0, PB5, PB12, PB14,
+    PB15, PC0, PC1, PC2,
 };
 use embassy_stm32::{Peri, Peripherals};
 
@@ -54,7 +54,6 @@ pub(crate) struct Pins {
     pub(crate) stop: StopPins,
     pub(crate) link: LinkPins,
     pub(crate) led: Output<'static>,
-    pub(crate) watchdog: Peri<'static, IWDG>,
 }
 
 /// The encoder's channels and index.
@@ -157,7 +156,6 @@ impl Pins {
                 rx_dma: p.DMA1_CH2,
             },
             led: Output::new(led, Level::Low, Speed::Low),
-            watchdog: p.IWDG,
         }
     }
 }
@@ -184,12 +182,6 @@ pub(crate) fn pull(channel: usize, up: bool) {
 #[inline(always)]
 pub(crate) fn is_high(channel: usize) -> bool {
     GPIOA.idr().read().idr(pin(channel)) == Idr::HIGH
-}
-
-/// Returns true if the bridge holds its fault line low.
-#[inline(always)]
-pub(crate) fn is_fault_line_low() -> bool {
-    GPIOB.idr().read().idr(12) == Idr::LOW
 }
 
 /// Returns true if both inputs of the bridge, PA8 and PA9, have this level.

@@ -1,4 +1,4 @@
-//! TIM1: the two bridge inputs and the break input. TIM4, started by TIM1: the trigger of every sample.
+//! TIM1: the two bridge inputs and the break inputs, one of the bridge's fault line and one of the comparators. TIM4, started by TIM1: the trigger of every sample.
 //!
 //! Centre-aligned at 20 kHz. With d > 0 input 1 is high and input 2 low for the share d of a period; both are high for
 //! the rest (drive and brake, called slow decay). The motor current continues through the bridge, the ripple is
@@ -20,11 +20,12 @@ use embassy_stm32::pac::timer::vals::{
 use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1, TIM4};
 use rig_firmware::nameplate;
 use rig_firmware::sample::{Command, PWM_HZ};
+use rig_shared::safety::monitor::Breaks;
 use rig_shared::wire::message::SelfTest;
 
 use super::adc::SAMPLING_LEAD;
 use super::clock::CORE_HZ;
-use super::pins::{BridgePins, disable_bridge, is_fault_line_low};
+use super::pins::{BridgePins, disable_bridge};
 use super::{comparator, self_test};
 
 // A whole number of pulses between two ticks: every update is then an underflow.
@@ -40,14 +41,17 @@ const SUPPLY_LEVEL: u8 = 5;
 /// COMP3 and COMP4, counted from 0.
 const COMPARATORS: [usize; 2] = [2, 3];
 
-/// Causes that switch the outputs off without the program.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Break {
-    /// The bridge's fault line, or a fault inside the chip.
-    Driver,
-    /// Over-current.
-    Comparator,
-}
+/// TIM1_SR: the flags of the break inputs, BIF and B2IF, and that of a fault inside the chip, SBIF.
+const BIF: u32 = 1 << 7;
+const B2IF: u32 = 1 << 8;
+const SBIF: u32 = 1 << 13;
+
+/// Filter of the bridge's fault line: 32 · 8 cycles, 1.5 µs. A fault of the bridge holds the line for a millisecond or more;
+/// spikes that it couples in are shorter.
+const FAULT_FILTER: FilterValue = FilterValue::FDTS_DIV32_N8;
+/// Filter of the comparators: 16 · 8 cycles, 0.75 µs. At 24 V the current of a 0.5 mH motor grows by 0.04 A meanwhile; the
+/// edges of the amplifier after a step of the bridge are shorter (estimate for an INA240).
+const OVER_CURRENT_FILTER: FilterValue = FilterValue::FDTS_DIV16_N8;
 
 /// The bridge.
 pub(crate) struct Bridge {
@@ -110,28 +114,14 @@ impl Bridge {
             w.set_cce(0, true);
             w.set_cce(1, true);
         });
-        // The break input, active low. Its sources are the pin and the comparators, which are high at over-current
-        // (RM0440, TIM1_AF1: BKCMP3E and BKCMP4E with their polarities).
         comparator::start(thresholds);
-        timer.af1().write(|w| {
-            // Only after the self-test: the bridge sleeps, and may hold its fault line low.
-            w.set_bkine(false);
-            w.set_bkinp(Bkinp::NOT_INVERTED);
-            for comparator in COMPARATORS {
-                w.set_bkcmpe(comparator, true);
-                w.set_bkcmpp(comparator, Bkinp::INVERTED);
-            }
-        });
-        timer.bdtr().write(|w| {
-            w.set_bke(0, true);
-            w.set_bkp(0, Bkp::ACTIVE_LOW);
-            // No filter: a filtered input needs the timer's clock, which may have failed. A capacitor at the pin
-            // removes the spikes that the bridge couples in.
-            w.set_bkf(0, FilterValue::NO_FILTER);
+        set_up_breaks();
+        timer.bdtr().modify(|w| {
             w.set_aoe(false);
             w.set_ossi(Ossi::IDLE_LEVEL);
             w.set_ossr(Ossr::IDLE_LEVEL);
         });
+        enable_breaks();
         // Loads the preloaded registers.
         timer.egr().write(|w| w.set_ug(true));
         timer.sr().write_value(Default::default());
@@ -155,23 +145,27 @@ impl Bridge {
         TIM1.cr1().modify(|w| w.set_cen(true));
     }
 
-    /// Returns the cause that has switched the outputs off since the bridge was last switched on, or acts now.
+    /// Returns what has switched the outputs off since the bridge was last switched on, or acts now. Each cause has its own
+    /// flag.
     ///
     /// A bridge that sleeps or wakes may hold its fault line low, which then means nothing.
     #[inline(always)]
-    pub(crate) fn break_cause(&self) -> Option<Break> {
-        let flags = TIM1.sr().read();
-        // A fault inside the chip has its own flag, which also keeps the outputs off (RM0440, TIM1_SR.SBIF).
-        if flags.sbif() {
-            Some(Break::Driver)
-        } else if !flags.bif(0) || self.waking > 0 {
-            None
-        } else if is_fault_line_low() {
-            self.awake.then_some(Break::Driver)
-        } else {
-            // The line is up, so the bridge is not the cause: a bridge fault holds it low for a millisecond or more.
-            Some(Break::Comparator)
+    pub(crate) fn breaks(&self) -> Breaks {
+        let flags = TIM1.sr().read().0;
+        if flags & (BIF | B2IF | SBIF) == 0 {
+            return Breaks::default();
         }
+        let mut breaks = Breaks::default();
+        for (flag, cause, counts) in [
+            (BIF, Breaks::DRIVER, self.awake),
+            (B2IF, Breaks::OVER_CURRENT, true),
+            (SBIF, Breaks::CHIP, true),
+        ] {
+            if counts && flags & flag != 0 {
+                breaks = breaks.union(cause);
+            }
+        }
+        breaks
     }
 
     /// Applies a command to the outputs, effective from the next update. Switching off acts at once.
@@ -216,13 +210,48 @@ impl Bridge {
     }
 }
 
-/// Clears the flags of the break. A fault that has ended is forgotten; one that still acts sets its flag again at once.
+/// Sets up the sources of the two break inputs, before they are enabled: the bridge's fault line, active low, and the
+/// comparators, which are high at over-current (RM0440, TIM1_AF1 and TIM1_AF2). No pin is the second input's.
+///
+/// A filter needs the timer's clock ("an asynchronous operation is only guaranteed when the programmable filter is
+/// disabled", RM0440, TIM1, "Using the break function"). If the crystal stops, the chip's own oscillator replaces it, and the
+/// clock security system switches the outputs off without any filter.
+fn set_up_breaks() {
+    TIM1.af1().write(|w| {
+        // Only after the self-test: the bridge sleeps, and may hold its fault line low.
+        w.set_bkine(false);
+        w.set_bkinp(Bkinp::NOT_INVERTED);
+    });
+    TIM1.af2().write(|w| {
+        w.set_bk2ine(false);
+        for comparator in COMPARATORS {
+            w.set_bk2cmpe(comparator, true);
+            w.set_bk2cmpp(comparator, Bkinp::NOT_INVERTED);
+        }
+    });
+}
+
+/// Enables both break inputs. The second one may only be used with OSSR = OSSI = 1 (RM0440, TIM1, "Using the break
+/// function"), which must be set before; its outputs are inactive then, which is as low as their idle level.
+fn enable_breaks() {
+    TIM1.bdtr().modify(|w| {
+        w.set_bkp(0, Bkp::ACTIVE_LOW);
+        w.set_bkf(0, FAULT_FILTER);
+        w.set_bke(0, true);
+        w.set_bkp(1, Bkp::ACTIVE_HIGH);
+        w.set_bkf(1, OVER_CURRENT_FILTER);
+        w.set_bke(1, true);
+    });
+}
+
+/// Clears the flags of the breaks. A fault that has ended is forgotten; one that still acts sets its flag again at once.
 #[inline(always)]
 pub(crate) fn clear_breaks() {
     TIM1.sr().write(|w| {
         // Writing zero clears a flag, writing one keeps it (rc_w0).
         *w = embassy_stm32::pac::timer::regs::SrAdv(!0);
         w.set_bif(0, false);
+        w.set_bif(1, false);
         w.set_sbif(false);
     });
 }

@@ -2,7 +2,7 @@
 //!
 //! 1. The outputs come on and go off by command: both pins are read back.
 //! 2. For each comparator: its threshold is moved to the other side of the present current, which must switch the outputs off
-//!    without the program, and set the break's flag.
+//!    without the program, and set the flag of their break input.
 //!
 //! Not found: a current sense that floats where it happens to pass, and what fails later.
 
@@ -41,7 +41,7 @@ fn force_high(forced: bool) {
     });
 }
 
-/// Runs the self-test with TIM1 set up, its outputs idle and connected, and the comparators as its only break. Returns the
+/// Runs the self-test with TIM1 set up, its outputs idle and connected, and the comparators as the only source of a break. Returns the
 /// first part that fails.
 pub(crate) fn run(thresholds: [u16; 2]) -> Option<SelfTest> {
     force_high(true);
@@ -76,7 +76,7 @@ fn switches_off(moved: [u16; 2], thresholds: [u16; 2]) -> bool {
     let on = are_bridge_inputs(true);
     comparator::set_thresholds(moved);
     settle();
-    let off = are_bridge_inputs(false) && TIM1.sr().read().bif(0);
+    let off = are_bridge_inputs(false) && TIM1.sr().read().bif(1);
     comparator::set_thresholds(thresholds);
     settle();
     on && off

@@ -29,7 +29,7 @@ use super::storage::Storage;
 use super::tick::{EVENTS, RECEIVED, REQUESTS, Tick, URGENT};
 use super::watchdog::{Task, Watchdog, check_in};
 use super::wire_check::WireCheck;
-use super::{crash, cycles, debugger, health, heat, link, probe, stack, tick};
+use super::{crash, cycles, debugger, health, heat, link, probe, stack, tick, watchdog};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -51,9 +51,12 @@ static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
 /// Initialises the board and runs it.
 pub(crate) fn run() -> ! {
+    // Before anything that could wait without end.
+    watchdog::start();
     let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
     let crash = crash::take(reset);
+    watchdog::record_start();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
     let (peripherals, crystal) = clock::start();
     cycles::start(&mut core.DCB, &mut core.DWT);
@@ -91,7 +94,6 @@ pub(crate) fn run() -> ! {
     let Ok((sender, receiver)) = link::open(pins.link) else {
         unreachable!()
     };
-    let watchdog = Watchdog::start(pins.watchdog);
     tick::start(Tick {
         config,
         state,
@@ -134,7 +136,7 @@ pub(crate) fn run() -> ! {
     // Each task is spawned once. Its memory is reserved at compile time.
     let tasks = (
         link::telemetry(config, start, sender, probe_out, event_out),
-        indicator(watchdog, pins.led),
+        indicator(Watchdog::new(), pins.led),
         link::receive(receiver, probe_in, urgent_in, received_in),
         link::precheck_requests(config, received_out, request_in),
         storage_task(storage, settings_from_tick),

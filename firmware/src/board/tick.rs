@@ -24,7 +24,7 @@ use super::encoder::EncoderTimer;
 use super::health::HealthMonitor;
 use super::heat;
 use super::pins::StopInput;
-use super::pwm::{Break, Bridge};
+use super::pwm::Bridge;
 use super::queue::{Numbered, QueueReceiver, QueueSender, URGENT_WAITS};
 use super::return_barrier::finish_stores;
 use super::stack;
@@ -79,16 +79,14 @@ impl Tick {
         if URGENT_WAITS.load(Ordering::Relaxed) {
             self.serve_urgent();
         }
-        let break_cause = self.bridge.break_cause();
         let sample = Sample {
             encoder: motion.count,
             edge_age: Some(motion.edge_age),
             current: codes.current,
             supply: codes.supply,
             temperature: codes.temperature,
-            driver_fault: break_cause == Some(Break::Driver),
+            breaks: self.bridge.breaks(),
             late_ticks,
-            comparator: break_cause == Some(Break::Comparator),
             encoder_wrong: motion.error,
             // Not in the tick of the estimator's update, an even one with a high load.
             encoder_open: self.wire_check.check(self.state.tick & 1 != 0),

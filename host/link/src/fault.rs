@@ -2,6 +2,7 @@
 //!
 //! The table in docs/firmware.md gives more detail.
 
+use rig_shared::safety::monitor::Breaks;
 use rig_shared::safety::{Fault, FaultRecord};
 
 use rig_output::format_significant;
@@ -25,9 +26,7 @@ pub fn describe_fault(record: &FaultRecord, control_rate: f64) -> String {
 fn happened(fault: Fault, value: f64) -> String {
     let number = format_significant(value, 4);
     match fault {
-        Fault::Driver => {
-            "The motor driver reported a fault, or the chip switched its outputs off".to_owned()
-        }
+        Fault::Driver => driver(Breaks(value as u8)).to_owned(),
         Fault::OverCurrent => format!("The motor current was too high: {number} A"),
         Fault::AdcStuck => format!(
             "The current reading stayed at one end of its range or did not change: converter code {number} of 0 to 4095"
@@ -76,11 +75,28 @@ fn happened(fault: Fault, value: f64) -> String {
     }
 }
 
+/// Describes what switched the outputs off: the sum of the causes.
+fn driver(breaks: Breaks) -> &'static str {
+    let line = breaks.has_any(Breaks::DRIVER);
+    match (line, breaks.has_any(Breaks::OVER_CURRENT)) {
+        _ if breaks.has_any(Breaks::CHIP) => {
+            "The chip switched its outputs off by itself: its supply fell below 2.8 V, its clock stopped, a flash word was wrong, or its processor locked up"
+        }
+        (true, true) => {
+            "The motor driver pulled its fault line, and the comparators saw a motor current beyond their limit"
+        }
+        (true, false) => {
+            "The motor driver pulled its fault line; the comparators saw no over-current"
+        }
+        (false, _) => "The motor driver reported a fault, or the chip switched its outputs off",
+    }
+}
+
 /// Returns likely causes and their remedy, as sentences.
 fn remedy(fault: Fault) -> &'static str {
     match fault {
         Fault::Driver => {
-            "Check the motor's wires for a short circuit, the temperature of the bridge and its supply."
+            "Check the motor's wires for a short circuit, the temperature of the bridge and its supply, and the chip's own supply."
         }
         Fault::OverCurrent => {
             "Check the motor's wires for a short circuit, and resistance and inductance in the nameplate or description."
@@ -169,6 +185,23 @@ mod tests {
                 let words = sentence.split_whitespace().count();
                 assert!(words <= 32, "{words} words: {sentence}");
             }
+        }
+    }
+
+    #[test]
+    fn what_switched_the_outputs_off_is_told() {
+        let said = |value| {
+            let record = FaultRecord {
+                fault: Fault::Driver,
+                tick: 0,
+                value,
+            };
+            describe_fault(&record, 1e4)
+        };
+        assert!(said(1.0).contains("no over-current"), "{}", said(1.0));
+        assert!(said(3.0).contains("beyond their limit"), "{}", said(3.0));
+        for chip in [4.0, 7.0] {
+            assert!(said(chip).contains("The chip switched"), "{}", said(chip));
         }
     }
 

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use rig_firmware::sample::{Command, EDGE_CLOCK_HZ, Sample};
+use rig_shared::safety::monitor::Breaks;
 use rig_shared::units::AdcCode;
 
 use super::body::{Body, Load};
@@ -221,8 +222,11 @@ impl Plant {
             current: faults.current_stuck.map_or(current, AdcCode),
             supply: faults.supply_stuck.map_or(supply, AdcCode),
             temperature: faults.temperature_stuck.map_or(temperature, AdcCode),
-            driver_fault: faults.driver,
-            comparator: false,
+            breaks: if faults.driver {
+                Breaks::DRIVER
+            } else {
+                Breaks::default()
+            },
             late_ticks: u8::from(faults.overrun),
             stop_switch_open: faults.stop_switch_open,
             // The plant has no board.

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 /// A reason to end every motion ([`Fault::reaction`]). Latched: the first one stays until cleared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Fault {
-    /// The driver chip or comparator pulled the break input.
+    /// The driver pulled its fault line, or the chip switched its outputs off by itself. The value is the sum of
+    /// [`Breaks`](super::monitor::Breaks): 1 for the line, 2 if the comparators saw an over-current as well, 4 for the chip.
     Driver,
     /// Motor current beyond its hard limit; the value is in A.
     OverCurrent,

@@ -1,8 +1,8 @@
 //! The checks of every control tick.
 //!
 //! The checks use measured values only and no estimates of the controller, so that a wrong link model cannot hide a
-//! fault. Leaves out: everything that hardware must catch within a tick. Short circuits go to the timer's break input
-//! and arrive here as [`Fault::Driver`].
+//! fault. Leaves out: everything that hardware must catch within a tick. Short circuits go to the timer's break inputs
+//! and arrive here as [`Breaks`].
 
 use super::fault::Fault;
 use super::limit::Limits;
@@ -46,13 +46,35 @@ const COOLED_SHARE: f32 = 0.5;
 /// Ticks within which the noise of a live converter changes its code.
 const CODE_NOISE_TICKS: u32 = 10;
 
+/// What has switched the bridge's outputs off without the program, as bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Breaks(pub u8);
+
+impl Breaks {
+    /// The driver's fault line.
+    pub const DRIVER: Self = Self(1);
+    /// The comparators: over-current.
+    pub const OVER_CURRENT: Self = Self(2);
+    /// A fault inside the chip: lock-up, flash word, supply, clock.
+    pub const CHIP: Self = Self(4);
+
+    /// Returns the causes in either set.
+    #[must_use]
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Returns true if any of these causes has acted.
+    pub const fn has_any(self, causes: Self) -> bool {
+        self.0 & causes.0 != 0
+    }
+}
+
 /// Inputs of the checks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Readings {
-    /// Break input.
-    pub driver_fault: bool,
-    /// True if a comparator has detected over-current.
-    pub comparator: bool,
+    /// What has switched the outputs off.
+    pub breaks: Breaks,
     /// Ticks that were missed or finished late since the last one.
     pub late_ticks: u8,
     /// Converter code of the current.
@@ -231,8 +253,7 @@ pub fn step(
         || found.stuck
         || found.lost
         || found.late
-        || now.driver_fault
-        || now.comparator
+        || now.breaks != Breaks::default()
         || state.overloaded
         || has_jumped(config, now)
         || is_outside(config, limits, now);
@@ -257,11 +278,15 @@ fn first_fault(
     let persistent = &found.persistent;
     let code = f32::from(now.current_code);
     let faults = [
-        (now.driver_fault, Fault::Driver, 0.0),
+        (
+            now.breaks.has_any(Breaks::DRIVER.union(Breaks::CHIP)),
+            Fault::Driver,
+            f32::from(now.breaks.0),
+        ),
         // Before over-current: a code at the rail is no measurement, although it reads as a large current.
         (persistent.at_rail || found.stuck, Fault::AdcStuck, code),
         (
-            persistent.over_current || now.comparator,
+            persistent.over_current || now.breaks.has_any(Breaks::OVER_CURRENT),
             Fault::OverCurrent,
             now.current,
         ),

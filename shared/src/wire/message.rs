@@ -402,12 +402,13 @@ pub enum CrashKind {
 }
 
 /// Parts of the firmware that report to its watchdog, in the order of the bits of [`Crash::silent`].
-pub const WATCHED_PARTS: [&str; 5] = [
+pub const WATCHED_PARTS: [&str; 6] = [
     "the control tick",
     "the telemetry",
     "the receiver",
     "the storage",
     "the precheck of requests",
+    "the start of the program",
 ];
 
 /// Bytes of a source file's path in [`Crash::file`].

@@ -71,6 +71,8 @@ pub struct BoardFaults {
     pub comparators_dead: bool,
     /// The wire of the current sense to PB0 is open.
     pub second_sense_open: bool,
+    /// The converter never becomes ready.
+    pub converter_dead: bool,
     /// The converter's trigger does not come.
     pub trigger_lost: bool,
     /// The serial line accepts no byte.

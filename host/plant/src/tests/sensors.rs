@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use rig_shared::safety::monitor::Breaks;
 use rig_shared::units::AdcCode;
 
 use super::{OFF, Plant, PlantConfig, drive, horizontal, run, shake};
@@ -172,7 +173,7 @@ fn faults_do_what_they_say() {
     plant.faults_mut().supply = Some(9.0);
     plant.faults_mut().driver = true;
     let sample = plant.advance(drive(0.1));
-    assert!(sample.driver_fault && sample.current == AdcCode(4095));
+    assert!(sample.breaks == Breaks::DRIVER && sample.current == AdcCode(4095));
     let supply =
         f64::from(sample.supply.0) * f64::from(plant.config().sensors.scaling.supply_per_code);
     assert!((supply - 9.0).abs() < 0.1, "{supply}");

@@ -48,6 +48,10 @@ impl Chip {
             }
             Peripheral::Comp => self.comp.read(offset)?,
             Peripheral::Dac3 => self.dac.read(offset)?,
+            // ADRDY, its first bit.
+            Peripheral::Adc12 if offset == 0 && self.board.faults.converter_dead => {
+                self.adc.read(now, offset)? & !1
+            }
             Peripheral::Adc12 => self.adc.read(now, offset)?,
             Peripheral::Dwt => match offset {
                 // CTRL: four comparators, no trace; CYCCNTENA.

@@ -58,7 +58,7 @@ impl Chip {
             self.exti.edge(12, high);
         }
         if self.gpio[1].function(12) == Function::Alternate(6) {
-            self.tim[0].set_break_pin(high);
+            self.tim[0].set_break_pin(self.work.now, high);
         }
         self.compare();
         let low = self.board.faults.logic_supply;
@@ -82,7 +82,7 @@ impl Chip {
         let fourth = self.comp.compare(4, [pb0, None], self.dac.output(1));
         for (place, (number, output)) in [(3, third), (4, fourth)].into_iter().enumerate() {
             let output = self.delayed(place, output);
-            self.tim[0].set_comparator(number, output);
+            self.tim[0].set_comparator(self.work.now, number, output);
         }
     }
 

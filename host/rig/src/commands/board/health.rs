@@ -85,8 +85,14 @@ pub(super) fn describe(greeting: &Greeting, health: &Health) -> String {
     })
 }
 
+/// Bit of the start of the program among [`WATCHED_PARTS`], the last of them.
+const START: u8 = 1 << (WATCHED_PARTS.len() - 1);
+
 /// Describes a reset by the watchdog.
 fn describe_silence(silent: u8) -> String {
+    if silent & START != 0 {
+        return "the watchdog reset the chip: the start of the program did not end within 0.1 s; the converter or an oscillator did not become ready".to_owned();
+    }
     let parts: Vec<&str> = WATCHED_PARTS
         .iter()
         .enumerate()
@@ -168,6 +174,11 @@ mod tests {
             describe_crash(&silent),
             "the watchdog reset the chip: the telemetry and the precheck of requests had stopped reporting"
         );
+        let start = Crash {
+            silent: START,
+            ..silent
+        };
+        assert!(describe_crash(&start).contains("the start of the program did not end"));
         let stopped = Crash {
             silent: 0,
             ..silent

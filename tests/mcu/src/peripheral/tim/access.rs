@@ -1,11 +1,15 @@
 //! Loads and stores.
 
 use super::timer::{
-    AF1, ARPE, ARR, BDTR, BIF, CCER, CCMR1, CCMR2, CCR1, CEN, CNT, CR1, EGR, PSC, RCR, SBIF, SMCR,
+    AF1, AF2, ARPE, ARR, BDTR, BIF, CCER, CCMR1, CCMR2, CCR1, CEN, CNT, CR1, EGR, PSC, RCR, SMCR,
     SMS, SMS_TRIGGER, SR, TS, TS_ITR0, Tim, UDIS, UIF,
 };
 use crate::peripheral::{Refusal, told};
 use crate::time::Instant;
+
+/// BDTR: enable of the second break input, and the off states of the outputs.
+const BK2E: u32 = 1 << 24;
+const OSSI_OSSR: u32 = 3 << 10;
 
 impl Tim {
     /// A load.
@@ -40,9 +44,7 @@ impl Tim {
         match offset {
             SR => {
                 // Writing zeros clears flags, except bits that cannot be set and breaks that still act.
-                let acting =
-                    (u32::from(self.break_active) * BIF) | (u32::from(self.system_break) * SBIF);
-                let status = self.bank.get(SR) & (value | acting);
+                let status = self.bank.get(SR) & (value | self.acting_flags());
                 self.bank.put(SR, status);
                 return Ok(());
             }
@@ -98,16 +100,19 @@ impl Tim {
                     self.active.compare[k] = self.bank.get(offset);
                 }
             }
-            AF1 if value & 0xE0 != 0 => {
-                return told("comparators 5 to 7 at the break input are not modelled");
+            AF1 | AF2 if value & 0xE0 != 0 => {
+                return told("comparators 5 to 7 at the break inputs are not modelled");
             }
+            AF1 | AF2 => self.see_breaks(now),
             BDTR => {
-                self.see_breaks();
+                self.see_breaks(now);
                 if self.is_broken() {
                     self.cut();
                 }
-                if value & 0x0100_0000 != 0 {
-                    return told("the second break input is not modelled");
+                if value & BK2E != 0 && value & OSSI_OSSR != OSSI_OSSR {
+                    return told(
+                        "the second break input needs OSSR = OSSI = 1 (RM0440 section 28.3.17)",
+                    );
                 }
             }
             _ => {}
@@ -139,7 +144,7 @@ impl Tim {
         }
         self.flag(value & 0x1E);
         if value & 0x80 != 0 {
-            self.trip();
+            self.trip(BIF);
         }
         Ok(())
     }

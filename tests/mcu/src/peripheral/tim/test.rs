@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::timer::*;
+use crate::time::NEVER;
 
 const CLOCK: u64 = 24;
 
@@ -63,13 +64,13 @@ fn compare_flags_of_a_free_running_timer() {
 fn break_takes_the_outputs_and_holds_them() {
     let mut tim = Tim::new(1, CLOCK);
     tim.write(0, BDTR, BKE | MOE).unwrap();
-    tim.set_break_pin(true);
+    tim.set_break_pin(0, true);
     assert!(tim.main_output());
-    tim.set_break_pin(false);
+    tim.set_break_pin(0, false);
     assert!(!tim.main_output());
     tim.write(0, BDTR, BKE | MOE).unwrap();
     assert!(!tim.main_output(), "while the pin is low");
-    tim.set_break_pin(true);
+    tim.set_break_pin(0, true);
     assert!(!tim.main_output(), "not by itself");
     tim.write(0, BDTR, BKE | MOE).unwrap();
     assert!(tim.main_output());
@@ -121,20 +122,51 @@ fn a_timer_in_trigger_mode_starts_with_its_master_and_sends_its_updates() {
 fn comparators_break_by_their_own_polarity_and_only_where_they_are_let_through() {
     let mut tim = Tim::new(1, CLOCK);
     tim.write(0, BDTR, BKE | MOE).unwrap();
-    tim.set_comparator(3, true);
+    tim.set_comparator(0, 3, true);
     assert!(tim.main_output(), "not let through");
-    tim.set_comparator(3, false);
+    tim.set_comparator(0, 3, false);
     // BKCMP3E, inverted: high acts. BKCMP4E not inverted: low acts.
-    tim.set_comparator(4, true);
+    tim.set_comparator(0, 4, true);
     tim.write(0, AF1, 1 | 1 << 3 | 1 << 12 | 1 << 4).unwrap();
-    tim.set_comparator(3, true);
+    tim.set_comparator(0, 3, true);
     assert!(!tim.main_output() && tim.read(0, SR).unwrap() & BIF != 0);
-    tim.set_comparator(3, false);
+    tim.set_comparator(0, 3, false);
     tim.write(0, BDTR, BKE | MOE).unwrap();
     assert!(tim.main_output());
-    tim.set_comparator(4, false);
+    tim.set_comparator(0, 4, false);
     assert!(!tim.main_output());
     assert!(tim.write(0, AF1, 1 | 1 << 6).is_err());
+}
+
+/// The second input has its own flag, sources and filter. A level shorter than the filter's 8 samples at a 32nd of the clock does
+/// nothing; one that stands for them switches off at that time.
+#[test]
+fn the_second_break_input_is_apart_and_filtered() {
+    let length = 32 * 8 * CLOCK;
+    let mut tim = Tim::new(1, CLOCK);
+    let [bk2e, bk2p] = [1 << 24, 1 << 25];
+    assert!(
+        tim.write(0, BDTR, bk2e | bk2p).is_err(),
+        "without OSSR and OSSI"
+    );
+    let on = BKE | bk2e | bk2p | 0xF << 20 | 3 << 10 | MOE;
+    tim.write(0, AF2, 1 << 3).unwrap();
+    tim.write(0, BDTR, on).unwrap();
+    tim.set_comparator(0, 3, true);
+    assert_eq!(tim.due(), length);
+    tim.advance(length - 1);
+    tim.set_comparator(length - 1, 3, false);
+    assert!(tim.main_output() && tim.due() == NEVER, "too short");
+    tim.set_comparator(length, 3, true);
+    tim.advance(2 * length - 1);
+    assert!(tim.main_output());
+    tim.advance(2 * length);
+    assert!(!tim.main_output());
+    assert_eq!(tim.read(0, SR).unwrap(), B2IF, "not the first input's flag");
+    tim.write(2 * length, SR, 0).unwrap();
+    assert_eq!(tim.read(0, SR).unwrap(), B2IF, "it still acts");
+    tim.write(2 * length, BDTR, on).unwrap();
+    assert!(!tim.main_output());
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The counter of a timer, its events and its requests.
 
+use super::break_input::BreakInput;
 use crate::peripheral::{Bank, Register};
 use crate::time::{Instant, NEVER};
 
@@ -20,6 +21,7 @@ pub(super) const CCR1: u32 = 0x34;
 pub(super) const BDTR: u32 = 0x44;
 pub(super) const ECR: u32 = 0x58;
 pub(super) const AF1: u32 = 0x60;
+pub(super) const AF2: u32 = 0x64;
 
 pub(super) const CEN: u32 = 1;
 pub(super) const UDIS: u32 = 1 << 1;
@@ -27,6 +29,7 @@ const OPM: u32 = 1 << 3;
 pub(super) const ARPE: u32 = 1 << 7;
 pub(super) const UIF: u32 = 1;
 pub(super) const BIF: u32 = 1 << 7;
+pub(super) const B2IF: u32 = 1 << 8;
 /// System break: lock-up, supply, ECC or clock (RM0440 section 28.6.5).
 pub(super) const SBIF: u32 = 1 << 13;
 pub(super) const IDXF: u32 = 1 << 20;
@@ -80,7 +83,7 @@ const REGISTERS: &[Register] = &[
     Register(0x5C, "TIM_TISEL", 0, 0x0F0F_0F0F),
     // Break by pin and comparators with their polarities, and the ETR source.
     Register(0x60, "TIM_AF1", 0x0000_0001, 0x0003_FEFF),
-    Register(0x64, "TIM_AF2", 0x0000_0001, 0x0000_0201),
+    Register(0x64, "TIM_AF2", 0x0000_0001, 0x0000_3EFF),
 ];
 
 /// Values in effect, in contrast to preloaded ones.
@@ -97,7 +100,7 @@ pub struct Tim {
     pub(super) number: u8,
     pub(super) bank: Bank,
     /// Period of the kernel clock.
-    clock: u64,
+    pub(super) clock: u64,
     pub(super) active: Active,
     /// Start of the present run up or down.
     pub(super) base: Instant,
@@ -110,9 +113,7 @@ pub struct Tim {
     /// Updates sent as TRGO2 or TRGO and not yet taken.
     pulses: [Option<Instant>; 2],
     pub(super) indexed: bool,
-    /// Levels at the break input: the pin, and comparators 1 to 4.
-    pub(super) break_levels: [bool; 5],
-    pub(super) break_active: bool,
+    pub(super) breaks: [BreakInput; 2],
     pub(super) system_break: bool,
     /// The debugger has halted the processor, and the timer stands meanwhile (DBG_TIMx_STOP).
     frozen: bool,
@@ -146,8 +147,8 @@ impl Tim {
             held: 0,
             pulses: [None; 2],
             indexed: false,
-            break_levels: [true, false, false, false, false],
-            break_active: false,
+            // No pin of this board is the second input's: it reads low.
+            breaks: [BreakInput::with_pin(true), BreakInput::with_pin(false)],
             system_break: false,
             frozen: false,
             updates: 0,
@@ -248,6 +249,10 @@ impl Tim {
 
     /// Returns the next event here that has a receiver.
     pub fn due(&self) -> Instant {
+        self.counter_due().min(self.break_due())
+    }
+
+    fn counter_due(&self) -> Instant {
         if !self.counts_by_clock() {
             return NEVER;
         }
@@ -270,6 +275,9 @@ impl Tim {
 
     /// Handles the events due up to `now`.
     pub fn advance(&mut self, now: Instant) {
+        if self.break_due() <= now {
+            self.see_breaks(now);
+        }
         while self.counts_by_clock() {
             let end = self.base + self.run() * self.tick();
             let until = now.min(end - 1);
@@ -371,8 +379,8 @@ impl Tim {
     pub fn requests(&self) -> [bool; 4] {
         let pending = self.bank.get(SR) & self.bank.get(DIER);
         [
-            // SBIF shares the break's interrupt.
-            pending & BIF != 0 || self.bank.get(SR) & SBIF != 0 && self.bank.get(DIER) & BIF != 0,
+            // SBIF and B2IF share the break's interrupt.
+            self.bank.get(SR) & (BIF | B2IF | SBIF) != 0 && self.bank.get(DIER) & BIF != 0,
             pending & UIF != 0,
             pending & 0x0010_0060 != 0,
             pending & 0x1E != 0,
