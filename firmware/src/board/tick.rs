@@ -106,7 +106,8 @@ impl Tick {
         if let Some(measured) = measured {
             self.events.push(Event::Health(measured));
         }
-        self.next_waiting = self.converter.is_waiting();
+        // One delay counts once: a tick that began late, and so was counted, often ends late too.
+        self.next_waiting = late_ticks == 0 && self.converter.is_waiting();
     }
 }
 

@@ -421,6 +421,29 @@ fn a_single_late_tick_is_tolerated_and_told() {
     assert_eq!(snapshot(&mut line).0.fault, Fault::Deadline);
 }
 
+/// One delay is one late tick, whenever in the period it begins: a tick that begins late may also end after the next is due.
+#[test]
+fn a_single_delay_is_tolerated_at_any_phase() {
+    let mut line = moving(49);
+    let mut wrong = Vec::new();
+    for phase in 0..20 {
+        let emulated = board(&mut line);
+        let before = emulated.with_chip(|chip| chip.triggers);
+        while emulated.with_chip(|chip| chip.triggers) == before {
+            let until = emulated.with_chip(|chip| chip.work.now) + from_seconds(5e-7);
+            emulated.run_until(until).unwrap();
+        }
+        emulated.run_for(5e-6 * f64::from(phase)).unwrap();
+        emulated.with_chip(|chip| chip.held_until = chip.work.now + from_seconds(135e-6));
+        wait(&mut line, 0.12);
+        if let Some(record) = snapshot_of_fault(&mut line) {
+            wrong.push(format!("{} µs: {record:?}", 5 * phase));
+            line = moving(50 + phase as u64);
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
 /// A command to switch off, once for each of its bits wrong, while the rig moves: none is carried out.
 #[test]
 fn a_corrupted_command_is_counted_and_changes_nothing() {
