@@ -125,7 +125,7 @@ impl Converter {
         (Self, supply_ratio)
     }
 
-    /// Enables the interrupt, with the highest priority.
+    /// Enables the interrupt, with the highest priority but that of the watch over it.
     pub(crate) fn enable_interrupt(&mut self) {
         interrupt::ADC1_2.set_priority(TICK_PRIORITY);
         // Everything that the handler owns was initialised before.

@@ -12,8 +12,10 @@ use embassy_stm32::{Config, Peripherals};
 /// Core, buses and timers, Hz: 24 MHz / 6 · 85 / 2, or 16 MHz / 4 · 85 / 2.
 pub(crate) const CORE_HZ: u32 = 170_000_000;
 
+/// Priority of the warning that the control tick has stopped: the only one above the tick.
+pub(crate) const TICK_WATCH_PRIORITY: Priority = Priority::P0;
 /// Priority of the control tick, above everything else.
-pub(crate) const TICK_PRIORITY: Priority = Priority::P0;
+pub(crate) const TICK_PRIORITY: Priority = Priority::P1;
 /// Serial line, its DMA, and the tasks' clock.
 pub(crate) const LINK_PRIORITY: Priority = Priority::P8;
 

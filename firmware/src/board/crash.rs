@@ -22,13 +22,14 @@ const FRAME_LR: usize = 5;
 const FRAME_PC: usize = 6;
 
 /// Kinds in the order of their numbers, which begin at 1.
-const KINDS: [CrashKind; 6] = [
+const KINDS: [CrashKind; 7] = [
     CrashKind::Panic,
     CrashKind::ProcessorFault,
     CrashKind::ClockStopped,
     CrashKind::FlashError,
     CrashKind::UnexpectedException,
     CrashKind::Watchdog,
+    CrashKind::TickStopped,
 ];
 
 // Symbols of memory.x; only their addresses are used.

@@ -2,7 +2,7 @@
 //!
 //! Meanwhile TIM1 stands, and its outputs are inactive, as if the main output were off (RM0440, TIM1, "Debug mode"; with
 //! OSSI set they are at their idle level, low: the motor is open). TIM4, which triggers the samples, stands with it, so that
-//! both keep their phase. The watchdog stands too. The encoder's timers go on: the link may move.
+//! both keep their phase. The watchdogs stand too. The encoder's timers go on: the link may move.
 //!
 //! The control tick stands as well and notices nothing. The processor notes the halt in DFSR; at the next look, 10 ms later
 //! at most, the cycle counter, which stood too, is moved on. The control tick then finds that it is late, which is the
@@ -27,6 +27,7 @@ pub(crate) fn freeze_outputs_at_halts() {
     DBGMCU.apb1lfzr().modify(|w| {
         w.set_tim4(true);
         w.set_iwdg(true);
+        w.set_wwdg(true);
     });
     take_halt();
 }

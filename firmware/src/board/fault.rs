@@ -100,14 +100,14 @@ extern "C" fn unexpected(frame: *const u32) {
 }
 
 /// Switches the bridge off for good.
-fn switch_off() {
+pub(super) fn switch_off() {
     // This comes before the bridge is switched off: a control tick in between would switch it on again.
     cortex_m::interrupt::disable();
     pwm::switch_off();
 }
 
 /// Records a failure in an exception with this frame, and restarts.
-fn restart_from(kind: CrashKind, frame: *const u32, line: u32) -> ! {
+pub(super) fn restart_from(kind: CrashKind, frame: *const u32, line: u32) -> ! {
     restart(
         kind,
         Failure {

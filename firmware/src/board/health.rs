@@ -75,13 +75,13 @@ pub(crate) fn reset_cause() -> ResetCause {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
     // Every internal reset pulls the reset pin low too, so the pin is tested last (RM0440, RCC, "System reset").
-    if flags.iwdgrstf() {
+    if flags.iwdgrstf() || flags.wwdgrstf() {
         ResetCause::Watchdog
     } else if flags.sftrstf() {
         ResetCause::Software
     } else if flags.borrstf() {
         ResetCause::Power
-    } else if flags.wwdgrstf() || flags.lpwrrstf() || flags.oblrstf() {
+    } else if flags.lpwrrstf() || flags.oblrstf() {
         ResetCause::Other
     } else {
         ResetCause::Pin

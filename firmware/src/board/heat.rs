@@ -28,16 +28,10 @@ fn word(slot: usize, half: usize) -> *mut u32 {
         .wrapping_add(2 * (slot & 1) + (half & 1))
 }
 
-/// Ticks between two stores: 1.6 ms at 10 kHz, a small part of the winding's thermal time of seconds.
-const STORE_TICKS: u64 = 16;
-
-/// Stores the heat, A², in every [`STORE_TICKS`]th tick; `tick` counts up.
+/// Stores the heat, A²; `count` counts the stores.
 #[inline(always)]
-pub(crate) fn store(tick: u64, heat: f32) {
-    if !tick.is_multiple_of(STORE_TICKS) {
-        return;
-    }
-    let slot = (tick / STORE_TICKS) as usize & 1;
+pub(crate) fn store(count: u32, heat: f32) {
+    let slot = count as usize & 1;
     // Within the static, aligned; volatile, because the next reader is the next start.
     #[allow(unsafe_code)]
     unsafe {

@@ -23,5 +23,6 @@ mod stack;
 pub(crate) mod start;
 mod storage;
 mod tick;
+mod tick_watch;
 mod watchdog;
 mod wire_check;

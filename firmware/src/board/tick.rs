@@ -28,6 +28,7 @@ use super::pwm::Bridge;
 use super::queue::{Numbered, QueueReceiver, QueueSender, URGENT_WAITS};
 use super::return_barrier::finish_stores;
 use super::stack;
+use super::tick_watch;
 use super::watchdog::{Task, check_in};
 use super::wire_check::WireCheck;
 
@@ -39,6 +40,12 @@ pub(crate) const REQUESTS: usize = 1;
 pub(crate) const RECEIVED: usize = 5;
 /// Urgent requests that the queue to the tick holds: the line brings one in a tick.
 pub(crate) const URGENT: usize = 4;
+
+/// Ticks between two refreshes of the watch over the tick, 0.4 ms at 10 kHz: it waits for 1.5 ms.
+const REFRESH_TICKS: u32 = 4;
+/// Ticks between two stores of the heat, 1.6 ms: a small part of the winding's thermal time of seconds.
+const HEAT_TICKS: u32 = 16;
+const _: () = assert!(HEAT_TICKS.is_multiple_of(REFRESH_TICKS));
 
 /// Everything that the interrupt owns.
 pub(crate) struct Tick {
@@ -95,7 +102,6 @@ impl Tick {
         };
         let output = step(self.config, self.state, sample);
         self.bridge.apply(output.command);
-        heat::store(self.state.tick, self.state.heat());
         self.tick_session
             .report(self.state, self.capture, &output, &mut self.events);
         self.serve();
@@ -108,6 +114,13 @@ impl Tick {
         }
         // One delay counts once: a tick that began late, and so was counted, often ends late too.
         self.next_waiting = late_ticks == 0 && self.converter.is_waiting();
+        let tick = self.state.tick as u32;
+        if tick.is_multiple_of(REFRESH_TICKS) {
+            tick_watch::refresh();
+            if tick.is_multiple_of(HEAT_TICKS) {
+                heat::store(tick / HEAT_TICKS, self.state.heat());
+            }
+        }
     }
 }
 
@@ -217,6 +230,7 @@ pub(crate) fn start(mut tick: Tick) {
     let tick = unsafe { (*TICK.0.get()).write(tick) };
     tick.converter.enable_interrupt();
     tick.bridge.run();
+    tick_watch::start();
 }
 
 #[interrupt]

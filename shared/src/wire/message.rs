@@ -378,7 +378,7 @@ pub enum ResetCause {
     Pin,
     /// The firmware, after a panic or a processor fault.
     Software,
-    /// The independent watchdog: a part of the firmware stopped reporting.
+    /// A watchdog: a part of the firmware stopped reporting, or the control tick hung where no interrupt could note it.
     Watchdog,
     /// Any other reason.
     Other,
@@ -399,6 +399,8 @@ pub enum CrashKind {
     UnexpectedException,
     /// The watchdog reset the chip, because a part of the program had stopped reporting.
     Watchdog,
+    /// No control tick had ended for 1.5 ms: it hung, or its trigger did not come.
+    TickStopped,
 }
 
 /// Parts of the firmware that report to its watchdog, in the order of the bits of [`Crash::silent`].

@@ -22,6 +22,8 @@ pub enum Peripheral {
     Tim(u8),
     /// Independent watchdog.
     Iwdg,
+    /// Window watchdog.
+    Wwdg,
     /// Power control.
     Pwr,
     /// Low-power UART.
@@ -55,13 +57,14 @@ pub enum Peripheral {
 }
 
 /// Base address and size of every peripheral that is modelled.
-const PLACES: [(u32, u32, Peripheral); 35] = [
+const PLACES: [(u32, u32, Peripheral); 36] = [
     (0x4000_0000, 0x400, Peripheral::Tim(2)),
     (0x4000_0400, 0x400, Peripheral::Tim(3)),
     (0x4000_0800, 0x400, Peripheral::Tim(4)),
     (0x4000_0C00, 0x400, Peripheral::Tim(5)),
     (0x4000_1000, 0x400, Peripheral::Tim(6)),
     (0x4000_1400, 0x400, Peripheral::Tim(7)),
+    (0x4000_2C00, 0x400, Peripheral::Wwdg),
     (0x4000_3000, 0x400, Peripheral::Iwdg),
     (0x4000_7000, 0x400, Peripheral::Pwr),
     (0x4000_8000, 0x400, Peripheral::Lpuart),
@@ -102,11 +105,10 @@ pub fn peripheral(address: u32) -> Option<(Peripheral, u32)> {
 }
 
 /// Peripherals of the chip that are not modelled, so that an access can be named.
-const UNMODELLED: [(u32, &str); 33] = [
+const UNMODELLED: [(u32, &str); 32] = [
     (0x4000_2000, "CRS"),
     (0x4000_2400, "TAMP"),
     (0x4000_2800, "RTC"),
-    (0x4000_2C00, "WWDG"),
     (0x4000_3800, "SPI2"),
     (0x4000_3C00, "SPI3"),
     (0x4000_4400, "USART2"),

@@ -307,7 +307,7 @@ impl<B: Bus + 'static> Cpu<B> for UnicornCpu<B> {
     }
 
     fn forget_code(&mut self, address: u32, size: u32) {
-        let from = address.wrapping_sub(map::FLASH.start) as usize / 2;
+        let Some(from) = place(address) else { return };
         let mut blocks = self.blocks.borrow_mut();
         let ran = blocks
             .get(from..from + size as usize / 2)

@@ -32,6 +32,7 @@ impl Chip {
                 self.tim[timer_index(number)].read(now, offset)?
             }
             Peripheral::Iwdg => self.iwdg.read(offset)?,
+            Peripheral::Wwdg => self.wwdg.read(now, offset)?,
             Peripheral::Pwr => self.pwr.read(offset)?,
             Peripheral::Lpuart => self.lpuart.read(offset)?,
             Peripheral::Syscfg => self.syscfg.read(offset)?,
@@ -112,6 +113,10 @@ impl Chip {
         match peripheral {
             Peripheral::Tim(number) => self.store_timer(number, offset, value)?,
             Peripheral::Iwdg => self.iwdg.write(now, offset, value)?,
+            Peripheral::Wwdg => {
+                let clock = self.rcc.apb1_period()?;
+                self.wwdg.write(now, clock, offset, value)?;
+            }
             Peripheral::Pwr => self.store_power(offset, value)?,
             Peripheral::Lpuart => self.lpuart.write(now, offset, value)?,
             Peripheral::Syscfg => self.syscfg.write(offset, value)?,

@@ -4,6 +4,7 @@ use super::error::ChipError;
 use super::state::{Chip, NON_MASKABLE, TIM1_TRGO2, TIM4_TRGO};
 use crate::cpu::Memory;
 use crate::peripheral::Refusal;
+use crate::peripheral::rcc::Cause;
 use crate::time::{Instant, NEVER};
 
 impl Chip {
@@ -38,6 +39,7 @@ impl Chip {
             .min(self.adc.due())
             .min(self.lpuart.due())
             .min(self.iwdg.bites())
+            .min(self.wwdg.due())
             .min(self.flash.due())
             .min(self.nvic.due())
             .min(self.halt.map_or(NEVER, |[_, end]| end));
@@ -62,7 +64,7 @@ impl Chip {
                     self.fail(ChipError::Hardware(refusal));
                     break;
                 }
-                if self.bitten {
+                if self.bitten.is_some() {
                     break;
                 }
             }
@@ -111,8 +113,11 @@ impl Chip {
         {
             self.changed.push(changed);
         }
+        self.wwdg.advance(at);
         if self.iwdg.bites() <= at {
-            self.bitten = true;
+            self.bitten = Some(Cause::Watchdog);
+        } else if self.wwdg.bites() <= at {
+            self.bitten = Some(Cause::WindowWatchdog);
         }
         Ok(())
     }

@@ -4,10 +4,11 @@ use super::error::ChipError;
 use super::state::{Chip, TIMERS};
 use crate::time::Instant;
 
-/// DBGMCU_APB1FZR1, as a word of the debug unit, with TIM2 to TIM7 in its first bits, and its bit of the watchdog (RM0440
+/// DBGMCU_APB1FZR1, as a word of the debug unit, with TIM2 to TIM7 in its first bits, and its bits of the watchdogs (RM0440
 /// section 47.6, "DBGMCU_APB1FZR1").
 const APB1: usize = 1;
 const IWDG: u32 = 1 << 12;
+const WWDG: u32 = 1 << 11;
 /// DBGMCU_APB2FZR likewise, with the bits of TIM1, TIM8, TIM15, TIM16, TIM17 and TIM20.
 const APB2: usize = 3;
 const APB2_BITS: [(u8, u32); 6] = [(1, 11), (8, 13), (15, 16), (16, 17), (17, 18), (20, 20)];
@@ -52,6 +53,9 @@ impl Chip {
         }
         if apb1 & IWDG != 0 {
             self.iwdg.freeze(now, frozen);
+        }
+        if apb1 & WWDG != 0 {
+            self.wwdg.freeze(now, frozen);
         }
         if let Err(refusal) = self.update_bridge(now) {
             self.fail(ChipError::Hardware(refusal));

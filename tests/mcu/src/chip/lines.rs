@@ -38,6 +38,7 @@ impl Chip {
                 raise(number, up);
             }
         }
+        raise(0, self.wwdg.requests());
         raise(ADC1_2, self.adc.requests());
         raise(91, self.lpuart.requests());
         raise(4, self.flash.requests());

@@ -18,6 +18,7 @@ use crate::peripheral::pwr::Pwr;
 use crate::peripheral::rcc::{Cause, Rcc};
 use crate::peripheral::syscfg::Syscfg;
 use crate::peripheral::tim::Tim;
+use crate::peripheral::wwdg::Wwdg;
 use crate::time::UNITS_PER_SECOND;
 
 impl Chip {
@@ -52,9 +53,10 @@ impl Chip {
             dmamux: Dmamux::default(),
             lpuart: Lpuart::default(),
             iwdg: Iwdg::default(),
+            wwdg: Wwdg::default(),
             cycle_counter: (false, 0),
             debug_unit: [0; 4],
-            bitten: false,
+            bitten: None,
             stores: Vec::new(),
             changed: Vec::new(),
             triggers: 0,
@@ -71,7 +73,7 @@ impl Chip {
         self.period = UNITS_PER_SECOND / 16_000_000;
         self.waits = false;
         self.event = false;
-        self.bitten = false;
+        self.bitten = None;
         self.nvic = Nvic::default();
         self.rcc = Rcc::new(cause);
         self.rcc.set_crystal(!self.board.faults.crystal_dead);
@@ -89,6 +91,7 @@ impl Chip {
         self.dmamux = Dmamux::default();
         self.lpuart.reset();
         self.iwdg = Iwdg::default();
+        self.wwdg = Wwdg::default();
         self.cycle_counter = (false, 0);
         self.halt = None;
         self.stores.clear();

@@ -16,9 +16,10 @@ use crate::peripheral::gpio::Gpio;
 use crate::peripheral::iwdg::Iwdg;
 use crate::peripheral::lpuart::Lpuart;
 use crate::peripheral::pwr::Pwr;
-use crate::peripheral::rcc::Rcc;
+use crate::peripheral::rcc::{Cause, Rcc};
 use crate::peripheral::syscfg::Syscfg;
 use crate::peripheral::tim::Tim;
+use crate::peripheral::wwdg::Wwdg;
 use crate::time::Instant;
 
 /// Additional cost of an access to a peripheral, cycles: the bridge from AHB to APB.
@@ -83,12 +84,14 @@ pub struct Chip {
     pub(super) dmamux: Dmamux,
     /// Serial port.
     pub lpuart: Lpuart,
-    /// Watchdog.
+    /// Independent watchdog.
     pub iwdg: Iwdg,
+    /// Window watchdog.
+    pub(super) wwdg: Wwdg,
     pub(super) cycle_counter: (bool, u64),
     pub(super) debug_unit: [u32; 4],
-    /// True if the watchdog has reset the chip.
-    pub bitten: bool,
+    /// The watchdog that has reset the chip.
+    pub bitten: Option<Cause>,
     /// Stores into the flash memory that wait for the controller.
     pub(super) stores: Vec<(u32, u32, u32)>,
     /// Changes in the flash memory: first address and bytes, for the emulation to collect.

@@ -95,8 +95,8 @@ impl<C: Cpu<Chip>> Emulation<C> {
         for (address, size) in changed {
             self.cpu.forget_code(address, size);
         }
-        if bitten {
-            self.reset(Cause::Watchdog);
+        if let Some(cause) = bitten {
+            self.reset(cause);
         } else if reset {
             self.reset(Cause::Software);
         }

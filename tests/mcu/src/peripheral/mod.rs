@@ -20,6 +20,7 @@ mod refusal;
 mod register;
 pub mod syscfg;
 pub mod tim;
+pub mod wwdg;
 
 pub use refusal::{Refusal, told};
 pub use register::{Bank, Register};

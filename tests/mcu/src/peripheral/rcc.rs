@@ -68,6 +68,8 @@ pub enum Cause {
     Software,
     /// The independent watchdog.
     Watchdog,
+    /// The window watchdog.
+    WindowWatchdog,
     /// The reset button.
     Pin,
 }
@@ -106,6 +108,7 @@ impl Rcc {
             Cause::Pin => 0x0400_0000,
             Cause::Software => 0x1400_0000,
             Cause::Watchdog => 0x2400_0000,
+            Cause::WindowWatchdog => 0x4400_0000,
         };
         bank.put(CSR, flags);
         Self {
@@ -274,6 +277,14 @@ impl Rcc {
         Ok(UNITS_PER_SECOND / self.system_clock()?)
     }
 
+    /// Returns the time units of one period of the APB1 clock.
+    ///
+    /// # Errors
+    /// As [`Rcc::system_clock`].
+    pub fn apb1_period(&self) -> Result<u64, Refusal> {
+        Ok(self.system_period()? << self.apb_shift(false))
+    }
+
     /// Returns the time units of one period of LPUART1's kernel clock.
     ///
     /// # Errors
@@ -322,6 +333,7 @@ impl Rcc {
             Peripheral::Tim(8) => (APB2ENR, 13),
             Peripheral::Tim(n @ 15..=17) => (APB2ENR, u32::from(n) + 1),
             Peripheral::Tim(_) => (APB2ENR, 20),
+            Peripheral::Wwdg => (APB1ENR1, 11),
             Peripheral::Pwr => (APB1ENR1, 28),
             Peripheral::Lpuart => (APB1ENR2, 0),
             Peripheral::Syscfg | Peripheral::Comp => (APB2ENR, 0),
@@ -362,6 +374,7 @@ impl Rcc {
             Peripheral::Exti
             | Peripheral::Rcc
             | Peripheral::Iwdg
+            | Peripheral::Wwdg
             | Peripheral::Dwt
             | Peripheral::Scs
             | Peripheral::Dbgmcu => return false,

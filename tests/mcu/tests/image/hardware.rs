@@ -356,7 +356,7 @@ fn lock_up_and_flash_errors_take_the_outputs_in_hardware() {
     board(&mut line).with_chip(|chip| chip.held_until = 0);
     assert!(matches!(
         board(&mut line).resets[..],
-        [(_, Cause::Watchdog)]
+        [(_, Cause::WindowWatchdog)]
     ));
 
     // In the program's bank: off at once, and started anew by the non-maskable interrupt.

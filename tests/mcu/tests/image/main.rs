@@ -19,6 +19,7 @@ mod requests;
 mod self_test;
 mod stop_switch;
 mod storage;
+mod tick_watch;
 mod wires;
 
 use std::path::PathBuf;

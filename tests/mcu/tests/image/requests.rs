@@ -157,8 +157,8 @@ fn every_request_keeps_to_the_budget_whatever_the_rig_does() {
 /// Number of the interrupt in which the watchdog is fed: CORDIC's, 100 of the chip's own (RM0440, vector table).
 const FEEDER: u16 = 16 + 100;
 
-/// The watchdog is fed only when every part has reported. The tick and the task that sends are stopped by their hardware; of
-/// the two that wait for it with a time limit the report is taken away.
+/// The watchdog is fed only when every part has reported. The task that sends is stopped by its hardware; of those that wait for
+/// it with a time limit the report is taken away. The tick has a watch of its own besides: `tick_watch.rs`.
 #[test]
 fn each_part_that_stops_is_found_by_the_watchdog() {
     type Stop = fn(&mut BoardSession);
@@ -173,13 +173,7 @@ fn each_part_that_stops_is_found_by_the_watchdog() {
         });
     }
     // Seconds within which the chip must start anew; the watchdog's clock is right to a few per cent (DS12288, LSI).
-    let parts: [(&str, Stop, f64, u8); 5] = [
-        (
-            "tick",
-            |line| board(line).with_board(|b| b.faults.trigger_lost = true),
-            0.12,
-            1,
-        ),
+    let parts: [(&str, Stop, f64, u8); 4] = [
         (
             // It stops with its next frame, which is an estimate every 50 ms.
             "telemetry",

@@ -122,6 +122,9 @@ fn describe_crash(crash: &Crash) -> String {
         CrashKind::FlashError => "a word of the flash memory has two wrong bits".to_owned(),
         CrashKind::UnexpectedException => format!("exception {} came unexpectedly", crash.line),
         CrashKind::Watchdog => describe_silence(crash.silent),
+        CrashKind::TickStopped => {
+            "the control tick hung or did not come for 1.5 ms; the code that ran then".to_owned()
+        }
     };
     let numbers = [
         ("pc", crash.pc),
