@@ -9,6 +9,21 @@ const TURNS: f64 = 2.0;
 /// Least acceleration to reach the velocity limit within the range, rad/s², above which a remark is given. Arms and
 /// servos are below 100 (UR5 2, Panda 2, SO-101 26, XL330 20); the same limits in degrees are above 400.
 const ABRUPT: f64 = 400.0;
+/// The same if no acceleration limit bounds the motion instead. Limits of 2.5 to 3.5 rad/s in rpm, over 4 to 6 rad,
+/// are between 100 and 300.
+const ABRUPT_UNBOUNDED: f64 = 100.0;
+/// Velocity limit as a multiple of the speed that the joint reaches within its range at its acceleration limit, above
+/// which a remark is given. rpm for rad/s is 9.5; a range that is restricted to a tenth makes 3 of 1.
+const OUT_OF_REACH: f64 = 3.5;
+
+/// Returns what a velocity would be in rad/s if it were in another unit, a clause and a sentence.
+fn in_other_units(velocity: f64) -> String {
+    format!(
+        "were this deg/s, it would be {} rad/s, in rpm {}. Limits are in rad/s.",
+        format_significant(velocity.to_radians(), 4),
+        format_significant(velocity * std::f64::consts::PI / 30.0, 4)
+    )
+}
 
 impl Robot {
     /// One sentence for each revolute joint whose limits look like degrees.
@@ -42,15 +57,43 @@ impl Robot {
             }
             let velocity = limits.known_velocity()?;
             let least = velocity.powi(2) / (high - low);
-            let stated = limits.acceleration.is_none_or(|a| a < least);
-            (least > ABRUPT && stated).then(|| {
+            let implausible = match limits.acceleration {
+                Some(stated) => stated < least && least > ABRUPT,
+                None => least > ABRUPT_UNBOUNDED,
+            };
+            implausible.then(|| {
                 format!(
-                    "Joint \"{}\": to reach its velocity limit of {} rad/s within its range takes at least {} rad/s²; were this deg/s, it would be {} rad/s, in rpm {}. Limits are in rad/s.",
+                    "Joint \"{}\": to reach its velocity limit of {} rad/s within its range takes at least {} rad/s²; {}",
                     joint.name,
                     number(velocity),
                     number(least),
-                    number(velocity.to_radians()),
-                    number(velocity * std::f64::consts::PI / 30.0)
+                    in_other_units(velocity)
+                )
+            })
+        };
+        self.joints.iter().filter_map(of_joint).collect()
+    }
+
+    /// One sentence for each revolute joint whose velocity limit is far beyond what it reaches within its range at its
+    /// acceleration limit, except those of [`Self::limits_in_degrees`]. A motion is safe: its acceleration is bounded.
+    pub fn velocities_out_of_reach(&self) -> Vec<String> {
+        let number = |v: f64| format_significant(v, 4);
+        let of_joint = |joint: &Joint| {
+            let limits = joint.limits.as_ref()?;
+            let [low, high] = limits.position;
+            let (velocity, acceleration) = (limits.known_velocity()?, limits.acceleration?);
+            let reached = (acceleration * (high - low)).sqrt();
+            let told = joint.kind == JointKind::Revolute
+                && velocity.powi(2) <= ABRUPT * (high - low)
+                && velocity > OUT_OF_REACH * reached;
+            told.then(|| {
+                format!(
+                    "Joint \"{}\": its velocity limit is {} rad/s, but within its range it reaches only {} rad/s at its acceleration limit of {} rad/s²; {}",
+                    joint.name,
+                    number(velocity),
+                    number(reached),
+                    number(acceleration),
+                    in_other_units(velocity)
                 )
             })
         };
@@ -80,6 +123,9 @@ mod tests {
             ([-178.0, 178.0], 340.0, "5.934"),
             ([-3.1, 3.1], 57.0, "0.9948"),
             ([-2.9, 2.9], 180.0, "3.142"),
+            ([-2.8, 2.8], 29.0, "in rpm 3.037"),
+            ([-2.0, 2.0], 24.0, "in rpm 2.513"),
+            ([-1.6, 1.2], 19.0, "in rpm 1.990"),
         ] {
             let message = with(position, velocity);
             assert!(
@@ -99,6 +145,36 @@ mod tests {
     }
 
     #[test]
+    fn a_velocity_far_beyond_what_its_acceleration_reaches_is_told() {
+        let with = |position: [f64; 2], velocity: f64, acceleration: f64| {
+            let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("r.toml")).unwrap();
+            let limits = robot.joints[0].limits.as_mut().unwrap();
+            (limits.position, limits.velocity) = (position, velocity);
+            limits.acceleration = Some(acceleration);
+            assert_eq!(robot.limits_in_degrees(), Vec::<String>::new());
+            robot.velocities_out_of_reach()
+        };
+        for (position, velocity, acceleration, told) in [
+            ([-2.4, 2.4], 38.0, 20.0, "in rpm 3.979"),
+            ([-2.8, 2.8], 29.0, 12.0, "in rpm 3.037"),
+            ([-1.5, 1.5], 30.0, 15.0, "in rpm 3.142"),
+        ] {
+            let message = with(position, velocity, acceleration);
+            assert!(
+                message.len() == 1 && message[0].contains(told),
+                "{message:?}"
+            );
+        }
+        for (position, velocity, acceleration) in [
+            ([-2.4, 2.4], 4.0, 20.0),
+            ([-0.3, 0.3], 3.0, 5.0),
+            ([-2.0, 2.0], 19.0, 100.0),
+        ] {
+            assert_eq!(with(position, velocity, acceleration), Vec::<String>::new());
+        }
+    }
+
+    #[test]
     fn no_description_that_ships_looks_like_degrees() {
         for text in [
             ONE_LINK_TEMPLATE,
@@ -110,6 +186,7 @@ mod tests {
         ] {
             let robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
             assert_eq!(robot.limits_in_degrees(), Vec::<String>::new());
+            assert_eq!(robot.velocities_out_of_reach(), Vec::<String>::new());
         }
     }
 }

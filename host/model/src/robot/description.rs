@@ -98,6 +98,7 @@ impl Description {
             let (robot, mut remarks) = text::read(&text, path)?;
             remarks.extend(robot.implausible_bodies(None));
             remarks.extend(robot.limits_in_degrees());
+            remarks.extend(robot.velocities_out_of_reach());
             remarks.extend(robot.unlikely_values());
             return Ok(Self {
                 remarks,
