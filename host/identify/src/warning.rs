@@ -7,6 +7,7 @@ use rig_output::{format_significant, format_unit, format_value, listed};
 use serde::{Serialize, Serializer};
 
 use crate::estimator::Estimator;
+use rig_model::robot::CONTRADICTED;
 
 /// Independent stretches of a recording from which the intervals of the parameters are reliable.
 pub const LEAST_STRETCHES: f64 = 8.0;
@@ -114,6 +115,14 @@ pub struct TorqueScale {
 }
 
 impl TorqueScale {
+    /// Returns true if both are the same factor of the same joint: within their standard deviations, and by far nearer to
+    /// each other than to one.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let apart = (self.factor - other.factor).abs();
+        let near = (CONTRADICTED * self.std.hypot(other.std)).min(0.5 * (self.factor - 1.0).abs());
+        self.joint == other.joint && apart < near
+    }
+
     /// Says what the torques of some joints are.
     fn of_joints(list: &[Self]) -> String {
         let said = |confirmed: bool| -> Vec<String> {
@@ -147,6 +156,9 @@ impl TorqueScale {
     }
 }
 
+/// Least factor of a position by a unit, a ratio or counts.
+const FACTOR_OF_POSITION: f64 = 1.4;
+
 /// The torque of a joint over what the torques of the other joints show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TorqueFactor {
@@ -159,6 +171,14 @@ pub struct TorqueFactor {
 }
 
 impl TorqueFactor {
+    /// Returns true if both are the same factor of the same joint: within their standard deviations, and by far nearer to
+    /// each other than to one.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let apart = (self.factor - other.factor).abs();
+        let near = (CONTRADICTED * self.std.hypot(other.std)).min(0.5 * (self.factor - 1.0).abs());
+        self.joint == other.joint && apart < near
+    }
+
     /// Says which of some joints may be off.
     fn of_joints(list: &[Self]) -> String {
         let each: Vec<String> = (list.iter())
@@ -176,8 +196,14 @@ impl TorqueFactor {
                 "the torque constant or gear ratio of one of them is off by its factor, and these data do not tell which"
             }
         };
+        let far =
+            |own: &Self| own.factor > FACTOR_OF_POSITION || own.factor < 1.0 / FACTOR_OF_POSITION;
+        let or = match list.iter().any(far) {
+            true => ", or its position by the inverse",
+            false => "",
+        };
         format!(
-            "The torques of the joints contradict each other. One factor explains it: {} what the others show (± one standard deviation); {which}.",
+            "The torques of the joints contradict each other. One factor explains it: {} what the others show (± one standard deviation); {which}{or}.",
             each.join(", or ")
         )
     }

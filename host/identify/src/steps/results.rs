@@ -6,7 +6,7 @@ use super::further::{Further, further};
 use super::named::Named;
 use super::outcome::Outcome;
 use super::own::Own;
-use super::own_fit::own_fits;
+use super::own_fit::{OwnFit, beside_varying_friction, own_fits};
 use super::torque_agreement::torque_agreement;
 use super::torque_scale::torque_scale;
 use super::treated::Treated;
@@ -56,6 +56,23 @@ pub(crate) struct Results<'a> {
     pub compensated: bool,
 }
 
+/// Says which joints' torques are off by a factor: by the described gravity, or by the other joints.
+fn torque_factor(
+    problem: &Problem,
+    described: &Robot,
+    fits: &[OwnFit],
+) -> Result<Option<Warning>, IdentifyError> {
+    let said = |varying: Option<&[OwnFit]>| -> Result<Option<Warning>, IdentifyError> {
+        let by_gravity = torque_scale(problem, described, fits, varying)?;
+        Ok(by_gravity.or_else(|| torque_agreement(fits, varying, described)))
+    };
+    // The rows are read once more only if there is something to tell.
+    if said(None)?.is_none() {
+        return Ok(None);
+    }
+    said(beside_varying_friction(problem, fits)?.as_deref())
+}
+
 impl Results<'_> {
     /// Computes the further results and puts all of them together. `own` is the fit of an estimator beyond least
     /// squares.
@@ -94,8 +111,7 @@ impl Results<'_> {
         // A base that leans changes gravity itself.
         if self.known.tilt.is_none() {
             let fits = own_fits(problem, outcome.factors)?;
-            let by_gravity = torque_scale(problem, described, &fits)?;
-            warnings.extend(by_gravity.or_else(|| torque_agreement(&fits, described)));
+            warnings.extend(torque_factor(problem, described, &fits)?);
         }
         let stated =
             Effects::of(self.described).map_err(|e| IdentifyError::Model(e.to_string()))?;

@@ -26,11 +26,11 @@ struct Shown {
 
 impl Shown {
     fn of(fit: &OwnFit) -> Self {
-        let (r, z) = fit.equation.system();
+        let (r, z) = &fit.system;
         let shown = directions(r.clone());
         Self {
-            regressor: shown.tr_mul(&r) / fit.std,
-            torque: shown.tr_mul(&z) / fit.std,
+            regressor: shown.tr_mul(r) / fit.std,
+            torque: shown.tr_mul(z) / fit.std,
         }
     }
 }
@@ -83,9 +83,24 @@ impl CommonFit {
     }
 }
 
-/// Says which joint's torque is that of the others times a factor.
-pub(crate) fn torque_agreement(fits: &[OwnFit], robot: &Robot) -> Option<Warning> {
-    if fits.len() < 2 || fits.iter().any(|fit| fit.equation.rows() == 0) {
+/// Says which joint's torque is that of the others times a factor. Friction that changes with load or position must not
+/// explain the contradiction as well.
+pub(crate) fn torque_agreement(
+    fits: &[OwnFit],
+    varying: Option<&[OwnFit]>,
+    robot: &Robot,
+) -> Option<Warning> {
+    let mut found = factors(fits, robot)?;
+    if let Some(varying) = varying.filter(|_| !found.is_empty()) {
+        let beside = factors(varying, robot).unwrap_or_default();
+        found.retain(|own| beside.iter().any(|other| own.is_like(other)));
+    }
+    (!found.is_empty()).then_some(Warning::TorqueDisagrees(found))
+}
+
+/// Returns the joints of which one factor explains the contradiction; `None` if there is none.
+fn factors(fits: &[OwnFit], robot: &Robot) -> Option<Vec<TorqueFactor>> {
+    if fits.len() < 2 || fits.iter().any(|fit| fit.rows == 0) {
         return None;
     }
     let joints: Vec<Shown> = fits.iter().map(Shown::of).collect();
@@ -105,5 +120,5 @@ pub(crate) fn torque_agreement(fits: &[OwnFit], robot: &Robot) -> Option<Warning
         })
         .filter(|own| (own.factor - 1.0).abs() > CONTRADICTED * own.std)
         .collect();
-    (!found.is_empty()).then_some(Warning::TorqueDisagrees(found))
+    Some(found)
 }

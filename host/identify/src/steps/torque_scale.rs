@@ -11,7 +11,8 @@
 //! A wrong mass beyond the joint in the same proportion looks alike. The joints before it carry that mass as well: if their
 //! gravity is as described, the torque is wrong.
 //!
-//! Leaves out: friction that grows with load unequally in both directions.
+//! Friction that changes with load or position looks like another gravity where a pose is not passed in both directions
+//! alike. A factor is told only if it holds beside such friction as well.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,6 +26,9 @@ use rig_shared::multibody::{COLUMNS, column, inverse_dynamics};
 
 /// Poses at which gravity is looked for.
 const POSES: usize = 8;
+
+/// Share of the strongest joint's gravity above which gravity loads a joint: angles of four digits tilt an axis by 1e-5.
+const LOADED: f64 = 1e-4;
 
 /// Gravity in the torques of a joint beside inertias, friction and constants.
 struct Gravity {
@@ -49,6 +53,12 @@ impl Scale {
     fn contradicts(&self) -> bool {
         (self.factor - 1.0).abs() > CONTRADICTED * self.std
     }
+
+    /// Returns true if both joints show the same other masses.
+    fn is_like(&self, other: &Self) -> bool {
+        let apart = (self.factor - other.factor).abs();
+        self.contradicts() && apart < CONTRADICTED * self.std.hypot(other.std)
+    }
 }
 
 /// Says which joints' torques are the described gravity times a factor.
@@ -59,10 +69,29 @@ pub(crate) fn torque_scale(
     problem: &Problem,
     described: &Robot,
     fits: &[OwnFit],
+    varying: Option<&[OwnFit]>,
 ) -> Result<Option<Warning>, IdentifyError> {
+    let mut found = scales(problem, described, fits)?;
+    if let Some(varying) = varying.filter(|_| !found.is_empty()) {
+        let beside = scales(problem, described, varying)?;
+        found.retain_mut(|own| {
+            let like = beside.iter().find(|other| own.is_like(other));
+            own.masses_confirmed &= like.is_some_and(|other| other.masses_confirmed);
+            like.is_some()
+        });
+    }
+    Ok((!found.is_empty()).then_some(Warning::TorqueScale(found)))
+}
+
+/// Returns the joints whose torques are the described gravity times a factor.
+fn scales(
+    problem: &Problem,
+    described: &Robot,
+    fits: &[OwnFit],
+) -> Result<Vec<TorqueScale>, IdentifyError> {
     let columns = gravity_columns(problem, described)?;
     if columns.is_empty() {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let weights = |robot: &Robot| {
         let all = stated(problem, robot);
@@ -70,18 +99,27 @@ pub(crate) fn torque_scale(
     };
     let own = weights(described);
     if own.amax() == 0.0 {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let scales: Vec<(Gravity, Scale)> = (fits.iter().enumerate())
         .filter_map(|(joint, fit)| Gravity::of(joint, fit, &columns))
         .filter_map(|gravity| gravity.scale(&own).map(|scale| (gravity, scale)))
         .collect();
     let mut found = Vec::new();
-    for (gravity, scale) in scales.iter().filter(|(_, scale)| scale.contradicts()) {
+    let loaded = loaded_joints(described)?;
+    let contradict = |(gravity, scale): &&(Gravity, Scale)| {
+        scale.contradicts() && loaded.get(gravity.joint) == Some(&true)
+    };
+    for (gravity, scale) in scales.iter().filter(contradict) {
         let heavier = weights(&with_masses(described, gravity.joint, scale.factor));
-        let masses_confirmed = scales.iter().any(|(before, other)| {
-            before.joint < gravity.joint && !other.contradicts() && before.refutes(&heavier)
-        });
+        let before = || (scales.iter()).filter(|(before, _)| before.joint < gravity.joint);
+        let confirm =
+            |(before, other): &(Gravity, Scale)| !other.contradicts() && before.refutes(&heavier);
+        // A joint before it may show the other masses as well, by their weight or inertia.
+        let share = |(before, other): &(Gravity, Scale)| {
+            other.contradicts() && !before.refutes(&heavier) || other.is_like(scale)
+        };
+        let masses_confirmed = before().any(confirm) && !before().any(share);
         found.push(TorqueScale {
             joint: described.joints[gravity.joint].name.clone(),
             factor: scale.factor,
@@ -89,7 +127,37 @@ pub(crate) fn torque_scale(
             masses_confirmed,
         });
     }
-    Ok((!found.is_empty()).then_some(Warning::TorqueScale(found)))
+    Ok(found)
+}
+
+/// Returns for each joint: does the described gravity load it? Its own equation shows the same moments by their inertia.
+fn loaded_joints(described: &Robot) -> Result<Vec<bool>, IdentifyError> {
+    let chain = chain_of(described).map_err(|e| IdentifyError::Model(e.to_string()))?;
+    let mut parameters = described.standard_parameters();
+    for row in &mut parameters {
+        row[column::VISCOUS..].fill(0.0);
+    }
+    let n = described.joints.len();
+    let (mut most, still) = (vec![0.0f64; n], vec![0.0; n]);
+    for q in poses(n) {
+        let mut torque = vec![0.0; n];
+        inverse_dynamics(&chain, &parameters, &q, &still, &still, &mut torque)
+            .map_err(|e| IdentifyError::Model(e.to_string()))?;
+        for (most, own) in most.iter_mut().zip(torque) {
+            *most = most.max(own.abs());
+        }
+    }
+    let strongest = most.iter().copied().fold(0.0, f64::max);
+    Ok(most.iter().map(|own| *own > LOADED * strongest).collect())
+}
+
+/// Returns poses in general position: no two angles are multiples of each other.
+pub(crate) fn poses(n: usize) -> impl Iterator<Item = Vec<f64>> {
+    (0..POSES).map(move |pose| {
+        (0..n)
+            .map(|j| 0.7 + 1.3 * pose as f64 + 0.37 * (j * (pose + 1)) as f64)
+            .collect()
+    })
 }
 
 /// Returns the robot whose links from a joint on are heavier by a factor.
@@ -118,11 +186,7 @@ fn gravity_columns(problem: &Problem, described: &Robot) -> Result<Vec<usize>, I
         let mut rows = vec![[0.0; COLUMNS]; chain.link_count()];
         rows[c / COLUMNS][c % COLUMNS] = 1.0;
         let mut weighs = false;
-        for pose in 0..POSES {
-            // Poses in general position: no two angles are multiples of each other.
-            let q: Vec<f64> = (0..n)
-                .map(|j| 0.7 + 1.3 * pose as f64 + 0.37 * (j * (pose + 1)) as f64)
-                .collect();
+        for q in poses(n) {
             let mut torque = vec![0.0; n];
             inverse_dynamics(&chain, &rows, &q, &still, &still, &mut torque)
                 .map_err(|e| IdentifyError::Model(e.to_string()))?;
@@ -147,17 +211,17 @@ impl Gravity {
     /// Returns what a joint's own fit leaves of its torque without inertias, friction and constants; `columns` are those that
     /// weigh. `None` without rows.
     fn of(joint: usize, fit: &OwnFit, columns: &[usize]) -> Option<Self> {
-        if fit.equation.rows() == 0 {
+        if fit.rows == 0 {
             return None;
         }
-        let (r, z) = fit.equation.system();
+        let (r, z) = &fit.system;
         let others: Vec<usize> = (0..r.ncols()).filter(|c| !columns.contains(c)).collect();
         let beside = directions(r.select_columns(&others));
         let columns = r.select_columns(columns);
         Some(Self {
             joint,
             columns: &columns - &beside * beside.tr_mul(&columns),
-            torque: &z - &beside * beside.tr_mul(&z),
+            torque: z - &beside * beside.tr_mul(z),
             std: fit.std,
         })
     }
@@ -191,5 +255,35 @@ impl Gravity {
     fn contradicted(&self, directions: &DMatrix<f64>, torque: &DVector<f64>) -> bool {
         let squares = directions.tr_mul(torque).norm_squared() / (self.std * self.std);
         is_contradicted(squares, directions.ncols())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use rig_model::robot::{IRP6_TEMPLATE, ONE_LINK_TEMPLATE, TX40};
+    use std::path::Path;
+
+    #[test]
+    fn gravity_is_told_only_of_axes_that_it_loads() {
+        for (text, upright) in [
+            (TX40, Some(0)),
+            (IRP6_TEMPLATE, Some(0)),
+            (ONE_LINK_TEMPLATE, None),
+        ] {
+            let mut robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
+            for turned in [false, true] {
+                // A wall turns gravity onto the first axis.
+                if turned {
+                    robot.gravity = [9.81, 0.0, 0.0];
+                }
+                let loaded = loaded_joints(&robot).unwrap();
+                if let Some(joint) = upright {
+                    assert_eq!(loaded[joint], turned, "{}", robot.name);
+                }
+                assert!(loaded.iter().skip(1).take(2).all(|own| *own), "{loaded:?}");
+            }
+        }
     }
 }

@@ -37,6 +37,11 @@ fn arm() -> Robot {
 /// Torques by Lagrange's equations of the double pendulum, friction, and noise; the torque of joint k is read `scale[k]`
 /// times too large.
 fn recorded(scale: [f64; 2]) -> InMemory {
+    with_friction(scale, |_, _, _| 0.0)
+}
+
+/// The same with more friction of joint k at a position, a speed and a torque.
+fn with_friction(scale: [f64; 2], more: impl Fn(usize, [f64; 2], f64) -> f64) -> InMemory {
     let mut g = rand_pcg::Pcg64::seed_from_u64(31);
     let mut normal = move || (0..12).map(|_| g.random::<f64>()).sum::<f64>() - 6.0;
     let waves = [
@@ -70,7 +75,7 @@ fn recorded(scale: [f64; 2]) -> InMemory {
             + outer;
         block.t.push(t);
         for (j, torque) in [first, second].into_iter().enumerate() {
-            let friction = 0.4 * v[j].signum() + 0.2 * v[j];
+            let friction = 0.4 * v[j].signum() + 0.2 * v[j] + more(j, [q[j], v[j]], torque);
             let read = scale[j] * (torque + friction) + 0.1 * normal();
             block.joints[j].q.push(q[j] + 1e-5 * normal());
             block.joints[j].tau.push(read);
@@ -84,8 +89,11 @@ fn recorded(scale: [f64; 2]) -> InMemory {
 
 /// What is said of the torques of an arm as described.
 fn said(robot: &Robot, scale: [f64; 2]) -> (Vec<TorqueScale>, String) {
-    let recording = recorded(scale);
-    let found = identify(robot, &[&recording], &[], &Options::default()).unwrap();
+    said_of(robot, &recorded(scale))
+}
+
+fn said_of(robot: &Robot, recording: &InMemory) -> (Vec<TorqueScale>, String) {
+    let found = identify(robot, &[recording], &[], &Options::default()).unwrap();
     let own = found.warnings.iter().find_map(|warning| match warning {
         Warning::TorqueScale(list) => Some((list.clone(), warning.to_string())),
         _ => None,
@@ -171,4 +179,54 @@ fn a_torque_constant_of_one_joint_contradicts_the_other_joint() {
         );
     }
     assert!(text.contains("do not tell which"), "{text}");
+}
+
+/// Friction that changes with the position or grows with the load, beside links that are lighter than described: no torque
+/// constant is accused.
+#[test]
+fn friction_that_changes_is_no_torque_constant() {
+    type Friction = fn(usize, [f64; 2], f64) -> f64;
+    let cases: [(&str, Friction); 4] = [
+        ("beyond a position", |j, [q, v], _| {
+            if j == 0 && q > 0.3 { v.signum() } else { 0.0 }
+        }),
+        ("with the position", |j, [q, v], _| {
+            if j == 0 {
+                0.8 * (2.0 * q).cos() * v.signum()
+            } else {
+                0.0
+            }
+        }),
+        ("with the load", |j, [_, v], torque| {
+            if j == 1 {
+                0.15 * torque.abs() * v.signum()
+            } else {
+                0.0
+            }
+        }),
+        ("with load and speed", |j, [_, v], torque| {
+            if j == 1 {
+                torque.abs() * (0.06 * v.signum() + 0.05 * v)
+            } else {
+                0.0
+            }
+        }),
+    ];
+    for (name, friction) in cases {
+        let recording = with_friction([1.0; 2], friction);
+        for share in [1.0, 0.9] {
+            let mut robot = arm();
+            let body = robot.joints[1].inertial.as_mut().unwrap();
+            body.mass /= share;
+            body.first_moment[0] /= share;
+            let (found, text) = said_of(&robot, &recording);
+            assert!(
+                found.iter().all(|own| !own.masses_confirmed),
+                "{name}, {share}: {text}"
+            );
+            let whole = identify(&robot, &[&recording], &[], &Options::default()).unwrap();
+            let accused = |warning: &Warning| matches!(warning, Warning::TorqueDisagrees(_));
+            assert!(!whole.warnings.iter().any(accused), "{name}, {share}");
+        }
+    }
 }
