@@ -12,7 +12,7 @@
 use super::check::Check;
 use super::law;
 use super::map::{FrictionMap, FrictionMapOptions};
-use super::sweep::{reference_of, rows_of, treatment_of};
+use super::sweep::{can_be_loaded, friction_of, reference_of, rows_of, treatment_of};
 use super::text::{one_speed, text_of, too_few};
 use crate::error::IdentifyError;
 use crate::identification::Identification;
@@ -68,6 +68,9 @@ pub fn friction_map(
         noise: (identification.details.train.get(joint)).map_or(f64::INFINITY, |own| own.rms),
         number: joint + 1,
         kind: described.kind,
+        friction: friction_of(identification, joint),
+        loaded: can_be_loaded(robot, joint)?,
+        ratio: described.gear_ratio(),
     };
     let doubts = check.doubts(&points, &decision);
     let text = text_of(&decision, &points, described.kind);

@@ -20,6 +20,12 @@ pub(super) struct Check<'a> {
     /// Number of the joint, from 1.
     pub(super) number: usize,
     pub(super) kind: JointKind,
+    /// Identified viscous and Coulomb friction of the joint.
+    pub(super) friction: [f64; 2],
+    /// True if gravity can load the joint.
+    pub(super) loaded: bool,
+    /// Motor turns per turn of the joint.
+    pub(super) ratio: f64,
 }
 
 impl Check<'_> {
@@ -34,23 +40,35 @@ impl Check<'_> {
             stribeck.unwrap_or_else(|| decision.simple.clone())
         };
         let recorded = chosen(decision, decision.warranted);
-        let clock = self.rows.late().and_then(|late| {
+        let cause = self.rows.cause(self.friction, self.loaded);
+        let late = self.rows.late();
+        // The better of two explanations counts.
+        let is_late = late
+            .as_ref()
+            .is_some_and(|late| (cause.as_ref()).is_none_or(|cause| late.moved < cause.left));
+        let cause = cause
+            .filter(|_| !is_late)
+            .map(|own| own.told(self.sweep, self.joint, self.number, self.ratio));
+        let strange = || {
+            let shown = self.rows.gravity_shown(points);
+            shown.doubt(self.noise, self.sweep, self.joint, self.number)
+        };
+        let scale = if self.loaded { strange() } else { None };
+        let clock = late.filter(|_| is_late).and_then(|late| {
             let moved = self.rows.earlier(late.by)?;
             let (points, _) = moved.points(self.stretches, self.options);
             let moved = chosen(&law::decide(&points)?, decision.warranted);
             consistency::late_doubt(
                 &late,
                 [&recorded, &moved],
+                scale.is_some(),
                 self.sweep,
                 self.number,
                 units[1],
             )
         });
-        let scale = || {
-            (self.rows.gravity_shown(points)).doubt(self.noise, self.sweep, self.joint, self.number)
-        };
         let impossible =
             consistency::impossible(&recorded, points.len(), self.joint, self.number, units);
-        (clock.or_else(scale).into_iter().chain(impossible)).collect()
+        (cause.or(clock).or(scale).into_iter().chain(impossible)).collect()
     }
 }

@@ -294,10 +294,11 @@ pub(super) fn impossible(
     })
 }
 
-/// Returns a sentence about a late torque; none if both laws agree within their intervals.
+/// Returns a sentence about a late torque; none if both laws agree within their intervals and gravity is not `strange`.
 pub(super) fn late_doubt(
     late: &Late,
     [recorded, moved]: [&FrictionFit; 2],
+    strange: bool,
     sweep: &str,
     n: usize,
     viscous: &str,
@@ -306,8 +307,9 @@ pub(super) fn late_doubt(
         let half = recorded.half_interval.get(k).copied().unwrap_or(0.0);
         (a - b).abs() > half
     };
-    if !changes(recorded.coulomb, moved.coulomb, 0) && !changes(recorded.viscous, moved.viscous, 1)
-    {
+    let other_law =
+        changes(recorded.coulomb, moved.coulomb, 0) || changes(recorded.viscous, moved.viscous, 1);
+    if !other_law && !strange {
         return None;
     }
     let (word, mend) = if late.by > 0.0 {

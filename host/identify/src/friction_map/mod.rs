@@ -1,6 +1,7 @@
 //! Friction against speed, from a recording with stretches of constant speed.
 
 mod build;
+mod cause;
 mod check;
 mod consistency;
 mod law;

@@ -1,11 +1,12 @@
 //! Rows of a sweep: torque, reference and the torque of the identified model.
 
-use rig_shared::multibody::{COLUMNS, column, differential_regressor};
+use rig_shared::multibody::{COLUMNS, column, differential_regressor, inverse_dynamics};
 
 use super::passes::Signal;
 use super::rows::Rows;
 use crate::error::IdentifyError;
 use crate::identification::Identification;
+use crate::steps::torque_scale::poses;
 use crate::structure::chain::chain_of;
 use crate::treatment::decide::treatment_for;
 use rig_data::prepare::{
@@ -124,4 +125,39 @@ pub(super) fn rows_of(
         Ok(())
     })?;
     Ok(rows)
+}
+
+/// Returns the identified viscous and Coulomb friction of a joint; 0 for a parameter that is not in the model.
+pub(super) fn friction_of(identification: &Identification, joint: usize) -> [f64; 2] {
+    let details = &identification.details;
+    [column::VISCOUS, column::COULOMB].map(|own| {
+        let mut all = details.columns.iter().zip(&details.estimate.values);
+        let found = all.find(|(c, _)| **c == joint * COLUMNS + own);
+        found.map_or(0.0, |(_, value)| *value)
+    })
+}
+
+/// Returns true if gravity loads a joint in some pose, for bodies of any shape.
+pub(super) fn can_be_loaded(robot: &Robot, joint: usize) -> Result<bool, IdentifyError> {
+    let chain = chain_of(robot)?;
+    let n = robot.joints.len();
+    let (still, mut torque) = (vec![0.0; n], vec![0.0; n]);
+    for (mass, first_moment) in [
+        (1.0, [0.0; 3]),
+        (1.0, [0.3, 0.2, 0.1]),
+        (1.0, [-0.1, 0.3, 0.2]),
+    ] {
+        let mut body = [0.0; COLUMNS];
+        body[column::MASS] = mass;
+        body[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&first_moment);
+        for q in poses(n) {
+            inverse_dynamics(&chain, &vec![body; n], &q, &still, &still, &mut torque)
+                .map_err(|e| IdentifyError::Model(e.to_string()))?;
+            // Unit bodies on arms of any size, N·m; rounded angles of a description tilt an axis by 1e-5.
+            if torque[joint].abs() > 1e-3 {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
 }
