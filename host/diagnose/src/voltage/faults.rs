@@ -24,8 +24,33 @@ const BOTH_WAYS: f64 = 0.1;
 const STEADY: f64 = 0.1;
 /// Ratio of residuals below which another factor of the position is believed.
 const BETTER: f64 = 0.35;
-/// Ratio within which a factor is a thousand: friction adds to the back-EMF, the torque constant is uncertain.
-const THOUSAND: f64 = 5.0;
+/// Ratio within which the back-EMF is the described one: friction adds to it, and the torque constant is uncertain.
+const UNCERTAIN: f64 = 5.0;
+/// Ratio within which a factor is a hundred; a thousandth and a duty cycle are as near beyond it.
+const HUNDRED: f64 = 2.5;
+/// Largest duty cycle, with rounding.
+const FULL: f64 = 1.01;
+/// Largest delay of a voltage that is searched, s.
+const LONGEST: f64 = 0.15;
+/// Longest delay from filters and buses, s.
+const SHORTEST: f64 = 0.01;
+/// Share of the largest voltage by which one without its sign may be below zero: noise.
+const ONE_SENSE: f64 = 0.02;
+
+/// What a voltage looks like by its back-EMF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum VoltageUnit {
+    /// mV
+    Milli,
+    /// kV
+    Kilo,
+    /// Hundredths of a volt.
+    Centi,
+    /// A share of the supply.
+    Duty,
+    /// None that has a name.
+    Unknown,
+}
 
 /// A fault of a recording, or of all.
 #[derive(Clone, Debug)]
@@ -49,11 +74,22 @@ pub(crate) enum Wrong {
         /// Residual shares of the voltage's squares, as recorded and with the factor.
         left: [f64; 2],
     },
-    /// A voltage in mV, else in kV.
+    /// A voltage in another unit.
     VoltageScaled {
-        milli: bool,
+        unit: VoltageUnit,
         /// Back-EMF, V·s/rad, found and described.
         emf: [f64; 2],
+    },
+    /// A voltage that is `by` seconds behind the position.
+    Late {
+        by: f64,
+        /// Residual shares of the voltage's squares, as recorded and with the shift.
+        left: [f64; 2],
+    },
+    /// A voltage without its sign.
+    Magnitude {
+        /// Residual shares of the voltage's squares, as recorded and with the sense of the motion.
+        left: [f64; 2],
     },
 }
 
@@ -71,6 +107,8 @@ impl Wrong {
             | Self::Dead
             | Self::Supply { .. }
             | Self::VoltageScaled { .. } => FaultKind::Unit,
+            Self::Late { .. } => FaultKind::Clock,
+            Self::Magnitude { .. } => FaultKind::Magnitude,
         }
     }
 }
@@ -100,6 +138,7 @@ pub(crate) fn faults(
     let train = read[0];
     let wrong = (too_short(train).or_else(|| still(train)))
         .or_else(|| dead(train))
+        .or_else(|| changed(train))
         .or_else(|| turned(plant, train))
         .or_else(|| position_scale(joint, train))
         .or_else(|| voltage_scale(joint, plant, train));
@@ -154,6 +193,79 @@ fn dead(logs: &[Log]) -> Option<Wrong> {
     (both && high - low < STEADY * most).then_some(Wrong::Supply { low, high })
 }
 
+/// Returns the logs with other voltages.
+fn with_voltages(logs: &[Log], change: impl Fn(&Log) -> Vec<f64>) -> Vec<Log> {
+    let other = |log: &Log| Log {
+        u: change(log),
+        ..log.clone()
+    };
+    logs.iter().map(other).collect()
+}
+
+/// Returns a fault if a voltage at another time, or with the sense of the motion, fits far better; of both the better.
+fn changed(logs: &[Log]) -> Option<Wrong> {
+    let recorded = left_of_voltage(logs, 1.0)?;
+    let late = late(logs);
+    let size = magnitude(logs);
+    let least = |own: &Option<(f64, Wrong)>| own.as_ref().map_or(f64::INFINITY, |own| own.0);
+    let best = match least(&size) < least(&late) {
+        true => size,
+        false => late,
+    };
+    best.filter(|(left, _)| *left < BETTER * recorded)
+        .map(|(_, wrong)| wrong)
+}
+
+/// Returns the shift of the voltage with the least residual, and that residual.
+fn late(logs: &[Log]) -> Option<(f64, Wrong)> {
+    let recorded = left_of_voltage(logs, 1.0)?;
+    let (time, rows) = logs.iter().fold((0.0, 0), |(time, rows), log| {
+        (time + log.duration(), rows + log.t.len())
+    });
+    let step = time / rows.max(1) as f64;
+    let reach = (LONGEST / step).ceil() as i64;
+    let moved = |by: i64| {
+        let moved = with_voltages(logs, |log| {
+            let last = log.u.len() as i64 - 1;
+            let at = |k: i64| log.u[(k + by).clamp(0, last.max(0)) as usize];
+            (0..=last).map(at).collect()
+        });
+        left_of_voltage(&moved, 1.0)
+    };
+    let (by, left) = (-reach..=reach)
+        .filter_map(|by| Some((by, moved(by)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    // At the end of the search nothing shows a minimum.
+    let found = by.abs() < reach && by.abs() as f64 * step > SHORTEST;
+    found.then_some((
+        left,
+        Wrong::Late {
+            by: by as f64 * step,
+            left: [recorded, left],
+        },
+    ))
+}
+
+/// Returns the residual of the voltage with the sense of the motion, if it has one sense only as recorded.
+fn magnitude(logs: &[Log]) -> Option<(f64, Wrong)> {
+    let all = || logs.iter().flat_map(|log| &log.u);
+    let most = all().fold(0.0_f64, |most, u| most.max(u.abs()));
+    if all().any(|u| *u < -ONE_SENSE * most) {
+        return None;
+    }
+    let signed = with_voltages(logs, |log| {
+        let sense = |k: usize| log.slope(k)[0].signum();
+        (0..log.u.len()).map(|k| log.u[k] * sense(k)).collect()
+    });
+    let (recorded, left) = (left_of_voltage(logs, 1.0)?, left_of_voltage(&signed, 1.0)?);
+    Some((
+        left,
+        Wrong::Magnitude {
+            left: [recorded, left],
+        },
+    ))
+}
+
 /// Returns a fault if gravity's period shows a multiple of the joint's position.
 fn position_scale(joint: &Joint, logs: &[Log]) -> Option<Wrong> {
     if joint.kind == JointKind::Prismatic {
@@ -171,18 +283,23 @@ fn position_scale(joint: &Joint, logs: &[Log]) -> Option<Wrong> {
     })
 }
 
-/// Returns a fault if the recordings show the back-EMF, and it is a thousand times the described, or a thousandth.
+/// Returns a fault if the recordings show the back-EMF, and it is far from the described one.
 fn voltage_scale(joint: &Joint, plant: &Plant, logs: &[Log]) -> Option<Wrong> {
     let emf = joint.drive.as_ref()?.torque_constant * plant.ratio.abs();
     let found = back_emf(plant, logs)?;
     let factor = found / emf;
-    let milli = match factor {
-        f if (f / 1e3).ln().abs() < THOUSAND.ln() => true,
-        f if (f * 1e3).ln().abs() < THOUSAND.ln() => false,
-        _ => return None,
+    let most = (logs.iter().flat_map(|log| &log.u)).fold(0.0_f64, |most, u| most.max(u.abs()));
+    let near = |unit: f64| (factor / unit).ln().abs();
+    let unit = match () {
+        () if near(1.0) < UNCERTAIN.ln() => return None,
+        () if near(1e3) < UNCERTAIN.ln() && near(1e3) < near(100.0) => VoltageUnit::Milli,
+        () if near(100.0) < HUNDRED.ln() => VoltageUnit::Centi,
+        () if near(1e-3) < UNCERTAIN.ln() => VoltageUnit::Kilo,
+        () if factor < 1.0 && most <= FULL => VoltageUnit::Duty,
+        () => VoltageUnit::Unknown,
     };
     Some(Wrong::VoltageScaled {
-        milli,
+        unit,
         emf: [found, emf],
     })
 }

@@ -2,7 +2,7 @@
 
 use crate::faults::sentences::name;
 use crate::voltage::controllers::{Driven, Shown};
-use crate::voltage::faults::{FEWEST_STEPS, FEWEST_WINDOWS, Wrong};
+use crate::voltage::faults::{FEWEST_STEPS, FEWEST_WINDOWS, VoltageUnit, Wrong};
 use crate::voltage::fit::WINDOW;
 use crate::voltage::free_run::FreeRun;
 use crate::voltage::halt::Cause;
@@ -69,11 +69,40 @@ pub(super) fn fault(wrong: &Wrong) -> String {
                 name(named)
             )
         }
-        Wrong::VoltageScaled { milli, emf } => {
-            let what = if *milli { "mV" } else { "kV" };
+        Wrong::VoltageScaled { unit, emf } => {
+            let [what, mend] = match unit {
+                VoltageUnit::Milli => ["u1 looks like mV", "give it in V"],
+                VoltageUnit::Kilo => ["u1 looks like kV", "give it in V"],
+                VoltageUnit::Centi => ["u1 looks like hundredths of a volt", "give it in V"],
+                VoltageUnit::Duty => [
+                    "u1 looks like a duty cycle",
+                    "give it in V, or name it duty1 with the supply as supply",
+                ],
+                VoltageUnit::Unknown => [
+                    "u1 is no voltage of the described drive",
+                    "check its unit (V; a duty cycle is duty1 with the supply as supply), the torque constant and the gear ratio",
+                ],
+            };
             let [found, stated] = emf.map(|x| format_significant(x, 3));
             format!(
-                "u1 looks like {what}: the back-EMF comes out at {found} V·s/rad, where the description's torque constant and gear ratio make {stated}; give it in V."
+                "{what}: the back-EMF comes out at {found} V·s/rad, where the description's torque constant and gear ratio make {stated}; {mend}."
+            )
+        }
+        Wrong::Late { by, left } => {
+            let [recorded, own] = left.map(|share| format_significant(100.0 * share, 2));
+            let [word, mend] = match *by > 0.0 {
+                true => ["behind", "earlier"],
+                false => ["ahead of", "later"],
+            };
+            format!(
+                "u1 is {} s {word} q1: moved that much {mend}, the model leaves {own} % of its squares, as recorded {recorded} %; give both by one clock.",
+                format_significant(by.abs(), 2)
+            )
+        }
+        Wrong::Magnitude { left } => {
+            let [recorded, own] = left.map(|share| format_significant(100.0 * share, 2));
+            format!(
+                "u1 is never negative though the joint turns both ways: it is a magnitude whose sign was lost (with the sense of the motion the model leaves {own} % of its squares, as recorded {recorded} %). Record the signed voltage."
             )
         }
     }

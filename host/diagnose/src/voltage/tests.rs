@@ -298,6 +298,12 @@ fn voltages_that_are_none_and_units_are_told() {
     assert!(millivolts.contains("u1 looks like mV"), "{millivolts}");
     let kilovolts = fault_of(|joint| volts(joint, &|u| 0.001 * u));
     assert!(kilovolts.contains("u1 looks like kV"), "{kilovolts}");
+    let hundredths = fault_of(|joint| volts(joint, &|u| 100.0 * u));
+    assert!(hundredths.contains("hundredths of a volt"), "{hundredths}");
+    for supply in [12.0, 24.0, 48.0] {
+        let duty = fault_of(|joint| volts(joint, &|u| u / supply));
+        assert!(duty.contains("u1 looks like a duty cycle"), "{duty}");
+    }
     for (factor, words) in [
         (1.0 / std::f64::consts::TAU, "it looks like turns"),
         (0.5, "it is half what it should be"),
@@ -305,6 +311,30 @@ fn voltages_that_are_none_and_units_are_told() {
         let scaled = fault_of(|joint| joint.q.iter_mut().for_each(|q| *q *= factor));
         assert!(scaled.contains(words), "{scaled}");
     }
+}
+
+#[test]
+fn a_voltage_at_another_time_or_without_its_sign_is_told() {
+    for (rows, words) in [
+        (8, "behind q1"),
+        (15, "behind q1"),
+        (-10_i64, "ahead of q1"),
+    ] {
+        let late = fault_of(|joint| {
+            let u = joint.voltage.as_mut().unwrap();
+            let sound = u.clone();
+            let last = sound.len() as i64 - 1;
+            for (k, u) in u.iter_mut().enumerate() {
+                *u = sound[(k as i64 - rows).clamp(0, last) as usize];
+            }
+        });
+        assert!(late.contains(words), "{rows}: {late}");
+    }
+    let size = fault_of(|joint| {
+        let u = joint.voltage.as_mut().unwrap();
+        u.iter_mut().for_each(|u| *u = u.abs());
+    });
+    assert!(size.contains("a magnitude whose sign was lost"), "{size}");
 }
 
 /// Real recordings of lifts and drops, in which friction hides the back-EMF: no unit is accused.
