@@ -46,8 +46,11 @@ pub struct Block {
     pub joints: Vec<JointColumns>,
     /// Columns without a meaning for the model, kept by name (for instance `pulses`).
     pub extra: Vec<(String, Vec<f64>)>,
-    /// Line of the first row in the file (1-based; in MCAP the number of the message).
+    /// Line of the first row in the file (1-based; in MCAP the number of the message); if it was interpolated, that of
+    /// the next row that was not.
     pub first_line: u64,
+    /// Rows that the file does not have, in order: they were interpolated between those around them.
+    pub interpolated: Vec<usize>,
     /// True if this block follows the previous one without a gap in time.
     pub continues: bool,
 }
@@ -75,6 +78,11 @@ impl Block {
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.t.len()
+    }
+    /// Returns the line of a row in the file, as [`Self::first_line`].
+    pub fn line(&self, row: usize) -> u64 {
+        let before = self.interpolated.partition_point(|own| *own < row);
+        self.first_line + (row - before) as u64
     }
     /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {

@@ -24,6 +24,7 @@
 mod array;
 mod bag;
 mod bag_table;
+mod between_rows;
 mod binary_number;
 mod block;
 mod bursts;
@@ -59,6 +60,7 @@ mod mcap_messages;
 mod mcap_records;
 mod mcap_rows;
 mod mcap_sorted;
+mod missing_rows;
 mod motors;
 mod npz;
 mod npz_writer;

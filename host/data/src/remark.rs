@@ -243,6 +243,18 @@ pub enum Remark {
         /// The first one.
         first: Place,
     },
+    /// Rows that are missing in an even clock.
+    #[error("{} interpolated between the rows around them; the first is before {first}", missing_words(*rows, *places, *most))]
+    MissingRows {
+        /// Number of rows.
+        rows: u64,
+        /// Number of gaps.
+        places: u64,
+        /// Most rows in one gap.
+        most: usize,
+        /// The row after the first gap.
+        first: Place,
+    },
     /// Velocities that are not numbers.
     #[error(
         "the velocity of joint \"{joint}\" is NaN in the first message: the velocities are not read"
@@ -251,6 +263,16 @@ pub enum Remark {
         /// The joint.
         joint: String,
     },
+}
+
+/// Says how many rows are missing where.
+fn missing_words(rows: u64, places: u64, most: usize) -> String {
+    match (rows, places, most) {
+        (1, ..) => "1 missing row is".to_owned(),
+        (_, 1, _) => format!("{rows} missing rows in one gap are"),
+        (_, _, 1) => format!("{rows} missing rows (one in a row) are"),
+        _ => format!("{rows} missing rows in {places} gaps (up to {most} in a row) are"),
+    }
 }
 
 impl Remark {
@@ -293,6 +315,7 @@ impl Remark {
             Self::RowUnit { .. } => 25,
             Self::RowNumbers => 26,
             Self::OtherColumns { .. } => 27,
+            Self::MissingRows { .. } => 28,
         }
     }
 }

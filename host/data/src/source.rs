@@ -1,5 +1,6 @@
 //! A recording as a stream of blocks that can be read repeatedly.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use super::block::{Block, JointColumns};
@@ -12,9 +13,11 @@ use super::header::Header;
 use super::joined_rows::JoinedRows;
 use super::layout::layout;
 use super::mapping::Mapping;
+use super::missing_rows::{BESIDE, MissingRows, filled, last_rows};
 use super::motors::{MotorPass, MotorSide};
 use super::parquet::ParquetRows;
 use super::place::Place;
+use super::prepare::{append, stretch};
 use super::quantity::Quantity;
 use super::remark::Remark;
 use super::rounded_time::RoundedTime;
@@ -28,6 +31,10 @@ const PROBED_ROWS: usize = 1001;
 
 /// Number of warnings kept per recording; more are only counted, so that memory does not grow.
 pub const KEPT_WARNINGS: usize = 1000;
+
+/// Number of rows by which a block may be longer before missing rows are interpolated, so that it does not end beside a
+/// gap.
+const BESIDE_A_GAP: usize = 64;
 
 /// A recording whose header fits the robot.
 #[derive(Clone, Debug)]
@@ -268,6 +275,7 @@ impl Source {
                     | Remark::CutRow { .. }
                     | Remark::OpenEnd { .. }
                     | Remark::Copies { .. }
+                    | Remark::MissingRows { .. }
             )
         };
         let kept = remarks.filter(|remark| !is_late(remark));
@@ -352,7 +360,8 @@ impl Source {
     }
 
     /// Reads the recording once, in blocks of at most `rows_per_block` rows (at least 1). A block ends early before a
-    /// gap or an uneven step in time. After an error there are no further blocks.
+    /// gap or an uneven step in time. Up to four missing rows in a row of an even clock are interpolated, and a warning
+    /// counts them. After an error there are no further blocks.
     pub fn blocks(&self, rows_per_block: usize) -> Blocks<'_> {
         Blocks {
             source: self,
@@ -370,6 +379,11 @@ impl Source {
             named_extras: vec![false; self.layout.columns.len()],
             motors: self.layout.motors.as_ref().map(MotorSide::pass),
             rounded: self.sampling.corrected(),
+            missing: MissingRows::default(),
+            since_gap: BESIDE,
+            has_gaps: false,
+            context: Block::default(),
+            ready: VecDeque::new(),
         }
     }
 
@@ -417,6 +431,16 @@ pub struct Blocks<'a> {
     motors: Option<MotorPass>,
     /// Correction of rounded stamps.
     rounded: Option<RoundedTime>,
+    /// Rows that are interpolated.
+    missing: MissingRows,
+    /// Number of rows since the last gap that is interpolated.
+    since_gap: usize,
+    /// True if rows of the next block, or in front of it, are missing.
+    has_gaps: bool,
+    /// The last rows of the block before.
+    context: Block,
+    /// Blocks that are complete.
+    ready: VecDeque<Block>,
 }
 
 impl Blocks<'_> {
@@ -443,7 +467,13 @@ impl Blocks<'_> {
 
     /// Adds the warnings that concern the whole file.
     fn hear_the_rows(&mut self) {
-        let remarks = self.rows.as_ref().map(Rows::remarks).unwrap_or_default();
+        let mut remarks = self.rows.as_ref().map(Rows::remarks).unwrap_or_default();
+        remarks.extend(self.missing.first.map(|first| Remark::MissingRows {
+            rows: self.missing.rows,
+            places: self.missing.places,
+            most: self.missing.most,
+            first,
+        }));
         for remark in remarks {
             let warning = Warning::Reading { remark };
             if !self.source.warnings().contains(&warning) {
@@ -461,6 +491,7 @@ impl Blocks<'_> {
             joints: vec![JointColumns::default(); layout.joints],
             extra: Vec::with_capacity(layout.extras),
             first_line,
+            interpolated: Vec::new(),
             continues: self.continues,
         };
         for c in &layout.columns {
@@ -629,17 +660,64 @@ impl Blocks<'_> {
         Ok(self.pardoned)
     }
 
+    /// Ends the stretch before the row at `now`.
+    fn part(&mut self, line: u64, from: f64, now: f64) {
+        self.gaps += 1;
+        self.warn((self.source.sampling).parting(self.source.place(line), from, now));
+        self.continues = false;
+        self.since_gap = BESIDE;
+    }
+
+    /// Counts the rows that are missing before the row at `now`, to be interpolated.
+    fn count_missing(&mut self, line: u64, from: f64, now: f64) {
+        let rows = self.source.sampling.missing(now - from);
+        if rows > 0 {
+            self.missing.count(rows, self.source.place(line));
+            (self.since_gap, self.has_gaps) = (0, true);
+        }
+    }
+
+    /// Returns the next block with its missing rows.
     fn next_block(&mut self) -> Result<Option<Block>, DataError> {
+        if let Some(block) = self.ready.pop_front() {
+            return Ok(Some(block));
+        }
+        let Some(block) = self.next_recorded()? else {
+            return Ok(None);
+        };
+        if !block.continues {
+            self.context = Block::default();
+        }
+        if !std::mem::take(&mut self.has_gaps) {
+            let mut rows = std::mem::take(&mut self.context);
+            append(&mut rows, last_rows(&block));
+            self.context = last_rows(&rows);
+            return Ok(Some(block));
+        }
+        let all = filled(&mut self.context, block, &self.source.sampling);
+        let starts = (0..all.len()).step_by(self.rows_per_block);
+        let parts = starts.map(|from| {
+            let end = from.saturating_add(self.rows_per_block);
+            stretch(&all, from, end.min(all.len()))
+        });
+        self.ready = parts.collect();
+        Ok(self.ready.pop_front())
+    }
+
+    /// Returns true if a block may end here.
+    fn is_full(&self, block: &Block) -> bool {
+        let most = self.rows_per_block.saturating_add(BESIDE_A_GAP);
+        block.len() >= most || block.len() >= self.rows_per_block && self.since_gap >= BESIDE
+    }
+
+    fn next_recorded(&mut self) -> Result<Option<Block>, DataError> {
         let source = self.source;
         if self.rows.is_none() {
             self.rows = Some(source.rows()?);
         }
         let mut block: Option<Block> = None;
         loop {
-            if block
-                .as_ref()
-                .is_some_and(|b| b.len() >= self.rows_per_block)
-            {
+            if block.as_ref().is_some_and(|block| self.is_full(block)) {
                 self.continues = true;
                 return Ok(block);
             }
@@ -657,17 +735,20 @@ impl Blocks<'_> {
                     }
                     let before = self.previous.replace(now);
                     let pardoned = std::mem::take(&mut self.pardoned);
+                    self.since_gap = self.since_gap.saturating_add(1);
                     if let Some(from) = before
                         && !pardoned
-                        && source.sampling.parts(now - from)
+                        && source.sampling.is_uneven(now - from)
                         && !self.misplaced(line, from, now)?
                     {
-                        self.gaps += 1;
-                        self.warn(source.sampling.parting(source.place(line), from, now));
-                        self.continues = false;
-                        if block.is_some() {
-                            self.pending = Some(line);
-                            return Ok(block);
+                        if !source.sampling.parts(now - from) {
+                            self.count_missing(line, from, now);
+                        } else {
+                            self.part(line, from, now);
+                            if block.is_some() {
+                                self.pending = Some(line);
+                                return Ok(block);
+                            }
                         }
                     }
                     line

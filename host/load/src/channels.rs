@@ -402,7 +402,8 @@ fn seen(recording: &dyn Recording, robot: &Robot) -> Result<Seen, LoadError> {
             steps.push(*t, block.joints.iter().map(|joint| joint.q[k]).collect());
         }
         for (channel, list) in channels.iter_mut().zip(readings) {
-            for (value, line) in list.iter().zip(block.first_line..) {
+            for (row, value) in list.iter().enumerate() {
+                let line = block.line(row);
                 channel.highest[0].push(*value, line);
                 channel.highest[1].push(-value, line);
                 channel.low = channel.low.min(*value);

@@ -127,7 +127,7 @@ impl Frozen {
         for row in 0..block.len() {
             self.travel.push(row, block);
             self.rows += 1;
-            let line = block.first_line + row as u64;
+            let line = block.line(row);
             for (channel, list) in self.channels.iter_mut().zip(readings) {
                 channel.push(list[row], line, &self.travel);
             }

@@ -152,7 +152,7 @@ pub(crate) fn each_readings(
 fn no_number(block: &Block) -> Option<u64> {
     let list = temperature(&block.extra)?;
     let at = list.iter().position(|value| !value.is_finite())?;
-    Some(block.first_line + at as u64)
+    Some(block.line(at))
 }
 
 /// Returns the six columns of the sensor; the name of the first that is missing otherwise.

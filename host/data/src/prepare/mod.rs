@@ -31,6 +31,7 @@ pub use error::PrepareError;
 pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
 pub use motion::later;
 pub use motion::{JointMotion, Motion, each_motion, worked_motion};
+pub(crate) use pieces::append;
 pub use pieces::{Beginning, Changed, LongestPart, first_block, longest_part, stretch};
 pub use pieces::{InMemory, Piece, Recording, Unburdened, each_piece};
 pub use preprocessing_plan::MAX_CUTOFF_SHARE;

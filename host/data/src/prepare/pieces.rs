@@ -286,12 +286,17 @@ pub fn stretch(block: &Block, start: usize, end: usize) -> Block {
             .iter()
             .map(|(name, column)| (name.clone(), of(column)))
             .collect(),
-        first_line: block.first_line + start as u64,
+        first_line: block.line(start),
+        interpolated: (block.interpolated.iter())
+            .filter(|row| (start..end).contains(*row))
+            .map(|row| row - start)
+            .collect(),
         continues: start > 0 || block.continues,
     }
 }
 
-fn append(block: &mut Block, mut more: Block) {
+/// Appends the rows of a block to those before it.
+pub(crate) fn append(block: &mut Block, mut more: Block) {
     if block.is_empty() {
         *block = more;
         return;
@@ -302,6 +307,9 @@ fn append(block: &mut Block, mut more: Block) {
             _ => *a = None,
         }
     }
+    let rows = block.len();
+    let interpolated = more.interpolated.iter().map(|row| row + rows);
+    block.interpolated.extend(interpolated);
     block.t.append(&mut more.t);
     for (a, b) in block.joints.iter_mut().zip(more.joints) {
         a.q.extend(b.q);
@@ -320,8 +328,10 @@ fn append(block: &mut Block, mut more: Block) {
 }
 
 fn drop_front(block: &mut Block, rows: usize) {
+    block.first_line = block.line(rows);
+    block.interpolated.retain(|row| *row >= rows);
+    block.interpolated.iter_mut().for_each(|row| *row -= rows);
     block.t.drain(..rows);
-    block.first_line += rows as u64;
     for joint in &mut block.joints {
         joint.q.drain(..rows);
         joint.tau.drain(..rows);

@@ -2,6 +2,7 @@
 
 use super::error::PrepareError;
 use super::pieces::Recording;
+use crate::between_rows::{between, cubic};
 use crate::block::{Block, JointColumns};
 
 /// A recording whose stretches between gaps are interpolated at t₀, t₀ + Δ, t₀ + 2Δ, …; its time stamps are trusted.
@@ -84,27 +85,6 @@ struct Row {
     extra: Vec<f64>,
 }
 
-/// Interpolates at the fraction `u` from `a` to `b`; between two whole numbers returns the nearer one.
-fn between(a: f64, b: f64, u: f64) -> f64 {
-    match a.fract() == 0.0 && b.fract() == 0.0 {
-        true if u < 0.5 => a,
-        true => b,
-        false => a + u * (b - a),
-    }
-}
-
-/// Slope of the parabola through three points at point number `at`.
-fn slope(points: [(f64, f64); 3], at: usize) -> f64 {
-    let [(t0, x0), (t1, x1), (t2, x2)] = points;
-    let (left, right) = ((x1 - x0) / (t1 - t0), (x2 - x1) / (t2 - t1));
-    let bend = (right - left) / (t2 - t0);
-    match at {
-        0 => left - bend * (t1 - t0),
-        1 => left + bend * (t1 - t0),
-        _ => right + bend * (t2 - t1),
-    }
-}
-
 /// Rows waiting for interpolation, and the interpolated rows.
 struct Grid {
     period: f64,
@@ -118,23 +98,10 @@ struct Grid {
 
 impl Grid {
     fn value(&self, s: usize, from: usize, t: f64) -> f64 {
-        let at = |k: usize| (self.rows[k].t, self.rows[k].values[s]);
-        let ((t0, x0), (t1, x1)) = (at(from), at(from + 1));
-        let width = t1 - t0;
-        let chord = (x1 - x0) / width;
-        let last = self.rows.len() - 1;
-        let slope_at = |k: usize| {
-            if last < 2 {
-                return chord;
-            }
-            let middle = k.clamp(1, last - 1);
-            slope([at(middle - 1), at(middle), at(middle + 1)], k + 1 - middle)
-        };
-        let u = (t - t0) / width;
-        let (d0, d1) = (slope_at(from) * width, slope_at(from + 1) * width);
-        // Cubic Hermite interpolation.
-        let (a, b) = (d0 - (x1 - x0), (x1 - x0) - d1);
-        x0 + u * (x1 - x0) + u * (1.0 - u) * ((1.0 - u) * a + u * b)
+        let points: Vec<(f64, f64)> = (self.rows.iter())
+            .map(|row| (row.t, row.values[s]))
+            .collect();
+        cubic(&points, from, t)
     }
 
     /// Interpolates between the rows `from` and `from + 1`. The later row belongs to the next interval unless it is the
@@ -248,7 +215,7 @@ impl Recording for Resampled<'_> {
             for (k, t) in block.t.iter().enumerate() {
                 grid.push(Row {
                     t: *t,
-                    line: block.first_line + k as u64,
+                    line: block.line(k),
                     values: block
                         .joints
                         .iter()
@@ -310,6 +277,7 @@ mod tests {
                     ),
                 ],
                 first_line: from as u64 + 2,
+                interpolated: Vec::new(),
                 continues,
                 t,
             }

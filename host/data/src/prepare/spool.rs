@@ -99,6 +99,11 @@ fn write(to: &mut File, record: &mut Vec<u8>, block: &Block) -> std::io::Result<
     begin(record);
     put_count(record, block.first_line as usize);
     put_count(record, usize::from(block.continues));
+    put_count(record, block.interpolated.len());
+    block
+        .interpolated
+        .iter()
+        .for_each(|row| put_count(record, *row));
     put_numbers(record, block.t.iter());
     put_count(record, block.joints.len());
     for joint in &block.joints {
@@ -125,6 +130,9 @@ fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<Option<Block>>
     let mut record = Record(record);
     let first_line = record.count()? as u64;
     let continues = record.count()? == 1;
+    let interpolated = (0..record.count()?)
+        .map(|_| record.count())
+        .collect::<std::io::Result<Vec<_>>>()?;
     let t = record.list()?;
     let joints = (0..record.count()?)
         .map(|_| {
@@ -154,6 +162,7 @@ fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<Option<Block>>
         joints,
         extra,
         first_line,
+        interpolated,
         continues,
     }))
 }
@@ -202,6 +211,7 @@ mod tests {
                 .map(|name| ((*name).to_owned(), list(from, 1.0)))
                 .collect(),
             first_line: from as u64 + 2,
+            interpolated: vec![1],
             continues,
         };
         let source = Counted(

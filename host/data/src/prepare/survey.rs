@@ -254,7 +254,7 @@ impl Survey {
                 });
             }
             for k in 0..block.len() {
-                let line = block.first_line + k as u64;
+                let line = block.line(k);
                 let follows = spacing.push(block.t[k], line, k > 0 || block.continues);
                 let rate = spacing.rate();
                 for (r, column) in running.iter_mut().zip(&block.joints) {
