@@ -217,6 +217,16 @@ fn counts_crept(samples: &[(u64, Sample)], told: &[(RequestBody, [u64; 2])]) -> 
     crept
 }
 
+/// Whether two estimates are equal bit for bit. The tick of a request is not known exactly, so one row with the bridge off may lie
+/// before the restart that it causes, or behind it.
+fn is_same(sent: &Estimate, own: &Estimate) -> bool {
+    let mut own = *own;
+    if own.rows.masked.abs_diff(sent.rows.masked) <= 1 {
+        own.rows.masked = sent.rows.masked;
+    }
+    own == *sent
+}
+
 /// Runs the desktop's library over the samples; gives how many of the estimates sent it equals bit for bit.
 fn replay(
     samples: &[(u64, Sample)],
@@ -244,7 +254,7 @@ fn replay(
             while next.peek().is_some_and(|e| e.tick < estimate.tick) {
                 next.next();
             }
-            if next.peek().is_some_and(|e| ***e == estimate) {
+            if next.peek().is_some_and(|e| is_same(e, &estimate)) {
                 equal += 1;
                 next.next();
             }
