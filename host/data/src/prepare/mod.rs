@@ -42,5 +42,5 @@ pub use resampling::interpolation;
 pub use resampling::{MaybeResampled, as_recordings, surveyed};
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
 pub use spool::Spooled;
-pub use survey::{JointSurvey, PILE_UP, Survey};
+pub use survey::{JointSurvey, Survey};
 pub use workers::{each_of, threads};

@@ -6,6 +6,8 @@ use super::error::PrepareError;
 use super::pieces::Recording;
 use super::spacing::Spacing;
 use super::spectrum::{PositionSpectrum, Welch};
+use crate::plateau::{PILE_UP, plateaus, speed_per_row};
+use crate::plausibility::JUDGED_ROWS;
 
 /// Minimum number of rows for a spectrum.
 const FEWEST_ROWS: u64 = 256;
@@ -22,7 +24,8 @@ pub struct JointSurvey {
     /// Lowest and highest torque.
     pub torque: [f64; 2],
     /// Torque limits at which the recording was clipped: its extreme value repeats for at least `CLIPPED_RUN` rows, and
-    /// more often than the top level of a smooth torque in steps.
+    /// more often than the top level of a smooth torque in steps. Or it is noise about a level while the motion goes on:
+    /// then the end of this noise towards smaller torques.
     pub clipped: [Option<f64>; 2],
     /// Spectrum of the position.
     pub spectrum: PositionSpectrum,
@@ -31,9 +34,8 @@ pub struct JointSurvey {
 /// Number of consecutive rows at the extreme torque that counts as clipping. Noise never repeats a value that often,
 /// but a command held at a limit does.
 pub(super) const CLIPPED_RUN: usize = 5;
-/// Least ratio of the rows at the extreme torque to the rows at the next level. A parabola, the peak of a smooth torque,
-/// stays in its top level up to 1/(√2 − 1) = 2.41 times as long as in the level below; a plateau of friction less.
-pub const PILE_UP: f64 = 2.5;
+/// Number of rows in which a noisy plateau of the torque is searched, as many as are checked for other faults of columns.
+const SEARCHED: usize = JUDGED_ROWS;
 
 /// Survey of a whole recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -104,6 +106,9 @@ struct Running {
     high: Extreme,
     low: Extreme,
     welch: Delayed,
+    /// Torque and position of the first rows, stretch by stretch.
+    first: Vec<[Vec<f64>; 2]>,
+    searched: usize,
 }
 
 impl Running {
@@ -116,6 +121,8 @@ impl Running {
             high: Extreme::new(),
             low: Extreme::new(),
             welch: Delayed::default(),
+            first: Vec::new(),
+            searched: 0,
         }
     }
 
@@ -130,6 +137,29 @@ impl Running {
         self.high.push(tau);
         self.low.push(-tau);
         self.welch.push(q, follows, rate);
+        if self.searched < SEARCHED {
+            self.searched += 1;
+            if !follows || self.first.is_empty() {
+                self.first.push([Vec::new(), Vec::new()]);
+            }
+            if let Some([torques, positions]) = self.first.last_mut() {
+                torques.push(tau);
+                positions.push(q);
+            }
+        }
+    }
+
+    /// Returns the torques beyond which rows are cut: at the lowest and at the highest ones.
+    fn clipped(&self) -> [Option<f64>; 2] {
+        let speeds: Vec<Vec<f64>> = (self.first.iter()).map(|[_, q]| speed_per_row(q)).collect();
+        let stretches: Vec<_> = (self.first.iter().zip(&speeds))
+            .map(|([tau, _], speed)| [tau.as_slice(), speed.as_slice()])
+            .collect();
+        let [low, high] = plateaus(&stretches).map(|own| own.map(|own| own.edge));
+        [
+            self.low.clipped().map(|v| -v).or(low),
+            self.high.clipped().or(high),
+        ]
     }
 
     fn still(&self) -> bool {
@@ -138,14 +168,14 @@ impl Running {
 
     /// Returns the survey of `rows` rows; `None` if no stretch is long enough for a spectrum.
     fn finish(self, rows: u64, sample_rate: f64) -> Option<JointSurvey> {
-        let still = self.still();
+        let (still, clipped) = (self.still(), self.clipped());
         let (frequency, density) = (self.welch.finish(sample_rate)).density(sample_rate)?;
         Some(JointSurvey {
             position: self.position,
             peak_speed: self.step * sample_rate,
             torque_rms: (self.square / rows as f64).sqrt(),
             torque: [-self.low.value, self.high.value],
-            clipped: [self.low.clipped().map(|v| -v), self.high.clipped()],
+            clipped,
             spectrum: if still {
                 PositionSpectrum::still(frequency)
             } else {

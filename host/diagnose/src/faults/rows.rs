@@ -7,8 +7,8 @@ use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission};
 
 use crate::DiagnoseError;
-use rig_data::prepare::PILE_UP;
 use rig_data::runs::Run;
+use rig_data::{PILE_UP, Stretch, plateaus};
 use rig_identify::{chain_of, transmission_of};
 use rig_model::batch::ChainBatch;
 use rig_model::robot::Robot;
@@ -69,7 +69,8 @@ pub(crate) struct Rows {
     pub(crate) qd: Vec<Vec<f64>>,
     pub(crate) qdd: Vec<Vec<f64>>,
     pub(crate) tau: Vec<Vec<f64>>,
-    /// Share of the samples of each row at the highest or lowest torque of the recording, if they pile up there.
+    /// Share of the samples of each row at the highest or lowest torque of the recording, if they pile up there, in one
+    /// value or as noise about a level.
     pub(crate) cut: Vec<Vec<f64>>,
 }
 
@@ -87,6 +88,28 @@ fn pile(values: &[f64], near: f64) -> f64 {
         true => top,
         false => f64::INFINITY,
     }
+}
+
+/// Returns the torques of a joint beyond which rows are cut, at the lowest and at the highest ones: those within `near` of
+/// a value where they pile up, or a band of noise about a level; infinite if there is none.
+fn cut_beyond(runs: &[&Run], joint: usize, all: &[f64], near: f64) -> [f64; 2] {
+    let high = pile(all, near) - near;
+    let low = near - pile(&all.iter().map(|v| -v).collect::<Vec<_>>(), near);
+    let own = runs.iter().filter_map(|run| run.joints.get(joint));
+    let stretches: Vec<Stretch<'_>> = own
+        .map(|own| [own.tau.as_slice(), own.qd.as_slice()])
+        .collect();
+    let [noisy_low, noisy_high] = plateaus(&stretches);
+    [
+        match (low.is_finite(), noisy_low) {
+            (false, Some(noisy)) => noisy.edge,
+            _ => low,
+        },
+        match (high.is_finite(), noisy_high) {
+            (false, Some(noisy)) => noisy.edge,
+            _ => high,
+        },
+    ]
 }
 
 impl Rows {
@@ -117,8 +140,7 @@ impl Rows {
             let own = runs.iter().filter_map(|run| run.joints.get(j));
             let all: Vec<f64> = own.flat_map(|own| own.tau.iter().copied()).collect();
             let near = 1e-6 * all.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-            let high = pile(&all, near);
-            let low = -pile(&all.iter().map(|v| -v).collect::<Vec<_>>(), near);
+            let [low, high] = cut_beyond(runs, j, &all, near);
             for run in runs {
                 let Some(joint) = run.joints.get(j) else {
                     continue;
@@ -139,7 +161,7 @@ impl Rows {
                     rows.tau[j].push(mean(&joint.tau, k));
                     let at = joint.tau[k..k + stride]
                         .iter()
-                        .filter(|v| high - **v <= near || **v - low <= near)
+                        .filter(|v| **v >= high || **v <= low)
                         .count();
                     rows.cut[j].push(at as f64 / stride as f64);
                 }

@@ -21,9 +21,7 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Misfit) -> String {
             level,
             excess,
             percent,
-        } => format!(
-            "tau{n} is cut at {level:.4} for {percent:.0} % of the time, where the motion needs {excess:.4} more on average; record without the limit, or a motion that needs less."
-        ),
+        } => clipped(robot, j, [level, excess, percent]),
         Misfit::Shifted { shift, left } => shifted(n, shift, left),
         Misfit::Scaled {
             factor,
@@ -96,6 +94,16 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Misfit) -> String {
 fn leaves(left: [f64; 2], beside: &str) -> String {
     let [recorded, without] = left.map(|share| 100.0 * share);
     format!("leaves {without:.1} % of the torque's variance{beside}, as recorded {recorded:.1} %")
+}
+
+fn clipped(robot: &Robot, j: usize, [level, excess, percent]: [f64; 3]) -> String {
+    let unit = format_unit(robot.joints[j].kind.units().1);
+    format!(
+        "tau{} is cut at {} {unit} for {percent:.0} % of the time, where the motion needs {} {unit} more on average; record without the limit, or a motion that needs less.",
+        j + 1,
+        format_significant(level, 4),
+        format_significant(excess, 2),
+    )
 }
 
 /// Formats an angle with the resolution of a fit of gravity.
