@@ -4,27 +4,34 @@
 //! Without limits in the robot's description, the columns are only compared with each other.
 
 use super::block::{Block, JointColumns};
+use super::frozen::{Frozen, frozen_position, frozen_torque};
 use super::lost_rows::{Advances, LostRows, advances};
+use super::place::{Place, RowAt};
 use super::position_jump::largest_position_jump;
 use super::rate_match::{RateMismatch, rate_mismatch};
 use super::rate_spike::rate_spike;
+use super::rate_zeros::{RateZeros, rate_zeros};
 use super::sample_hold::repeated_rows;
+use super::stale_rows::{StaleRows, stale_rows};
 use super::torque_spike::largest_torque_spike;
 use super::unsigned::{Unsigned, unsigned};
 use rig_model::robot::{Joint, JointKind, Robot, is_placeholder};
 use rig_numerics::statistics::median;
-use rig_output::{format_significant, format_time, format_trimmed, listed};
+use rig_output::{format_short, format_significant, format_time, format_trimmed, listed};
 
 /// Number of rows at the start by which the columns are checked: a wrong unit or direction shows from the start.
 pub const JUDGED_ROWS: usize = 100_000;
+
+/// Most stale rows in a row that are a remark.
+const FEW_STALE: usize = 4;
 
 /// A column that cannot have the required unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Implausible {
     /// Position of a revolute joint in degrees.
     #[error(
-        "q{joint} looks like degrees ({}, while the joint reaches {limit:.4} rad); give it in rad, or name its unit with --unit q{joint}=deg{or}",
-        range_words(*lowest, *highest)
+        "q{joint} looks like degrees ({}, while the joint reaches {} rad); give it in rad, or name its unit with --unit q{joint}=deg{or}",
+        range_words(*lowest, *highest), format_short(*limit)
     )]
     Degrees {
         /// Joint, 1-based.
@@ -61,7 +68,8 @@ pub enum Implausible {
     },
     /// Speed above ten times the limit.
     #[error(
-        "q{joint} moves at up to {speed:.4} {unit}/s, more than ten times its limit of {limit} {unit}/s; check the units of q{joint} and t and the limit"
+        "q{joint} moves at up to {} {unit}/s, more than ten times its limit of {limit} {unit}/s; check the units of q{joint} and t and the limit",
+        format_short(*speed)
     )]
     Velocity {
         /// Joint, 1-based.
@@ -75,8 +83,8 @@ pub enum Implausible {
     },
     /// A position with jumps.
     #[error(
-        "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {} s{more}, while its fastest motion is {} {unit} a row; {mend}",
-        format_time(*at),
+        "q{joint} jumps by {} {unit} from one row to the next at t = {} s{more}, while its fastest motion is {} {unit} a row; {mend}",
+        format_short(*by), format_time(*at),
         format_significant(*fastest, 3)
     )]
     Jump {
@@ -95,10 +103,66 @@ pub enum Implausible {
         /// rad or m.
         unit: &'static str,
     },
+    /// Single rows of a position far away from both rows beside them.
+    #[error(
+        "q{joint} is {} {unit} at {at}{more}, while the rows beside it have {} {unit}; no joint moves there and back in two rows: look for a lost bit or a damaged message, and take the row out. It is then interpolated",
+        format_short(*value), format_short(*beside)
+    )]
+    Outlier {
+        /// Joint, 1-based.
+        joint: usize,
+        /// The row that is farthest away.
+        at: RowAt,
+        /// Its value.
+        value: f64,
+        /// Value of the row before.
+        beside: f64,
+        /// Number of further rows in words; empty if there is only one.
+        more: String,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// A position or torque that keeps one value while the motion goes on.
+    #[error(
+        "{column}{joint} stays at {} {unit} from {from} {until}, while {going_on}: a sensor or a topic that stopped. {mend}",
+        format_short(*value)
+    )]
+    Frozen {
+        /// Name of the column without its number.
+        column: &'static str,
+        /// Joint, 1-based.
+        joint: usize,
+        /// Its value.
+        value: f64,
+        /// N·m, N, rad or m.
+        unit: &'static str,
+        /// First row with this value.
+        from: RowAt,
+        /// Where it ends, in words.
+        until: String,
+        /// What shows that the motion goes on.
+        going_on: String,
+        /// Advice for a correction.
+        mend: &'static str,
+    },
+    /// Rows whose values stand still while none arrive, and catch up in one row.
+    #[error(
+        "the positions stand still in {rows} rows at {places} (first at {at}; up to {most} in a row) and catch up in the next one. t is right: these rows are stale values. Take them out; up to four missing rows in a row are then interpolated"
+    )]
+    StaleRows {
+        /// First of them.
+        at: RowAt,
+        /// Number of rows.
+        rows: usize,
+        /// Number of places in words.
+        places: String,
+        /// Most rows at one place.
+        most: usize,
+    },
     /// Single rows of effort far above all others.
     #[error(
-        "tau{joint} is {value:.4} {unit} in the row at t = {} s{more}, while it is hardly ever more than {usual:.4} {unit} elsewhere; a row like that is no torque: look for a loose contact or a lost bit, and take the row out",
-        format_time(*at)
+        "tau{joint} is {} {unit} in the row at t = {} s{more}, while it is hardly ever more than {} {unit} elsewhere; a row like that is no torque: look for a loose contact or a lost bit, and take the row out",
+        format_short(*value), format_time(*at), format_short(*usual)
     )]
     Spike {
         /// Joint, 1-based.
@@ -116,7 +180,8 @@ pub enum Implausible {
     },
     /// Measured velocity that does not fit the change of position.
     #[error(
-        "qd{joint} and q{joint} do not belong together: q changes by {ratio:.4} times the integral of qd; give both in {unit} and {unit}/s and t in s"
+        "qd{joint} and q{joint} do not belong together: q changes by {} times the integral of qd; give both in {unit} and {unit}/s and t in s",
+        format_short(*ratio)
     )]
     VelocityScale {
         /// Joint, 1-based.
@@ -128,7 +193,8 @@ pub enum Implausible {
     },
     /// Reference that does not fit the position.
     #[error(
-        "ref{joint} does not belong to q{joint}: it moves {ratio:.4} times as far{hint}, while both should be in {unit} and counted in the same sense"
+        "ref{joint} does not belong to q{joint}: it moves {} times as far{hint}, while both should be in {unit} and counted in the same sense",
+        format_short(*ratio)
     )]
     ReferenceScale {
         /// Joint, 1-based.
@@ -253,7 +319,8 @@ pub enum Implausible {
     },
     /// Effort far above the limit.
     #[error(
-        "tau{joint} looks too large by a factor of about 1000, as m{unit} would be (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
+        "tau{joint} looks too large by a factor of about 1000, as m{unit} would be (up to {}, while the limit is {} {unit}); give it in {unit}, at the joint",
+        format_short(*highest), format_short(*limit)
     )]
     EffortTooLarge {
         /// Joint, 1-based.
@@ -291,7 +358,7 @@ pub enum Implausible {
         joint: usize,
     },
     /// Time in milliseconds or in a smaller unit.
-    #[error("t looks like {} (its steps are {step:.4}); give it in s, or --unit t={}", unit_of_steps(*step), sign_of_steps(*step))]
+    #[error("t looks like {} (its steps are {}); give it in s, or --unit t={}", unit_of_steps(*step), format_short(*step), sign_of_steps(*step))]
     NotSeconds {
         /// Median step.
         step: f64,
@@ -305,23 +372,28 @@ impl Implausible {
             Self::Degrees { joint, .. }
             | Self::Position { joint, .. }
             | Self::Jump { joint, .. }
+            | Self::Outlier { joint, .. }
             | Self::Velocity { joint, .. } => format!("q{joint}"),
+            Self::Frozen { column, joint, .. } => format!("{column}{joint}"),
             Self::VelocityScale { joint, .. }
             | Self::RateSpike { joint, .. }
             | Self::RateMismatch { joint, .. } => format!("qd{joint}"),
             Self::Unsigned { column, joint, .. } | Self::NoRate { column, joint } => {
                 format!("{column}{joint}")
             }
-            Self::ReferenceScale { joint, ratio, .. } => format!("ref{joint} ({ratio:.4})"),
+            Self::ReferenceScale { joint, ratio, .. } => {
+                format!("ref{joint} ({})", format_short(*ratio))
+            }
             Self::EffortTooLarge { joint, .. }
             | Self::EffortTooSmall { joint, .. }
             | Self::NoEffort { joint }
             | Self::Spike { joint, .. } => format!("tau{joint}"),
             Self::HeldPosition { joints, .. } => columns_of("q", joints),
             Self::HeldEffort { joints, .. } => columns_of("tau", joints),
-            Self::NotSeconds { .. } | Self::LostRows { .. } | Self::RepeatedRows { .. } => {
-                "t".into()
-            }
+            Self::NotSeconds { .. }
+            | Self::LostRows { .. }
+            | Self::StaleRows { .. }
+            | Self::RepeatedRows { .. } => "t".into(),
         }
     }
 }
@@ -330,7 +402,12 @@ impl Implausible {
     /// Returns true if the column may still be correct, or is wrong by a share that the sentence gives, so that it is
     /// reported but not refused.
     pub fn is_doubt(&self) -> bool {
-        matches!(self, Self::HeldEffort { .. } | Self::RepeatedRows { .. })
+        match self {
+            Self::HeldEffort { .. } | Self::RepeatedRows { .. } => true,
+            // As many are interpolated where they are missing.
+            Self::StaleRows { most, .. } => *most <= FEW_STALE,
+            _ => false,
+        }
     }
 
     /// Returns true if motion or torque cannot be analysed before a correction.
@@ -338,11 +415,33 @@ impl Implausible {
         matches!(
             self,
             Self::Jump { .. }
+                | Self::Outlier { .. }
+                | Self::Frozen { .. }
+                | Self::StaleRows { .. }
                 | Self::Spike { .. }
                 | Self::HeldPosition { .. }
                 | Self::LostRows { .. }
                 | Self::Unsigned { .. }
         )
+    }
+}
+
+impl Implausible {
+    /// Returns true if both are the same fault of the same column.
+    pub fn is_like(&self, other: &Self) -> bool {
+        core::mem::discriminant(self) == core::mem::discriminant(other)
+            && self.column() == other.column()
+    }
+
+    /// Returns the sentence with the places of rows that `place` gives for their numbers: those of a text file are lines.
+    pub fn placed(self, place: &dyn Fn(u64) -> Place) -> Self {
+        let mut own = self;
+        match &mut own {
+            Self::Outlier { at, .. } | Self::StaleRows { at, .. } => *at = at.placed(place),
+            Self::Frozen { from, .. } => *from = from.placed(place),
+            _ => {}
+        }
+        own
     }
 }
 
@@ -365,8 +464,12 @@ fn changes(column: &str, joints: &[usize]) -> String {
 /// Says between which values a position lies.
 fn range_words(lowest: f64, highest: f64) -> String {
     match lowest == highest {
-        true => format!("it is {lowest:.4}"),
-        false => format!("range {lowest:.4} to {highest:.4}"),
+        true => format!("it is {}", format_short(lowest)),
+        false => format!(
+            "range {} to {}",
+            format_short(lowest),
+            format_short(highest)
+        ),
     }
 }
 
@@ -392,17 +495,81 @@ pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     if let Some(step) = long_step(&block.t) {
         found.push(Implausible::NotSeconds { step });
     }
-    for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
-        check_joint(k, &block.t, columns, joint, &mut found);
+    let stale = stale_rows(block);
+    for (k, joint) in (1..).zip(robot.joints.iter().take(block.joints.len())) {
+        match frozen(k, block, joint) {
+            Some(wrong) => found.push(wrong),
+            None => check_joint(k, block, joint, stale.is_some(), &mut found),
+        }
     }
     let held = repeated(block);
-    let jumps = |own: &Implausible| matches!(own, Implausible::Jump { .. });
+    let is_no_motion = |own: &Implausible| {
+        matches!(
+            own,
+            Implausible::Jump { .. }
+                | Implausible::Outlier { .. }
+                | Implausible::Frozen { column: "q", .. }
+        )
+    };
     // A column that is no motion says nothing about rows.
-    if held.is_empty() && !found.iter().any(jumps) {
-        found.extend(miscounted(block));
+    if held.is_empty() && !found.iter().any(is_no_motion) {
+        let stale = stale.map(|stale| told_stale(block, stale));
+        found.extend(stale.or_else(|| miscounted(block)));
     }
     found.extend(held);
     found
+}
+
+fn told_stale(block: &Block, stale: StaleRows) -> Implausible {
+    Implausible::StaleRows {
+        at: RowAt::of(block, stale.row),
+        rows: stale.rows,
+        places: match stale.places {
+            1 => "one place".to_owned(),
+            n => format!("{n} places"),
+        },
+        most: stale.most,
+    }
+}
+
+/// Returns the fault of a torque or position that keeps one value while the motion goes on.
+fn frozen(k: usize, block: &Block, joint: &Joint) -> Option<Implausible> {
+    let columns = block.joints.get(k - 1)?;
+    let (unit, effort_unit) = units(joint);
+    let until = |own: &Frozen| match own.to + 1 == block.len() {
+        true => "to the end".to_owned(),
+        false => format!("to {}", RowAt::of(block, own.to)),
+    };
+    let whole = |own: &Frozen| own.to + 1 - own.from == block.len();
+    if let Some(own) = frozen_torque(columns) {
+        return Some(Implausible::Frozen {
+            column: "tau",
+            joint: k,
+            value: own.value,
+            unit: effort_unit,
+            from: RowAt::of(block, own.from),
+            until: until(&own),
+            going_on: format!("q{k} moves over {} {unit}", format_significant(own.by, 3)),
+            mend: match whole(&own) {
+                true => "Check that the column is the torque and was recorded",
+                false => "Use the rows without this stretch, or record again",
+            },
+        });
+    }
+    let own = frozen_position(columns)?;
+    let change = format_significant(own.by, 3);
+    let going_on =
+        format!("it changes by {change} {unit} in the row before, and no joint stops like that");
+    Some(Implausible::Frozen {
+        column: "q",
+        joint: k,
+        value: own.value,
+        unit,
+        from: RowAt::of(block, own.from),
+        until: until(&own),
+        going_on,
+        mend: "Use the rows without this stretch, or record again",
+    })
 }
 
 /// Finds rows that were lost or written twice while the time was counted on.
@@ -459,7 +626,7 @@ fn lost_how(held: bool) -> &'static str {
 /// Says why rows repeat the row before, what follows, and what would be right.
 fn repeated_how(percent: f64, made_up: bool) -> String {
     match made_up {
-        true => "the logger kept the last value where none had arrived. The other rows are right and outweigh them; without them, up to five missing rows in a row are interpolated".to_owned(),
+        true => "t is right: these rows are stale values, as the logger kept the last value where none had arrived. The other rows are right and outweigh them; take the stale ones out, and up to four missing rows in a row are interpolated".to_owned(),
         false => format!(
             "they were written twice, so that velocities come out {} % and accelerations {} % too small on average: take them out, and count t without them",
             format_significant(percent, 2),
@@ -539,6 +706,7 @@ pub fn unit_of_steps(step: f64) -> &'static str {
 fn more(count: usize) -> String {
     match count {
         1 => String::new(),
+        2 => " and at one more place".to_owned(),
         n => format!(" and at {} more places", n - 1),
     }
 }
@@ -552,22 +720,30 @@ pub(super) fn range(values: &[f64]) -> (f64, f64) {
         })
 }
 
-fn check_joint(
-    k: usize,
-    t: &[f64],
-    columns: &JointColumns,
-    joint: &Joint,
-    found: &mut Vec<Implausible>,
-) {
-    let (unit, effort_unit) = match joint.kind {
+/// Returns the units of a joint's position and effort, as sentences have them.
+fn units(joint: &Joint) -> (&'static str, &'static str) {
+    match joint.kind {
         JointKind::Revolute => ("rad", "N·m"),
         JointKind::Prismatic => ("m", "N"),
+    }
+}
+
+fn check_joint(
+    k: usize,
+    block: &Block,
+    joint: &Joint,
+    has_stale_rows: bool,
+    found: &mut Vec<Implausible>,
+) {
+    let (unit, effort_unit) = units(joint);
+    let (t, Some(columns)) = (&block.t, block.joints.get(k - 1)) else {
+        return;
     };
     let (lowest, highest) = range(&columns.q);
     if columns.q.is_empty() {
         return;
     }
-    found.extend(position_fault(k, t, &columns.q, joint, unit));
+    found.extend(position_fault(k, block, &columns.q, joint, has_stale_rows));
     if let Some(ratio) = columns
         .qd
         .as_ref()
@@ -585,18 +761,34 @@ fn check_joint(
     check_effort(k, t, columns, joint, effort_unit, highest - lowest, found);
 }
 
-/// Returns the first fault of a position; `unit` is rad or m.
+/// Returns the first fault of a position. Behind stale rows it jumps to its right value.
 fn position_fault(
     k: usize,
-    t: &[f64],
+    block: &Block,
     q: &[f64],
     joint: &Joint,
-    unit: &'static str,
+    has_stale_rows: bool,
 ) -> Option<Implausible> {
+    let (t, unit) = (&block.t, joint.kind.units().0);
     if let Some(lost) = unsigned(q) {
         return Some(lost_sign("q", k, lost));
     }
-    if let Some(jump) = largest_position_jump(t, q) {
+    let jump = largest_position_jump(t, q).filter(|_| !has_stale_rows);
+    if let Some((row, count)) = jump.and_then(|jump| jump.outlier) {
+        return Some(Implausible::Outlier {
+            joint: k,
+            at: RowAt::of(block, row),
+            value: q[row],
+            beside: q[row - 1],
+            more: match count {
+                1 => String::new(),
+                2 => ", and another value in one more row".to_owned(),
+                n => format!(", and other values in {} more rows", n - 1),
+            },
+            unit,
+        });
+    }
+    if let Some(jump) = jump {
         let turns = jump.change.abs() / core::f64::consts::TAU;
         return Some(Implausible::Jump {
             joint: k,
@@ -720,6 +912,14 @@ pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
                 found.push(Implausible::NoRate { column, joint: k });
             }
         }
+        let zeros = (columns.qd.as_ref()).and_then(|qd| rate_zeros(&block.t, &columns.q, qd));
+        if let Some(zeros) = zeros {
+            found.push(Implausible::RateMismatch {
+                joint: k,
+                how: zero_words(k, block, joint, zeros),
+            });
+            continue;
+        }
         let spike = (columns.qd.as_ref()).and_then(|qd| rate_spike(&block.t, &columns.q, qd));
         if let Some(spike) = spike {
             let number = |x: f64| format_significant(x, 4);
@@ -746,6 +946,22 @@ pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
     found
 }
 
+/// Says why the measured velocity of joint `k` is zero in motion, and what mends it.
+fn zero_words(k: usize, block: &Block, joint: &Joint, zeros: RateZeros) -> String {
+    match zeros {
+        RateZeros::Dropouts { row, share } => format!(
+            "it is 0 in {} % of the rows in fast motion (the first at t = {} s), between readings that are right: they dropped out. Take these rows out, or leave out --measured-derivatives",
+            format_significant(100.0 * share, 2),
+            format_time(block.t[row])
+        ),
+        RateZeros::DeadBand { end } => format!(
+            "it is 0 wherever q{k} moves more slowly than its least value, {} {}/s: a dead band. Turn it off in the drive, or leave out --measured-derivatives",
+            format_significant(end, 2),
+            joint.kind.units().0
+        ),
+    }
+}
+
 /// Says what is wrong with the measured velocity of joint `k`, and what mends it.
 fn mismatch_words(k: usize, wrong: RateMismatch) -> String {
     match wrong {
@@ -758,6 +974,9 @@ fn mismatch_words(k: usize, wrong: RateMismatch) -> String {
             format_significant(1000.0 * time.abs(), 2),
             if time > 0.0 { "later" } else { "earlier" }
         ),
+        RateMismatch::Reversed => {
+            format!("it runs against q{k}. Reverse it, or leave out --measured-derivatives")
+        }
         RateMismatch::Other(left) => format!(
             "whatever its scale and delay, {} % of the changes of q{k} (RMS) are not in it. Check the order of the columns and the signs, or leave out --measured-derivatives",
             format_significant(100.0 * left.sqrt(), 2)

@@ -1,4 +1,5 @@
-//! Position jumps from one row to the next: a lost count, an angle that wraps after a turn, two joined recordings.
+//! Position jumps from one row to the next: a lost count, an angle that wraps after a turn, two joined recordings; and
+//! outliers, single rows that are far away from both rows beside them.
 
 /// Number of row intervals whose median speed is the local speed of the joint.
 const SPAN_ROWS: usize = 8;
@@ -6,6 +7,9 @@ const SPAN_ROWS: usize = 8;
 const MIN_MOTION_RATIO: f64 = 3.0;
 /// … and to the changes by noise and acceleration (99th percentile), and to the smallest change.
 const MIN_NOISE_RATIO: f64 = 20.0;
+
+/// Largest sum of two changes that follow each other, as a share of the larger one, if the position jumps there and back.
+const BACK: f64 = 0.25;
 
 /// The largest jump of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +22,8 @@ pub(super) struct PositionJump {
     pub count: usize,
     /// Largest change from row to row without the jumps.
     pub largest_motion_step: f64,
+    /// The row that is far away from both rows beside it, and the number of such rows, if all jumps are there and back.
+    pub outlier: Option<(usize, usize)>,
 }
 
 /// Returns true if a column has a jump.
@@ -55,6 +61,7 @@ pub(super) fn largest_position_jump(t: &[f64], q: &[f64]) -> Option<PositionJump
     let threshold = (MIN_MOTION_RATIO * largest_motion_step)
         .max(MIN_NOISE_RATIO * usual_change.max(smallest_change));
     let count = deviations.iter().filter(|x| x.abs() > threshold).count();
+    let outlier = outlier(&deviations, threshold);
     let (row, change) = (0..)
         .zip(deviations)
         .max_by(|a: &(usize, f64), b| a.1.abs().total_cmp(&b.1.abs()))?;
@@ -63,7 +70,29 @@ pub(super) fn largest_position_jump(t: &[f64], q: &[f64]) -> Option<PositionJump
         change,
         count,
         largest_motion_step,
+        outlier,
     })
+}
+
+/// Returns the row that is farthest away from both rows beside it, and the number of such rows; `None` if a change beyond
+/// the threshold is not followed by its opposite.
+fn outlier(deviations: &[f64], threshold: f64) -> Option<(usize, usize)> {
+    let (mut rows, mut k) = (Vec::new(), 0);
+    while k < deviations.len() {
+        let own = deviations[k];
+        if own.abs() <= threshold {
+            k += 1;
+            continue;
+        }
+        let next = deviations.get(k + 1).copied()?;
+        if (own + next).abs() > BACK * own.abs().max(next.abs()) {
+            return None;
+        }
+        rows.push((k + 1, own.abs()));
+        k += 2;
+    }
+    let (row, _) = rows.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((*row, rows.len()))
 }
 
 #[cfg(test)]
@@ -87,8 +116,23 @@ mod tests {
                 assert_eq!(largest_position_jump(&t, &q), None, "{step} {count}");
                 q[2345..].iter_mut().for_each(|q| *q -= 0.3);
                 let found = largest_position_jump(&t, &q).unwrap();
-                assert_eq!((found.row, found.count), (2344, 1));
+                assert_eq!((found.row, found.count, found.outlier), (2344, 1, None));
                 assert!((found.change + 0.3).abs() < 0.02, "{found:?}");
+            }
+        }
+        // Single rows that are far away from those beside them.
+        for (step, count) in [(1e-3, 1e-12), (5e-3, 1e-4), (1e-3, 5e-3)] {
+            for size in [0.5, -3.0, 1e4] {
+                let (t, mut q) = motion(step, count);
+                q[1234] += size;
+                let found = largest_position_jump(&t, &q).unwrap();
+                assert_eq!(found.outlier, Some((1234, 1)), "{step} {count} {size}");
+                q[3210] -= 0.9 * size;
+                let found = largest_position_jump(&t, &q).unwrap();
+                assert_eq!(found.outlier, Some((1234, 2)), "{step} {count} {size}");
+                q[2345..].iter_mut().for_each(|q| *q -= 0.7);
+                let found = largest_position_jump(&t, &q).unwrap();
+                assert_eq!(found.outlier, None, "{step} {count} {size}");
             }
         }
         // At rest, except for the last count of the encoder.

@@ -26,6 +26,8 @@ pub(super) enum RateMismatch {
     Factor(f64),
     /// It is late by this time, s; early if negative.
     Late(f64),
+    /// It is counted in the opposite sense.
+    Reversed,
     /// It leaves this share of the position's changes, whatever its factor and shift.
     Other(f64),
 }
@@ -66,8 +68,11 @@ pub(super) fn rate_mismatch(t: &[f64], q: &[f64], qd: &[f64]) -> Option<RateMism
     let (left, _) = shifts[most];
     let best = (0..shifts.len()).min_by(|a, b| shifts[*a].0.total_cmp(&shifts[*b].0))?;
     let (least, factor) = shifts[best];
-    if least > OTHER || factor <= 0.0 {
+    if least > OTHER {
         return Some(RateMismatch::Other(least));
+    }
+    if factor <= 0.0 {
+        return Some(RateMismatch::Reversed);
     }
     if (factor - 1.0).abs() > EXACT.max(least) {
         return Some(RateMismatch::Factor(factor));
@@ -116,6 +121,9 @@ mod tests {
                 panic!("{:?}", rate_mismatch(&t, &q, &late));
             };
             assert!((found - 0.04).abs() < 2e-3, "{found}");
+            let against: Vec<f64> = qd.iter().map(|v| -v).collect();
+            let found = rate_mismatch(&t, &q, &against);
+            assert_eq!(found, Some(RateMismatch::Reversed));
             let size: Vec<f64> = qd.iter().map(|v| v.abs()).collect();
             assert!(matches!(
                 rate_mismatch(&t, &q, &size),

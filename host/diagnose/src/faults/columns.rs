@@ -207,6 +207,10 @@ fn of_column(robot: &Robot, problem: Implausible) -> Option<Fault> {
         Implausible::Degrees { joint, .. }
         | Implausible::Position { joint, .. }
         | Implausible::Jump { joint, .. }
+        | Implausible::Outlier { joint, .. }
+        | Implausible::Frozen {
+            column: "q", joint, ..
+        }
         | Implausible::Unsigned {
             column: "q", joint, ..
         }
@@ -215,9 +219,12 @@ fn of_column(robot: &Robot, problem: Implausible) -> Option<Fault> {
         Implausible::EffortTooLarge { joint, .. }
         | Implausible::EffortTooSmall { joint, .. }
         | Implausible::Unsigned { joint, .. }
+        | Implausible::Frozen { joint, .. }
         | Implausible::Spike { joint, .. }
         | Implausible::NoEffort { joint } => (*joint, About::Torque),
-        Implausible::LostRows { .. } | Implausible::RepeatedRows { .. } => {
+        Implausible::LostRows { .. }
+        | Implausible::StaleRows { .. }
+        | Implausible::RepeatedRows { .. } => {
             return Some(Fault::of_recording(Finding::Clock(problem)));
         }
         Implausible::NotSeconds { .. }

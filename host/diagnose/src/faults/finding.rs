@@ -163,7 +163,7 @@ impl Finding {
     /// Returns the check of the column that found it, if one did.
     pub(crate) fn column(&self) -> Option<&Implausible> {
         match self {
-            Self::Column(problem, _) => Some(problem),
+            Self::Column(problem, _) | Self::Clock(problem) => Some(problem),
             _ => None,
         }
     }
@@ -188,8 +188,12 @@ impl From<Misfit> for Finding {
 
 fn of_column(problem: &Implausible) -> FaultKind {
     match problem {
-        Implausible::Jump { .. } | Implausible::Spike { .. } => FaultKind::Jump,
-        Implausible::HeldPosition { .. } | Implausible::HeldEffort { .. } => FaultKind::Held,
+        Implausible::Jump { .. } | Implausible::Outlier { .. } | Implausible::Spike { .. } => {
+            FaultKind::Jump
+        }
+        Implausible::HeldPosition { .. }
+        | Implausible::HeldEffort { .. }
+        | Implausible::Frozen { .. } => FaultKind::Held,
         Implausible::Unsigned { .. } => FaultKind::Unsigned,
         _ => FaultKind::Unit,
     }

@@ -11,6 +11,7 @@ use rig_data::{
     unit_of_steps,
 };
 use rig_model::robot::Robot;
+use rig_output::format_short;
 
 /// Share of a joint's motion that every second sample may miss of the others. At 10 % a sine has 7.4 samples a period: the
 /// interpolation of all samples is within 0.2 % of its position and 2 % of its velocity.
@@ -162,8 +163,11 @@ fn wrong_unit(block: &Block, robot: &Robot) -> Option<String> {
                 limit,
                 ..
             } => Some(format!(
-                "{}{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad",
-                column(joint)
+                "{}{joint} looks like degrees (range {} to {}, while the joint reaches {} rad); give it in rad",
+                column(joint),
+                format_short(lowest),
+                format_short(highest),
+                format_short(limit)
             )),
             _ => None,
         })

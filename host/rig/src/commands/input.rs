@@ -197,7 +197,8 @@ fn at_start<T>(
 
 /// Puts all faults of a recording into one sentence.
 fn sentence(source: &Source, wrong: &[Implausible]) -> String {
-    let all: Vec<String> = wrong.iter().map(ToString::to_string).collect();
+    let placed = |own: &Implausible| own.clone().placed(&|row| source.place(row)).to_string();
+    let all: Vec<String> = wrong.iter().map(placed).collect();
     let text = source.in_its_names(&all.join("; "));
     format!("{}: {text}.", source.path().display())
 }
@@ -404,7 +405,11 @@ impl Inputs {
             if !told.is_empty() {
                 faults.wrong.extend(in_degrees);
             }
+            let is_told = |own: &Implausible| doubts.iter().any(|doubt| doubt.is_like(own));
             for fault in judged {
+                if fault.column.as_ref().is_some_and(is_told) {
+                    continue;
+                }
                 let list = match (fault.certain, fault.of_description) {
                     (true, true) => &mut faults.described,
                     (true, false) => &mut faults.wrong,

@@ -5,6 +5,7 @@ use crate::faults::columns::{FEWEST, LEAST_TO_JUDGE, LEAST_TO_LEARN, SHORTEST};
 use crate::faults::finding::{Finding, Short};
 use rig_data::{Implausible, sign_of_steps, unit_of_steps};
 use rig_model::robot::Robot;
+use rig_output::format_short;
 
 /// Returns a sentence on recordings that are too short.
 pub(crate) fn short(found: &Short) -> String {
@@ -45,7 +46,8 @@ fn clock(problem: &Implausible) -> String {
     let unit = unit_of_steps(*step);
     let sign = sign_of_steps(*step);
     format!(
-        "t looks like {unit}: its steps are {step:.4}, where seconds would be right; give --unit t={sign}."
+        "t looks like {unit}: its steps are {}, where seconds would be right; give --unit t={sign}.",
+        format_short(*step)
     )
 }
 
@@ -75,8 +77,8 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Finding) -> String {
                 ),
             };
             format!(
-                "qd{n} is {:.4} times the change of q{n} over time; {what}.",
-                1.0 / factor
+                "qd{n} is {} times the change of q{n} over time; {what}.",
+                format_short(1.0 / factor)
             )
         }
         Finding::AtLimit { limit, share } => format!(
@@ -95,7 +97,7 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Finding) -> String {
                 || format!("give it in {unit} of the joint, and check its counts"),
                 names::name,
             );
-            format!("ql{n} moves {factor:.4} times as far as q{n}; {what}.")
+            format!("ql{n} moves {} times as far as q{n}; {what}.", format_short(*factor))
         }
     }
 }

@@ -8,7 +8,9 @@ use crate::faults::misfit::{Misfit, Needs, Reversal, Sense};
 use crate::faults::names::Name;
 use crate::faults::undo::Columns;
 use rig_model::robot::{Joint, JointKind, Robot};
-use rig_output::{format_significant, format_trimmed, format_unit, format_value, listed};
+use rig_output::{
+    format_short, format_significant, format_trimmed, format_unit, format_value, listed,
+};
 
 /// Relative difference below which two factors are the same.
 const SAME: f64 = 0.1;
@@ -21,7 +23,16 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Misfit) -> String {
             level,
             excess,
             percent,
+<<<<<<< ours
         } => clipped(robot, j, [level, excess, percent]),
+=======
+        } => format!(
+            "tau{n} is cut at {} {unit} for {percent:.0} % of the time, where the motion needs {} {unit} more on average; record without the limit, or a motion that needs less.",
+            format_short(level),
+            format_significant(excess, 2),
+            unit = format_unit(joint.kind.units().1)
+        ),
+>>>>>>> theirs
         Misfit::Shifted { shift, left } => shifted(n, shift, left),
         Misfit::Scaled {
             factor,
