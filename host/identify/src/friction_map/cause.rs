@@ -210,22 +210,27 @@ fn magnitude(whole: &[f64], tau: &[f64]) -> Option<f64> {
     lost.then(|| squares().sum())
 }
 
-/// Returns the name of a factor of a position, and what mends it.
+/// Returns the name of the nearest factor of a position, and what mends it.
 fn name_of(factor: f64, ratio: f64) -> &'static str {
-    let is = |named: f64| apart(factor, named) < 1.0 + SAME;
-    match () {
-        () if is(std::f64::consts::TAU) => "it looks like turns; give it in rad",
-        () if is(1.0 / 57.296) => "it looks like degrees; give it in rad",
-        () if ratio != 1.0 && is(1.0 / ratio) => {
-            "it looks like the angle of the motor; divide it by the gear ratio"
-        }
-        () if is(0.5) => {
-            "it is twice what it should be; check the gear ratio and the counts of the encoder"
-        }
-        () if is(2.0) => {
-            "it is half what it should be; check the gear ratio and the counts of the encoder"
-        }
-        () => "check its unit, the gear ratio and the counts of the encoder",
+    const TWICE: &str =
+        "it is twice what it should be; check the gear ratio and the counts of the encoder";
+    const HALF: &str =
+        "it is half what it should be; check the gear ratio and the counts of the encoder";
+    const MOTOR: &str = "it looks like the angle of the motor; divide it by the gear ratio";
+    let mut names = vec![
+        (std::f64::consts::TAU, "it looks like turns; give it in rad"),
+        (1.0 / 57.296, "it looks like degrees; give it in rad"),
+        (0.5, TWICE),
+        (2.0, HALF),
+    ];
+    if ratio > 1.0 {
+        names.push((1.0 / ratio, MOTOR));
+    }
+    let nearest =
+        (names.into_iter()).min_by(|a, b| apart(factor, a.0).total_cmp(&apart(factor, b.0)));
+    match nearest {
+        Some((named, name)) if apart(factor, named) < 1.0 + SAME => name,
+        _ => "check its unit, the gear ratio and the counts of the encoder",
     }
 }
 
