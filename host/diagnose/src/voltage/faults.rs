@@ -139,7 +139,7 @@ pub(crate) fn faults(
     let wrong = (too_short(train).or_else(|| still(train)))
         .or_else(|| dead(train))
         .or_else(|| changed(train))
-        .or_else(|| turned(plant, train))
+        .or_else(|| turned(plant, train).map(|turned| without_sense(train).unwrap_or(turned)))
         .or_else(|| position_scale(joint, train))
         .or_else(|| voltage_scale(joint, plant, train));
     found.extend(wrong.map(|wrong| {
@@ -184,13 +184,17 @@ fn dead(logs: &[Log]) -> Option<Wrong> {
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| {
         (low.min(*u), high.max(*u))
     });
+    (turns_both_ways(logs) && high - low < STEADY * most).then_some(Wrong::Supply { low, high })
+}
+
+/// Returns true if the joint travels in both directions.
+fn turns_both_ways(logs: &[Log]) -> bool {
     let travel = |sense: f64| -> f64 {
         let steps = logs.iter().flat_map(|log| log.q.windows(2));
         steps.map(|q| (sense * (q[1] - q[0])).max(0.0)).sum()
     };
     let (forth, back) = (travel(1.0), travel(-1.0));
-    let both = forth.min(back) > BOTH_WAYS * (forth + back);
-    (both && high - low < STEADY * most).then_some(Wrong::Supply { low, high })
+    forth.min(back) > BOTH_WAYS * (forth + back)
 }
 
 /// Returns the logs with other voltages.
@@ -246,11 +250,16 @@ fn late(logs: &[Log]) -> Option<(f64, Wrong)> {
     ))
 }
 
+/// Returns a lost sign in place of a wrong one, if the voltage has one sense while the joint turns both ways.
+fn without_sense(logs: &[Log]) -> Option<Wrong> {
+    magnitude(logs).map(|(_, wrong)| wrong)
+}
+
 /// Returns the residual of the voltage with the sense of the motion, if it has one sense only as recorded.
 fn magnitude(logs: &[Log]) -> Option<(f64, Wrong)> {
     let all = || logs.iter().flat_map(|log| &log.u);
     let most = all().fold(0.0_f64, |most, u| most.max(u.abs()));
-    if all().any(|u| *u < -ONE_SENSE * most) {
+    if all().any(|u| *u < -ONE_SENSE * most) || !turns_both_ways(logs) {
         return None;
     }
     let signed = with_voltages(logs, |log| {

@@ -101,8 +101,14 @@ pub(super) fn fault(wrong: &Wrong) -> String {
         }
         Wrong::Magnitude { left } => {
             let [recorded, own] = left.map(|share| format_significant(100.0 * share, 2));
+            let compared = match left[1] < left[0] {
+                true => format!(
+                    " (with the sense of the motion the model leaves {own} % of its squares, as recorded {recorded} %)"
+                ),
+                false => String::new(),
+            };
             format!(
-                "u1 is never negative though the joint turns both ways: it is a magnitude whose sign was lost (with the sense of the motion the model leaves {own} % of its squares, as recorded {recorded} %). Record the signed voltage."
+                "u1 is never negative though the joint turns both ways: it is a magnitude whose sign was lost{compared}. Record the signed voltage."
             )
         }
     }
