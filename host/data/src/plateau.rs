@@ -469,11 +469,7 @@ mod tests {
                 }
             }
         }
-        // A link that turns back where it is horizontal has the flattest of all peaks.
-        let flat = found
-            .iter()
-            .filter(|own| own.contains("horizontal"))
-            .count();
-        assert!(flat == found.len() && flat <= 20, "{flat} {found:#?}");
+        // Of 2880, 12: most of a link that turns back where it is horizontal, the flattest of all peaks, and of friction alone.
+        assert!(found.len() <= 14, "{} {found:#?}", found.len());
     }
 }

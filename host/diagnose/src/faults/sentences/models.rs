@@ -23,16 +23,7 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Misfit) -> String {
             level,
             excess,
             percent,
-<<<<<<< ours
         } => clipped(robot, j, [level, excess, percent]),
-=======
-        } => format!(
-            "tau{n} is cut at {} {unit} for {percent:.0} % of the time, where the motion needs {} {unit} more on average; record without the limit, or a motion that needs less.",
-            format_short(level),
-            format_significant(excess, 2),
-            unit = format_unit(joint.kind.units().1)
-        ),
->>>>>>> theirs
         Misfit::Shifted { shift, left } => shifted(n, shift, left),
         Misfit::Scaled {
             factor,
@@ -112,7 +103,7 @@ fn clipped(robot: &Robot, j: usize, [level, excess, percent]: [f64; 3]) -> Strin
     format!(
         "tau{} is cut at {} {unit} for {percent:.0} % of the time, where the motion needs {} {unit} more on average; record without the limit, or a motion that needs less.",
         j + 1,
-        format_significant(level, 4),
+        format_short(level),
         format_significant(excess, 2),
     )
 }
