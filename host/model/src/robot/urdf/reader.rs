@@ -231,7 +231,10 @@ mod tests {
             let said = parsed(&text, Path::new("a.urdf")).map_err(|e| e.to_string());
             let said = said.err().unwrap_or_default();
             assert!(said.starts_with("a.urdf:"), "{said}");
-            assert!(said.contains("remove the empty line or the blanks"), "{said}");
+            assert!(
+                said.contains("remove the empty line or the blanks"),
+                "{said}"
+            );
         }
         assert!(parsed("<?xml version=\"1.0\"?>\n<robot/>", Path::new("a.urdf")).is_ok());
     }
