@@ -9,6 +9,8 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
 
+use super::watchdog;
+
 /// Core, buses and timers, Hz: 24 MHz / 6 · 85 / 2, or 16 MHz / 4 · 85 / 2.
 pub(crate) const CORE_HZ: u32 = 170_000_000;
 
@@ -33,6 +35,8 @@ fn start_crystal() -> bool {
         if RCC.cr().read().hserdy() {
             return true;
         }
+        // The wait ends by its count, which takes longer than its time.
+        watchdog::feed();
         cortex_m::asm::delay(RESET_KHZ / 10);
     }
     RCC.cr().modify(|w| w.set_hseon(false));

@@ -9,8 +9,8 @@ use rig_shared::wire::message::{CrashKind, WATCHED_PARTS};
 
 use super::crash::{self, Failure};
 
-/// Longest silence of the tick or the telemetry, and longest start, ms: a thousand control ticks. The start takes about 40 ms
-/// with a crystal that needs 20 ms.
+/// Longest silence of the tick or the telemetry, and longest start, ms: a thousand control ticks. The wait for a crystal
+/// that does not start is left out.
 const TIMEOUT_MS: u32 = 100;
 /// Counts of the watchdog in a ms: its oscillator of 32 kHz (DS12288, f_LSI: 31.04 to 32.96 kHz at 3 V, 30 °C) over 4.
 const COUNTS_PER_MS: u32 = 8;
@@ -60,7 +60,8 @@ pub(crate) fn start() {
     feed();
 }
 
-fn feed() {
+/// Feeds it. The start does so in a wait that ends by a count.
+pub(crate) fn feed() {
     IWDG.kr().write(|w| w.set_key(Key::RESET));
 }
 
