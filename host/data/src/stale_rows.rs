@@ -14,6 +14,8 @@ const NORMAL: f64 = 1.4826;
 const BEYOND_NOISE: f64 = 8.0;
 /// … and in the smallest changes of the position: a coarse encoder repeats its count, too.
 const BEYOND_COUNTS: f64 = 5.0;
+/// One change in this number may be smaller than the encoder's count: means over several of its readings are, at times.
+const RARE: usize = 100;
 /// Bounds of the change of the row that catches up, as a share of that at the velocity around it.
 const CAUGHT_UP: [f64; 2] = [0.6, 1.6];
 /// Fewest stale rows in a row at one place: single ones are found as repeated rows.
@@ -36,7 +38,7 @@ pub(super) struct StaleRows {
     pub most: usize,
 }
 
-/// Change from row to row of a position, its noise and its smallest step.
+/// Change from row to row of a position, its noise and its smallest step that is not rare.
 struct Change {
     by: Vec<f64>,
     noise: f64,
@@ -48,9 +50,12 @@ impl Change {
         let by: Vec<f64> = q.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let bends = by.windows(2).map(|pair| (pair[1] - pair[0]).abs());
         let noise = NORMAL * median(bends.collect())? / 2.0_f64.sqrt();
-        let sizes = by.iter().map(|by| by.abs()).filter(|by| *by > 0.0);
-        let count = sizes.fold(f64::INFINITY, f64::min);
-        count.is_finite().then_some(Self { by, noise, count })
+        let mut sizes: Vec<f64> = (by.iter().map(|by| by.abs()))
+            .filter(|by| *by > 0.0)
+            .collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        let count = *sizes.get(sizes.len() / RARE)?;
+        Some(Self { by, noise, count })
     }
 
     /// Returns the changes of the row that catches up and of a row around it, if they show more than noise.

@@ -508,7 +508,7 @@ fn an_encoder_on_the_link_is_checked_like_the_joint_s_own() {
         (&|_, q| 57.296 * q, "unit", "degrees"),
         (&|_, q| -q, "sign", "reverse its sense"),
         (&|_, q| 50.0 * q, "ratio", "gear ratio 50"),
-        (&|_, q| 1.7 * q, "unit", "1.7000 times"),
+        (&|_, q| 1.7 * q, "unit", "1.7 times"),
         (&|_, _| 0.3, "not-moving", "stands still"),
         (
             &|k, q| {
