@@ -80,10 +80,11 @@ pub(super) fn stale_rows(block: &Block) -> Option<StaleRows> {
         .collect();
     let steps = changes.iter().map(|own| own.by.len()).min()?;
     let stands = |k: &usize| changes.iter().all(|own| own.by[*k] == 0.0);
-    let (mut places, mut k) = (Vec::new(), 0);
+    let (mut places, mut repeated, mut k) = (Vec::new(), 0, 0);
     while k < steps {
         let rows = (k..steps).take_while(stands).count();
         if rows > 0 {
+            repeated += 1;
             let shown = changes.iter().filter_map(|own| own.caught_up(k, k + rows));
             let (along, all) = shown.fold((0.0, 0.0), |(along, all), [own, speed]| {
                 (along + own * speed, all + speed * speed)
@@ -96,7 +97,9 @@ pub(super) fn stale_rows(block: &Block) -> Option<StaleRows> {
         k += rows + 1;
     }
     let most = places.iter().map(|(_, rows)| *rows).max()?;
-    let told = most >= MANY || most >= FEWEST_ROWS && places.len() >= FEWEST_PLACES;
+    let enough = most >= MANY || most >= FEWEST_ROWS && places.len() >= FEWEST_PLACES;
+    // Values that repeat mostly without catching up are counts of an encoder in slow motion.
+    let told = enough && 2 * places.len() > repeated;
     told.then(|| StaleRows {
         row: places[0].0,
         places: places.len(),
