@@ -56,14 +56,10 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
             calibrating.then(|| calibrate(config, state, sample.current, readings.temperature))?
         })
         .or_else(|| check_host(config, state))
-        .or_else(|| {
-            let stops = sample.stop_switch_open || state.stop_switch.stopping;
-            stops.then(|| check_stop_switch(state, sample.stop_switch_open))?
-        });
+        .or_else(|| stop_switch_fault(state, sample.stop_switch_open));
     if let Some((fault, value)) = fault {
         output.fault = latch_fault(state, fault, value);
     }
-
     let mut limits = state.marks;
     limits.set(Limit::LateTick, sample.late_ticks > 0);
     state.reference = reference(config, state, &mut limits);
@@ -190,6 +186,13 @@ fn check_host(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
     }
     (silent > silent_limit + u64::from(config.host_lost_ticks))
         .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
+}
+
+/// Returns the fault of a stop switch that is open, or was opened during this motion.
+#[inline(always)]
+fn stop_switch_fault(state: &mut State, is_open: bool) -> Option<(Fault, f32)> {
+    let stops = is_open || state.stop_switch.stopping;
+    stops.then(|| check_stop_switch(state, is_open))?
 }
 
 /// Ends the motion of a rig whose stop switch is open, or was opened during this motion: first by a controlled stop, then

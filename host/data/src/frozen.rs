@@ -12,7 +12,6 @@
 //! is off.
 
 use super::block::JointColumns;
-use super::plausibility::range;
 use rig_numerics::statistics::median;
 
 /// Fewest equal rows.
@@ -151,6 +150,15 @@ fn longest_run(values: &[f64]) -> Option<Frozen> {
         value: values[from],
         by: 0.0,
     })
+}
+
+/// Returns the lowest and highest value.
+pub(super) fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        })
 }
 
 #[cfg(test)]

@@ -5,9 +5,8 @@
 //! the rows on both sides, and a few per cent of lost rows would leave no stretch to fit.
 
 use super::between_rows::{between, cubic};
-use super::block::{Block, JointColumns};
+use super::block::{Block, JointColumns, append, stretch};
 use super::place::Place;
-use super::prepare::{append, stretch};
 use super::sampling::Sampling;
 
 /// Rows on either side of a gap that its interpolation uses.

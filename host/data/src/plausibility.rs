@@ -4,7 +4,7 @@
 //! Without limits in the robot's description, the columns are only compared with each other.
 
 use super::block::{Block, JointColumns};
-use super::frozen::{Frozen, frozen_position, frozen_torque};
+use super::frozen::{Frozen, frozen_position, frozen_torque, range};
 use super::lost_rows::{Advances, LostRows, advances};
 use super::place::{Place, RowAt};
 use super::position_jump::largest_position_jump;
@@ -709,15 +709,6 @@ fn more(count: usize) -> String {
         2 => " and at one more place".to_owned(),
         n => format!(" and at {} more places", n - 1),
     }
-}
-
-/// Returns the lowest and highest value.
-pub(super) fn range(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        })
 }
 
 /// Returns the units of a joint's position and effort, as sentences have them.

@@ -6,7 +6,8 @@
 use core::f64::consts::TAU;
 
 use super::block::{Block, JointColumns};
-use super::plausibility::{Implausible, range};
+use super::frozen::range;
+use super::plausibility::Implausible;
 use rig_model::robot::{Joint, JointKind, Robot};
 use rig_numerics::statistics::{correlation, mean, moments_about_means};
 use rig_output::format_significant;

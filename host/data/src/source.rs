@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
-use super::block::{Block, JointColumns};
+use super::block::{Block, JointColumns, append, stretch};
 use super::bursts::{Changes, bursts};
 use super::columns::{EffortNeed, Layout, Role};
 use super::csv::CsvRows;
@@ -17,7 +17,6 @@ use super::missing_rows::{BESIDE, MissingRows, filled, last_rows};
 use super::motors::{MotorPass, MotorSide};
 use super::parquet::ParquetRows;
 use super::place::Place;
-use super::prepare::{append, stretch};
 use super::quantity::Quantity;
 use super::remark::Remark;
 use super::rounded_time::RoundedTime;

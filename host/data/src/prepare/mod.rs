@@ -26,13 +26,13 @@ mod spool;
 mod survey;
 mod workers;
 
+pub use crate::block::stretch;
 pub use decimate::{Decimator, Stream};
 pub use error::PrepareError;
 pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
 pub use motion::later;
 pub use motion::{JointMotion, Motion, each_motion, worked_motion};
-pub(crate) use pieces::append;
-pub use pieces::{Beginning, Changed, LongestPart, first_block, longest_part, stretch};
+pub use pieces::{Beginning, Changed, LongestPart, first_block, longest_part};
 pub use pieces::{InMemory, Piece, Recording, Unburdened, each_piece};
 pub use preprocessing_plan::MAX_CUTOFF_SHARE;
 pub use preprocessing_plan::{Choice, CutoffTrial, Masked, PrepareOptions, PreprocessingPlan};

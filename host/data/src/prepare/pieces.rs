@@ -1,7 +1,7 @@
 //! A recording in pieces with margins: filters over whole recordings in constant memory.
 
 use super::error::PrepareError;
-use crate::block::{Block, JointColumns};
+use crate::block::{Block, append, stretch};
 use crate::source::Source;
 
 /// A source of rows in blocks that can be read repeatedly.
@@ -259,72 +259,6 @@ pub struct Piece {
     pub segment: usize,
     /// True where `rows` starts and ends with the segment.
     pub at_ends: [bool; 2],
-}
-
-/// Rows `start .. end` of a block.
-pub fn stretch(block: &Block, start: usize, end: usize) -> Block {
-    let of = |column: &Vec<f64>| column.get(start..end).unwrap_or_default().to_vec();
-    Block {
-        t: of(&block.t),
-        joints: block
-            .joints
-            .iter()
-            .map(|j| JointColumns {
-                q: of(&j.q),
-                tau: of(&j.tau),
-                qd: j.qd.as_ref().map(of),
-                qdd: j.qdd.as_ref().map(of),
-                reference: j.reference.as_ref().map(of),
-                voltage: j.voltage.as_ref().map(of),
-                temperature: j.temperature.as_ref().map(of),
-                link: j.link.as_ref().map(of),
-                effects: j.effects.as_ref().map(of),
-            })
-            .collect(),
-        extra: block
-            .extra
-            .iter()
-            .map(|(name, column)| (name.clone(), of(column)))
-            .collect(),
-        first_line: block.line(start),
-        interpolated: (block.interpolated.iter())
-            .filter(|row| (start..end).contains(*row))
-            .map(|row| row - start)
-            .collect(),
-        continues: start > 0 || block.continues,
-    }
-}
-
-/// Appends the rows of a block to those before it.
-pub(crate) fn append(block: &mut Block, mut more: Block) {
-    if block.is_empty() {
-        *block = more;
-        return;
-    }
-    fn join(a: &mut Option<Vec<f64>>, b: Option<Vec<f64>>) {
-        match (a.as_mut(), b) {
-            (Some(a), Some(b)) => a.extend(b),
-            _ => *a = None,
-        }
-    }
-    let rows = block.len();
-    let interpolated = more.interpolated.iter().map(|row| row + rows);
-    block.interpolated.extend(interpolated);
-    block.t.append(&mut more.t);
-    for (a, b) in block.joints.iter_mut().zip(more.joints) {
-        a.q.extend(b.q);
-        a.tau.extend(b.tau);
-        join(&mut a.qd, b.qd);
-        join(&mut a.qdd, b.qdd);
-        join(&mut a.reference, b.reference);
-        join(&mut a.voltage, b.voltage);
-        join(&mut a.temperature, b.temperature);
-        join(&mut a.link, b.link);
-        join(&mut a.effects, b.effects);
-    }
-    for ((_, a), (_, b)) in block.extra.iter_mut().zip(more.extra) {
-        a.extend(b);
-    }
 }
 
 fn drop_front(block: &mut Block, rows: usize) {

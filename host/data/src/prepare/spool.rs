@@ -5,8 +5,9 @@ use std::io::Seek;
 use std::sync::{Mutex, PoisonError};
 
 use super::error::PrepareError;
-use super::pieces::{Recording, stretch};
+use super::pieces::Recording;
 use super::record::{self, Record, begin, put_count, put_numbers, unusable};
+use crate::block::stretch;
 use crate::block::{Block, JointColumns};
 use crate::unsettled::{MARKED_BY, with_marks};
 
