@@ -138,7 +138,7 @@ impl Wwdg {
                 // Only a reset disables it.
                 self.misused |= self.enabled && early || value & ENABLE != 0 && value & T6 == 0;
                 self.enabled |= value & ENABLE != 0;
-                self.count = clock * 4096 << (self.configuration >> 11 & 7);
+                self.count = (clock * 4096) << (self.configuration >> 11 & 7);
                 self.written = (value & COUNTER, now);
                 self.warns = self.reaches(T6);
             }
