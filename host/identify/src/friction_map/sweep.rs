@@ -151,8 +151,15 @@ pub(super) fn can_be_loaded(robot: &Robot, joint: usize) -> Result<bool, Identif
         body[column::MASS] = mass;
         body[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&first_moment);
         for q in poses(n) {
-            inverse_dynamics(&chain, &vec![body; n], &q, &still, &still, &mut torque)
-                .map_err(|e| IdentifyError::Model(e.to_string()))?;
+            inverse_dynamics(
+                &chain,
+                &vec![body; chain.link_count()],
+                &q,
+                &still,
+                &still,
+                &mut torque,
+            )
+            .map_err(|e| IdentifyError::Model(e.to_string()))?;
             // Unit bodies on arms of any size, N·m; rounded angles of a description tilt an axis by 1e-5.
             if torque[joint].abs() > 1e-3 {
                 return Ok(true);
