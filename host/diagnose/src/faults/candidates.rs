@@ -11,11 +11,12 @@ use crate::faults::described::{Described, friction};
 use crate::faults::finding::Fault;
 use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
-use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
+use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, POOR_ALONE, TRIAL, WORTH};
 use crate::faults::misfit::{Misfit, Reversal};
+use crate::faults::names;
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
-use crate::faults::undo::{Columns, Undo};
+use crate::faults::undo::{Columns, Side, Undo};
 use rig_numerics::statistics::squares_about_mean;
 
 /// Least fall of the log residual variances, summed over joints, to believe a transformation: one joint's falls to a
@@ -35,12 +36,18 @@ pub(crate) struct Found {
     left: [f64; 2],
     /// True if the other columns of the same joints explain it too.
     twin: bool,
+    /// True if it is a factor of positions that has a name.
+    named: bool,
+    /// Largest residual share of a moving joint without it.
+    worst: f64,
 }
 
 /// Residuals of the recording as it is, for comparison with transformations.
 pub(crate) struct Before {
     /// Rows of the trial.
     rows: Rows,
+    /// True if a drive whose inertia is not described may have any.
+    free_drives: bool,
     /// Joints that move.
     pub(crate) moving: Vec<usize>,
     /// Residual share of each torque's variance.
@@ -56,9 +63,14 @@ impl Before {
         self.moving.iter().map(of).sum()
     }
 
-    /// Returns the poorly explained joints whose residual variance the transformation at least halves.
-    fn mended(&self, after: &[f64]) -> Vec<usize> {
-        let mends = |j: &usize| self.left[*j] > POOR && after[*j] < 0.5 * self.left[*j];
+    /// Returns the largest residual share of a moving joint.
+    fn worst(&self, left: &[f64]) -> f64 {
+        self.moving.iter().map(|j| left[*j]).fold(0.0, f64::max)
+    }
+
+    /// Returns the joints with a residual share above `level` whose residual variance the transformation at least halves.
+    fn mended(&self, after: &[f64], level: f64) -> Vec<usize> {
+        let mends = |j: &usize| self.left[*j] > level && after[*j] < 0.5 * self.left[*j];
         self.moving.iter().copied().filter(mends).collect()
     }
 }
@@ -67,48 +79,19 @@ impl Judge<'_> {
     /// Returns the transformations that explain the recording, the likeliest first; none for a single joint.
     pub(crate) fn transformed(&self) -> Result<Vec<Found>, DiagnoseError> {
         let rows = self.rows.thinned(TRIAL);
-        let ranges: Vec<f64> = rows.q.iter().map(|q| range(q)).collect();
-        let widest = ranges.iter().copied().fold(0.0, f64::max);
-        let moving: Vec<usize> = (0..ranges.len())
-            .filter(|j| ranges[*j] > STILL * widest)
-            .collect();
-        let described = self.states_from(0);
         if self.robot.joints.len() < 2 {
             return Ok(Vec::new());
         }
-        let left = self.left(&rows)?;
-        let enough = match described {
-            true => CONVINCING_TO_DESCRIPTION,
-            false => CONVINCING_TO_FIT,
+        // The inertia of a drive that is not described could adapt to a wrong sense or order.
+        let stated = self.before(rows, false)?;
+        let mut all = match stated.worst(&stated.left) > POOR {
+            true => self.convincing(self.of_sense_and_order(&stated)?, &stated)?,
+            false => Vec::new(),
         };
-        let before = Before {
-            rows,
-            moving,
-            left,
-            enough,
-        };
-        if before.moving.iter().all(|j| before.left[*j] <= POOR) {
-            return Ok(Vec::new());
+        if self.states_from(0) {
+            let free = self.before(stated.rows, true)?;
+            all.extend(self.convincing(self.of_values(&free)?, &free)?);
         }
-        let mut all: Vec<Found> = Vec::new();
-        for undo in self.candidates(&before)? {
-            let after = self.left_without(&undo, &before.rows)?;
-            let concerned = concerned(&undo, &before, &after);
-            // One joint's own columns explain turned gravity as well.
-            if concerned.is_empty() || concerned.len() < 2 && matches!(undo, Undo::Gravity(_)) {
-                continue;
-            }
-            let mean = |left: &[f64]| {
-                concerned.iter().map(|j| left[*j]).sum::<f64>() / concerned.len() as f64
-            };
-            all.push(Found {
-                undo,
-                gain: before.gain(&after),
-                left: [mean(&before.left), mean(&after)],
-                twin: false,
-            });
-        }
-        all.retain(|found| found.convinces(enough));
         all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let twins: Vec<bool> = (all.iter())
             .map(|own| all.iter().any(|other| other.is_twin(own)))
@@ -116,15 +99,81 @@ impl Judge<'_> {
         for (found, twin) in all.iter_mut().zip(twins) {
             found.twin = twin;
         }
-        all.truncate(SUSPECTS);
         Ok(all)
     }
 
-    /// Returns the transformations to try.
-    fn candidates(&self, before: &Before) -> Result<Vec<Undo>, DiagnoseError> {
+    /// Returns the residuals of the recording as it is. `free_drives`: a drive whose inertia is not described may have any.
+    fn before(&self, rows: Rows, free_drives: bool) -> Result<Before, DiagnoseError> {
+        let ranges: Vec<f64> = rows.q.iter().map(|q| range(q)).collect();
+        let widest = ranges.iter().copied().fold(0.0, f64::max);
+        let moving = (0..ranges.len())
+            .filter(|j| ranges[*j] > STILL * widest)
+            .collect();
+        let left = self.left(&rows, free_drives)?;
+        Ok(Before {
+            rows,
+            free_drives,
+            moving,
+            left,
+            enough: match self.states_from(0) {
+                true => CONVINCING_TO_DESCRIPTION,
+                false => CONVINCING_TO_FIT,
+            },
+        })
+    }
+
+    /// Returns the transformations that explain the recording, the likeliest first.
+    fn convincing(
+        &self,
+        candidates: Vec<Undo>,
+        before: &Before,
+    ) -> Result<Vec<Found>, DiagnoseError> {
+        let mut all: Vec<Found> = Vec::new();
+        for undo in candidates {
+            let after = self.left_without(&undo, before)?;
+            let concerned = concerned(&undo, before, &after);
+            // One joint's own columns explain turned gravity as well.
+            if concerned.is_empty() || concerned.len() < 2 && matches!(undo, Undo::Gravity(_)) {
+                continue;
+            }
+            let mean = |left: &[f64]| {
+                concerned.iter().map(|j| left[*j]).sum::<f64>() / concerned.len() as f64
+            };
+            let named = self.is_named(&undo);
+            all.push(Found {
+                undo,
+                gain: before.gain(&after),
+                left: [mean(&before.left), mean(&after)],
+                twin: false,
+                named,
+                worst: before.worst(&after),
+            });
+        }
+        all.retain(|found| found.convinces(before.enough));
+        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut once: Vec<Found> = Vec::new();
+        for own in all {
+            if once.iter().all(|other| !other.undo.is_like(&own.undo)) {
+                once.push(own);
+            }
+        }
+        once.truncate(SUSPECTS);
+        Ok(once)
+    }
+
+    /// Returns the senses and orders of columns to try.
+    fn of_sense_and_order(&self, before: &Before) -> Result<Vec<Undo>, DiagnoseError> {
         let mut all = Vec::new();
+        let ratio = |j: &usize| self.robot.joints[*j].gear_ratio();
+        let first = before.moving.first().map_or(1.0, ratio);
+        let sides: &[Side] = match before.moving.iter().all(|j| ratio(j) == first) {
+            true => &[Side::Joint],
+            false => &[Side::Motor, Side::Joint],
+        };
         for which in [Columns::Torques, Columns::Positions, Columns::Joints] {
-            all.extend(self.orders(which, before)?);
+            for side in sides {
+                all.extend(self.orders((which, *side), before)?);
+            }
         }
         for &j in &before.moving {
             all.extend([
@@ -133,27 +182,57 @@ impl Judge<'_> {
                 Undo::Both(j),
             ]);
         }
-        if !self.states_from(0) {
-            return Ok(all);
-        }
-        all.extend(self.gravity_shown(&before.rows)?.map(Undo::Gravity));
+        Ok(all)
+    }
+
+    /// Returns the values of the description to try: factors of all gears, of all positions and of each joint's, and in
+    /// a poor recording zeros and the direction of gravity.
+    fn of_values(&self, before: &Before) -> Result<Vec<Undo>, DiagnoseError> {
+        let mut all = self.through_gears();
+        all.extend(self.factor(None, before)?);
         for &j in &before.moving {
-            all.extend(self.zero(j, before)?);
             all.extend(self.factor(Some(j), before)?);
         }
-        all.extend(self.factor(None, before)?);
+        if before.worst(&before.left) > POOR {
+            all.extend(self.gravity_shown(&before.rows)?.map(Undo::Gravity));
+            for &j in &before.moving {
+                all.extend(self.zero(j, before)?);
+            }
+        }
         Ok(all)
+    }
+
+    /// Returns torques and positions of all joints times, or by, the ratio of their own gears; nothing without two gears.
+    fn through_gears(&self) -> Vec<Undo> {
+        let joints = &self.robot.joints;
+        if joints
+            .iter()
+            .filter(|joint| names::ratio(joint).is_some())
+            .count()
+            < 2
+        {
+            return Vec::new();
+        }
+        let ratios: Vec<f64> = joints
+            .iter()
+            .map(|joint| joint.gear_ratio().abs())
+            .collect();
+        let inverse: Vec<f64> = ratios.iter().map(|ratio| 1.0 / ratio).collect();
+        let of = |which| [&ratios, &inverse].map(|own| Undo::Each(which, own.clone()));
+        [of(Columns::Torques), of(Columns::Positions)].concat()
     }
 
     /// Returns the fall of the log residual variances when a transformation is undone.
     pub(crate) fn gain_without(&self, undo: &Undo, before: &Before) -> Result<f64, DiagnoseError> {
-        Ok(before.gain(&self.left_without(undo, &before.rows)?))
+        Ok(before.gain(&self.left_without(undo, before)?))
     }
 
-    fn left_without(&self, undo: &Undo, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
+    fn left_without(&self, undo: &Undo, before: &Before) -> Result<Vec<f64>, DiagnoseError> {
         match undo {
-            Undo::Gravity(other) => self.left_of_description(rows, *other),
-            _ => self.left(&undo.applied(self.robot, rows)),
+            Undo::Gravity(other) => {
+                self.left_of_description(&before.rows, *other, before.free_drives)
+            }
+            _ => self.left(&undo.applied(self.robot, &before.rows), before.free_drives),
         }
     }
 
@@ -161,7 +240,7 @@ impl Judge<'_> {
     pub(crate) fn said(&self, found: &Found) -> Option<Suspicion> {
         let left = found.left;
         let fault = match &found.undo {
-            Undo::Order(which, order) => {
+            Undo::Order(which, _, order) => {
                 let first = (0..order.len()).find(|j| order[*j] != *j).unwrap_or(0);
                 let order = Misfit::Order {
                     which: *which,
@@ -173,11 +252,25 @@ impl Judge<'_> {
             }
             Undo::Torque(Some(j), _) => self.reversed(true, *j, found),
             Undo::Position(Some(j), -1.0) => self.reversed(false, *j, found),
-            Undo::Position(Some(j), factor) => self.scaled(*j, &[*factor], left).fault,
+            Undo::Position(Some(j), factor) => match self.shown_by_limits(*j) {
+                // Limits show a unit better than a rough description does.
+                Some(unit) => unit.clone(),
+                None => self.scaled(*j, &[*factor], left).fault,
+            },
             Undo::Position(None, factor) => Fault::of_recording(Misfit::AllScaled {
                 factor: *factor,
                 left,
             }),
+            Undo::Each(which, factors) => {
+                let torque = *which == Columns::Torques;
+                let larger = factors.iter().zip(&self.robot.joints);
+                let larger = larger.map(|(f, joint)| f.ln() * joint.gear_ratio().abs().ln());
+                Fault::of_recording(Misfit::ThroughGears {
+                    torque,
+                    twice: (larger.sum::<f64>() > 0.0) != torque,
+                    left,
+                })
+            }
             Undo::Both(j) => Fault::of_joint(*j, Misfit::AxisReversed { left }),
             Undo::Zero(j, angle) => Fault::of_joint(
                 *j,
@@ -213,9 +306,9 @@ impl Judge<'_> {
 
     /// Returns the residual share of each torque's variance: by the description, which has few free numbers, if it
     /// states every link; else by one set of parameters for all joints.
-    fn left(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
+    fn left(&self, rows: &Rows, free_drives: bool) -> Result<Vec<f64>, DiagnoseError> {
         if self.states_from(0) {
-            self.left_of_description(rows, self.robot.gravity)
+            self.left_of_description(rows, self.robot.gravity, free_drives)
         } else {
             self.left_of_parameters(rows)
         }
@@ -246,21 +339,18 @@ impl Judge<'_> {
         &self,
         rows: &Rows,
         gravity: [f64; 3],
+        free_drives: bool,
     ) -> Result<Vec<f64>, DiagnoseError> {
         let n = self.robot.joints.len();
         let Described { all, motors, .. } = self.described_under(rows, gravity)?;
         let share = |j: usize| {
             let friction = friction(&rows.qd[j], motors.get(j));
-            let order: Vec<usize> = (0..friction.ncols()).collect();
             let rest: Vec<f64> = (rows.tau[j].iter().zip(&all[j]))
                 .map(|(tau, own)| tau - own)
                 .collect();
             let total = squares_about_mean(&rows.tau[j]).max(f64::MIN_POSITIVE);
-            let squares = Fit::of(&friction, &rest, &order).map_or_else(
-                || squares_about_mean(&rest),
-                |fit| fit.residual.norm_squared(),
-            );
-            squares / total
+            let drive = (free_drives && !self.states_drive(j)).then(|| rows.qdd[j].as_slice());
+            squares_left(&friction, drive, &rest) / total
         };
         Ok((0..n).map(share).collect())
     }
@@ -271,12 +361,17 @@ impl Found {
     /// fitted value must be better by more.
     fn convinces(&self, enough: f64) -> bool {
         let [recorded, without] = self.left;
-        let fitted = match self.undo {
-            Undo::Position(_, factor) if factor != -1.0 => MUCH_BETTER,
-            Undo::Zero(..) => MUCH_BETTER,
-            _ => 1.0,
+        // A factor that has a name is likelier than any other value; it must explain more where the description is far off.
+        let far_off = f64::max(1.0, self.worst / POOR_ALONE);
+        if self.named && self.gain > WORTH * far_off {
+            return true;
+        }
+        let (fitted, poor) = match self.undo {
+            Undo::Position(_, factor) if factor != -1.0 => (MUCH_BETTER, POOR_ALONE),
+            Undo::Zero(..) => (MUCH_BETTER, POOR),
+            _ => (1.0, POOR),
         };
-        recorded > POOR
+        recorded > poor
             && without < GOOD.max(0.2 * recorded).min(0.5)
             && without < fitted * recorded
             && self.gain > enough
@@ -290,14 +385,6 @@ impl Found {
         )
     }
 
-    /// Returns true if both scale the position of the same joint.
-    pub(crate) fn is_of(&self, other: &Undo) -> bool {
-        match (&self.undo, other) {
-            (Undo::Position(Some(a), _), Undo::Position(Some(b), _)) => a == b,
-            _ => false,
-        }
-    }
-
     /// Returns true if it is a joint's zero.
     pub(crate) fn is_zero(&self) -> bool {
         matches!(self.undo, Undo::Zero(..))
@@ -306,7 +393,7 @@ impl Found {
     /// Returns true if both mean the same for torque and position of the same joints.
     fn is_twin(&self, other: &Self) -> bool {
         match (&self.undo, &other.undo) {
-            (Undo::Order(own, a), Undo::Order(other, b)) => {
+            (Undo::Order(own, _, a), Undo::Order(other, _, b)) => {
                 // The positions' order is the inverse of the torques'.
                 let columns = [own, other];
                 let both =
@@ -320,6 +407,25 @@ impl Found {
     }
 }
 
+/// Returns the residual squares of a torque by friction, and by the inertia of a drive with acceleration `drive`.
+fn squares_left(friction: &DMatrix<f64>, drive: Option<&[f64]>, torque: &[f64]) -> f64 {
+    let count = friction.ncols();
+    let fit = |x: &DMatrix<f64>| Fit::of(x, torque, &(0..x.ncols()).collect::<Vec<_>>());
+    let with = drive.and_then(|acceleration| {
+        let mut x = friction.clone().insert_column(count, 0.0);
+        x.column_mut(count).copy_from_slice(acceleration);
+        // No drive has negative inertia.
+        fit(&x).filter(|fit| {
+            fit.parameter(count)
+                .is_some_and(|inertia| inertia.value > 0.0)
+        })
+    });
+    with.or_else(|| fit(friction)).map_or_else(
+        || squares_about_mean(torque),
+        |fit| fit.residual.norm_squared(),
+    )
+}
+
 fn range(values: &[f64]) -> f64 {
     let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     most - values.iter().copied().fold(f64::INFINITY, f64::min)
@@ -328,8 +434,9 @@ fn range(values: &[f64]) -> f64 {
 /// Returns the joints whose torques show a transformation.
 fn concerned(undo: &Undo, before: &Before, after: &[f64]) -> Vec<usize> {
     match undo {
-        Undo::Gravity(_) | Undo::Zero(..) | Undo::Position(None, _) => before.mended(after),
-        Undo::Order(_, order) => (0..order.len()).filter(|j| order[*j] != *j).collect(),
+        Undo::Gravity(_) | Undo::Zero(..) => before.mended(after, POOR),
+        Undo::Position(None, _) | Undo::Each(..) => before.mended(after, 0.0),
+        Undo::Order(_, _, order) => (0..order.len()).filter(|j| order[*j] != *j).collect(),
         Undo::Torque(Some(j), _) | Undo::Position(Some(j), _) | Undo::Both(j) => vec![*j],
         _ => Vec::new(),
     }

@@ -91,6 +91,12 @@ impl Judge<'_> {
         self.robot.joints[j..].iter().all(stated)
     }
 
+    /// Returns true if the description states inertia of joint `j`'s drive; a URDF never does.
+    pub(crate) fn states_drive(&self, j: usize) -> bool {
+        let drive = self.robot.joints[j].drive.as_ref();
+        drive.is_some_and(|own| own.rotor_inertia > 0.0 || own.joint_inertia > 0.0)
+    }
+
     /// Returns the described torques of these rows; `None` without rows, or if joint `j`'s torque is not described.
     pub(crate) fn stated(&self, data: &Rows, j: usize) -> Result<Option<Described>, DiagnoseError> {
         if data.len() == 0 || !self.states_from(j) {

@@ -60,10 +60,7 @@ impl Judge<'_> {
         let joint = &self.robot.joints[j];
         let (gravity, inertia) = self.scales(&self.rows, j, described);
         // Drive parts that are not described make the inertia larger, never smaller.
-        let complete = joint
-            .drive
-            .as_ref()
-            .is_none_or(|d| d.rotor_inertia > 0.0 || d.joint_inertia > 0.0);
+        let complete = joint.drive.is_none() || self.states_drive(j);
         let inertia = inertia
             .map(|m| m.value)
             .filter(|s| complete || s.abs() < 1.0);

@@ -122,6 +122,15 @@ impl Fault {
         }
     }
 
+    /// Returns true if it concerns columns of joint `j`.
+    pub(crate) fn concerns(&self, j: usize) -> bool {
+        match (&self.finding, self.joint) {
+            (Finding::Fit(Misfit::Order { order, .. }), _) => order[j] != j,
+            (_, Some(joint)) => joint == j,
+            (finding, None) => finding.about() == About::Motion,
+        }
+    }
+
     /// Returns true if nothing without a fault explains the data.
     pub(crate) fn is_certain(&self) -> bool {
         let doubt = match &self.finding {
@@ -135,6 +144,11 @@ impl Fault {
 }
 
 impl Finding {
+    /// Returns true if the gears of all joints were forgotten, or counted twice.
+    pub(crate) fn is_of_all_gears(&self) -> bool {
+        matches!(self, Self::Fit(Misfit::ThroughGears { .. }))
+    }
+
     /// Returns the kind of the fault.
     pub(crate) fn kind(&self) -> FaultKind {
         let named = |name: &Option<Name>, unnamed| name.as_ref().map_or(unnamed, Name::kind);

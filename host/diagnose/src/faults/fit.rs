@@ -147,19 +147,26 @@ impl Fit {
     }
 
     /// Returns the residual share of variance with the torque moved by each number of rows from `-reach` to `reach`
-    /// against the motion. All use the same stretch of the motion; `None` if that is too short.
-    pub(crate) fn unexplained_moved(&self, torque: &[f64], reach: usize) -> Option<Vec<f64>> {
+    /// against the motion. All use the same stretch of the motion, and those of its rows that are `used`; `None` if these
+    /// are too few.
+    pub(crate) fn unexplained_moved(
+        &self,
+        torque: &[f64],
+        reach: usize,
+        used: &[bool],
+    ) -> Option<Vec<f64>> {
         let span = self.basis.nrows().checked_sub(2 * reach)?;
-        if span < 3 * self.kept.len() {
+        let rows: Vec<usize> = (0..span).filter(|k| used[reach + k]).collect();
+        if rows.len() < 3 * self.kept.len() {
             return None;
         }
-        let part = self.basis.rows(reach, span).into_owned();
+        let part = self.basis.rows(reach, span).select_rows(&rows);
         let inner = (part.transpose() * &part).cholesky()?;
         let moved = torque.windows(span).map(|window| {
-            let y = DVector::from_column_slice(window);
+            let y = DVector::from_iterator(rows.len(), rows.iter().map(|k| window[*k]));
             let along = part.transpose() * &y;
             let left = y.norm_squared() - along.dot(&inner.solve(&along));
-            left.max(0.0) / squares_about_mean(window).max(f64::MIN_POSITIVE)
+            left.max(0.0) / squares_about_mean(y.as_slice()).max(f64::MIN_POSITIVE)
         });
         Some(moved.collect())
     }

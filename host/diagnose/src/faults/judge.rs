@@ -3,8 +3,10 @@
 use nalgebra::DMatrix;
 
 use crate::DiagnoseError;
+use crate::faults::finding::Fault;
 use crate::faults::fit::Fit;
 use crate::faults::rows::{Form, Rows};
+use rig_data::Implausible;
 use rig_data::runs::Run;
 use rig_identify::preference;
 use rig_model::robot::{JointKind, Robot};
@@ -13,6 +15,8 @@ use rig_model::robot::{JointKind, Robot};
 pub(crate) struct Judge<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) runs: &'a [&'a Run],
+    /// What columns show without a model.
+    pub(crate) units: &'a [Fault],
     pub(crate) form: Form,
     pub(crate) rows: Rows,
     pub(crate) order: Vec<usize>,
@@ -22,14 +26,19 @@ pub(crate) struct Judge<'a> {
 
 impl<'a> Judge<'a> {
     /// Compares the rows of one recording.
-    pub(crate) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
-        Self::of_rows(robot, runs, Rows::of(runs, robot.joints.len()))
+    pub(crate) fn new(
+        robot: &'a Robot,
+        runs: &'a [&'a Run],
+        units: &'a [Fault],
+    ) -> Result<Self, DiagnoseError> {
+        Self::of_rows(robot, runs, units, Rows::of(runs, robot.joints.len()))
     }
 
     /// Compares other rows of the same recording.
     pub(crate) fn of_rows(
         robot: &'a Robot,
         runs: &'a [&'a Run],
+        units: &'a [Fault],
         rows: Rows,
     ) -> Result<Self, DiagnoseError> {
         let form = Form::of(robot)?;
@@ -45,11 +54,21 @@ impl<'a> Judge<'a> {
         Ok(Self {
             robot,
             runs,
+            units,
             form,
             rows,
             order,
             matrices,
             fits,
         })
+    }
+
+    /// Returns the fault that shows degrees in joint `j`'s position by its limits.
+    pub(crate) fn shown_by_limits(&self, j: usize) -> Option<&Fault> {
+        let degrees = |own: &Fault| {
+            let column = own.finding.column();
+            own.is_certain() && matches!(column, Some(Implausible::Degrees { .. }))
+        };
+        (self.units.iter()).find(|own| own.joint == Some(j) && degrees(own))
     }
 }

@@ -59,6 +59,14 @@ pub(crate) enum Misfit {
     },
     /// All positions fit if multiplied by `factor`.
     AllScaled { factor: f64, left: [f64; 2] },
+    /// All torques or positions by the gear ratio of their own joint.
+    ThroughGears {
+        /// True for the torques.
+        torque: bool,
+        /// True if the ratios were applied twice, false if not at all.
+        twice: bool,
+        left: [f64; 2],
+    },
     /// A position from another zero.
     Zero {
         /// Angle to add, rad.
@@ -179,7 +187,9 @@ impl Misfit {
             Self::GravityTurned { .. }
             | Self::LevelAxis { .. }
             | Self::StrongestElsewhere { .. } => FaultKind::Gravity,
-            Self::Alike { .. } | Self::HeavyRotor { .. } => FaultKind::Ratio,
+            Self::Alike { .. } | Self::HeavyRotor { .. } | Self::ThroughGears { .. } => {
+                FaultKind::Ratio
+            }
             Self::Magnitude { .. } => FaultKind::Magnitude,
             Self::GainChanged { .. } => FaultKind::Gain,
         }
@@ -211,6 +221,7 @@ impl Misfit {
             | Self::InertiaTimes { .. } => About::Recording,
             Self::Scaled { .. }
             | Self::AllScaled { .. }
+            | Self::ThroughGears { torque: false, .. }
             | Self::Zero { .. }
             | Self::Reversed { torque: false, .. }
             | Self::AxisReversed { .. }

@@ -190,7 +190,7 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<Fault>, DiagnoseError> {
         .all(|run| run.joints.len() == n && run.joints.iter().all(|j| j.tau.len() == j.q.len()));
     let mut judged = Vec::new();
     if torque {
-        for round in judge::Judge::new(robot, runs)?.faults()? {
+        for round in judge::Judge::new(robot, runs, &units)?.faults()? {
             judged.extend(unsaid(robot, &judged, round));
         }
         // A torque that fits after a certain fault is undone shows no gain as recorded.
@@ -198,7 +198,12 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<Fault>, DiagnoseError> {
             judged.extend(gain::changes(robot, runs)?);
         }
     }
-    let (units, doubts): (Vec<_>, Vec<_>) = units.into_iter().partition(Fault::is_certain);
+    let (mut units, doubts): (Vec<_>, Vec<_>) = units.into_iter().partition(Fault::is_certain);
+    // One cause at all joints is the reason of what single columns show.
+    let of_all = |f: &&Fault| f.is_certain() && f.finding.is_of_all_gears();
+    if let Some(own) = judged.iter().find(of_all) {
+        units.retain(|unit| unit.finding.about() != own.finding.about());
+    }
     if !units.is_empty() {
         // Drops consequences: faults of other joints from a wrong unit, and torque faults from a wrong position.
         let own = |f: &Fault| units.iter().find(|fault| fault.joint == f.joint);
@@ -211,7 +216,7 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<Fault>, DiagnoseError> {
     found.extend(judged);
     found.extend(doubts);
     for j in 0..n {
-        let sound = |found: &[Fault]| found.iter().all(|f| f.joint != Some(j));
+        let sound = |found: &[Fault]| !found.iter().any(|f| f.concerns(j));
         // A wrong position also contradicts the measured velocity.
         if sound(&found) {
             found.extend(columns::velocity(robot, runs, j));

@@ -4,7 +4,7 @@ use crate::DiagnoseError;
 use crate::faults::finding::Fault;
 use crate::faults::fit::{Fit, Measured};
 use crate::faults::judge::Judge;
-use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, TRIAL};
+use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, POOR_ALONE, TRIAL};
 use crate::faults::misfit::Misfit;
 use crate::faults::names;
 use crate::faults::rows::Rows;
@@ -13,14 +13,12 @@ use crate::faults::undo::Undo;
 use rig_model::robot::JointKind;
 use rig_numerics::statistics;
 
-/// Residual share of the torque's variance above which other units or times are tried for a single joint, whose few
-/// parameters cannot compensate them; and for a shift in time of any robot, as many parameters of a slow arm compensate
-/// most of it.
-const POOR_ALONE: f64 = 0.01;
 /// Ratio of residuals below which a trial is believed, if its own is below [`GOOD`] too.
 const BETTER: f64 = 0.35;
 /// Ratio of residuals below which a shift is suspected; the trial decides.
 const LESS: f64 = 0.7;
+/// Ratio to the least residual up to which a shift explains as much.
+const NEAREST: f64 = 1.3;
 /// The same as [`MUCH_BETTER`] for a small misfit.
 const FAR_BETTER: f64 = 0.1;
 /// Largest shift from filters and buses instead of clocks, s: half a row. The second is for several joints, whose many
@@ -85,7 +83,8 @@ impl Judge<'_> {
             .then(|| Fault::of_joint(j, found))
     }
 
-    /// Suspects a torque that is shifted in time against the motion.
+    /// Suspects a torque that is shifted in time against the motion. The shift must explain the rows in motion too:
+    /// friction at standstill lies anywhere between its two limits, and a shift explains some of it by chance.
     pub(crate) fn shifted(&self, j: usize) -> Option<Suspicion> {
         let fit = self.fits[j].as_ref()?;
         if fit.unexplained() < POOR_ALONE {
@@ -93,14 +92,15 @@ impl Judge<'_> {
         }
         let time = self.rows.len() as f64 * self.rows.period;
         let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
-        let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
+        let tau = &self.rows.tau[j];
+        let left = fit.unexplained_moved(tau, reach, &vec![true; tau.len()])?;
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
         if left[reach] < POOR_ALONE || least > LESS * left[reach] {
             return None;
         }
         // For a periodic motion, the nearest period.
         let at = (0..left.len())
-            .filter(|k| left[*k] <= 1.3 * least)
+            .filter(|k| left[*k] <= NEAREST * least)
             .min_by_key(|k| k.abs_diff(reach))?;
         let shift = (at as f64 - reach as f64) * self.rows.period;
         if shift.abs() <= SMALL && least > BETTER * left[reach] {
@@ -108,8 +108,15 @@ impl Judge<'_> {
         }
         let speed = &self.rows.qd[j];
         let fastest = speed.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        let moving = speed.iter().filter(|v| v.abs() > IN_MOTION * fastest);
-        let shown = moving.count() as f64 * self.rows.period > SHOWN_BY * shift.abs();
+        let moving: Vec<bool> = (speed.iter())
+            .map(|v| v.abs() > IN_MOTION * fastest)
+            .collect();
+        let in_motion = fit.unexplained_moved(tau, reach, &moving)?;
+        let time = moving.iter().filter(|moves| **moves).count() as f64 * self.rows.period;
+        // A delay is the same at all speeds.
+        let best = in_motion.iter().copied().fold(f64::INFINITY, f64::min);
+        let agree = in_motion[at] < LESS * in_motion[reach] && in_motion[at] <= NEAREST * best;
+        let shown = agree && time > SHOWN_BY * shift.abs();
         (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
             let left = [left[reach], least];
             let fault = Fault::of_joint(j, Misfit::Shifted { shift, left });

@@ -121,7 +121,7 @@ const LIKELY: f64 = 1.0 / 3.0;
 const CLOSE: f64 = 1.12;
 
 /// Returns motor turns per joint turn, if the described ratio is far enough from one.
-fn ratio(joint: &Joint) -> Option<f64> {
+pub(crate) fn ratio(joint: &Joint) -> Option<f64> {
     let ratio = joint.drive.as_ref()?.gear_ratio.abs();
     (ratio > 1.5 || (ratio > 0.0 && ratio < 0.67)).then_some(ratio)
 }

@@ -3,11 +3,11 @@
 use crate::DiagnoseError;
 use crate::faults::candidates::Before;
 use crate::faults::judge::Judge;
-use crate::faults::undo::{Columns, Undo};
+use crate::faults::undo::{Columns, Side, Undo};
 
 impl Judge<'_> {
-    /// Returns the order in which these columns explain the recording best, and the best exchange of two alone; nothing
-    /// for the description's order.
+    /// Returns the order in which these columns, measured on this side of the gears, explain the recording best, and the
+    /// best exchange of two alone; nothing for the description's order.
     ///
     /// Starts from the description's order and exchanges joints while that explains convincingly more.
     ///
@@ -15,7 +15,7 @@ impl Judge<'_> {
     /// [`DiagnoseError::Model`] if the description is no chain.
     pub(crate) fn orders(
         &self,
-        which: Columns,
+        (which, side): (Columns, Side),
         before: &Before,
     ) -> Result<Vec<Undo>, DiagnoseError> {
         let mut found: Vec<Undo> = Vec::new();
@@ -26,7 +26,7 @@ impl Judge<'_> {
             let mut enough = gained + before.enough;
             for places in exchanges(order.len(), &before.moving) {
                 let tried: Vec<usize> = places.iter().map(|place| order[*place]).collect();
-                let undo = Undo::Order(which, tried.clone());
+                let undo = Undo::Order(which, side, tried.clone());
                 let gain = self.gain_without(&undo, before)?;
                 let moved = (0..tried.len()).filter(|j| tried[*j] != *j).count();
                 if moved == 2 && gain > pair.0 {

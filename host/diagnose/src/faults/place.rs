@@ -11,7 +11,9 @@ use core::f64::consts::{PI, TAU};
 use crate::DiagnoseError;
 use crate::faults::candidates::Before;
 use crate::faults::judge::Judge;
+use crate::faults::levels::ODDS;
 use crate::faults::names;
+use crate::faults::physical::INDEPENDENT;
 use crate::faults::undo::Undo;
 use rig_model::robot::JointKind;
 
@@ -58,16 +60,9 @@ impl Judge<'_> {
         j: Option<usize>,
         before: &Before,
     ) -> Result<Option<Undo>, DiagnoseError> {
-        // Limits show the unit of positions beyond them better than a rough description does.
-        if j.is_some_and(|j| !self.reaches(j, 1.0)) {
-            return Ok(None);
-        }
         let gain = |factor: f64| self.gain_without(&Undo::Position(j, factor), before);
         let step = 10f64.powf(1.0 / f64::from(A_DECADE));
-        let named = match j {
-            Some(j) => names::factors_of_position(&self.robot.joints[j]),
-            None => vec![TAU, 1.0 / 57.296, 57.296],
-        };
+        let named = self.named_factors(j);
         let reached = |factor: &f64| match j {
             Some(j) => self.reaches(j, *factor),
             None => (0..self.robot.joints.len()).all(|j| self.reaches(j, *factor)),
@@ -82,19 +77,37 @@ impl Judge<'_> {
         let Some(near) = best(tried.into_iter(), &gain)? else {
             return Ok(None);
         };
-        let apart = |own: &f64| (near / own).ln().abs();
-        if let Some(own) = named.iter().find(|own| apart(own) < NAMED) {
-            return Ok(Some(Undo::Position(j, *own)));
+        if j.is_none() {
+            return Ok(Some(Undo::Position(None, near)));
         }
         let sense = near.signum();
         let [low, high] = [near.abs() / step, near.abs() * step].map(f64::ln);
         let close = sense * closely(low, high, &|log: f64| gain(sense * log.exp()))?.exp();
-        let own = named
-            .iter()
-            .copied()
-            .find(|own| (close / own).ln().abs() < NAMED);
-        let factor = own.unwrap_or(close);
-        Ok((far(&factor) && reached(&factor)).then_some(Undo::Position(j, factor)))
+        let most = gain(close)?;
+        for own in named.iter().filter(|own| reached(own)) {
+            // A named factor that is as near as the description is right, or explains nearly as much, is the likelier one.
+            let near = (close / own).ln().abs() < NAMED;
+            if near || most - gain(*own)? < 2.0 * ODDS / INDEPENDENT {
+                return Ok(Some(Undo::Position(j, *own)));
+            }
+        }
+        Ok((far(&close) && reached(&close)).then_some(Undo::Position(j, close)))
+    }
+
+    /// Returns the factors of joint `j`'s position, or of all positions, that have a name.
+    fn named_factors(&self, j: Option<usize>) -> Vec<f64> {
+        match j {
+            Some(j) => names::factors_of_position(&self.robot.joints[j]),
+            None => vec![TAU, 1.0 / 57.296, 57.296],
+        }
+    }
+
+    /// Returns true if a transformation is a factor of positions that has a name.
+    pub(crate) fn is_named(&self, undo: &Undo) -> bool {
+        match undo {
+            Undo::Position(j, factor) => self.named_factors(*j).contains(factor),
+            _ => false,
+        }
     }
 }
 

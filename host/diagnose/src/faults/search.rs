@@ -1,7 +1,6 @@
 //! Search for the faults of one recording by models: suspicions, their trial, and the recording without what is found.
 
 use crate::DiagnoseError;
-use crate::faults::candidates::Found;
 use crate::faults::finding::Fault;
 use crate::faults::judge::Judge;
 use crate::faults::suspicion::Suspicion;
@@ -28,7 +27,7 @@ impl Judge<'_> {
                 break;
             };
             rows = one.applied(self.robot, &rows);
-            let without = Judge::of_rows(self.robot, self.runs, rows.clone())?;
+            let without = Judge::of_rows(self.robot, self.runs, self.units, rows.clone())?;
             let (mut more, next) = without.tried(without.suspicions()?)?;
             more.retain(Fault::is_certain);
             rounds.push(more);
@@ -46,20 +45,14 @@ impl Judge<'_> {
         let mut all: Vec<Suspicion> = (0..n)
             .filter_map(|j| self.magnitude(j, described))
             .collect();
-        // Factors that the torques show without a description.
-        let free = self.positions()?;
-        let known = |found: &Found| {
-            let of_free = |own: &Suspicion| own.undo.as_ref().is_some_and(|undo| found.is_of(undo));
-            free.iter().any(of_free)
-        };
-        let mut transformed = self.transformed()?;
-        transformed.retain(|found| !known(found));
-        all.extend(free);
+        let transformed = self.transformed()?;
         let (turned, others): (Vec<_>, Vec<_>) =
             transformed.into_iter().partition(|found| found.is_sense());
         let (zeros, others): (Vec<_>, Vec<_>) =
             others.into_iter().partition(|found| found.is_zero());
         all.extend(others.iter().filter_map(|found| self.said(found)));
+        // Factors that the torques show without a description.
+        all.extend(self.positions()?);
         all.extend((0..n).filter_map(|j| self.shifted(j)));
         all.extend(self.thousandfold(described));
         all.extend(self.single_zero()?);

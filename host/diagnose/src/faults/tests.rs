@@ -4,6 +4,7 @@ mod alike;
 mod coarse;
 mod doubts;
 mod gain;
+mod geared;
 mod mounts;
 mod scales;
 mod transformed;

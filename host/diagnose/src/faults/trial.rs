@@ -15,7 +15,7 @@ use crate::DiagnoseError;
 use crate::faults::finding::{Beside, Explanation, Fault};
 use crate::faults::fit::Measured;
 use crate::faults::judge::Judge;
-use crate::faults::levels::GOOD;
+use crate::faults::levels::{GOOD, ODDS, WORTH};
 use crate::faults::physical::{Belief, INDEPENDENT, Physical, Score};
 use crate::faults::rows::{Form, Rows};
 use crate::faults::suspicion::Suspicion;
@@ -25,12 +25,8 @@ use rig_numerics::statistics;
 
 /// Rows in the test: over all joints, and least of each.
 const ROWS: (usize, usize) = (4000, 500);
-/// Least fall of the log left-out variance, summed over joints, for a fault: one joint's variance halves.
-const WORTH: f64 = core::f64::consts::LN_2;
 /// Standard deviations between stretches that are clear; chance reaches them once in a hundred.
 const CLEAR: f64 = 2.33;
-/// Least log odds of a fault, as its prior odds are one to a thousand.
-const ODDS: f64 = 6.9;
 /// Variance share that counts as none: no model is closer to a real robot.
 const EXACT: f64 = 1e-4;
 /// Heaviest payload as a multiple of the links' mass: a tool may weigh many times a light link.
@@ -98,8 +94,13 @@ fn beats(a: &Score, b: &Score) -> bool {
 
 /// Returns the log odds of the data under `a` against `b`, each with its own noise level.
 fn odds(a: &Score, b: &Score) -> f64 {
-    let joints = a.errors.first().map_or(0, Vec::len) as f64;
-    0.5 * joints * INDEPENDENT * (b.cost / a.cost).ln()
+    independent(a) * (b.cost / a.cost).ln()
+}
+
+/// Returns half the number of independent rows of all joints: the expected misfit under the assumed noise.
+fn independent(score: &Score) -> f64 {
+    let joints = score.errors.first().map_or(0, Vec::len) as f64;
+    0.5 * joints * INDEPENDENT
 }
 
 /// Returns true if `a` predicts clearly better than `b`, even if by little.
@@ -118,9 +119,11 @@ fn best<'a>(scores: impl Iterator<Item = &'a Score>) -> Option<&'a Score> {
 
 /// Returns true if undoing the fault improves the description (`recorded` to `own`) decisively more than `free`
 /// parameters improve it further, and predicts no worse. One fault is likelier than a wrong description of every link.
+/// The noise is that of the free parameters, if they leave more than rows are assumed to have.
 fn explains(own: &Score, recorded: &Score, free: &Score) -> bool {
     let (gained, beyond) = (recorded.cost - own.cost, own.cost - free.cost);
-    gained - beyond > ODDS && gain(own, recorded).value > 0.0
+    let noise = f64::max(1.0, free.cost / independent(free));
+    gained - beyond > ODDS * noise && gain(own, recorded).value > 0.0
 }
 
 /// Result of testing a suspicion.
@@ -186,7 +189,8 @@ impl Judge<'_> {
         let recorded = self.reading(None, edge)?;
         let (mut certain, mut open) = (Vec::new(), Vec::new());
         for (k, (_, undo)) in left.iter().enumerate() {
-            match outcome(undo, &self.reading(Some(undo), edge)?, &recorded) {
+            let without = self.reading(Some(undo), edge)?;
+            match outcome(undo, &without, &recorded) {
                 Outcome::Certain(own) => certain.push((k, own)),
                 Outcome::Open => open.push(k),
                 Outcome::Refuted => {}
@@ -202,6 +206,8 @@ impl Judge<'_> {
             if let Some((other, _)) = equal.next() {
                 fault.beside = Beside::Fault(Box::new(left[*other].0.clone()));
             }
+            // What other evidence shows of this joint is judged again without the fault.
+            found.retain(|other| undo.is_of_robot() || other.joint != fault.joint);
             found.push(fault);
             return Ok((found, Some(undo)));
         }

@@ -17,6 +17,15 @@ pub(crate) enum Columns {
     Joints,
 }
 
+/// Side of the gears on which columns were measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// At the joints: values are those of another joint.
+    Joint,
+    /// At the motors: values of another joint passed the gear ratio of this one.
+    Motor,
+}
+
 /// A way to undo a suspected fault.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Undo {
@@ -24,10 +33,12 @@ pub(crate) enum Undo {
     Torque(Option<usize>, f64),
     /// A joint's position times a factor; all joints for `None`.
     Position(Option<usize>, f64),
+    /// The torques or positions of all joints, each times a factor of its own.
+    Each(Columns, Vec<f64>),
     /// Position and torque of a joint, both reversed.
     Both(usize),
     /// Columns in another order: those of joint j are in the place of joint `order[j]`.
-    Order(Columns, Vec<usize>),
+    Order(Columns, Side, Vec<usize>),
     /// A joint's position from another zero: the angle to add, rad.
     Zero(usize, f64),
     /// A joint's torque earlier by a number of rows.
@@ -55,11 +66,23 @@ impl Undo {
                 }
             }
             Self::Position(joint, factor) => rows = rows.rescaled(joint, factor),
+            Self::Each(which, ref factors) => {
+                for (j, factor) in factors.iter().enumerate() {
+                    match which {
+                        Columns::Torques => scale(&mut rows.tau[j], *factor),
+                        Columns::Positions | Columns::Joints => {
+                            rows = rows.rescaled(Some(j), *factor);
+                        }
+                    }
+                }
+            }
             Self::Both(j) => {
                 rows = rows.rescaled(Some(j), -1.0);
                 scale(&mut rows.tau[j], -1.0);
             }
-            Self::Order(which, ref order) => rows = reordered(robot, &rows, which, order),
+            Self::Order(which, side, ref order) => {
+                rows = reordered(robot, &rows, (which, side), order);
+            }
             Self::Zero(j, angle) => rows.q[j].iter_mut().for_each(|q| *q += angle),
             Self::Earlier(j, by) => {
                 let tau = rows.tau[j].clone();
@@ -115,6 +138,8 @@ impl Undo {
             (Self::Position(i, a), Self::Position(j, b)) => {
                 i == j && (a / b).ln().abs() < ALIKE.ln()
             }
+            // Both sides of the gears are one fault in words.
+            (Self::Order(own, _, a), Self::Order(other, _, b)) => own == other && a == b,
             _ => self == other,
         }
     }
@@ -137,11 +162,13 @@ fn scale(column: &mut [f64], factor: f64) {
     column.iter_mut().for_each(|v| *v *= factor);
 }
 
-/// Motor-side measurements passed the ratio of the other joint.
-fn reordered(robot: &Robot, rows: &Rows, which: Columns, order: &[usize]) -> Rows {
+fn reordered(robot: &Robot, rows: &Rows, (which, side): (Columns, Side), order: &[usize]) -> Rows {
     let mut own = rows.clone();
     for (j, &from) in order.iter().enumerate().filter(|(j, from)| j != *from) {
-        let share = robot.joints[j].gear_ratio() / robot.joints[from].gear_ratio();
+        let share = match side {
+            Side::Joint => 1.0,
+            Side::Motor => robot.joints[j].gear_ratio() / robot.joints[from].gear_ratio(),
+        };
         if which != Columns::Positions {
             own.tau[j].clone_from(&rows.tau[from]);
             scale(&mut own.tau[j], share);

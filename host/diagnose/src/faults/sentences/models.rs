@@ -37,6 +37,11 @@ pub(super) fn of(robot: &Robot, j: usize, found: &Misfit) -> String {
             mend_scaled(factor, reversed, name.as_ref())
         ),
         Misfit::AllScaled { factor, left } => all_scaled(factor, left),
+        Misfit::ThroughGears {
+            torque,
+            twice,
+            left,
+        } => through_gears(robot, torque, twice, left),
         Misfit::Zero { angle, left } => zero(joint, n, angle, left),
         Misfit::Reversed {
             torque,
@@ -158,6 +163,31 @@ fn all_scaled(factor: f64, left: [f64; 2]) -> String {
         format_trimmed(factor, 4),
         leaves(left, "")
     )
+}
+
+fn through_gears(robot: &Robot, torque: bool, twice: bool, left: [f64; 2]) -> String {
+    let ratios: Vec<String> = (robot.joints.iter())
+        .map(|joint| format_trimmed(joint.gear_ratio().abs(), 4))
+        .collect();
+    let ratios = listed(&ratios);
+    let [count, found] = [
+        robot.joints.len().to_string(),
+        leaves(left, " at the joints that show it"),
+    ];
+    match (torque, twice) {
+        (true, false) => format!(
+            "The torques are those of the motors, before their gears ({ratios} to 1): multiplied by the ratios, the description {found}. Give torques at the joints, or name the columns taum1 to taum{count}."
+        ),
+        (true, true) => format!(
+            "The gear ratios ({ratios}) have been applied twice to the torques: divided by them, the description {found}. Give torques at the joints."
+        ),
+        (false, false) => format!(
+            "The positions are those of the motors ({ratios} turns for one of the joint): divided by the ratios, the description {found}. Give positions of the joints, or name the columns qm1 to qm{count}."
+        ),
+        (false, true) => format!(
+            "The positions have been divided by the gear ratios ({ratios}) twice: multiplied by them, the description {found}. Give positions of the joints."
+        ),
+    }
 }
 
 fn zero(joint: &Joint, n: usize, angle: f64, left: [f64; 2]) -> String {
