@@ -97,13 +97,17 @@ fn each_instant(
     Ok(())
 }
 
-/// Fits the autoregressions of the residual under `full`, one per equation.
+/// Fits the autoregressions of the residual under `full`, one per equation. The likelihood of a recording counts with its
+/// weight, and so do its products. The order's criterion gets as many rows as rows of one weight would be needed for the
+/// same scatter, (Σw)²/Σw² (Kish 1992).
 fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, IdentifyError> {
     let (p, equations) = (problem.base.len(), problem.weights.len());
+    let weights = squared_weights(problem);
     let mut past: Vec<VecDeque<f64>> = vec![VecDeque::new(); equations];
     let mut sums = vec![vec![0.0; MOST_ORDER + 1]; equations];
-    let mut counts = vec![0u64; equations];
-    each_instant(problem, &mut |_, _, rows, i, follows| {
+    // Per equation, sum of the weights and of their squares.
+    let mut counts = vec![[0.0; 2]; equations];
+    each_instant(problem, &mut |r, _, rows, i, follows| {
         for (k, equation) in rows.equations.iter().enumerate() {
             if !follows || !equation.keep[i] {
                 past[k].clear();
@@ -112,9 +116,10 @@ fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, I
                 let e = equation.y[i] - dot_in_order(&equation.x[i * p..(i + 1) * p], full);
                 past[k].push_front(e);
                 past[k].truncate(MOST_ORDER + 1);
-                counts[k] += 1;
+                counts[k][0] += weights[r];
+                counts[k][1] += weights[r] * weights[r];
                 for (sum, before) in sums[k].iter_mut().zip(&past[k]) {
-                    *sum += e * before;
+                    *sum += weights[r] * e * before;
                 }
             }
         }
@@ -122,12 +127,19 @@ fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, I
     Ok(sums
         .iter()
         .zip(&counts)
-        .map(|(sum, &count)| {
-            let mut covariance: Vec<f64> = sum.iter().map(|s| s / count.max(1) as f64).collect();
+        .map(|(sum, [count, squares])| {
+            let all = count.max(f64::MIN_POSITIVE);
+            let mut covariance: Vec<f64> = sum.iter().map(|s| s / all).collect();
             covariance[0] *= 1.0 + WHITE_SHARE;
-            Predictors::of(&covariance, count)
+            let rows = count * count / squares.max(f64::MIN_POSITIVE);
+            Predictors::of(&covariance, rows.round() as u64)
         })
         .collect())
+}
+
+/// Returns how often each recording counts, by which sums of squares are weighted.
+fn squared_weights(problem: &Problem) -> Vec<f64> {
+    problem.recording_weights().map(|w| w * w).collect()
 }
 
 /// Inverse lower Cholesky factor of the joints' correlation, for each set of joints present.
@@ -214,7 +226,7 @@ fn whitened(
             .collect();
         for (a, ea) in present.iter().zip(&errors) {
             for (b, eb) in present.iter().zip(&errors) {
-                sums[(*a, *b)] += ea * eb;
+                sums[(*a, *b)] += weights[r] * weights[r] * ea * eb;
             }
         }
         let lower = whiteners.of(&present);
