@@ -4,12 +4,10 @@
 //! Each transformation is undone in turn and the torques of all joints are fitted again. The ones that make the data by
 //! far the likeliest are suspected; the trial ([`crate::faults::trial`]) decides.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 
 use crate::DiagnoseError;
-use crate::faults::described::{Described, friction};
 use crate::faults::finding::Fault;
-use crate::faults::fit::Fit;
 use crate::faults::judge::Judge;
 use crate::faults::levels::{EXACT, GOOD, MUCH_BETTER, POOR, POOR_ALONE, TRIAL, WORTH};
 use crate::faults::misfit::{Misfit, Reversal};
@@ -17,7 +15,6 @@ use crate::faults::names;
 use crate::faults::rows::Rows;
 use crate::faults::suspicion::Suspicion;
 use crate::faults::undo::{Columns, Side, Undo};
-use rig_numerics::statistics::squares_about_mean;
 
 /// Least fall of the log residual variances, summed over joints, to believe a transformation: one joint's falls to a
 /// tenth. A description may be far off, and a transformation may improve it by chance.
@@ -218,8 +215,12 @@ impl Judge<'_> {
             .map(|joint| joint.gear_ratio().abs())
             .collect();
         let inverse: Vec<f64> = ratios.iter().map(|ratio| 1.0 / ratio).collect();
-        let of = |which| [&ratios, &inverse].map(|own| Undo::Each(which, own.clone()));
-        [of(Columns::Torques), of(Columns::Positions)].concat()
+        vec![
+            Undo::Torques(ratios.clone()),
+            Undo::Torques(inverse.clone()),
+            Undo::Positions(ratios),
+            Undo::Positions(inverse),
+        ]
     }
 
     /// Returns the fall of the log residual variances when a transformation is undone.
@@ -261,8 +262,8 @@ impl Judge<'_> {
                 factor: *factor,
                 left,
             }),
-            Undo::Each(which, factors) => {
-                let torque = *which == Columns::Torques;
+            Undo::Torques(factors) | Undo::Positions(factors) => {
+                let torque = matches!(found.undo, Undo::Torques(_));
                 let larger = factors.iter().zip(&self.robot.joints);
                 let larger = larger.map(|(f, joint)| f.ln() * joint.gear_ratio().abs().ln());
                 Fault::of_recording(Misfit::ThroughGears {
@@ -302,57 +303,6 @@ impl Judge<'_> {
             left,
         };
         Fault::of_joint(j, reversed)
-    }
-
-    /// Returns the residual share of each torque's variance: by the description, which has few free numbers, if it
-    /// states every link; else by one set of parameters for all joints.
-    fn left(&self, rows: &Rows, free_drives: bool) -> Result<Vec<f64>, DiagnoseError> {
-        if self.states_from(0) {
-            self.left_of_description(rows, self.robot.gravity, free_drives)
-        } else {
-            self.left_of_parameters(rows)
-        }
-    }
-
-    fn left_of_parameters(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
-        let (n, count) = (rows.tau.len(), rows.len());
-        let matrices = rows.regressors(&self.form)?;
-        // A still torque has no variance to explain.
-        let size: Vec<f64> = (rows.tau.iter())
-            .map(|tau| squares_about_mean(tau).sqrt().max(f64::MIN_POSITIVE))
-            .collect();
-        let width = matrices.first().map_or(0, DMatrix::ncols);
-        let whole = DMatrix::from_fn(n * count, width, |k, c| {
-            matrices[k / count][(k % count, c)] / size[k / count]
-        });
-        let torque: Vec<f64> = (rows.tau.iter().zip(&size))
-            .flat_map(|(tau, size)| tau.iter().map(move |v| v / size))
-            .collect();
-        let Some(fit) = Fit::of(&whole, &torque, &self.order) else {
-            return Ok(vec![1.0; n]);
-        };
-        let own = |j: usize| fit.residual.rows(j * count, count).norm_squared();
-        Ok((0..n).map(own).collect())
-    }
-
-    fn left_of_description(
-        &self,
-        rows: &Rows,
-        gravity: [f64; 3],
-        free_drives: bool,
-    ) -> Result<Vec<f64>, DiagnoseError> {
-        let n = self.robot.joints.len();
-        let Described { all, motors, .. } = self.described_under(rows, gravity)?;
-        let share = |j: usize| {
-            let friction = friction(&rows.qd[j], motors.get(j));
-            let rest: Vec<f64> = (rows.tau[j].iter().zip(&all[j]))
-                .map(|(tau, own)| tau - own)
-                .collect();
-            let total = squares_about_mean(&rows.tau[j]).max(f64::MIN_POSITIVE);
-            let drive = (free_drives && !self.states_drive(j)).then(|| rows.qdd[j].as_slice());
-            squares_left(&friction, drive, &rest) / total
-        };
-        Ok((0..n).map(share).collect())
     }
 }
 
@@ -407,25 +357,6 @@ impl Found {
     }
 }
 
-/// Returns the residual squares of a torque by friction, and by the inertia of a drive with acceleration `drive`.
-fn squares_left(friction: &DMatrix<f64>, drive: Option<&[f64]>, torque: &[f64]) -> f64 {
-    let count = friction.ncols();
-    let fit = |x: &DMatrix<f64>| Fit::of(x, torque, &(0..x.ncols()).collect::<Vec<_>>());
-    let with = drive.and_then(|acceleration| {
-        let mut x = friction.clone().insert_column(count, 0.0);
-        x.column_mut(count).copy_from_slice(acceleration);
-        // No drive has negative inertia.
-        fit(&x).filter(|fit| {
-            fit.parameter(count)
-                .is_some_and(|inertia| inertia.value > 0.0)
-        })
-    });
-    with.or_else(|| fit(friction)).map_or_else(
-        || squares_about_mean(torque),
-        |fit| fit.residual.norm_squared(),
-    )
-}
-
 fn range(values: &[f64]) -> f64 {
     let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     most - values.iter().copied().fold(f64::INFINITY, f64::min)
@@ -435,7 +366,9 @@ fn range(values: &[f64]) -> f64 {
 fn concerned(undo: &Undo, before: &Before, after: &[f64]) -> Vec<usize> {
     match undo {
         Undo::Gravity(_) | Undo::Zero(..) => before.mended(after, POOR),
-        Undo::Position(None, _) | Undo::Each(..) => before.mended(after, 0.0),
+        Undo::Position(None, _) | Undo::Torques(_) | Undo::Positions(_) => {
+            before.mended(after, 0.0)
+        }
         Undo::Order(_, _, order) => (0..order.len()).filter(|j| order[*j] != *j).collect(),
         Undo::Torque(Some(j), _) | Undo::Position(Some(j), _) | Undo::Both(j) => vec![*j],
         _ => Vec::new(),

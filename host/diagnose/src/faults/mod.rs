@@ -28,6 +28,7 @@ mod order;
 mod physical;
 mod place;
 pub(crate) mod refusal;
+mod residual;
 mod rotor;
 mod rows;
 mod search;

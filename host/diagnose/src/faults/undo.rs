@@ -33,8 +33,10 @@ pub(crate) enum Undo {
     Torque(Option<usize>, f64),
     /// A joint's position times a factor; all joints for `None`.
     Position(Option<usize>, f64),
-    /// The torques or positions of all joints, each times a factor of its own.
-    Each(Columns, Vec<f64>),
+    /// The torques of all joints, each times a factor of its own.
+    Torques(Vec<f64>),
+    /// The positions of all joints, each times a factor of its own.
+    Positions(Vec<f64>),
     /// Position and torque of a joint, both reversed.
     Both(usize),
     /// Columns in another order: those of joint j are in the place of joint `order[j]`.
@@ -66,14 +68,14 @@ impl Undo {
                 }
             }
             Self::Position(joint, factor) => rows = rows.rescaled(joint, factor),
-            Self::Each(which, ref factors) => {
+            Self::Torques(ref factors) => {
+                for (tau, factor) in rows.tau.iter_mut().zip(factors) {
+                    scale(tau, *factor);
+                }
+            }
+            Self::Positions(ref factors) => {
                 for (j, factor) in factors.iter().enumerate() {
-                    match which {
-                        Columns::Torques => scale(&mut rows.tau[j], *factor),
-                        Columns::Positions | Columns::Joints => {
-                            rows = rows.rescaled(Some(j), *factor);
-                        }
-                    }
+                    rows = rows.rescaled(Some(j), *factor);
                 }
             }
             Self::Both(j) => {
