@@ -84,12 +84,18 @@ impl Judge<'_> {
         let [low, high] = [near.abs() / step, near.abs() * step].map(f64::ln);
         let close = sense * closely(low, high, &|log: f64| gain(sense * log.exp()))?.exp();
         let most = gain(close)?;
-        for own in named.iter().filter(|own| reached(own)) {
-            // A named factor that is as near as the description is right, or explains nearly as much, is the likelier one.
+        // A named factor that is as near as the description is right, or explains nearly as much, is the likelier one.
+        let mut likelier: Option<(f64, f64)> = None;
+        for own in named.into_iter().filter(|own| reached(own)) {
+            let gained = gain(own)?;
             let near = (close / own).ln().abs() < NAMED;
-            if near || most - gain(*own)? < 2.0 * ODDS / INDEPENDENT {
-                return Ok(Some(Undo::Position(j, *own)));
+            let better = likelier.is_none_or(|(_, best)| gained > best);
+            if better && (near || most - gained < 2.0 * ODDS / INDEPENDENT) {
+                likelier = Some((own, gained));
             }
+        }
+        if let Some((own, _)) = likelier {
+            return Ok(Some(Undo::Position(j, own)));
         }
         Ok((far(&close) && reached(&close)).then_some(Undo::Position(j, close)))
     }

@@ -189,8 +189,7 @@ impl Judge<'_> {
         let recorded = self.reading(None, edge)?;
         let (mut certain, mut open) = (Vec::new(), Vec::new());
         for (k, (_, undo)) in left.iter().enumerate() {
-            let without = self.reading(Some(undo), edge)?;
-            match outcome(undo, &without, &recorded) {
+            match outcome(undo, &self.reading(Some(undo), edge)?, &recorded) {
                 Outcome::Certain(own) => certain.push((k, own)),
                 Outcome::Open => open.push(k),
                 Outcome::Refuted => {}
