@@ -178,6 +178,9 @@ impl Judge<'_> {
                 Undo::Position(Some(j), -1.0),
                 Undo::Both(j),
             ]);
+            if self.states_from(0) {
+                all.extend(self.factor(Some(j), -1.0, before)?);
+            }
         }
         Ok(all)
     }
@@ -186,9 +189,9 @@ impl Judge<'_> {
     /// a poor recording zeros and the direction of gravity.
     fn of_values(&self, before: &Before) -> Result<Vec<Undo>, DiagnoseError> {
         let mut all = self.through_gears();
-        all.extend(self.factor(None, before)?);
+        all.extend(self.factor(None, 1.0, before)?);
         for &j in &before.moving {
-            all.extend(self.factor(Some(j), before)?);
+            all.extend(self.factor(Some(j), 1.0, before)?);
         }
         if before.worst(&before.left) > POOR {
             all.extend(self.gravity_shown(&before.rows)?.map(Undo::Gravity));

@@ -113,9 +113,11 @@ impl Judge<'_> {
             .collect();
         let in_motion = fit.unexplained_moved(tau, reach, &moving)?;
         let time = moving.iter().filter(|moves| **moves).count() as f64 * self.rows.period;
-        // A delay is the same at all speeds.
+        // A delay is the same at all speeds, to the row.
         let best = in_motion.iter().copied().fold(f64::INFINITY, f64::min);
-        let agree = in_motion[at] < LESS * in_motion[reach] && in_motion[at] <= NEAREST * best;
+        let there = in_motion[at.saturating_sub(1)..(at + 2).min(in_motion.len())].iter();
+        let there = there.copied().fold(f64::INFINITY, f64::min);
+        let agree = there < LESS * in_motion[reach] && there <= NEAREST * best;
         let shown = agree && time > SHOWN_BY * shift.abs();
         (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
             let left = [left[reach], least];

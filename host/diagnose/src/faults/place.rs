@@ -51,26 +51,30 @@ impl Judge<'_> {
     }
 
     /// Returns the factor of joint `j`'s position, or of all positions, with which the description explains the
-    /// recording best; `None` for one.
+    /// recording best; `None` for one. `sense` is the factor's sign.
     ///
     /// # Errors
     /// As for [`Self::zero`].
     pub(crate) fn factor(
         &self,
         j: Option<usize>,
+        sense: f64,
         before: &Before,
     ) -> Result<Option<Undo>, DiagnoseError> {
         let gain = |factor: f64| self.gain_without(&Undo::Position(j, factor), before);
         let step = 10f64.powf(1.0 / f64::from(A_DECADE));
-        let named = self.named_factors(j);
+        let named = match sense > 0.0 {
+            true => self.named_factors(j),
+            false => Vec::new(),
+        };
         let reached = |factor: &f64| match j {
             Some(j) => self.reaches(j, *factor),
             None => (0..self.robot.joints.len()).all(|j| self.reaches(j, *factor)),
         };
         // A common factor of all positions without a name would mean another robot.
         let decades = if j.is_some() { A_DECADE } else { 0 };
-        let grid = (-decades..=decades).flat_map(|k| [step.powi(k), -step.powi(k)]);
-        let far = |factor: &f64| factor.ln().abs() > LEAST_FACTOR.ln() || *factor < 0.0;
+        let grid = (-decades..=decades).map(|k| sense * step.powi(k));
+        let far = |factor: &f64| *factor < 0.0 || factor.ln().abs() > LEAST_FACTOR.ln();
         let tried: Vec<f64> = (grid.chain(named.iter().copied()))
             .filter(|f| far(f) && *f != -1.0 && reached(f))
             .collect();
@@ -80,7 +84,6 @@ impl Judge<'_> {
         if j.is_none() {
             return Ok(Some(Undo::Position(None, near)));
         }
-        let sense = near.signum();
         let [low, high] = [near.abs() / step, near.abs() * step].map(f64::ln);
         let close = sense * closely(low, high, &|log: f64| gain(sense * log.exp()))?.exp();
         let most = gain(close)?;

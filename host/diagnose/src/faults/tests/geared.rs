@@ -232,3 +232,20 @@ fn a_rough_description_is_no_fault() {
         assert_eq!(certain(&robot, &runs), [""; 0], "{masses:?}");
     }
 }
+
+/// A delay that lies between two rows of the search is named too.
+#[test]
+fn a_late_torque_is_named_whatever_its_delay() {
+    let (robot, real) = (described(false), real([1.0, 1.0, 0.92]));
+    let runs = recorded(&robot, &real, &sines(&robot, 20.0, 4), 4);
+    for (j, delay) in [(0, 0.15), (1, 0.15), (1, 0.17), (2, 0.31)] {
+        let late = injured(&runs, |run| {
+            let by = (delay * run.rate).round() as usize;
+            run.joints[j].tau.rotate_right(by);
+        });
+        let found = faults(&robot, &late).unwrap();
+        let words = format!("tau{} is", j + 1);
+        let named = |f: &DataFault| f.kind == FaultKind::Clock && f.text.contains(&words);
+        assert!(found.iter().any(named), "{j} {delay}: {found:?}");
+    }
+}
