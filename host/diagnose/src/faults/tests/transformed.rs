@@ -19,7 +19,7 @@ fn certain(robot: &Robot, runs: &[Run]) -> (&'static str, String) {
 }
 
 /// Rotates columns of the first three joints: positions, torques, or both.
-fn rotated(runs: &[Run], positions: bool, torques: bool) -> Vec<Run> {
+pub(crate) fn rotated(runs: &[Run], positions: bool, torques: bool) -> Vec<Run> {
     injured(runs, |run| {
         let sound = run.joints.clone();
         for (to, from) in [(0, 1), (1, 2), (2, 0)] {
