@@ -41,6 +41,8 @@ pub enum Warning {
     },
     /// The residual follows the rate of the torque.
     TorqueLead {
+        /// Joint whose torque alone does; `None` for all.
+        joint: Option<String>,
         /// Time by which the torque was recorded before it acts, s; negative if after.
         lead: f64,
         /// Sample period, s.
@@ -429,24 +431,33 @@ fn what_it_means(estimator: Estimator, trusted: bool) -> &'static str {
 }
 
 /// Describes a torque-rate lead.
-fn lead_text(lead: f64, sample: f64) -> String {
+fn lead_text(joint: Option<&str>, lead: f64, sample: f64) -> String {
     let samples = lead / sample;
     let size = format!("{:.2} ms ({:.1} samples)", 1e3 * lead.abs(), samples.abs());
-    let (what, mend) = if samples < 0.0 {
-        (
-            format!("was recorded some {size} after it acted, as behind a filter"),
-            "If it was, give both by one clock, or that time, negative, as --torque-lead"
-                .to_owned(),
-        )
-    } else {
-        let hold = format!(
+    let what = match samples < 0.0 {
+        true => format!("was recorded some {size} after it acted, as behind a filter"),
+        false => format!("was recorded some {size} before it acts"),
+    };
+    let torque = match joint {
+        Some(joint) => format!("the torque of joint \"{joint}\""),
+        None => "the torque".to_owned(),
+    };
+    let mend = match joint {
+        Some(_) => "If it was, or the position the other way round, give the columns of all joints by one clock".to_owned(),
+        None if samples < 0.0 => {
+            "If it was, give both by one clock, or that time, negative, as --torque-lead".to_owned()
+        }
+        // A command that is held acts half a sample later.
+        None if samples > 1.0 => {
+            "If the position came late, give both by one clock, or that time as --torque-lead".to_owned()
+        }
+        None => format!(
             "If the recorded torque is a command that is held until the next, give half a sample, --torque-lead {}",
             format_significant(0.5 * sample, 2)
-        );
-        (format!("was recorded some {size} before it acts"), hold)
+        ),
     };
     format!(
-        "What is left of the torque goes with its rate of change, as if it {what} (noise of the position that a controller feeds back makes that look longer): inertia and friction are then off by more than their intervals say. {mend}."
+        "What is left of {torque} goes with its rate of change, as if it {what} (noise of the position that a controller feeds back makes that look longer): inertia and friction are then off by more than their intervals say. {mend}."
     )
 }
 
@@ -480,7 +491,11 @@ impl Warning {
             } => format!(
                 "{label} is sampled at {own} Hz, the training data at {training} Hz: its errors are of one row in {decimation} and up to {edge:.3} Hz, those of the training data up to {trained:.3} Hz."
             ),
-            Self::TorqueLead { lead, sample } => lead_text(*lead, *sample),
+            Self::TorqueLead {
+                joint,
+                lead,
+                sample,
+            } => lead_text(joint.as_deref(), *lead, *sample),
             Self::LongLead { samples } => format!(
                 "--torque-lead shifts the torque by {} samples, where a command that is held acts half a sample late: it is given in s.",
                 format_significant(*samples, 3)

@@ -55,9 +55,14 @@ impl Heard<'_> {
                 });
             }
         }
-        warnings.extend(self.lag.map(|lag| Warning::TorqueLead {
-            lead: lag.lead,
-            sample: treatment.dt(),
+        warnings.extend(self.lag.map(|lag| {
+            Warning::TorqueLead {
+                joint: (lag.joint)
+                    .filter(|_| self.robot.joints.len() > 1)
+                    .map(|j| self.robot.joints[j].name.clone()),
+                lead: lag.lead,
+                sample: treatment.dt(),
+            }
         }));
         let samples = treatment.torque_lead / treatment.dt();
         if samples.abs() > MOST_LED {

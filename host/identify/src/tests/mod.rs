@@ -8,6 +8,7 @@ mod emps;
 mod exact;
 mod flawed;
 mod judged;
+mod late;
 mod lwr4;
 mod made;
 mod position;
