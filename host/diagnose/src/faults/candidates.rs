@@ -37,6 +37,8 @@ pub(crate) struct Found {
     named: bool,
     /// Largest residual share of a moving joint without it.
     worst: f64,
+    /// True if it is suspected without another suspicion beside it.
+    pub(crate) alone: bool,
 }
 
 /// Residuals of the recording as it is, for comparison with transformations.
@@ -144,10 +146,14 @@ impl Judge<'_> {
                 twin: false,
                 named,
                 worst: before.worst(&after),
+                alone: false,
             });
         }
-        all.retain(|found| found.convinces(before.enough));
-        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        for found in &mut all {
+            found.alone = found.convinces(before.enough);
+        }
+        all.retain(|found| found.alone || found.named && found.gain > WORTH);
+        all.sort_by(|a, b| b.alone.cmp(&a.alone).then(b.gain.total_cmp(&a.gain)));
         let mut once: Vec<Found> = Vec::new();
         for own in all {
             if once.iter().all(|other| !other.undo.is_like(&own.undo)) {
@@ -328,19 +334,6 @@ impl Found {
             && without < GOOD.max(0.2 * recorded).min(0.5)
             && without < fitted * recorded
             && self.gain > enough
-    }
-
-    /// Returns true if it concerns one joint's sense alone.
-    pub(crate) fn is_sense(&self) -> bool {
-        matches!(
-            self.undo,
-            Undo::Torque(..) | Undo::Position(_, -1.0) | Undo::Both(_)
-        )
-    }
-
-    /// Returns true if it is a joint's zero.
-    pub(crate) fn is_zero(&self) -> bool {
-        matches!(self.undo, Undo::Zero(..))
     }
 
     /// Returns true if both mean the same for torque and position of the same joints.

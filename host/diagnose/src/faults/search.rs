@@ -45,11 +45,16 @@ impl Judge<'_> {
         let mut all: Vec<Suspicion> = (0..n)
             .filter_map(|j| self.magnitude(j, described))
             .collect();
-        let transformed = self.transformed()?;
-        let (turned, others): (Vec<_>, Vec<_>) =
-            transformed.into_iter().partition(|found| found.is_sense());
-        let (zeros, others): (Vec<_>, Vec<_>) =
-            others.into_iter().partition(|found| found.is_zero());
+        let (transformed, rivals): (Vec<_>, Vec<_>) = self
+            .transformed()?
+            .into_iter()
+            .partition(|found| found.alone);
+        let (turned, others): (Vec<_>, Vec<_>) = transformed
+            .into_iter()
+            .partition(|found| found.undo.is_of_sense());
+        let (zeros, others): (Vec<_>, Vec<_>) = others
+            .into_iter()
+            .partition(|found| found.undo.is_of_zero());
         all.extend(others.iter().filter_map(|found| self.said(found)));
         // Factors that the torques show without a description.
         all.extend(self.positions()?);
@@ -68,6 +73,10 @@ impl Judge<'_> {
         // Senses and zeros come last: other explanations of a recording are likelier.
         let last = turned.iter().chain(&zeros);
         all.extend(last.filter_map(|found| self.said(found)));
+        // What explains less is compared with what is suspected, but raises nothing alone.
+        if all.iter().any(|own| own.undo.is_some()) {
+            all.extend(rivals.iter().filter_map(|found| self.said(found)));
+        }
         // A suspicion with two reasons is tried once.
         let mut once: Vec<Suspicion> = Vec::new();
         for own in all {

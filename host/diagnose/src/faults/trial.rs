@@ -198,11 +198,21 @@ impl Judge<'_> {
         let better =
             |a: &(usize, Score), b: &(usize, Score)| gain(&a.1, &b.1).value.total_cmp(&0.0);
         if let Some(best) = certain.iter().max_by(|a, b| better(a, b)) {
-            let mut equal = certain.iter().filter(|one| equals(&one.1, &best.1));
-            // Among equals the first suspicion counts.
-            let first = equal.next().unwrap_or(best);
-            let (mut fault, undo) = left[first.0].clone();
-            if let Some((other, _)) = equal.next() {
+            let mut equal: Vec<_> = (certain.iter())
+                .filter(|one| equals(&one.1, &best.1))
+                .collect();
+            // Among equals the one that predicts best counts; senses and zeros come last, as others are likelier.
+            let late = |one: &(usize, Score)| {
+                let undo = &left[one.0].1;
+                undo.is_of_sense() || undo.is_of_zero()
+            };
+            equal.sort_by(|a, b| match (late(a), late(b)) {
+                (false, false) => better(b, a),
+                (a, b) => a.cmp(&b),
+            });
+            let first = equal.first().map_or(best.0, |one| one.0);
+            let (mut fault, undo) = left[first].clone();
+            if let Some((other, _)) = equal.get(1) {
                 fault.beside = Beside::Fault(Box::new(left[*other].0.clone()));
             }
             // What other evidence shows of this joint is judged again without the fault.

@@ -154,6 +154,19 @@ impl Undo {
         }
     }
 
+    /// Returns true if it concerns the sense of one joint's columns.
+    pub(crate) fn is_of_sense(&self) -> bool {
+        matches!(
+            self,
+            Self::Torque(Some(_), -1.0) | Self::Position(Some(_), -1.0) | Self::Both(_)
+        )
+    }
+
+    /// Returns true if it is a joint's zero.
+    pub(crate) fn is_of_zero(&self) -> bool {
+        matches!(self, Self::Zero(..))
+    }
+
     /// Returns true if it concerns the robot's description, not the rows.
     pub(crate) fn is_of_robot(&self) -> bool {
         matches!(self, Self::Gravity(_) | Self::Rotor(_))
