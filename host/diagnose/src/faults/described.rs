@@ -12,6 +12,9 @@ use rig_identify::chain_of;
 use rig_model::batch::ModelBatch;
 use rig_model::robot::Joint;
 
+/// Share of a torque's variance above which gravity or inertia alone shows a factor: errors of the model leave less.
+const SHOWN: f64 = 0.05;
+
 /// Measured over described gravity and inertia, if identifiable.
 pub(crate) type Scales = (Option<Measured>, Option<Measured>);
 
@@ -63,6 +66,17 @@ pub(crate) fn columns(data: &Rows, j: usize, described: &Described) -> DMatrix<f
 impl Judge<'_> {
     /// Returns measured gravity and inertia over the described ones, if they are described and the motion shows them.
     pub(crate) fn scales(&self, data: &Rows, j: usize, described: Option<&Described>) -> Scales {
+        self.scales_above(data, j, described, SHOWN)
+    }
+
+    /// Returns the same for torques that are more than a share `least` of the joint's torque, in variance.
+    pub(crate) fn scales_above(
+        &self,
+        data: &Rows,
+        j: usize,
+        described: Option<&Described>,
+        least: f64,
+    ) -> Scales {
         let Some(described) = described.filter(|_| self.states_from(j)) else {
             return (None, None);
         };
@@ -75,7 +89,7 @@ impl Judge<'_> {
             let order: Vec<usize> = (0..first + 2).filter(|o| *o != c).collect();
             let without = Fit::of(&x, tau, &order)?.unexplained();
             fit.parameter(c)
-                .filter(|m| m.sigmas().abs() > 5.0 && without - fit.unexplained() > 0.05)
+                .filter(|m| m.sigmas().abs() > 5.0 && without - fit.unexplained() > least)
         };
         // A description that explains little of the torque gives no scale.
         let whole = fit.unexplained() < 0.2;

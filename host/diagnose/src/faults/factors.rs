@@ -66,6 +66,13 @@ impl Judge<'_> {
             .filter(|s| complete || s.abs() < 1.0);
         let large = |s: f64| !(1.0 / CHANGE..CHANGE).contains(&s.abs());
         let apart = |a: f64, b: f64| (a / b).abs().ln().abs() > f64::ln(2.5);
+        // Two torques that agree show a factor, however small they are beside friction.
+        let agreed = match self.scales_above(&self.rows, j, described, 0.0) {
+            (Some(g), Some(i)) if complete && large(g.value) && !apart(g.value, i.value) => {
+                Some(g.value)
+            }
+            _ => None,
+        };
         Ok(match (gravity.map(|m| m.value), inertia) {
             (Some(g), Some(i)) if large(g) && !apart(g, i) => self.torque_times(j, g, Needs::Both),
             (Some(g), None) if large(g) => self.torque_times(j, g, Needs::Gravity),
@@ -76,6 +83,7 @@ impl Judge<'_> {
             (Some(g), _) if (-2.0..-0.5).contains(&g) && self.sign(j, described)?.is_none() => {
                 Some(self.gravity_reversed(j, g)?)
             }
+            (None, None) => agreed.and_then(|g| self.torque_times(j, g, Needs::Both)),
             _ => None,
         })
     }

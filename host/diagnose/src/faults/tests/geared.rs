@@ -296,3 +296,27 @@ fn a_factor_in_a_coupled_wrist_is_compared_with_what_looks_like_it() {
         );
     }
 }
+
+/// Gravity and inertia of a joint that agree show a factor of its torque, however small they are beside friction.
+#[test]
+fn a_factor_of_one_torque_is_told_with_its_name() {
+    let (robot, real) = (described(true), real([1.0, 1.0, 0.92]));
+    let runs = recorded(&robot, &real, &sines(&robot, 20.0, 6), 6);
+    assert_eq!(certain(&robot, &runs), [""; 0]);
+    for (j, factor, words) in [
+        (0, 1.0 / 120.0, "before its gear (120 to 1)"),
+        (1, 1.0 / 100.0, "before its gear (100 to 1)"),
+        (2, 1.0 / 60.0, "before its gear (60 to 1)"),
+        (
+            0,
+            120.0,
+            "as if the gear ratio (120) had been applied twice",
+        ),
+        (2, 60.0, "as if the gear ratio (60) had been applied twice"),
+        (2, 30.0 / TAU / 60.0, "tau3 is 0.0"),
+        (2, 9.55, "as a motor constant per rpm"),
+    ] {
+        let scaled = injured(&runs, |run| times(&mut run.joints[j].tau, factor));
+        told(&robot, &scaled, words);
+    }
+}
