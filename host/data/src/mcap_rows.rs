@@ -1,4 +1,4 @@
-//! MCAP reader: one JSON message per sample on `/joint/state`, or joint states of ROS.
+//! MCAP reader: one JSON message per sample on `/joint/state`, or joint states of ROS, in CDR, as in ROS 1, or as JSON.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -198,10 +198,12 @@ impl McapRows {
                 wanted.join(", ")
             ));
         }
-        if let Some((_, broken)) = self.messages.broken().first() {
+        let broken = self.messages.broken().first().map(|(_, broken)| broken.at);
+        let of_other = |channel: &Channel| matches!(channel.content, Content::Other);
+        let has_other = !self.channels.is_empty() && self.channels.values().all(of_other);
+        if let (Some(at), false) = (broken, has_other) {
             return self.error(format!(
-                "the file breaks off at byte {} before the first sample; record it again",
-                broken.at
+                "the file breaks off at byte {at} before the first sample; record it again"
             ));
         }
         let topics: Vec<String> = self
@@ -214,8 +216,11 @@ impl McapRows {
         } else {
             format!("its topics are {}", topics.join(", "))
         };
+        let cut = broken.map_or_else(String::new, |at| {
+            format!("; it breaks off at byte {at}, which loses what came later")
+        });
         self.error(format!(
-            "there is no message on topic {TOPIC} and none of type {}; {there}, and a recording has one JSON message per sample on {TOPIC}, or joint states of ROS",
+            "there is no message on topic {TOPIC} and no joint state of ROS ({}) that can be read; {there}{cut}. If other topics hold the samples, `rig inspect` lists their columns and the --map options that read them",
             JOINT_STATE[0]
         ))
     }
@@ -401,6 +406,7 @@ fn content(channel: &channel::Channel) -> Content {
     let has_joints = schema.is_some_and(|s| is_joint_state(&s.name));
     match (schema, ros_encoding(encoding)) {
         _ if topic == TOPIC && encoding == "json" => Content::Json,
+        _ if encoding == "json" && has_joints => Content::JointStates(Vec::new(), Encoding::Json),
         (Some(schema), Some(ros)) if has_joints => {
             match joint_state(schema.ros_text(), ros == Encoding::Ros1) {
                 Ok(fields) => Content::JointStates(fields, ros),

@@ -510,6 +510,89 @@ fn definitions_are_read_and_not_presumed() {
     );
 }
 
+/// As bridges to web tools record them; the parts of the time are named as in ROS 2, by Foxglove or as in ROS 1.
+#[test]
+fn joint_states_as_json_are_read_too() {
+    let file = |parts: [&str; 2], rows: u64, last: &str| {
+        let state = |k: u64| {
+            let (sec, nsec) = (ns(k) / 1_000_000_000, ns(k) % 1_000_000_000);
+            format!(
+                r#"{{"header":{{"frame_id":"","stamp":{{"{}":{sec},"{}":{nsec}}}}},"name":["elbow","finger","shoulder"],"position":[{k},9,-{k}.5],"velocity":[],"effort":[0.5,null,-0.25]}}"#,
+                parts[0], parts[1]
+            )
+        };
+        let channels = [
+            schema(1, "sensor_msgs/msg/JointState", "jsonschema", "{}"),
+            channel(1, 1, "/joint_states", "json"),
+        ];
+        let states = (0..rows).flat_map(|k| message(1, ns(k), state(k).as_bytes()));
+        let states: Vec<u8> = states
+            .chain(message(1, ns(rows), last.as_bytes()))
+            .collect();
+        [channels.concat(), states].concat()
+    };
+    let arm = robot(&ARM);
+    let last = r#"{"name":["shoulder","elbow"],"position":[1,2],"effort":[3,4]}"#;
+    for parts in [["sec", "nanosec"], ["sec", "nsec"], ["secs", "nsecs"]] {
+        let last = last.replace(
+            "{\"name\"",
+            &format!(
+                r#"{{"header":{{"stamp":{{"{}":1700000000,"{}":143456789}}}},"name""#,
+                parts[0], parts[1]
+            ),
+        );
+        let (blocks, _) = read_with(&whole(&file(parts, 10, &last)), &arm).unwrap();
+        let [shoulder, elbow] = blocks[0].joints.as_slice() else {
+            panic!()
+        };
+        assert_eq!(
+            blocks[0].t[..10],
+            (0..10).map(|k| k as f64 * 2e6 * 1e-9).collect::<Vec<_>>()
+        );
+        assert_eq!(
+            (shoulder.q[3], elbow.q[3], shoulder.q[10]),
+            (-3.5, 3.0, 1.0)
+        );
+        assert_eq!((shoulder.tau[3], elbow.tau[10]), (-0.25, 4.0));
+        assert_eq!(shoulder.qd, None);
+    }
+    let parts = ["sec", "nanosec"];
+    refused(
+        read_with(&whole(&file(parts, 10, "[1, 2]")), &arm),
+        &["message 11 on /joint_states", "is no joint state in JSON"],
+    );
+    // A file that was not closed is read up to its break.
+    let bytes = start(&file(parts, 400, last));
+    let (blocks, warnings) = read_with(&bytes[..bytes.len() / 2], &arm).unwrap();
+    assert!((150..250).contains(&blocks[0].len()));
+    assert!(
+        warnings.iter().any(|own| own.contains("messages are read")),
+        "{warnings:?}"
+    );
+}
+
+/// Samples on other topics are not the recording, but they are there: the advice is not to record again.
+#[test]
+fn a_broken_file_with_other_topics_is_told_with_what_it_has() {
+    let other = [
+        schema(1, "std_msgs/msg/Float64MultiArray", "jsonschema", "{}"),
+        channel(1, 1, "/telemetry", "json"),
+        (0..50)
+            .flat_map(|k| message(1, ns(k), b"{\"data\":[1,2]}"))
+            .collect(),
+    ];
+    let bytes = start(&other.concat());
+    let error = read_with(&bytes[..bytes.len() - 9], &robot(&ARM)).unwrap_err();
+    for words in [
+        "its topics are /telemetry",
+        "breaks off at byte",
+        "`rig inspect` lists",
+    ] {
+        assert!(error.contains(words), "{error}");
+    }
+    assert!(!error.contains("record it again"), "{error}");
+}
+
 #[test]
 fn joint_states_of_ros_1_are_read_too() {
     let definition = "Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n=====\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";

@@ -1,4 +1,6 @@
-//! Reads one joint state from the bytes of a ROS message.
+//! Reads one joint state from the bytes of a ROS message, or from its JSON.
+
+use serde::Deserialize;
 
 use super::binary_number::BinaryNumber;
 use super::ros_layout::{Count, Field, Kind, Part};
@@ -10,6 +12,36 @@ pub(super) enum Encoding {
     Cdr,
     /// ROS 1: little-endian without gaps.
     Ros1,
+    /// The fields of the message as JSON, as bridges to web tools record them.
+    Json,
+}
+
+/// A joint state as JSON; the parts of the time are named as in ROS 2, by Foxglove or as in ROS 1.
+#[derive(Deserialize)]
+struct JsonState {
+    #[serde(default)]
+    header: JsonHeader,
+    name: Vec<String>,
+    #[serde(default)]
+    position: Vec<Option<f64>>,
+    #[serde(default)]
+    velocity: Vec<Option<f64>>,
+    #[serde(default)]
+    effort: Vec<Option<f64>>,
+}
+
+#[derive(Default, Deserialize)]
+struct JsonHeader {
+    #[serde(default)]
+    stamp: JsonTime,
+}
+
+#[derive(Default, Deserialize)]
+struct JsonTime {
+    #[serde(default, alias = "secs")]
+    sec: i64,
+    #[serde(default, alias = "nsec", alias = "nsecs")]
+    nanosec: u32,
 }
 
 /// Returns the encoding of messages by its name in an MCAP file.
@@ -52,9 +84,33 @@ impl JointSample {
         for list in [&mut self.position, &mut self.velocity, &mut self.effort] {
             list.clear();
         }
+        if encoding == Encoding::Json {
+            return self.read_json(message);
+        }
         let mut cursor = Cursor::new(message, encoding)?;
         self.walk(&mut cursor, fields)
             .ok_or_else(|| "ends in the middle of a field".to_owned())
+    }
+
+    fn read_json(&mut self, message: &[u8]) -> Result<(), String> {
+        let state: JsonState = serde_json::from_slice(message)
+            .map_err(|error| format!("is no joint state in JSON: {error}"))?;
+        let JsonTime { sec, nanosec } = state.header.stamp;
+        (self.seconds, self.nanoseconds) = (sec, i64::from(nanosec));
+        for name in &state.name {
+            self.names.extend_from_slice(name.as_bytes());
+            self.ends.push(self.names.len());
+        }
+        let lists = [
+            (&mut self.position, state.position),
+            (&mut self.velocity, state.velocity),
+            (&mut self.effort, state.effort),
+        ];
+        for (list, values) in lists {
+            // JSON has no NaN; writers put null in its place.
+            list.extend(values.into_iter().map(|value| value.unwrap_or(f64::NAN)));
+        }
+        Ok(())
     }
 
     /// Returns the names in order.
