@@ -156,7 +156,13 @@ impl<'a> Reader<'a> {
             let is_known = names.clone().any(|other| *other == tag);
             // Of a robot's own children other tools read more, and none of them enters the dynamics.
             if !is_known && name != "robot" && ELEMENTS.iter().any(|own| own.name == tag) {
-                return Err(self.error(*child, self.misplaced(node, tag)));
+                let text = self.misplaced(node, tag);
+                if !is_origin_of_nothing(&children, *child) {
+                    return Err(self.error(*child, text));
+                }
+                let place = format!("{}:{}", self.path.display(), self.place(*child));
+                self.remarks.borrow_mut().push(format!("{place}: {text}."));
+                continue;
             }
             let missing = (names.copied()).filter(|other| {
                 known.often.contains(other) || !children.iter().any(|own| own.has_tag_name(*other))
@@ -208,7 +214,7 @@ impl<'a> Reader<'a> {
             .map(|own| format!("<{}>", own.name))
             .collect();
         format!(
-            "<{tag}> stands in {}, where URDF does not have it, so it would not be read; it belongs in {}",
+            "<{tag}> stands in {}, where URDF does not have it, so it is not read; it belongs in {}",
             self.called(node),
             places.join(" or ")
         )
@@ -222,6 +228,14 @@ impl<'a> Reader<'a> {
             None => format!("<{tag}>"),
         }
     }
+}
+
+/// Returns true if an <origin> stands in a link beside no <inertial>, or beside one that has its own: no body can have
+/// been meant. The frame of the SO-101's gripper has such a one.
+fn is_origin_of_nothing(siblings: &[Xml], child: Xml) -> bool {
+    let has_origin = |own: &Xml| own.children().any(|part| part.has_tag_name("origin"));
+    let mut bodies = siblings.iter().filter(|own| own.has_tag_name("inertial"));
+    child.tag_name().name() == "origin" && bodies.all(has_origin)
 }
 
 #[cfg(test)]
@@ -284,6 +298,26 @@ mod tests {
         refused(&beside, LIMIT, "<mass> stands in link `arm`");
         let damped = format!("{LIMIT}<dynamics damping='1'><limit effort='3'/></dynamics>");
         refused(INERTIAL, &damped, "<limit> stands in <dynamics>");
+    }
+
+    /// The gripper's frame of a published arm has an origin beside an <inertial> with its own, and empty links have one.
+    #[test]
+    fn an_origin_that_places_no_body_is_remarked() {
+        let placed = INERTIAL.replace("<mass", "<origin xyz='0 0 0.1'/><mass");
+        for link in [
+            format!("<origin xyz='0 0 0'/>\n{placed}"),
+            "<origin xyz='0 0 0'/>".to_owned(),
+        ] {
+            let text = format!(
+                "<robot name='r'>\n<link name='base'/>\n<link name='arm'>{INERTIAL}</link>\n<link name='tool'>{link}</link>\n<joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>{LIMIT}</joint>\n<joint name='flange' type='fixed'><parent link='arm'/><child link='tool'/></joint>\n</robot>"
+            );
+            let original = Original::read(text, Path::new("r.urdf")).unwrap();
+            let remarks = original.remarks();
+            let told = |own: &&String| {
+                own.contains("r.urdf:4") && own.contains("<origin> stands in link `tool`")
+            };
+            assert_eq!(remarks.iter().filter(told).count(), 1, "{remarks:?}");
+        }
     }
 
     /// The stand of a published arm has two origins.
