@@ -2,10 +2,12 @@
 
 mod causes;
 mod columns;
+mod controllers;
 mod frozen;
 mod made;
 mod sensor;
 mod sentences;
+mod solids;
 mod torque;
 mod warm_up;
 mod zeroed;
