@@ -303,7 +303,7 @@ impl Job {
         let both = [&training, &holdout];
         remarks.extend(checked(robot, &both, wrong, self.even_if_wrong)?);
         self.options.compare = match self.compare {
-            Compared::ByProgram(compare) => compare.list(training.bytes()),
+            Compared::ByProgram(compare) => compare.list(),
             Compared::Listed(ref list) => list.clone(),
         };
         // Three passes over the training data, two over the hold-out: see `identify`.

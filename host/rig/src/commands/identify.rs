@@ -97,7 +97,7 @@ impl From<Fit> for Estimator {
 /// Estimators to compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Compare {
-    /// weighted, iv and consistent, if the recordings are small (32 MiB at most)
+    /// weighted, iv and consistent
     Auto,
     /// All estimators that the recordings and the description allow
     All,
@@ -105,18 +105,13 @@ pub enum Compare {
     None,
 }
 
-/// Largest size of recordings that are compared by default, bytes: up to this size a comparison takes a few seconds.
-const COMPARED_BYTES: u64 = 32 << 20;
-
 impl Compare {
-    /// Returns the estimators to compare on recordings of `bytes` bytes.
-    pub fn list(self, bytes: u64) -> Vec<Estimator> {
+    /// Returns the estimators to compare.
+    pub fn list(self) -> Vec<Estimator> {
         match self {
             Self::All => Estimator::ALL.to_vec(),
-            Self::Auto if bytes <= COMPARED_BYTES => {
-                vec![Estimator::Weighted, Estimator::Iv, Estimator::Consistent]
-            }
-            Self::Auto | Self::None => Vec::new(),
+            Self::Auto => vec![Estimator::Weighted, Estimator::Iv, Estimator::Consistent],
+            Self::None => Vec::new(),
         }
     }
 }
@@ -223,7 +218,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    fn options(&self, robot: &Robot, bytes: u64) -> Options {
+    fn options(&self, robot: &Robot) -> Options {
         Options {
             model: self.model.into(),
             estimator: self
@@ -242,7 +237,7 @@ impl Args {
             seed: self.seed,
             recording_weights: self.weight.clone(),
             prior_uncertainty: self.prior_uncertainty,
-            compare: self.compare.list(bytes),
+            compare: self.compare.list(),
             look_beyond: !self.as_described,
         }
     }
@@ -290,20 +285,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         warnings,
         args.report.is_markdown(),
     )?;
-    if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
-        ui.say(&format!(
-            "No estimators were compared, so none is recommended: the recordings have {:.0} MiB, and a comparison takes long beyond {} MiB. Give --compare all to run it.",
-            training.bytes() as f64 / f64::from(1 << 20),
-            COMPARED_BYTES >> 20
-        ));
-    }
-    for sentence in &said {
-        ui.say(&format!("{URDF}: {sentence}"));
-    }
+    remarks_of_urdf(&said, ui);
     if let Some(note) = followers_note(&description.robot) {
         ui.note(&note);
     }
-    printed::print(ui, &found);
+    printed::print(ui, robot, &found);
     args.report.tell(&args.out.join(REPORT), ui);
     Ok(())
 }
@@ -366,7 +352,7 @@ fn identified(
         robot,
         &recordings(&training.watched(&progress)),
         &recordings(&holdout.watched(&progress)),
-        &args.options(robot, training.bytes()),
+        &args.options(robot),
     )?;
     drop(progress);
     for inputs in [training, holdout] {
@@ -429,4 +415,18 @@ pub fn write_identification(
     write_whole(&out.join(JSON), (json + "\n").as_bytes())?;
     write_report(&out.join(REPORT), &page, markdown)?;
     Ok(said)
+}
+
+/// Says what the identified URDF cannot hold: one remark, or how many there are.
+fn remarks_of_urdf(remarks: &[String], ui: &Ui) {
+    if remarks.len() > 1 && !ui.is_verbose() {
+        ui.say(&format!(
+            "{URDF}: {} remarks on what it cannot hold: the report and --verbose list them",
+            remarks.len()
+        ));
+        return;
+    }
+    for sentence in remarks {
+        ui.say(&format!("{URDF}: {sentence}"));
+    }
 }

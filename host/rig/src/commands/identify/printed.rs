@@ -2,13 +2,14 @@
 
 use super::super::ui::{LISTED, Ui};
 use rig_identify::{Estimator, Identification, JointFigures, NotExcited, StandardSet};
+use rig_model::robot::{JointKind, Robot};
 use rig_output::{format_interval, format_value};
 
 /// Share of used rows from which on the figure over all rows is not printed, because it is nearly the same.
 const ALL_BUT_A_FEW: f64 = 0.985;
 
 /// Prints the result: details, what the data do not show, the parameters, and last the residuals and the estimator to trust.
-pub(super) fn print(ui: &Ui, result: &Identification) {
+pub(super) fn print(ui: &Ui, robot: &Robot, result: &Identification) {
     for warning in &result.warnings {
         ui.warn(&warning.to_string());
     }
@@ -24,8 +25,8 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
         ui.say(&line);
     }
     parameters(ui, result);
-    for joint in &result.joints {
-        ui.answer(&residual(joint));
+    for (joint, described) in result.joints.iter().zip(&robot.joints) {
+        ui.answer(&residual(joint, described.kind));
     }
     if let Some(comparison) = &result.comparison {
         ui.say(&comparison.recommendation);
@@ -58,7 +59,7 @@ fn parameters(ui: &Ui, result: &Identification) {
 }
 
 /// Describes the residual of a joint.
-fn residual(joint: &JointFigures) -> String {
+fn residual(joint: &JointFigures, kind: JointKind) -> String {
     let held = (
         joint.holdout_relative_error,
         joint.holdout_rows_share,
@@ -75,9 +76,10 @@ fn residual(joint: &JointFigures) -> String {
         return format!("{}: no row of its torque was used{holdout}", joint.name);
     }
     format!(
-        "{}: residual {:.4} rms, {}{holdout}",
+        "{}: residual {:.4} {} rms, {}{holdout}",
         joint.name,
         joint.train_residual_rms,
+        kind.units().1.replace('*', "·"),
         left(
             joint.train_relative_error,
             joint.train_rows_share,
