@@ -174,6 +174,23 @@ fn force_of_the_whole_contact_stays_within_ten_per_cent() {
     }
 }
 
+#[test]
+fn hybrid_control_bears_parameters_that_are_wrong_by_thirty_per_cent() {
+    for name in ["one-link.toml", "edda.toml", "irp6.toml"] {
+        let robot = robot(name);
+        let settings = Settings::default();
+        let task = choose(&robot, &options(1e3), &settings);
+        let run = press_wrong(&robot, LawKind::Hybrid, &task, settings, Some((0.3, 20)));
+        let robust = run.measures.robustness.unwrap();
+        println!("{name}: {} {}", robust.median, robust.worst);
+        assert!(
+            robust.worst <= 0.1 && robust.failed == 0,
+            "{name}: {}",
+            robust.worst
+        );
+    }
+}
+
 /// A damper presses with the speed of the approach, before its spring does.
 #[test]
 fn the_approach_is_slow_enough_for_the_surface_s_damping() {
