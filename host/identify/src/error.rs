@@ -75,7 +75,7 @@ pub enum IdentifyError {
     },
     /// The recording is too short for a confidence interval.
     #[error(
-        "{rows} rows whose residuals remember {memory:.0} rows are too few for a confidence interval; record at least {needed} s."
+        "{rows} rows whose residuals are correlated over {memory:.0} rows are too few for a confidence interval; record at least {needed} s."
     )]
     TooShortForIntervals {
         /// Rows.

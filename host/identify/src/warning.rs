@@ -517,7 +517,7 @@ impl Warning {
                 format!("{} had not settled after {passes} passes{still}.", by.words())
             }
             Self::FewStretches { memory, stretches } => format!(
-                "The residuals remember {memory:.2} s, so the recording holds only {stretches:.1} independent stretches; the intervals, formed from eight, may be too narrow. A longer recording would mend that."
+                "The residuals are correlated over {memory:.2} s, so the recording has only {stretches:.1} independent stretches. The intervals take it for eight and may be too narrow; record longer."
             ),
             Self::IllConditioned { condition } => format!(
                 "The condition number of the scaled regressor is {condition:.0}: the motion tells some parameters apart badly; look at their intervals."

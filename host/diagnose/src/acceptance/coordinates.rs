@@ -21,8 +21,8 @@ pub(crate) const DRIVE: &str = "torque of the drive";
 pub(crate) const LOAD: &str = "torque on the gear along the motion";
 /// Derivative of the drive's torque.
 pub(crate) const DRIVE_CHANGE: &str = "change of the drive's torque";
-/// Way since the last reversal, with the sign of the velocity.
-pub(crate) const WAY: &str = "way since the last reversal, by direction";
+/// Travel since the last reversal, with the sign of the velocity.
+pub(crate) const WAY: &str = "travel since the last reversal, by direction";
 /// Temperature.
 pub(crate) const TEMPERATURE: &str = "temperature";
 

@@ -65,7 +65,7 @@ pub fn of_joints(robot: &Robot, moving: &Robot, runs: &[Run]) -> (Option<Vec<Con
             let (position, effort) = joint.kind.units();
             let kd = c.torque_gain * c.velocity_gain;
             format!(
-                "The recorded torque drives each model, and a controller answers what it departs from the recorded motion by: {} ({:.3} {} and {kd:.3} {}).",
+                "The recorded torque drives each model, and a controller holds it to the recorded motion: {} ({:.3} {} and {kd:.3} {}).",
                 sources[0].0,
                 kd * c.position_gain,
                 format_unit(&format!("{effort}/{position}")),
@@ -81,7 +81,7 @@ pub fn of_joints(robot: &Robot, moving: &Robot, runs: &[Run]) -> (Option<Vec<Con
                 })
                 .collect();
             format!(
-                "The recorded torques drive each model, and a controller at each joint answers what it departs from the recorded motion by: {}.",
+                "The recorded torques drive each model, and a controller at each joint holds it to the recorded motion: {}.",
                 told.join("; ")
             )
         }

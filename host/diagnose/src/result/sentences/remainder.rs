@@ -44,7 +44,7 @@ pub(crate) fn text(left: &Unexplained) -> String {
             time: [from, to],
             times,
         } => format!(
-            "{:.0} % of the squares that are left of joint {joint} lie in {count} stretch{} of half a second, the loudest from {from:.1} to {to:.1} s of {label} with {} times the RMS of the others: something touched the joint or held it there, or that piece of the recording is damaged. Look at it, or record the motion again.",
+            "{:.0} % of the residual's variance of joint {joint} is in {count} stretch{} of half a second, the loudest from {from:.1} to {to:.1} s of {label} with {} times the RMS of the others: something touched the joint or held it there, or that piece of the recording is damaged. Look at it, or record the motion again.",
             100.0 * share,
             if *count == 1 { "" } else { "es" },
             format_significant(*times, 2),

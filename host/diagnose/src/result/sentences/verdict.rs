@@ -107,7 +107,7 @@ fn bent(d: &Diagnosis) -> Option<String> {
     let a = d.absorbed.iter().find(|a| a.sigmas >= MOVED)?;
     let [before, after] = apart(a.before, a.after);
     Some(format!(
-        "Without {} the fit had bent its parameters: {} came out as {before} instead of {after} {}.",
+        "Without {} other parameters of the fit were wrong: {} was {before} instead of {after} {}.",
         if d.steps.len() == 1 { "it" } else { "them" },
         a.parameter,
         format_unit(&a.unit)

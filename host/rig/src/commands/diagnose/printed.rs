@@ -120,7 +120,7 @@ fn effect(number: usize, step: &Step, of_joint: bool) -> String {
     let open = if rivals.is_empty() {
         String::new()
     } else {
-        format!("; these data support equally: {}", rivals.join(", "))
+        format!("; equally probable: {}", rivals.join(", "))
     };
     format!(
         "{number}. {}{law} at joint {}, {}{open}",

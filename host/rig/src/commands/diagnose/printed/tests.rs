@@ -40,5 +40,5 @@ fn a_step_is_one_line_that_names_what_the_data_leave_open() {
         "1. cogging at joint link, closes 50.0 % of the remaining gap of that joint"
     );
     step.set.push("torque_ripple".into());
-    assert!(effect(2, &step, true).ends_with("; these data support equally: torque_ripple"));
+    assert!(effect(2, &step, true).ends_with("; equally probable: torque_ripple"));
 }
