@@ -138,42 +138,7 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
     );
     if found.joints.len() > 1 {
         section = section.with(Block::Plot(by_joint(found)));
-        let optional = |v: Option<f64>, f: &dyn Fn(f64) -> String| v.map_or("–".into(), f);
-        section = section.with(Block::Table(Table {
-            caption: "Residuals by joint".into(),
-            columns: vec![
-                Column::text("Joint"),
-                Column::text("Unit"),
-                Column::number("Residual RMS, training", ""),
-                Column::number("Residual RMS, hold-out", ""),
-                Column::number("Residual, training", "%"),
-                Column::number("Residual, hold-out", "%"),
-                Column::number("Rows used, training", "%"),
-                Column::number("Residual on all rows, training", "%"),
-                Column::number("Rows used, hold-out", "%"),
-                Column::number("Residual on all rows, hold-out", "%"),
-            ],
-            rows: found
-                .joints
-                .iter()
-                .zip(&robot.joints)
-                .map(|(j, joint)| {
-                    vec![
-                        j.name.clone(),
-                        parts::units(joint.kind)[2].into(),
-                        format_significant(j.train_residual_rms, 3),
-                        optional(j.holdout_residual_rms, &|v| format_significant(v, 3)),
-                        parts::percent(j.train_relative_error),
-                        optional(j.holdout_relative_error, &parts::percent),
-                        parts::percent(j.train_rows_share),
-                        parts::percent(j.train_relative_error_all_rows),
-                        optional(j.holdout_rows_share, &parts::percent),
-                        optional(j.holdout_relative_error_all_rows, &parts::percent),
-                    ]
-                })
-                .collect(),
-            note: "Residual in %: residual RMS over torque RMS. Rows used: share of the rows in the fit and in these figures, without slow rows and rows at the torque limit.".into(),
-        }));
+        section = section.with(Block::Table(residuals_by_joint(robot, found)));
     }
     for (j, joint) in robot.joints.iter().enumerate() {
         let mut blocks = Vec::new();
@@ -192,6 +157,50 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
     section.with(parts::info(
         "Drag over a plot to zoom; double-click to reset.",
     ))
+}
+
+/// Lists the residuals of all joints; without a hold-out those of the training data alone.
+fn residuals_by_joint(robot: &Robot, found: &Identification) -> Table {
+    let has_holdout = (found.joints.iter()).any(|joint| joint.holdout_rows_share.is_some());
+    let columns = |of: &str| {
+        [
+            Column::number(format!("Residual RMS, {of}"), ""),
+            Column::number(format!("Residual, {of}"), "%"),
+            Column::number(format!("Rows used, {of}"), "%"),
+            Column::number(format!("Residual on all rows, {of}"), "%"),
+        ]
+    };
+    let mut table = Table {
+        caption: "Residuals by joint".into(),
+        columns: vec![Column::text("Joint"), Column::text("Unit")],
+        rows: Vec::new(),
+        note: "Residual in %: residual RMS over torque RMS. Rows used: share of the rows in the fit and in these figures, without slow rows and rows at the torque limit.".into(),
+    };
+    table.columns.extend(columns("training"));
+    if has_holdout {
+        table.columns.extend(columns("hold-out"));
+    }
+    let optional = |v: Option<f64>, f: &dyn Fn(f64) -> String| v.map_or("–".into(), f);
+    for (j, joint) in found.joints.iter().zip(&robot.joints) {
+        let mut row = vec![
+            j.name.clone(),
+            parts::units(joint.kind)[2].into(),
+            format_significant(j.train_residual_rms, 3),
+            parts::percent(j.train_relative_error),
+            parts::percent(j.train_rows_share),
+            parts::percent(j.train_relative_error_all_rows),
+        ];
+        if has_holdout {
+            row.extend([
+                optional(j.holdout_residual_rms, &|v| format_significant(v, 3)),
+                optional(j.holdout_relative_error, &parts::percent),
+                optional(j.holdout_rows_share, &parts::percent),
+                optional(j.holdout_relative_error_all_rows, &parts::percent),
+            ]);
+        }
+        table.rows.push(row);
+    }
+    table
 }
 
 /// Draws the residual of every joint beside those of the others.
