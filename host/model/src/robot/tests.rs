@@ -351,6 +351,17 @@ fn gear_ratios_are_read_in_every_form() {
         two.contains("r.urdf:9:19") && two.contains("60 at 8:"),
         "{two}"
     );
+    for conflict in [
+        ros_2("", &reduction(60.0)) + &ros_2("", &reduction(50.0)).replace("name='t'", "name='u'"),
+        "<transmission name='t'><joint name='one'/><actuator name='m'><mechanicalReduction>40</mechanicalReduction><drake:gear_ratio xmlns:drake='d' value='50'/></actuator></transmission>".to_owned(),
+        "<transmission name='t'><joint name='one'/><actuator name='m'><mechanicalReduction>40</mechanicalReduction></actuator></transmission><transmission name='u'><joint name='one'/><actuator name='n'><mechanicalReduction>-40</mechanicalReduction></actuator></transmission>".to_owned(),
+    ] {
+        let message = read(&conflict).unwrap_err().to_string();
+        assert!(
+            message.contains("give a joint one reduction") && message.contains("r.urdf:"),
+            "{message}"
+        );
+    }
     // A joint that another file describes.
     let other = ros_2("", &reduction(50.0)).replace("'one'", "'gripper'");
     assert_eq!(read(&other).unwrap(), None);

@@ -131,11 +131,11 @@ mod tests {
             assert_eq!(found.len(), 1, "{found:?}");
             found[0].clone()
         };
-        let inverted = of(&|drive| drive.gear_ratio = -1.0 / 6.0);
-        assert!(
-            inverted.contains("give -6") || inverted.contains("give −6"),
-            "{inverted}"
-        );
+        for ratio in [-6.0, 50.0, 101.0, 4.5] {
+            let inverted = of(&|drive| drive.gear_ratio = 1.0 / ratio);
+            let wanted = format!("give {ratio}");
+            assert!(inverted.replace('−', "-").contains(&wanted), "{inverted}");
+        }
         let grams = of(&|drive| drive.rotor_inertia = 200.0);
         assert!(grams.contains("in g·cm², it would be 2·10⁻⁵"), "{grams}");
         let speed = of(&|drive| drive.torque_constant = 190.0);
