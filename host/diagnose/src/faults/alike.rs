@@ -96,7 +96,7 @@ impl Judge<'_> {
             };
             let fault = Fault::of_joint(j, found);
             // A trial of masses alone cannot show four values with one factor.
-            Suspicion { fault, undo: None }
+            Suspicion::of_columns(fault)
         }))
     }
 

@@ -96,7 +96,7 @@ impl Judge<'_> {
         };
         let fault = Fault::of_joint(0, found);
         // The wave's direction shows it; a trial of masses does not.
-        Ok(Some(Suspicion { fault, undo: None }))
+        Ok(Some(Suspicion::of_columns(fault)))
     }
 
     /// Returns gravity of described strength in the direction that the torques show (in frame 0), if that is far from

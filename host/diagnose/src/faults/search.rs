@@ -75,7 +75,11 @@ impl Judge<'_> {
         all.extend(last.filter_map(|found| self.said(found)));
         // What explains less is compared with what is suspected, but raises nothing alone.
         if all.iter().any(|own| own.undo.is_some()) {
-            all.extend(rivals.iter().filter_map(|found| self.said(found)));
+            let said = rivals.iter().filter_map(|found| self.said(found));
+            all.extend(said.map(|own| Suspicion {
+                is_rival: true,
+                ..own
+            }));
         }
         // A suspicion with two reasons is tried once.
         let mut once: Vec<Suspicion> = Vec::new();

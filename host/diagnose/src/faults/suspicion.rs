@@ -9,6 +9,8 @@ pub(crate) struct Suspicion {
     pub(crate) fault: Fault,
     /// How it is undone; `None` if columns alone show it, without a model.
     pub(crate) undo: Option<Undo>,
+    /// True if it is only compared with the others: it is told if it is certain, never as open.
+    pub(crate) is_rival: bool,
 }
 
 impl Suspicion {
@@ -16,6 +18,16 @@ impl Suspicion {
         Self {
             fault,
             undo: Some(undo),
+            is_rival: false,
+        }
+    }
+
+    /// A fault that columns alone show.
+    pub(crate) fn of_columns(fault: Fault) -> Self {
+        Self {
+            fault,
+            undo: None,
+            is_rival: false,
         }
     }
 

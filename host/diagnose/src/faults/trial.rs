@@ -175,10 +175,13 @@ impl Judge<'_> {
         &self,
         suspicions: Vec<Suspicion>,
     ) -> Result<(Vec<Fault>, Option<Undo>), DiagnoseError> {
-        let (mut left, mut found) = (Vec::new(), Vec::new());
+        let (mut left, mut rivals, mut found) = (Vec::new(), Vec::new(), Vec::new());
         for suspicion in suspicions {
             match suspicion.undo {
-                Some(undo) => left.push((suspicion.fault, undo)),
+                Some(undo) => {
+                    left.push((suspicion.fault, undo));
+                    rivals.push(suspicion.is_rival);
+                }
                 None => found.push(suspicion.fault),
             }
         }
@@ -191,8 +194,8 @@ impl Judge<'_> {
         for (k, (_, undo)) in left.iter().enumerate() {
             match outcome(undo, &self.reading(Some(undo), edge)?, &recorded) {
                 Outcome::Certain(own) => certain.push((k, own)),
-                Outcome::Open => open.push(k),
-                Outcome::Refuted => {}
+                Outcome::Open if !rivals[k] => open.push(k),
+                Outcome::Open | Outcome::Refuted => {}
             }
         }
         let better =
